@@ -1,0 +1,182 @@
+//! The blur stage: one plan, two executors.
+//!
+//! A [`Settings`] becomes a [`plan::Plan`] once per picture size; the CPU executor ([`cpu`]) and the GPU executor
+//! ([`gpu`]) run it with the same passes under the same names.
+
+pub mod aperture;
+pub mod cpu;
+pub mod low_rank;
+pub mod plan;
+
+use std::time::Duration;
+
+use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pooled;
+use crate::optics::CocField;
+
+/// What the blur is driven by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// One radius everywhere.
+    Blur,
+    /// The radius is a ramp across the picture.
+    TiltShift,
+    /// The radius follows depth.
+    Dof,
+}
+
+/// How `dof` is composited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Depth bins, each blurred on its own, composited front to back.
+    Layered,
+    /// Every pixel gathers with its own radius (McGraw's plain form; kept for comparison).
+    Gather,
+}
+
+/// How many separable terms approximate the aperture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rank {
+    /// The first `n` terms of the singular value decomposition, 1 to 16.
+    Terms(u32),
+    /// Every term that the aperture's picture has.
+    Full,
+}
+
+/// Everything about the blur that stays the same from frame to frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// What the radius follows.
+    pub effect: Effect,
+    /// Compositing of `dof`; the other effects ignore it.
+    pub method: Method,
+    /// Shape of the aperture.
+    pub aperture: aperture::Aperture,
+    /// Width of the soft rim, as a fraction of the radius, 0 to 1.
+    pub rim: f32,
+    /// Separable terms; `None` takes the quality level's.
+    pub rank: Option<Rank>,
+    /// Highlight recovery `M`: clipped white is taken as `M` times as bright; 0 switches it off.
+    pub highlights: f32,
+    /// Rung of the quality ladder.
+    pub quality: crate::budget::Quality,
+    /// Largest CoC radius behind the focal plane, in pixels.
+    pub far_max_px: f32,
+    /// Largest CoC radius in front of the focal plane, in pixels (0 when nothing can be there).
+    pub near_max_px: f32,
+}
+
+/// One frame to blur. The executor owns the buffers until the frame is [`Finished`].
+pub struct Job {
+    /// Chosen by the caller; comes back in [`Finished`].
+    pub ticket: u64,
+    /// The picture.
+    pub color: Pooled<ColorImage>,
+    /// Its depth; needed when `coc` is [`CocField::Depth`].
+    pub depth: Option<Pooled<DepthMap>>,
+    /// The radius of every pixel.
+    pub coc: CocField,
+    /// Where the result goes; resized to the picture's size.
+    pub out: Pooled<ColorImage>,
+}
+
+/// A blurred frame.
+pub struct Finished {
+    /// The job's ticket.
+    pub ticket: u64,
+    /// The result.
+    pub out: Pooled<ColorImage>,
+    /// Time per pass.
+    pub times: PassTimes,
+}
+
+/// Time per pass of one frame, in the order the passes ran. Fixed size, so that a frame allocates nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct PassTimes {
+    passes: [(&'static str, Duration); Self::CAPACITY],
+    len: usize,
+}
+
+impl PassTimes {
+    const CAPACITY: usize = 16;
+
+    /// No pass yet.
+    pub fn new() -> Self {
+        Self { passes: [("", Duration::ZERO); Self::CAPACITY], len: 0 }
+    }
+
+    /// Adds time to the pass `name`, which is the name of its file under `shaders/`.
+    pub fn add(&mut self, name: &'static str, time: Duration) {
+        if let Some(pass) = self.passes[..self.len].iter_mut().find(|pass| pass.0 == name) {
+            pass.1 += time;
+        } else if self.len < Self::CAPACITY {
+            self.passes[self.len] = (name, time);
+            self.len += 1;
+        }
+    }
+
+    /// Pass names and times.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static str, Duration)> + '_ {
+        self.passes[..self.len].iter().copied()
+    }
+}
+
+impl Default for PassTimes {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Why a frame could not be blurred.
+#[derive(Debug, thiserror::Error)]
+pub enum BokehError {
+    /// The effect needs a depth map and the frame has none.
+    #[error("the effect dof needs depth, and the frame has none")]
+    NoDepth,
+    /// The picture has another size than the executor was made for.
+    #[error("the executor was made for {made_for:?} pixels, the frame has {got:?}")]
+    Size {
+        /// Width and height the executor was made for.
+        made_for: (u32, u32),
+        /// Width and height of the frame.
+        got: (u32, u32),
+    },
+    /// No adapter fits what was asked for.
+    #[error("no GPU adapter {wanted}; found: {found}. Use --backend cpu, or install a Vulkan driver")]
+    NoAdapter {
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        found: String,
+    },
+    /// The GPU refused or was lost.
+    #[error("GPU: {0}")]
+    Gpu(String),
+}
+
+/// An executor of the plan.
+///
+/// Frames come out in the order they went in. `submit` may be called while [`Bokeh::in_flight`] is below
+/// [`Bokeh::capacity`].
+pub trait Bokeh: Send {
+    /// Starts one frame.
+    ///
+    /// # Errors
+    /// The frame does not fit the plan, or the device failed; the frame is then gone.
+    fn submit(&mut self, job: Job) -> Result<(), BokehError>;
+
+    /// The oldest finished frame, if there is one; with `wait`, blocks until there is (or nothing is in flight).
+    ///
+    /// # Errors
+    /// The device failed.
+    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError>;
+
+    /// Frames submitted and not yet collected.
+    fn in_flight(&self) -> usize;
+
+    /// Frames that may be in flight at once.
+    fn capacity(&self) -> usize;
+
+    /// One line for the report, such as `cpu, 2 threads, AVX-512` or the adapter's name.
+    fn describe(&self) -> String;
+}

@@ -1,0 +1,74 @@
+//! Pictures and depth maps: what travels between the stages.
+
+/// Number of a captured frame: counts from 0 in capture order, dropped frames included.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FrameId(pub u64);
+
+/// An 8-bit sRGB picture: `height` x `width` x 3 bytes (R, G, B), row-major, no padding.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ColorImage {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `height * width * 3` bytes.
+    pub rgb: Vec<u8>,
+}
+
+impl ColorImage {
+    /// A black picture.
+    pub fn new(width: u32, height: u32) -> Self {
+        let mut image = Self::default();
+        image.resize(width, height);
+        image
+    }
+
+    /// Gives the picture another size, keeping its memory where that suffices. The content is unspecified after.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        (self.width, self.height) = (width, height);
+        self.rgb.resize(width as usize * height as usize * 3, 0);
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+}
+
+/// Depth along the optical axis: `height` x `width` metres, row-major; 0 or a non-finite value means unknown.
+/// It covers the same view as its colour picture, and may have fewer pixels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DepthMap {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `height * width` metres.
+    pub metres: Vec<f32>,
+}
+
+impl DepthMap {
+    /// A map with every depth unknown.
+    pub fn new(width: u32, height: u32) -> Self {
+        let mut map = Self::default();
+        map.resize(width, height);
+        map
+    }
+
+    /// Gives the map another size, keeping its memory where that suffices. The content is unspecified after.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        (self.width, self.height) = (width, height);
+        self.metres.resize(width as usize * height as usize, 0.0);
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// Whether a stored value is a depth rather than the mark for "unknown".
+    #[inline]
+    pub fn is_known(metres: f32) -> bool {
+        metres > 0.0 && metres.is_finite()
+    }
+}

@@ -1,0 +1,39 @@
+//! **bokehcam**: depth-aware, disc-shaped background blur for cameras and RGB-D recordings.
+//!
+//! A frame goes one straight way, and only empty buffers come back:
+//!
+//! ```text
+//! capture ──> depth ──> bokeh ──> sink
+//!    colour     + depth    blurred   file, stream, window
+//! ```
+//!
+//! The map of the house; imports go down only, and siblings do not know each other:
+//!
+//! | layer | modules |
+//! |---|---|
+//! | 4 | [`cli`]: arguments to one resolved configuration, one function per command |
+//! | 3 | [`pipeline`]: the one place that knows all stages |
+//! | 2 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
+//! | 1 | [`link`], [`budget`], [`stats`], [`recording`], [`scene`] |
+//! | 0 | [`frame`], [`optics`], [`clock`] |
+//!
+//! Words: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
+//! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in
+//! nanoseconds of a monotonic clock; blurring happens in linear light.
+//!
+//! `unsafe` is allowed in one file, `bokeh/cpu/team.rs`, where each block carries its argument.
+
+pub mod bokeh;
+pub mod budget;
+pub mod capture;
+pub mod cli;
+pub mod clock;
+pub mod depth;
+pub mod frame;
+pub mod link;
+pub mod optics;
+pub mod pipeline;
+pub mod recording;
+pub mod scene;
+pub mod sink;
+pub mod stats;

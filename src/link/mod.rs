@@ -1,0 +1,3 @@
+//! How frames change hands between threads, and how buffers come home.
+
+pub mod pool;
