@@ -4,6 +4,7 @@
 //! ([`gpu`]) run it with the same passes under the same names.
 
 pub mod aperture;
+pub mod bank;
 pub mod cpu;
 pub mod low_rank;
 pub mod plan;
