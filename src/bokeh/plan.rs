@@ -24,6 +24,9 @@ pub const MAX_BINS: usize = 13;
 /// A bin pixel with less coverage than this has no colour of its own.
 pub const COVERAGE_FLOOR: f32 = 1e-3;
 
+/// Weight of far cells in a local radius, so that there is one wherever the filter finds anything at all.
+pub const FAR_WEIGHT: f32 = 0.02;
+
 /// What a quality level trades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rung {
@@ -85,6 +88,13 @@ pub struct Bin {
     pub max_radius_px: f32,
     /// Whether it lies in front of the focal plane.
     pub near: bool,
+}
+
+impl Bin {
+    /// Width of the neighbourhood that a local radius is the mean of, in cells.
+    pub fn sigma_cells(&self) -> f32 {
+        (self.max_radius_px / (2.0 * CELL as f32)).max(0.5)
+    }
 }
 
 /// The plan of every frame of one size.

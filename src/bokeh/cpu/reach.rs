@@ -2,15 +2,11 @@
 //! mean, weighted by coverage and nearness), and the range of its colours.
 
 use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges};
-use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
-
-/// Weight of far cells, so that a radius exists wherever the filter finds anything at all.
-const FAR_WEIGHT: f32 = 0.02;
+use crate::bokeh::plan::{Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};
 
 /// Weight of a cell `distance` cells away, along one axis.
 pub fn nearness(distance: usize, bin: &Bin) -> f32 {
-    let sigma = (bin.max_radius_px / (2.0 * CELL as f32)).max(0.5);
-    let d = distance as f32 / sigma;
+    let d = distance as f32 / bin.sigma_cells();
     (-0.5 * d * d).exp() + FAR_WEIGHT
 }
 

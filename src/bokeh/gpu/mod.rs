@@ -1,35 +1,205 @@
-//! The GPU executor.
+//! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the CPU's passes.
 
-use super::plan::Plan;
+mod buffers;
+mod device;
+mod passes;
+mod readback;
+pub mod shaders;
+
+use std::time::Instant;
+
+use buffers::Buffers;
+use device::Device;
+use passes::Passes;
+use readback::{CAPACITY, MAX_QUERIES, Ring};
+
+use super::bank::STEPS_PER_PX;
+use super::plan::{Compositing, Plan};
 use super::{Bokeh, BokehError, Finished, Job};
+use crate::optics::CocField;
 
 /// Runs a plan with wgpu compute passes.
-pub struct GpuBokeh;
+pub struct GpuBokeh {
+    plan: Plan,
+    device: Device,
+    buffers: Buffers,
+    depth: wgpu::Buffer,
+    passes: Passes,
+    ring: Ring,
+    queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
+}
 
 impl GpuBokeh {
-    /// An executor of `plan`.
+    /// An executor of `plan` on the adapter whose name contains `adapter`, else on the best one; with
+    /// `hardware_only`, software adapters do not count (unless named).
     ///
     /// # Errors
-    /// No adapter fits.
-    pub fn new(_plan: &Plan, _hardware_only: bool, adapter: Option<&str>) -> Result<Self, BokehError> {
-        Err(BokehError::NoAdapter { wanted: adapter.unwrap_or("at all").to_owned(), found: "none".to_owned() })
+    /// No adapter fits, or its device failed.
+    pub fn new(plan: &Plan, hardware_only: bool, adapter: Option<&str>) -> Result<Self, BokehError> {
+        let device = Device::open(hardware_only, adapter)?;
+        let most = device.device.limits().max_storage_buffer_binding_size;
+        let largest: u64 = plan.bins.iter().map(|bin| (bin.width * bin.height) as u64 * 16).sum();
+        if largest.max(16) > most {
+            return Err(BokehError::Gpu(format!(
+                "{}: pictures of {} x {} need buffers of {largest} bytes and it allows {most}; use --backend cpu",
+                device.name, plan.width, plan.height
+            )));
+        }
+        let buffers = Buffers::new(&device, plan);
+        let depth = Buffers::depth(&device, plan.width * plan.height);
+        let passes = Passes::new(&device, plan, &buffers, &depth);
+        let ring = Ring::new(&device, buffers::picture_bytes(plan));
+        let queries = device.timestamps.then(|| {
+            let set = device.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("pass times"),
+                ty: wgpu::QueryType::Timestamp,
+                count: MAX_QUERIES,
+            });
+            let resolved = device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("stamps"),
+                size: u64::from(MAX_QUERIES) * 8,
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            });
+            (set, resolved)
+        });
+        device.check()?;
+        Ok(Self { plan: plan.clone(), device, buffers, depth, passes, ring, queries })
+    }
+
+    /// Bit `k`: something in the frame may belong to bin `k`.
+    fn present(&self, job: &Job) -> u32 {
+        let plan = &self.plan;
+        let all = (1u32 << plan.bins.len()) - 1;
+        let (CocField::Depth(lens), Some(map), Compositing::Layers) = (&job.coc, &job.depth, plan.compositing) else {
+            return all;
+        };
+        // Which of many small ranges of CoC occur, then which bins those ranges meet.
+        const RANGES: usize = 512;
+        let mut occurs = [false; RANGES];
+        let range_px = 2.0 * lens.max_coc_px.max(1e-3) / (RANGES - 1) as f32;
+        let first_px = -lens.max_coc_px;
+        for &metres in &map.metres {
+            occurs[(((lens.coc_px(metres) - first_px) / range_px) as usize).min(RANGES - 1)] = true;
+        }
+        let meets = |k: usize, range: usize| {
+            let (low_px, high_px) =
+                (first_px + (range as f32 - 1.0) * range_px, first_px + (range as f32 + 1.0) * range_px);
+            let step = |border: Option<(f32, f32)>, coc_px: f32, without: f32| {
+                border.map_or(without, |(at, slope)| (coc_px - at) * slope + 0.5)
+            };
+            step(k.checked_sub(1).and_then(|k| plan.border(k)), high_px, 1.0) > 0.0
+                && step(plan.border(k), low_px, 0.0) < 1.0
+        };
+        let mask = (0..plan.bins.len())
+            .filter(|&k| (0..RANGES).any(|range| occurs[range] && meets(k, range)))
+            .fold(0, |mask, k| mask | 1 << k);
+        let near = plan.bins.iter().enumerate().filter(|(_, bin)| bin.near).fold(0, |near, (k, _)| near | 1 << k);
+        // What is filled in behind a near object may have any CoC between those around it.
+        if plan.fill && mask & near != 0 { mask | (all & !near) } else { mask }
+    }
+
+    fn frame(&self, job: &Job, present: u32) -> shaders::Frame {
+        let plan = &self.plan;
+        let near = plan.bins.iter().filter(|bin| bin.near).count();
+        let rest_front = near.checked_sub(1).and_then(|k| plan.border(k)).unwrap_or((-1e30, 1.0));
+        let (coc_kind, coc, ramp) = match job.coc {
+            CocField::Uniform { radius_px } => (0, [radius_px, 0.0, 0.0, 0.0], [0.0; 2]),
+            CocField::Ramp(r) => (1, [r.normal.x, r.normal.y, r.offset_px, r.half_band_px], [r.slope, r.max_px]),
+            CocField::Depth(d) => (2, [d.coc_at_infinity_px, d.focus_m, d.max_coc_px, 0.0], [0.0; 2]),
+        };
+        shaders::Frame {
+            size: [plan.width as u32, plan.height as u32],
+            depth_size: job.depth.as_ref().map_or([1, 1], |map| [map.width, map.height]),
+            coc_kind,
+            compositing: match plan.compositing {
+                Compositing::Layers => 0,
+                Compositing::Select => 1,
+                Compositing::Gather => 2,
+            },
+            bins: plan.bins.len() as u32,
+            near_bins: near as u32,
+            present,
+            reach: plan.bank.reach as u32,
+            nodes: plan.bank.nodes as u32,
+            groups: plan.bank.terms.div_ceil(4) as u32,
+            coc,
+            ramp,
+            expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
+            steps_per_px: STEPS_PER_PX,
+            rest_front: [rest_front.0, rest_front.1],
+            nearest_px: rest_front.0,
+            unused: 0.0,
+        }
+    }
+
+    /// Copies bytes to a buffer whatever their number; the device takes whole words only.
+    fn upload(&self, buffer: &wgpu::Buffer, bytes: &[u8]) {
+        let (words, rest) = bytes.split_at(bytes.len() & !3);
+        self.device.queue.write_buffer(buffer, 0, words);
+        if !rest.is_empty() {
+            let mut word = [0; 4];
+            word[..rest.len()].copy_from_slice(rest);
+            self.device.queue.write_buffer(buffer, words.len() as u64, &word);
+        }
     }
 }
 
 impl Bokeh for GpuBokeh {
-    fn submit(&mut self, _job: Job) -> Result<(), BokehError> {
+    fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
+        let made_for = (self.plan.width as u32, self.plan.height as u32);
+        if job.color.size() != made_for {
+            return Err(BokehError::Size { made_for, got: job.color.size() });
+        }
+        if matches!(job.coc, CocField::Depth(_)) && job.depth.is_none() {
+            return Err(BokehError::NoDepth);
+        }
+        self.device.check()?;
+        let Some(mut slot) = self.ring.take() else {
+            return Err(BokehError::Gpu(format!("more than {CAPACITY} frames submitted and not collected")));
+        };
+        let started = Instant::now();
+        job.out.resize(made_for.0, made_for.1);
+        if let Some(map) = &job.depth {
+            let bytes: &[u8] = bytemuck::cast_slice(&map.metres);
+            if bytes.len() as u64 > self.depth.size() {
+                self.depth = Buffers::depth(&self.device, map.metres.len());
+                self.passes.set_depth(&self.device, &self.buffers, &self.depth);
+            }
+            self.upload(&self.depth, bytes);
+        }
+        self.upload(&self.buffers.color, &job.color.rgb);
+        let present = self.present(&job);
+        let frame = self.frame(&job, present);
+        self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
+
+        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let set = self.queries.as_ref().map(|(set, _)| set);
+        self.passes.encode(&mut encoder, present, set, &mut slot.passes);
+        encoder.copy_buffer_to_buffer(&self.buffers.result, 0, &slot.picture, 0, slot.picture.size());
+        if let (Some((set, resolved)), Some(back)) = (&self.queries, &slot.stamps) {
+            let count = 2 * slot.passes.len() as u32;
+            encoder.resolve_query_set(set, 0..count, resolved, 0);
+            encoder.copy_buffer_to_buffer(resolved, 0, back, 0, u64::from(count) * 8);
+        }
+        let submission = self.device.queue.submit([encoder.finish()]);
+        self.ring.push(slot, job, submission, started);
         Ok(())
     }
-    fn collect(&mut self, _wait: bool) -> Result<Option<Finished>, BokehError> {
-        Ok(None)
+
+    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+        self.ring.pop(&self.device, wait)
     }
+
     fn in_flight(&self) -> usize {
-        0
+        self.ring.in_flight()
     }
+
     fn capacity(&self) -> usize {
-        1
+        CAPACITY
     }
+
     fn describe(&self) -> String {
-        String::new()
+        self.device.name.clone()
     }
 }

@@ -1,0 +1,95 @@
+// Pass composite: the blurred bins, front to back as disjoint coverage, become one picture of packed 8-bit sRGB.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> bins: array<Bin>;
+@group(0) @binding(2) var<storage, read> blurred: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read_write> result: array<u32>;
+
+// A bin at the scale of the picture.
+fn sample_bin(index: u32, pixel: vec2<u32>) -> vec4<f32> {
+    let size = bins[index].size;
+    let along = (vec2<f32>(pixel) + 0.5) / f32(bins[index].scale) - 0.5;
+    let at = clamp(along, vec2(0.0), vec2<f32>(size - 1u));
+    let first = vec2<u32>(at);
+    let second = min(first + 1u, size - 1u);
+    let share = at - vec2<f32>(first);
+    let top = bins[index].offset + first.y * size.x;
+    let bottom = bins[index].offset + second.y * size.x;
+    return mix(mix(blurred[top + first.x], blurred[top + second.x], share.x),
+               mix(blurred[bottom + first.x], blurred[bottom + second.x], share.x), share.y);
+}
+
+fn layers(pixel: vec2<u32>) -> vec3<f32> {
+    var front = vec4(vec3(0.0), 1.0);
+    var back = vec4(vec3(0.0), 1.0);
+    for (var k = 0u; k < frame.bins; k++) {
+        if (frame.present & (1u << k)) == 0u {
+            continue;
+        }
+        let layer = sample_bin(k, pixel);
+        let near = k < frame.near_bins;
+        let stack = select(back, front, near);
+        let taken = min(layer.a, stack.a);
+        let next = vec4(stack.rgb + layer.rgb * (taken / max(layer.a, 1.0e-6)), stack.a - taken);
+        front = select(front, next, near);
+        back = select(next, back, near);
+    }
+    let filled = 1.0 - back.a;
+    if filled > 1.0e-4 {
+        return front.rgb + back.rgb * (front.a / filled);
+    }
+    // Where nothing lies behind, what lies in front is all there is.
+    return front.rgb / max(1.0 - front.a, 1.0e-4);
+}
+
+fn chosen(pixel: vec2<u32>) -> vec3<f32> {
+    let coc_px = scene[pixel.y * frame.size.x + pixel.x].w;
+    var color = vec3(0.0);
+    for (var k = 0u; k < frame.bins; k++) {
+        let share = share_at(bins[k].front, bins[k].behind, coc_px);
+        if (frame.present & (1u << k)) != 0u && share > 0.0 {
+            let layer = sample_bin(k, pixel);
+            color += layer.rgb * (share / max(layer.a, 1.0e-6));
+        }
+    }
+    return color;
+}
+
+fn code_of(light: f32) -> u32 {
+    let compressed = select(light, light * frame.expansion / (frame.expansion + light), frame.expansion > 0.0);
+    let x = clamp(compressed, 0.0, 1.0);
+    let code = select(1.055 * pow(x, 1.0 / 2.4) - 0.055, x * 12.92, x <= 0.0031308);
+    return u32(code * 255.0 + 0.5);
+}
+
+fn color_of(index: u32) -> vec3<u32> {
+    let pixel = vec2(index % frame.size.x, index / frame.size.x);
+    var color: vec3<f32>;
+    if frame.compositing == 0u {
+        color = layers(pixel);
+    } else if frame.compositing == 1u {
+        color = chosen(pixel);
+    } else {
+        color = blurred[index].rgb;
+    }
+    return vec3(code_of(color.r), code_of(color.g), code_of(color.b));
+}
+
+// Four pixels, three words.
+@compute @workgroup_size(64)
+fn composite(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let quad = id.y * groups.x * 64u + id.x;
+    let pixels = frame.size.x * frame.size.y;
+    if 4u * quad >= pixels {
+        return;
+    }
+    let last = pixels - 1u;
+    let a = color_of(4u * quad);
+    let b = color_of(min(4u * quad + 1u, last));
+    let c = color_of(min(4u * quad + 2u, last));
+    let d = color_of(min(4u * quad + 3u, last));
+    result[3u * quad] = a.r | (a.g << 8u) | (a.b << 16u) | (b.r << 24u);
+    result[3u * quad + 1u] = b.g | (b.b << 8u) | (c.r << 16u) | (c.g << 24u);
+    result[3u * quad + 2u] = c.b | (d.r << 8u) | (d.g << 16u) | (d.b << 24u);
+}

@@ -1,0 +1,32 @@
+// Pass gather: the exact two-dimensional gather, every pixel with the full kernel of its own radius. For comparison.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> kernel_starts: array<u32>;
+@group(0) @binding(2) var<storage, read> kernels: array<f32>;
+@group(0) @binding(3) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read> node_reach: array<u32>;
+@group(0) @binding(5) var<storage, read_write> blurred: array<vec4<f32>>;
+
+@compute @workgroup_size(16, 16)
+fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
+    if any(id.xy >= frame.size) {
+        return;
+    }
+    let pixel = id.y * frame.size.x + id.x;
+    let coc_px = scene[pixel].w;
+    let node = node_at(abs(coc_px), frame.steps_per_px, frame.nodes);
+    let reach = i32(node_reach[node]);
+    // In front of the focal plane the aperture is turned.
+    let sign = select(1, -1, coc_px < 0.0);
+    var tap = kernel_starts[node];
+    var sum = vec3(0.0);
+    for (var j = -reach; j <= reach; j++) {
+        let y = u32(clamp(i32(id.y) + sign * j, 0, i32(frame.size.y) - 1));
+        for (var i = -reach; i <= reach; i++) {
+            let x = u32(clamp(i32(id.x) + sign * i, 0, i32(frame.size.x) - 1));
+            sum += kernels[tap] * scene[y * frame.size.x + x].rgb;
+            tap++;
+        }
+    }
+    blurred[pixel] = vec4(sum, 1.0);
+}

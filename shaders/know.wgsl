@@ -1,0 +1,32 @@
+// Pass know: the finest level of the pyramid: colour and CoC where neither the pixel nor a neighbour is hidden.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read> hidden: array<f32>;
+@group(0) @binding(3) var<storage, read_write> pyramid: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read_write> known: array<f32>;
+
+@compute @workgroup_size(16, 16)
+fn know(@builtin(global_invocation_id) id: vec3<u32>) {
+    let size = (frame.size + 1u) / 2u;
+    if any(id.xy >= size) {
+        return;
+    }
+    let first = id.xy - min(id.xy, vec2(1u));
+    let last = min(id.xy + 1u, size - 1u);
+    var most = 0.0;
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            most = max(most, hidden[y * size.x + x]);
+        }
+    }
+    var sum = vec4(0.0);
+    for (var sub = 0u; sub < 4u; sub++) {
+        let at = min(2u * id.xy + vec2(sub % 2u, sub / 2u), frame.size - 1u);
+        sum += 0.25 * scene[at.y * frame.size.x + at.x];
+    }
+    let index = id.y * size.x + id.x;
+    let knows = select(0.0, 1.0, most <= 0.0);
+    pyramid[index] = sum * knows;
+    known[index] = knows;
+}

@@ -1,0 +1,41 @@
+// Pass unpack: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC.
+// Reads packed RGB bytes and metres; writes linear r, g, b and the CoC in pixels.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> color: array<u32>;
+@group(0) @binding(2) var<storage, read> depth: array<f32>;
+@group(0) @binding(3) var<storage, read_write> scene: array<vec4<f32>>;
+
+fn light_of(index: u32) -> f32 {
+    let code = f32((color[index / 4u] >> (8u * (index % 4u))) & 255u) / 255.0;
+    let light = select(pow((code + 0.055) / 1.055, 2.4), code / 12.92, code <= 0.04045);
+    return select(light, light * frame.expansion / (frame.expansion - light), frame.expansion > 0.0);
+}
+
+fn coc_of(x: u32, y: u32) -> f32 {
+    if frame.coc_kind == 0u {
+        return frame.coc.x;
+    }
+    if frame.coc_kind == 1u {
+        let distance_px = abs(frame.coc.x * f32(x) + frame.coc.y * f32(y) - frame.coc.z) - frame.coc.w;
+        return min(max(distance_px, 0.0) * frame.ramp.x, frame.ramp.y);
+    }
+    let column = min((2u * x + 1u) * frame.depth_size.x / (2u * frame.size.x), frame.depth_size.x - 1u);
+    let row = min((2u * y + 1u) * frame.depth_size.y / (2u * frame.size.y), frame.depth_size.y - 1u);
+    let metres = depth[row * frame.depth_size.x + column];
+    // Unknown depth counts as infinitely far. The largest finite number stands in for infinity.
+    var inverse_m = 0.0;
+    if metres > 0.0 && metres < 3.0e38 {
+        inverse_m = 1.0 / metres;
+    }
+    return clamp(frame.coc.x * (1.0 - frame.coc.y * inverse_m), -frame.coc.z, frame.coc.z);
+}
+
+@compute @workgroup_size(16, 16)
+fn unpack(@builtin(global_invocation_id) id: vec3<u32>) {
+    if any(id.xy >= frame.size) {
+        return;
+    }
+    let pixel = id.y * frame.size.x + id.x;
+    scene[pixel] = vec4(light_of(3u * pixel), light_of(3u * pixel + 1u), light_of(3u * pixel + 2u), coc_of(id.x, id.y));
+}

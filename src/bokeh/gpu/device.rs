@@ -1,0 +1,108 @@
+//! Which adapter, and the device on it.
+
+use std::sync::{Arc, Mutex};
+
+use crate::bokeh::BokehError;
+
+/// A device and its queue.
+pub struct Device {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// Name, kind and driver of the adapter.
+    pub name: String,
+    /// Whether passes can be timed.
+    pub timestamps: bool,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl Device {
+    /// Opens the best adapter: a discrete GPU before an integrated one before software, or the one whose name
+    /// contains `wanted` (case aside). With `hardware_only`, software does not count.
+    ///
+    /// # Errors
+    /// Nothing fits, or the device could not be had.
+    pub fn open(hardware_only: bool, wanted: Option<&str>) -> Result<Self, BokehError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::VULKAN;
+        let instance = wgpu::Instance::new(descriptor);
+        let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
+        let infos: Vec<_> = adapters.iter().map(wgpu::Adapter::get_info).collect();
+        let fits = |info: &wgpu::AdapterInfo| match wanted {
+            Some(wanted) => info.name.to_lowercase().contains(&wanted.to_lowercase()),
+            None => !hardware_only || info.device_type != wgpu::DeviceType::Cpu,
+        };
+        let best = (0..adapters.len()).filter(|&k| fits(&infos[k])).min_by_key(|&k| preference(&infos[k]));
+        let Some(best) = best else {
+            let names: Vec<_> = infos.iter().map(describe).collect();
+            return Err(BokehError::NoAdapter {
+                wanted: match wanted {
+                    Some(name) => format!("named '{name}'"),
+                    None if hardware_only => "in hardware".to_owned(),
+                    None => "at all".to_owned(),
+                },
+                found: if names.is_empty() { "none".to_owned() } else { names.join("; ") },
+            });
+        };
+        let (adapter, name) = (&adapters[best], describe(&infos[best]));
+        let timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("bokehcam"),
+            required_features: if timestamps { wgpu::Features::TIMESTAMP_QUERY } else { wgpu::Features::empty() },
+            // Large pictures need more than the portable 128 MiB a buffer.
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .map_err(|error| BokehError::Gpu(format!("{name}: {error}")))?;
+        let fault = Arc::new(Mutex::new(None));
+        let report = |fault: &Arc<Mutex<Option<String>>>| {
+            let fault = Arc::clone(fault);
+            move |message: String| {
+                if let Ok(mut fault) = fault.lock() {
+                    fault.get_or_insert(message);
+                }
+            }
+        };
+        let (on_error, on_loss) = (report(&fault), report(&fault));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| on_error(error.to_string())));
+        device.set_device_lost_callback(move |reason, message| {
+            // Dropping the device is the ordinary end.
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                on_loss(format!("device lost: {message}"));
+            }
+        });
+        Ok(Self { device, queue, name, timestamps, fault })
+    }
+
+    /// The first thing that went wrong on the device, if anything did.
+    ///
+    /// # Errors
+    /// That thing.
+    pub fn check(&self) -> Result<(), BokehError> {
+        match self.fault.lock().ok().and_then(|fault| fault.clone()) {
+            Some(message) => Err(BokehError::Gpu(format!("{}: {message}", self.name))),
+            None => Ok(()),
+        }
+    }
+}
+
+fn preference(info: &wgpu::AdapterInfo) -> u32 {
+    match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu | wgpu::DeviceType::Other => 2,
+        wgpu::DeviceType::Cpu => 3,
+    }
+}
+
+fn describe(info: &wgpu::AdapterInfo) -> String {
+    let kind = match info.device_type {
+        wgpu::DeviceType::Cpu => "software",
+        wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+        wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+        wgpu::DeviceType::VirtualGpu => "virtual GPU",
+        wgpu::DeviceType::Other => "other",
+    };
+    format!("{} ({kind}, {} {})", info.name, info.driver, info.driver_info)
+}

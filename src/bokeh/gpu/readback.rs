@@ -1,0 +1,136 @@
+//! The way back from the device: a ring of buffers, copied to after a frame and mapped later, so that submitting never
+//! waits.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::{Duration, Instant};
+
+use super::device::Device;
+use crate::bokeh::{BokehError, Finished, Job, PassTimes};
+
+/// Frames that may be in flight: one on the device, one waiting, one on its way back.
+pub const CAPACITY: usize = 3;
+/// Timestamps a frame can have.
+pub const MAX_QUERIES: u32 = 512;
+
+const PENDING: u8 = 0;
+const READY: u8 = 1;
+const FAILED: u8 = 2;
+
+/// Buffers of one frame in flight.
+pub struct Slot {
+    /// The packed picture.
+    pub picture: wgpu::Buffer,
+    /// Timestamps: two per pass.
+    pub stamps: Option<wgpu::Buffer>,
+    /// Name of each timed pass, in order.
+    pub passes: Vec<&'static str>,
+}
+
+struct Pending {
+    slot: Slot,
+    job: Job,
+    submission: wgpu::SubmissionIndex,
+    started: Instant,
+    state: Arc<AtomicU8>,
+}
+
+/// The ring.
+pub struct Ring {
+    free: Vec<Slot>,
+    pending: VecDeque<Pending>,
+}
+
+impl Ring {
+    /// A ring for pictures of `bytes` (a multiple of 4).
+    pub fn new(device: &Device, bytes: u64) -> Self {
+        let buffer = |label, size| {
+            device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let slot = || Slot {
+            picture: buffer("picture back", bytes),
+            stamps: device.timestamps.then(|| buffer("stamps back", u64::from(MAX_QUERIES) * 8)),
+            passes: Vec::with_capacity(MAX_QUERIES as usize / 2),
+        };
+        Self { free: std::iter::repeat_with(slot).take(CAPACITY).collect(), pending: VecDeque::with_capacity(CAPACITY) }
+    }
+
+    /// A slot to copy a frame to.
+    pub fn take(&mut self) -> Option<Slot> {
+        self.free.pop()
+    }
+
+    /// Frames in flight.
+    pub fn in_flight(&self) -> usize {
+        self.pending.len()
+    }
+
+    /// Starts the way back of a frame that was submitted.
+    pub fn push(&mut self, slot: Slot, job: Job, submission: wgpu::SubmissionIndex, started: Instant) {
+        let state = Arc::new(AtomicU8::new(PENDING));
+        if let Some(stamps) = &slot.stamps {
+            stamps.map_async(wgpu::MapMode::Read, .., |_| {});
+        }
+        let done = Arc::clone(&state);
+        slot.picture.map_async(wgpu::MapMode::Read, .., move |result| {
+            done.store(if result.is_ok() { READY } else { FAILED }, Ordering::Release);
+        });
+        self.pending.push_back(Pending { slot, job, submission, started, state });
+    }
+
+    /// The oldest frame, if it is back (`wait`: when it is back).
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn pop(&mut self, device: &Device, wait: bool) -> Result<Option<Finished>, BokehError> {
+        let Some(oldest) = self.pending.front() else { return Ok(None) };
+        let poll = if wait {
+            wgpu::PollType::Wait { submission_index: Some(oldest.submission.clone()), timeout: None }
+        } else {
+            wgpu::PollType::Poll
+        };
+        device.device.poll(poll).map_err(|error| BokehError::Gpu(format!("{}: {error}", device.name)))?;
+        device.check()?;
+        match oldest.state.load(Ordering::Acquire) {
+            READY => {}
+            FAILED => return Err(BokehError::Gpu(format!("{}: the picture could not be read back", device.name))),
+            _ => return Ok(None),
+        }
+        let Some(mut oldest) = self.pending.pop_front() else { return Ok(None) };
+        let fault = |error: wgpu::MapRangeError| BokehError::Gpu(error.to_string());
+        {
+            let bytes = oldest.slot.picture.get_mapped_range(..).map_err(fault)?;
+            let out = &mut oldest.job.out.rgb;
+            let length = out.len();
+            out.copy_from_slice(&bytes[..length]);
+        }
+        oldest.slot.picture.unmap();
+        let mut times = PassTimes::new();
+        if let Some(stamps) = &oldest.slot.stamps {
+            {
+                let bytes = stamps.get_mapped_range(..).map_err(fault)?;
+                let stamp =
+                    |k: usize| bytes.get(k * 8..k * 8 + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
+                let period_ns = f64::from(device.queue.get_timestamp_period());
+                for (k, name) in oldest.slot.passes.iter().enumerate() {
+                    // Stamps may run backwards when clocks change; such a sample says nothing.
+                    if let (Some(from), Some(to)) = (stamp(2 * k), stamp(2 * k + 1)) {
+                        times.add(name, Duration::from_nanos((to.saturating_sub(from) as f64 * period_ns) as u64));
+                    }
+                }
+            }
+            stamps.unmap();
+        } else {
+            times.add("gpu", oldest.started.elapsed());
+        }
+        oldest.slot.passes.clear();
+        self.free.push(oldest.slot);
+        Ok(Some(Finished { ticket: oldest.job.ticket, out: oldest.job.out, times }))
+    }
+}

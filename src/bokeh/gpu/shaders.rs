@@ -1,0 +1,132 @@
+//! The shaders, and what Rust shares with them: uniforms and numbers.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, FAR_WEIGHT, SEGMENT};
+
+/// A pass: the name of its entry point and file, and its source.
+#[derive(Clone, Copy, Debug)]
+pub struct Shader {
+    /// Entry point.
+    pub name: &'static str,
+    /// Whole source, shared parts included.
+    pub source: &'static str,
+}
+
+macro_rules! shader {
+    ($name:literal $(, $shared:literal)*) => {
+        Shader {
+            name: $name,
+            source: concat!(
+                include_str!("../../../shaders/common.wgsl"),
+                $(include_str!(concat!("../../../shaders/", $shared, ".wgsl")),)*
+                include_str!(concat!("../../../shaders/", $name, ".wgsl")),
+            ),
+        }
+    };
+}
+
+/// 8-bit sRGB and depth to linear light and CoC.
+pub const UNPACK: Shader = shader!("unpack");
+/// A bin's share of each pixel.
+pub const BIN: Shader = shader!("bin");
+/// The coarse grid over a bin.
+pub const CELLS: Shader = shader!("cells");
+/// Local radius and range of colours.
+pub const REACH: Shader = shader!("reach");
+/// Horizontal filters.
+pub const BLUR_ROWS: Shader = shader!("blur_rows", "filter");
+/// Vertical filters.
+pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "filter");
+/// The exact two-dimensional gather.
+pub const GATHER: Shader = shader!("gather");
+/// What near objects touch.
+pub const HIDE: Shader = shader!("hide");
+/// What is known behind them.
+pub const KNOW: Shader = shader!("know");
+/// To the coarser level.
+pub const PULL: Shader = shader!("pull");
+/// Back to the finer level.
+pub const PUSH: Shader = shader!("push");
+/// The filled scene.
+pub const FILL: Shader = shader!("fill");
+/// The final picture.
+pub const COMPOSITE: Shader = shader!("composite");
+
+/// Every shader.
+pub const ALL: [Shader; 13] =
+    [UNPACK, BIN, CELLS, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, KNOW, PULL, PUSH, FILL, COMPOSITE];
+
+/// The `override` constants of `common.wgsl`.
+pub const CONSTANTS: [(&str, f64); 4] = [
+    ("CELL", CELL as f64),
+    ("SEGMENT", SEGMENT as f64),
+    ("COVERAGE_FLOOR", COVERAGE_FLOOR as f64),
+    ("FAR_WEIGHT", FAR_WEIGHT as f64),
+];
+
+/// `Frame` of `common.wgsl`, where each field is explained.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Frame {
+    pub size: [u32; 2],
+    pub depth_size: [u32; 2],
+    pub coc_kind: u32,
+    pub compositing: u32,
+    pub bins: u32,
+    pub near_bins: u32,
+    pub present: u32,
+    pub reach: u32,
+    pub nodes: u32,
+    pub groups: u32,
+    pub coc: [f32; 4],
+    pub ramp: [f32; 2],
+    pub expansion: f32,
+    pub steps_per_px: f32,
+    pub rest_front: [f32; 2],
+    pub nearest_px: f32,
+    pub unused: f32,
+}
+
+/// `Bin` of `common.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Bin {
+    pub size: [u32; 2],
+    pub cells: [u32; 2],
+    pub scale: u32,
+    pub edges: u32,
+    pub turned: u32,
+    pub whole: u32,
+    pub front: [f32; 2],
+    pub behind: [f32; 2],
+    pub max_radius_px: f32,
+    pub sigma_cells: f32,
+    pub reach_cells: u32,
+    pub offset: u32,
+}
+
+/// `Group` of `filter.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Group {
+    pub index: u32,
+    pub terms: u32,
+    pub last: u32,
+    pub unused: u32,
+}
+
+/// `Level` of `pull.wgsl` and `push.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Level {
+    pub fine: [u32; 2],
+    pub coarse: [u32; 2],
+    pub fine_offset: u32,
+    pub coarse_offset: u32,
+    pub unused: [u32; 2],
+}
