@@ -190,7 +190,7 @@ pub enum PictureFault {
     #[error("cannot be read: {0}")]
     Io(#[from] io::Error),
     /// Another format than those that are read here.
-    #[error("neither {0}; convert it")]
+    #[error("not a {0} file; convert it")]
     Format(&'static str),
     /// The header claims more than is decoded.
     #[error("its header claims {width}x{height} pixels, and at most {max}x{max} are read; scale it down", max = MAX_SIDE_PX)]
@@ -243,6 +243,12 @@ pub enum PictureFault {
         /// Columns and rows of the colour pictures.
         color: (u32, u32),
     },
+    /// No picture can be written under this name.
+    #[error("no format is known for this name; end it with {0}")]
+    Extension(&'static str),
+    /// The pixels do not make a picture.
+    #[error("cannot be encoded: {0}")]
+    Encoding(String),
     /// A picture that holds something else than depth.
     #[error("{0} is not depth; export depth as a 16-bit grey PNG")]
     NotDepth(&'static str),

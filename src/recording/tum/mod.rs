@@ -5,10 +5,17 @@
 //! comment. `associations.txt` is a ready pairing and used where it exists; else `rgb.txt` is paired with
 //! `depth.txt` by nearest time, as the benchmark's own tool does it; `rgb.txt` alone is a recording without depth.
 
+mod list;
+mod open;
+mod pair;
 mod time;
 mod writer;
 
+pub(super) use open::open;
 pub use writer::{Writer, WriterOptions};
+
+/// The name of the layout.
+pub(super) const LAYOUT: &str = "TUM RGB-D";
 
 /// Units per metre of the benchmark's depth pictures.
 pub(super) const DEPTH_SCALE: f32 = 5000.0;
