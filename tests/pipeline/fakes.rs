@@ -23,6 +23,8 @@ use bokehcam::stats::Report;
 pub const SIZE: (u32, u32) = (6, 4);
 pub const PERIOD_NS: u64 = 1_000_000;
 pub const NEVER: usize = usize::MAX;
+/// Bytes of a picture that the fake blur changes.
+pub const BLURRED: usize = 12;
 
 /// What a fake stage does at one of its frames.
 #[derive(Clone, Copy, Default)]
@@ -50,7 +52,7 @@ impl Trouble {
     }
 }
 
-/// Frames whose every byte is their number.
+/// Frames whose every byte is the lowest of their number, and the last two bytes all of it.
 pub struct FakeCamera {
     pub frames: usize,
     pub next: usize,
@@ -89,6 +91,7 @@ impl Camera for FakeCamera {
         }
         color.resize(SIZE.0, SIZE.1);
         color.rgb.fill(index as u8);
+        color.rgb.last_chunk_mut::<2>().unwrap().copy_from_slice(&(index as u16).to_le_bytes());
         if self.exact_depth {
             depth.resize(SIZE.0, SIZE.1);
             depth.metres.fill(1.0 + index as f32);
@@ -118,7 +121,7 @@ impl DepthSource for FakeDepth {
     }
 }
 
-/// Adds 100 to the picture, and the focus distance to its first byte; holds as many frames as it may.
+/// Adds 100 to the first bytes of the picture, and the focus distance to its first byte; holds as many frames as it may.
 pub struct FakeBokeh {
     pub capacity: usize,
     pub held: VecDeque<Job>,
@@ -149,9 +152,8 @@ impl Bokeh for FakeBokeh {
         }
         Ok(self.held.pop_front().map(|mut job| {
             job.out.resize(job.color.width, job.color.height);
-            for (out, color) in job.out.rgb.iter_mut().zip(&job.color.rgb) {
-                *out = color + 100;
-            }
+            job.out.rgb.copy_from_slice(&job.color.rgb);
+            job.out.rgb[..BLURRED].iter_mut().for_each(|byte| *byte = byte.wrapping_add(100));
             if let CocField::Depth(coc) = job.coc {
                 let map = job.depth.as_ref().expect("dof has depth");
                 assert!(map.metres.iter().all(|&z_m| z_m == map.metres[0]), "holes are filled");
@@ -187,7 +189,7 @@ impl Received {
         self.pictures.lock().unwrap().len() as u64
     }
     pub fn numbers(&self) -> Vec<usize> {
-        self.pictures.lock().unwrap().iter().map(|rgb| rgb[5] as usize % 100).collect()
+        self.pictures.lock().unwrap().iter().map(|rgb| u16::from_le_bytes(*rgb.last_chunk().unwrap()).into()).collect()
     }
     pub fn is_finished(&self) -> bool {
         self.finished.load(Ordering::SeqCst)
@@ -240,7 +242,6 @@ pub struct Setup {
     pub coc: CocRule,
     pub pace: Pace,
     pub keep_going: bool,
-    pub mirror: bool,
     pub stop_after: u64,
 }
 
@@ -267,7 +268,6 @@ impl Setup {
             coc: dof(),
             pace,
             keep_going: false,
-            mirror: false,
             stop_after: u64::MAX,
         }
     }
@@ -298,7 +298,7 @@ impl Setup {
             pace: self.pace,
             budget_ns: 500_000,
             keep_going: self.keep_going,
-            mirror: self.mirror,
+            mirror: false,
             clock: Clock::system(),
             stop: &stop,
             progress: &|progress| {
