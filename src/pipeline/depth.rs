@@ -1,0 +1,111 @@
+//! Second stage: gives each frame its depth and its CoC.
+
+use super::capture::Shot;
+use super::{CocAtInfinity, CocRule, Ended, Fault, Frame, hand_on};
+use crate::clock::Clock;
+use crate::depth::DepthSource;
+use crate::depth::fill::Filler;
+use crate::depth::focus::Focus;
+use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::{Pool, Pooled};
+use crate::link::{Receiver, Sender};
+use crate::optics::CocField;
+use crate::stats::{Cause, Histogram, Tally};
+
+/// All that the blur needs of a frame.
+pub(super) struct Ready {
+    pub color: Pooled<ColorImage>,
+    pub depth: Option<Pooled<DepthMap>>,
+    pub coc: CocField,
+}
+
+pub(super) struct Stage<'a> {
+    pub coc: CocRule,
+    pub source: Option<Box<dyn DepthSource>>,
+    pub source_name: &'a str,
+    pub keep_going: bool,
+    pub depths: &'a Pool<DepthMap>,
+    pub tally: &'a Tally,
+    pub clock: &'a Clock,
+    pub times: &'a mut Histogram,
+}
+
+/// A [`CocRule`] at work.
+enum Coc {
+    Fixed(CocField),
+    Depth(Box<DepthCoc>),
+}
+
+struct DepthCoc {
+    focus: Focus,
+    filler: Filler,
+    lens: CocAtInfinity,
+    max_coc_px: f32,
+}
+
+impl Coc {
+    fn new(rule: CocRule) -> Self {
+        match rule {
+            CocRule::Fixed(field) => Self::Fixed(field),
+            CocRule::Depth { focus, lens, max_coc_px } => {
+                let (focus, filler) = (Focus::new(focus), Filler::new());
+                Self::Depth(Box::new(DepthCoc { focus, filler, lens, max_coc_px }))
+            }
+        }
+    }
+}
+
+impl DepthCoc {
+    /// Focuses on what was measured, and only then makes up what was not.
+    fn see(&mut self, map: &mut DepthMap, time_ns: u64, width_px: u32) -> CocField {
+        let focus_m = self.focus.focus_m(map, time_ns);
+        self.filler.fill(map);
+        self.lens.field(focus_m, width_px, self.max_coc_px)
+    }
+}
+
+impl Stage<'_> {
+    pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
+        let mut coc = Coc::new(self.coc);
+        let mut complained = false;
+        while let Some(Frame { ticket, stamp, item: Shot { color, depth } }) = from.recv() {
+            let (depth, coc) = match &mut coc {
+                Coc::Fixed(field) => (None, *field),
+                Coc::Depth(coc) => {
+                    let began_ns = self.clock.now_ns();
+                    let mut map = match depth.map_or_else(|| self.read(stamp.index), Ok) {
+                        Ok(map) => map,
+                        Err(fault) => {
+                            let corrupt = matches!(fault, Fault::Depth(_));
+                            self.tally.dropped(ticket, if corrupt { Cause::Corrupt } else { Cause::Failed });
+                            if !corrupt || !self.keep_going {
+                                return Err(fault);
+                            }
+                            if !complained {
+                                tracing::warn!("{fault}; going on without such frames");
+                                complained = true;
+                            }
+                            continue;
+                        }
+                    };
+                    let field = coc.see(&mut map, stamp.time_ns, color.width);
+                    self.times.add(self.clock.now_ns() - began_ns);
+                    (Some(map), field)
+                }
+            };
+            if !hand_on(&mut to, Frame { ticket, stamp, item: Ready { color, depth, coc } }, self.tally) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, index: usize) -> Result<Pooled<DepthMap>, Fault> {
+        let Some(source) = &mut self.source else {
+            return Err(Fault::NoDepth { source_name: self.source_name.to_owned() });
+        };
+        let mut map = self.depths.take();
+        source.read(index, &mut map)?;
+        Ok(map)
+    }
+}
