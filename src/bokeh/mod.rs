@@ -157,6 +157,19 @@ pub enum BokehError {
     Gpu(String),
 }
 
+/// What a pass has left behind of the last frame: vectors of four values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Probe {
+    /// After `unpack` and `fill`, per pixel: linear r, g, b and CoC in pixels.
+    Scene,
+    /// After `bin`, per pixel of a bin: premultiplied r, g, b and coverage.
+    Bin(usize),
+    /// After `reach`, per row of cells and edge: radius in bin pixels and lowest r, g, b; highest r, g, b and nothing.
+    Reach(usize),
+    /// After `blur`, per pixel of a bin: premultiplied r, g, b and coverage.
+    Blur(usize),
+}
+
 /// Where the blur runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Backend {

@@ -5,6 +5,7 @@ mod blur;
 mod composite;
 mod fill;
 mod gather;
+mod probe;
 mod reach;
 mod rows;
 mod simd;

@@ -3,6 +3,7 @@
 mod buffers;
 mod device;
 mod passes;
+mod probe;
 mod readback;
 pub mod shaders;
 

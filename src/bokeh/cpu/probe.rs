@@ -1,0 +1,43 @@
+//! What the passes leave behind, for comparing the executors pass by pass.
+
+use super::CpuBokeh;
+use super::rows::STRIP;
+use crate::bokeh::Probe;
+
+impl CpuBokeh {
+    /// The result of a pass over the last frame, in the layout that [`Probe`] states. Allocates; for tests.
+    pub fn probe(&self, probe: Probe) -> Vec<[f32; 4]> {
+        match probe {
+            Probe::Scene => {
+                let pixels = |y: usize| (0..self.plan.width).map(move |x| (x, y));
+                let at = |(x, y): (usize, usize)| {
+                    let row = self.scene.row(y);
+                    std::array::from_fn(|p| row[p * self.scene.stride + x])
+                };
+                (0..self.plan.height).flat_map(pixels).map(at).collect()
+            }
+            Probe::Bin(k) => {
+                let (bin, source) = (&self.plan.bins[k], &self.bins[k].source);
+                let pixels = |y: usize| (0..bin.width).map(move |x| (x, y));
+                let at =
+                    |(x, y): (usize, usize)| std::array::from_fn(|p| source.row(y)[p * source.stride + source.pad + x]);
+                (0..bin.height).flat_map(pixels).map(at).collect()
+            }
+            Probe::Reach(k) => self.bins[k].edges.data.as_chunks::<4>().0.to_vec(),
+            Probe::Blur(k) => {
+                let (bin, rows) = (&self.plan.bins[k], &self.bins[k]);
+                let pixels = |y: usize| (0..bin.width).map(move |x| (x, y));
+                let at = |(x, y): (usize, usize)| {
+                    let start = (x / STRIP * bin.height + y) * 4 * STRIP + x % STRIP;
+                    std::array::from_fn(|p| rows.out[start + p * STRIP])
+                };
+                (0..bin.height).flat_map(pixels).map(at).collect()
+            }
+        }
+    }
+
+    /// Whether anything in the last frame belonged to bin `k`; if not, its passes were left out.
+    pub fn is_present(&self, k: usize) -> bool {
+        self.bins[k].present
+    }
+}

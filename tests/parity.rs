@@ -1,0 +1,163 @@
+//! The GPU executor does what the CPU executor does, pass by pass and as a whole.
+#![cfg(feature = "gpu")]
+#![allow(missing_docs)]
+
+mod common;
+
+use bokehcam::bokeh::aperture::{Aperture, Shape};
+use bokehcam::bokeh::cpu::CpuBokeh;
+use bokehcam::bokeh::gpu::GpuBokeh;
+use bokehcam::bokeh::plan::{Compositing, Plan};
+use bokehcam::bokeh::{Bokeh, Effect, Job, Method, Probe, Rank, Settings};
+use bokehcam::budget::Quality;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::link::pool::Pooled;
+use bokehcam::optics::CocField;
+use common::{EFFECTS, Numbers, coc, color, depth, noise, settings, shapes, three_depths};
+
+/// Largest difference of an 8-bit value. A radius that falls between two nodes of the bank may round to either.
+const CODES: u8 = 2;
+/// Largest difference within a pass, in linear light or coverage (radii: a node of the bank).
+const LIGHT: f32 = 2e-3;
+
+fn gpu(plan: &Plan) -> GpuBokeh {
+    GpuBokeh::new(plan, false, None).expect("a Vulkan adapter, software included")
+}
+
+fn job(ticket: u64, color: &ColorImage, map: &DepthMap, field: &CocField) -> Job {
+    Job {
+        ticket,
+        color: Pooled::detached(color.clone()),
+        depth: Some(Pooled::detached(map.clone())),
+        coc: *field,
+        out: Pooled::detached(ColorImage::default()),
+    }
+}
+
+fn same(settings: &Settings, image: &ColorImage, map: &DepthMap, field: &CocField, what: &str) {
+    let plan = Plan::new(settings, image.width, image.height);
+    let mut cpu = CpuBokeh::new(plan.clone(), Some(2));
+    let mut gpu = gpu(&plan);
+    let mut expected = ColorImage::default();
+    cpu.blur(image, Some(map), field, &mut expected).expect("the CPU blurs");
+    gpu.submit(job(3, image, map, field)).expect("the GPU takes a frame");
+    let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
+    assert_eq!(finished.ticket, 3);
+    assert_eq!(finished.out.size(), image.size());
+
+    close(&cpu.probe(Probe::Scene), &gpu.probe(Probe::Scene).expect("a probe"), 1e-4, &format!("{what}: scene"));
+    for k in (0..plan.bins.len()).filter(|&k| cpu.is_present(k) && plan.compositing != Compositing::Gather) {
+        let radius_px = 1.0 / bokehcam::bokeh::bank::STEPS_PER_PX;
+        for (probe, limit) in [(Probe::Bin(k), 1e-4), (Probe::Reach(k), radius_px), (Probe::Blur(k), LIGHT)] {
+            close(&cpu.probe(probe), &gpu.probe(probe).expect("a probe"), limit, &format!("{what}: {probe:?}"));
+        }
+    }
+    let worst = finished.out.rgb.iter().zip(&expected.rgb).map(|(a, b)| a.abs_diff(*b)).max();
+    assert!(worst <= Some(CODES), "{what}: {worst:?}");
+}
+
+/// Equal up to `limit`, relative to values above 1; at most one value in a thousand may be off by ten times as much,
+/// where rounding fell the other way.
+fn close(a: &[[f32; 4]], b: &[[f32; 4]], limit: f32, what: &str) {
+    assert_eq!(a.len(), b.len(), "{what}");
+    let off = |(a, b): (&f32, &f32)| (a - b).abs() / a.abs().max(1.0);
+    let differences: Vec<f32> = a.as_flattened().iter().zip(b.as_flattened()).map(off).collect();
+    let beyond = differences.iter().filter(|d| !(**d <= limit)).count();
+    let worst = differences.iter().copied().fold(0.0, f32::max);
+    let some = differences.len() / 1000 + 1;
+    assert!(
+        beyond <= some && worst <= 10.0 * limit,
+        "{what}: {beyond} of {} beyond {limit}, worst {worst}",
+        a.len() * 4
+    );
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn every_effect_and_quality_agrees() {
+    let (image, map) = (noise(97, 71), three_depths(97, 71));
+    for effect in EFFECTS {
+        for quality in Quality::ALL {
+            let settings = Settings { quality, ..settings(effect) };
+            same(&settings, &image, &map, &coc(effect, 71), &format!("{effect:?} {quality}"));
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn every_aperture_and_rank_agrees() {
+    let (image, map) = (noise(80, 60), three_depths(80, 60));
+    for shape in shapes() {
+        for rank in [Rank::Terms(1), Rank::Terms(6)] {
+            let aperture = Aperture { shape: shape.clone(), intensity: 0.3 };
+            let settings = Settings { aperture, rank: Some(rank), highlights: 6.0, ..settings(Effect::Dof) };
+            same(&settings, &image, &map, &coc(Effect::Dof, 60), &format!("{shape:?} {rank:?}"));
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn the_comparison_methods_agree() {
+    let (image, map) = (noise(64, 48), three_depths(64, 48));
+    for rank in [Rank::Terms(3), Rank::Full] {
+        let aperture = Aperture { shape: Shape::Heart, intensity: 0.0 };
+        let settings = Settings { method: Method::Gather, rank: Some(rank), aperture, ..settings(Effect::Dof) };
+        same(&settings, &image, &map, &coc(Effect::Dof, 48), &format!("gather {rank:?}"));
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn odd_inputs_agree() {
+    let settings = settings(Effect::Dof);
+    for (width, height) in [(17, 13), (1, 1), (4096, 2), (3, 130)] {
+        let (image, map) = (noise(width, height), three_depths(width, height));
+        same(&settings, &image, &map, &coc(Effect::Dof, height), &format!("{width}x{height}"));
+    }
+    let (width, height) = (70, 50);
+    let constant = color(width, height, |_, _| [7, 130, 255]);
+    let point = color(width, height, |x, y| if (x, y) == (31, 22) { [255; 3] } else { [3; 3] });
+    let mut numbers = Numbers(3);
+    let maps = [
+        ("unknown", depth(width, height, |_, _| 0.0)),
+        ("not a number", depth(width, height, |x, _| if x % 3 == 0 { f32::NAN } else { 2.0 })),
+        (
+            "extreme",
+            depth(width, height, |_, _| [1e-7, 1.0, 1e9, f32::INFINITY, -4.0][(numbers.next() * 5.0) as usize]),
+        ),
+        ("small", three_depths(35, 25)),
+        ("all in front", depth(width, height, |_, _| 0.5)),
+    ];
+    for (name, map) in &maps {
+        for (kind, image) in [("constant", &constant), ("point", &point), ("noise", &noise(width, height))] {
+            same(&settings, image, map, &coc(Effect::Dof, height), &format!("{name} {kind}"));
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn frames_in_flight_come_back_in_order_and_whole() {
+    let (width, height) = (64, 48);
+    let plan = Plan::new(&settings(Effect::Dof), width, height);
+    let (mut gpu, mut cpu) = (gpu(&plan), CpuBokeh::new(plan, Some(1)));
+    let (image, field) = (noise(width, height), coc(Effect::Dof, height));
+    let map = |k: u64| depth(width, height, |x, _| if u64::from(x) > 8 * (k % 7) { 1.0 } else { 3.0 });
+    let (mut next, mut back) = (0, 0);
+    while back < 20 {
+        while next < 20 && gpu.in_flight() < gpu.capacity() {
+            gpu.submit(job(next, &image, &map(next), &field)).expect("room for a frame");
+            next += 1;
+        }
+        let finished = gpu.collect(true).expect("a frame").expect("one is in flight");
+        assert_eq!(finished.ticket, back);
+        let mut expected = ColorImage::default();
+        cpu.blur(&image, Some(&map(back)), &field, &mut expected).expect("a blur");
+        assert!(finished.out.rgb.iter().zip(&expected.rgb).all(|(a, b)| a.abs_diff(*b) <= CODES), "frame {back}");
+        assert!(finished.times.iter().count() > 0);
+        back += 1;
+    }
+    assert!(gpu.collect(true).expect("nothing is no failure").is_none());
+}

@@ -1,0 +1,100 @@
+//! Every shader is valid, and what Rust shares with it is the same on both sides. Needs no adapter.
+#![cfg(feature = "gpu")]
+#![allow(missing_docs)]
+
+use std::mem::offset_of;
+
+use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Group, Level};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+fn parse(source: &str) -> naga::Module {
+    naga::front::wgsl::parse_str(source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)))
+}
+
+#[test]
+fn every_shader_validates_and_is_named_like_its_file() {
+    for shader in ALL {
+        let module = parse(shader.source);
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::default());
+        if let Err(error) = validator.validate(&module) {
+            panic!("{}: {}", shader.name, error.emit_to_string(shader.source));
+        }
+        let entries: Vec<_> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
+        assert_eq!(entries, [shader.name]);
+        let overrides: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
+        assert_eq!(overrides, CONSTANTS.map(|(name, _)| name));
+    }
+}
+
+#[test]
+fn every_file_is_a_pass_or_shared_and_short() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/shaders");
+    for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
+        let known = ["common", "filter"].contains(&name.as_str()) || ALL.iter().any(|shader| shader.name == name);
+        assert!(known, "{} belongs to no pass", path.display());
+        let lines = std::fs::read_to_string(&path).expect("a text").lines().count();
+        assert!(lines <= 150, "{} has {lines} lines", path.display());
+    }
+}
+
+#[test]
+fn structs_have_the_same_layout_in_rust_and_wgsl() {
+    macro_rules! layout {
+        ($type:ident { $($field:ident),* }) => {
+            (stringify!($type), size_of::<$type>(), vec![$((stringify!($field), offset_of!($type, $field))),*])
+        };
+    }
+    let expected = [
+        layout!(Frame {
+            size,
+            depth_size,
+            coc_kind,
+            compositing,
+            bins,
+            near_bins,
+            present,
+            reach,
+            nodes,
+            groups,
+            coc,
+            ramp,
+            expansion,
+            steps_per_px,
+            rest_front,
+            nearest_px,
+            unused
+        }),
+        layout!(Bin {
+            size,
+            cells,
+            scale,
+            edges,
+            turned,
+            whole,
+            front,
+            behind,
+            max_radius_px,
+            sigma_cells,
+            reach_cells,
+            offset
+        }),
+        layout!(Group { index, terms, last, unused }),
+        layout!(Level { fine, coarse, fine_offset, coarse_offset, unused }),
+    ];
+    for (name, size, fields) in expected {
+        let mut found = false;
+        for shader in ALL {
+            let module = parse(shader.source);
+            for (_, kind) in module.types.iter().filter(|(_, kind)| kind.name.as_deref() == Some(name)) {
+                let naga::TypeInner::Struct { members, span } = &kind.inner else { panic!("{name} is a struct") };
+                let members: Vec<_> =
+                    members.iter().map(|m| (m.name.as_deref().unwrap_or_default(), m.offset as usize)).collect();
+                assert_eq!((members, *span as usize), (fields.clone(), size), "{name} in {}", shader.name);
+                found = true;
+            }
+        }
+        assert!(found, "{name} is in some shader");
+    }
+}
