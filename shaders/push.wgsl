@@ -34,9 +34,9 @@ fn push(@builtin(global_invocation_id) id: vec3<u32>) {
     var knows = 0.0;
     for (var k = 0u; k < 4u; k++) {
         let weight = select(0.75, 0.25, k % 2u == 1u) * select(0.75, 0.25, k / 2u == 1u);
-        let from = level.coarse_offset + ys[k / 2u] * level.coarse.x + xs[k % 2u];
-        sum += weight * pyramid[from];
-        knows += weight * known[from];
+        let behind = level.coarse_offset + ys[k / 2u] * level.coarse.x + xs[k % 2u];
+        sum += weight * pyramid[behind];
+        knows += weight * known[behind];
     }
     let scale = missing / max(knows, 1.0e-6);
     pyramid[index] += sum * scale;
