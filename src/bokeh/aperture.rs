@@ -189,10 +189,7 @@ impl Mask {
         let at = |x: usize, y: usize| self.values[y * n + x];
         let same = |a: f64, b: f64| (a - b).abs() < 1e-9;
         let cells = || (0..n * n).map(move |i| (i % n, i / n));
-        (
-            cells().all(|(x, y)| same(at(x, y), at(n - 1 - x, y))),
-            cells().all(|(x, y)| same(at(x, y), at(x, n - 1 - y))),
-        )
+        (cells().all(|(x, y)| same(at(x, y), at(n - 1 - x, y))), cells().all(|(x, y)| same(at(x, y), at(x, n - 1 - y))))
     }
 
     /// Sum of all values.
