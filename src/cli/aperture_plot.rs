@@ -6,8 +6,8 @@ use super::aperture::Analysis;
 use super::error::CliError;
 
 const SIZE_PX: (u32, u32) = (880, 560);
-/// Range of the error axis, in percent.
-const ERROR_RANGE_PERCENT: (f64, f64) = (0.1, 100.0);
+/// The error axis ends here, in percent; what is smaller is not drawn.
+const LEAST_PERCENT: f64 = 0.01;
 /// Colours that stay apart for the colour-blind (Okabe and Ito 2008).
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
@@ -41,7 +41,9 @@ fn draw(
 ) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
     area.fill(&WHITE)?;
     let ranks = analyses.iter().map(|analysis| analysis.truncation_errors.len()).max().unwrap_or(1);
-    let (low, high) = ERROR_RANGE_PERCENT;
+    let drawn = |error: &f64| Some(error * 100.0).filter(|&percent| percent >= LEAST_PERCENT);
+    let errors = analyses.iter().flat_map(|analysis| analysis.truncation_errors.iter().filter_map(drawn));
+    let (low, high) = (10f64.powf(errors.fold(10.0, f64::min).log10().floor()), 100.0);
     let mut chart = ChartBuilder::on(area)
         .caption(
             format!("Error by rank: kernels of {size_px} x {size_px}, rim {rim}"),
@@ -65,11 +67,8 @@ fn draw(
         .draw()?;
     for (analysis, color) in analyses.iter().zip(COLORS.iter().cycle()) {
         // Beyond its exact rank a kernel has no error to draw.
-        let points: Vec<(f64, f64)> = (1..)
-            .map(f64::from)
-            .zip(analysis.truncation_errors.iter().map(|error| error * 100.0))
-            .take_while(|&(_, percent)| percent >= low)
-            .collect();
+        let points: Vec<(f64, f64)> =
+            (1..).map(f64::from).zip(analysis.truncation_errors.iter().map_while(drawn)).collect();
         let line = color.stroke_width(2);
         chart
             .draw_series(LineSeries::new(points, line).point_size(3))?
@@ -78,7 +77,7 @@ fn draw(
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::LowerLeft)
+        .position(SeriesLabelPosition::UpperRight)
         .background_style(WHITE.mix(0.9))
         .border_style(BLACK.mix(0.3))
         .label_font(("sans-serif", 14))

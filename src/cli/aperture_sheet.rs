@@ -12,7 +12,7 @@ const PANEL_PX: usize = 200;
 /// A difference of this share of the plateau has the full colour.
 const FULL_DIFFERENCE: f64 = 0.5;
 
-const PAPER: [u8; 3] = [250, 250, 250];
+const PAPER: [u8; 3] = [228, 228, 228];
 const INK: [u8; 3] = [40, 40, 40];
 const BLUE: [f64; 3] = [33.0, 102.0, 172.0];
 const RED: [f64; 3] = [178.0, 24.0, 43.0];

@@ -3,6 +3,7 @@
 mod aperture;
 mod aperture_plot;
 mod aperture_sheet;
+mod config;
 mod defaults;
 mod dump;
 mod error;
