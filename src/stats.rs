@@ -1,1 +1,34 @@
-//! The accounting and the report.
+//! The accounting and the report: what became of every frame, how long it took, at which quality.
+//!
+//! Memory is fixed, however long the run, and counting a frame allocates nothing.
+
+mod histogram;
+mod report;
+mod tally;
+
+pub use histogram::{Histogram, PassHistograms};
+pub use report::{About, QualityUse, Report, RungCounts, Spread, StageMs, StagesMs, Versions};
+pub use tally::{Cause, Dropped, Frames, Tally, Ticket};
+
+/// What the stages measure while they run; each stage fills its own fields.
+#[derive(Clone, Debug, Default)]
+pub struct Timings {
+    /// Reading and decoding a picture, waits excluded.
+    pub decode: Histogram,
+    /// Reading depth, focusing and filling holes.
+    pub depth: Histogram,
+    /// The blur of a frame: the sum of its passes, or the wall time where an executor times none.
+    pub blur: Histogram,
+    /// The blur's passes.
+    pub passes: PassHistograms,
+    /// Writing or showing a picture.
+    pub sink: Histogram,
+    /// From capture to delivery.
+    pub latency: Histogram,
+    /// From one delivery to the next.
+    pub frame: Histogram,
+    /// Frames blurred at each rung of the quality ladder.
+    pub rungs: RungCounts,
+    /// Frames whose blur took longer than the budget.
+    pub misses: u64,
+}

@@ -1,1 +1,34 @@
-//! Where depth comes from.
+//! Where depth comes from, and what is made of it before the blur: a focus distance ([`focus`]) and a map without
+//! holes ([`fill`]).
+
+pub mod fill;
+pub mod focus;
+pub mod recorded;
+
+use crate::frame::DepthMap;
+use crate::recording::RecordingError;
+
+/// Gives each frame its depth.
+///
+/// Cameras that know the depth of their frames themselves hand it over with the picture and need no source.
+pub trait DepthSource: Send {
+    /// The depth of the frame that its camera numbered `index`, into `map` (resized to fit).
+    ///
+    /// # Errors
+    /// There is none, or it cannot be read; `map` is then unspecified.
+    fn read(&mut self, index: usize, map: &mut DepthMap) -> Result<(), DepthError>;
+}
+
+/// Why a frame has no depth.
+#[derive(Debug, thiserror::Error)]
+pub enum DepthError {
+    /// The recording's depth picture cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The recording has no depth at all.
+    #[error("{source_name} has no depth pictures; use --effect blur or tilt-shift, which need none")]
+    NoDepth {
+        /// The recording.
+        source_name: String,
+    },
+}

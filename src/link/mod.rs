@@ -1,3 +1,90 @@
 //! How frames change hands between threads, and how buffers come home.
+//!
+//! A link has one sender and one receiver, and comes in two kinds behind one interface:
+//!
+//! - [`live`]: a one-slot mailbox in which the newest item wins. Sending never waits; the item that was not read in
+//!   time comes back to the sender, who counts it.
+//! - [`lossless`]: a short queue. Sending waits for room, so nothing is lost and every replay is the same.
+//!
+//! Dropping the sender is the end of the stream: what is pending is still delivered. Dropping the receiver makes the
+//! next send fail with [`Abandoned`].
+//!
+//! # What is lock-free
+//! The hand-over is: an item moves through atomic operations alone, in `crossbeam_queue::ArrayQueue` (live) or in the
+//! ring of a bounded `crossbeam_channel` (lossless). Two things are not. Sleeping: a thread that waits on an empty or
+//! full link registers itself under a mutex, and whoever wakes it takes that mutex for a few instructions; while nobody
+//! sleeps, nobody locks. And both rings are Vyukov's, which is not lock-free in the strict sense: a thread suspended by
+//! the scheduler in the middle of moving an item holds up that one slot until it runs again.
 
+mod mailbox;
 pub mod pool;
+
+/// The receiving end is gone: nobody will read what is sent, and what is pending goes with the sender.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the next stage is gone")]
+pub struct Abandoned;
+
+/// Room of a lossless link: one item being made ready behind one that is ready.
+pub const LOSSLESS_ITEMS: usize = 2;
+
+/// A link in which the newest item wins and sending never waits.
+pub fn live<T>() -> (Sender<T>, Receiver<T>) {
+    let (sender, receiver) = mailbox::mailbox();
+    (Sender(Tx::Live(sender)), Receiver(Rx::Live(receiver)))
+}
+
+/// A link that loses nothing: sending waits while [`LOSSLESS_ITEMS`] are pending.
+pub fn lossless<T>() -> (Sender<T>, Receiver<T>) {
+    let (sender, receiver) = crossbeam_channel::bounded(LOSSLESS_ITEMS);
+    (Sender(Tx::Lossless(sender)), Receiver(Rx::Lossless(receiver)))
+}
+
+/// The sending end of a link. Dropping it ends the stream.
+pub struct Sender<T>(Tx<T>);
+
+enum Tx<T> {
+    Live(mailbox::Sender<T>),
+    Lossless(crossbeam_channel::Sender<T>),
+}
+
+impl<T> Sender<T> {
+    /// Hands `item` over. Gives back the older item that it displaced, if any (live links only).
+    ///
+    /// # Errors
+    /// The receiver is gone; `item` is dropped.
+    pub fn send(&mut self, item: T) -> Result<Option<T>, Abandoned> {
+        match &self.0 {
+            Tx::Live(mailbox) => mailbox.send(item),
+            Tx::Lossless(queue) => queue.send(item).map(|()| None).map_err(|_| Abandoned),
+        }
+    }
+}
+
+/// The receiving end of a link.
+pub struct Receiver<T>(Rx<T>);
+
+enum Rx<T> {
+    Live(mailbox::Receiver<T>),
+    Lossless(crossbeam_channel::Receiver<T>),
+}
+
+impl<T> Receiver<T> {
+    /// The next item; sleeps until there is one. `None` once the sender is gone and nothing is pending.
+    pub fn recv(&mut self) -> Option<T> {
+        match &self.0 {
+            Rx::Live(mailbox) => mailbox.recv(),
+            Rx::Lossless(queue) => queue.recv().ok(),
+        }
+    }
+
+    /// The next item if it is there already.
+    pub fn try_recv(&mut self) -> Option<T> {
+        match &self.0 {
+            Rx::Live(mailbox) => mailbox.try_recv(),
+            Rx::Lossless(queue) => queue.try_recv().ok(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

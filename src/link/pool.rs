@@ -1,4 +1,7 @@
 //! A fixed set of buffers that circulate: taken by a stage, given back by being dropped.
+//!
+//! Buffers come home through a bounded `crossbeam_channel` with room for all of them, so giving one back never waits;
+//! a mutex is touched only when somebody sleeps for a buffer.
 
 use std::ops::{Deref, DerefMut};
 
@@ -21,8 +24,9 @@ impl<T> Pool<T> {
         Self { home, back }
     }
 
-    /// A free buffer; waits until one comes home.
+    /// A free buffer; waits until one comes home. A pool of none waits forever.
     pub fn take(&self) -> Pooled<T> {
+        // `recv` fails only when every sender is gone, and the pool holds one itself.
         let value = self.home.recv().ok();
         Pooled { value, home: Some(self.back.clone()) }
     }
@@ -32,10 +36,16 @@ impl<T> Pool<T> {
         let value = self.home.try_recv().ok()?;
         Some(Pooled { value: Some(value), home: Some(self.back.clone()) })
     }
+
+    /// Buffers that are home now.
+    pub fn free(&self) -> usize {
+        self.home.len()
+    }
 }
 
 /// A buffer on loan from a [`Pool`]; dropping it sends it home.
 pub struct Pooled<T> {
+    /// Empty only while the loan is being dropped.
     value: Option<T>,
     home: Option<Sender<T>>,
 }
@@ -66,5 +76,35 @@ impl<T> Drop for Pooled<T> {
             // Fails only when the pool itself is gone; then the buffer goes too.
             let _ = home.try_send(value);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn buffers_circulate_and_are_made_once() {
+        let mut made = 0;
+        let pool = Pool::new(2, || {
+            made += 1;
+            vec![0u8; 4]
+        });
+        let (mut first, second) = (pool.take(), pool.take());
+        assert!(pool.try_take().is_none(), "both are out");
+        first[0] = 9;
+        drop(first);
+        assert_eq!(pool.take()[0], 9, "the same buffer, as it was left");
+        drop(second);
+        assert_eq!((pool.free(), made), (2, 2));
+    }
+
+    #[test]
+    fn a_buffer_may_outlive_its_pool() {
+        let pool = Pool::new(1, || 5);
+        let loan = pool.take();
+        drop(pool);
+        assert_eq!(*loan, 5);
+        assert_eq!(*Pooled::detached(6), 6);
     }
 }

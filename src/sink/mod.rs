@@ -1,1 +1,134 @@
 //! Where frames go.
+//!
+//! A file appears under its name only when it is whole: it is written beside that name and renamed. Nothing that
+//! exists is overwritten unless that was asked for.
+
+mod error;
+mod ffmpeg;
+mod png;
+mod staged;
+mod y4m;
+pub mod yuv;
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+pub use error::SinkError;
+pub use ffmpeg::Ffmpeg;
+pub use png::PngFolder;
+pub use y4m::{Y4m, Y4mFile};
+
+use crate::frame::ColorImage;
+
+/// Takes finished frames, in order.
+///
+/// Dropping a sink without [`Sink::finish`] gives up its output: a file that is not whole never appears.
+pub trait Sink {
+    /// Takes one frame. `Break` says that the reader at the other end has gone and wants no more, not even this one.
+    ///
+    /// # Errors
+    /// The frame could not be written.
+    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError>;
+
+    /// Completes the output after the last frame.
+    ///
+    /// # Errors
+    /// The output could not be completed; it then does not appear.
+    fn finish(self: Box<Self>) -> Result<(), SinkError>;
+
+    /// One line for the report: what this is, and where.
+    fn describe(&self) -> String;
+}
+
+/// Takes frames and forgets them.
+pub struct Null;
+
+impl Sink for Null {
+    fn put(&mut self, _frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+        Ok(())
+    }
+
+    fn describe(&self) -> String {
+        "null".into()
+    }
+}
+
+/// A sink as named on the command line (`--to`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// `null`
+    Null,
+    /// `-`: y4m on standard output.
+    Stdout,
+    /// `FILE.y4m`
+    Y4m(PathBuf),
+    /// `FILE.mp4`, `FILE.mkv` or `FILE.webm`, through ffmpeg.
+    Video(PathBuf),
+    /// `DIR/`, or any other name without an extension: numbered PNG files.
+    Folder(PathBuf),
+}
+
+impl FromStr for Target {
+    type Err = SinkError;
+
+    fn from_str(name: &str) -> Result<Self, SinkError> {
+        let path = PathBuf::from(name);
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match (name, extension.as_deref()) {
+            ("", _) => Err(SinkError::Target { name: name.into() }),
+            ("null", _) => Ok(Self::Null),
+            ("-", _) => Ok(Self::Stdout),
+            _ if name.ends_with('/') => Ok(Self::Folder(path)),
+            (_, Some("y4m")) => Ok(Self::Y4m(path)),
+            (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
+            (_, None) => Ok(Self::Folder(path)),
+            _ if path.is_dir() => Ok(Self::Folder(path)),
+            _ => Err(SinkError::Target { name: name.into() }),
+        }
+    }
+}
+
+/// What the frames will be like, and what may be overwritten.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Time from frame to frame, > 0.
+    pub period_ns: u64,
+    /// Overwrite what exists.
+    pub force: bool,
+}
+
+impl Target {
+    /// Opens the sink.
+    ///
+    /// # Errors
+    /// Something of that name exists and `force` is not set, the place cannot be written, or ffmpeg is missing.
+    pub fn open(&self, options: &Options) -> Result<Box<dyn Sink>, SinkError> {
+        Ok(match self {
+            Self::Null => Box::new(Null),
+            Self::Stdout => Box::new(Y4m::stdout(options)?),
+            Self::Y4m(path) => Box::new(Y4mFile::create(path, options)?),
+            Self::Video(path) => Box::new(Ffmpeg::create(path, options)?),
+            Self::Folder(path) => Box::new(PngFolder::create(path, options)?),
+        })
+    }
+
+    /// The file or folder that this writes to, if it is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Null | Self::Stdout => None,
+            Self::Y4m(path) | Self::Video(path) | Self::Folder(path) => Some(path),
+        }
+    }
+}
+
+/// The frames of a stream keep the size that its header states.
+fn check_size(made_for: (u32, u32), frame: &ColorImage) -> Result<(), SinkError> {
+    if frame.size() == made_for { Ok(()) } else { Err(SinkError::Size { made_for, got: frame.size() }) }
+}

@@ -1,0 +1,85 @@
+//! Unknown depth, filled from behind.
+//!
+//! A hole beside a person is a depth shadow: the wall that one of the sensor's two eyes could not see. A hole inside
+//! the person is the person. Both come out right when a hole takes the farthest of the nearest known depths to its
+//! left, right, above and below. The empty frame around a registered depth picture is continued the same way.
+
+use std::mem;
+
+use crate::frame::DepthMap;
+
+/// Fills depth maps; owns the memory for it, and the last map that had any depth.
+#[derive(Debug, Default)]
+pub struct Fill {
+    /// The map being made, exchanged with the caller's when it is done.
+    filled: Vec<f32>,
+    /// Nearest known depth above, then below, per column.
+    column_m: Vec<f32>,
+    last_good: DepthMap,
+}
+
+impl Fill {
+    /// No memory of earlier frames.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Fills every unknown depth of `map`, in time linear in its pixels. A map with no known depth at all becomes a
+    /// copy of the last good one of the same size; if there is none it stays unknown (0) everywhere.
+    pub fn fill(&mut self, map: &mut DepthMap) {
+        if !map.metres.iter().any(|&z_m| DepthMap::is_known(z_m)) {
+            if self.last_good.size() == map.size() {
+                map.metres.copy_from_slice(&self.last_good.metres);
+            } else {
+                map.metres.fill(0.0);
+            }
+            return;
+        }
+        // After the first round every row and column that had a known depth is full. The rest crosses such a row, so
+        // that one more round fills it.
+        if !self.round(map) {
+            self.round(map);
+        }
+        self.last_good.resize(map.width, map.height);
+        self.last_good.metres.copy_from_slice(&map.metres);
+    }
+
+    /// One round of four scans; returns whether the map is full now.
+    fn round(&mut self, map: &mut DepthMap) -> bool {
+        let width = map.width as usize;
+        self.filled.resize(map.metres.len(), 0.0);
+        self.column_m.resize(width, 0.0);
+
+        // Down and to the right: known depths, and in the holes the farther one of left and above.
+        self.column_m.fill(0.0);
+        for (row, filled) in map.metres.chunks_exact(width).zip(self.filled.chunks_exact_mut(width)) {
+            let mut left_m = 0.0;
+            for ((&z_m, filled), above_m) in row.iter().zip(filled).zip(&mut self.column_m) {
+                *filled = if DepthMap::is_known(z_m) {
+                    left_m = z_m;
+                    *above_m = z_m;
+                    z_m
+                } else {
+                    above_m.max(left_m)
+                };
+            }
+        }
+        // Up and to the left: in the holes, the farther one of that, right and below.
+        let mut full = true;
+        self.column_m.fill(0.0);
+        for (row, filled) in map.metres.chunks_exact(width).zip(self.filled.chunks_exact_mut(width)).rev() {
+            let mut right_m = 0.0;
+            for ((&z_m, filled), below_m) in row.iter().zip(filled).zip(&mut self.column_m).rev() {
+                if DepthMap::is_known(z_m) {
+                    right_m = z_m;
+                    *below_m = z_m;
+                } else {
+                    *filled = filled.max(*below_m).max(right_m);
+                    full &= *filled > 0.0;
+                }
+            }
+        }
+        mem::swap(&mut map.metres, &mut self.filled);
+        full
+    }
+}

@@ -1,0 +1,182 @@
+//! Where the lens is focused: at a distance, at the nearest large subject, or at a point of the picture.
+//!
+//! The focus moves like a lens, in dioptres (1/m): it eases towards its target and does not follow small changes.
+
+use crate::frame::DepthMap;
+
+/// What the lens focuses on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FocusRule {
+    /// A distance in metres, > 0.
+    Metres(f32),
+    /// The nearest subject that is large enough to be meant.
+    Auto,
+    /// A point, as fractions of width and height (0 to 1).
+    Point {
+        /// Fraction of the width, from the left.
+        x: f32,
+        /// Fraction of the height, from the top.
+        y: f32,
+    },
+}
+
+/// Used when nothing was ever known to focus on: the distance of somebody at a desk.
+const FALLBACK_M: f32 = 1.0;
+/// Time in which the focus covers 63 % of its way.
+const TIME_CONSTANT_S: f64 = 0.25;
+/// Relative change of the target that sets a resting focus moving, and the distance at which it rests again.
+const START: f32 = 0.03;
+const STOP: f32 = 0.005;
+
+/// The focus from frame to frame: a function of the depth maps and their media times alone.
+#[derive(Debug)]
+pub struct Focus {
+    rule: FocusRule,
+    subject: Subject,
+    window_m: Vec<f32>,
+    lens: Option<EasedLens>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct EasedLens {
+    dioptres: f32,
+    time_ns: u64,
+    moving: bool,
+}
+
+impl Focus {
+    /// A lens that was not focused yet: the first frame sets it at once.
+    pub fn new(rule: FocusRule) -> Self {
+        Self { rule, subject: Subject::default(), window_m: Vec::new(), lens: None }
+    }
+
+    /// The focus distance in metres for a frame at `time_ns` of media time, from its depth as measured (not filled).
+    /// Where the map knows nothing of the subject, the lens stays where it is.
+    pub fn focus_m(&mut self, map: &DepthMap, time_ns: u64) -> f32 {
+        let target_m = match self.rule {
+            FocusRule::Metres(focus_m) => return focus_m,
+            FocusRule::Auto => self.subject.distance_m(map),
+            FocusRule::Point { x, y } => point_m(map, x, y, &mut self.window_m),
+        };
+        let Some(target_m) = target_m else {
+            return self.lens.map_or(FALLBACK_M, |lens| 1.0 / lens.dioptres);
+        };
+        let target = 1.0 / target_m;
+        let lens = self.lens.get_or_insert(EasedLens { dioptres: target, time_ns, moving: false });
+        lens.ease(target, time_ns);
+        1.0 / lens.dioptres
+    }
+}
+
+impl EasedLens {
+    fn ease(&mut self, target: f32, time_ns: u64) {
+        let elapsed_s = time_ns.saturating_sub(self.time_ns) as f64 / 1e9;
+        self.time_ns = time_ns;
+        let off = (target - self.dioptres).abs() / target;
+        self.moving = off > if self.moving { STOP } else { START };
+        if self.moving {
+            let share = 1.0 - (-elapsed_s / TIME_CONSTANT_S).exp();
+            self.dioptres += (target - self.dioptres) * share as f32;
+        }
+    }
+}
+
+/// Median of the known depths in a small window around a point; the window grows until it holds some.
+fn point_m(map: &DepthMap, x: f32, y: f32, window_m: &mut Vec<f32>) -> Option<f32> {
+    let (width, height) = (map.width as usize, map.height as usize);
+    if width == 0 || height == 0 {
+        return None;
+    }
+    let at = |fraction: f32, size: usize| ((fraction * size as f32) as usize).min(size - 1);
+    let (x_px, y_px) = (at(x, width), at(y, height));
+    let mut reach_px = (width.min(height) / 50).max(2);
+    loop {
+        window_m.clear();
+        let columns = x_px.saturating_sub(reach_px)..(x_px + reach_px + 1).min(width);
+        for row in y_px.saturating_sub(reach_px)..(y_px + reach_px + 1).min(height) {
+            let row = &map.metres[row * width..][columns.clone()];
+            window_m.extend(row.iter().copied().filter(|&z_m| DepthMap::is_known(z_m)));
+        }
+        if !window_m.is_empty() {
+            let middle = window_m.len() / 2;
+            return Some(*window_m.select_nth_unstable_by(middle, f32::total_cmp).1);
+        }
+        if reach_px >= width.max(height) {
+            return None;
+        }
+        reach_px *= 2;
+    }
+}
+
+/// Cells of the histogram over disparity (dioptres), and the disparity that its last cell ends at: 0.2 m.
+const CELLS: usize = 256;
+const NEAREST: f32 = 5.0;
+/// A subject spans this many cells to either side of its peak: a head is some 0.25 m deep at 1 m.
+const REACH: usize = 6;
+/// Share of the weight of all known pixels that makes a subject large enough.
+const LARGE: f32 = 0.10;
+/// Rows and columns looked at, at most; more would only cost time.
+const LOOKS: usize = 160;
+
+/// Finds the nearest large subject in a histogram over disparity, in which the middle of the picture weighs most.
+#[derive(Debug)]
+struct Subject {
+    weight: [f32; CELLS],
+    /// Sum of weight x disparity, so that the distance is finer than the cells.
+    moment: [f32; CELLS],
+}
+
+impl Default for Subject {
+    fn default() -> Self {
+        Self { weight: [0.0; CELLS], moment: [0.0; CELLS] }
+    }
+}
+
+impl Subject {
+    /// Distance of the subject; the largest one's when none is large; `None` without any known depth.
+    fn distance_m(&mut self, map: &DepthMap) -> Option<f32> {
+        let total = self.weigh(map);
+        if total == 0.0 {
+            return None;
+        }
+        let mass = |cell: usize| -> f32 { Self::window(cell).map(|c| self.weight[c]).sum() };
+        let masses: [f32; CELLS] = std::array::from_fn(mass);
+        let is_peak = |&cell: &usize| Self::window(cell).all(|c| masses[c] <= masses[cell]);
+        let nearest = (0..CELLS).rev().filter(is_peak).find(|&cell| masses[cell] >= LARGE * total);
+        let peak = nearest.or_else(|| (0..CELLS).max_by(|&a, &b| masses[a].total_cmp(&masses[b])))?;
+        let moment: f32 = Self::window(peak).map(|c| self.moment[c]).sum();
+        Some(masses[peak] / moment)
+    }
+
+    fn window(cell: usize) -> std::ops::Range<usize> {
+        cell.saturating_sub(REACH)..(cell + REACH + 1).min(CELLS)
+    }
+
+    /// Fills the histogram; returns its sum.
+    fn weigh(&mut self, map: &DepthMap) -> f32 {
+        self.weight.fill(0.0);
+        self.moment.fill(0.0);
+        let (width, height) = (map.width as usize, map.height as usize);
+        let mut total = 0.0;
+        for y in (0..height).step_by(height.div_ceil(LOOKS).max(1)) {
+            let row = &map.metres[y * width..][..width];
+            for x in (0..width).step_by(width.div_ceil(LOOKS).max(1)) {
+                if DepthMap::is_known(row[x]) {
+                    let disparity = 1.0 / row[x];
+                    let cell = ((disparity * (CELLS as f32 / NEAREST)) as usize).min(CELLS - 1);
+                    let weight = centre_weight(x, width) * centre_weight(y, height);
+                    self.weight[cell] += weight;
+                    self.moment[cell] += weight * disparity;
+                    total += weight;
+                }
+            }
+        }
+        total
+    }
+}
+
+/// A parabola: 1 in the middle, 0.1 at the border.
+fn centre_weight(at_px: usize, size_px: usize) -> f32 {
+    let off = (at_px as f32 + 0.5) / size_px as f32 * 2.0 - 1.0;
+    1.0 - 0.9 * off * off
+}

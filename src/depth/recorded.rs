@@ -1,0 +1,33 @@
+//! Depth from a recording, decoded on the depth thread while the next picture is decoded on the capture thread.
+
+use std::sync::Arc;
+
+use super::{DepthError, DepthSource};
+use crate::frame::DepthMap;
+use crate::recording::{Recording, Scratch};
+
+/// The depth pictures of a recording.
+pub struct Recorded {
+    recording: Arc<Recording>,
+    scratch: Scratch,
+}
+
+impl Recorded {
+    /// Depth of `recording`, which `name` stands for in messages.
+    ///
+    /// # Errors
+    /// The recording has no depth.
+    pub fn new(recording: Arc<Recording>, name: &str) -> Result<Self, DepthError> {
+        if recording.has_depth() {
+            Ok(Self { recording, scratch: Scratch::default() })
+        } else {
+            Err(DepthError::NoDepth { source_name: name.to_owned() })
+        }
+    }
+}
+
+impl DepthSource for Recorded {
+    fn read(&mut self, index: usize, map: &mut DepthMap) -> Result<(), DepthError> {
+        Ok(self.recording.read_depth(index, &mut self.scratch, map)?)
+    }
+}

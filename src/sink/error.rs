@@ -1,0 +1,75 @@
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a frame could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum SinkError {
+    /// Not the name of a sink.
+    #[error("no sink '{name}': use DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm, - (y4m on standard output) or null")]
+    Target {
+        /// What was given.
+        name: String,
+    },
+    /// The output exists.
+    #[error("{} exists; choose another name or overwrite it with --force", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The output folder has something in it.
+    #[error("the folder {} is not empty; choose another or write into it with --force", path.display())]
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot write {}: {cause}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        cause: io::Error,
+    },
+    /// A frame of another size than the stream's.
+    #[error("the stream is {} x {} pixels, and a frame has {} x {}", made_for.0, made_for.1, got.0, got.1)]
+    Size {
+        /// Width and height of the stream.
+        made_for: (u32, u32),
+        /// Width and height of the frame.
+        got: (u32, u32),
+    },
+    /// The PNG encoder refused.
+    #[error("cannot write {} as PNG: {message}", path.display())]
+    Png {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        message: String,
+    },
+    /// The ffmpeg program is missing.
+    #[error(
+        "writing {} needs the program ffmpeg, which was not found: install the package ffmpeg, or write FILE.y4m",
+        path.display()
+    )]
+    NoFfmpeg {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The ffmpeg program failed.
+    #[error("ffmpeg could not write {} ({status}): {}", path.display(), if said.is_empty() { "it said nothing" } else { said })]
+    Ffmpeg {
+        /// The file.
+        path: PathBuf,
+        /// How it ended.
+        status: String,
+        /// Its last lines, joined by ` | `.
+        said: String,
+    },
+}
+
+impl SinkError {
+    /// Puts the path to a system error.
+    pub(super) fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        |cause| Self::Write { path: path.to_owned(), cause }
+    }
+}

@@ -1,0 +1,280 @@
+//! The report of a run: JSON for measurements, a few lines for people.
+
+use std::fmt;
+use std::io;
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use super::{Frames, Histogram, Timings};
+
+/// What a run was, as resolved.
+#[derive(Clone, Debug, Default)]
+pub struct About {
+    /// `cpu`, `gpu` or `none`.
+    pub backend: String,
+    /// What executed the blur.
+    pub adapter: String,
+    /// Where the frames came from.
+    pub source: String,
+    /// Where they went.
+    pub sink: String,
+    /// Time that a frame's blur may take.
+    pub budget_ns: u64,
+    /// Wall time of the run.
+    pub elapsed_ns: u64,
+}
+
+/// The report (`--report`). Times are in milliseconds.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Report {
+    /// What became of every frame.
+    pub frames: Frames,
+    /// From capture to delivery.
+    pub latency_ms: Option<Spread>,
+    /// From one delivery to the next.
+    pub frame_ms: Option<Spread>,
+    /// Per stage, and per pass of the blur as `blur.PASS`.
+    pub stages_ms: StagesMs,
+    /// How finely the frames were blurred.
+    pub quality: QualityUse,
+    /// Time that a frame's blur may take.
+    pub budget_ms: f64,
+    /// Frames whose blur took longer.
+    pub misses: u64,
+    /// `cpu`, `gpu` or `none`.
+    pub backend: String,
+    /// What executed the blur.
+    pub adapter: String,
+    /// Where the frames came from.
+    pub source: String,
+    /// Where they went.
+    pub sink: String,
+    /// Wall time of the run, in seconds.
+    pub elapsed_s: f64,
+    /// What made this report.
+    pub versions: Versions,
+}
+
+/// Percentiles of a time.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Spread {
+    /// Median.
+    pub p50: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// Maximum.
+    pub max: f64,
+}
+
+/// Percentiles of a stage's time.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct StageMs {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+}
+
+/// Stage names and times, in the order in which a frame passes them; in JSON an object.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StagesMs(pub Vec<(String, StageMs)>);
+
+/// How finely the frames were blurred.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct QualityUse {
+    /// Share of the blurred frames per rung used, summing to 1; in JSON members of the object itself.
+    pub share: Vec<(&'static str, f64)>,
+    /// Changes of rung.
+    pub switches: u64,
+}
+
+/// What made a report.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Versions {
+    /// This program.
+    pub bokehcam: &'static str,
+    /// Operating system and processor family.
+    pub platform: String,
+}
+
+impl Report {
+    /// Sums up a run. The accounting law is checked here: a breach is a defect of this program, and logged as such.
+    pub fn new(frames: Frames, timings: &Timings, about: About) -> Self {
+        if !frames.balance() {
+            tracing::error!(?frames, "the frames do not add up: please report this");
+        }
+        let mut stages = Vec::new();
+        let mut stage = |name: String, times: &Histogram| {
+            if times.samples() > 0 {
+                stages.push((name, StageMs { p50: ms(times.percentile_ns(0.5)), p99: ms(times.percentile_ns(0.99)) }));
+            }
+        };
+        stage("decode".into(), &timings.decode);
+        stage("depth".into(), &timings.depth);
+        stage("blur".into(), &timings.blur);
+        for (name, times) in timings.passes.iter() {
+            stage(format!("blur.{name}"), times);
+        }
+        stage("sink".into(), &timings.sink);
+        Self {
+            frames,
+            latency_ms: Spread::of(&timings.latency),
+            frame_ms: Spread::of(&timings.frame),
+            stages_ms: StagesMs(stages),
+            quality: timings.rungs.shares(),
+            budget_ms: ms(about.budget_ns),
+            misses: timings.misses,
+            backend: about.backend,
+            adapter: about.adapter,
+            source: about.source,
+            sink: about.sink,
+            elapsed_s: ms(about.elapsed_ns) / 1000.0,
+            versions: Versions {
+                bokehcam: env!("CARGO_PKG_VERSION"),
+                platform: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            },
+        }
+    }
+
+    /// Writes the report as JSON with a final line break.
+    ///
+    /// # Errors
+    /// Writing failed.
+    pub fn write_json(&self, mut to: impl io::Write) -> io::Result<()> {
+        serde_json::to_writer_pretty(&mut to, self)?;
+        to.write_all(b"\n")
+    }
+}
+
+/// Milliseconds to three decimals: the histograms know no more.
+fn ms(time_ns: u64) -> f64 {
+    (time_ns as f64 / 1e3).round() / 1e3
+}
+
+impl Spread {
+    fn of(times: &Histogram) -> Option<Self> {
+        let p = |p| ms(times.percentile_ns(p));
+        (times.samples() > 0).then(|| Self { p50: p(0.5), p95: p(0.95), p99: p(0.99), max: ms(times.max_ns()) })
+    }
+}
+
+/// Frames per rung of the quality ladder, by the rungs' names.
+#[derive(Clone, Debug, Default)]
+pub struct RungCounts {
+    frames: Vec<(&'static str, u64)>,
+    last: Option<&'static str>,
+    switches: u64,
+}
+
+impl RungCounts {
+    /// Counts one frame at `rung`. Memory is taken only when a rung is seen for the first time.
+    pub fn add(&mut self, rung: &'static str) {
+        match self.frames.iter_mut().find(|seen| seen.0 == rung) {
+            Some(seen) => seen.1 += 1,
+            None => self.frames.push((rung, 1)),
+        }
+        self.switches += u64::from(self.last.replace(rung).is_some_and(|last| last != rung));
+    }
+
+    fn shares(&self) -> QualityUse {
+        let all: u64 = self.frames.iter().map(|rung| rung.1).sum();
+        let share = self.frames.iter().map(|&(rung, frames)| (rung, frames as f64 / all as f64));
+        QualityUse { share: share.collect(), switches: self.switches }
+    }
+}
+
+impl Serialize for StagesMs {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, times)| (name, times)))
+    }
+}
+
+impl Serialize for QualityUse {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.share.len() + 1))?;
+        for (rung, share) in &self.share {
+            map.serialize_entry(rung, share)?;
+        }
+        map.serialize_entry("switches", &self.switches)?;
+        map.end()
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Frames { captured, delivered, dropped, in_flight } = &self.frames;
+        write!(f, "{delivered} of {captured} frames delivered in {:.2} s", self.elapsed_s)?;
+        if self.elapsed_s > 0.0 {
+            write!(f, " ({:.1} per second)", *delivered as f64 / self.elapsed_s)?;
+        }
+        for (cause, count) in dropped.by_cause().into_iter().chain([("in flight", *in_flight)]) {
+            if count > 0 {
+                write!(f, ", {count} {cause}")?;
+            }
+        }
+        if let Some(latency) = &self.latency_ms {
+            let Spread { p50, p95, p99, max } = latency;
+            write!(f, "\nlatency ms: p50 {p50:.1}, p95 {p95:.1}, p99 {p99:.1}, max {max:.1}")?;
+        }
+        for (name, StageMs { p50, p99 }) in self.stages_ms.0.iter().filter(|stage| !stage.0.contains('.')) {
+            write!(f, "\n{name} ms: p50 {p50:.1}, p99 {p99:.1}")?;
+            if name == "blur" {
+                write!(f, "; budget {:.1}, missed by {} frames ({})", self.budget_ms, self.misses, self.adapter)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::{Cause, Tally};
+
+    fn report() -> Report {
+        let tally = Tally::new();
+        let mut timings = Timings::default();
+        for frame in 0..10u64 {
+            let ticket = tally.captured(frame);
+            timings.decode.add(2_000_000);
+            timings.blur.add(12_000_000);
+            timings.passes.add("rows", 7_000_000);
+            timings.latency.add(30_000_000 + frame);
+            tally.delivered(ticket);
+        }
+        for rung in ["fast", "balanced", "balanced", "balanced"] {
+            timings.rungs.add(rung);
+        }
+        tally.lost(3, Cause::Late);
+        let about = About { budget_ns: 33_333_333, elapsed_ns: 500_000_000, ..About::default() };
+        Report::new(tally.frames(), &timings, about)
+    }
+
+    #[test]
+    fn the_json_has_the_documented_form() {
+        let mut text = Vec::new();
+        report().write_json(&mut text).unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        assert_eq!(json["frames"]["captured"], 13);
+        assert_eq!(json["frames"]["dropped"]["late"], 3);
+        assert_eq!(json["frames"]["in_flight"], 0);
+        assert!((json["latency_ms"]["p95"].as_f64().unwrap() - 30.0).abs() < 0.3);
+        assert!(json["frame_ms"].is_null(), "nothing measured is not zero");
+        assert!((json["stages_ms"]["blur.rows"]["p99"].as_f64().unwrap() - 7.0).abs() < 0.07);
+        assert_eq!(json["quality"]["balanced"], 0.75);
+        assert_eq!(json["quality"]["switches"], 1);
+        assert_eq!(json["budget_ms"], 33.333);
+        for key in ["misses", "backend", "adapter", "source", "sink", "versions"] {
+            assert!(!json[key].is_null(), "{key}");
+        }
+    }
+
+    #[test]
+    fn the_summary_names_what_was_lost() {
+        let text = report().to_string();
+        assert!(text.starts_with("10 of 13 frames delivered in 0.50 s (20.0 per second), 3 late\n"), "{text}");
+        assert!(!text.contains("blur.rows"));
+    }
+}

@@ -1,0 +1,183 @@
+//! What became of every frame: captured = delivered + dropped, by cause, + in flight.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use serde::Serialize;
+
+use crate::frame::FrameId;
+
+/// Why a frame was dropped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// The source had overwritten it before it could be read.
+    Driver,
+    /// It could not be decoded.
+    Corrupt,
+    /// A newer frame took its place in a link.
+    Evicted,
+    /// It was too old when its turn to be blurred came.
+    Late,
+    /// It found no partner (two cameras).
+    Unpaired,
+    /// A stage failed on it.
+    Failed,
+}
+
+/// A frame on its way: made when it is captured, used up when its fate is known.
+#[derive(Debug)]
+#[must_use = "a frame is delivered or dropped, never forgotten"]
+pub struct Ticket {
+    /// Place in the order of capture.
+    pub id: FrameId,
+    /// When the frame was captured, on the run's clock.
+    pub captured_ns: u64,
+}
+
+/// Counts frames from several threads. No frame can be counted twice: its [`Ticket`] is used up.
+#[derive(Debug, Default)]
+pub struct Tally {
+    captured: AtomicU64,
+    delivered: AtomicU64,
+    dropped: [AtomicU64; 6],
+    in_flight: AtomicU64,
+}
+
+impl Tally {
+    /// Nothing counted yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A frame was captured.
+    pub fn captured(&self, captured_ns: u64) -> Ticket {
+        self.in_flight.fetch_add(1, Ordering::Relaxed);
+        Ticket { id: FrameId(self.captured.fetch_add(1, Ordering::Relaxed)), captured_ns }
+    }
+
+    /// `count` frames were lost before there was a picture of them.
+    pub fn lost(&self, count: u64, cause: Cause) {
+        self.captured.fetch_add(count, Ordering::Relaxed);
+        self.dropped[cause as usize].fetch_add(count, Ordering::Relaxed);
+    }
+
+    /// The frame reached the sink.
+    pub fn delivered(&self, ticket: Ticket) {
+        let Ticket { .. } = ticket;
+        self.in_flight.fetch_sub(1, Ordering::Relaxed);
+        self.delivered.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The frame ends here.
+    pub fn dropped(&self, ticket: Ticket, cause: Cause) {
+        let Ticket { .. } = ticket;
+        self.in_flight.fetch_sub(1, Ordering::Relaxed);
+        self.dropped[cause as usize].fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The counts now. While stages run, a frame that moves meanwhile may be missed; at rest they are exact.
+    pub fn frames(&self) -> Frames {
+        let dropped = |cause: Cause| self.dropped[cause as usize].load(Ordering::Relaxed);
+        Frames {
+            captured: self.captured.load(Ordering::Relaxed),
+            delivered: self.delivered.load(Ordering::Relaxed),
+            dropped: Dropped {
+                driver: dropped(Cause::Driver),
+                corrupt: dropped(Cause::Corrupt),
+                evicted: dropped(Cause::Evicted),
+                late: dropped(Cause::Late),
+                unpaired: dropped(Cause::Unpaired),
+                failed: dropped(Cause::Failed),
+            },
+            in_flight: self.in_flight.load(Ordering::Relaxed),
+        }
+    }
+}
+
+/// The counts of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Frames {
+    /// Frames that the source produced, read or not.
+    pub captured: u64,
+    /// Frames that reached the sink.
+    pub delivered: u64,
+    /// Frames that did not, by cause.
+    pub dropped: Dropped,
+    /// Frames still on their way when the run ended; 0 unless a stage failed or the sink was closed from outside.
+    pub in_flight: u64,
+}
+
+/// Dropped frames by [`Cause`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Dropped {
+    /// [`Cause::Driver`]
+    pub driver: u64,
+    /// [`Cause::Corrupt`]
+    pub corrupt: u64,
+    /// [`Cause::Evicted`]
+    pub evicted: u64,
+    /// [`Cause::Late`]
+    pub late: u64,
+    /// [`Cause::Unpaired`]
+    pub unpaired: u64,
+    /// [`Cause::Failed`]
+    pub failed: u64,
+}
+
+impl Dropped {
+    /// Causes by name, in the order of the report.
+    pub fn by_cause(&self) -> [(&'static str, u64); 6] {
+        [
+            ("driver", self.driver),
+            ("corrupt", self.corrupt),
+            ("evicted", self.evicted),
+            ("late", self.late),
+            ("unpaired", self.unpaired),
+            ("failed", self.failed),
+        ]
+    }
+
+    /// All causes together.
+    pub fn total(&self) -> u64 {
+        self.by_cause().iter().map(|cause| cause.1).sum()
+    }
+}
+
+impl Frames {
+    /// The accounting law: captured = delivered + dropped + in flight.
+    pub fn balance(&self) -> bool {
+        self.captured == self.delivered + self.dropped.total() + self.in_flight
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cause_has_its_own_count() {
+        let tally = Tally::new();
+        let causes = [Cause::Driver, Cause::Corrupt, Cause::Evicted, Cause::Late, Cause::Unpaired, Cause::Failed];
+        for (times, cause) in causes.into_iter().enumerate() {
+            tally.lost(times as u64, cause);
+            let ticket = tally.captured(0);
+            tally.dropped(ticket, cause);
+        }
+        let frames = tally.frames();
+        assert_eq!(frames.dropped.by_cause().map(|cause| cause.1), [1, 2, 3, 4, 5, 6]);
+        assert_eq!((frames.captured, frames.in_flight), (21, 0));
+        assert!(frames.balance());
+    }
+
+    #[test]
+    fn a_frame_without_a_fate_is_in_flight() {
+        let tally = Tally::new();
+        let (first, second) = (tally.captured(10), tally.captured(20));
+        assert_eq!((first.id, second.id, second.captured_ns), (FrameId(0), FrameId(1), 20));
+        tally.delivered(first);
+        drop(second);
+        let frames = tally.frames();
+        assert_eq!((frames.captured, frames.delivered, frames.in_flight), (2, 1, 1));
+        assert!(frames.balance());
+        assert!(!Frames { captured: 3, ..frames }.balance());
+    }
+}
