@@ -1,1 +1,292 @@
-//! The one place that knows all stages.
+//! The one place that knows all stages: the thread graph of a run, and what becomes of a failure.
+//!
+//! Three named threads and the caller's, joined by three links; all end because their input ended. Stop is one flag
+//! that only capture reads: what is under way then drains, and the output is completed. A stage that fails drops both
+//! its ends, so that its neighbours end as well: quietly, since only the cause is an error.
+
+mod blur;
+mod capture;
+mod deliver;
+mod depth;
+mod error;
+mod pacer;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, Scope, ScopedJoinHandle};
+
+pub use error::{Fault, PipelineError};
+
+use crate::bokeh::Bokeh;
+use crate::budget::Quality;
+use crate::capture::{Camera, Stamp};
+use crate::clock::Clock;
+use crate::depth::DepthSource;
+use crate::depth::focus::FocusRule;
+use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pool;
+use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
+use crate::optics::{CocField, DepthCoc, Lens};
+use crate::sink::Sink;
+use crate::stats::{About, Cause, Report, Tally, Ticket, Timings};
+
+/// Whether frames wait for the program, or the program for frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// Frames come when they are due, the newest wins, and frames that are too old are dropped.
+    Realtime,
+    /// As fast as it goes: every frame is delivered, and the result is the same every time.
+    Asap,
+}
+
+/// Where the CoC of a frame comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CocRule {
+    /// The same field for every frame (effects `blur` and `tilt-shift`).
+    Fixed(CocField),
+    /// The thin lens over the frame's depth (effect `dof`).
+    Depth {
+        /// What the lens is focused on.
+        focus: FocusRule,
+        /// How large the CoC grows.
+        lens: CocAtInfinity,
+        /// Largest CoC radius, in pixels.
+        max_coc_px: f32,
+    },
+}
+
+/// The CoC radius of a point at infinity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CocAtInfinity {
+    /// The same at every focus distance, in pixels.
+    Px(f32),
+    /// What a real lens gives at each focus distance.
+    Lens(Lens),
+}
+
+impl CocAtInfinity {
+    /// The CoC over depth of a picture `width_px` wide, focused at `focus_m` metres.
+    pub fn field(self, focus_m: f32, width_px: u32, max_coc_px: f32) -> CocField {
+        let coc_at_infinity_px = match self {
+            Self::Px(radius_px) => radius_px,
+            Self::Lens(lens) => lens.coc_at_infinity_px(focus_m, width_px),
+        };
+        CocField::Depth(DepthCoc { coc_at_infinity_px, focus_m, max_coc_px })
+    }
+}
+
+/// Everything a run is made of.
+pub struct Run<'a> {
+    /// Where frames come from.
+    pub camera: Box<dyn Camera>,
+    /// Where their depth comes from, unless they bring it with them; read only for [`CocRule::Depth`].
+    pub depth: Option<Box<dyn DepthSource>>,
+    /// What blurs them; `None` passes them through (effect `none`).
+    pub bokeh: Option<Box<dyn Bokeh>>,
+    /// The rung that `bokeh` was made for, for the report.
+    pub quality: Quality,
+    /// By how much they are blurred.
+    pub coc: CocRule,
+    /// Where they go.
+    pub sink: Box<dyn Sink>,
+    /// Real time, or all frames.
+    pub pace: Pace,
+    /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss.
+    pub budget_ns: u64,
+    /// Count frames that cannot be read, and go on; otherwise the first one ends the run.
+    pub keep_going: bool,
+    /// Flip the pictures left to right on their way out.
+    pub mirror: bool,
+    /// What measures time.
+    pub clock: Clock,
+    /// Once set, no more frames are captured.
+    pub stop: &'a AtomicBool,
+    /// Told after each delivered frame, on the caller's thread.
+    pub progress: &'a dyn Fn(Progress),
+}
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Frames captured, those that were lost included.
+    pub captured: u64,
+    /// Frames delivered.
+    pub delivered: u64,
+    /// Frames dropped, for any cause.
+    pub dropped: u64,
+    /// Frames to be captured in all, where that is known.
+    pub total: Option<u64>,
+}
+
+/// A frame on its way: what identifies it, and what there is of it at this point.
+struct Frame<T> {
+    ticket: Ticket,
+    stamp: Stamp,
+    item: T,
+}
+
+/// Runs the pipeline to the end of its frames, its sink, or the stop flag, and completes the output.
+///
+/// # Errors
+/// The fault of the stage that failed; a panic is one. The output was then given up. The error carries the report.
+pub fn run(run: Run) -> Result<Report, PipelineError> {
+    let Run { camera, depth: source, bokeh: executor, mut sink, pace, clock, .. } = run;
+    let info = camera.info();
+    let mut about = About {
+        backend: executor.as_ref().map_or("none", |executor| backend(&executor.describe())).into(),
+        adapter: executor.as_ref().map_or_else(|| "none".into(), |executor| executor.describe()),
+        source: info.name.clone(),
+        sink: sink.describe(),
+        budget_ns: run.budget_ns,
+        elapsed_ns: 0,
+    };
+    let tally = Tally::new();
+    let mut timings = Timings::default();
+    let Timings { decode, depth: depth_times, blur, passes, rungs, misses, sink: sink_times, latency, frame } =
+        &mut timings;
+    let began_ns = clock.now_ns();
+    let over = AtomicBool::new(false);
+    let places = Places { in_blur: executor.as_ref().map_or(0, |executor| executor.capacity()) };
+    let colors = Pool::new(places.colors(), || ColorImage::new(info.size.0, info.size.1));
+    let depths = Pool::new(places.depths(), DepthMap::default);
+    let outs = Pool::new(places.outs(), || ColorImage::new(info.size.0, info.size.1));
+
+    let (to_depth, from_capture) = link(pace);
+    let (to_blur, from_depth) = link(pace);
+    let (to_sink, from_blur) = link(pace);
+    let capture = capture::Stage {
+        pacer: pacer::Pacer::new(clock.clone(), pace == Pace::Realtime && !info.live, info.period_ns),
+        exact_depth: info.exact_depth,
+        camera,
+        keep_going: run.keep_going,
+        stop: [run.stop, &over],
+        colors: &colors,
+        depths: &depths,
+        tally: &tally,
+        clock: &clock,
+        times: decode,
+    };
+    let depth = depth::Stage {
+        // Without a blur nobody asks for depth.
+        coc: if executor.is_some() { depth::Coc::new(run.coc) } else { depth::Coc::Fixed(UNUSED) },
+        source,
+        source_name: &info.name,
+        keep_going: run.keep_going,
+        depths: &depths,
+        tally: &tally,
+        clock: &clock,
+        times: depth_times,
+    };
+    let blur = blur::Stage {
+        executor,
+        late: (pace == Pace::Realtime).then(|| blur::LateRule::new(info.period_ns)),
+        outs: &outs,
+        tally: &tally,
+        clock: &clock,
+        quality: run.quality,
+        budget_ns: run.budget_ns,
+        times: blur::Times { blur, passes, rungs, misses },
+    };
+    let deliver = deliver::Stage {
+        sink: &mut *sink,
+        mirror: run.mirror,
+        total: info.frames,
+        progress: run.progress,
+        tally: &tally,
+        clock: &clock,
+        times: deliver::Times { sink: sink_times, latency, frame },
+    };
+
+    let ended = thread::scope(|scope| {
+        let upstream = [
+            spawn(scope, "capture", &over, move || capture.run(to_depth))?,
+            spawn(scope, "depth", &over, move || depth.run(from_capture, to_blur))?,
+            spawn(scope, "blur", &over, move || blur.run(from_depth, to_sink))?,
+        ];
+        let delivered = guard("sink", &over, move || deliver.run(from_blur));
+        upstream.into_iter().map(join).chain([delivered]).collect::<Result<(), Fault>>()
+    });
+    let ended = ended.and_then(|()| guard("sink", &over, move || Ok(sink.finish()?)));
+    about.elapsed_ns = clock.now_ns() - began_ns;
+    let report = Report::new(tally.frames(), &timings, about);
+    match ended {
+        Ok(()) => Ok(report),
+        Err(fault) => Err(PipelineError { fault, report: Box::new(report) }),
+    }
+}
+
+fn link<T>(pace: Pace) -> (Sender<T>, Receiver<T>) {
+    match pace {
+        Pace::Realtime => link::live(),
+        Pace::Asap => link::lossless(),
+    }
+}
+
+/// The CPU executor's description begins with its name; any other is that of a GPU.
+fn backend(description: &str) -> &'static str {
+    if description.starts_with("cpu") { "cpu" } else { "gpu" }
+}
+
+/// Hands a frame on; gives back whether there is anybody to take more.
+fn hand_on<T>(to: &mut Sender<Frame<T>>, frame: Frame<T>, tally: &Tally) -> bool {
+    match to.send(frame) {
+        Ok(None) => true,
+        Ok(Some(older)) => {
+            tally.dropped(older.ticket, Cause::Evicted);
+            true
+        }
+        // Nobody knows the frame's fate: it stays in flight.
+        Err(link::Abandoned) => false,
+    }
+}
+
+/// Room for buffers along the way, so that no stage waits for one that another has no need to give back.
+struct Places {
+    in_blur: usize,
+}
+
+impl Places {
+    /// A link's items, and the one that it displaces or that waits for room.
+    const LINK: usize = LOSSLESS_ITEMS + 1;
+    const HAND: usize = 1;
+
+    fn colors(&self) -> usize {
+        // Where nothing blurs, the captured pictures themselves go on to the sink.
+        3 * (Self::HAND + Self::LINK) + Self::HAND + self.in_blur
+    }
+
+    fn depths(&self) -> usize {
+        self.colors()
+    }
+
+    fn outs(&self) -> usize {
+        if self.in_blur == 0 { 0 } else { self.in_blur + 2 * Self::HAND + Self::LINK }
+    }
+}
+
+/// The CoC of a frame that passes through.
+const UNUSED: CocField = CocField::Uniform { radius_px: 0.0 };
+
+type Ended = Result<(), Fault>;
+
+fn spawn<'scope>(
+    scope: &'scope Scope<'scope, '_>,
+    stage: &'static str,
+    over: &'scope AtomicBool,
+    body: impl FnOnce() -> Ended + Send + 'scope,
+) -> Result<ScopedJoinHandle<'scope, Ended>, Fault> {
+    let thread = thread::Builder::new().name(stage.into());
+    thread.spawn_scoped(scope, move || guard(stage, over, body)).map_err(|cause| Fault::Thread { stage, cause })
+}
+
+/// Runs a stage; makes an error of a panic, and tells capture that the end has come.
+fn guard(stage: &'static str, over: &AtomicBool, body: impl FnOnce() -> Ended) -> Ended {
+    // Nothing of a stage is used after it panicked but its counts and times, which are whole at every step.
+    let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(body));
+    over.store(true, Ordering::Relaxed);
+    ended.unwrap_or_else(|panic| Err(Fault::panic(stage, &*panic)))
+}
+
+fn join(thread: ScopedJoinHandle<Ended>) -> Ended {
+    // The guard lets no panic through but one that its own handling raised.
+    thread.join().unwrap_or_else(|panic| Err(Fault::panic("upstream", &*panic)))
+}

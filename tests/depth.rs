@@ -1,6 +1,6 @@
 //! Holes in depth maps, and where the lens is focused.
 
-use bokehcam::depth::fill::Fill;
+use bokehcam::depth::fill::Filler;
 use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::frame::DepthMap;
 
@@ -42,7 +42,7 @@ fn a_depth_shadow_becomes_wall_and_a_hole_in_the_person_stays_person() {
             }
         }
     }
-    Fill::new().fill(&mut holed);
+    Filler::new().fill(&mut holed);
     assert_eq!(holed, whole);
 }
 
@@ -51,7 +51,7 @@ fn an_empty_frame_around_the_picture_is_continued_into_its_corners() {
     let inside = |x: u32, y: u32| (10..110).contains(&x) && (10..80).contains(&y);
     let whole = portrait(PERSON_M);
     let mut framed = map(120, 90, |x, y| if inside(x, y) { at(&whole, x, y) } else { 0.0 });
-    Fill::new().fill(&mut framed);
+    Filler::new().fill(&mut framed);
     assert!(framed.metres.iter().all(|&z_m| z_m == WALL_M || z_m == PERSON_M));
     assert_eq!((at(&framed, 0, 0), at(&framed, 119, 89)), (WALL_M, WALL_M));
     assert_eq!((at(&framed, 60, 89), at(&framed, 60, 0)), (PERSON_M, WALL_M), "the person goes on below the picture");
@@ -63,14 +63,14 @@ fn one_known_pixel_fills_the_whole_map() {
     for (width, height) in [(1, 1), (17, 13), (64, 1), (1, 64)] {
         let mut single = DepthMap::new(width, height);
         single.metres[(width * height / 2) as usize] = 2.5;
-        Fill::new().fill(&mut single);
+        Filler::new().fill(&mut single);
         assert!(single.metres.iter().all(|&z_m| z_m == 2.5), "{width} x {height}");
     }
 }
 
 #[test]
 fn a_frame_without_depth_keeps_the_last_good_map_of_its_size() {
-    let mut fill = Fill::new();
+    let mut fill = Filler::new();
     let mut first = map(8, 6, |_, _| f32::NAN);
     fill.fill(&mut first);
     assert!(first.metres.iter().all(|&z_m| z_m == 0.0), "nothing known yet: unknown, in its plain spelling");

@@ -1,1 +1,99 @@
 //! Where frames come from.
+
+pub mod replay;
+pub mod synthetic;
+
+use crate::frame::{ColorImage, DepthMap};
+use crate::recording::RecordingError;
+
+/// Produces frames, one after the other.
+pub trait Camera: Send {
+    /// What this camera is; stays the same during a run.
+    fn info(&self) -> SourceInfo;
+
+    /// Reads the next frame into `color`, and its depth into `depth` if the camera [knows it](SourceInfo::exact_depth).
+    /// A live camera waits for the frame; the others leave it to the caller when the frame is due. On anything but
+    /// [`Captured::Frame`] the buffers are unspecified.
+    ///
+    /// # Errors
+    /// The camera failed, and there will be no more frames.
+    fn next(&mut self, color: &mut ColorImage, depth: &mut DepthMap) -> Result<Captured, CaptureError>;
+
+    /// Passes over the frames before media time `until_ns` without reading them; returns how many those were.
+    /// Cameras that cannot (see [`SourceInfo::live`]) pass over none.
+    fn skip(&mut self, until_ns: u64) -> u64 {
+        let _ = until_ns;
+        0
+    }
+}
+
+/// What a camera is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceInfo {
+    /// For the report and for messages.
+    pub name: String,
+    /// Width and height of every frame, in pixels.
+    pub size: (u32, u32),
+    /// Time from frame to frame, > 0.
+    pub period_ns: u64,
+    /// Frames until the end, where that is known: for a progress bar.
+    pub frames: Option<u64>,
+    /// Whether frames come at their own pace. Otherwise they can be read and passed over at will, and a run that
+    /// wants real time waits for their media time.
+    pub live: bool,
+    /// Whether frames bring their own depth.
+    pub exact_depth: bool,
+}
+
+/// What came of reading a frame.
+#[derive(Debug)]
+pub enum Captured {
+    /// A frame.
+    Frame(Stamp),
+    /// There was a frame, and it cannot be decoded.
+    Corrupt(CaptureError),
+    /// There are no more.
+    End,
+}
+
+/// Which frame it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stamp {
+    /// The camera's own number of the frame: its place in a recording.
+    pub index: usize,
+    /// Media time: since the first frame, strictly increasing also where a recording starts over.
+    pub time_ns: u64,
+}
+
+/// Why there is no frame.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// The recording's picture cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// No frame lies between start and end.
+    #[error(
+        "{source_name} has no frame from {start_s} s to {}; it lasts {length_s:.3} s",
+        end_s.map_or("its end".into(), |end_s| format!("{end_s} s"))
+    )]
+    EmptyRange {
+        /// The recording.
+        source_name: String,
+        /// Start of the range.
+        start_s: f64,
+        /// End of the range.
+        end_s: Option<f64>,
+        /// From the first frame to the end of the last.
+        length_s: f64,
+    },
+    /// A picture size or rate that no frame can have.
+    #[error("a synthetic camera cannot make {width} x {height} pixels at {fps} frames per second")]
+    Format {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Frames per second.
+        fps: f64,
+    },
+}

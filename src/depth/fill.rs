@@ -10,7 +10,7 @@ use crate::frame::DepthMap;
 
 /// Fills depth maps; owns the memory for it, and the last map that had any depth.
 #[derive(Debug, Default)]
-pub struct Fill {
+pub struct Filler {
     /// The map being made, exchanged with the caller's when it is done.
     filled: Vec<f32>,
     /// Nearest known depth above, then below, per column.
@@ -18,7 +18,7 @@ pub struct Fill {
     last_good: DepthMap,
 }
 
-impl Fill {
+impl Filler {
     /// No memory of earlier frames.
     pub fn new() -> Self {
         Self::default()

@@ -1,1 +1,141 @@
-//! The synthetic scene.
+//! A small ray caster with a moving portrait: the synthetic camera, the bundled recordings, and the physics that
+//! the blur is measured against.
+//!
+//! The world is in metres, `x` right, `y` up, `z` away from the camera, whose left eye is at the origin and looks
+//! along `z`. A pixel's ray goes through `((column - cx) / focal_px, -(row - cy) / focal_px, 1)` with
+//! `cx = (width - 1) / 2`, `cy = (height - 1) / 2`: its parameter is the depth.
+
+mod bvh;
+mod light;
+mod noise;
+mod part;
+mod portrait;
+mod ray;
+mod render;
+mod shape;
+mod targets;
+
+pub use render::{LensPicture, LinearImage, ThinLens, View, encode_srgb, lens_points};
+pub use targets::PointLight;
+
+use glam::Vec3;
+use light::{Ambient, Form, Light, Lit, Shade};
+use part::{Part, Spot};
+use ray::{Pose, Ray};
+
+/// Things in space, lit, that repeat their motion after [`Scene::period_s`].
+#[derive(Clone, Debug)]
+pub struct Scene {
+    parts: Vec<Part>,
+    lights: Vec<Light>,
+    ambient: Ambient,
+    /// Radiance where there is nothing.
+    nothing: Vec3,
+    focus_m: f32,
+    period_s: f64,
+}
+
+impl Scene {
+    /// A person at a table in a room in the evening: subject in focus at 1.2 m, a twig in front at half a metre,
+    /// furniture, a shelf and a window on a lit street behind.
+    pub fn portrait() -> Scene {
+        portrait::scene()
+    }
+
+    /// Length of the seamless loop, in seconds.
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// Depth of the subject's face, in metres.
+    pub fn focus_m(&self) -> f32 {
+        self.focus_m
+    }
+
+    /// The scene as it stands at `time_s`.
+    fn at(&self, time_s: f64) -> Moment<'_> {
+        let phase = (time_s / self.period_s).rem_euclid(1.0) as f32;
+        let poses: Vec<Pose> = self.parts.iter().map(|part| (part.motion)(phase)).collect();
+        let shades = self
+            .parts
+            .iter()
+            .zip(&poses)
+            .enumerate()
+            .flat_map(|(index, (part, pose))| {
+                part.shades.iter().map(move |(centre, radius)| Shade {
+                    centre: pose.to_world(*centre),
+                    radius: *radius,
+                    part: index,
+                })
+            })
+            .collect();
+        Moment { scene: self, poses, shades }
+    }
+}
+
+/// A scene at one time.
+struct Moment<'a> {
+    scene: &'a Scene,
+    poses: Vec<Pose>,
+    shades: Vec<Shade>,
+}
+
+/// What a ray meets first.
+#[derive(Clone, Copy)]
+struct Hit {
+    t: f32,
+    part: usize,
+    shape: usize,
+}
+
+impl Moment<'_> {
+    fn meet(&self, ray: &Ray) -> Option<Hit> {
+        let mut hit: Option<Hit> = None;
+        for (part, (group, pose)) in self.scene.parts.iter().zip(&self.poses).enumerate() {
+            let t_max = hit.map_or(f32::INFINITY, |h| h.t);
+            let found = group.tree.meet(&group.shapes, &pose.ray_to_local(ray), t_max);
+            if let Some((t, shape)) = found {
+                hit = Some(Hit { t, part, shape: shape as usize });
+            }
+        }
+        hit
+    }
+
+    /// The linear radiance that comes along the ray, and the depth where it comes from.
+    fn look(&self, ray: &Ray) -> (Vec3, f32) {
+        match self.meet(ray) {
+            Some(hit) => (self.radiance(ray, hit), hit.t),
+            None => (self.scene.nothing, 0.0),
+        }
+    }
+
+    fn radiance(&self, ray: &Ray, hit: Hit) -> Vec3 {
+        let (part, pose) = (&self.scene.parts[hit.part], &self.poses[hit.part]);
+        let (shape, material) = (&part.shapes[hit.shape], &part.materials[hit.shape]);
+        let p = ray.at(hit.t);
+        let local = pose.to_local(p);
+        let mut skin = shape.surface(local);
+        // Open shapes are seen from both sides.
+        if (pose.turn * skin.normal).dot(ray.unit) > 0.0 {
+            skin.normal = -skin.normal;
+        }
+        let spot = Spot {
+            p: local,
+            normal: skin.normal,
+            uv: skin.uv,
+            tangent: skin.tangent,
+            tint: material.tint,
+            seed: material.seed,
+        };
+        let mut surface = (material.paint)(&spot);
+        if surface.albedo == Vec3::ZERO && surface.gloss <= 0.0 {
+            return surface.emission;
+        }
+        surface.normal = pose.turn * surface.normal;
+        surface.fibre = pose.turn * surface.fibre;
+        let lit = Lit { p, to_eye: -ray.unit, surface, part: hit.part, shades: &self.shades };
+        let to_local = |direction: Vec3| pose.turn.transpose() * direction;
+        let form = part.form.map(|distance| Form { distance, to_local: &to_local, p: local, normal: skin.normal });
+        light::shine(&lit, &self.scene.lights, &self.scene.ambient, form)
+    }
+}

@@ -1,0 +1,87 @@
+//! The project's own scene as a camera, with exact depth.
+
+use super::{Camera, CaptureError, Captured, SourceInfo, Stamp};
+use crate::frame::{ColorImage, DepthMap};
+use crate::scene::{Scene, View};
+
+/// What the synthetic camera makes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Format {
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Frames per second, > 0.
+    pub fps: f64,
+    /// End after so many frames, those passed over included; `None` never ends.
+    pub frames: Option<u64>,
+    /// Threads that render, > 0.
+    pub threads: usize,
+}
+
+/// Renders a moving portrait.
+pub struct Synthetic {
+    scene: Scene,
+    view: View,
+    format: Format,
+    position: u64,
+}
+
+/// One ray per pixel: a camera has to keep pace.
+const SAMPLES_PER_PIXEL: u32 = 1;
+/// Pictures beyond this are no camera's.
+const MAX_SIDE_PX: u32 = 8192;
+
+impl Synthetic {
+    /// A camera of the given format.
+    ///
+    /// # Errors
+    /// The size is 0 or beyond 8192 pixels, or the rate is not a usable number.
+    pub fn new(format: Format) -> Result<Self, CaptureError> {
+        let Format { size: (width, height), fps, .. } = format;
+        let sides = 1..=MAX_SIDE_PX;
+        if !sides.contains(&width) || !sides.contains(&height) || !(0.001..=1000.0).contains(&fps) {
+            return Err(CaptureError::Format { width, height, fps });
+        }
+        Ok(Self { scene: Scene::portrait(), view: View::new(width, height), format, position: 0 })
+    }
+
+    fn time_ns(&self, position: u64) -> u64 {
+        (position as f64 / self.format.fps * 1e9).round() as u64
+    }
+
+    fn at_end(&self) -> bool {
+        self.format.frames.is_some_and(|frames| self.position >= frames)
+    }
+}
+
+impl Camera for Synthetic {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: "synthetic".into(),
+            size: self.format.size,
+            period_ns: self.time_ns(1),
+            frames: self.format.frames,
+            live: false,
+            exact_depth: true,
+        }
+    }
+
+    fn next(&mut self, color: &mut ColorImage, depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+        if self.at_end() {
+            return Ok(Captured::End);
+        }
+        let time_s = self.position as f64 / self.format.fps;
+        let threads = self.format.threads.max(1);
+        self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, color, depth);
+        let stamp = Stamp { index: self.position as usize, time_ns: self.time_ns(self.position) };
+        self.position += 1;
+        Ok(Captured::Frame(stamp))
+    }
+
+    fn skip(&mut self, until_ns: u64) -> u64 {
+        let from = self.position;
+        while !self.at_end() && self.time_ns(self.position) < until_ns {
+            self.position += 1;
+        }
+        self.position - from
+    }
+}

@@ -1,0 +1,68 @@
+//! First stage: reads frames, at their pace.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::pacer::Pacer;
+use super::{Ended, Frame, hand_on};
+use crate::capture::{Camera, Captured};
+use crate::clock::Clock;
+use crate::frame::{ColorImage, DepthMap};
+use crate::link::Sender;
+use crate::link::pool::{Pool, Pooled};
+use crate::stats::{Cause, Histogram, Tally};
+
+/// A picture, and its depth where the camera knows it.
+pub(super) struct Shot {
+    pub color: Pooled<ColorImage>,
+    pub depth: Option<Pooled<DepthMap>>,
+}
+
+pub(super) struct Stage<'a> {
+    pub camera: Box<dyn Camera>,
+    pub pacer: Pacer,
+    pub exact_depth: bool,
+    pub keep_going: bool,
+    pub stop: [&'a AtomicBool; 2],
+    pub colors: &'a Pool<ColorImage>,
+    pub depths: &'a Pool<DepthMap>,
+    pub tally: &'a Tally,
+    pub clock: &'a Clock,
+    pub times: &'a mut Histogram,
+}
+
+impl Stage<'_> {
+    pub(super) fn run(mut self, mut to: Sender<Frame<Shot>>) -> Ended {
+        let stopped = || self.stop.iter().any(|stop| stop.load(Ordering::Relaxed));
+        let mut no_depth = DepthMap::default();
+        let mut complained = false;
+        while !stopped() {
+            self.tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
+            let mut color = self.colors.take();
+            let mut depth = self.exact_depth.then(|| self.depths.take());
+            let began_ns = self.clock.now_ns();
+            match self.camera.next(&mut color, depth.as_deref_mut().unwrap_or(&mut no_depth))? {
+                Captured::Frame(stamp) => {
+                    let read_ns = self.clock.now_ns() - began_ns;
+                    self.times.add(read_ns);
+                    let captured_ns = self.pacer.wait(stamp.time_ns, read_ns, stopped);
+                    let ticket = self.tally.captured(captured_ns);
+                    if !hand_on(&mut to, Frame { ticket, stamp, item: Shot { color, depth } }, self.tally) {
+                        break;
+                    }
+                }
+                Captured::Corrupt(error) => {
+                    self.tally.lost(1, Cause::Corrupt);
+                    if !self.keep_going {
+                        return Err(error.into());
+                    }
+                    if !complained {
+                        tracing::warn!("{error}; going on without such frames");
+                        complained = true;
+                    }
+                }
+                Captured::End => break,
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,71 @@
+use std::any::Any;
+use std::io;
+
+use crate::bokeh::BokehError;
+use crate::capture::CaptureError;
+use crate::depth::DepthError;
+use crate::sink::SinkError;
+use crate::stats::Report;
+
+/// A run that failed: why, and the report of what it did until then.
+#[derive(Debug, thiserror::Error)]
+#[error("{fault}")]
+pub struct PipelineError {
+    /// The fault that ended it.
+    pub fault: Fault,
+    /// The report up to there.
+    pub report: Box<Report>,
+}
+
+/// What can end a run early.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// Capture failed.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// Depth failed.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+    /// The blur failed.
+    #[error(transparent)]
+    Bokeh(#[from] BokehError),
+    /// The sink failed.
+    #[error(transparent)]
+    Sink(#[from] SinkError),
+    /// The blur needs depth that nobody has.
+    #[error("the effect dof needs depth, and {source_name} has none; use --effect blur or tilt-shift")]
+    NoDepth {
+        /// Where the frames come from.
+        source_name: String,
+    },
+    /// The executor broke its contract.
+    #[error("the blur executor gave back another frame than the oldest, or none: please report this")]
+    LostFrame,
+    /// A stage panicked.
+    #[error("the {stage} stage panicked: {message}; please report this")]
+    Panic {
+        /// The stage.
+        stage: &'static str,
+        /// What it said.
+        message: String,
+    },
+    /// The system gave no thread.
+    #[error("cannot start the thread of the {stage} stage: {cause}")]
+    Thread {
+        /// The stage.
+        stage: &'static str,
+        /// What the system said.
+        cause: io::Error,
+    },
+}
+
+impl Fault {
+    pub(super) fn panic(stage: &'static str, payload: &(dyn Any + Send)) -> Self {
+        let message = match (payload.downcast_ref::<&str>(), payload.downcast_ref::<String>()) {
+            (Some(text), _) => (*text).to_owned(),
+            (_, Some(text)) => text.clone(),
+            _ => "no message".to_owned(),
+        };
+        Self::Panic { stage, message }
+    }
+}

@@ -1,0 +1,127 @@
+//! Real time for stored frames: each waits for its media time, and those that cannot make theirs are passed over, as
+//! a camera would have overwritten them.
+
+use crate::capture::Camera;
+use crate::clock::Clock;
+
+/// A stop is seen after this time at the latest.
+const NAP_NS: u64 = 50_000_000;
+
+pub(super) struct Pacer {
+    clock: Clock,
+    active: bool,
+    period_ns: u64,
+    /// When media time 0 was or will be; known with the first frame.
+    epoch_ns: Option<u64>,
+    /// What reading a frame took lately.
+    read_ns: u64,
+}
+
+impl Pacer {
+    pub(super) fn new(clock: Clock, active: bool, period_ns: u64) -> Self {
+        Self { clock, active, period_ns, epoch_ns: None, read_ns: 0 }
+    }
+
+    /// Passes over the frames that would be more than a period late when they are read; returns how many.
+    pub(super) fn skip(&self, camera: &mut dyn Camera) -> u64 {
+        match self.epoch_ns {
+            Some(epoch_ns) if self.active => {
+                let read_ns = self.clock.now_ns() + self.read_ns;
+                camera.skip(read_ns.saturating_sub(epoch_ns + self.period_ns))
+            }
+            _ => 0,
+        }
+    }
+
+    /// Waits until the frame of media time `time_ns`, which took `read_ns` to read, is due, or until `stop` says so.
+    /// Returns the time at which it was captured: when it was due, or now where nothing is paced.
+    pub(super) fn wait(&mut self, time_ns: u64, read_ns: u64, stop: impl Fn() -> bool) -> u64 {
+        let now_ns = self.clock.now_ns();
+        if !self.active {
+            return now_ns;
+        }
+        self.read_ns = if self.epoch_ns.is_none() { read_ns } else { self.read_ns - self.read_ns / 4 + read_ns / 4 };
+        let due_ns = *self.epoch_ns.get_or_insert(now_ns.saturating_sub(time_ns)) + time_ns;
+        while !stop() && self.clock.now_ns() < due_ns {
+            self.clock.sleep_until_ns(due_ns.min(self.clock.now_ns() + NAP_NS));
+        }
+        // Stopped early, the frame would otherwise be delivered before it was captured.
+        due_ns.min(self.clock.now_ns())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::{CaptureError, Captured, SourceInfo};
+    use crate::frame::{ColorImage, DepthMap};
+
+    const PERIOD_NS: u64 = 100;
+
+    /// Frames every 100 ns, by position.
+    struct Positions(u64);
+
+    impl Camera for Positions {
+        fn info(&self) -> SourceInfo {
+            unreachable!("the pacer asks for nothing but skips")
+        }
+        fn next(&mut self, _: &mut ColorImage, _: &mut DepthMap) -> Result<Captured, CaptureError> {
+            Ok(Captured::End)
+        }
+        fn skip(&mut self, until_ns: u64) -> u64 {
+            let from = self.0;
+            self.0 = self.0.max(until_ns.div_ceil(PERIOD_NS));
+            self.0 - from
+        }
+    }
+
+    /// Plays 40 frames that take `read_ns` each; returns how many were read, and the latest by how much.
+    fn play(read_ns: u64) -> (u64, u64) {
+        let clock = Clock::manual();
+        let mut pacer = Pacer::new(clock.clone(), true, PERIOD_NS);
+        let mut camera = Positions(0);
+        let (mut read, mut latest_ns) = (0, 0);
+        loop {
+            pacer.skip(&mut camera);
+            if camera.0 >= 40 {
+                return (read, latest_ns);
+            }
+            let time_ns = camera.0 * PERIOD_NS;
+            camera.0 += 1;
+            clock.advance_ns(read_ns);
+            let captured_ns = pacer.wait(time_ns, read_ns, || false);
+            latest_ns = latest_ns.max(clock.now_ns() - captured_ns);
+            read += 1;
+        }
+    }
+
+    #[test]
+    fn a_fast_source_keeps_every_frame_on_time() {
+        assert_eq!(play(90), (40, 0));
+    }
+
+    #[test]
+    fn a_slow_source_keeps_time_and_loses_frames() {
+        let (read, latest_ns) = play(350);
+        assert!((10..=12).contains(&read), "{read} of 40 at 3.5 periods each");
+        assert!(latest_ns <= PERIOD_NS + 50, "never much more than a period late: {latest_ns}");
+    }
+
+    #[test]
+    fn without_pace_nothing_waits_and_nothing_is_passed_over() {
+        let clock = Clock::manual();
+        let mut pacer = Pacer::new(clock.clone(), false, PERIOD_NS);
+        clock.advance_ns(7);
+        assert_eq!(pacer.wait(1_000_000, 5, || false), 7);
+        assert_eq!(pacer.skip(&mut Positions(0)), 0);
+        assert_eq!(clock.now_ns(), 7);
+    }
+
+    #[test]
+    fn a_stop_ends_the_wait() {
+        let mut pacer = Pacer::new(Clock::system(), true, PERIOD_NS);
+        pacer.wait(0, 0, || false);
+        let hour_ns = 3_600_000_000_000;
+        assert!(pacer.wait(hour_ns, 0, || true) < hour_ns);
+    }
+}

@@ -1,0 +1,145 @@
+//! A tree of boxes over shapes, so that a ray tests a few of thousands.
+
+use super::ray::{Bounds, Ray};
+use super::shape::Shape;
+
+/// The shapes of one part, in an order that the tree's leaves are ranges of.
+#[derive(Clone, Debug, Default)]
+pub struct Bvh {
+    nodes: Vec<Node>,
+    /// Index of the shape at each place of the order.
+    order: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: Bounds,
+    /// First place in `order` of a leaf; index of the second child of an inner node, the first being the next node.
+    first: u32,
+    /// Shapes in a leaf; 0 for an inner node.
+    count: u32,
+    /// Axis along which an inner node was split.
+    axis: usize,
+}
+
+const LEAF: usize = 3;
+const BUCKETS: usize = 12;
+
+impl Bvh {
+    /// The tree over `shapes`.
+    pub fn new(shapes: &[Shape]) -> Self {
+        let boxes: Vec<Bounds> = shapes.iter().map(Shape::bounds).collect();
+        let mut tree = Self { nodes: Vec::new(), order: (0..shapes.len() as u32).collect() };
+        if !shapes.is_empty() {
+            tree.split(&boxes, 0, shapes.len());
+        }
+        tree
+    }
+
+    /// The box around everything.
+    pub fn bounds(&self) -> Bounds {
+        self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
+    }
+
+    fn split(&mut self, boxes: &[Bounds], start: usize, end: usize) {
+        let of = |place: &u32| boxes[*place as usize];
+        let bounds = self.order[start..end].iter().map(of).fold(Bounds::EMPTY, Bounds::join);
+        let centres = self.order[start..end].iter().map(of).fold(Bounds::EMPTY, |all, b| {
+            let c = b.centre();
+            all.join(Bounds { low: c, high: c })
+        });
+        let extent = centres.high - centres.low;
+        let axis = if extent.x >= extent.y && extent.x >= extent.z {
+            0
+        } else if extent.y >= extent.z {
+            1
+        } else {
+            2
+        };
+        let index = self.nodes.len();
+        self.nodes.push(Node { bounds, first: start as u32, count: (end - start) as u32, axis });
+        if end - start <= LEAF || extent[axis] <= 0.0 {
+            return;
+        }
+        let bucket = |b: &Bounds| {
+            (((b.centre()[axis] - centres.low[axis]) / extent[axis] * BUCKETS as f32) as usize).min(BUCKETS - 1)
+        };
+        let mut filled = [(Bounds::EMPTY, 0usize); BUCKETS];
+        for place in &self.order[start..end] {
+            let b = of(place);
+            let slot = &mut filled[bucket(&b)];
+            *slot = (slot.0.join(b), slot.1 + 1);
+        }
+        let cost = |part: &[(Bounds, usize)]| {
+            let (b, n) = part.iter().fold((Bounds::EMPTY, 0), |(b, n), s| (b.join(s.0), n + s.1));
+            if n == 0 { f32::INFINITY } else { b.half_area() * n as f32 }
+        };
+        let cost_at = |at: usize| cost(&filled[..at]) + cost(&filled[at..]);
+        let Some(at) = (1..BUCKETS).min_by(|a, b| cost_at(*a).total_cmp(&cost_at(*b))) else { return };
+        self.order[start..end].sort_by_key(|place| bucket(&of(place)));
+        let middle = start + filled[..at].iter().map(|s| s.1).sum::<usize>();
+        self.nodes[index].count = 0;
+        self.split(boxes, start, middle);
+        self.nodes[index].first = self.nodes.len() as u32;
+        self.split(boxes, middle, end);
+    }
+
+    /// The nearest shape that the ray meets before `t_max`: `t` and the shape's index.
+    pub fn meet(&self, shapes: &[Shape], ray: &Ray, mut t_max: f32) -> Option<(f32, u32)> {
+        let mut found = None;
+        let mut stack = [0u32; 64];
+        let mut depth = usize::from(!self.nodes.is_empty());
+        while depth > 0 {
+            depth -= 1;
+            let index = stack[depth];
+            let node = &self.nodes[index as usize];
+            if node.bounds.span(ray, t_max).is_none() {
+                continue;
+            }
+            if node.count > 0 {
+                for place in &self.order[node.first as usize..(node.first + node.count) as usize] {
+                    if let Some(t) = shapes[*place as usize].meet(ray, t_max) {
+                        (t_max, found) = (t, Some((t, *place)));
+                    }
+                }
+            } else {
+                // The child that the ray comes to first is taken first: it is last on the stack.
+                let (near, far) =
+                    if ray.direction[node.axis] > 0.0 { (index + 1, node.first) } else { (node.first, index + 1) };
+                stack[depth] = far;
+                stack[depth + 1] = near;
+                depth += 2;
+            }
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::noise::Dice;
+    use glam::Vec3;
+
+    #[test]
+    fn the_tree_finds_what_testing_every_shape_finds() {
+        let mut dice = Dice::new(1);
+        let mut point = |scale: f32| scale * Vec3::new(dice.next() - 0.5, dice.next() - 0.5, dice.next() - 0.5);
+        let shapes: Vec<Shape> = (0..500)
+            .map(|_| {
+                let a = point(4.0) + 5.0 * Vec3::Z;
+                Shape::Cone { a, b: a + point(0.8), radius_a: 0.03, radius_b: 0.01 }
+            })
+            .collect();
+        let tree = Bvh::new(&shapes);
+        let mut hits = 0;
+        for _ in 0..2000 {
+            let ray = Ray::new(Vec3::ZERO, point(1.0) + Vec3::Z);
+            let every = shapes.iter().filter_map(|s| s.meet(&ray, f32::INFINITY)).fold(f32::INFINITY, f32::min);
+            let found = tree.meet(&shapes, &ray, f32::INFINITY).map_or(f32::INFINITY, |hit| hit.0);
+            assert_eq!(found, every);
+            hits += usize::from(every.is_finite());
+        }
+        assert!(hits > 200, "the rays must meet something: {hits}");
+    }
+}

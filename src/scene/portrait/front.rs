@@ -1,0 +1,125 @@
+//! What stands before the subject: the table with a cup and a notebook, and a twig near the lens.
+
+use std::f32::consts::TAU;
+
+use glam::{Mat3, Vec2, Vec3};
+
+use super::form::{blend, carve, hex, step};
+use super::paint;
+use crate::scene::noise::{Dice, unit};
+use crate::scene::part::{Material, Part, Spot, Surface};
+use crate::scene::ray::{Bounds, Pose};
+use crate::scene::shape::Shape;
+
+/// Height of the table top.
+const TABLE_Y: f32 = -0.232;
+const CUP: Vec3 = Vec3::new(0.300, TABLE_Y, 0.93);
+
+/// The table and what is on it.
+pub fn desk() -> Part {
+    let mut part = Part::still();
+    let top = Shape::Cuboid {
+        centre: Vec3::new(0.0, TABLE_Y - 0.02, 0.72),
+        axes: Mat3::IDENTITY,
+        half: Vec3::new(1.3, 0.02, 0.33),
+    };
+    part.add(top, Material::new(paint::boards, hex(0xa8743f)));
+    let bounds = Bounds { low: CUP - Vec3::new(0.05, 0.002, 0.05), high: CUP + Vec3::new(0.09, 0.1, 0.05) };
+    part.add(Shape::Field { distance: cup, bounds }, Material::new(glaze, hex(0xe9e2d3)));
+    let turn = Mat3::from_rotation_y(0.35);
+    let book = Shape::Cuboid {
+        centre: Vec3::new(-0.335, TABLE_Y + 0.008, 0.90),
+        axes: turn,
+        half: Vec3::new(0.085, 0.008, 0.06),
+    };
+    part.add(book, Material::new(paint::plain, hex(0x7c2f33)));
+    part.form = Some(|p| (p.y - TABLE_Y).min(cup(p)));
+    part.shades = vec![(CUP + 0.04 * Vec3::Y, 0.045)];
+    part
+}
+
+fn cup(p: Vec3) -> f32 {
+    let q = p - CUP;
+    let radial = Vec2::new(q.x, q.z).length();
+    let radius = 0.036 + 0.05 * (q.y - 0.04);
+    let side = (radial - radius) * 0.98;
+    let body = side.max((q.y - 0.046).abs() - 0.044);
+    let hollow = (side + 0.0035).max(-(q.y - 0.006));
+    let arc = Vec2::new(Vec2::new(q.x - 0.038, q.y - 0.046).length() - 0.021, q.z).length() - 0.0048;
+    let shell = carve(blend(body, arc, 0.006), hollow, 0.003);
+    let coffee = radial.max((q.y - 0.060).abs() - 0.002) - 0.034;
+    shell.min(coffee.max(side + 0.003)) * 0.9
+}
+
+fn glaze(spot: &Spot) -> Surface {
+    let q = spot.p - CUP;
+    let inside = Vec2::new(q.x, q.z).length() < 0.0335 + 0.05 * (q.y - 0.04);
+    if inside && q.y < 0.064 {
+        return Surface::matt(spot, hex(0x3a2012)).glossy(0.3, 60.0);
+    }
+    let dip = step(0.034, 0.036, q.y + 0.003 * (6.0 * q.z.atan2(q.x)).sin());
+    let color = hex(0x2f6f73).lerp(spot.tint, dip);
+    Surface::matt(spot, color).glossy(0.30, 50.0)
+}
+
+/// A twig with round leaves that leans into the picture from the lower left.
+pub fn twig() -> Part {
+    let mut part = Part::moving(|phase| {
+        let sway = Mat3::from_rotation_z(0.020 * (TAU * phase + 1.2).sin())
+            * Mat3::from_rotation_y(0.05 * (TAU * phase).cos());
+        Pose::about(Vec3::new(-0.30, -0.30, 0.52), sway)
+    });
+    let mut dice = Dice::new(23);
+    let arms = [
+        [Vec3::new(-0.27, -0.26, 0.53), Vec3::new(-0.21, -0.12, 0.50), Vec3::new(-0.160, -0.045, 0.49), Vec3::new(-0.098, -0.012, 0.50)],
+        [Vec3::new(-0.25, -0.24, 0.56), Vec3::new(-0.20, -0.14, 0.55), Vec3::new(-0.140, -0.105, 0.54), Vec3::new(-0.085, -0.098, 0.53)],
+        [Vec3::new(-0.31, -0.22, 0.50), Vec3::new(-0.27, -0.06, 0.48), Vec3::new(-0.245, 0.03, 0.47), Vec3::new(-0.215, 0.085, 0.47)],
+    ];
+    for arm in arms {
+        add_arm(&mut part, &mut dice, arm);
+    }
+    part
+}
+
+/// A stem along a cubic curve with leaves in pairs.
+fn add_arm(part: &mut Part, dice: &mut Dice, [a, b, c, d]: [Vec3; 4]) {
+    let at = |s: f32| {
+        let r = 1.0 - s;
+        a * (r * r * r) + b * (3.0 * r * r * s) + c * (3.0 * r * s * s) + d * (s * s * s)
+    };
+    let stem: Vec<_> = (0..=16).map(|i| i as f32 / 16.0).map(|s| (at(s), 0.0024 * (1.0 - 0.7 * s))).collect();
+    part.add_chain(&stem, Material::new(paint::plain, hex(0x6a5238)));
+    for k in 0..7 {
+        let s = 0.22 + 0.13 * k as f32;
+        let ahead = (at(s + 0.02) - at(s - 0.02)).normalize_or(Vec3::X);
+        let sides: &[f32] = if k == 6 { &[0.0] } else { &[-1.0, 1.0] };
+        for side in sides {
+            let out = (ahead.cross(Vec3::Z) * *side + ahead * 0.55 + 0.30 * dice.direction()).normalize_or(ahead);
+            let out = if *side == 0.0 { ahead } else { out };
+            let length = 0.024 * (1.15 - 0.5 * s) * dice.between(0.85, 1.15);
+            add_leaf(part, dice, at(s.min(1.0)), out, length);
+        }
+    }
+}
+
+/// A leaf as two halves folded along its midrib.
+fn add_leaf(part: &mut Part, dice: &mut Dice, root: Vec3, out: Vec3, half_length: f32) {
+    let facing = (Vec3::new(-0.35, 0.45, -1.0) + 0.65 * dice.direction()).normalize_or(Vec3::NEG_Z);
+    let across = out.cross(facing).normalize_or(Vec3::X);
+    let normal = across.cross(out);
+    let green = hex(0x4f8a4c).lerp(hex(0x86a94e), dice.next());
+    let seed = (dice.next() * 1e6) as u32;
+    let centre = root + (half_length + 0.004) * out;
+    part.add_chain(&[(root, 0.0009), (centre, 0.0005)], Material::new(paint::plain, hex(0x73854a)));
+    for side in [-1.0f32, 1.0] {
+        let wing = (across * side + 0.28 * normal * -1.0).normalize_or(across) * (0.62 + 0.1 * unit(seed)) * half_length;
+        let shape = Shape::Quad { centre, right: half_length * out, up: wing, cut: half_leaf };
+        part.add(shape, Material::new(paint::leaf, green).seeded(seed));
+    }
+}
+
+/// Outline of one half of a leaf: `u` from stalk to tip, `v` from the midrib out.
+pub fn half_leaf(uv: Vec2) -> bool {
+    let round = (1.0 - uv.x * uv.x).max(0.0);
+    uv.y >= 0.0 && uv.y <= round.powf(0.62) * (1.0 - 0.22 * uv.x)
+}

@@ -1,0 +1,175 @@
+//! Hair: a combed mass tied into a bun, strands over it, and several hundred fine hairs that stand off.
+
+use glam::Vec3;
+
+use super::form::{ball, blend, carve, egg, fold, hex, rod, step};
+use crate::scene::noise::{Dice, fractal};
+use crate::scene::part::{Material, Part, Spot, Surface};
+use crate::scene::ray::Bounds;
+use crate::scene::shape::Shape;
+
+/// Where the hair is tied.
+const BUN: Vec3 = Vec3::new(0.006, 0.158, 0.045);
+const BUN_RADIUS_M: f32 = 0.043;
+/// Strands that lie on the mass.
+const COMBED: usize = 900;
+/// Fine hairs that stand off the outline.
+const FLYAWAY: usize = 420;
+/// Middle of the light that the hair shines back.
+const HAIR: u32 = 0x8a4a24;
+
+/// Adds the hair to the head.
+pub fn grow(part: &mut Part) {
+    let material = Material::new(combed, hex(HAIR));
+    let bounds = Bounds { low: Vec3::new(-0.125, -0.135, -0.125), high: Vec3::new(0.125, 0.215, 0.145) };
+    part.add(Shape::Field { distance: mass, bounds }, material);
+    let mut dice = Dice::new(11);
+    for k in 0..COMBED {
+        let Some(root) = root(&mut dice) else { continue };
+        let points = strand(&mut dice, root, Lie { lift_m: 0.0012, rise: 0.0, wild: 0.10, step_m: 0.011 }, 6, 0.0007);
+        part.add_chain(&points, Material::new(fibre, hex(HAIR)).seeded(k as u32));
+    }
+    for k in 0..FLYAWAY {
+        let Some(root) = root(&mut dice) else { continue };
+        let lie = Lie {
+            lift_m: 0.001,
+            rise: dice.between(0.15, 0.9),
+            wild: dice.between(0.15, 0.5),
+            step_m: dice.between(0.004, 0.0105),
+        };
+        let points = strand(&mut dice, root, lie, 8, 0.00042);
+        part.add_chain(&points, Material::new(fibre, hex(HAIR)).seeded(k as u32));
+    }
+    for side in [-1.0, 1.0] {
+        for k in 0..46 {
+            add_lock(part, &mut dice, side, k);
+        }
+    }
+}
+
+/// The combed mass with its bun.
+pub fn mass(p: Vec3) -> f32 {
+    let q = fold(p);
+    let cap = egg(p - Vec3::new(0.0, 0.036, 0.030), Vec3::new(0.0895, 0.100, 0.100));
+    // Round over the forehead, to the ears, and open to the neck.
+    let window = egg(p - Vec3::new(0.010, -0.052, -0.105), Vec3::new(0.074, 0.112, 0.098));
+    let mut d = carve(cap, window, 0.012);
+    d = carve(d, ball(q - Vec3::new(0.0, -0.155, 0.02), 0.105), 0.02);
+    // A fringe swept to one side.
+    let fringe = rod(p, Vec3::new(0.046, 0.094, -0.052), Vec3::new(-0.052, 0.062, -0.058), 0.017, 0.011);
+    d = blend(d, fringe, 0.022);
+    d = blend(d, rod(p, Vec3::new(-0.052, 0.064, -0.056), Vec3::new(-0.082, 0.012, -0.016), 0.011, 0.006), 0.014);
+    d = blend(d, rod(p, Vec3::new(0.048, 0.090, -0.050), Vec3::new(0.083, 0.014, -0.012), 0.013, 0.006), 0.016);
+    let bun = p - BUN;
+    let coil = 0.0022 * (3.0 * bun.z.atan2(bun.x) + 150.0 * bun.y).sin();
+    d = blend(d, (egg(bun, Vec3::new(1.08, 0.86, 1.0) * BUN_RADIUS_M) + coil) * 0.8, 0.016);
+    d * 0.9
+}
+
+/// Coordinate that is constant along the combed hair: the angle about the line through the bun.
+fn comb(p: Vec3) -> f32 {
+    let away = p - Vec3::new(BUN.x, 0.0, BUN.z - 0.03);
+    away.z.atan2(away.x)
+}
+
+fn combed(spot: &Spot) -> Surface {
+    let p = spot.p;
+    let bun = (p - BUN).length() < BUN_RADIUS_M * 1.25;
+    let across = if bun {
+        let b = p - BUN;
+        90.0 * b.y + 5.0 * (b.z.atan2(b.x)).sin() + 40.0 * b.x
+    } else {
+        34.0 * comb(p)
+    };
+    let streak = fractal(Vec3::new(across, 12.0 * p.y, 3.0), 3);
+    let fine = fractal(Vec3::new(4.0 * across, 20.0 * p.y, 9.0), 2);
+    let tone = 0.45 + 0.75 * streak + 0.45 * (fine - 0.5);
+    let color = spot.tint * tone * (0.75 + 0.25 * step(0.5, 0.75, streak) * Vec3::new(1.6, 1.35, 1.0));
+    let normal = (spot.normal + 0.5 * (streak - 0.5) * spot.normal.cross(Vec3::Y)).normalize_or(spot.normal);
+    let open = 0.55 + 0.45 * step(0.25, 0.6, streak);
+    Surface { wrap: 0.35, normal, open, ..Surface::matt(spot, color) }.glossy(0.12 * tone, 14.0)
+}
+
+fn fibre(spot: &Spot) -> Surface {
+    let tone = 0.75 + 0.7 * crate::scene::noise::unit(spot.seed ^ 0x77);
+    let color = spot.tint * tone * Vec3::new(1.25, 1.1, 0.95);
+    Surface { wrap: 0.5, fibre: spot.tangent, ..Surface::matt(spot, color) }.glossy(0.22, 22.0)
+}
+
+/// A point on the mass, over the head or on the bun.
+fn root(dice: &mut Dice) -> Option<Vec3> {
+    let from = if dice.next() < 0.22 { BUN } else { Vec3::new(0.0, 0.045, 0.02) };
+    let direction = dice.direction();
+    let mut p = from + 0.2 * direction;
+    for _ in 0..60 {
+        let gap_m = mass(p);
+        if gap_m < 2e-4 {
+            // The nape and the face stay free.
+            return (p.y > -0.045).then_some(p);
+        }
+        p -= gap_m * direction;
+        if (p - from).dot(direction) < 0.0 {
+            return None;
+        }
+    }
+    None
+}
+
+/// How a strand lies.
+struct Lie {
+    lift_m: f32,
+    /// 0 along the mass, 1 straight up from it.
+    rise: f32,
+    /// How much each step strays.
+    wild: f32,
+    step_m: f32,
+}
+
+/// A chain of `steps` cones from `root`: combed to the bun (or around it), lifted and straying by `lie`.
+fn strand(dice: &mut Dice, root: Vec3, lie: Lie, steps: usize, radius_m: f32) -> Vec<(Vec3, f32)> {
+    let gradient = |p: Vec3| {
+        let e = 1e-3;
+        let d = |k: Vec3| mass(p + e * k) - mass(p - e * k);
+        Vec3::new(d(Vec3::X), d(Vec3::Y), d(Vec3::Z)).normalize_or(Vec3::Y)
+    };
+    let on_bun = (root - BUN).length() < 1.3 * BUN_RADIUS_M;
+    let lean = dice.direction();
+    let mut p = root + lie.lift_m * gradient(root);
+    let mut heading = Vec3::ZERO;
+    let mut points = vec![(p, radius_m)];
+    for k in 1..=steps {
+        let normal = gradient(p);
+        let to_bun = if on_bun { Vec3::Y.cross(p - BUN) + 0.5 * (p - BUN).cross(Vec3::X) } else { BUN - p };
+        let along = (to_bun - normal * to_bun.dot(normal)).normalize_or(Vec3::X);
+        let wish = along * (1.0 - lie.rise) + normal * lie.rise + lie.wild * (0.7 * lean + 0.6 * dice.direction());
+        heading = (0.55 * heading + 0.45 * wish.normalize_or(normal)).normalize_or(normal);
+        p += lie.step_m * heading;
+        let sunk_m = lie.lift_m - mass(p);
+        if sunk_m > 0.0 {
+            p += sunk_m * normal;
+        }
+        points.push((p, radius_m * (1.0 - 0.55 * k as f32 / steps as f32)));
+    }
+    points
+}
+
+/// A hair of the loose lock that falls beside the face.
+fn add_lock(part: &mut Part, dice: &mut Dice, side: f32, k: u32) {
+    let spread = 0.0045 * Vec3::new(dice.next() - 0.5, 0.0, dice.next() - 0.5) * 2.0;
+    let end = 0.6 + 0.4 * dice.next();
+    let swing = dice.between(0.8, 1.2);
+    let loose = 0.35 * (dice.next() - 0.5);
+    let points: Vec<_> = (0..=12)
+        .map(|i| {
+            let s = end * i as f32 / 12.0;
+            let wave = 0.007 * swing * (7.5 * s + loose).sin();
+            let p = Vec3::new(
+                side * (0.0785 + 0.016 * (3.1 * s).sin() - 0.010 * s + wave),
+                0.040 - 0.150 * s,
+                -0.036 - 0.012 * (2.6 * s).sin() + 0.010 * s + 0.4 * wave,
+            );
+            (p + spread * (0.5 + 1.4 * s * (1.0 - 0.5 * s)), 0.0009 * (1.0 - 0.5 * s))
+        })
+        .collect();
+    part.add_chain(&points, Material::new(fibre, hex(HAIR)).seeded(900 + k));
+}

@@ -1,0 +1,77 @@
+//! The portrait scene, put together.
+
+mod form;
+mod front;
+mod hair;
+mod head;
+mod outside;
+mod paint;
+mod room;
+mod torso;
+
+use std::f32::consts::TAU;
+
+use glam::{Mat3, Vec3};
+
+use super::Scene;
+use super::light::{Ambient, Light};
+use super::part::Part;
+use super::ray::Pose;
+
+/// Depth of the eyes, in metres.
+const FOCUS_M: f32 = 1.2;
+/// The middle of the head at rest; the face is 7 cm nearer.
+const HEAD: Vec3 = Vec3::new(0.035, 0.045, FOCUS_M + 0.072);
+/// Where the head turns on the neck, in its own frame.
+const NAPE: Vec3 = Vec3::new(0.0, -0.15, 0.04);
+/// About which the body sways, in its own frame.
+const HIP: Vec3 = Vec3::new(0.0, -0.75, 0.06);
+
+/// The whole scene.
+pub fn scene() -> Scene {
+    let parts = [head::part(nod), torso::part(sway), front::desk(), front::twig(), room::part(), outside::part()];
+    Scene {
+        parts: parts.into_iter().map(Part::built).collect(),
+        lights: lights(),
+        ambient: Ambient { above: Vec3::new(0.155, 0.165, 0.20), below: Vec3::new(0.105, 0.080, 0.066) },
+        nothing: Vec3::ZERO,
+        focus_m: FOCUS_M,
+        period_s: 2.0,
+    }
+}
+
+fn lights() -> Vec<Light> {
+    let lamp = |position: [f32; 3], power: [f32; 3], softness, casts| Light {
+        position: position.into(),
+        power: power.into(),
+        softness,
+        casts,
+    };
+    vec![
+        // The key, high on the left in front: a large warm lamp.
+        lamp([-0.75, 0.75, 0.25], [1.55, 1.34, 1.10], 0.22, true),
+        // The fill, from a screen low on the right.
+        lamp([0.55, -0.05, 0.15], [0.16, 0.18, 0.22], 0.5, false),
+        // The rims: the room's lamp on the right, the evening on the left.
+        lamp([0.95, 0.75, 2.05], [1.5, 0.95, 0.50], 0.15, false),
+        lamp([-1.05, 0.60, 2.3], [0.75, 0.95, 1.45], 0.15, false),
+        // The lamp on the sideboard, and a ceiling light out of sight.
+        lamp([1.42, 0.02, 3.72], [0.50, 0.33, 0.16], 0.25, true),
+        lamp([0.3, 1.25, 2.9], [0.95, 0.76, 0.54], 0.25, true),
+    ]
+}
+
+/// The body sways a little, once per loop.
+fn sway(phase: f32) -> Pose {
+    let turn = Mat3::from_rotation_z(0.012 * (TAU * phase).sin()) * Mat3::from_rotation_y(0.06 + 0.02 * (TAU * phase).cos());
+    Pose { turn: Mat3::IDENTITY, place: HEAD }.over(Pose::about(HIP, turn))
+}
+
+/// The head turns and tilts on the swaying body.
+fn nod(phase: f32) -> Pose {
+    let yaw = 0.11 + 0.10 * (TAU * phase + 0.6).sin();
+    let pitch = 0.02 + 0.018 * (2.0 * TAU * phase).sin();
+    let roll = -0.035 + 0.022 * (TAU * phase - 0.5).sin();
+    let turn = Mat3::from_rotation_z(roll) * Mat3::from_rotation_y(yaw) * Mat3::from_rotation_x(pitch);
+    sway(phase).over(Pose::about(NAPE, turn))
+}

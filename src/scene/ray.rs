@@ -1,0 +1,121 @@
+//! Rays, boxes around things, and rigid poses.
+
+use glam::{Mat3, Vec3};
+
+/// A half line. `origin + t * direction`; for a camera ray `direction.z` is 1, so that `t` is the depth in metres.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Start.
+    pub origin: Vec3,
+    /// Step per unit of `t`, of any length.
+    pub direction: Vec3,
+    /// `direction` at length 1.
+    pub unit: Vec3,
+    /// Length of `direction`.
+    pub length: f32,
+    /// One over each component of `direction`.
+    pub inverse: Vec3,
+}
+
+impl Ray {
+    /// The ray from `origin` along `direction`.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        let length = direction.length();
+        Self { origin, direction, unit: direction / length, length, inverse: direction.recip() }
+    }
+
+    /// The point at `t`.
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.origin + t * self.direction
+    }
+
+    /// The point of the ray nearest to `p`, and how far along in metres: intersections are computed from there,
+    /// because a hair's radius squared is lost in the rounding of a squared camera distance.
+    pub fn near(&self, p: Vec3) -> (Vec3, f32) {
+        let along_m = (p - self.origin).dot(self.unit);
+        (self.origin + along_m * self.unit, along_m)
+    }
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// The corner of the lowest coordinates.
+    pub low: Vec3,
+    /// The corner of the highest coordinates.
+    pub high: Vec3,
+}
+
+impl Bounds {
+    /// The box that holds nothing.
+    pub const EMPTY: Bounds = Bounds { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+
+    /// The box of `centre` and half its size.
+    pub fn around(centre: Vec3, half: Vec3) -> Self {
+        Self { low: centre - half, high: centre + half }
+    }
+
+    /// The smallest box that holds both.
+    pub fn join(self, other: Bounds) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// The middle.
+    pub fn centre(&self) -> Vec3 {
+        0.5 * (self.low + self.high)
+    }
+
+    /// Half the surface: what the chance of being hit by a ray is proportional to.
+    pub fn half_area(&self) -> f32 {
+        let d = (self.high - self.low).max(Vec3::ZERO);
+        d.x * d.y + d.y * d.z + d.z * d.x
+    }
+
+    /// Where the ray is inside, cut to `0..t_max`.
+    pub fn span(&self, ray: &Ray, t_max: f32) -> Option<(f32, f32)> {
+        let a = (self.low - ray.origin) * ray.inverse;
+        let b = (self.high - ray.origin) * ray.inverse;
+        let enter = a.min(b).max_element().max(0.0);
+        let leave = a.max(b).min_element().min(t_max);
+        (enter <= leave).then_some((enter, leave))
+    }
+}
+
+/// Where a part stands: `world = turn * local + place`.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose {
+    /// A rotation.
+    pub turn: Mat3,
+    /// Where the part's origin is, in metres.
+    pub place: Vec3,
+}
+
+impl Pose {
+    /// At the origin, not turned.
+    pub const REST: Pose = Pose { turn: Mat3::IDENTITY, place: Vec3::ZERO };
+
+    /// `self` after `inner`.
+    pub fn over(self, inner: Pose) -> Pose {
+        Pose { turn: self.turn * inner.turn, place: self.turn * inner.place + self.place }
+    }
+
+    /// A turn about the point `pivot`.
+    pub fn about(pivot: Vec3, turn: Mat3) -> Pose {
+        Pose { turn, place: pivot - turn * pivot }
+    }
+
+    /// A world point in the part's frame.
+    pub fn to_local(&self, p: Vec3) -> Vec3 {
+        self.turn.transpose() * (p - self.place)
+    }
+
+    /// A point of the part in the world.
+    pub fn to_world(&self, p: Vec3) -> Vec3 {
+        self.turn * p + self.place
+    }
+
+    /// The ray in the part's frame; `t` keeps its meaning.
+    pub fn ray_to_local(&self, ray: &Ray) -> Ray {
+        Ray::new(self.to_local(ray.origin), self.turn.transpose() * ray.direction)
+    }
+}
