@@ -7,12 +7,13 @@ use clap::{Args, value_parser};
 use serde::Serialize;
 
 use super::error::CliError;
-use super::files::{refuse_overwrite, write_picture, write_whole};
+use super::files::{refuse_overwrite, write_whole};
 use super::options::{Global, Output};
 use super::values::{ApertureName, between};
 use super::{aperture_plot, aperture_sheet, defaults, terminal};
 use crate::bokeh::aperture::Mask;
 use crate::bokeh::low_rank::Decomposition;
+use crate::recording::still::write_color;
 
 /// The error curves end at this rank.
 const LAST_PLOTTED_RANK: usize = 16;
@@ -133,7 +134,7 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
 
     fs::create_dir_all(&command.out).map_err(CliError::io(&command.out))?;
     for (analysis, path) in analyses.iter().zip(&outputs) {
-        write_picture(path, &aperture_sheet::draw(analysis))?;
+        write_color(path, &aperture_sheet::draw(analysis), command.output.force)?;
     }
     write_whole(&plot_path, plot.as_bytes())?;
     write_whole(&table_path, &json)?;

@@ -1,19 +1,19 @@
 //! Resolved, validated configuration: what the raw options mean. Nothing below the command line sees an option.
 
-use std::path::{Path, PathBuf};
-
 use super::defaults;
 use super::error::CliError;
 use super::options;
-use super::values::{DepthChoice, Effect, Focus, Method, Rank, Tilt};
-use crate::bokeh;
+use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Tilt};
 use crate::bokeh::aperture::Aperture;
+use crate::bokeh::{self, Backend, Bokeh};
 use crate::budget::Quality;
-use crate::optics::{CocField, DepthCoc, Lens, Ramp};
+use crate::depth::focus::FocusRule;
+use crate::optics::{CocField, Lens, Ramp};
+use crate::pipeline::{CocAtInfinity, CocRule};
 
 /// How strong the blur is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Strength {
+enum Strength {
     /// A fraction of the picture's height.
     Default,
     /// CoC radius at infinity, in pixels.
@@ -25,10 +25,8 @@ pub enum Strength {
 /// Everything about the blur, for pictures of any size.
 #[derive(Clone, Debug)]
 pub struct Blur {
-    /// What the blur follows; none passes frames through.
-    pub effect: Option<bokeh::Effect>,
-    /// Where the focal plane is.
-    pub focus: Focus,
+    effect: Option<bokeh::Effect>,
+    focus: Focus,
     method: bokeh::Method,
     strength: Strength,
     max_coc_px: Option<f32>,
@@ -107,11 +105,7 @@ impl Blur {
     pub fn settings(&self, size: (u32, u32)) -> Option<bokeh::Settings> {
         let effect = self.effect?;
         let max_px = self.max_coc_px(size);
-        let far_max_px = match (effect, self.strength) {
-            // The distance of focus, and with it the radius at infinity, may change from frame to frame.
-            (bokeh::Effect::Dof, Strength::Lens(_)) => max_px,
-            _ => self.coc_at_infinity_px(size, self.focus_m()).min(max_px),
-        };
+        let far_max_px = self.even_px(size).min(max_px);
         let near_max_px = if effect == bokeh::Effect::Dof { max_px } else { 0.0 };
         Some(bokeh::Settings {
             effect,
@@ -126,42 +120,76 @@ impl Blur {
         })
     }
 
-    /// The radius of every pixel of a picture of `size` pixels that is in focus at `focus_m` metres; `blur` and
-    /// `tilt-shift` need the distance only with a lens.
-    pub fn coc_field(&self, size: (u32, u32), focus_m: f32) -> CocField {
-        let (at_infinity_px, max_px) = (self.coc_at_infinity_px(size, focus_m), self.max_coc_px(size));
+    /// By how much a picture of `size` pixels is blurred.
+    pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
+        let max_coc_px = self.max_coc_px(size);
+        let even_px = self.even_px(size).min(max_coc_px);
         match self.effect {
-            None => CocField::Uniform { radius_px: 0.0 },
-            Some(bokeh::Effect::Blur) => CocField::Uniform { radius_px: at_infinity_px.min(max_px) },
-            Some(bokeh::Effect::TiltShift) => CocField::Ramp(self.tilt.ramp(size, at_infinity_px.min(max_px))),
-            Some(bokeh::Effect::Dof) => {
-                CocField::Depth(DepthCoc { coc_at_infinity_px: at_infinity_px, focus_m, max_coc_px: max_px })
-            }
+            None => CocRule::Fixed(CocField::Uniform { radius_px: 0.0 }),
+            Some(bokeh::Effect::Blur) => CocRule::Fixed(CocField::Uniform { radius_px: even_px }),
+            Some(bokeh::Effect::TiltShift) => CocRule::Fixed(CocField::Ramp(self.tilt.ramp(size, even_px))),
+            Some(bokeh::Effect::Dof) => CocRule::Depth {
+                focus: match self.focus {
+                    Focus::Auto => FocusRule::Auto,
+                    Focus::Metres(metres) => FocusRule::Metres(metres),
+                    Focus::Point(x, y) => FocusRule::Point { x, y },
+                },
+                lens: match self.strength {
+                    Strength::Lens(lens) => CocAtInfinity::Lens(lens),
+                    Strength::Default | Strength::AtInfinity(_) => CocAtInfinity::Px(self.even_px(size)),
+                },
+                max_coc_px,
+            },
         }
     }
 
-    /// The distance of focus, where it is given as such.
-    fn focus_m(&self) -> f32 {
-        if let Focus::Metres(metres) = self.focus { metres } else { 1.0 }
-    }
-
-    /// CoC radius at infinity, in pixels.
-    pub fn coc_at_infinity_px(&self, (width, height): (u32, u32), focus_m: f32) -> f32 {
-        match self.strength {
-            Strength::Default => height as f32 * defaults::COC_AT_INFINITY_PER_HEIGHT,
-            Strength::AtInfinity(radius_px) => radius_px,
-            Strength::Lens(lens) => lens.coc_at_infinity_px(focus_m, width),
+    /// CoC radius at infinity in pixels, where it does not depend on a focus that is yet to be found.
+    fn even_px(&self, (width, height): (u32, u32)) -> f32 {
+        match (self.strength, self.focus) {
+            (Strength::Default, _) => height as f32 * defaults::COC_AT_INFINITY_PER_HEIGHT,
+            (Strength::AtInfinity(radius_px), _) => radius_px,
+            (Strength::Lens(lens), Focus::Metres(focus_m)) => lens.coc_at_infinity_px(focus_m, width),
+            // Whatever the lens may give: the largest CoC is the bound.
+            (Strength::Lens(_), _) => f32::INFINITY,
         }
     }
 
     /// Largest CoC radius, in pixels. Without depth no point is nearer than the focal plane, and the strength that
     /// was asked for holds unless `--max-coc` is given, too.
-    pub fn max_coc_px(&self, size: (u32, u32)) -> f32 {
+    fn max_coc_px(&self, size: (u32, u32)) -> f32 {
         let by_height_px = size.1 as f32 * defaults::MAX_COC_PER_HEIGHT;
         self.max_coc_px.unwrap_or(match self.strength {
             Strength::AtInfinity(radius_px) => by_height_px.max(radius_px),
             Strength::Default | Strength::Lens(_) => by_height_px,
         })
+    }
+}
+
+/// What runs the blur.
+#[derive(Clone, Debug)]
+pub struct Executor {
+    backend: Backend,
+    adapter: Option<String>,
+    threads: Option<usize>,
+}
+
+impl Executor {
+    /// Resolves options.
+    pub fn of(computing: &options::Computing) -> Self {
+        let backend = match computing.backend {
+            values::Backend::Auto => Backend::Auto,
+            values::Backend::Gpu => Backend::Gpu,
+            values::Backend::Cpu => Backend::Cpu,
+        };
+        Self { backend, adapter: computing.adapter.clone(), threads: computing.threads }
+    }
+
+    /// An executor for pictures of `size` pixels.
+    ///
+    /// # Errors
+    /// There is no such GPU.
+    pub fn create(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, CliError> {
+        Ok(bokeh::create(settings, size, self.backend, self.adapter.as_deref(), self.threads)?)
     }
 }
 
@@ -179,62 +207,6 @@ impl Tilt {
             .into_iter()
             .fold(0.0, f32::max);
         Ramp { normal, offset_px, half_band_px, slope: if reach_px > 0.0 { max_px / reach_px } else { 0.0 }, max_px }
-    }
-}
-
-/// Where frames go, as it is written.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SinkName {
-    /// A folder of numbered PNG files.
-    Folder(PathBuf),
-    /// A y4m file.
-    Y4m(PathBuf),
-    /// y4m on standard output.
-    Stdout,
-    /// A file that ffmpeg encodes.
-    Encoded(PathBuf),
-    /// Nowhere.
-    Null,
-}
-
-impl std::str::FromStr for SinkName {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let path = Path::new(text);
-        match text {
-            "null" => return Ok(SinkName::Null),
-            "-" => return Ok(SinkName::Stdout),
-            folder if folder.ends_with('/') || path.is_dir() => return Ok(SinkName::Folder(path.to_owned())),
-            _ => {}
-        }
-        match path.extension().and_then(|extension| extension.to_str()) {
-            Some("y4m") => Ok(SinkName::Y4m(path.to_owned())),
-            Some("mp4" | "mkv" | "webm") => Ok(SinkName::Encoded(path.to_owned())),
-            _ => Err("use DIR/ (with the slash), FILE.y4m, - for y4m on standard output, FILE.mp4, .mkv or .webm, \
-                      or null"
-                .to_string()),
-        }
-    }
-}
-
-/// Where frames come from, as it is written.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SourceName {
-    /// The moving scene with known depth.
-    Synthetic,
-    /// A folder with a recording.
-    Folder(PathBuf),
-}
-
-impl std::str::FromStr for SourceName {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match Path::new(text) {
-            _ if text == "synthetic" => Ok(SourceName::Synthetic),
-            folder if folder.is_dir() => Ok(SourceName::Folder(folder.to_owned())),
-            other if other.exists() => Err("it is no folder: use a folder with a recording, or synthetic".to_string()),
-            _ => Err("there is no such folder: use a folder with a recording, or synthetic".to_string()),
-        }
     }
 }
 
@@ -269,9 +241,12 @@ mod tests {
 
     #[test]
     fn the_strength_is_a_share_of_the_height_a_radius_or_a_lens() {
-        let field = |flags: &[&str]| resolve(flags, true).unwrap().coc_field(SIZE, 2.0);
-        let depth = |flags: &[&str]| match field(flags) {
-            CocField::Depth(depth) => (depth.coc_at_infinity_px, depth.max_coc_px),
+        let rule = |flags: &[&str]| resolve(flags, true).unwrap().coc_rule(SIZE);
+        let depth = |flags: &[&str]| match rule(flags) {
+            CocRule::Depth { lens, max_coc_px, .. } => match lens.field(2.0, SIZE.0, max_coc_px) {
+                CocField::Depth(depth) => (depth.coc_at_infinity_px, depth.max_coc_px),
+                other => panic!("{other:?}"),
+            },
             other => panic!("{other:?}"),
         };
         assert_eq!(depth(&[]), (10.0, 27.0));
@@ -281,7 +256,8 @@ mod tests {
         assert!((depth(&lens).0 - 5.698).abs() < 1e-2);
         assert!(refusal(&lens[..2], true).contains("--sensor-width"));
         assert!(refusal(&lens, false).contains("--focus METRES"));
-        assert_eq!(field(&["--effect=blur", "--coc-at-infinity=7"]), CocField::Uniform { radius_px: 7.0 });
+        let even = CocRule::Fixed(CocField::Uniform { radius_px: 7.0 });
+        assert_eq!(rule(&["--effect=blur", "--coc-at-infinity=7"]), even);
     }
 
     #[test]
@@ -298,21 +274,11 @@ mod tests {
         for angle in ["0", "30", "-90"] {
             let tilt = format!("--tilt=0.25:0.1:{angle}");
             let blur = resolve(&["--effect=tilt-shift", "--coc-at-infinity=8", &tilt], true).unwrap();
-            let CocField::Ramp(ramp) = blur.coc_field(SIZE, 1.0) else { panic!("no ramp") };
+            let CocRule::Fixed(CocField::Ramp(ramp)) = blur.coc_rule(SIZE) else { panic!("no ramp") };
             assert_eq!(ramp.coc_px(320.0, 112.5), 0.0);
             let corners = [(0.0, 0.0), (640.0, 0.0), (0.0, 450.0), (640.0, 450.0)];
             let most = corners.map(|(x, y)| ramp.coc_px(x, y)).into_iter().fold(0.0, f32::max);
             assert!((most - 8.0).abs() < 1e-3, "{angle}: {most}");
         }
-    }
-
-    #[test]
-    fn sinks_are_told_by_their_names() {
-        let sink = |text: &str| text.parse::<SinkName>();
-        assert_eq!(sink("out/"), Ok(SinkName::Folder("out/".into())));
-        assert_eq!(sink("-"), Ok(SinkName::Stdout));
-        assert_eq!(sink("a.y4m"), Ok(SinkName::Y4m("a.y4m".into())));
-        assert_eq!(sink("a.webm"), Ok(SinkName::Encoded("a.webm".into())));
-        assert!(sink("out").unwrap_err().contains("DIR/"));
     }
 }

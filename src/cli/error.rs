@@ -5,6 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::bokeh::BokehError;
+use crate::capture::CaptureError;
+use crate::depth::DepthError;
+use crate::pipeline::Fault;
+use crate::recording::RecordingError;
+use crate::sink::SinkError;
 
 /// Why a command did not do what was asked for.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +41,27 @@ pub enum CliError {
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),
+    /// No handler of signals can be set.
+    #[error("signals cannot be handled: {0}")]
+    Signals(String),
+    /// The executor took a picture and gave none back.
+    #[error("the blur gave no picture back: please report this")]
+    NothingCameBack,
+    /// A picture or a recording cannot be read or written.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The source failed.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// There is no depth.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+    /// The output failed.
+    #[error(transparent)]
+    Sink(#[from] SinkError),
+    /// A stage of the pipeline failed.
+    #[error(transparent)]
+    Run(#[from] Fault),
     /// The blur failed.
     #[error(transparent)]
     Bokeh(#[from] BokehError),

@@ -28,9 +28,3 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
         CliError::io(path)(error)
     })
 }
-
-/// Writes a picture as PNG.
-pub fn write_picture(path: &Path, image: &crate::frame::ColorImage) -> Result<(), CliError> {
-    image::save_buffer(path, &image.rgb, image.width, image.height, image::ExtendedColorType::Rgb8)
-        .map_err(|error| CliError::Diagram(error.to_string()))
-}

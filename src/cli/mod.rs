@@ -9,7 +9,11 @@ mod dump;
 mod error;
 mod files;
 mod options;
+mod record;
+mod render;
 mod settings;
+mod source;
+mod stream;
 mod terminal;
 mod values;
 
@@ -43,6 +47,9 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    Stream(Box<stream::StreamCommand>),
+    Render(Box<render::RenderCommand>),
+    Record(record::RecordCommand),
     Aperture(aperture::ApertureCommand),
     /// Print a script that completes commands and options in a shell
     #[command(after_help = "\
@@ -93,6 +100,9 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile) -> Result<(), CliError> {
     match cli.command {
+        Command::Stream(command) => stream::run(&command, &cli.global),
+        Command::Render(command) => render::run(&command, &cli.global),
+        Command::Record(command) => record::run(&command, &cli.global),
         Command::Aperture(command) => aperture::run(&command, &cli.global),
         Command::Completions { shell } => {
             let mut script = Vec::new();

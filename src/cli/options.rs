@@ -54,10 +54,6 @@ pub struct Source {
     /// Frames per second of `synthetic`
     #[arg(long, value_name = "RATE", default_value_t = defaults::FPS, value_parser = rate)]
     pub fps: f64,
-    /// Mirror the picture, as a mirror does
-    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
-    pub mirror: bool,
 }
 
 /// How depth pictures are read.
@@ -156,9 +152,13 @@ pub struct Stream {
     /// Time for one frame, in milliseconds [default: the frame period]
     #[arg(long, value_name = "MS", value_parser = above_zero)]
     pub budget_ms: Option<f32>,
-    /// realtime drops what is late, asap drops nothing [default: realtime to a device, else asap]
-    #[arg(long, value_enum, value_name = "HOW")]
-    pub pace: Option<Pace>,
+    /// Whether frames come when they are due, or as fast as they can be written
+    #[arg(long, value_enum, value_name = "HOW", default_value = "asap")]
+    pub pace: Pace,
+    /// Mirror the picture, as a mirror does
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub mirror: bool,
     /// Count frames that fail and go on, instead of ending
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]

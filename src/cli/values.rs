@@ -9,6 +9,7 @@ use clap::ValueEnum;
 
 use super::error::CliError;
 use crate::bokeh::aperture::{Aperture, Picture, Shape};
+use crate::recording::still::read_grey;
 
 /// What drives the blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -266,14 +267,13 @@ impl ApertureName {
             }
             ApertureName::Heart => Shape::Heart,
             ApertureName::Star { points } => Shape::Star { points },
-            ApertureName::Image(ref file) => Shape::Picture(Arc::new(read_picture(file)?)),
+            ApertureName::Image(ref file) => {
+                let (width, height, grey) = read_grey(file)?;
+                Shape::Picture(Arc::new(Picture { width, height, grey }))
+            }
         };
         Ok(Aperture { shape, intensity })
     }
-}
-
-fn read_picture(file: &std::path::Path) -> Result<Picture, CliError> {
-    Err(CliError::Usage(file.display().to_string()))
 }
 
 fn number_in(text: &str, low: f32, high: f32) -> Option<f32> {
