@@ -44,7 +44,8 @@ fn dumped(dump: &str, name: &str) -> (String, String) {
     (value.to_string(), origin.to_string())
 }
 
-const COMMANDS: [&[&str]; 4] = [&["aperture"], &["completions"], &["config"], &["config", "dump"]];
+const COMMANDS: [&[&str]; 7] =
+    [&["stream"], &["render"], &["record"], &["aperture"], &["completions"], &["config"], &["config", "dump"]];
 
 #[test]
 fn every_command_has_help_with_examples() {
@@ -65,7 +66,15 @@ fn the_version_is_the_packages() {
 
 #[test]
 fn wrong_arguments_cost_one_line_and_exit_code_2() {
-    let cases: [(&[&str], &str); 12] = [
+    let cases: [(&[&str], &str); 20] = [
+        (&["stream", "nowhere", "--to", "null"], "a folder with a recording, or synthetic"),
+        (&["stream", "Cargo.toml", "--to", "null"], "a folder with a recording, or synthetic"),
+        (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
+        (&["stream", "synthetic", "--to", "null", "--loop", "--frames", "1"], "--loop are for recordings"),
+        (&["stream", "synthetic", "--to", "null", "--f-number", "2"], "--sensor-width"),
+        (&["stream", "synthetic", "--to", "null", "--size", "640"], "1280x720"),
+        (&["stream", "synthetic", "--to", "null", "--depth", "none", "--effect", "dof"], "--effect blur"),
+        (&["render", "x.png"], "--out"),
         (&["frobnicate"], "frobnicate"),
         (&["aperture"], "--out"),
         (&["aperture", "--out", "x", "--size", "3"], "5..=257"),
@@ -157,6 +166,108 @@ fn an_unknown_key_in_the_file_is_named_with_its_line() {
 
     let ran: Ran = bokehcam(home.path(), &["config", "dump", "--config", "/nowhere.toml"]).output().unwrap().into();
     assert!(ran.code != 0 && ran.stderr.contains("/nowhere.toml"), "{}", ran.stderr);
+}
+
+/// A recording of three small frames in `home`.
+fn recording(home: &Path) -> String {
+    let folder = home.join("recording").to_str().unwrap().to_string();
+    let args = ["record", "synthetic", "--size", "64x48", "--frames", "3", "--to", &folder];
+    let ran: Ran = bokehcam(home, &args).output().unwrap().into();
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+    folder
+}
+
+#[test]
+fn a_recording_becomes_pictures_and_a_report_that_adds_up() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let (out, report) = (home.path().join("out/"), home.path().join("report.json"));
+    let args = ["stream", &recording, "--to", out.to_str().unwrap(), "--report", report.to_str().unwrap()];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("3 of 3 frames delivered"), "{}", ran.stderr);
+
+    let json: serde_json::Value = serde_json::from_slice(&fs::read(&report).unwrap()).unwrap();
+    assert_eq!((&json["frames"]["captured"], &json["frames"]["delivered"]), (&3.into(), &3.into()));
+    assert_eq!(json["quality"]["balanced"], 1.0);
+    let original = image::open(Path::new(&recording).join("rgb/000001.png")).unwrap().to_rgb8();
+    let blurred = image::open(out.join("000001.png")).unwrap().to_rgb8();
+    assert_eq!(original.dimensions(), blurred.dimensions());
+    assert_ne!(original, blurred);
+
+    let again: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert!(again.code == 1 && again.stderr.contains("--force"), "{}", again.stderr);
+}
+
+#[test]
+fn effect_none_passes_frames_through_and_mirror_turns_them() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let out = home.path().join("out/");
+    let args = ["stream", &recording, "--to", out.to_str().unwrap(), "--effect", "none", "--mirror", "--start", "0.03"];
+    let ran: Ran = bokehcam(home.path(), &[&args[..], &["-q"]].concat()).output().unwrap().into();
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let original = image::open(Path::new(&recording).join("rgb/000001.png")).unwrap().to_rgb8();
+    let mirrored = image::open(out.join("000000.png")).unwrap().fliph().to_rgb8();
+    assert!(original == mirrored, "the second frame, mirrored, comes first");
+}
+
+#[test]
+fn one_picture_is_blurred_by_each_effect_and_its_file_is_safe() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let image = format!("{recording}/rgb/000000.png");
+    let depth = format!("{recording}/depth/000000.png");
+    let out = home.path().join("out.png");
+    let render = |more: &[&str]| -> Ran {
+        let args = [&["render", &image, "--out", out.to_str().unwrap()], more].concat();
+        bokehcam(home.path(), &args).output().unwrap().into()
+    };
+    let mut seen = vec![image::open(&image).unwrap().to_rgb8()];
+    for more in [
+        &["--depth-map", &depth][..],
+        &["--effect", "blur", "--coc-at-infinity", "5", "--force"],
+        &["--effect", "tilt-shift", "--coc-at-infinity", "5", "--force"],
+    ] {
+        let ran = render(more);
+        assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+        let result = image::open(&out).unwrap().to_rgb8();
+        assert!(seen.iter().all(|other| *other != result), "{more:?} is something of its own");
+        seen.push(result);
+    }
+    let refused = render(&["--effect", "none"]);
+    assert!(refused.code == 1 && refused.stderr.contains("--force"), "{}", refused.stderr);
+    assert!(image::open(&out).unwrap().to_rgb8() == seen[3], "what was there stays");
+    let passed = render(&["--effect", "none", "--force"]);
+    assert_eq!(passed.code, 0, "{}", passed.stderr);
+    assert!(image::open(&out).unwrap().to_rgb8() == seen[0]);
+}
+
+#[test]
+fn an_aperture_can_be_a_picture() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let cat = home.path().join("cat.png");
+    image::GrayImage::from_fn(9, 9, |x, _| image::Luma([if x < 3 { 255 } else { 0 }])).save(&cat).unwrap();
+    let aperture = format!("image:{}", cat.display());
+    let args = ["stream", &recording, "--to", "null", "--aperture", &aperture];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+
+    let args = ["stream", &recording, "--to", "null", "--aperture", "image:nowhere.png"];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert!(ran.code == 1 && ran.stderr.contains("nowhere.png"), "{}", ran.stderr);
+}
+
+#[test]
+fn y4m_on_standard_output_is_nothing_but_y4m() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let output = bokehcam(home.path(), &["stream", &recording, "--to", "-"]).output().unwrap();
+    assert!(output.status.success());
+    let header_end = output.stdout.iter().position(|&byte| byte == b'\n').unwrap() + 1;
+    assert!(output.stdout.starts_with(b"YUV4MPEG2 W64 H48 "));
+    assert_eq!(output.stdout.len() - header_end, 3 * ("FRAME\n".len() + 64 * 48 * 3 / 2));
 }
 
 #[test]

@@ -49,7 +49,7 @@ pub enum CliError {
     NothingCameBack,
     /// A picture or a recording cannot be read or written.
     #[error(transparent)]
-    Recording(#[from] RecordingError),
+    Recording(RecordingError),
     /// The source failed.
     #[error(transparent)]
     Capture(#[from] CaptureError),
@@ -65,6 +65,16 @@ pub enum CliError {
     /// The blur failed.
     #[error(transparent)]
     Bokeh(#[from] BokehError),
+}
+
+impl From<RecordingError> for CliError {
+    fn from(error: RecordingError) -> Self {
+        match error {
+            // Here it is known what the way to overwrite is called.
+            RecordingError::Exists { path } => CliError::Exists(path),
+            other => CliError::Recording(other),
+        }
+    }
 }
 
 impl CliError {

@@ -1,6 +1,6 @@
 //! `stream`: a source, blurred, into a sink.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use clap::Args;
 
@@ -95,7 +95,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
     ended
 }
 
-fn write_report(path: &PathBuf, report: &Report) -> Result<(), CliError> {
+fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
     let mut json = Vec::new();
     report.write_json(&mut json).map_err(CliError::io(path))?;
     write_whole(path, &json)
