@@ -44,8 +44,16 @@ fn dumped(dump: &str, name: &str) -> (String, String) {
     (value.to_string(), origin.to_string())
 }
 
-const COMMANDS: [&[&str]; 7] =
-    [&["stream"], &["render"], &["record"], &["aperture"], &["completions"], &["config"], &["config", "dump"]];
+const COMMANDS: [&[&str]; 8] = [
+    &["stream"],
+    &["render"],
+    &["record"],
+    &["aperture"],
+    &["bench"],
+    &["completions"],
+    &["config"],
+    &["config", "dump"],
+];
 
 #[test]
 fn every_command_has_help_with_examples() {
@@ -257,6 +265,20 @@ fn an_aperture_can_be_a_picture() {
     let args = ["stream", &recording, "--to", "null", "--aperture", "image:nowhere.png"];
     let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
     assert!(ran.code == 1 && ran.stderr.contains("nowhere.png"), "{}", ran.stderr);
+}
+
+#[test]
+fn bench_measures_every_combination() {
+    let args = ["bench", "--sizes", "64x48,17x13", "--coc", "2,4", "--threads", "1,2", "--frames", "3", "--json"];
+    let ran = run(&[&args[..], &["--backend", "cpu"]].concat());
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let lines: Vec<serde_json::Value> = ran.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 8);
+    for line in &lines {
+        let time = |key: &str| line[key].as_f64().unwrap();
+        assert!(0.0 < time("p50_ms") && time("p50_ms") <= time("p95_ms") && time("p95_ms") <= time("max_ms"), "{line}");
+    }
+    assert!(lines[0]["executor"].as_str().unwrap().contains("1 thread"), "{}", lines[0]);
 }
 
 #[test]

@@ -176,12 +176,17 @@ pub struct Executor {
 impl Executor {
     /// Resolves options.
     pub fn of(computing: &options::Computing) -> Self {
-        let backend = match computing.backend {
+        Self::new(computing.backend, computing.adapter.clone(), computing.threads)
+    }
+
+    /// An executor by its backend, part of its adapter's name, and its number of threads.
+    pub fn new(backend: values::Backend, adapter: Option<String>, threads: Option<usize>) -> Self {
+        let backend = match backend {
             values::Backend::Auto => Backend::Auto,
             values::Backend::Gpu => Backend::Gpu,
             values::Backend::Cpu => Backend::Cpu,
         };
-        Self { backend, adapter: computing.adapter.clone(), threads: computing.threads }
+        Self { backend, adapter, threads }
     }
 
     /// An executor for pictures of `size` pixels.

@@ -28,3 +28,7 @@ pub const ANALYSED_APERTURES: &str = "disc,ring:0.5,polygon:5,polygon:6,polygon:
 pub const ANALYSED_RANKS: &str = "1,2,3,4,6,8";
 /// Columns and rows of the kernels that it decomposes.
 pub const ANALYSED_SIZE: &str = "65";
+/// Picture sizes that the command `bench` measures.
+pub const BENCHED_SIZES: &str = "640x480,1280x720,1920x1080";
+/// Frames that it measures of each.
+pub const BENCHED_FRAMES: u32 = 20;

@@ -3,6 +3,7 @@
 mod aperture;
 mod aperture_plot;
 mod aperture_sheet;
+mod bench;
 mod config;
 mod defaults;
 mod dump;
@@ -51,6 +52,7 @@ enum Command {
     Render(Box<render::RenderCommand>),
     Record(record::RecordCommand),
     Aperture(aperture::ApertureCommand),
+    Bench(Box<bench::BenchCommand>),
     /// Print a script that completes commands and options in a shell
     #[command(after_help = "\
 Examples:
@@ -104,6 +106,7 @@ fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile) -> Result<(), Cl
         Command::Render(command) => render::run(&command, &cli.global),
         Command::Record(command) => record::run(&command, &cli.global),
         Command::Aperture(command) => aperture::run(&command, &cli.global),
+        Command::Bench(command) => bench::run(&command),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "bokehcam", &mut script);

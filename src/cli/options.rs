@@ -69,7 +69,7 @@ pub struct Depth {
 }
 
 /// What the blur does.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Blur")]
 pub struct Blur {
     /// What the blur follows [default: dof with depth, else blur]
@@ -211,6 +211,7 @@ fn rate(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "use frames per second from 0.1 to 1000".to_string())
 }
 
-fn quality() -> impl TypedValueParser<Value = Quality> {
+/// A parser of quality levels.
+pub fn quality() -> impl TypedValueParser<Value = Quality> {
     PossibleValuesParser::new(Quality::ALL.map(Quality::name)).try_map(|name| name.parse::<Quality>())
 }

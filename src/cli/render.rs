@@ -12,6 +12,7 @@ use crate::bokeh::{BokehError, Job};
 use crate::depth::{fill::Filler, focus::Focus};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
+use crate::optics::CocField;
 use crate::pipeline::CocRule;
 use crate::recording::still;
 
@@ -72,16 +73,7 @@ fn blurred(
 ) -> Result<(ColorImage, String), CliError> {
     let size = color.size();
     let Some(settings) = blur.settings(size) else { return Ok((color, "not blurred".to_string())) };
-    let (coc, depth) = match (blur.coc_rule(size), depth) {
-        (CocRule::Fixed(field), _) => (field, None),
-        (CocRule::Depth { .. }, None) => return Err(BokehError::NoDepth.into()),
-        (CocRule::Depth { focus, lens, max_coc_px }, Some(mut map)) => {
-            // Focus looks at what was measured, so it comes before the holes are filled.
-            let focus_m = Focus::new(focus).focus_m(&map, 0);
-            Filler::new().fill(&mut map);
-            (lens.field(focus_m, size.0, max_coc_px), Some(map))
-        }
-    };
+    let (coc, depth) = prepared(blur, size, depth)?;
     let mut bokeh = executor.create(&settings, size)?;
     bokeh.submit(Job {
         ticket: 0,
@@ -93,5 +85,26 @@ fn blurred(
     match bokeh.collect(true)? {
         Some(mut finished) => Ok((std::mem::take(&mut *finished.out), bokeh.describe())),
         None => Err(CliError::NothingCameBack),
+    }
+}
+
+/// What a frame on its own is blurred by: the radius of every pixel, and the depth map (holes filled) if that needs it.
+///
+/// # Errors
+/// [`BokehError::NoDepth`] when the blur follows depth and there is none.
+pub fn prepared(
+    blur: &Blur,
+    size: (u32, u32),
+    depth: Option<DepthMap>,
+) -> Result<(CocField, Option<DepthMap>), BokehError> {
+    match (blur.coc_rule(size), depth) {
+        (CocRule::Fixed(field), _) => Ok((field, None)),
+        (CocRule::Depth { .. }, None) => Err(BokehError::NoDepth),
+        (CocRule::Depth { focus, lens, max_coc_px }, Some(mut map)) => {
+            // Focus looks at what was measured, so it comes before the holes are filled.
+            let focus_m = Focus::new(focus).focus_m(&map, 0);
+            Filler::new().fill(&mut map);
+            Ok((lens.field(focus_m, size.0, max_coc_px), Some(map)))
+        }
     }
 }
