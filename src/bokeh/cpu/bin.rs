@@ -2,39 +2,40 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::rows::{CELL_PLANES, Rows};
+use super::rows::{CELL_PLANES, Rows, TILE_H, TILE_W};
 use super::simd::madd;
-use super::unpack::{TILE_H, TILE_W};
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR};
 
-/// How much of a pixel with a given CoC a bin takes.
+/// How much of a pixel with a given CoC a bin takes: a step up at the border in front, a step down at the one behind.
 #[derive(Clone, Copy, Debug)]
 pub struct Share {
-    /// Border to the bin in front: CoC and slope of the hand-over.
-    pub front: Option<(f32, f32)>,
-    /// Border to the bin behind.
-    pub behind: Option<(f32, f32)>,
+    front: (f32, f32),
+    behind: (f32, f32),
 }
 
 impl Share {
+    /// Borders as CoC and slope of the hand-over; `None` where there is no bin beyond.
+    pub fn new(front: Option<(f32, f32)>, behind: Option<(f32, f32)>) -> Self {
+        Self { front: front.unwrap_or((-1e30, 1.0)), behind: behind.unwrap_or((1e30, 1.0)) }
+    }
+
     /// The share at a CoC, 0 to 1; the shares of all bins of a plan sum to 1.
     #[inline(always)]
     pub fn at(&self, coc_px: f32) -> f32 {
-        step(self.front, coc_px, 1.0) - step(self.behind, coc_px, 0.0)
+        step(self.front, coc_px) - step(self.behind, coc_px)
     }
 
     /// Whether any CoC in a range has a share.
     pub fn meets(&self, (low_px, high_px): (f32, f32)) -> bool {
-        step(self.front, high_px, 1.0) > 0.0 && step(self.behind, low_px, 0.0) < 1.0
+        step(self.front, high_px) > 0.0 && step(self.behind, low_px) < 1.0
     }
 }
 
 #[inline(always)]
-fn step(border: Option<(f32, f32)>, coc_px: f32, without: f32) -> f32 {
-    match border {
-        Some((at, slope)) => ((coc_px - at) * slope + 0.5).clamp(0.0, 1.0),
-        None => without,
-    }
+fn step((at, slope): (f32, f32), coc_px: f32) -> f32 {
+    let value = (coc_px - at) * slope + 0.5;
+    let value = if value > 0.0 { value } else { 0.0 };
+    if value < 1.0 { value } else { 1.0 }
 }
 
 /// One row of cells of one bin.
@@ -61,8 +62,8 @@ pub struct BinBand<'a> {
     pub pad: usize,
     /// This row of cells.
     pub cells: &'a mut [f32],
-    /// Sums of up to 4 rows at picture scale: `5 * TILE_W` values.
-    pub scratch: &'a mut [f32],
+    /// Per tile across, whether `out` holds anything but zeros there.
+    pub filled: &'a mut [bool],
 }
 
 impl WithSimd for BinBand<'_> {
@@ -80,103 +81,114 @@ impl WithSimd for BinBand<'_> {
 impl BinBand<'_> {
     #[inline(always)]
     fn fill<V: Simd, const S: usize>(mut self) {
-        let cells_across = self.cells.len() / CELL_PLANES;
-        let rows = self.out.len() / (5 * self.stride);
-        self.cells[..2 * cells_across].fill(0.0);
-        self.cells[2 * cells_across..5 * cells_across].fill(f32::INFINITY);
-        self.cells[5 * cells_across..].fill(f32::NEG_INFINITY);
-        for chunk in 0..self.size.0.div_ceil(TILE_W) {
-            let (x0, across) = (chunk * TILE_W / S, TILE_W / S);
-            let meets = self.share.is_none_or(|share| {
-                let first = self.band * CELL * S / TILE_H;
-                let tiles_across = self.size.0.div_ceil(TILE_W);
-                (first..(first + S).min(self.tiles.len() / tiles_across))
-                    .any(|row| share.meets(self.tiles[row * tiles_across + chunk]))
-            });
-            for row in 0..rows {
-                for plane in 0..5 {
-                    let start = (row * 5 + plane) * self.stride + self.pad + x0;
-                    let take = across.min(self.stride - self.pad - x0);
-                    self.out[start..start + take].fill(0.0);
-                }
-                if meets {
-                    self.average::<V, S>(row, chunk);
-                    self.measure(row, x0, across.min(self.width.saturating_sub(x0)));
-                }
-            }
-        }
-        for planes in self.out.chunks_exact_mut(self.stride) {
-            let (first, last) = (planes[self.pad], planes[self.pad + self.width - 1]);
-            planes[..self.pad].fill(first);
-            planes[self.pad + self.width..].fill(last);
-        }
-    }
-
-    /// Averages one row of one chunk.
-    #[inline(always)]
-    fn average<V: Simd, const S: usize>(&mut self, row: usize, chunk: usize) {
-        let (width, height) = self.size;
-        let sums: &mut [[f32; TILE_W]] = self.scratch.as_chunks_mut().0;
-        let Some(sums) = sums.first_chunk_mut::<5>() else { return };
-        *sums = [[0.0; TILE_W]; 5];
-        let x0 = chunk * TILE_W;
-        let take = TILE_W.min(width - x0);
-        for sub in 0..S {
-            let y = ((self.band * CELL + row) * S + sub).min(height - 1);
-            let planes = self.scene.row(y);
-            let plane = |p: usize| &planes[p * self.scene.stride + x0..][..take];
-            let (r, g, b, c) = (plane(0), plane(1), plane(2), plane(3));
-            for x in 0..take {
-                let share = self.share.map_or(1.0, |share| share.at(c[x]));
-                sums[0][x] = madd::<V>(share, r[x], sums[0][x]);
-                sums[1][x] = madd::<V>(share, g[x], sums[1][x]);
-                sums[2][x] = madd::<V>(share, b[x], sums[2][x]);
-                sums[3][x] += share;
-                sums[4][x] = madd::<V>(share, c[x].abs(), sums[4][x]);
-            }
-        }
-        let out_width = take.div_ceil(S);
-        for (plane, sum) in sums.iter_mut().enumerate() {
-            for x in take..out_width * S {
-                sum[x] = sum[take - 1];
-            }
-            let start = (row * 5 + plane) * self.stride + self.pad + x0 / S;
-            let out = &mut self.out[start..start + out_width];
-            for (out, group) in out.iter_mut().zip(sum.as_chunks::<S>().0) {
-                *out = group.iter().sum::<f32>() * (1.0 / (S * S) as f32);
-            }
-        }
-    }
-
-    /// Adds a row of one chunk to its cells.
-    #[inline(always)]
-    fn measure(&mut self, row: usize, x0: usize, take: usize) {
         let across = self.cells.len() / CELL_PLANES;
-        let plane = |p: usize| (row * 5 + p) * self.stride + self.pad + x0;
-        for first in (0..take).step_by(CELL) {
-            let cell = (x0 + first) / CELL;
-            let span = CELL.min(take - first);
-            let coverage = &self.out[plane(3) + first..][..span];
-            let sum: f32 = coverage.iter().sum();
-            if sum <= 0.0 {
-                continue;
-            }
-            self.cells[cell] += sum;
-            self.cells[across + cell] += self.out[plane(4) + first..][..span].iter().sum::<f32>();
-            for p in 0..3 {
-                let color = &self.out[plane(p) + first..][..span];
-                let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-                for (&color, &coverage) in color.iter().zip(coverage) {
-                    let own = color / coverage;
-                    let counts = coverage > COVERAGE_FLOOR;
-                    low = if counts && own < low { own } else { low };
-                    high = if counts && own > high { own } else { high };
+        self.cells[..2 * across].fill(0.0);
+        self.cells[2 * across..5 * across].fill(f32::INFINITY);
+        self.cells[5 * across..].fill(f32::NEG_INFINITY);
+        for chunk in 0..self.filled.len() {
+            if self.meets::<S>(chunk) {
+                self.chunk::<V, S>(chunk);
+                self.filled[chunk] = true;
+            } else if std::mem::take(&mut self.filled[chunk]) {
+                for plane in self.out.chunks_exact_mut(self.stride) {
+                    plane[self.pad + chunk * (TILE_W / S)..][..TILE_W / S].fill(0.0);
                 }
-                let (lows, highs) = ((2 + p) * across + cell, (5 + p) * across + cell);
-                self.cells[lows] = self.cells[lows].min(low);
-                self.cells[highs] = self.cells[highs].max(high);
             }
         }
+        for plane in self.out.chunks_exact_mut(self.stride) {
+            let (first, last) = (plane[self.pad], plane[self.pad + self.width - 1]);
+            plane[..self.pad].fill(first);
+            plane[self.pad + self.width..].fill(last);
+        }
+    }
+
+    /// Whether a chunk of this row of cells has anything for this bin.
+    #[inline(always)]
+    fn meets<const S: usize>(&self, chunk: usize) -> bool {
+        let across = self.filled.len();
+        let first = self.band * CELL * S / TILE_H;
+        let last = (first + S).min(self.tiles.len() / across);
+        self.share.is_none_or(|share| (first..last).any(|row| share.meets(self.tiles[row * across + chunk])))
+    }
+
+    /// One chunk of all rows, and its cells.
+    #[inline(always)]
+    fn chunk<V: Simd, const S: usize>(&mut self, chunk: usize) {
+        let rows = self.out.len() / (5 * self.stride);
+        let (x0, width) = (chunk * TILE_W / S, TILE_W / S);
+        let mut coverage = [[0.0f32; TILE_W]; 2];
+        let mut range = [[f32::INFINITY; TILE_W]; 6];
+        range[3..].fill([f32::NEG_INFINITY; TILE_W]);
+        for row in 0..rows {
+            let sums = self.sums::<V, S>(row, chunk);
+            let mut means = [[0.0f32; TILE_W]; 5];
+            for (mean, sum) in means.iter_mut().zip(&sums) {
+                for (mean, group) in mean.iter_mut().zip(sum.as_chunks::<S>().0) {
+                    let mut total = 0.0;
+                    for value in group {
+                        total += value;
+                    }
+                    *mean = total * (1.0 / (S * S) as f32);
+                }
+            }
+            for (p, mean) in means.iter().enumerate() {
+                self.out[(row * 5 + p) * self.stride + self.pad + x0..][..width].copy_from_slice(&mean[..width]);
+            }
+            for x in 0..width {
+                coverage[0][x] += means[3][x];
+                coverage[1][x] += means[4][x];
+                let counts = means[3][x] > COVERAGE_FLOOR;
+                let inverse = if counts { 1.0 / means[3][x] } else { 0.0 };
+                for p in 0..3 {
+                    let own = means[p][x] * inverse;
+                    let low = if counts { own } else { f32::INFINITY };
+                    let high = if counts { own } else { f32::NEG_INFINITY };
+                    range[p][x] = if low < range[p][x] { low } else { range[p][x] };
+                    range[3 + p][x] = if high > range[3 + p][x] { high } else { range[3 + p][x] };
+                }
+            }
+        }
+        let across = self.cells.len() / CELL_PLANES;
+        let valid = width.min(self.width.saturating_sub(x0));
+        for first in (0..valid).step_by(CELL) {
+            let (cell, span) = ((x0 + first) / CELL, first..(first + CELL).min(valid));
+            for p in 0..2 {
+                self.cells[p * across + cell] = coverage[p][span.clone()].iter().sum();
+                for k in 0..3 {
+                    let values = range[3 * p + k][span.clone()].iter().copied();
+                    let value = &mut self.cells[(2 + 3 * p + k) * across + cell];
+                    *value = if p == 0 { values.fold(*value, f32::min) } else { values.fold(*value, f32::max) };
+                }
+            }
+        }
+    }
+
+    /// The rows of the picture under one row of the bin, weighted and summed.
+    #[inline(always)]
+    fn sums<V: Simd, const S: usize>(&self, row: usize, chunk: usize) -> [[f32; TILE_W]; 5] {
+        let mut sums = [[0.0f32; TILE_W]; 5];
+        for sub in 0..S {
+            let y = ((self.band * CELL + row) * S + sub).min(self.size.1 - 1);
+            let planes = self.scene.row(y);
+            let mut tile = [[0.0f32; TILE_W]; 4];
+            for (p, tile) in tile.iter_mut().enumerate() {
+                tile.copy_from_slice(&planes[p * self.scene.stride + chunk * TILE_W..][..TILE_W]);
+            }
+            let mut shares = [1.0f32; TILE_W];
+            if let Some(share) = self.share {
+                for (share_at, &coc) in shares.iter_mut().zip(&tile[3]) {
+                    *share_at = share.at(coc);
+                }
+            }
+            for x in 0..TILE_W {
+                sums[0][x] = madd::<V>(shares[x], tile[0][x], sums[0][x]);
+                sums[1][x] = madd::<V>(shares[x], tile[1][x], sums[1][x]);
+                sums[2][x] = madd::<V>(shares[x], tile[2][x], sums[2][x]);
+                sums[3][x] += shares[x];
+                sums[4][x] = madd::<V>(shares[x], tile[3][x].abs(), sums[4][x]);
+            }
+        }
+        sums
     }
 }
 
@@ -187,7 +199,7 @@ mod tests {
     #[test]
     fn the_shares_of_all_bins_sum_to_one() {
         let borders = [(-7.0, 0.5), (-1.0, 3.0), (1.0, 3.0), (4.0, 0.8)];
-        let bin = |k: usize| Share { front: k.checked_sub(1).map(|k| borders[k]), behind: borders.get(k).copied() };
+        let bin = |k: usize| Share::new(k.checked_sub(1).map(|k| borders[k]), borders.get(k).copied());
         for step in -200..200 {
             let coc_px = step as f32 * 0.1;
             let sum: f32 = (0..=borders.len()).map(|k| bin(k).at(coc_px)).sum();

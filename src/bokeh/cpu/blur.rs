@@ -3,9 +3,11 @@
 //! The radius is read at the edges of segments of `SEGMENT` pixels and the taps are linear between them, so that it
 //! varies without steps. Where every profile is even, taps at -j and j share one multiplication.
 
+#![allow(clippy::needless_range_loop)] // Terms and planes index several arrays at once.
+
 use pulp::{Simd, WithSimd};
 
-use super::rows::{Cells, STRIP};
+use super::rows::{Cells, EDGE_VALUES, Edges, STRIP, STRIP_EDGES};
 use super::simd::{fma, load, store};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, SEGMENT};
@@ -25,8 +27,8 @@ pub struct Strip<'a> {
     pub height: usize,
     /// The grid as measured (what is where).
     pub cells: &'a Cells,
-    /// The grid after `reach`.
-    pub near_cells: &'a Cells,
+    /// Radius and range of colours, from `reach`.
+    pub edges: &'a Edges,
     /// The filters.
     pub bank: &'a Bank,
     /// Whether the aperture is turned (content in front of the focal plane).
@@ -90,10 +92,9 @@ impl Strip<'_> {
         filtered.extend((0..rows).map(|y| self.cells.plane(y, 0)[columns.clone()].iter().any(|&c| c > 0.0)));
         for y in 0..rows {
             let reach = y.saturating_sub(down)..(y + down + 1).min(rows);
-            self.active[y] = filtered[reach].iter().any(|&f| f) && self.wanted.is_none_or(|wanted| wanted[y]);
-        }
-        for (y, &active) in self.active.iter().enumerate() {
-            if !active {
+            let active = filtered[reach].iter().any(|&f| f) && self.wanted.is_none_or(|wanted| wanted[y]);
+            let was = std::mem::replace(&mut self.active[y], active);
+            if was && !active {
                 let end = ((y + 1) * CELL).min(self.height);
                 self.out[y * CELL * 4 * STRIP..end * 4 * STRIP].fill(0.0);
             }
@@ -101,134 +102,116 @@ impl Strip<'_> {
         self.active.iter().any(|&a| a)
     }
 
+    /// Filters `R` terms from `first` on: all rows, then all columns.
     #[inline(always)]
     fn group<S: Simd, const R: usize, const EVEN: bool>(&mut self, simd: S, first: usize) {
         let mut scratch = std::mem::take(&mut self.scratch.rows);
-        let rows = &mut scratch[..self.height * R * 4 * STRIP];
         let down = self.reach.div_ceil(CELL);
-        for y in 0..self.height {
-            let (cell, out) = (y / CELL, &mut rows[y * R * 4 * STRIP..][..R * 4 * STRIP]);
+        for (y, row) in scratch.chunks_exact_mut(R * 4 * STRIP).take(self.height).enumerate() {
+            let cell = y / CELL;
             let needed = cell.saturating_sub(down)..(cell + down + 1).min(self.active.len());
-            if !self.active[needed].iter().any(|&a| a) {
+            if !self.active[needed].iter().any(|&active| active) {
                 continue;
             }
-            if !self.filtered(cell) {
-                out.fill(0.0);
-                continue;
+            if self.scratch.filtered[cell] {
+                self.row::<S, R, EVEN>(simd, first, y, row);
+            } else {
+                row.fill(0.0);
             }
-            let source = &self.source[y * 5 * self.stride..][..5 * self.stride];
-            let at = self.pad + self.strip * STRIP - self.reach;
-            let planes: [&[f32]; 4] =
-                std::array::from_fn(|p| &source[p * self.stride + at..][..STRIP + 2 * self.reach]);
-            self.segments::<S, R>(y, first, &self.bank.horizontal, |taps, x| {
-                let sums = if taps.steady {
-                    along_row::<S, R, EVEN, false>(simd, &taps, &planes, x + self.reach)
-                } else {
-                    along_row::<S, R, EVEN, true>(simd, &taps, &planes, x + self.reach)
-                };
-                for (k, sum) in sums.iter().flatten().enumerate() {
-                    store::<S>(out, k * STRIP + x, *sum);
-                }
-            });
         }
-        let last = first + R >= self.bank.terms;
-        let result = std::mem::take(&mut self.out);
-        for y in (0..self.height).filter(|y| self.active[y / CELL]) {
-            let out = &mut result[y * 4 * STRIP..][..4 * STRIP];
-            self.segments::<S, R>(y, first, &self.bank.vertical, |taps, x| {
-                let mut sums = if taps.steady {
-                    along_column::<S, R, EVEN, false>(simd, &taps, rows, y, x, self.height)
-                } else {
-                    along_column::<S, R, EVEN, true>(simd, &taps, rows, y, x, self.height)
-                };
-                if first > 0 {
-                    for (p, sum) in sums.iter_mut().enumerate() {
-                        *sum = simd.add_f32s(*sum, load::<S>(out, p * STRIP + x));
-                    }
-                }
-                if last {
-                    keep_in_range(simd, &mut sums, self.near_cells, y, self.strip * STRIP + x);
-                }
-                for (p, sum) in sums.iter().enumerate() {
-                    store::<S>(out, p * STRIP + x, *sum);
-                }
-            });
+        for y in 0..self.height {
+            if self.active[y / CELL] {
+                self.columns::<S, R, EVEN>(simd, first, y, &scratch);
+            }
         }
-        self.out = result;
         self.scratch.rows = scratch;
     }
 
     #[inline(always)]
-    fn filtered(&self, cell: usize) -> bool {
-        self.scratch.filtered[cell]
-    }
-
-    /// Calls `work` for every vector of row `y`, with the taps of its segment and its column in the strip.
-    #[inline(always)]
-    fn segments<S: Simd, const R: usize>(
-        &self,
-        y: usize,
-        first: usize,
-        table: &[f32],
-        mut work: impl FnMut(Taps<'_, R>, usize),
-    ) {
-        let nodes = self.nodes(y);
-        for (segment, edges) in nodes.windows(2).enumerate() {
-            let reach = self.bank.node_reach[edges[0].max(edges[1])] as usize;
-            let origin = |node: usize| self.bank.tap(node, 0) + first;
-            for lane in (0..SEGMENT).step_by(S::F32_LANES) {
-                let taps = Taps {
-                    table,
-                    left: origin(edges[0]),
-                    right: origin(edges[1]),
-                    step: if self.turned { -(self.bank.terms as isize) } else { self.bank.terms as isize },
-                    reach,
-                    lane,
-                    steady: edges[0] == edges[1],
-                };
-                work(taps, segment * SEGMENT + lane);
+    fn row<S: Simd, const R: usize, const EVEN: bool>(&self, simd: S, first: usize, y: usize, out: &mut [f32]) {
+        let start = y * 5 * self.stride + self.pad + self.strip * STRIP - self.reach;
+        let span = STRIP + 2 * self.reach;
+        let plane = |p: usize| &self.source[start + p * self.stride..][..span];
+        let planes = [plane(0), plane(1), plane(2), plane(3)];
+        let edges = self.edges.at(self.strip, y);
+        let mut x = 0;
+        while x < STRIP {
+            let taps = self.taps::<R>(&self.bank.horizontal, first, &edges, x);
+            let sums = if taps.steady {
+                along_row::<S, R, EVEN, false>(simd, &taps, &planes, x + self.reach)
+            } else {
+                along_row::<S, R, EVEN, true>(simd, &taps, &planes, x + self.reach)
+            };
+            for r in 0..R {
+                for p in 0..4 {
+                    store::<S>(out, (r * 4 + p) * STRIP + x, sums[r][p]);
+                }
             }
+            x += S::F32_LANES;
         }
     }
 
-    /// The nodes of the bank at the segment edges of this strip, in row `y`.
     #[inline(always)]
-    fn nodes(&self, y: usize) -> [usize; STRIP / SEGMENT + 1] {
-        let first = self.strip * STRIP / SEGMENT;
-        std::array::from_fn(|k| self.bank.node(at_edge(self.near_cells, 1, y, first + k)))
+    fn columns<S: Simd, const R: usize, const EVEN: bool>(&mut self, simd: S, first: usize, y: usize, rows: &[f32]) {
+        let edges = self.edges.at(self.strip, y);
+        let mut x = 0;
+        while x < STRIP {
+            let taps = self.taps::<R>(&self.bank.vertical, first, &edges, x);
+            let mut sums = if taps.steady {
+                along_column::<S, R, EVEN, false>(simd, &taps, rows, y, x, self.height)
+            } else {
+                along_column::<S, R, EVEN, true>(simd, &taps, rows, y, x, self.height)
+            };
+            let out = &mut self.out[y * 4 * STRIP..][..4 * STRIP];
+            if first > 0 {
+                for p in 0..4 {
+                    sums[p] = simd.add_f32s(sums[p], load::<S>(out, p * STRIP + x));
+                }
+            }
+            if first + R >= self.bank.terms {
+                keep_in_range(simd, &mut sums, &edges, x);
+            }
+            for p in 0..4 {
+                store::<S>(out, p * STRIP + x, sums[p]);
+            }
+            x += S::F32_LANES;
+        }
     }
-}
 
-/// A plane of the coarse grid, at row `y` of the bin and the left edge of segment `segment`.
-#[inline(always)]
-pub fn at_edge(cells: &Cells, plane: usize, y: usize, segment: usize) -> f32 {
-    let right = segment * SEGMENT / CELL;
-    let (left, right) = (right.saturating_sub(1), right.min(cells.width - 1));
-    let along = (y as f32 - (CELL as f32 - 1.0) / 2.0) / CELL as f32;
-    let along = along.clamp(0.0, (cells.height - 1) as f32);
-    let (above, share) = (along as usize, along.fract());
-    let below = (above + 1).min(cells.height - 1);
-    let mean = |y: usize| {
-        let row = cells.plane(y, plane);
-        0.5 * (row[left] + row[right])
-    };
-    mean(above) * (1.0 - share) + mean(below) * share
+    /// The taps of the vector at column `x` of the strip.
+    #[inline(always)]
+    fn taps<'b, const R: usize>(
+        &self,
+        table: &'b [f32],
+        first: usize,
+        edges: &[[f32; EDGE_VALUES]; STRIP_EDGES],
+        x: usize,
+    ) -> Taps<'b, R> {
+        let segment = x / SEGMENT;
+        let (left, right) = (self.bank.node(edges[segment][0]), self.bank.node(edges[segment + 1][0]));
+        Taps {
+            table,
+            left: self.bank.tap(left, 0) + first,
+            right: self.bank.tap(right, 0) + first,
+            step: if self.turned { -(self.bank.terms as isize) } else { self.bank.terms as isize },
+            reach: self.bank.node_reach[left.max(right)] as usize,
+            lane: x % SEGMENT,
+            steady: left == right,
+        }
+    }
 }
 
 /// Truncation leaves lobes: no result may leave the range of the colours that went into it.
 #[inline(always)]
-fn keep_in_range<S: Simd>(simd: S, sums: &mut [S::f32s; 4], cells: &Cells, y: usize, x: usize) {
-    let (segment, lane) = (x / SEGMENT, x % SEGMENT);
-    let across = load::<S>(&ACROSS, lane);
-    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-    let coverage = simd.min_f32s(simd.max_f32s(sums[3], zero), one);
-    let bound = |plane: usize| {
-        let (left, right) = (at_edge(cells, plane, y, segment), at_edge(cells, plane, y, segment + 1));
-        let value = fma(simd, simd.splat_f32s(right - left), across, simd.splat_f32s(left));
-        simd.mul_f32s(value, coverage)
-    };
-    for (p, sum) in sums.iter_mut().take(3).enumerate() {
-        *sum = simd.min_f32s(simd.max_f32s(*sum, bound(2 + p)), bound(5 + p));
+fn keep_in_range<S: Simd>(simd: S, sums: &mut [S::f32s; 4], edges: &[[f32; EDGE_VALUES]; STRIP_EDGES], x: usize) {
+    let (left, right) = (&edges[x / SEGMENT], &edges[x / SEGMENT + 1]);
+    let across = load::<S>(&ACROSS, x % SEGMENT);
+    let coverage = simd.min_f32s(simd.max_f32s(sums[3], simd.splat_f32s(0.0)), simd.splat_f32s(1.0));
+    for p in 0..3 {
+        let low = between(simd, left[1 + p], right[1 + p], across);
+        let high = between(simd, left[4 + p], right[4 + p], across);
+        let at_least = simd.max_f32s(sums[p], simd.mul_f32s(low, coverage));
+        sums[p] = simd.min_f32s(at_least, simd.mul_f32s(high, coverage));
     }
     sums[3] = coverage;
 }
@@ -243,6 +226,11 @@ const ACROSS: [f32; SEGMENT] = {
     }
     at
 };
+
+#[inline(always)]
+fn between<S: Simd>(simd: S, left: f32, right: f32, across: S::f32s) -> S::f32s {
+    fma(simd, simd.splat_f32s(right - left), across, simd.splat_f32s(left))
+}
 
 /// The taps of a group of `R` terms for one vector of a segment.
 struct Taps<'a, const R: usize> {
@@ -261,14 +249,20 @@ struct Taps<'a, const R: usize> {
 impl<const R: usize> Taps<'_, R> {
     #[inline(always)]
     fn at<S: Simd, const VARY: bool>(&self, simd: S, j: isize) -> [S::f32s; R] {
-        let read = |origin: usize| &self.table[origin.wrapping_add_signed(j * self.step)..][..R];
-        let left = read(self.left);
-        if !VARY {
-            return std::array::from_fn(|r| simd.splat_f32s(left[r]));
+        let left = &self.table[self.left.wrapping_add_signed(j * self.step)..][..R];
+        let mut taps = [simd.splat_f32s(0.0); R];
+        if VARY {
+            let right = &self.table[self.right.wrapping_add_signed(j * self.step)..][..R];
+            let across = load::<S>(&ACROSS, self.lane);
+            for r in 0..R {
+                taps[r] = between(simd, left[r], right[r], across);
+            }
+        } else {
+            for r in 0..R {
+                taps[r] = simd.splat_f32s(left[r]);
+            }
         }
-        let right = read(self.right);
-        let across = load::<S>(&ACROSS, self.lane);
-        std::array::from_fn(|r| fma(simd, simd.splat_f32s(right[r] - left[r]), across, simd.splat_f32s(left[r])))
+        taps
     }
 }
 
@@ -280,22 +274,27 @@ fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool>(
     planes: &[&[f32]; 4],
     x: usize,
 ) -> [[S::f32s; 4]; R] {
+    let mut sums = [[simd.splat_f32s(0.0); 4]; R];
     let weights = taps.at::<S, VARY>(simd, 0);
-    let centre: [S::f32s; 4] = std::array::from_fn(|p| load::<S>(planes[p], x));
-    let mut sums: [[S::f32s; 4]; R] =
-        std::array::from_fn(|r| std::array::from_fn(|p| simd.mul_f32s(weights[r], centre[p])));
+    for p in 0..4 {
+        let here = load::<S>(planes[p], x);
+        for r in 0..R {
+            sums[r][p] = simd.mul_f32s(weights[r], here);
+        }
+    }
     for j in 1..=taps.reach {
         let weights = taps.at::<S, VARY>(simd, j as isize);
         let opposite = if EVEN { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
         for p in 0..4 {
             let (after, before) = (load::<S>(planes[p], x + j), load::<S>(planes[p], x - j));
-            let both = simd.add_f32s(after, before);
-            for r in 0..R {
-                if EVEN {
+            if EVEN {
+                let both = simd.add_f32s(after, before);
+                for r in 0..R {
                     sums[r][p] = fma(simd, weights[r], both, sums[r][p]);
-                } else {
-                    sums[r][p] = fma(simd, weights[r], after, sums[r][p]);
-                    sums[r][p] = fma(simd, opposite[r], before, sums[r][p]);
+                }
+            } else {
+                for r in 0..R {
+                    sums[r][p] = fma(simd, opposite[r], before, fma(simd, weights[r], after, sums[r][p]));
                 }
             }
         }
@@ -313,9 +312,9 @@ fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool>(
     x: usize,
     height: usize,
 ) -> [S::f32s; 4] {
-    let row = |y: usize| &rows[y * R * 4 * STRIP..][..R * 4 * STRIP];
+    let row_len = R * 4 * STRIP;
     let weights = taps.at::<S, VARY>(simd, 0);
-    let here = row(y);
+    let here = &rows[y * row_len..][..row_len];
     let mut sums = [simd.splat_f32s(0.0); 4];
     for r in 0..R {
         for p in 0..4 {
@@ -323,19 +322,19 @@ fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool>(
         }
     }
     for j in 1..=taps.reach {
-        let (below, above) = (row((y + j).min(height - 1)), row(y.saturating_sub(j)));
+        let below = &rows[(y + j).min(height - 1) * row_len..][..row_len];
+        let above = &rows[y.saturating_sub(j) * row_len..][..row_len];
         let weights = taps.at::<S, VARY>(simd, j as isize);
         let opposite = if EVEN { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
         for r in 0..R {
             for p in 0..4 {
                 let at = (r * 4 + p) * STRIP + x;
                 let (below, above) = (load::<S>(below, at), load::<S>(above, at));
-                if EVEN {
-                    sums[p] = fma(simd, weights[r], simd.add_f32s(below, above), sums[p]);
+                sums[p] = if EVEN {
+                    fma(simd, weights[r], simd.add_f32s(below, above), sums[p])
                 } else {
-                    sums[p] = fma(simd, weights[r], below, sums[p]);
-                    sums[p] = fma(simd, opposite[r], above, sums[p]);
-                }
+                    fma(simd, opposite[r], above, fma(simd, weights[r], below, sums[p]))
+                };
             }
         }
     }

@@ -75,6 +75,7 @@ impl WithSimd for Composite<'_> {
 /// Disjoint coverage, near bins first; what is behind them is normalised on its own.
 #[inline(always)]
 fn layers<S: Simd>(plan: &Plan, bins: &[BinRows], y: usize, x0: usize) -> [[f32; CHUNK]; 3] {
+    let any_near = plan.bins.iter().zip(bins).any(|(bin, rows)| bin.near && rows.present);
     let mut front = Stack::EMPTY;
     let mut back = Stack::EMPTY;
     let mut layer = [[0.0; CHUNK]; 4];
@@ -92,6 +93,16 @@ fn layers<S: Simd>(plan: &Plan, bins: &[BinRows], y: usize, x0: usize) -> [[f32;
             }
             stack.open[x] -= taken;
         }
+    }
+    if !any_near {
+        for x in 0..CHUNK {
+            let filled = 1.0 - back.open[x];
+            let scale = 1.0 / if filled > 1e-4 { filled } else { 1e-4 };
+            for p in 0..3 {
+                back.color[p][x] *= scale;
+            }
+        }
+        return back.color;
     }
     for x in 0..CHUNK {
         let filled = 1.0 - back.open[x];

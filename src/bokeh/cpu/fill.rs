@@ -172,7 +172,7 @@ mod tests {
                 scene.data[y * row_len + 3 * stride + x] = if near { -8.0 } else { 2.0 };
             }
         }
-        let front = Share { front: Some((-1.0, 3.0)), behind: None };
+        let front = Share::new(Some((-1.0, 3.0)), None);
         Pyramid::new(width, height).fill(&mut scene, (width, height), front, -1.0);
         for y in 0..height {
             for x in 0..width {
@@ -186,7 +186,7 @@ mod tests {
     fn a_picture_that_is_all_near_keeps_finite() {
         let mut scene = Rows::<4>::new(5, 3, 0);
         scene.data.fill(-9.0);
-        let front = Share { front: Some((-1.0, 3.0)), behind: None };
+        let front = Share::new(Some((-1.0, 3.0)), None);
         Pyramid::new(5, 3).fill(&mut scene, (5, 3), front, -1.0);
         assert!(scene.data.iter().all(|v| v.is_finite()));
     }

@@ -17,9 +17,9 @@ use std::time::Instant;
 use bin::{BinBand, Share};
 use blur::{GROUP, Scratch, Strip};
 use pulp::Arch;
-use rows::{BinRows, CELL_PLANES, Rows, STRIP};
+use rows::{BinRows, CELL_PLANES, Rows, STRIP, TILE_H, TILE_W};
 use team::{Shelf, Team};
-use unpack::{TILE_H, TILE_W, Unpack};
+use unpack::Unpack;
 
 use super::plan::{CELL, Compositing, Plan};
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
@@ -44,6 +44,7 @@ pub struct CpuBokeh {
     members: Vec<Member>,
     taken: Vec<AtomicBool>,
     taken_too: Vec<AtomicBool>,
+    taken_three: Vec<AtomicBool>,
     done: Option<Finished>,
 }
 
@@ -51,7 +52,6 @@ pub struct CpuBokeh {
 #[derive(Default)]
 struct Member {
     blur: Scratch,
-    sums: Vec<f32>,
     reach: Vec<f32>,
 }
 
@@ -69,7 +69,7 @@ impl CpuBokeh {
         let (width, height) = (plan.width, plan.height);
         let team = Team::new(threads);
         let shares = (0..plan.bins.len())
-            .map(|k| Share { front: k.checked_sub(1).and_then(|k| plan.border(k)), behind: plan.border(k) })
+            .map(|k| Share::new(k.checked_sub(1).and_then(|k| plan.border(k)), plan.border(k)))
             .collect();
         let bins: Vec<BinRows> = plan.bins.iter().map(|bin| BinRows::new(&plan, bin)).collect();
         let tallest = plan.bins.iter().map(|bin| bin.height).max().unwrap_or(0);
@@ -79,8 +79,7 @@ impl CpuBokeh {
                     rows: vec![0.0; tallest * GROUP.min(plan.bank.terms) * 4 * STRIP],
                     filtered: Vec::with_capacity(tallest.div_ceil(CELL)),
                 },
-                sums: vec![0.0; 5 * TILE_W],
-                reach: Vec::with_capacity(bins.iter().map(|bin| bin.cells.data.len()).max().unwrap_or(0)),
+                reach: Vec::with_capacity(bins.iter().map(|bin| bin.cells.data.len() * 2).max().unwrap_or(0)),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
@@ -106,6 +105,7 @@ impl CpuBokeh {
             arch: Arch::new(),
             taken: flags(most),
             taken_too: flags(most),
+            taken_three: flags(most),
             plan,
             team,
             shares,
@@ -206,8 +206,8 @@ impl CpuBokeh {
             let cells = Shelf::new(&mut rows.cells.data, cells_row, &mut self.taken_too);
             let (arch, scene, tiles) = (self.arch, &self.scene, &self.tiles);
             let size = (self.plan.width, self.plan.height);
-            debug_assert_eq!(tiles.len() % across, 0);
-            self.team.run_with(&mut self.members, bin.height.div_ceil(CELL), &|member: &mut Member, part| {
+            let filled = Shelf::new(&mut rows.filled, across, &mut self.taken_three);
+            self.team.run(bin.height.div_ceil(CELL), &|part| {
                 arch.dispatch(BinBand {
                     scene,
                     size,
@@ -220,7 +220,7 @@ impl CpuBokeh {
                     stride,
                     pad,
                     cells: cells.part(part),
-                    scratch: &mut member.sums,
+                    filled: filled.part(part),
                 });
             });
         }
@@ -233,7 +233,7 @@ impl CpuBokeh {
             return;
         }
         let Some(index) = self.plan.bins.iter().rposition(|bin| bin.near) else { return };
-        let behind = Share { front: self.shares[index].behind, behind: None };
+        let behind = Share::new(self.plan.border(index), None);
         let nearest_px = self.plan.bins[index].high_px;
         pyramid.fill(&mut self.scene, (self.plan.width, self.plan.height), behind, nearest_px);
         // What was filled in has another CoC: find the tiles' ranges anew.
@@ -254,7 +254,7 @@ impl CpuBokeh {
         let parts = Shelf::new(&mut self.bins, 1, &mut self.taken);
         self.team.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
             for rows in parts.part(part).iter_mut().filter(|rows| rows.present) {
-                reach::reach(plan, &plan.bins[part], &rows.cells, &mut rows.near_cells, &mut member.reach);
+                reach::reach(plan, &plan.bins[part], &rows.cells, &mut rows.edges, &mut member.reach);
             }
         });
     }
@@ -268,7 +268,7 @@ impl CpuBokeh {
             let down = bin.height.div_ceil(CELL);
             let out = Shelf::new(&mut rows.out, bin.height * 4 * STRIP, &mut self.taken);
             let active = Shelf::new(&mut rows.active, down, &mut self.taken_too);
-            let (source, cells, near_cells) = (&rows.source, &rows.cells, &rows.near_cells);
+            let (source, cells, edges) = (&rows.source, &rows.cells, &rows.edges);
             self.team.run_with(&mut self.members, rows.strips, &|member: &mut Member, part| {
                 arch.dispatch(Strip {
                     source: &source.data,
@@ -276,7 +276,7 @@ impl CpuBokeh {
                     pad: source.pad,
                     height: bin.height,
                     cells,
-                    near_cells,
+                    edges,
                     bank: &plan.bank,
                     turned: bin.near,
                     reach: plan.bank.node_reach[plan.bank.node(bin.max_radius_px)] as usize,

@@ -1,14 +1,10 @@
 //! Pass `unpack`: 8-bit sRGB to linear light with highlights expanded, and depth to signed CoC.
 
+use super::rows::TILE_W;
 use pulp::{Simd, WithSimd};
 
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
-
-/// Pixels across a tile of the CoC range.
-pub const TILE_W: usize = 64;
-/// Rows of a tile.
-pub const TILE_H: usize = 8;
 
 /// Linear light of an sRGB code value in [0, 1] (IEC 61966-2-1).
 pub fn srgb_to_linear(code: f32) -> f32 {
@@ -75,6 +71,12 @@ impl WithSimd for Unpack<'_> {
                 *b = self.table[pixel[2] as usize];
             }
             coc_row(self.coc, self.depth, y, self.color.height as usize, &mut coc[..width]);
+            // Columns beyond the picture repeat its last one, so that whole tiles can be worked on.
+            for plane in planes.chunks_exact_mut(self.stride) {
+                let last = plane[width - 1];
+                plane[width..].fill(last);
+            }
+            let coc = &planes[3 * self.stride..];
             for (tile, values) in self.tiles.iter_mut().zip(coc[..width].chunks(TILE_W)) {
                 for &value in values {
                     tile.0 = if value < tile.0 { value } else { tile.0 };
