@@ -167,7 +167,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     };
     let depth = depth::Stage {
         // Without a blur nobody asks for depth.
-        coc: if executor.is_some() { depth::Coc::new(run.coc) } else { depth::Coc::Fixed(UNUSED) },
+        coc: if executor.is_some() { run.coc } else { UNUSED },
         source,
         source_name: &info.name,
         keep_going: run.keep_going,
@@ -264,7 +264,7 @@ impl Places {
 }
 
 /// The CoC of a frame that passes through.
-const UNUSED: CocField = CocField::Uniform { radius_px: 0.0 };
+const UNUSED: CocRule = CocRule::Fixed(CocField::Uniform { radius_px: 0.0 });
 
 type Ended = Result<(), Fault>;
 

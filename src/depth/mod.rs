@@ -25,10 +25,10 @@ pub enum DepthError {
     /// The recording's depth picture cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The recording has no depth at all.
-    #[error("{source_name} has no depth pictures; use --effect blur or tilt-shift, which need none")]
+    /// There is no depth at all.
+    #[error("the effect dof needs depth, and {source_name} has none; use --effect blur or tilt-shift")]
     NoDepth {
-        /// The recording.
+        /// Where the frames come from.
         source_name: String,
     },
 }

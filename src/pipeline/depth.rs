@@ -20,7 +20,7 @@ pub(super) struct Ready {
 }
 
 pub(super) struct Stage<'a> {
-    pub coc: Coc,
+    pub coc: CocRule,
     pub source: Option<Box<dyn DepthSource>>,
     pub source_name: &'a str,
     pub keep_going: bool,
@@ -31,57 +31,66 @@ pub(super) struct Stage<'a> {
 }
 
 /// A [`CocRule`] at work.
-pub(super) enum Coc {
+enum Coc {
     Fixed(CocField),
-    Depth { focus: Focus, filler: Filler, lens: CocAtInfinity, max_coc_px: f32 },
+    Depth(Box<DepthCoc>),
+}
+
+struct DepthCoc {
+    focus: Focus,
+    filler: Filler,
+    lens: CocAtInfinity,
+    max_coc_px: f32,
 }
 
 impl Coc {
-    pub(super) fn new(rule: CocRule) -> Self {
+    fn new(rule: CocRule) -> Self {
         match rule {
             CocRule::Fixed(field) => Self::Fixed(field),
             CocRule::Depth { focus, lens, max_coc_px } => {
-                Self::Depth { focus: Focus::new(focus), filler: Filler::new(), lens, max_coc_px }
+                let (focus, filler) = (Focus::new(focus), Filler::new());
+                Self::Depth(Box::new(DepthCoc { focus, filler, lens, max_coc_px }))
             }
         }
     }
 }
 
+impl DepthCoc {
+    /// Focuses on what was measured, and only then makes up what was not.
+    fn see(&mut self, map: &mut DepthMap, time_ns: u64, width_px: u32) -> CocField {
+        let focus_m = self.focus.focus_m(map, time_ns);
+        self.filler.fill(map);
+        self.lens.field(focus_m, width_px, self.max_coc_px)
+    }
+}
+
 impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
+        let mut coc = Coc::new(self.coc);
         let mut complained = false;
         while let Some(Frame { ticket, stamp, item: Shot { color, depth } }) = from.recv() {
-            let (depth, coc) = match &mut self.coc {
+            let (depth, coc) = match &mut coc {
                 Coc::Fixed(field) => (None, *field),
-                Coc::Depth { focus, filler, lens, max_coc_px } => {
+                Coc::Depth(coc) => {
                     let began_ns = self.clock.now_ns();
-                    let mut map = match (depth, &mut self.source) {
-                        (Some(exact), _) => exact,
-                        (None, Some(source)) => {
-                            let mut map = self.depths.take();
-                            if let Err(error) = source.read(stamp.index, &mut map) {
-                                self.tally.dropped(ticket, Cause::Corrupt);
-                                if !self.keep_going {
-                                    return Err(error.into());
-                                }
-                                if !complained {
-                                    tracing::warn!("{error}; going on without such frames");
-                                    complained = true;
-                                }
-                                continue;
+                    let mut map = match depth.map_or_else(|| self.read(stamp.index), Ok) {
+                        Ok(map) => map,
+                        Err(fault) => {
+                            let corrupt = matches!(fault, Fault::Depth(_));
+                            self.tally.dropped(ticket, if corrupt { Cause::Corrupt } else { Cause::Failed });
+                            if !corrupt || !self.keep_going {
+                                return Err(fault);
                             }
-                            map
-                        }
-                        (None, None) => {
-                            self.tally.dropped(ticket, Cause::Failed);
-                            return Err(Fault::NoDepth { source_name: self.source_name.to_owned() });
+                            if !complained {
+                                tracing::warn!("{fault}; going on without such frames");
+                                complained = true;
+                            }
+                            continue;
                         }
                     };
-                    // Focused on what was measured, not on what was made up.
-                    let focus_m = focus.focus_m(&map, stamp.time_ns);
-                    filler.fill(&mut map);
+                    let field = coc.see(&mut map, stamp.time_ns, color.width);
                     self.times.add(self.clock.now_ns() - began_ns);
-                    (Some(map), lens.field(focus_m, color.width, *max_coc_px))
+                    (Some(map), field)
                 }
             };
             if !hand_on(&mut to, Frame { ticket, stamp, item: Ready { color, depth, coc } }, self.tally) {
@@ -89,5 +98,14 @@ impl Stage<'_> {
             }
         }
         Ok(())
+    }
+
+    fn read(&mut self, index: usize) -> Result<Pooled<DepthMap>, Fault> {
+        let Some(source) = &mut self.source else {
+            return Err(Fault::NoDepth { source_name: self.source_name.to_owned() });
+        };
+        let mut map = self.depths.take();
+        source.read(index, &mut map)?;
+        Ok(map)
     }
 }

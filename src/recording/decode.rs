@@ -206,12 +206,11 @@ fn open(bytes: &[u8]) -> Result<Box<dyn ImageDecoder + '_>, PictureFault> {
             Box::new(PngDecoder::with_limits(Cursor::new(bytes), limits).map_err(decode_fault)?)
         }
         Ok(ImageFormat::Jpeg) => {
-            let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(decode_fault)?;
             // The decoder would fill up what is missing with grey.
             if !jpeg_is_whole(bytes) {
                 return Err(PictureFault::Truncated);
             }
-            Box::new(decoder)
+            Box::new(JpegDecoder::new(Cursor::new(bytes)).map_err(decode_fault)?)
         }
         _ if bytes.len() < 8 => return Err(PictureFault::Truncated),
         _ => return Err(PictureFault::Format("PNG or JPEG")),

@@ -9,9 +9,12 @@ use crate::frame::{ColorImage, DepthMap};
 /// High enough that the blur, not the file format, decides what is seen.
 const JPEG_QUALITY: u8 = 95;
 
+/// As small as choosing a filter for each row, in half the time (measured on 640x480 colour and depth).
+const FILTER: FilterType = FilterType::Paeth;
+
 /// Appends `image` to `file` as PNG, with the fast compression that keeps up with a camera.
 pub(super) fn color_png(image: &ColorImage, file: &mut Vec<u8>) -> ImageResult<()> {
-    PngEncoder::new_with_quality(file, CompressionType::Fast, FilterType::Adaptive).write_image(
+    PngEncoder::new_with_quality(file, CompressionType::Fast, FILTER).write_image(
         &image.rgb,
         image.width,
         image.height,
@@ -38,7 +41,7 @@ pub(super) fn depth_png(
 ) -> ImageResult<()> {
     units.clear();
     units.extend(depth.metres.iter().flat_map(|&metres| depth_units(metres, depth_scale).to_ne_bytes()));
-    PngEncoder::new_with_quality(file, CompressionType::Fast, FilterType::Adaptive).write_image(
+    PngEncoder::new_with_quality(file, CompressionType::Fast, FILTER).write_image(
         units,
         depth.width,
         depth.height,

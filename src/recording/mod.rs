@@ -1,4 +1,4 @@
-//! Recordings on disk: read frame by frame in constant memory, and written; and single pictures ([`still`]).
+//! Recordings on disk, read and written frame by frame; and single pictures ([`still`]).
 //!
 //! A [`Recording`] is opened by its folder, and its layout is recognised by its content. [`tum`] is the layout that
 //! is read and written.
@@ -54,7 +54,8 @@ pub struct Unpaired {
     pub depth: usize,
 }
 
-/// An opened recording: its lists are read, its pictures are read one by one when asked for.
+/// An opened recording: its lists are in memory (some 300 bytes a frame), its pictures are read one by one when asked
+/// for, into memory that the caller keeps.
 ///
 /// Where there is depth, the frames are the pairs of a colour picture and a depth map; [`Recording::unpaired`] counts
 /// what is left over.

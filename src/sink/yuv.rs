@@ -59,31 +59,39 @@ impl Converter {
     /// `ceil(height / 2) * ceil(width / 2)` each. At an odd edge the last column or row counts twice.
     pub fn append(&self, image: &ColorImage, planes: &mut Vec<u8>) {
         let (width, height) = (image.width as usize, image.height as usize);
-        planes.reserve(width * height + 2 * width.div_ceil(2) * height.div_ceil(2));
-        planes.extend(image.rgb.chunks_exact(3).map(|pixel| {
-            let [r, g, b] = [pixel[0], pixel[1], pixel[2]].map(i32::from);
-            let y = self.luma[0] * r + self.luma[1] * g + self.luma[2] * b;
-            (16 + ((y + (1 << (BITS - 1))) >> BITS)) as u8
-        }));
-        for chroma in [&self.cb, &self.cr] {
-            for y in (0..height).step_by(2) {
-                let rows = [y, (y + 1).min(height - 1)].map(|row| &image.rgb[row * width * 3..][..width * 3]);
-                let value = |x: usize, step: usize| -> u8 {
-                    let mut sum = 0;
-                    for row in rows {
-                        for at in [x * 3, (x + step) * 3] {
-                            for channel in 0..3 {
-                                sum += chroma[channel] * i32::from(row[at + channel]);
-                            }
-                        }
-                    }
-                    (128 + ((sum + (1 << (BITS + 1))) >> (BITS + 2))) as u8
+        let (half_width, half_height) = (width.div_ceil(2), height.div_ceil(2));
+        let start = planes.len();
+        planes.resize(start + width * height + 2 * half_width * half_height, 0);
+        let (luma, chroma) = planes[start..].split_at_mut(width * height);
+        let (cb, cr) = chroma.split_at_mut(half_width * half_height);
+
+        for (y, pixel) in luma.iter_mut().zip(image.rgb.as_chunks::<3>().0) {
+            let sum = dot(&self.luma, pixel.map(i32::from));
+            *y = (16 + ((sum + (1 << (BITS - 1))) >> BITS)) as u8;
+        }
+        if width == 0 {
+            return;
+        }
+        let row_pairs = image.rgb.chunks(2 * 3 * width);
+        for ((rows, cb), cr) in row_pairs.zip(cb.chunks_exact_mut(half_width)).zip(cr.chunks_exact_mut(half_width)) {
+            let (upper, lower) = rows.split_at(3 * width);
+            let lower = if lower.is_empty() { upper } else { lower };
+            for (((upper, lower), cb), cr) in upper.chunks(6).zip(lower.chunks(6)).zip(cb).zip(cr) {
+                let right = upper.len() - 3;
+                let sum = |channel: usize| {
+                    [upper[channel], upper[right + channel], lower[channel], lower[right + channel]]
+                        .map(i32::from)
+                        .iter()
+                        .sum()
                 };
-                planes.extend((0..width / 2).map(|half| value(2 * half, 1)));
-                if width % 2 == 1 {
-                    planes.push(value(width - 1, 0));
-                }
+                let four = [sum(0), sum(1), sum(2)];
+                let mean = |weights| (128 + ((dot(weights, four) + (1 << (BITS + 1))) >> (BITS + 2))) as u8;
+                (*cb, *cr) = (mean(&self.cb), mean(&self.cr));
             }
         }
     }
+}
+
+fn dot(weights: &[i32; 3], rgb: [i32; 3]) -> i32 {
+    weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
 }

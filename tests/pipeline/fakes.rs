@@ -1,0 +1,378 @@
+//! Stages that do little, and that badly when told so; and a run of them.
+
+use std::cell::Cell;
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::sleep;
+use std::time::Duration;
+
+use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
+use bokehcam::budget::Quality;
+use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo, Stamp};
+use bokehcam::clock::Clock;
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::depth::{DepthError, DepthSource};
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::CocField;
+use bokehcam::pipeline::{CocAtInfinity, CocRule, Pace, PipelineError, Progress, Run, run};
+use bokehcam::sink::{Sink, SinkError};
+use bokehcam::stats::Report;
+
+pub const SIZE: (u32, u32) = (6, 4);
+pub const PERIOD_NS: u64 = 1_000_000;
+pub const NEVER: usize = usize::MAX;
+/// Bytes of a picture that the fake blur changes.
+pub const BLURRED: usize = 12;
+
+/// What a fake stage does at one of its frames.
+#[derive(Clone, Copy, Default)]
+pub struct Trouble {
+    pub stall: Duration,
+    pub fails_at: Option<usize>,
+    pub panics_at: Option<usize>,
+}
+
+impl Trouble {
+    pub fn slow() -> Self {
+        Self { stall: Duration::from_millis(3), ..Self::default() }
+    }
+    pub fn fails_at(frame: usize) -> Self {
+        Self { fails_at: Some(frame), ..Self::default() }
+    }
+    pub fn panics_at(frame: usize) -> Self {
+        Self { panics_at: Some(frame), ..Self::default() }
+    }
+    /// Whether this frame fails.
+    fn strikes(&self, frame: usize) -> bool {
+        sleep(self.stall);
+        assert!(self.panics_at != Some(frame), "out of order at frame {frame}");
+        self.fails_at == Some(frame)
+    }
+}
+
+/// Frames whose every byte is the lowest of their number, and the last two bytes all of it.
+pub struct FakeCamera {
+    pub frames: usize,
+    pub next: usize,
+    pub corrupt_every: usize,
+    pub exact_depth: bool,
+    pub trouble: Trouble,
+}
+
+fn size_error() -> CaptureError {
+    CaptureError::Format { width: 0, height: 0, fps: 0.0 }
+}
+
+impl Camera for FakeCamera {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: "fake camera".into(),
+            size: SIZE,
+            period_ns: PERIOD_NS,
+            frames: Some(self.frames as u64),
+            live: false,
+            exact_depth: self.exact_depth,
+        }
+    }
+
+    fn next(&mut self, color: &mut ColorImage, depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+        if self.next >= self.frames {
+            return Ok(Captured::End);
+        }
+        let index = self.next;
+        self.next += 1;
+        if self.trouble.strikes(index) {
+            return Err(size_error());
+        }
+        if index % self.corrupt_every == self.corrupt_every - 1 {
+            return Ok(Captured::Corrupt(size_error()));
+        }
+        color.resize(SIZE.0, SIZE.1);
+        color.rgb.fill(index as u8);
+        color.rgb.last_chunk_mut::<2>().unwrap().copy_from_slice(&(index as u16).to_le_bytes());
+        if self.exact_depth {
+            depth.resize(SIZE.0, SIZE.1);
+            depth.metres.fill(1.0 + index as f32);
+        }
+        Ok(Captured::Frame(Stamp { index, time_ns: index as u64 * PERIOD_NS }))
+    }
+
+    fn skip(&mut self, until_ns: u64) -> u64 {
+        let from = self.next;
+        self.next = (until_ns.div_ceil(PERIOD_NS) as usize).clamp(from, self.frames);
+        (self.next - from) as u64
+    }
+}
+
+/// Depth of 1 m plus the frame's number, with a hole.
+pub struct FakeDepth(Trouble);
+
+impl DepthSource for FakeDepth {
+    fn read(&mut self, index: usize, map: &mut DepthMap) -> Result<(), DepthError> {
+        if self.0.strikes(index) {
+            return Err(DepthError::NoDepth { source_name: format!("frame {index}") });
+        }
+        map.resize(SIZE.0, SIZE.1);
+        map.metres.fill(1.0 + index as f32);
+        map.metres[3] = 0.0;
+        Ok(())
+    }
+}
+
+/// Adds 100 to the first bytes of the picture, and the focus distance to its first byte; holds as many frames as it may.
+pub struct FakeBokeh {
+    pub capacity: usize,
+    pub held: VecDeque<Job>,
+    pub submitted: usize,
+    pub trouble: Trouble,
+    pub collect_fails: bool,
+    pub loses_frames: bool,
+}
+
+impl Bokeh for FakeBokeh {
+    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
+        assert!(self.held.len() < self.capacity, "submitted beyond the capacity");
+        let index = self.submitted;
+        self.submitted += 1;
+        if self.trouble.strikes(index) && !self.collect_fails {
+            return Err(BokehError::Gpu("lost".into()));
+        }
+        self.held.push_back(job);
+        Ok(())
+    }
+
+    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+        if self.collect_fails && self.trouble.fails_at.is_some_and(|frame| self.submitted > frame) {
+            return Err(BokehError::Gpu("lost".into()));
+        }
+        if self.loses_frames || !wait && self.held.len() < self.capacity {
+            return Ok(None);
+        }
+        Ok(self.held.pop_front().map(|mut job| {
+            job.out.resize(job.color.width, job.color.height);
+            job.out.rgb.copy_from_slice(&job.color.rgb);
+            job.out.rgb[..BLURRED].iter_mut().for_each(|byte| *byte = byte.wrapping_add(100));
+            if let CocField::Depth(coc) = job.coc {
+                let map = job.depth.as_ref().expect("dof has depth");
+                assert!(map.metres.iter().all(|&z_m| z_m == map.metres[0]), "holes are filled");
+                job.out.rgb[0] = coc.focus_m.round() as u8;
+            }
+            let mut times = PassTimes::new();
+            times.add("rows", Duration::from_micros(400));
+            times.add("columns", Duration::from_micros(300));
+            Finished { ticket: job.ticket, out: job.out, times }
+        }))
+    }
+
+    fn in_flight(&self) -> usize {
+        self.held.len()
+    }
+    fn capacity(&self) -> usize {
+        self.capacity
+    }
+    fn describe(&self) -> String {
+        "cpu, fake".into()
+    }
+}
+
+/// What a sink received, seen from outside.
+#[derive(Clone, Default)]
+pub struct Received {
+    pub pictures: Arc<Mutex<Vec<Vec<u8>>>>,
+    pub finished: Arc<AtomicBool>,
+}
+
+impl Received {
+    pub fn count(&self) -> u64 {
+        self.pictures.lock().unwrap().len() as u64
+    }
+    pub fn numbers(&self) -> Vec<usize> {
+        self.pictures.lock().unwrap().iter().map(|rgb| u16::from_le_bytes(*rgb.last_chunk().unwrap()).into()).collect()
+    }
+    pub fn is_finished(&self) -> bool {
+        self.finished.load(Ordering::SeqCst)
+    }
+}
+
+pub struct FakeSink {
+    pub received: Received,
+    pub trouble: Trouble,
+    pub closes_at: usize,
+    pub finish_fails: bool,
+}
+
+fn exists() -> SinkError {
+    SinkError::Exists { path: "fake".into() }
+}
+
+impl Sink for FakeSink {
+    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+        let index = self.received.count() as usize;
+        if self.trouble.strikes(index) {
+            return Err(exists());
+        }
+        if index == self.closes_at {
+            return Ok(ControlFlow::Break(()));
+        }
+        self.received.pictures.lock().unwrap().push(frame.rgb.clone());
+        Ok(ControlFlow::Continue(()))
+    }
+    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+        self.received.finished.store(true, Ordering::SeqCst);
+        if self.finish_fails { Err(exists()) } else { Ok(()) }
+    }
+    fn describe(&self) -> String {
+        "fake sink".into()
+    }
+}
+
+/// A run of fakes, good in every way until told otherwise.
+pub struct Setup {
+    pub frames: usize,
+    pub corrupt_every: usize,
+    pub exact_depth: bool,
+    pub camera: Trouble,
+    pub depth: Option<Trouble>,
+    pub bokeh: Option<FakeBokeh>,
+    pub sink: Trouble,
+    pub closes_at: usize,
+    pub finish_fails: bool,
+    pub coc: CocRule,
+    pub pace: Pace,
+    pub keep_going: bool,
+    pub stop_after: u64,
+}
+
+pub fn dof() -> CocRule {
+    CocRule::Depth { focus: FocusRule::Point { x: 0.0, y: 0.0 }, lens: CocAtInfinity::Px(8.0), max_coc_px: 20.0 }
+}
+
+pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {
+    FakeBokeh { capacity, held: VecDeque::new(), submitted: 0, trouble, collect_fails: false, loses_frames: false }
+}
+
+impl Setup {
+    pub fn new(frames: usize, pace: Pace) -> Self {
+        Self {
+            frames,
+            corrupt_every: NEVER,
+            exact_depth: false,
+            camera: Trouble::default(),
+            depth: Some(Trouble::default()),
+            bokeh: Some(fake_bokeh(2, Trouble::default())),
+            sink: Trouble::default(),
+            closes_at: NEVER,
+            finish_fails: false,
+            coc: dof(),
+            pace,
+            keep_going: false,
+            stop_after: u64::MAX,
+        }
+    }
+
+    /// Runs, and checks what holds for every run.
+    pub fn run(self) -> (Result<Report, PipelineError>, Received) {
+        let received = Received::default();
+        let stop = AtomicBool::new(false);
+        let last = Cell::new(None::<Progress>);
+        let result = run(Run {
+            camera: Box::new(FakeCamera {
+                frames: self.frames,
+                next: 0,
+                corrupt_every: self.corrupt_every,
+                exact_depth: self.exact_depth,
+                trouble: self.camera,
+            }),
+            depth: self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _),
+            bokeh: self.bokeh.map(|bokeh| Box::new(bokeh) as _),
+            quality: Quality::Fast,
+            coc: self.coc,
+            sink: Box::new(FakeSink {
+                received: received.clone(),
+                trouble: self.sink,
+                closes_at: self.closes_at,
+                finish_fails: self.finish_fails,
+            }),
+            pace: self.pace,
+            budget_ns: 500_000,
+            keep_going: self.keep_going,
+            mirror: false,
+            clock: Clock::system(),
+            stop: &stop,
+            progress: &|progress| {
+                last.set(Some(progress));
+                if progress.delivered >= self.stop_after {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            },
+        });
+        let report = match &result {
+            Ok(report) => report,
+            Err(error) => &error.report,
+        };
+        assert!(report.frames.balance(), "{:?}", report.frames);
+        assert_eq!(report.frames.delivered, received.count());
+        assert!(received.numbers().is_sorted_by(|a, b| a < b), "frames keep their order");
+        assert_eq!(last.get().map_or(0, |progress| progress.delivered), received.count());
+        if result.is_ok() {
+            assert!(received.is_finished());
+        }
+        (result, received)
+    }
+}
+
+/// Waits with its first frame until the camera is through with all of its own.
+pub struct GatedSink(pub Arc<AtomicUsize>, pub usize);
+
+impl Sink for GatedSink {
+    fn put(&mut self, _: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+        while self.0.load(Ordering::SeqCst) < self.1 {
+            sleep(Duration::from_millis(1));
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+        Ok(())
+    }
+    fn describe(&self) -> String {
+        "gated".into()
+    }
+}
+
+/// Comes live, and counts what was asked of it.
+pub struct LiveCamera(pub FakeCamera, pub Arc<AtomicUsize>);
+
+impl Camera for LiveCamera {
+    fn info(&self) -> SourceInfo {
+        // So slow that no frame is ever late.
+        SourceInfo { live: true, period_ns: 3_600_000_000_000, ..self.0.info() }
+    }
+    fn next(&mut self, color: &mut ColorImage, depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+        self.1.fetch_add(1, Ordering::SeqCst);
+        self.0.next(color, depth)
+    }
+}
+
+pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a AtomicBool, pace: Pace) -> Run<'a> {
+    Run {
+        camera,
+        depth: None,
+        bokeh: None,
+        quality: Quality::Fast,
+        coc: CocRule::Fixed(CocField::Uniform { radius_px: 3.0 }),
+        sink,
+        pace,
+        budget_ns: PERIOD_NS,
+        keep_going: false,
+        mirror: false,
+        clock: Clock::system(),
+        stop,
+        progress: &|_| {},
+    }
+}
+
+pub fn fake_camera(frames: usize) -> FakeCamera {
+    FakeCamera { frames, next: 0, corrupt_every: NEVER, exact_depth: false, trouble: Trouble::default() }
+}

@@ -1,0 +1,107 @@
+//! What arrives: the right depth, the right pixels, the same every time, and a report of it.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo, Stamp};
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::CocField;
+use bokehcam::pipeline::{CocRule, Fault, Pace, Run, run};
+
+use crate::fakes::*;
+
+#[test]
+fn depth_comes_with_the_frame_it_belongs_to() {
+    // Focus is eased over media time, and all of these frames come within 20 ms: the first one rules.
+    for (exact_depth, depth) in [(false, Some(Trouble::default())), (true, None)] {
+        let (result, received) = Setup { exact_depth, depth, ..Setup::new(20, Pace::Asap) }.run();
+        result.unwrap();
+        assert!(received.pictures.lock().unwrap().iter().all(|rgb| rgb[0] == 1 && rgb[1] >= 100));
+    }
+    let (result, _) = Setup { depth: None, ..Setup::new(20, Pace::Asap) }.run();
+    let error = result.unwrap_err();
+    assert!(matches!(error.fault, Fault::NoDepth { .. }) && error.to_string().contains("fake camera"), "{error}");
+}
+
+#[test]
+fn a_fixed_coc_and_no_blur_ask_for_no_depth() {
+    let never = Some(Trouble::panics_at(0));
+    let coc = CocRule::Fixed(CocField::Uniform { radius_px: 4.0 });
+    let (result, received) = Setup { depth: never, coc, ..Setup::new(10, Pace::Asap) }.run();
+    result.unwrap();
+    assert!(
+        received
+            .pictures
+            .lock()
+            .unwrap()
+            .iter()
+            .enumerate()
+            .all(|(i, rgb)| rgb[..BLURRED].iter().all(|&b| b == 100 + i as u8))
+    );
+
+    let (result, received) = Setup { depth: never, bokeh: None, ..Setup::new(10, Pace::Asap) }.run();
+    let report = result.unwrap();
+    assert!(
+        received
+            .pictures
+            .lock()
+            .unwrap()
+            .iter()
+            .enumerate()
+            .all(|(i, rgb)| rgb[..BLURRED].iter().all(|&b| b == i as u8))
+    );
+    assert_eq!((report.backend.as_str(), report.quality.share.len()), ("none", 0));
+}
+
+#[test]
+fn lossless_twice_is_the_same_twice() {
+    let bytes = || {
+        let (result, received) = Setup::new(60, Pace::Asap).run();
+        result.unwrap();
+        Arc::try_unwrap(received.pictures).unwrap().into_inner().unwrap()
+    };
+    assert_eq!(bytes(), bytes());
+}
+
+#[test]
+fn the_report_tells_what_ran() {
+    let (result, _) = Setup::new(10, Pace::Asap).run();
+    let report = result.unwrap();
+    assert_eq!((report.backend.as_str(), report.adapter.as_str()), ("cpu", "cpu, fake"));
+    assert_eq!((report.source.as_str(), report.sink.as_str()), ("fake camera", "fake sink"));
+    assert_eq!(report.quality.share, [("fast", 1.0)]);
+    assert_eq!((report.budget_ms, report.misses), (0.5, 10), "0.7 ms of passes each");
+    let stages: Vec<_> = report.stages_ms.0.iter().map(|stage| stage.0.as_str()).collect();
+    assert_eq!(stages, ["decode", "depth", "blur", "blur.rows", "blur.columns", "sink"]);
+    assert!((report.stages_ms.0[2].1.p50 - 0.7).abs() < 0.007);
+    assert!(report.latency_ms.is_some() && report.frame_ms.is_some());
+}
+
+/// A picture whose columns differ.
+struct Columns(bool);
+
+impl Camera for Columns {
+    fn info(&self) -> SourceInfo {
+        fake_camera(1).info()
+    }
+    fn next(&mut self, color: &mut ColorImage, _: &mut DepthMap) -> Result<Captured, CaptureError> {
+        if std::mem::replace(&mut self.0, true) {
+            return Ok(Captured::End);
+        }
+        color.resize(SIZE.0, SIZE.1);
+        (0..).zip(&mut color.rgb).for_each(|(index, byte)| *byte = index);
+        Ok(Captured::Frame(Stamp { index: 0, time_ns: 0 }))
+    }
+}
+
+#[test]
+fn mirror_flips_pixels_and_keeps_channels() {
+    let received = Received::default();
+    let sink =
+        FakeSink { received: received.clone(), trouble: Trouble::default(), closes_at: NEVER, finish_fails: false };
+    let stop = AtomicBool::new(false);
+    run(Run { mirror: true, ..simple(Box::new(Columns(false)), Box::new(sink), &stop, Pace::Asap) }).unwrap();
+    let rgb = &received.pictures.lock().unwrap()[0];
+    assert_eq!(rgb[..6], [15, 16, 17, 12, 13, 14]);
+    assert_eq!(rgb[18..21], [33, 34, 35]);
+}

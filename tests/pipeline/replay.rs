@@ -1,0 +1,199 @@
+//! Recordings and the synthetic scene as cameras.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use bokehcam::capture::replay::{Part, Replay};
+use bokehcam::capture::synthetic::{Format, Synthetic};
+use bokehcam::capture::{Camera, CaptureError, Captured, Stamp};
+use bokehcam::depth::recorded::Recorded;
+use bokehcam::depth::{DepthError, DepthSource};
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::pipeline::{Pace, Run, run};
+use bokehcam::recording::tum::{Writer, WriterOptions};
+use bokehcam::recording::{Options, Recording};
+use bokehcam::sink::{Sink, Target};
+
+use crate::fakes::*;
+
+const FRAMES: usize = 10;
+const STEP_NS: u64 = 40_000_000;
+
+/// Ten frames at 25 per second; their bytes are their numbers, their depth 1 m plus as many decimetres.
+fn record(dir: &Path, with_depth: bool) {
+    let mut writer = Writer::create(dir, &WriterOptions { depth_scale: 5000.0, overwrite: false }).unwrap();
+    for frame in 0..FRAMES {
+        let mut color = ColorImage::new(SIZE.0, SIZE.1);
+        color.rgb.fill(frame as u8);
+        let mut depth = DepthMap::new(SIZE.0, SIZE.1);
+        depth.metres.fill(1.0 + 0.1 * frame as f32);
+        writer.add(frame as u64 * STEP_NS, &color, with_depth.then_some(&depth)).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn open(dir: &Path) -> Arc<Recording> {
+    Arc::new(Recording::open(dir, &Options::default()).unwrap())
+}
+
+fn replay(dir: &Path, part: Part) -> Result<Replay, CaptureError> {
+    Replay::new(open(dir), "test recording", &part)
+}
+
+/// Index, media time in milliseconds and first byte of all frames; at most `limit`.
+fn play(camera: &mut dyn Camera, limit: usize) -> Vec<(usize, u64, u8)> {
+    let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
+    let mut frames = Vec::new();
+    while frames.len() < limit {
+        match camera.next(&mut color, &mut depth).unwrap() {
+            Captured::Frame(Stamp { index, time_ns }) => frames.push((index, time_ns / 1_000_000, color.rgb[0])),
+            Captured::Corrupt(error) => panic!("{error}"),
+            Captured::End => break,
+        }
+    }
+    frames
+}
+
+#[test]
+fn a_recording_plays_from_start_to_end() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    let mut whole = replay(folder.path(), Part::default()).unwrap();
+    let info = whole.info();
+    assert_eq!((info.size, info.period_ns, info.frames), (SIZE, STEP_NS, Some(10)));
+    assert_eq!((info.name.as_str(), info.live, info.exact_depth), ("test recording", false, false));
+    assert!(play(&mut whole, 99).into_iter().eq((0..10).map(|i| (i, 40 * i as u64, i as u8))));
+
+    // From 0.08 s, that frame included, to before 0.2 s.
+    let part = Part { start_s: 0.08, end_s: Some(0.2), ..Part::default() };
+    let mut middle = replay(folder.path(), part).unwrap();
+    assert_eq!(middle.info().frames, Some(3));
+    assert_eq!(play(&mut middle, 99), [(2, 0, 2), (3, 40, 3), (4, 80, 4)]);
+    let mut few = replay(folder.path(), Part { frames: Some(2), ..part }).unwrap();
+    assert_eq!((few.info().frames, play(&mut few, 99).len()), (Some(2), 2));
+}
+
+#[test]
+fn a_loop_goes_on_in_media_time() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    let part = Part { start_s: 0.3, end_s: None, looped: true, frames: Some(5) };
+    let mut looped = replay(folder.path(), part).unwrap();
+    assert_eq!(looped.info().frames, Some(5));
+    assert_eq!(play(&mut looped, 99), [(8, 0, 8), (9, 40, 9), (8, 80, 8), (9, 120, 9), (8, 160, 8)]);
+    let mut endless = replay(folder.path(), Part { frames: None, ..part }).unwrap();
+    assert_eq!((endless.info().frames, play(&mut endless, 31).len()), (None, 31));
+}
+
+#[test]
+fn frames_can_be_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    let mut camera = replay(folder.path(), Part { looped: true, ..Part::default() }).unwrap();
+    assert_eq!(camera.skip(0), 0);
+    assert_eq!(camera.skip(81_000_000), 3);
+    assert_eq!(play(&mut camera, 1), [(3, 120, 3)]);
+    assert_eq!(camera.skip(500_000_000), 9);
+    assert_eq!(play(&mut camera, 1), [(3, 520, 3)]);
+    let mut ends = replay(folder.path(), Part::default()).unwrap();
+    assert_eq!((ends.skip(u64::MAX), play(&mut ends, 1).len()), (10, 0));
+}
+
+#[test]
+fn an_empty_part_says_how_long_the_recording_is() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    for (start_s, end_s, range) in
+        [(3.0, None, "from 3 s to its end"), (0.2, Some(0.1), "from 0.2 s to 0.1 s"), (f64::NAN, None, "NaN")]
+    {
+        let error = replay(folder.path(), Part { start_s, end_s, ..Part::default() }).err().unwrap().to_string();
+        assert!(error.contains(range) && error.ends_with("it lasts 0.400 s"), "{error}");
+    }
+}
+
+#[test]
+fn a_loop_of_nothing_but_bad_frames_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    let part = Part { start_s: 0.3, looped: true, ..Part::default() };
+    let camera = replay(folder.path(), part).unwrap();
+    for picture in fs::read_dir(folder.path().join("rgb")).unwrap() {
+        fs::write(picture.unwrap().path(), "no picture").unwrap();
+    }
+    let stop = AtomicBool::new(false);
+    let sink = Target::Null.open(&sink_options()).unwrap();
+    let run_of = simple(Box::new(camera), sink, &stop, Pace::Asap);
+    let frames = run(Run { keep_going: true, ..run_of }).unwrap().frames;
+    assert_eq!((frames.captured, frames.dropped.corrupt), (2, 2));
+}
+
+fn sink_options() -> bokehcam::sink::Options {
+    bokehcam::sink::Options { size: SIZE, period_ns: STEP_NS, force: false }
+}
+
+#[test]
+fn recorded_depth_is_that_of_the_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), true);
+    let mut depth = Recorded::new(open(folder.path()), "test recording").unwrap();
+    let mut map = DepthMap::default();
+    depth.read(7, &mut map).unwrap();
+    assert_eq!(map.size(), SIZE);
+    assert!(map.metres.iter().all(|&z_m| (z_m - 1.7).abs() < 1e-3));
+
+    let without = tempfile::tempdir().unwrap();
+    record(without.path(), false);
+    let error = Recorded::new(open(without.path()), "test recording").err().unwrap();
+    assert!(matches!(&error, DepthError::NoDepth { .. }) && error.to_string().contains("test recording"), "{error}");
+}
+
+/// The recording through depth and blur into a file; its bytes.
+fn rendered(dir: &Path, file: &Path) -> Vec<u8> {
+    let recording = open(dir);
+    let stop = AtomicBool::new(false);
+    let camera = Replay::new(recording.clone(), "test recording", &Part::default()).unwrap();
+    let sink: Box<dyn Sink> = Target::Y4m(file.to_owned()).open(&sink_options()).unwrap();
+    let report = run(Run {
+        depth: Some(Box::new(Recorded::new(recording, "test recording").unwrap())),
+        bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
+        coc: dof(),
+        ..simple(Box::new(camera), sink, &stop, Pace::Asap)
+    })
+    .unwrap();
+    assert_eq!((report.frames.captured, report.frames.delivered), (10, 10));
+    fs::read(file).unwrap()
+}
+
+#[test]
+fn asap_twice_gives_identical_files() {
+    let folder = tempfile::tempdir().unwrap();
+    record(&folder.path().join("recording"), true);
+    let file = |name| rendered(&folder.path().join("recording"), &folder.path().join(name));
+    let first = file("a.y4m");
+    assert!(first.len() > 10 * 36);
+    assert!(first == file("b.y4m"), "bit-identical");
+}
+
+#[test]
+fn the_synthetic_camera_knows_its_depth() {
+    let format = Format { size: (48, 27), fps: 12.5, frames: Some(3), threads: 1 };
+    let mut camera = Synthetic::new(format).unwrap();
+    let info = camera.info();
+    assert_eq!((info.size, info.period_ns, info.frames), ((48, 27), 80_000_000, Some(3)));
+    assert!(info.exact_depth && !info.live);
+    let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
+    for index in 0..3 {
+        let Captured::Frame(stamp) = camera.next(&mut color, &mut depth).unwrap() else { panic!("frame {index}") };
+        assert_eq!(stamp, Stamp { index, time_ns: index as u64 * 80_000_000 });
+        assert_eq!((color.size(), depth.size()), ((48, 27), (48, 27)));
+        assert!(color.rgb.iter().any(|&byte| byte != color.rgb[0]));
+        assert!(depth.metres.iter().any(|&z_m| DepthMap::is_known(z_m)));
+    }
+    assert!(matches!(camera.next(&mut color, &mut depth), Ok(Captured::End)));
+
+    for (size, fps) in [((0, 9), 30.0), ((9, 9000), 30.0), ((9, 9), 0.0), ((9, 9), f64::NAN)] {
+        assert!(matches!(Synthetic::new(Format { size, fps, ..format }), Err(CaptureError::Format { .. })));
+    }
+}
