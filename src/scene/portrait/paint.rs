@@ -118,7 +118,7 @@ pub fn curtain(spot: &Spot) -> Surface {
 pub fn lamp_shade(spot: &Spot) -> Surface {
     let middle = (-((spot.uv.y - 0.45) / 0.42).powi(2)).exp();
     let thread = 0.92 + 0.16 * value(Vec3::new(10.0 * spot.uv.x, 160.0 * spot.p.y, 1.0));
-    let glow = spot.tint * (0.35 + 1.25 * middle) * thread;
+    let glow = spot.tint * (0.35 + 0.65 * middle) * thread;
     Surface { emission: glow, ..Surface::matt(spot, hex(0xe8d9b8)) }
 }
 

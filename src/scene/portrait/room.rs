@@ -1,10 +1,13 @@
 //! The room behind the subject: wall, window frame, shelf with books, sideboard with a lamp, sofa, low table.
 
+use std::sync::Arc;
+
 use glam::{Mat3, Vec2, Vec3};
 
 use super::form::{blend, brick, hex};
 use super::front::half_leaf;
 use super::paint;
+use crate::scene::grid::Grid;
 use crate::scene::noise::{Dice, unit};
 use crate::scene::part::{Material, Paint, Part};
 use crate::scene::ray::Bounds;
@@ -21,12 +24,14 @@ const TABLE: Vec3 = Vec3::new(1.10, -0.50, 2.45);
 /// The room.
 pub fn part() -> Part {
     let mut part = Part::still();
+    let around = Bounds { low: Vec3::new(-2.2, FLOOR_Y - 0.02, 1.75), high: Vec3::new(2.3, 1.1, WALL_M + 0.05) };
+    let form = Arc::new(Grid::new(form, around, 0.03));
     add_walls(&mut part);
     add_window(&mut part);
     add_shelves(&mut part);
     add_sideboard(&mut part);
     add_fairy_lights(&mut part);
-    add_seats(&mut part);
+    add_seats(&mut part, &form);
     part.form = Some(form);
     part
 }
@@ -177,7 +182,7 @@ fn add_sideboard(part: &mut Part) {
     part.add(belly, paint(paint::ceramic, 0x2f6f73));
     part.add_chain(&[(foot + 0.16 * Vec3::Y, 0.012), (foot + 0.30 * Vec3::Y, 0.010)], paint(paint::metal, 0xc59a4a));
     let shade = Shape::Frustum { base: foot + 0.235 * Vec3::Y, height: 0.22, low_radius: 0.175, high_radius: 0.115 };
-    part.add(shade, Material::new(paint::lamp_shade, Vec3::new(1.25, 0.74, 0.32)));
+    part.add(shade, Material::new(paint::lamp_shade, Vec3::new(1.25, 0.80, 0.40)));
     add_pot(part, Vec3::new(0.86, -0.42, 3.92), 0.095, 0xc9bda3, 61, 1.0);
     for k in 0..4u32 {
         let y = -0.42 + 0.034 * k as f32;
@@ -203,23 +208,23 @@ fn add_fairy_lights(part: &mut Part) {
         for k in 0..count {
             let s = (k as f32 + 0.5) / count as f32;
             let centre = at(s) - 0.016 * Vec3::Y;
-            let power = 7.0 + 6.0 * unit(k + 31);
+            let power = 7.0 + 5.0 * unit(k + 31);
             let bulb = Shape::Sphere { centre, radius: 0.0125 };
-            part.add(bulb, Material::new(paint::glow, power * Vec3::new(1.0, 0.62, 0.26)));
+            part.add(bulb, Material::new(paint::glow, power * Vec3::new(1.0, 0.46, 0.09)));
         }
     }
 }
 
-fn add_seats(part: &mut Part) {
+fn add_seats(part: &mut Part, form: &Arc<Grid>) {
     let bounds = Bounds { low: SOFA - Vec3::new(0.75, 0.65, 0.45), high: SOFA + Vec3::new(0.75, 0.25, 0.5) };
-    part.add(Shape::Field { distance: sofa, bounds }, paint(paint::cloth, 0x8c4a52));
+    part.add(Shape::Field { distance: sofa, bounds, guide: form.clone() }, paint(paint::cloth, 0x8c4a52));
     let cushion = Bounds { low: SOFA - Vec3::new(0.55, 0.2, 0.4), high: SOFA + Vec3::new(0.1, 0.25, 0.1) };
-    part.add(Shape::Field { distance: pillow, bounds: cushion }, paint(paint::stripes, 0x35606b));
+    part.add(Shape::Field { distance: pillow, bounds: cushion, guide: form.clone() }, paint(paint::stripes, 0x35606b));
     solid(
         part,
         [TABLE.x - 0.62, TABLE.y - 0.03, TABLE.z - 0.55],
         [TABLE.x + 0.75, TABLE.y, TABLE.z + 0.55],
-        paint(paint::boards, 0x9a683a),
+        paint(paint::cloth, 0xcfc2a8),
     );
     for (x, z) in [(-0.55, -0.48), (-0.55, 0.48), (0.6, 0.48)] {
         let leg = TABLE + Vec3::new(x, -0.03, z);
@@ -302,4 +307,5 @@ fn form(p: Vec3) -> f32 {
         .min(side)
         .min(table)
         .min(sofa(p))
+        .min(pillow(p))
 }
