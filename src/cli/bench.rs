@@ -39,7 +39,7 @@ pub struct BenchCommand {
     coc: Vec<f32>,
     /// Quality levels
     #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
-          default_value_t = Quality::default(), value_parser = options::quality())]
+          default_value = Quality::default().name(), value_parser = options::quality())]
     quality: Vec<Quality>,
     /// Numbers of threads of the CPU backend [default: one per core]
     #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',

@@ -185,7 +185,13 @@ impl Scene {
 
     /// The picture through a thin lens, one ray per point of the aperture to each pixel, averaged in linear light
     /// over the pixel and the lens. The result does not depend on `threads`; an aperture without points gives black.
-    pub fn render_thin_lens(&self, view: &View, time_s: f64, lens: &ThinLens, threads: usize) -> LensPicture {
+    pub fn render_thin_lens(
+        &self,
+        view: &View,
+        time_s: f64,
+        lens: &ThinLens,
+        threads: usize,
+    ) -> LensPicture {
         let mut picture = LensPicture { clipped: LinearImage::black(view), hdr: LinearImage::black(view) };
         if lens.aperture.is_empty() || view.width == 0 {
             return picture;
@@ -193,8 +199,10 @@ impl Scene {
         // At depth z the ray of lens point u is focal_px * radius_m * (1 / focus_m - 1 / z) px off: c(z) u.
         let radius_m = lens.coc_at_infinity_px * lens.focus_m / view.focal_px;
         let moment = self.at(time_s);
-        let samples: Vec<(Vec2, Vec2)> =
-            (0..).zip(lens.aperture).map(|(k, u)| (lens_jitter(k), radius_m * Vec2::new(u.x, -u.y))).collect();
+        let samples: Vec<(Vec2, Vec2)> = (0..)
+            .zip(lens.aperture)
+            .map(|(k, u)| (lens_jitter(k), radius_m * Vec2::new(u.x, -u.y)))
+            .collect();
         let width = view.width as usize;
         let rows = picture.clipped.rgb.chunks_exact_mut(width).zip(picture.hdr.rgb.chunks_exact_mut(width));
         share(rows.enumerate(), threads, |(row, (clipped, hdr))| {
