@@ -54,7 +54,7 @@ mod tests {
     fn the_ends_go_on_at_the_median_period() {
         assert_eq!(fill(&[None, Some(5), Some(15), Some(25), None, None]), [0, 10, 20, 30, 40, 50]);
         assert_eq!(fill(&[None, None]), [0, DEFAULT_PERIOD_NS]);
-        assert_eq!(fill(&[]), []);
+        assert!(fill(&[]).is_empty());
     }
 
     #[test]

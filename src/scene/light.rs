@@ -5,8 +5,8 @@
 
 use glam::Vec3;
 
+use super::grid::Grid;
 use super::part::Surface;
-use super::shape::Distance;
 
 /// A lamp.
 #[derive(Clone, Copy, Debug)]
@@ -17,8 +17,8 @@ pub struct Light {
     pub power: Vec3,
     /// Radius of the lamp over its distance: how soft its shadows are.
     pub softness: f32,
-    /// Whether a part's own form throws its shadow on the part.
-    pub casts: bool,
+    /// Within this distance, in metres, a part's own form throws its shadow on the part.
+    pub casts_within_m: f32,
 }
 
 /// Light from all around, by the direction that a surface faces.
@@ -59,8 +59,8 @@ pub struct Lit<'a> {
 /// A part's form and the point in its frame, for what the part hides from itself.
 #[derive(Clone, Copy)]
 pub struct Form<'a> {
-    /// The distance function.
-    pub distance: Distance,
+    /// Distances from the form.
+    pub grid: &'a Grid,
     /// A world direction in the part's frame.
     pub to_local: &'a dyn Fn(Vec3) -> Vec3,
     /// The point in the part's frame.
@@ -70,12 +70,19 @@ pub struct Form<'a> {
 }
 
 /// Light that contributes less than this is not worth a shadow.
-const FAINT: f32 = 0.012;
+const FAINT: f32 = 0.03;
+/// Balls further away than this shade nothing, in metres.
+const SHADE_REACH_M: f32 = 0.7;
 
 /// The radiance towards the eye.
 pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>) -> Vec3 {
     let surface = &lit.surface;
-    let open = surface.open * form.map_or(1.0, |f| openness(&f)) * shades_openness(lit);
+    let near = |s: &Shade| s.part != lit.part && s.centre.distance_squared(lit.p) < SHADE_REACH_M * SHADE_REACH_M;
+    let shaded = lit.shades.iter().any(near);
+    let mut open = surface.open * form.map_or(1.0, |f| openness(&f));
+    if shaded {
+        open *= shades_openness(lit);
+    }
     let up = 0.5 + 0.5 * surface.normal.y;
     let mut diffuse = (ambient.below + (ambient.above - ambient.below) * up) * open;
     let mut highlight = Vec3::ZERO;
@@ -89,9 +96,11 @@ pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>)
             continue;
         }
         let mut seen = 0.4 + 0.6 * surface.open;
-        if strength.max_element() > FAINT {
-            seen *= shades_pass(lit, direction, distance_m, light.softness);
-            if let (true, Some(f)) = (light.casts && seen > 0.01, form) {
+        if lambert.max(lobe) * strength.max_element() > FAINT {
+            if shaded {
+                seen *= shades_pass(lit, direction, distance_m, light.softness);
+            }
+            if let (true, Some(f)) = (distance_m < light.casts_within_m && seen > 0.01, form) {
                 seen *= form_passes(&f, (f.to_local)(direction), distance_m, light.softness);
             }
         }
@@ -122,10 +131,11 @@ fn reflection(surface: &Surface, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
 
 /// How much of the surroundings the part's own form leaves open.
 fn openness(form: &Form) -> f32 {
-    let taps = [(0.006, 1.0), (0.018, 0.7), (0.045, 0.45), (0.11, 0.28)];
+    // What is finer than the grid it cannot tell: taps start at one and a half cells.
+    let taps = [(1.5, 1.0), (4.0, 0.7), (10.0, 0.45), (24.0, 0.28)].map(|(n, weight)| (n * form.grid.cell_m(), weight));
     let (mut hidden, mut total) = (0.0, 0.0);
     for (reach_m, weight) in taps {
-        let gap_m = (form.distance)(form.p + reach_m * form.normal);
+        let gap_m = form.grid.gap_m(form.p + reach_m * form.normal);
         hidden += weight * (1.0 - (gap_m / reach_m).clamp(0.0, 1.0));
         total += weight;
     }
@@ -135,15 +145,16 @@ fn openness(form: &Form) -> f32 {
 /// The share of a lamp that is seen past the part's own form, after Quilez's soft shadows.
 fn form_passes(form: &Form, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
     let reach_m = distance_m.min(1.2);
-    let start = form.p + 0.003 * form.normal;
-    let (mut seen, mut along_m) = (1.0f32, 0.006);
-    for _ in 0..18 {
-        let gap_m = (form.distance)(start + along_m * direction);
+    let cell_m = form.grid.cell_m();
+    let start = form.p + 0.7 * cell_m * form.normal;
+    let (mut seen, mut along_m) = (1.0f32, 1.2 * cell_m);
+    for _ in 0..12 {
+        let gap_m = form.grid.gap_m(start + along_m * direction);
         seen = seen.min(0.5 + 0.5 * gap_m / (softness * along_m));
         if seen <= 0.0 {
             return 0.0;
         }
-        along_m += gap_m.clamp(0.005, 0.15);
+        along_m += gap_m.clamp(1.5 * cell_m, 0.4);
         if along_m > reach_m {
             break;
         }

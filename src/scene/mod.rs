@@ -6,6 +6,7 @@
 //! `cx = (width - 1) / 2`, `cy = (height - 1) / 2`: its parameter is the depth.
 
 mod bvh;
+mod grid;
 mod light;
 mod noise;
 mod part;
@@ -15,13 +16,13 @@ mod render;
 mod shape;
 mod targets;
 
-pub use render::{LensPicture, LinearImage, ThinLens, View, encode_srgb, lens_points};
+pub use render::{LensPicture, LinearImage, ThinLens, View, encode_srgb};
 pub use targets::PointLight;
 
 use glam::Vec3;
 use light::{Ambient, Form, Light, Lit, Shade};
 use part::{Part, Spot};
-use ray::{Pose, Ray};
+use ray::{Bounds, Pose, Ray};
 
 /// Things in space, lit, that repeat their motion after [`Scene::period_s`].
 #[derive(Clone, Debug)]
@@ -69,7 +70,8 @@ impl Scene {
                 })
             })
             .collect();
-        Moment { scene: self, poses, shades }
+        let boxes = self.parts.iter().zip(&poses).map(|(part, pose)| part.tree.bounds().posed(pose)).collect();
+        Moment { scene: self, poses, boxes, shades }
     }
 }
 
@@ -77,6 +79,8 @@ impl Scene {
 struct Moment<'a> {
     scene: &'a Scene,
     poses: Vec<Pose>,
+    /// Around each part, in the world.
+    boxes: Vec<Bounds>,
     shades: Vec<Shade>,
 }
 
@@ -93,6 +97,9 @@ impl Moment<'_> {
         let mut hit: Option<Hit> = None;
         for (part, (group, pose)) in self.scene.parts.iter().zip(&self.poses).enumerate() {
             let t_max = hit.map_or(f32::INFINITY, |h| h.t);
+            if self.boxes[part].span(ray, t_max).is_none() {
+                continue;
+            }
             let found = group.tree.meet(&group.shapes, &pose.ray_to_local(ray), t_max);
             if let Some((t, shape)) = found {
                 hit = Some(Hit { t, part, shape: shape as usize });
@@ -135,7 +142,7 @@ impl Moment<'_> {
         surface.fibre = pose.turn * surface.fibre;
         let lit = Lit { p, to_eye: -ray.unit, surface, part: hit.part, shades: &self.shades };
         let to_local = |direction: Vec3| pose.turn.transpose() * direction;
-        let form = part.form.map(|distance| Form { distance, to_local: &to_local, p: local, normal: skin.normal });
+        let form = part.form.as_deref().map(|grid| Form { grid, to_local: &to_local, p: local, normal: skin.normal });
         light::shine(&lit, &self.scene.lights, &self.scene.ambient, form)
     }
 }

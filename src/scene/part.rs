@@ -1,10 +1,13 @@
 //! Rigid parts of a scene: shapes, what they are painted with, and how they move.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 
 use super::bvh::Bvh;
+use super::grid::Grid;
 use super::ray::Pose;
-use super::shape::{Distance, Shape};
+use super::shape::Shape;
 
 /// A point of a surface to be painted, in the frame of its part.
 #[derive(Clone, Copy, Debug)]
@@ -103,7 +106,7 @@ pub struct Part {
     /// Where the part stands at a phase (0..1) of the loop.
     pub motion: fn(f32) -> Pose,
     /// Roughly the part's form: what hides light from its own surfaces.
-    pub form: Option<Distance>,
+    pub form: Option<Arc<Grid>>,
     /// Balls (centre, radius in metres) that shade other parts.
     pub shades: Vec<(Vec3, f32)>,
 }
@@ -116,7 +119,14 @@ impl Part {
 
     /// A part without shapes that moves.
     pub fn moving(motion: fn(f32) -> Pose) -> Self {
-        Self { shapes: Vec::new(), materials: Vec::new(), tree: Bvh::default(), motion, form: None, shades: Vec::new() }
+        Self {
+            shapes: Vec::new(),
+            materials: Vec::new(),
+            tree: Bvh::default(),
+            motion,
+            form: None,
+            shades: Vec::new(),
+        }
     }
 
     /// Adds a shape.

@@ -65,6 +65,13 @@ impl Bounds {
         0.5 * (self.low + self.high)
     }
 
+    /// A box around the box as it stands in `pose`.
+    pub fn posed(&self, pose: &Pose) -> Self {
+        let (half, turn) = (0.5 * (self.high - self.low), pose.turn);
+        let reach = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
+        Self::around(pose.to_world(self.centre()), reach)
+    }
+
     /// Half the surface: what the chance of being hit by a ray is proportional to.
     pub fn half_area(&self) -> f32 {
         let d = (self.high - self.low).max(Vec3::ZERO);

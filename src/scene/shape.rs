@@ -1,7 +1,10 @@
 //! The primitives: where a ray meets them, and what the surface is like there.
 
+use std::sync::Arc;
+
 use glam::{Mat3, Vec2, Vec3};
 
+use super::grid::Grid;
 use super::ray::{Bounds, Ray};
 
 /// A signed distance in metres (a lower bound of it suffices), negative inside.
@@ -72,6 +75,8 @@ pub enum Shape {
         distance: Distance,
         /// Where it is looked for.
         bounds: Bounds,
+        /// Distances nowhere larger than the function's, to a cell: the way to the surface is walked through them.
+        guide: Arc<Grid>,
     },
 }
 
@@ -109,7 +114,10 @@ impl Shape {
             }
             Shape::Frustum { base, height, low_radius, high_radius } => {
                 let radius = low_radius.max(high_radius);
-                Bounds { low: base - Vec3::new(radius, 0.0, radius), high: base + Vec3::new(radius, height, radius) }
+                Bounds {
+                    low: base - Vec3::new(radius, 0.0, radius),
+                    high: base + Vec3::new(radius, height, radius),
+                }
             }
             Shape::Field { bounds, .. } => bounds,
         }
@@ -144,7 +152,7 @@ impl Shape {
             Shape::Frustum { base, height, low_radius, high_radius } => {
                 meet_frustum(ray, base, height, low_radius, high_radius)?
             }
-            Shape::Field { distance, bounds } => meet_field(ray, distance, &bounds, t_max)?,
+            Shape::Field { distance, bounds, ref guide } => meet_field(ray, distance, &bounds, guide, t_max)?,
         };
         (t > 0.0 && t < t_max).then_some(t)
     }
@@ -152,8 +160,7 @@ impl Shape {
     /// The outward unit normal at `p` on the surface, and surface coordinates: `u`, `v` in -1..1 for a quad, the
     /// way along (0..1) and the direction along a cone in `tangent`; zero where a shape has none.
     pub fn surface(&self, p: Vec3) -> Skin {
-        let skin =
-            |normal: Vec3| Skin { normal: normal.normalize_or(Vec3::NEG_Z), uv: Vec2::ZERO, tangent: Vec3::ZERO };
+        let skin = |normal: Vec3| Skin { normal: normal.normalize_or(Vec3::NEG_Z), uv: Vec2::ZERO, tangent: Vec3::ZERO };
         match *self {
             Shape::Quad { centre, right, up, .. } => Skin {
                 normal: right.cross(up).normalize_or(Vec3::NEG_Z),
@@ -277,10 +284,12 @@ fn meet_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_radius
         .find(|t| *t > 0.0)
 }
 
-fn meet_field(ray: &Ray, distance: Distance, bounds: &Bounds, t_max: f32) -> Option<f32> {
+fn meet_field(ray: &Ray, distance: Distance, bounds: &Bounds, guide: &Grid, t_max: f32) -> Option<f32> {
     let (mut t, leave) = bounds.span(ray, t_max)?;
     for _ in 0..FIELD_STEPS {
-        let gap_m = distance(ray.at(t));
+        let p = ray.at(t);
+        let safe_m = guide.gap_m(p) - guide.cell_m();
+        let gap_m = if safe_m > guide.cell_m() { safe_m } else { distance(p) };
         if gap_m < FIELD_TOLERANCE_M {
             return Some(t);
         }

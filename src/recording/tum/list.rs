@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn as_few_times_as_possible_are_given_up() {
-        assert_eq!(kept(&[]), []);
+        assert!(kept(&[]).is_empty());
         assert_eq!(kept(&[1, 2, 3]), [1, 2, 3]);
         assert_eq!(kept(&[1, 99, 2, 3, 4]), [1, 2, 3, 4]);
         assert_eq!(kept(&[5, 6, 0, 7, 8]), [5, 6, 7, 8]);

@@ -1,11 +1,13 @@
 //! What stands before the subject: the table with a cup and a notebook, and a twig near the lens.
 
 use std::f32::consts::TAU;
+use std::sync::Arc;
 
 use glam::{Mat3, Vec2, Vec3};
 
 use super::form::{blend, carve, hex, step};
 use super::paint;
+use crate::scene::grid::Grid;
 use crate::scene::noise::{Dice, unit};
 use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::ray::{Bounds, Pose};
@@ -23,9 +25,12 @@ pub fn desk() -> Part {
         axes: Mat3::IDENTITY,
         half: Vec3::new(1.3, 0.02, 0.33),
     };
-    part.add(top, Material::new(paint::boards, hex(0xa8743f)));
+    part.add(top, Material::new(paint::boards, hex(0xc79a68)));
     let bounds = Bounds { low: CUP - Vec3::new(0.05, 0.002, 0.05), high: CUP + Vec3::new(0.09, 0.1, 0.05) };
-    part.add(Shape::Field { distance: cup, bounds }, Material::new(glaze, hex(0xe9e2d3)));
+    let around = Bounds { low: Vec3::new(-0.5, TABLE_Y - 0.02, 0.75), high: Vec3::new(0.5, -0.10, 1.06) };
+    let form = Arc::new(Grid::new(|p| (p.y - TABLE_Y).min(cup(p)), around, 0.008));
+    let guide = Arc::new(Grid::new(cup, bounds, 0.008));
+    part.add(Shape::Field { distance: cup, bounds, guide }, Material::new(glaze, hex(0xe9e2d3)));
     let turn = Mat3::from_rotation_y(0.35);
     let book = Shape::Cuboid {
         centre: Vec3::new(-0.335, TABLE_Y + 0.008, 0.90),
@@ -33,7 +38,7 @@ pub fn desk() -> Part {
         half: Vec3::new(0.085, 0.008, 0.06),
     };
     part.add(book, Material::new(paint::plain, hex(0x7c2f33)));
-    part.form = Some(|p| (p.y - TABLE_Y).min(cup(p)));
+    part.form = Some(form);
     part.shades = vec![(CUP + 0.04 * Vec3::Y, 0.045)];
     part
 }
@@ -44,17 +49,17 @@ fn cup(p: Vec3) -> f32 {
     let radius = 0.036 + 0.05 * (q.y - 0.04);
     let side = (radial - radius) * 0.98;
     let body = side.max((q.y - 0.046).abs() - 0.044);
-    let hollow = (side + 0.0035).max(-(q.y - 0.006));
+    let hollow = (side + 0.004).max(0.006 - q.y);
     let arc = Vec2::new(Vec2::new(q.x - 0.038, q.y - 0.046).length() - 0.021, q.z).length() - 0.0048;
-    let shell = carve(blend(body, arc, 0.006), hollow, 0.003);
-    let coffee = radial.max((q.y - 0.060).abs() - 0.002) - 0.034;
-    shell.min(coffee.max(side + 0.003)) * 0.9
+    let shell = carve(blend(body, arc, 0.006), hollow, 0.0025);
+    let coffee = (side + 0.002).max((q.y - 0.066).abs() - 0.003);
+    shell.min(coffee) * 0.9
 }
 
 fn glaze(spot: &Spot) -> Surface {
     let q = spot.p - CUP;
     let inside = Vec2::new(q.x, q.z).length() < 0.0335 + 0.05 * (q.y - 0.04);
-    if inside && q.y < 0.064 {
+    if inside && q.y < 0.0695 {
         return Surface::matt(spot, hex(0x3a2012)).glossy(0.3, 60.0);
     }
     let dip = step(0.034, 0.036, q.y + 0.003 * (6.0 * q.z.atan2(q.x)).sin());
@@ -71,24 +76,9 @@ pub fn twig() -> Part {
     });
     let mut dice = Dice::new(23);
     let arms = [
-        [
-            Vec3::new(-0.27, -0.26, 0.53),
-            Vec3::new(-0.21, -0.12, 0.50),
-            Vec3::new(-0.160, -0.045, 0.49),
-            Vec3::new(-0.098, -0.012, 0.50),
-        ],
-        [
-            Vec3::new(-0.25, -0.24, 0.56),
-            Vec3::new(-0.20, -0.14, 0.55),
-            Vec3::new(-0.140, -0.105, 0.54),
-            Vec3::new(-0.085, -0.098, 0.53),
-        ],
-        [
-            Vec3::new(-0.31, -0.22, 0.50),
-            Vec3::new(-0.27, -0.06, 0.48),
-            Vec3::new(-0.245, 0.03, 0.47),
-            Vec3::new(-0.215, 0.085, 0.47),
-        ],
+        [Vec3::new(-0.27, -0.26, 0.53), Vec3::new(-0.21, -0.12, 0.50), Vec3::new(-0.160, -0.045, 0.49), Vec3::new(-0.098, -0.012, 0.50)],
+        [Vec3::new(-0.25, -0.24, 0.56), Vec3::new(-0.20, -0.14, 0.55), Vec3::new(-0.140, -0.105, 0.54), Vec3::new(-0.085, -0.098, 0.53)],
+        [Vec3::new(-0.31, -0.22, 0.50), Vec3::new(-0.27, -0.06, 0.48), Vec3::new(-0.245, 0.03, 0.47), Vec3::new(-0.215, 0.085, 0.47)],
     ];
     for arm in arms {
         add_arm(&mut part, &mut dice, arm);
@@ -127,8 +117,7 @@ fn add_leaf(part: &mut Part, dice: &mut Dice, root: Vec3, out: Vec3, half_length
     let centre = root + (half_length + 0.004) * out;
     part.add_chain(&[(root, 0.0009), (centre, 0.0005)], Material::new(paint::plain, hex(0x73854a)));
     for side in [-1.0f32, 1.0] {
-        let wing =
-            (across * side + 0.28 * normal * -1.0).normalize_or(across) * (0.62 + 0.1 * unit(seed)) * half_length;
+        let wing = (across * side + 0.28 * normal * -1.0).normalize_or(across) * (0.62 + 0.1 * unit(seed)) * half_length;
         let shape = Shape::Quad { centre, right: half_length * out, up: wing, cut: half_leaf };
         part.add(shape, Material::new(paint::leaf, green).seeded(seed));
     }

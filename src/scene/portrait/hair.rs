@@ -1,8 +1,12 @@
 //! Hair: a combed mass tied into a bun, strands over it, and several hundred fine hairs that stand off.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
+use super::face::face;
 use super::form::{ball, blend, carve, egg, fold, hex, rod, step};
+use crate::scene::grid::Grid;
 use crate::scene::noise::{Dice, fractal};
 use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::ray::Bounds;
@@ -14,15 +18,15 @@ const BUN_RADIUS_M: f32 = 0.043;
 /// Strands that lie on the mass.
 const COMBED: usize = 900;
 /// Fine hairs that stand off the outline.
-const FLYAWAY: usize = 420;
+const FLYAWAY: usize = 330;
 /// Middle of the light that the hair shines back.
 const HAIR: u32 = 0x8a4a24;
 
 /// Adds the hair to the head.
-pub fn grow(part: &mut Part) {
+pub fn grow(part: &mut Part, form: &Arc<Grid>) {
     let material = Material::new(combed, hex(HAIR));
     let bounds = Bounds { low: Vec3::new(-0.125, -0.135, -0.125), high: Vec3::new(0.125, 0.215, 0.145) };
-    part.add(Shape::Field { distance: mass, bounds }, material);
+    part.add(Shape::Field { distance: mass, bounds, guide: form.clone() }, material);
     let mut dice = Dice::new(11);
     for k in 0..COMBED {
         let Some(root) = root(&mut dice) else { continue };
@@ -33,11 +37,14 @@ pub fn grow(part: &mut Part) {
         let Some(root) = root(&mut dice) else { continue };
         let lie = Lie {
             lift_m: 0.001,
-            rise: dice.between(0.15, 0.9),
-            wild: dice.between(0.15, 0.5),
-            step_m: dice.between(0.004, 0.0105),
+            rise: dice.between(0.10, 0.62),
+            wild: dice.between(0.25, 0.7),
+            step_m: dice.between(0.004, 0.0095),
         };
         let points = strand(&mut dice, root, lie, 8, 0.00042);
+        if points.iter().skip(2).any(|(p, _)| face(*p) < 0.002) {
+            continue;
+        }
         part.add_chain(&points, Material::new(fibre, hex(HAIR)).seeded(k as u32));
     }
     for side in [-1.0, 1.0] {
@@ -93,7 +100,7 @@ fn combed(spot: &Spot) -> Surface {
 fn fibre(spot: &Spot) -> Surface {
     let tone = 0.75 + 0.7 * crate::scene::noise::unit(spot.seed ^ 0x77);
     let color = spot.tint * tone * Vec3::new(1.25, 1.1, 0.95);
-    Surface { wrap: 0.5, fibre: spot.tangent, ..Surface::matt(spot, color) }.glossy(0.22, 22.0)
+    Surface { wrap: 0.5, fibre: spot.tangent, ..Surface::matt(spot, color) }.glossy(0.14, 22.0)
 }
 
 /// A point on the mass, over the head or on the bun.
@@ -164,8 +171,8 @@ fn add_lock(part: &mut Part, dice: &mut Dice, side: f32, k: u32) {
             let s = end * i as f32 / 12.0;
             let wave = 0.007 * swing * (7.5 * s + loose).sin();
             let p = Vec3::new(
-                side * (0.0785 + 0.016 * (3.1 * s).sin() - 0.010 * s + wave),
-                0.040 - 0.150 * s,
+                side * (0.0765 + 0.017 * (3.1 * s).sin() - 0.010 * s + wave),
+                0.062 - 0.172 * s,
                 -0.036 - 0.012 * (2.6 * s).sin() + 0.010 * s + 0.4 * wave,
             );
             (p + spread * (0.5 + 1.4 * s * (1.0 - 0.5 * s)), 0.0009 * (1.0 - 0.5 * s))

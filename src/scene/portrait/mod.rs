@@ -1,5 +1,6 @@
 //! The portrait scene, put together.
 
+mod face;
 mod form;
 mod front;
 mod hair;
@@ -41,30 +42,29 @@ pub fn scene() -> Scene {
 }
 
 fn lights() -> Vec<Light> {
-    let lamp = |position: [f32; 3], power: [f32; 3], softness, casts| Light {
+    let lamp = |position: [f32; 3], power: [f32; 3], softness, casts_within_m| Light {
         position: position.into(),
         power: power.into(),
         softness,
-        casts,
+        casts_within_m,
     };
     vec![
         // The key, high on the left in front: a large warm lamp.
-        lamp([-0.75, 0.75, 0.25], [1.55, 1.34, 1.10], 0.22, true),
+        lamp([-0.75, 0.75, 0.25], [1.55, 1.34, 1.10], 0.22, 1.9),
         // The fill, from a screen low on the right.
-        lamp([0.55, -0.05, 0.15], [0.16, 0.18, 0.22], 0.5, false),
+        lamp([0.55, -0.05, 0.15], [0.16, 0.18, 0.22], 0.5, 0.0),
         // The rims: the room's lamp on the right, the evening on the left.
-        lamp([0.95, 0.75, 2.05], [1.5, 0.95, 0.50], 0.15, false),
-        lamp([-1.05, 0.60, 2.3], [0.75, 0.95, 1.45], 0.15, false),
+        lamp([0.95, 0.75, 2.05], [1.5, 0.95, 0.50], 0.15, 0.0),
+        lamp([-1.05, 0.60, 2.3], [0.75, 0.95, 1.45], 0.15, 0.0),
         // The lamp on the sideboard, and a ceiling light out of sight.
-        lamp([1.42, 0.02, 3.72], [0.50, 0.33, 0.16], 0.25, true),
-        lamp([0.3, 1.25, 2.9], [0.95, 0.76, 0.54], 0.25, true),
+        lamp([1.42, 0.02, 3.72], [0.42, 0.25, 0.11], 0.25, 1.3),
+        lamp([0.3, 1.25, 2.9], [0.95, 0.76, 0.54], 0.25, 2.1),
     ]
 }
 
 /// The body sways a little, once per loop.
 fn sway(phase: f32) -> Pose {
-    let turn =
-        Mat3::from_rotation_z(0.012 * (TAU * phase).sin()) * Mat3::from_rotation_y(0.06 + 0.02 * (TAU * phase).cos());
+    let turn = Mat3::from_rotation_z(0.012 * (TAU * phase).sin()) * Mat3::from_rotation_y(0.06 + 0.02 * (TAU * phase).cos());
     Pose { turn: Mat3::IDENTITY, place: HEAD }.over(Pose::about(HIP, turn))
 }
 
@@ -74,5 +74,6 @@ fn nod(phase: f32) -> Pose {
     let pitch = 0.02 + 0.018 * (2.0 * TAU * phase).sin();
     let roll = -0.035 + 0.022 * (TAU * phase - 0.5).sin();
     let turn = Mat3::from_rotation_z(roll) * Mat3::from_rotation_y(yaw) * Mat3::from_rotation_x(pitch);
-    sway(phase).over(Pose::about(NAPE, turn))
+    let seat = Pose { turn: Mat3::IDENTITY, place: Vec3::new(0.0, -0.014, 0.0) };
+    sway(phase).over(Pose::about(NAPE, turn)).over(seat)
 }

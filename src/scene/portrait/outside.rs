@@ -33,8 +33,12 @@ pub fn part() -> Part {
         };
         part.add(shape, Material::new(house, hex(0x2a3448)).seeded(k as u32));
     }
-    let street =
-        Shape::Quad { centre: Vec3::new(-3.5, -1.75, 9.0), right: 6.0 * Vec3::X, up: 4.2 * Vec3::Z, cut: whole };
+    let street = Shape::Quad {
+        centre: Vec3::new(-3.5, -1.75, 9.0),
+        right: 6.0 * Vec3::X,
+        up: 4.2 * Vec3::Z,
+        cut: whole,
+    };
     part.add(street, Material::new(asphalt, hex(0x1b2029)));
     add_trees(&mut part);
     add_lights(&mut part);
@@ -59,21 +63,21 @@ fn add_trees(part: &mut Part) {
 }
 
 fn add_lights(part: &mut Part) {
-    let warm = Vec3::new(1.0, 0.66, 0.30);
-    let amber = Vec3::new(1.0, 0.47, 0.12);
-    let white = Vec3::new(1.0, 0.90, 0.74);
-    let red = Vec3::new(1.0, 0.10, 0.05);
-    let teal = Vec3::new(0.22, 0.85, 0.80);
-    let rose = Vec3::new(1.0, 0.32, 0.42);
+    let warm = Vec3::new(1.0, 0.52, 0.13);
+    let amber = Vec3::new(1.0, 0.36, 0.05);
+    let white = Vec3::new(1.0, 0.80, 0.50);
+    let red = Vec3::new(1.0, 0.07, 0.04);
+    let teal = Vec3::new(0.08, 0.85, 0.72);
+    let rose = Vec3::new(1.0, 0.16, 0.30);
     // The two rows of street lamps run away from the camera.
     let mut lights: Vec<(Vec3, f32, Vec3)> = Vec::new();
     for k in 0..6 {
-        let z = 6.2 + 1.05 * k as f32;
-        lights.push((Vec3::new(-0.92 * z * 0.42 - 0.05, 0.62 - 0.02 * k as f32, z), 0.050, 9.0 * warm));
-        lights.push((Vec3::new(-0.200 * z, 0.42, z + 0.4), 0.045, 6.0 * amber));
+        let z = 5.6 * 1.14f32.powi(k);
+        lights.push((Vec3::new(-2.36, 0.52, z), 0.045, 8.0 * warm));
+        lights.push((Vec3::new(-0.98, 0.34, z + 0.3), 0.040, 6.0 * amber));
     }
     let mut dice = Dice::new(5);
-    let palette = [(warm, 6.0), (white, 9.0), (amber, 5.0), (red, 3.5), (teal, 3.0), (rose, 3.0), (warm, 12.0)];
+    let palette = [(warm, 6.0), (white, 9.0), (amber, 5.0), (red, 4.0), (teal, 3.5), (rose, 4.0), (warm, 12.0)];
     // Shop signs, signals and cars: one to a cell of a loose grid, so that their discs seldom pile up.
     for row in 0..4 {
         for column in 0..8 {

@@ -32,17 +32,13 @@ pub fn wood(spot: &Spot) -> Surface {
     grain(spot, spot.p)
 }
 
-/// Wood with its grain along `y`.
-pub fn upright_wood(spot: &Spot) -> Surface {
-    grain(spot, Vec3::new(spot.p.y, spot.p.x, spot.p.z))
-}
 
 fn grain(spot: &Spot, p: Vec3) -> Surface {
     let offset = 31.0 * unit(spot.seed);
     let warp = fractal(Vec3::new(1.6 * p.x + offset, 9.0 * p.y, 9.0 * p.z), 3);
     let ring = 0.5 + 0.5 * ((34.0 * (p.z + p.y) + 9.0 * warp) * 2.2).sin();
     let pore = value(Vec3::new(14.0 * p.x, 260.0 * p.y + offset, 260.0 * p.z));
-    let color = spot.tint * (0.72 + 0.30 * ring * warp + 0.16 * pore);
+    let color = spot.tint * (0.75 + 0.30 * ring * warp + 0.10 * pore);
     Surface::matt(spot, color).glossy(0.10, 24.0)
 }
 
@@ -98,7 +94,7 @@ pub fn book(spot: &Spot) -> Surface {
 pub fn cloth(spot: &Spot) -> Surface {
     let weave = value(Vec3::new(300.0, 220.0, 300.0) * spot.p);
     let soft = fractal(14.0 * spot.p, 3);
-    Surface { wrap: 0.3, ..Surface::matt(spot, spot.tint * (0.72 + 0.22 * weave + 0.28 * soft)) }
+    Surface { wrap: 0.3, ..Surface::matt(spot, spot.tint * (0.77 + 0.12 * weave + 0.28 * soft)) }
 }
 
 /// A cloth with wide stripes across its width.
@@ -118,7 +114,7 @@ pub fn curtain(spot: &Spot) -> Surface {
 pub fn lamp_shade(spot: &Spot) -> Surface {
     let middle = (-((spot.uv.y - 0.45) / 0.42).powi(2)).exp();
     let thread = 0.92 + 0.16 * value(Vec3::new(10.0 * spot.uv.x, 160.0 * spot.p.y, 1.0));
-    let glow = spot.tint * (0.35 + 1.25 * middle) * thread;
+    let glow = spot.tint * (0.35 + 0.65 * middle) * thread;
     Surface { emission: glow, ..Surface::matt(spot, hex(0xe8d9b8)) }
 }
 
@@ -126,8 +122,7 @@ pub fn lamp_shade(spot: &Spot) -> Surface {
 pub fn leaf(spot: &Spot) -> Surface {
     let (u, v) = (spot.uv.x, spot.uv.y);
     let rib = step(0.06, 0.02, v.abs()) + 0.5 * step(0.16, 0.04, ((9.0 * (u - 0.55 * v.abs())).sin()).abs());
-    let tone =
-        0.78 + 0.3 * unit(spot.seed) + 0.25 * (fractal(Vec3::new(3.0 * u, 3.0 * v, unit(spot.seed) * 50.0), 3) - 0.5);
+    let tone = 0.78 + 0.3 * unit(spot.seed) + 0.25 * (fractal(Vec3::new(3.0 * u, 3.0 * v, unit(spot.seed) * 50.0), 3) - 0.5);
     let color = (spot.tint * tone).lerp(hex(0xb9cf8a), 0.25 * rib.min(1.0));
     Surface { wrap: 0.5, emission: 0.015 * color, ..Surface::matt(spot, color) }.glossy(0.07, 18.0)
 }

@@ -1,10 +1,13 @@
 //! The room behind the subject: wall, window frame, shelf with books, sideboard with a lamp, sofa, low table.
 
+use std::sync::Arc;
+
 use glam::{Mat3, Vec2, Vec3};
 
 use super::form::{blend, brick, hex};
 use super::front::half_leaf;
 use super::paint;
+use crate::scene::grid::Grid;
 use crate::scene::noise::{Dice, unit};
 use crate::scene::part::{Material, Paint, Part};
 use crate::scene::ray::Bounds;
@@ -21,12 +24,14 @@ const TABLE: Vec3 = Vec3::new(1.10, -0.50, 2.45);
 /// The room.
 pub fn part() -> Part {
     let mut part = Part::still();
+    let around = Bounds { low: Vec3::new(-2.2, FLOOR_Y - 0.02, 1.75), high: Vec3::new(2.3, 1.1, WALL_M + 0.05) };
+    let form = Arc::new(Grid::new(form, around, 0.03));
     add_walls(&mut part);
     add_window(&mut part);
     add_shelves(&mut part);
     add_sideboard(&mut part);
     add_fairy_lights(&mut part);
-    add_seats(&mut part);
+    add_seats(&mut part, &form);
     part.form = Some(form);
     part
 }
@@ -47,8 +52,7 @@ fn add_walls(part: &mut Part) {
     solid(part, [-4.0, -1.4, WALL_M], [low.x, 1.8, WALL_M + 0.12], wall);
     solid(part, [high.x, -1.4, WALL_M], [4.0, 1.8, WALL_M + 0.12], wall);
     solid(part, [low.x, -1.4, WALL_M], [high.x, low.y, WALL_M + 0.12], wall);
-    let floor =
-        Shape::Quad { centre: Vec3::new(0.0, FLOOR_Y, 3.0), right: 4.0 * Vec3::X, up: 2.0 * Vec3::Z, cut: whole };
+    let floor = Shape::Quad { centre: Vec3::new(0.0, FLOOR_Y, 3.0), right: 4.0 * Vec3::X, up: 2.0 * Vec3::Z, cut: whole };
     part.add(floor, paint(paint::boards, 0x7a5233));
     solid(part, [-4.0, FLOOR_Y, WALL_M - 0.02], [4.0, FLOOR_Y + 0.09, WALL_M], paint(paint::plain, 0x2a4442));
 }
@@ -113,7 +117,8 @@ fn add_pot(part: &mut Part, foot: Vec3, radius: f32, color: u32, seed: u32, spre
     }
 }
 
-const BOOKS: [u32; 9] = [0x9c3b34, 0x2f5d73, 0xd8a24a, 0x54734f, 0x7d4b63, 0xc9bda3, 0x33415e, 0xb5643c, 0x8a8f5c];
+const BOOKS: [u32; 9] =
+    [0x9c3b34, 0x2f5d73, 0xd8a24a, 0x54734f, 0x7d4b63, 0xc9bda3, 0x33415e, 0xb5643c, 0x8a8f5c];
 
 fn add_shelves(part: &mut Part) {
     let board = paint(paint::wood, 0x8a5a33);
@@ -138,8 +143,7 @@ fn add_shelves(part: &mut Part) {
                 let height = dice.between(0.19, 0.30);
                 let depth = dice.between(0.12, 0.17);
                 let lean = if kind > 0.93 { 0.16 } else { 0.0 };
-                let centre =
-                    Vec3::new(x + 0.5 * width + 0.5 * height * lean, y + 0.5 * height, WALL_M - 0.04 - 0.5 * depth);
+                let centre = Vec3::new(x + 0.5 * width + 0.5 * height * lean, y + 0.5 * height, WALL_M - 0.04 - 0.5 * depth);
                 let half = 0.5 * Vec3::new(width - 0.002, height, depth);
                 let code = BOOKS[(dice.next() * 9.0) as usize % 9];
                 let seed = (x * 1e4) as u32;
@@ -153,8 +157,12 @@ fn add_shelves(part: &mut Part) {
     }
     // A framed picture between the window and the shelves.
     solid(part, [0.02, 0.44, 4.165], [0.52, 0.84, WALL_M], paint(paint::wood, 0x5d3b22));
-    let canvas =
-        Shape::Quad { centre: Vec3::new(0.27, 0.64, 4.163), right: 0.225 * Vec3::X, up: 0.175 * Vec3::Y, cut: whole };
+    let canvas = Shape::Quad {
+        centre: Vec3::new(0.27, 0.64, 4.163),
+        right: 0.225 * Vec3::X,
+        up: 0.175 * Vec3::Y,
+        cut: whole,
+    };
     part.add(canvas, paint(paint::landscape, 0xffffff));
 }
 
@@ -174,7 +182,7 @@ fn add_sideboard(part: &mut Part) {
     part.add(belly, paint(paint::ceramic, 0x2f6f73));
     part.add_chain(&[(foot + 0.16 * Vec3::Y, 0.012), (foot + 0.30 * Vec3::Y, 0.010)], paint(paint::metal, 0xc59a4a));
     let shade = Shape::Frustum { base: foot + 0.235 * Vec3::Y, height: 0.22, low_radius: 0.175, high_radius: 0.115 };
-    part.add(shade, Material::new(paint::lamp_shade, Vec3::new(1.25, 0.74, 0.32)));
+    part.add(shade, Material::new(paint::lamp_shade, Vec3::new(1.25, 0.80, 0.40)));
     add_pot(part, Vec3::new(0.86, -0.42, 3.92), 0.095, 0xc9bda3, 61, 1.0);
     for k in 0..4u32 {
         let y = -0.42 + 0.034 * k as f32;
@@ -200,23 +208,23 @@ fn add_fairy_lights(part: &mut Part) {
         for k in 0..count {
             let s = (k as f32 + 0.5) / count as f32;
             let centre = at(s) - 0.016 * Vec3::Y;
-            let power = 7.0 + 6.0 * unit(k + 31);
-            let bulb = Shape::Sphere { centre, radius: 0.0125 };
-            part.add(bulb, Material::new(paint::glow, power * Vec3::new(1.0, 0.62, 0.26)));
+            let power = 7.0 + 5.0 * unit(k + 31);
+            let bulb = Shape::Sphere { centre, radius: 0.015 };
+            part.add(bulb, Material::new(paint::glow, power * Vec3::new(1.0, 0.46, 0.09)));
         }
     }
 }
 
-fn add_seats(part: &mut Part) {
+fn add_seats(part: &mut Part, form: &Arc<Grid>) {
     let bounds = Bounds { low: SOFA - Vec3::new(0.75, 0.65, 0.45), high: SOFA + Vec3::new(0.75, 0.25, 0.5) };
-    part.add(Shape::Field { distance: sofa, bounds }, paint(paint::cloth, 0x8c4a52));
+    part.add(Shape::Field { distance: sofa, bounds, guide: form.clone() }, paint(paint::cloth, 0x8c4a52));
     let cushion = Bounds { low: SOFA - Vec3::new(0.55, 0.2, 0.4), high: SOFA + Vec3::new(0.1, 0.25, 0.1) };
-    part.add(Shape::Field { distance: pillow, bounds: cushion }, paint(paint::stripes, 0x35606b));
+    part.add(Shape::Field { distance: pillow, bounds: cushion, guide: form.clone() }, paint(paint::stripes, 0x35606b));
     solid(
         part,
         [TABLE.x - 0.62, TABLE.y - 0.03, TABLE.z - 0.55],
         [TABLE.x + 0.75, TABLE.y, TABLE.z + 0.55],
-        paint(paint::boards, 0x9a683a),
+        paint(paint::cloth, 0xcfc2a8),
     );
     for (x, z) in [(-0.55, -0.48), (-0.55, 0.48), (0.6, 0.48)] {
         let leg = TABLE + Vec3::new(x, -0.03, z);
@@ -254,10 +262,7 @@ fn add_still_life(part: &mut Part) {
         for k in 2..7 {
             let bud = stem[k].0 + 0.018 * dice.direction();
             let color = hex(0xe9c3b0).lerp(hex(0xd98a86), dice.next());
-            part.add(
-                Shape::Sphere { centre: bud, radius: dice.between(0.010, 0.019) },
-                Material::new(paint::cloth, color),
-            );
+            part.add(Shape::Sphere { centre: bud, radius: dice.between(0.010, 0.019) }, Material::new(paint::cloth, color));
         }
     }
     for (x, y, z) in [(0.34, 0.035, -0.2), (0.405, 0.035, -0.165), (0.345, 0.035, -0.13), (0.365, 0.088, -0.165)] {
@@ -295,5 +300,12 @@ fn form(p: Vec3) -> f32 {
     };
     let side = brick(p - Vec3::new(1.46, -0.69, 3.96), Vec3::new(0.83, 0.27, 0.25), 0.0);
     let table = brick(p - TABLE - Vec3::new(0.065, -0.015, 0.0), Vec3::new(0.685, 0.015, 0.55), 0.0);
-    wall.max(-window).min(p.y - FLOOR_Y).min(board(0.20, 0.66)).min(board(0.66, 0.84)).min(side).min(table).min(sofa(p))
+    wall.max(-window)
+        .min(p.y - FLOOR_Y)
+        .min(board(0.20, 0.66))
+        .min(board(0.66, 0.84))
+        .min(side)
+        .min(table)
+        .min(sofa(p))
+        .min(pillow(p))
 }

@@ -1,8 +1,11 @@
 //! The shoulders in a knitted sweater with a rolled collar. Same frame as the head.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::form::{blend, egg, fold, hex, ring, rod, step};
+use crate::scene::grid::Grid;
 use crate::scene::noise::fractal;
 use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::ray::{Bounds, Pose};
@@ -12,8 +15,9 @@ use crate::scene::shape::Shape;
 pub fn part(motion: fn(f32) -> Pose) -> Part {
     let mut part = Part::moving(motion);
     let bounds = Bounds { low: Vec3::new(-0.33, -0.55, -0.12), high: Vec3::new(0.33, -0.12, 0.19) };
-    part.add(Shape::Field { distance: form, bounds }, Material::new(knit, hex(0xd99a2b)));
-    part.form = Some(form);
+    let guide = Arc::new(Grid::new(form, bounds, 0.006));
+    part.form = Some(guide.clone());
+    part.add(Shape::Field { distance: form, bounds, guide }, Material::new(knit, hex(0xd99a2b)));
     part.shades = vec![(Vec3::new(0.0, -0.38, 0.06), 0.16)];
     part
 }
@@ -21,8 +25,8 @@ pub fn part(motion: fn(f32) -> Pose) -> Part {
 fn form(p: Vec3) -> f32 {
     let q = fold(p);
     let chest = egg(p - Vec3::new(0.0, -0.42, 0.045), Vec3::new(0.180, 0.215, 0.112));
-    let shoulder = rod(q, Vec3::new(0.02, -0.222, 0.062), Vec3::new(0.168, -0.268, 0.068), 0.054, 0.056);
-    let arm = rod(q, Vec3::new(0.178, -0.278, 0.066), Vec3::new(0.232, -0.56, 0.02), 0.056, 0.050);
+    let shoulder = rod(q, Vec3::new(0.02, -0.222, 0.062), Vec3::new(0.150, -0.272, 0.068), 0.052, 0.056);
+    let arm = rod(q, Vec3::new(0.162, -0.284, 0.066), Vec3::new(0.222, -0.56, 0.02), 0.056, 0.050);
     let mut d = blend(chest, shoulder, 0.06);
     d = blend(d, arm, 0.025);
     let c = p - Vec3::new(0.0, 0.0, 0.044);
@@ -52,11 +56,6 @@ fn knit(spot: &Spot) -> Surface {
     let e = 0.0009;
     let slope = Vec3::new(stitch(p + e * Vec3::X) - height, stitch(p + e * Vec3::Y) - height, 0.0);
     let normal = (spot.normal - 0.35 * (slope - spot.normal * slope.dot(spot.normal))).normalize_or(spot.normal);
-    let wool = 0.88 + 0.24 * fractal(90.0 * p, 2);
-    Surface {
-        wrap: 0.30,
-        normal,
-        open: 0.55 + 0.45 * height,
-        ..Surface::matt(spot, spot.tint * wool * (0.72 + 0.28 * height))
-    }
+    let wool = 0.93 + 0.14 * fractal(90.0 * p, 2);
+    Surface { wrap: 0.30, normal, open: 0.55 + 0.45 * height, ..Surface::matt(spot, spot.tint * wool * (0.72 + 0.28 * height)) }
 }

@@ -1,0 +1,190 @@
+//! `bench`: how fast the blur is on this machine.
+
+use std::time::{Duration, Instant};
+
+use clap::{Args, value_parser};
+use serde::Serialize;
+
+use super::config::{Blur, Executor};
+use super::error::CliError;
+use super::values::{self, Size, above_zero};
+use super::{defaults, options, print, render};
+use crate::bokeh::{Bokeh, Job};
+use crate::budget::Quality;
+use crate::capture::Camera;
+use crate::capture::synthetic::{Format, Synthetic};
+use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pooled;
+use crate::optics::CocField;
+
+/// Frames before those that are measured: caches and clocks settle.
+const WARM_UP_FRAMES: usize = 2;
+
+/// Measure the blur on this machine, without reading or writing files
+///
+/// Blurs one frame of the synthetic scene again and again, one at a time, for every combination of the lists given.
+/// The time is that of one frame, in milliseconds, from handing it over until it is back.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam bench
+  bokehcam bench --sizes 1280x720 --quality draft,fast,balanced --threads 1,2,4
+  bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl")]
+pub struct BenchCommand {
+    /// Picture sizes
+    #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = defaults::BENCHED_SIZES)]
+    sizes: Vec<Size>,
+    /// Blur radii at infinity, in pixels [default: height / 45]
+    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = above_zero)]
+    coc: Vec<f32>,
+    /// Quality levels
+    #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
+          default_value = Quality::default().name(), value_parser = options::quality())]
+    quality: Vec<Quality>,
+    /// Numbers of threads of the CPU backend [default: one per core]
+    #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
+          value_parser = value_parser!(u16).range(1..=1024))]
+    threads: Vec<u16>,
+    /// Frames to measure
+    #[arg(id = "benched_frames", long = "frames", value_name = "N", default_value_t = defaults::BENCHED_FRAMES,
+          value_parser = value_parser!(u32).range(1..))]
+    frames: u32,
+    /// What runs the blur
+    #[arg(long, value_enum, value_name = "WHICH", default_value = "auto")]
+    backend: values::Backend,
+    /// Part of the name of the GPU to take
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// One JSON object a line, instead of a table
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    blur: options::Blur,
+    #[command(flatten)]
+    aperture: options::Aperture,
+}
+
+/// One line of the result.
+#[derive(Serialize)]
+struct Measured {
+    size_px: (u32, u32),
+    coc_px: f32,
+    quality: &'static str,
+    executor: String,
+    frames: u32,
+    p50_ms: f64,
+    p95_ms: f64,
+    max_ms: f64,
+    frames_per_s: f64,
+}
+
+/// Runs the command; each line is printed as soon as it is measured.
+///
+/// # Errors
+/// The options do not fit each other, there is no such executor, or it failed.
+pub fn run(command: &BenchCommand) -> Result<(), CliError> {
+    if !command.json {
+        print(b"size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n")?;
+    }
+    let threads: Vec<Option<usize>> = match &command.threads[..] {
+        [] => vec![None],
+        list => list.iter().map(|&threads| Some(usize::from(threads))).collect(),
+    };
+    for size in &command.sizes {
+        let (color, depth) = synthetic_frame((size.width, size.height))?;
+        let default_coc_px = [size.height as f32 * defaults::COC_AT_INFINITY_PER_HEIGHT];
+        let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
+        for &coc_px in radii_px {
+            for &quality in &command.quality {
+                for &threads in &threads {
+                    let executor = Executor::new(command.backend, command.adapter.clone(), threads);
+                    let measured = measure(command, (&color, &depth), coc_px, quality, &executor)?;
+                    print(measured.line(command.json).as_bytes())?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn measure(
+    command: &BenchCommand,
+    (color, depth): (&ColorImage, &DepthMap),
+    coc_px: f32,
+    quality: Quality,
+    executor: &Executor,
+) -> Result<Measured, CliError> {
+    let options = options::Blur { coc_at_infinity: Some(coc_px), ..command.blur.clone() };
+    let blur = Blur::resolve(&options, &command.aperture, quality, true)?;
+    let size = color.size();
+    let Some(settings) = blur.settings(size) else {
+        return Err(CliError::Usage(
+            "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
+        ));
+    };
+    let (coc, depth) = render::prepared(&blur, size, Some(depth.clone()))?;
+    let mut bokeh = executor.create(&settings, size)?;
+    for _ in 0..WARM_UP_FRAMES {
+        time_of_a_frame(&mut *bokeh, color, depth.as_ref(), coc)?;
+    }
+    let times: Result<Vec<Duration>, CliError> =
+        (0..command.frames).map(|_| time_of_a_frame(&mut *bokeh, color, depth.as_ref(), coc)).collect();
+    let mut times = times?;
+    times.sort_unstable();
+    let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3;
+    Ok(Measured {
+        size_px: size,
+        coc_px,
+        quality: quality.name(),
+        executor: bokeh.describe(),
+        frames: command.frames,
+        p50_ms: at(0.5),
+        p95_ms: at(0.95),
+        max_ms: at(1.0),
+        frames_per_s: times.len() as f64 / times.iter().sum::<Duration>().as_secs_f64(),
+    })
+}
+
+/// Time from handing a frame over until it is back; copying it first is not counted.
+fn time_of_a_frame(
+    bokeh: &mut dyn Bokeh,
+    color: &ColorImage,
+    depth: Option<&DepthMap>,
+    coc: CocField,
+) -> Result<Duration, CliError> {
+    let job = Job {
+        ticket: 0,
+        color: Pooled::detached(color.clone()),
+        depth: depth.cloned().map(Pooled::detached),
+        coc,
+        out: Pooled::detached(ColorImage::new(color.width, color.height)),
+    };
+    let began = Instant::now();
+    bokeh.submit(job)?;
+    let finished = bokeh.collect(true)?;
+    let time = began.elapsed();
+    finished.map(|_| time).ok_or(CliError::NothingCameBack)
+}
+
+fn synthetic_frame(size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut camera = Synthetic::new(Format { size, fps: defaults::FPS, frames: Some(1), threads })?;
+    let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
+    camera.next(&mut color, &mut depth)?;
+    Ok((color, depth))
+}
+
+impl Measured {
+    fn line(&self, json: bool) -> String {
+        if json {
+            // Numbers and texts always have a form in JSON.
+            return serde_json::to_string(self).unwrap_or_default() + "\n";
+        }
+        let Self { size_px: (width, height), coc_px, quality, executor, p50_ms, p95_ms, max_ms, frames_per_s, .. } =
+            self;
+        format!(
+            "{:<10} {coc_px:>7.1}  {quality:<9} {p50_ms:>7.2}  {p95_ms:>7.2}  {max_ms:>7.2} {frames_per_s:>7.1}  {executor}\n",
+            format!("{width}x{height}")
+        )
+    }
+}

@@ -1,0 +1,34 @@
+//! Every default of the command line, in one place.
+
+/// CoC radius at infinity, as a fraction of the picture's height: a portrait lens wide open.
+pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
+/// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
+pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
+/// Soft rim of the aperture, as a fraction of its radius: rank 3 is then as good as rank 7 of a hard disc.
+pub const RIM: f32 = 0.2;
+/// Highlight recovery; off, because it invents light.
+pub const HIGHLIGHTS: f32 = 0.0;
+/// Radial intensity of the aperture: flat.
+pub const INTENSITY: f32 = 0.0;
+/// Shape of the aperture.
+pub const APERTURE: &str = "disc";
+/// Middle of the sharp band, its width, both as fractions of the height, and its turn in degrees.
+pub const TILT: &str = "0.55:0.15:0";
+/// Units of a 16-bit depth picture per metre: the TUM convention.
+pub const DEPTH_SCALE: f32 = 5000.0;
+/// Value of a depth picture that means unknown.
+pub const DEPTH_INVALID: &str = "0";
+/// Picture size of the synthetic scene.
+pub const SIZE: &str = "640x480";
+/// Frame rate of the synthetic scene.
+pub const FPS: f64 = 30.0;
+/// Apertures that the command `aperture` analyses.
+pub const ANALYSED_APERTURES: &str = "disc,ring:0.5,polygon:5,polygon:6,polygon:8,heart,star:5";
+/// Ranks that it shows.
+pub const ANALYSED_RANKS: &str = "1,2,3,4,6,8";
+/// Columns and rows of the kernels that it decomposes.
+pub const ANALYSED_SIZE: &str = "65";
+/// Picture sizes that the command `bench` measures.
+pub const BENCHED_SIZES: &str = "640x480,1280x720,1920x1080";
+/// Frames that it measures of each.
+pub const BENCHED_FRAMES: u32 = 20;

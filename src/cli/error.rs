@@ -1,0 +1,106 @@
+//! What can go wrong between the arguments and the pipeline.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use crate::bokeh::BokehError;
+use crate::capture::CaptureError;
+use crate::depth::DepthError;
+use crate::pipeline::Fault;
+use crate::recording::RecordingError;
+use crate::sink::SinkError;
+
+/// Why a command did not do what was asked for.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// The arguments do not make sense together.
+    #[error("{0}")]
+    Usage(String),
+    /// The settings file cannot be used.
+    #[error("{}:{line}: {what}", path.display())]
+    Settings {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong, and what is accepted.
+        what: String,
+    },
+    /// Something would be overwritten.
+    #[error("{} exists: choose another name, or give --force to overwrite it", .0.display())]
+    Exists(PathBuf),
+    /// A file or folder cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A diagram cannot be drawn.
+    #[error("the diagram cannot be drawn: {0}")]
+    Diagram(String),
+    /// No handler of signals can be set.
+    #[error("signals cannot be handled: {0}")]
+    Signals(String),
+    /// The executor took a picture and gave none back.
+    #[error("the blur gave no picture back: please report this")]
+    NothingCameBack,
+    /// A picture or a recording cannot be read or written.
+    #[error(transparent)]
+    Recording(RecordingError),
+    /// The source failed.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// There is no depth.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+    /// The output failed.
+    #[error(transparent)]
+    Sink(#[from] SinkError),
+    /// A stage of the pipeline failed.
+    #[error(transparent)]
+    Run(#[from] Fault),
+    /// The blur failed.
+    #[error(transparent)]
+    Bokeh(#[from] BokehError),
+}
+
+impl From<RecordingError> for CliError {
+    fn from(error: RecordingError) -> Self {
+        match error {
+            // Here it is known what the way to overwrite is called.
+            RecordingError::Exists { path } => CliError::Exists(path),
+            other => CliError::Recording(other),
+        }
+    }
+}
+
+impl CliError {
+    /// For `map_err`: the same with the file's name.
+    pub fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| CliError::Io { path, source }
+    }
+
+    /// 2 for what the caller has to write differently, else 1.
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            CliError::Usage(_) | CliError::Settings { .. } => ExitCode::from(2),
+            _ => ExitCode::FAILURE,
+        }
+    }
+
+    /// Whether the reader of our output went away, which is no failure of ours.
+    pub fn is_broken_pipe(&self) -> bool {
+        let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(self);
+        while let Some(error) = cause {
+            if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe) {
+                return true;
+            }
+            cause = error.source();
+        }
+        false
+    }
+}

@@ -1,0 +1,30 @@
+//! Files that appear whole or not at all.
+
+use std::fs;
+use std::path::Path;
+
+use super::error::CliError;
+
+/// # Errors
+/// [`CliError::Exists`] when one of `paths` exists and `force` is not given.
+pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bool) -> Result<(), CliError> {
+    match paths.into_iter().find(|path| !force && path.symlink_metadata().is_ok()) {
+        Some(path) => Err(CliError::Exists(path.to_owned())),
+        None => Ok(()),
+    }
+}
+
+/// Writes a file under another name in the same folder, and then gives it its own.
+///
+/// # Errors
+/// [`CliError::Io`] when the folder cannot be written.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(format!(".{}.part", std::process::id()));
+    let part = Path::new(&part);
+    fs::write(part, bytes).and_then(|()| fs::rename(part, path)).map_err(|error| {
+        // The first failure is the one to tell.
+        let _ = fs::remove_file(part);
+        CliError::io(path)(error)
+    })
+}

@@ -1,0 +1,217 @@
+//! The options that commands share, in groups: what can be written on the command line, in the environment or in
+//! the settings file, before it means anything.
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, value_parser};
+
+use super::defaults;
+use super::values::{
+    ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Size, Tilt, above_zero, between,
+    not_negative, seconds,
+};
+use crate::budget::Quality;
+
+/// Options of every command.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Everywhere")]
+pub struct Global {
+    /// Tell more; twice for details
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
+    pub verbose: u8,
+    /// Tell only what went wrong
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// How log lines are written to stderr; RUST_LOG chooses which
+    #[arg(long, global = true, value_enum, value_name = "FORMAT", default_value = "text")]
+    pub log_format: LogFormat,
+    /// Settings file instead of $XDG_CONFIG_HOME/bokehcam/config.toml
+    #[arg(long, global = true, value_name = "FILE", env = "BOKEHCAM_CONFIG", hide_env = true)]
+    pub config: Option<PathBuf>,
+}
+
+/// Which frames of which source.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Source")]
+pub struct Source {
+    /// Start this many seconds after the first frame
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub start: Option<f64>,
+    /// End this many seconds after the first frame
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub end: Option<f64>,
+    /// Begin again at the end; only with --frames or Ctrl-C does it end
+    #[arg(long = "loop", value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub repeat: bool,
+    /// Stop after this many frames
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
+    pub frames: Option<u64>,
+    /// Picture size of `synthetic`
+    #[arg(long, value_name = "WxH", default_value = defaults::SIZE)]
+    pub size: Size,
+    /// Frames per second of `synthetic`
+    #[arg(long, value_name = "RATE", default_value_t = defaults::FPS, value_parser = rate)]
+    pub fps: f64,
+}
+
+/// How depth pictures are read.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Depth")]
+pub struct Depth {
+    /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000)
+    #[arg(long, value_name = "UNITS", default_value_t = defaults::DEPTH_SCALE, value_parser = above_zero)]
+    pub depth_scale: f32,
+    /// Value of a depth picture that means unknown
+    #[arg(long, value_name = "VALUE", default_value = defaults::DEPTH_INVALID)]
+    pub depth_invalid: u16,
+}
+
+/// What the blur does.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Blur")]
+pub struct Blur {
+    /// What the blur follows [default: dof with depth, else blur]
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub effect: Option<Effect>,
+    /// How dof is composited
+    #[arg(long, value_enum, value_name = "HOW", default_value = "layered")]
+    pub method: Method,
+    /// Where depth comes from
+    #[arg(long, value_enum, value_name = "FROM", default_value = "auto")]
+    pub depth: DepthChoice,
+    /// Distance of the focal plane: METRES, auto, or X,Y as fractions of width and height
+    #[arg(long, value_name = "WHERE", default_value = "auto")]
+    pub focus: Focus,
+    /// Blur radius of a point at infinity, in pixels: the strength of the blur [default: height / 45]
+    #[arg(long, value_name = "PX", value_parser = not_negative,
+          conflicts_with_all = ["f_number", "focal_length", "sensor_width"])]
+    pub coc_at_infinity: Option<f32>,
+    /// The strength by a lens instead: its f-number, with --focal-length and --sensor-width
+    #[arg(long, value_name = "N", value_parser = above_zero)]
+    pub f_number: Option<f32>,
+    /// Focal length of that lens, in millimetres
+    #[arg(long, value_name = "MM", value_parser = above_zero)]
+    pub focal_length: Option<f32>,
+    /// Width of the sensor behind that lens, in millimetres
+    #[arg(long, value_name = "MM", value_parser = above_zero)]
+    pub sensor_width: Option<f32>,
+    /// Largest blur radius, in pixels [default: 0.06 x height]
+    #[arg(long, value_name = "PX", value_parser = not_negative)]
+    pub max_coc: Option<f32>,
+    /// Sharp band of tilt-shift: CENTER_Y[:BAND[:ANGLE_DEG]], the first two as fractions of the height
+    #[arg(long, value_name = "BAND", default_value = defaults::TILT)]
+    pub tilt: Tilt,
+}
+
+/// The lens opening.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Aperture")]
+pub struct Aperture {
+    /// disc, ring:INNER, polygon:N[:ROTATION_DEG[:CURVATURE]], heart, star:N or image:FILE
+    #[arg(long, value_name = "SHAPE", default_value = defaults::APERTURE)]
+    pub aperture: ApertureName,
+    /// Radial intensity: -1 soap bubbles, 0 flat, 1 bright in the middle
+    #[arg(long, value_name = "I", default_value_t = defaults::INTENSITY, value_parser = between(-1.0, 1.0),
+          allow_negative_numbers = true)]
+    pub intensity: f32,
+    /// Width of the soft rim, as a fraction of the radius
+    #[arg(long, value_name = "W", default_value_t = defaults::RIM, value_parser = between(0.0, 1.0))]
+    pub rim: f32,
+    /// Separable terms, 1 to 16 or full [default: the quality level's]
+    #[arg(long, value_name = "TERMS")]
+    pub rank: Option<Rank>,
+    /// Take clipped white as this many times as bright; 0 is off
+    #[arg(long, value_name = "M", default_value_t = defaults::HIGHLIGHTS, value_parser = between(0.0, 1000.0))]
+    pub highlights: f32,
+}
+
+/// How finely and on what the blur is computed.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Computing")]
+pub struct Computing {
+    /// Quality level: changes fidelity, never the amount of blur
+    #[arg(long, value_name = "LEVEL", default_value_t = Quality::default(), value_parser = quality())]
+    pub quality: Quality,
+    /// What runs the blur
+    #[arg(long, value_enum, value_name = "WHICH", default_value = "auto")]
+    pub backend: Backend,
+    /// Part of the name of the GPU to take
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+    /// Threads of the CPU backend [default: one per core]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=1024).map(|threads| threads as usize))]
+    pub threads: Option<usize>,
+}
+
+/// How a stream runs.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Stream")]
+pub struct Stream {
+    /// Time for one frame, in milliseconds [default: the frame period]
+    #[arg(long, value_name = "MS", value_parser = above_zero)]
+    pub budget_ms: Option<f32>,
+    /// Whether frames come when they are due, or as fast as they can be written
+    #[arg(long, value_enum, value_name = "HOW", default_value = "asap")]
+    pub pace: Pace,
+    /// Mirror the picture, as a mirror does
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub mirror: bool,
+    /// Count frames that fail and go on, instead of ending
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub keep_going: bool,
+    /// Write what happened to every frame, and how long it took, to this JSON file
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+}
+
+/// What may be overwritten.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Output")]
+pub struct Output {
+    /// Overwrite what exists
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub force: bool,
+}
+
+/// Every setting: the keys of the settings file and of the environment.
+#[derive(Args, Debug)]
+pub struct Every {
+    /// Which frames.
+    #[command(flatten)]
+    pub source: Source,
+    /// Depth pictures.
+    #[command(flatten)]
+    pub depth: Depth,
+    /// The blur.
+    #[command(flatten)]
+    pub blur: Blur,
+    /// The lens opening.
+    #[command(flatten)]
+    pub aperture: Aperture,
+    /// The executor.
+    #[command(flatten)]
+    pub computing: Computing,
+    /// The stream.
+    #[command(flatten)]
+    pub stream: Stream,
+    /// Overwriting.
+    #[command(flatten)]
+    pub output: Output,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|rate| (0.1..=1000.0).contains(rate))
+        .ok_or_else(|| "use frames per second from 0.1 to 1000".to_string())
+}
+
+/// A parser of quality levels.
+pub fn quality() -> impl TypedValueParser<Value = Quality> {
+    PossibleValuesParser::new(Quality::ALL.map(Quality::name)).try_map(|name| name.parse::<Quality>())
+}

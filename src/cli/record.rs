@@ -1,0 +1,72 @@
+//! `record`: a source as a recording.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+
+use super::error::CliError;
+use super::source::{Source, SourceName};
+use super::{options, terminal};
+use crate::capture::Captured;
+use crate::frame::{ColorImage, DepthMap};
+use crate::recording::tum::{Writer, WriterOptions};
+
+/// Record a source in the TUM RGB-D layout
+///
+/// Writes rgb/, depth/ (16-bit PNG, 5000 units per metre, 0 unknown) and their lists. The lists appear when the
+/// recording is whole; Ctrl-C ends it whole.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam record synthetic --frames 90 --size 320x240 --to recordings/mine
+  bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
+pub struct RecordCommand {
+    /// A folder with a recording, or `synthetic`
+    source: SourceName,
+    /// Folder for the recording
+    #[arg(long, value_name = "DIR")]
+    to: PathBuf,
+    #[command(flatten)]
+    frames: options::Source,
+    #[command(flatten)]
+    depth: options::Depth,
+    #[command(flatten)]
+    output: options::Output,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The source cannot be read, or the recording exists (without `--force`) or cannot be written.
+pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliError> {
+    let Source { mut camera, depth: mut source } =
+        Source::open(&command.source, &command.frames, &command.depth, false)?;
+    let info = camera.info();
+    let options = WriterOptions { overwrite: command.output.force, ..WriterOptions::default() };
+    let mut writer = Writer::create(&command.to, &options)?;
+    let stop = terminal::stop_flag()?;
+    let progress = terminal::Progress::new(info.frames, global);
+    let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
+    let mut recorded = 0;
+    while !stop.load(Ordering::Relaxed) {
+        let stamp = match camera.next(&mut color, &mut depth)? {
+            Captured::Frame(stamp) => stamp,
+            Captured::Corrupt(error) => return Err(error.into()),
+            Captured::End => break,
+        };
+        if let Some(source) = &mut source {
+            source.read(stamp.index, &mut depth)?;
+        }
+        let has_depth = source.is_some() || info.exact_depth;
+        writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
+        recorded += 1;
+        progress.delivered(recorded);
+    }
+    writer.finish()?;
+    drop(progress);
+    if !global.quiet {
+        terminal::say(&format!("{}: {recorded} frames recorded from {}", command.to.display(), info.name));
+    }
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! `stream`: a source, blurred, into a sink.
+
+use std::path::Path;
+
+use clap::Args;
+
+use super::config::{Blur, Executor};
+use super::error::CliError;
+use super::files::{refuse_overwrite, write_whole};
+use super::source::{Source, SourceName};
+use super::{options, terminal, values};
+use crate::clock::Clock;
+use crate::pipeline::{self, Pace, Run};
+use crate::sink::{self, Target};
+use crate::stats::Report;
+
+/// Blur a recording or the synthetic scene, frame by frame
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam stream recordings/portrait --to out/
+  bokehcam stream recordings/portrait --to out.mp4 --aperture polygon:6 --focus 1.2
+  bokehcam stream recordings/portrait --to - --quiet | ffplay -
+  bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
+  bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
+pub struct StreamCommand {
+    /// A folder with a recording, or `synthetic`
+    source: SourceName,
+    /// DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null
+    #[arg(long, value_name = "SINK")]
+    to: Target,
+    #[command(flatten)]
+    frames: options::Source,
+    #[command(flatten)]
+    blur: options::Blur,
+    #[command(flatten)]
+    depth: options::Depth,
+    #[command(flatten)]
+    aperture: options::Aperture,
+    #[command(flatten)]
+    computing: options::Computing,
+    #[command(flatten)]
+    stream: options::Stream,
+    #[command(flatten)]
+    output: options::Output,
+}
+
+/// Runs the command. The report is written whenever the pipeline ran, however it ended.
+///
+/// # Errors
+/// The options do not fit the source, something would be overwritten, or a stage of the pipeline failed.
+pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliError> {
+    let StreamCommand { stream, output, .. } = command;
+    refuse_overwrite(stream.report.as_deref(), output.force)?;
+    let source = Source::open(&command.source, &command.frames, &command.depth, stream.keep_going)?;
+    let info = source.camera.info();
+    let blur = Blur::resolve(&command.blur, &command.aperture, command.computing.quality, source.has_depth())?;
+    let executor = Executor::of(&command.computing);
+    let bokeh = blur.settings(info.size).map(|settings| executor.create(&settings, info.size)).transpose()?;
+    // Last, so that nothing is begun that cannot be carried through.
+    let sink_options = sink::Options { size: info.size, period_ns: info.period_ns, force: output.force };
+    let sink = command.to.open(&sink_options)?;
+
+    let stop = terminal::stop_flag()?;
+    let bar = terminal::Progress::new(info.frames, global);
+    let ended = pipeline::run(Run {
+        camera: source.camera,
+        depth: source.depth,
+        bokeh,
+        quality: command.computing.quality,
+        coc: blur.coc_rule(info.size),
+        sink,
+        pace: match stream.pace {
+            values::Pace::Realtime => Pace::Realtime,
+            values::Pace::Asap => Pace::Asap,
+        },
+        budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
+        keep_going: stream.keep_going,
+        mirror: stream.mirror,
+        clock: Clock::system(),
+        stop: &stop,
+        progress: &|progress| bar.delivered(progress.delivered),
+    });
+    drop(bar);
+    let (report, ended) = match ended {
+        Ok(report) => (Box::new(report), Ok(())),
+        Err(failed) => (failed.report, Err(failed.fault.into())),
+    };
+    if let Some(path) = &stream.report {
+        write_report(path, &report)?;
+    }
+    if !global.quiet {
+        terminal::say(&report.to_string());
+    }
+    ended
+}
+
+fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
+    let mut json = Vec::new();
+    report.write_json(&mut json).map_err(CliError::io(path))?;
+    write_whole(path, &json)
+}

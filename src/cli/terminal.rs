@@ -1,0 +1,83 @@
+//! What the user sees while a command runs: log lines, one-line messages, progress.
+
+use std::io::{self, IsTerminal, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use tracing_subscriber::EnvFilter;
+
+use super::error::CliError;
+use super::options::Global;
+use super::values::LogFormat;
+
+/// Sends log lines to stderr: warnings, or as `-v`, `-q` and `RUST_LOG` say.
+pub fn start_log(global: &Global) {
+    let level = match (global.quiet, global.verbose) {
+        (true, _) => "error",
+        (_, 0) => "warn",
+        (_, 1) => "bokehcam=info,warn",
+        (_, _) => "bokehcam=debug,info",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
+    let log = log.with_ansi(io::stderr().is_terminal());
+    // A second log in one process changes nothing.
+    let _ = match global.log_format {
+        LogFormat::Text => log.try_init(),
+        LogFormat::Json => log.json().try_init(),
+    };
+}
+
+/// One line on stderr; a closed stderr is no reason to fail.
+pub fn say(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// The first Ctrl-C (or a termination signal) sets the flag, so that the file in hand is finished; the second ends
+/// the program at once.
+///
+/// # Errors
+/// The system has no place for a signal handler.
+pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
+    /// What shells expect of a program that SIGINT ended.
+    const INTERRUPTED: i32 = 130;
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    let handler = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            std::process::exit(INTERRUPTED);
+        }
+        say("stopping after the frames in hand; Ctrl-C again aborts");
+    };
+    ctrlc::set_handler(handler).map_err(|error| CliError::Signals(error.to_string()))?;
+    Ok(stop)
+}
+
+/// A bar of delivered frames on stderr; silent when that is no terminal.
+pub struct Progress(ProgressBar);
+
+impl Progress {
+    /// A bar for `frames` frames, or a counter when their number is not known.
+    pub fn new(frames: Option<u64>, global: &Global) -> Self {
+        let template = match frames {
+            Some(_) => "{wide_bar} {pos}/{len} frames, {per_sec}, {eta} left",
+            None => "{spinner} {pos} frames, {per_sec}, {elapsed}",
+        };
+        let target = if global.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(frames, target);
+        bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self(bar)
+    }
+
+    /// So many frames are delivered.
+    pub fn delivered(&self, frames: u64) {
+        self.0.set_position(frames);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -1,0 +1,347 @@
+//! The program as its user meets it: what it prints, what it refuses, and with which exit code.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+/// The program in an empty world: no settings of whoever runs the tests reach it.
+fn bokehcam(home: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    for (name, _) in std::env::vars_os() {
+        if name.to_string_lossy().starts_with("BOKEHCAM_") {
+            command.env_remove(name);
+        }
+    }
+    command.env("XDG_CONFIG_HOME", home).env_remove("RUST_LOG").args(args).stdin(Stdio::null());
+    command
+}
+
+struct Ran {
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+impl From<Output> for Ran {
+    fn from(output: Output) -> Self {
+        Self {
+            code: output.status.code().expect("ended by itself"),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+}
+
+fn run(args: &[&str]) -> Ran {
+    let home = tempfile::tempdir().unwrap();
+    bokehcam(home.path(), args).output().unwrap().into()
+}
+
+/// The value of a setting, and where it comes from, as `config dump` prints them.
+fn dumped(dump: &str, name: &str) -> (String, String) {
+    let line = dump.lines().find(|line| line.starts_with(&format!("{name} = "))).unwrap_or_else(|| panic!("{dump}"));
+    let (value, origin) = line[name.len() + 3..].rsplit_once(" # ").unwrap();
+    (value.to_string(), origin.to_string())
+}
+
+const COMMANDS: [&[&str]; 8] = [
+    &["stream"],
+    &["render"],
+    &["record"],
+    &["aperture"],
+    &["bench"],
+    &["completions"],
+    &["config"],
+    &["config", "dump"],
+];
+
+#[test]
+fn every_command_has_help_with_examples() {
+    for command in [&[][..]].into_iter().chain(COMMANDS) {
+        let help = run(&[command, &["--help"]].concat());
+        assert_eq!((help.code, help.stderr.as_str()), (0, ""), "{command:?}");
+        let example = format!("bokehcam {}", command.join(" "));
+        let examples = help.stdout.split("Example").nth(1).unwrap_or_default();
+        assert!(examples.contains(example.trim_end()), "{command:?}: {}", help.stdout);
+    }
+}
+
+#[test]
+fn the_version_is_the_packages() {
+    let version = run(&["--version"]);
+    assert_eq!(version.stdout, format!("bokehcam {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn wrong_arguments_cost_one_line_and_exit_code_2() {
+    let cases: [(&[&str], &str); 20] = [
+        (&["stream", "nowhere", "--to", "null"], "a folder with a recording, or synthetic"),
+        (&["stream", "Cargo.toml", "--to", "null"], "a folder with a recording, or synthetic"),
+        (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
+        (&["stream", "synthetic", "--to", "null", "--loop", "--frames", "1"], "--loop are for recordings"),
+        (&["stream", "synthetic", "--to", "null", "--f-number", "2"], "--sensor-width"),
+        (&["stream", "synthetic", "--to", "null", "--size", "640"], "1280x720"),
+        (&["stream", "synthetic", "--to", "null", "--depth", "none", "--effect", "dof"], "--effect blur"),
+        (&["render", "x.png"], "--out"),
+        (&["frobnicate"], "frobnicate"),
+        (&["aperture"], "--out"),
+        (&["aperture", "--out", "x", "--size", "3"], "5..=257"),
+        (&["aperture", "--out", "x", "--apertures", "disc,blob"], "polygon:N"),
+        (&["aperture", "--out", "x", "--apertures", "disc,disc"], "twice"),
+        (&["config", "dump", "--rim", "1.5"], "from 0 to 1"),
+        (&["config", "dump", "--intensity", "-2"], "from -1 to 1"),
+        (&["config", "dump", "--rank", "99"], "1 to 16, or full"),
+        (&["config", "dump", "--focus", "behind"], "METRES"),
+        (&["config", "dump", "--quality", "superb"], "balanced"),
+        (&["config", "dump", "--effect", "sepia"], "tilt-shift"),
+        (&["config", "dump", "--coc-at-infinity", "9", "--f-number", "2"], "--f-number"),
+    ];
+    for (args, accepted) in cases {
+        let refused = run(args);
+        assert_eq!((refused.code, refused.stdout.as_str()), (2, ""), "{args:?}: {}", refused.stderr);
+        assert!(refused.stderr.starts_with("error: ") && refused.stderr.contains(accepted), "{}", refused.stderr);
+        assert_eq!(refused.stderr.lines().count(), 1, "{}", refused.stderr);
+    }
+}
+
+#[test]
+fn a_flag_goes_before_the_environment_before_the_file_before_the_default() {
+    let home = tempfile::tempdir().unwrap();
+    let dump = |flags: &[&str], environment: bool| {
+        let mut command = bokehcam(home.path(), &[&["config", "dump"], flags].concat());
+        if environment {
+            command.env("BOKEHCAM_RIM", "0.3").env("BOKEHCAM_LOOP", "true");
+        }
+        let ran = Ran::from(command.output().unwrap());
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+        ran.stdout
+    };
+    let pair = |value: &str, origin: &str| (value.to_string(), origin.to_string());
+    assert_eq!(dumped(&dump(&[], false), "rim").1, "default");
+
+    fs::create_dir(home.path().join("bokehcam")).unwrap();
+    fs::write(home.path().join("bokehcam/config.toml"), "rim = 0.4\nrank = \"full\"\n").unwrap();
+    assert_eq!(dumped(&dump(&[], false), "rim"), pair("0.4", "file"));
+    assert_eq!(dumped(&dump(&[], false), "rank"), pair("\"full\"", "file"));
+    assert_eq!(dumped(&dump(&[], true), "rim"), pair("0.3", "environment"));
+    assert_eq!(dumped(&dump(&[], true), "loop"), pair("true", "environment"));
+    assert_eq!(dumped(&dump(&["--rim", "0.5"], true), "rim"), pair("0.5", "flag"));
+    assert_eq!(dumped(&dump(&["--loop"], false), "loop"), pair("true", "flag"));
+    assert_eq!(dumped(&dump(&["--loop=false"], true), "loop"), pair("false", "flag"));
+}
+
+#[test]
+fn a_flag_sets_aside_what_it_excludes_in_the_file() {
+    let home = tempfile::tempdir().unwrap();
+    let file = home.path().join("mine.toml");
+    fs::write(&file, "coc-at-infinity = 20\n").unwrap();
+    let args = ["config", "dump", "--config", file.to_str().unwrap(), "--f-number", "2"];
+    let ran = Ran::from(bokehcam(home.path(), &args).output().unwrap());
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert_eq!(dumped(&ran.stdout, "f-number"), ("2".to_string(), "flag".to_string()));
+    assert!(!ran.stdout.contains("\ncoc-at-infinity = "), "{}", ran.stdout);
+}
+
+#[test]
+fn the_dump_is_a_settings_file_that_dumps_the_same() {
+    let home = tempfile::tempdir().unwrap();
+    let flags = ["config", "dump", "--aperture", "polygon:6:15", "--focus", "0.5,0.25", "--force", "--intensity=-0.5"];
+    let first = Ran::from(bokehcam(home.path(), &flags).output().unwrap());
+    let file = home.path().join("saved.toml");
+    fs::write(&file, &first.stdout).unwrap();
+    let again = bokehcam(home.path(), &["--config", file.to_str().unwrap(), "config", "dump"]);
+    let second = Ran::from({ again }.output().unwrap());
+    assert_eq!((second.code, second.stderr.as_str()), (0, ""));
+    let values = |dump: &str| {
+        let lines = dump.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
+        lines.map(|line| line.rsplit_once(" # ").unwrap().0.to_string()).collect::<Vec<_>>()
+    };
+    assert_eq!(values(&first.stdout), values(&second.stdout));
+    assert!(values(&first.stdout).contains(&"aperture = \"polygon:6:15\"".to_string()));
+    assert!(values(&first.stdout).len() > 15);
+}
+
+#[test]
+fn an_unknown_key_in_the_file_is_named_with_its_line() {
+    let home = tempfile::tempdir().unwrap();
+    let file = home.path().join("mine.toml");
+    fs::write(&file, "rim = 0.1\n\napertur = \"disc\"\n").unwrap();
+    let ran: Ran =
+        bokehcam(home.path(), &["config", "dump", "--config", file.to_str().unwrap()]).output().unwrap().into();
+    assert_eq!((ran.code, ran.stdout.as_str()), (2, ""));
+    assert!(ran.stderr.contains("mine.toml:3: ") && ran.stderr.contains("did you mean aperture?"), "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1);
+
+    let ran: Ran = bokehcam(home.path(), &["config", "dump", "--config", "/nowhere.toml"]).output().unwrap().into();
+    assert!(ran.code != 0 && ran.stderr.contains("/nowhere.toml"), "{}", ran.stderr);
+}
+
+/// A recording of three small frames in `home`.
+fn recording(home: &Path) -> String {
+    let folder = home.join("recording").to_str().unwrap().to_string();
+    let args = ["record", "synthetic", "--size", "64x48", "--frames", "3", "--to", &folder];
+    let ran: Ran = bokehcam(home, &args).output().unwrap().into();
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+    folder
+}
+
+#[test]
+fn a_recording_becomes_pictures_and_a_report_that_adds_up() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let (out, report) = (home.path().join("out/"), home.path().join("report.json"));
+    let args = ["stream", &recording, "--to", out.to_str().unwrap(), "--report", report.to_str().unwrap()];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("3 of 3 frames delivered"), "{}", ran.stderr);
+
+    let json: serde_json::Value = serde_json::from_slice(&fs::read(&report).unwrap()).unwrap();
+    assert_eq!((&json["frames"]["captured"], &json["frames"]["delivered"]), (&3.into(), &3.into()));
+    assert_eq!(json["quality"]["balanced"], 1.0);
+    let original = image::open(Path::new(&recording).join("rgb/000001.png")).unwrap().to_rgb8();
+    let blurred = image::open(out.join("000001.png")).unwrap().to_rgb8();
+    assert_eq!(original.dimensions(), blurred.dimensions());
+    assert_ne!(original, blurred);
+
+    let again: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert!(again.code == 1 && again.stderr.contains("--force"), "{}", again.stderr);
+}
+
+#[test]
+fn effect_none_passes_frames_through_and_mirror_turns_them() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let out = home.path().join("out/");
+    let args = ["stream", &recording, "--to", out.to_str().unwrap(), "--effect", "none", "--mirror", "--start", "0.03"];
+    let ran: Ran = bokehcam(home.path(), &[&args[..], &["-q"]].concat()).output().unwrap().into();
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let original = image::open(Path::new(&recording).join("rgb/000001.png")).unwrap().to_rgb8();
+    let mirrored = image::open(out.join("000000.png")).unwrap().fliph().to_rgb8();
+    assert!(original == mirrored, "the second frame, mirrored, comes first");
+}
+
+#[test]
+fn one_picture_is_blurred_by_each_effect_and_its_file_is_safe() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let image = format!("{recording}/rgb/000000.png");
+    let depth = format!("{recording}/depth/000000.png");
+    let out = home.path().join("out.png");
+    let render = |more: &[&str]| -> Ran {
+        let args = [&["render", &image, "--out", out.to_str().unwrap()], more].concat();
+        bokehcam(home.path(), &args).output().unwrap().into()
+    };
+    let mut seen = vec![image::open(&image).unwrap().to_rgb8()];
+    for more in [
+        &["--depth-map", &depth][..],
+        &["--effect", "blur", "--coc-at-infinity", "5", "--force"],
+        &["--effect", "tilt-shift", "--coc-at-infinity", "5", "--force"],
+    ] {
+        let ran = render(more);
+        assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+        let result = image::open(&out).unwrap().to_rgb8();
+        assert!(seen.iter().all(|other| *other != result), "{more:?} is something of its own");
+        seen.push(result);
+    }
+    let refused = render(&["--effect", "none"]);
+    assert!(refused.code == 1 && refused.stderr.contains("--force"), "{}", refused.stderr);
+    assert!(image::open(&out).unwrap().to_rgb8() == seen[3], "what was there stays");
+    let passed = render(&["--effect", "none", "--force"]);
+    assert_eq!(passed.code, 0, "{}", passed.stderr);
+    assert!(image::open(&out).unwrap().to_rgb8() == seen[0]);
+}
+
+#[test]
+fn an_aperture_can_be_a_picture() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let cat = home.path().join("cat.png");
+    image::GrayImage::from_fn(9, 9, |x, _| image::Luma([if x < 3 { 255 } else { 0 }])).save(&cat).unwrap();
+    let aperture = format!("image:{}", cat.display());
+    let args = ["stream", &recording, "--to", "null", "--aperture", &aperture];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+
+    let args = ["stream", &recording, "--to", "null", "--aperture", "image:nowhere.png"];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert!(ran.code == 1 && ran.stderr.contains("nowhere.png"), "{}", ran.stderr);
+}
+
+#[test]
+fn bench_measures_every_combination() {
+    let args = ["bench", "--sizes", "64x48,17x13", "--coc", "2,4", "--threads", "1,2", "--frames", "3", "--json"];
+    let ran = run(&[&args[..], &["--backend", "cpu"]].concat());
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let lines: Vec<serde_json::Value> = ran.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 8);
+    for line in &lines {
+        let time = |key: &str| line[key].as_f64().unwrap();
+        assert!(0.0 < time("p50_ms") && time("p50_ms") <= time("p95_ms") && time("p95_ms") <= time("max_ms"), "{line}");
+    }
+    assert!(lines[0]["executor"].as_str().unwrap().contains("1 thread"), "{}", lines[0]);
+}
+
+#[test]
+fn y4m_on_standard_output_is_nothing_but_y4m() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let output = bokehcam(home.path(), &["stream", &recording, "--to", "-"]).output().unwrap();
+    assert!(output.status.success());
+    let header_end = output.stdout.iter().position(|&byte| byte == b'\n').unwrap() + 1;
+    assert!(output.stdout.starts_with(b"YUV4MPEG2 W64 H48 "));
+    assert_eq!(output.stdout.len() - header_end, 3 * ("FRAME\n".len() + 64 * 48 * 3 / 2));
+}
+
+#[test]
+fn completions_name_the_commands_in_each_shell() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = run(&["completions", shell]);
+        assert_eq!(script.code, 0);
+        for word in ["aperture", "config", "dump", "intensity", "tilt-shift"] {
+            assert!(script.stdout.contains(word), "{shell}: {word}");
+        }
+    }
+}
+
+#[test]
+fn a_reader_that_leaves_is_no_failure() {
+    let home = tempfile::tempdir().unwrap();
+    let mut child =
+        bokehcam(home.path(), &["completions", "bash"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let ran = child.wait_with_output().unwrap();
+    assert!(ran.status.success());
+    assert_eq!(ran.stderr, b"");
+}
+
+#[test]
+fn the_aperture_analysis_is_whole_and_is_not_overwritten_unasked() {
+    let home = tempfile::tempdir().unwrap();
+    let out = home.path().join("kernels");
+    let args = ["aperture", "--apertures", "disc,star:5", "--size", "33", "--out", out.to_str().unwrap()];
+    let first: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!((first.code, first.stdout.as_str()), (0, ""), "{}", first.stderr);
+    let mut files: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    files.sort();
+    assert_eq!(files, ["aperture.json", "disc.png", "errors.svg", "star-5.png"]);
+    let table: serde_json::Value = serde_json::from_slice(&fs::read(out.join("aperture.json")).unwrap()).unwrap();
+    // McGraw's kernels: 33 taps, hard rim; the disc has 18.7 % at rank 2.
+    let disc = &table["apertures"][0];
+    assert_eq!(disc["aperture"], "disc");
+    assert_eq!(disc["singular_values"].as_array().unwrap().len(), 33);
+    let error = disc["ranks"][1]["truncation_error"].as_f64().unwrap();
+    assert!((error - 0.187).abs() < 0.003, "{error}");
+    let sheet = image::open(out.join("star-5.png")).unwrap().to_rgb8();
+    assert!(sheet.pixels().any(|pixel| pixel.0 == [255; 3]), "the kernel is white");
+
+    fs::write(out.join("disc.png"), "mine").unwrap();
+    let second: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!(second.code, 1);
+    assert!(second.stderr.contains("exists") && second.stderr.contains("--force"), "{}", second.stderr);
+    assert_eq!(fs::read(out.join("disc.png")).unwrap(), b"mine");
+
+    let third: Ran = bokehcam(home.path(), &[&args[..], &["--force"]].concat()).output().unwrap().into();
+    assert_eq!(third.code, 0, "{}", third.stderr);
+    assert_ne!(fs::read(out.join("disc.png")).unwrap(), b"mine");
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 4, "no leftovers");
+}

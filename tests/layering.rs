@@ -1,0 +1,140 @@
+//! Imports go down only, siblings do not know each other, and a crate has one door: a scan of the source text.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Modules of the crate by layer, the lowest first.
+const LAYERS: [&[&str]; 6] = [
+    &["frame", "optics", "clock"],
+    &["link", "budget", "stats", "recording", "scene"],
+    &["capture", "depth", "bokeh", "sink"],
+    &["pipeline"],
+    &["cli"],
+    &["main"],
+];
+
+/// Crates, and the only places under `src/` that may name them.
+const DOORS: [(&str, &[&str]); 9] = [
+    ("clap", &["cli"]),
+    ("clap_complete", &["cli"]),
+    ("crossbeam_channel", &["link"]),
+    ("crossbeam_queue", &["link"]),
+    ("ctrlc", &["cli"]),
+    ("image", &["recording", "sink"]),
+    ("indicatif", &["cli"]),
+    ("plotters", &["cli"]),
+    ("wgpu", &["bokeh/gpu"]),
+];
+
+fn layer(module: &str) -> Option<usize> {
+    LAYERS.iter().position(|modules| modules.contains(&module))
+}
+
+/// What is wrong in the source file `path` (relative to `src/`), one line each.
+fn violations(path: &str, source: &str) -> Vec<String> {
+    let module = path.split(['/', '.']).next().unwrap_or_default();
+    let mut found = Vec::new();
+    let Some(own) = layer(module) else {
+        return if module == "lib" { found } else { vec![format!("{path}: module {module} has no layer")] };
+    };
+    // Tests may reach wherever they need to; they are the last thing in a file, or a file of their own.
+    let source = source.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+    for (number, line) in (1..).zip(source.lines()) {
+        let code = line.split("//").next().unwrap_or_default();
+        for root in ["crate::", "bokehcam::"] {
+            for used in after(code, root).flat_map(names) {
+                match layer(&used) {
+                    _ if used == module => {}
+                    Some(other) if other < own => {}
+                    Some(_) => found.push(format!("src/{path}:{number}: {module} may not import {used}")),
+                    None => {}
+                }
+            }
+        }
+        for (door, homes) in DOORS {
+            let named = after(code, &format!("{door}::")).next().is_some() || code.contains(&format!("use {door};"));
+            if named && !homes.iter().any(|home| path == format!("{home}.rs") || path.starts_with(&format!("{home}/")))
+            {
+                found.push(format!("src/{path}:{number}: {door} belongs to {homes:?}"));
+            }
+        }
+    }
+    found
+}
+
+/// What follows each `path_root` in a line, where that begins a path.
+fn after<'a>(code: &'a str, path_root: &'a str) -> impl Iterator<Item = &'a str> {
+    code.match_indices(path_root).filter_map(move |(at, _)| {
+        let before = code[..at].chars().last();
+        let begins = before.is_none_or(|c| !c.is_alphanumeric() && c != '_' && c != ':');
+        begins.then(|| &code[at + path_root.len()..])
+    })
+}
+
+/// The first name of a path, or of each path in braces.
+fn names(path: &str) -> Vec<String> {
+    let first = |text: &str| text.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let Some(list) = path.strip_prefix('{') else { return vec![first(path)] };
+    let mut depth = 0;
+    let outer: String = list
+        .chars()
+        .filter(|&c| {
+            depth += i32::from(c == '{') - i32::from(c == '}');
+            depth == 0
+        })
+        .collect();
+    outer.split(',').map(first).collect()
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> = entries
+        .flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] })
+        .filter(|path| path.extension().is_some_and(|extension| extension == "rs") && !path.ends_with("tests.rs"))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn imports_go_down_and_crates_have_one_door() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let files = sources(&root);
+    assert!(files.len() > 20, "the scan found only {} files", files.len());
+    let found: Vec<String> = files
+        .iter()
+        .flat_map(|file| {
+            let path = file.strip_prefix(&root).unwrap().to_str().unwrap();
+            violations(path, &fs::read_to_string(file).unwrap())
+        })
+        .collect();
+    assert!(found.is_empty(), "\n{}", found.join("\n"));
+}
+
+#[test]
+fn the_scan_finds_what_it_should() {
+    let bad = [
+        ("frame.rs", "use crate::link::pool::Pool;"),
+        ("sink/png.rs", "use crate::capture::Camera;"),
+        ("bokeh/mod.rs", "    let x = crate::pipeline::run();"),
+        ("stats.rs", "use crate::{frame::FrameId, recording::tum};"),
+        ("pipeline.rs", "use crossbeam_channel::bounded;"),
+        ("bokeh/cpu/mod.rs", "fn f() { wgpu::Instance::default(); }"),
+        ("cli/render.rs", "use image;"),
+        ("frame.rs", "#[cfg(test)]\nmod tests;\nuse crate::link::pool::Pool;"),
+        ("attic.rs", ""),
+    ];
+    for (path, source) in bad {
+        assert_eq!(violations(path, source).len(), 1, "{path}: {source}");
+    }
+    let good = [
+        ("pipeline.rs", "use crate::{bokeh::{Bokeh, Job}, sink};"),
+        ("bokeh/gpu/device.rs", "use wgpu::Device; use crate::bokeh::plan;"),
+        ("sink/png.rs", "use image::ImageEncoder; // crate::cli would be wrong"),
+        ("frame.rs", "#[cfg(test)]\nmod tests { use crate::pipeline::run; }"),
+        ("optics.rs", "let my_image::x = super::image();"),
+    ];
+    for (path, source) in good {
+        assert_eq!(violations(path, source), Vec::<String>::new(), "{path}");
+    }
+}
