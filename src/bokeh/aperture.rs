@@ -1,8 +1,9 @@
 //! The shape of the lens opening, sampled as an antialiased mask.
 
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// A lens opening as seen by the camera, inside the unit disc (x right, y down).
+/// A lens opening, drawn as a far highlight shows it (x right, y down), inside the unit disc.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aperture {
     /// The outline.
@@ -25,14 +26,14 @@ pub enum Shape {
     Polygon {
         /// Number of blades, 3 to 16.
         blades: u32,
-        /// Turn clockwise in degrees; 0 puts a corner at the top.
+        /// Turn clockwise in degrees; at 0 one corner points to the left.
         rotation_deg: f32,
         /// 0 straight blades to 1 a circle.
         curvature: f32,
     },
     /// A heart.
     Heart,
-    /// A star.
+    /// A star with one point up.
     Star {
         /// Number of points, 3 to 16.
         points: u32,
@@ -52,18 +53,236 @@ pub struct Picture {
     pub grey: Vec<f32>,
 }
 
-/// A square mask: `size` x `size` transmittances >= 0 over [-1, 1] x [-1, 1], row-major, at least one of them > 0.
+/// A square mask of transmittances, at least one of them > 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mask {
     /// Columns and rows.
     pub size: usize,
-    /// `size * size` values.
+    /// Half the side of the square, in aperture radii: a soft rim reaches beyond 1.
+    pub extent: f64,
+    /// `size * size` values >= 0, row-major, y down.
     pub values: Vec<f64>,
 }
 
+/// Samples per mask cell and axis.
+const SUPERSAMPLING: usize = 8;
+/// Ratio of a star's inner to its outer radius.
+const STAR_INNER: f64 = 0.45;
+
+impl Default for Aperture {
+    fn default() -> Self {
+        Self { shape: Shape::Disc, intensity: 0.0 }
+    }
+}
+
 impl Aperture {
-    /// The antialiased mask, with a rim that ramps over `rim` (0 to 1) of the radius.
-    pub fn mask(&self, _size: usize, _rim: f32) -> Mask {
-        unimplemented!()
+    /// The antialiased mask of `size` x `size` cells, whose rim falls linearly over `rim` (0 to 1) of the radius,
+    /// half of it inside and half outside the outline.
+    pub fn mask(&self, size: usize, rim: f32) -> Mask {
+        let rim = f64::from(rim).clamp(0.0, 1.0);
+        let extent = 1.0 + rim / 2.0;
+        let cell = 2.0 * extent / size as f64;
+        let sub = cell / SUPERSAMPLING as f64;
+        let mut values = vec![0.0; size * size];
+        for (index, value) in values.iter_mut().enumerate() {
+            let (left, top) = ((index % size) as f64 * cell - extent, (index / size) as f64 * cell - extent);
+            for sample in 0..SUPERSAMPLING * SUPERSAMPLING {
+                let x = left + (0.5 + (sample % SUPERSAMPLING) as f64) * sub;
+                let y = top + (0.5 + (sample / SUPERSAMPLING) as f64) * sub;
+                *value += self.transmittance(x, y, rim);
+            }
+            *value /= (SUPERSAMPLING * SUPERSAMPLING) as f64;
+        }
+        if values.iter().all(|&v| v <= 0.0) {
+            // A black picture or a vanishing ring lets no light through; a pinhole is its nearest useful meaning.
+            values[size / 2 * size + size / 2] = 1.0;
+        }
+        Mask { size, extent, values }
+    }
+
+    /// Transmittance at a point in units of the aperture's radius.
+    fn transmittance(&self, x: f64, y: f64, rim: f64) -> f64 {
+        let radius = x.hypot(y);
+        if let Shape::Picture(picture) = &self.shape {
+            return picture.sample(x, y, rim) * self.radial(radius.min(1.0));
+        }
+        let outline = self.outline(y.atan2(x));
+        let mut value = ramp(radius, outline, rim) * self.radial((radius / outline).min(1.0));
+        if let Shape::Ring { inner } = self.shape
+            && inner > 0.0
+        {
+            value *= 1.0 - ramp(radius, f64::from(inner), rim.min(f64::from(inner)));
+        }
+        value
+    }
+
+    /// Distance of the outline from the centre in the direction `angle` (radians, clockwise from +x as y is down).
+    fn outline(&self, angle: f64) -> f64 {
+        match self.shape {
+            Shape::Disc | Shape::Ring { .. } | Shape::Picture(_) => 1.0,
+            Shape::Polygon { blades, rotation_deg, curvature } => {
+                let (half, bend) = (PI / f64::from(blades.max(3)), f64::from(curvature).clamp(0.0, 1.0));
+                let from_corner = (angle - PI - f64::from(rotation_deg).to_radians()).rem_euclid(2.0 * half);
+                half.cos() / (from_corner - half).cos() * (1.0 - bend) + bend
+            }
+            Shape::Heart => heart_outline(angle),
+            Shape::Star { points } => {
+                let half = PI / f64::from(points.max(3));
+                let from_tip = ((angle + PI / 2.0 + half).rem_euclid(2.0 * half) - half).abs();
+                // The edge from the tip (1, 0) to the notch at angle `half`, met by the ray at `from_tip`.
+                let (notch_x, notch_y) = (STAR_INNER * half.cos(), STAR_INNER * half.sin());
+                notch_y / (from_tip.sin() * (1.0 - notch_x) + from_tip.cos() * notch_y)
+            }
+        }
+    }
+
+    /// Radial intensity at `t` = 0 (centre) to 1 (outline).
+    fn radial(&self, t: f64) -> f64 {
+        let strength = f64::from(self.intensity).clamp(-1.0, 1.0);
+        if strength >= 0.0 { 1.0 - strength * t * t } else { 1.0 + strength * (1.0 - t.powi(4)) * 0.85 }
+    }
+}
+
+impl Picture {
+    /// Box average of the picture over a square of side `rim`, zero outside of it.
+    fn sample(&self, x: f64, y: f64, rim: f64) -> f64 {
+        const TAPS: i32 = 3;
+        let half_px = f64::from(self.width.max(self.height)) / 2.0;
+        let mut sum = 0.0;
+        for j in 0..TAPS * TAPS {
+            let (dx, dy) = (f64::from(j % TAPS - 1) / 3.0 * rim, f64::from(j / TAPS - 1) / 3.0 * rim);
+            let column = ((x + dx) * half_px + f64::from(self.width) / 2.0).floor();
+            let row = ((y + dy) * half_px + f64::from(self.height) / 2.0).floor();
+            if column >= 0.0 && row >= 0.0 && column < f64::from(self.width) && row < f64::from(self.height) {
+                sum += f64::from(self.grey[row as usize * self.width as usize + column as usize].max(0.0));
+            }
+        }
+        sum / f64::from(TAPS * TAPS)
+    }
+}
+
+/// 1 inside `edge`, 0 outside, linear over `rim` around it.
+fn ramp(radius: f64, edge: f64, rim: f64) -> f64 {
+    if rim <= 0.0 { f64::from(u8::from(radius <= edge)) } else { ((edge - radius) / rim + 0.5).clamp(0.0, 1.0) }
+}
+
+/// The heart (x^2 + y^2 - 1)^3 = x^2 y^3, turned upright for y down and scaled into the unit disc.
+fn heart_outline(angle: f64) -> f64 {
+    const SCALE: f64 = 1.0 / 1.25;
+    let (sin, cos) = (-(angle.sin()), angle.cos());
+    let inside = |r: f64| {
+        let (x, y) = (r * cos, r * sin);
+        (x * x + y * y - 1.0).powi(3) <= x * x * y.powi(3)
+    };
+    let (mut low, mut high) = (0.0, 1.6);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if inside(middle) { low = middle } else { high = middle }
+    }
+    (low * SCALE).max(1e-3)
+}
+
+impl Mask {
+    /// Whether the mask is unchanged by a mirror image left to right, and top to bottom.
+    pub fn symmetry(&self) -> (bool, bool) {
+        let n = self.size;
+        let at = |x: usize, y: usize| self.values[y * n + x];
+        let same = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        let cells = || (0..n * n).map(move |i| (i % n, i / n));
+        (cells().all(|(x, y)| same(at(x, y), at(n - 1 - x, y))), cells().all(|(x, y)| same(at(x, y), at(x, n - 1 - y))))
+    }
+
+    /// Sum of all values.
+    pub fn sum(&self) -> f64 {
+        self.values.iter().sum()
+    }
+}
+
+/// Points of the aperture for a ray tracer: about `count` lens positions `u` in the unit disc, evenly spread over the
+/// shape (Vogel's spiral, those outside left out). A pixel `p` sees depth `z` at `p + c(z) u`, so that a far highlight
+/// shows the shape upright.
+pub fn lens_points(aperture: &Aperture, count: usize) -> Vec<glam::DVec2> {
+    let golden = PI * (3.0 - 5f64.sqrt());
+    let open = |p: &glam::DVec2| aperture.transmittance(p.x, p.y, 0.0) > 0.5;
+    let spiral = |n: usize| {
+        (0..n).map(move |k| {
+            let radius = ((k as f64 + 0.5) / n as f64).sqrt();
+            glam::DVec2::from_angle((k as f64 * golden) % TAU) * radius
+        })
+    };
+    let share = spiral(4096).filter(open).count().max(1) as f64 / 4096.0;
+    spiral((count as f64 / share).round() as usize).filter(open).map(|p| -p).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(shape: Shape) -> Aperture {
+        Aperture { shape, intensity: 0.0 }
+    }
+
+    #[test]
+    fn areas_are_those_of_the_shapes() {
+        let polygon = |n: u32| 0.5 * f64::from(n) * (TAU / f64::from(n)).sin();
+        for (shape, area) in [
+            (Shape::Disc, PI),
+            (Shape::Ring { inner: 0.5 }, 0.75 * PI),
+            (Shape::Polygon { blades: 5, rotation_deg: 13.0, curvature: 0.0 }, polygon(5)),
+            (Shape::Polygon { blades: 6, rotation_deg: 0.0, curvature: 0.0 }, polygon(6)),
+            (Shape::Polygon { blades: 7, rotation_deg: 0.0, curvature: 1.0 }, PI),
+            (Shape::Star { points: 5 }, 5.0 * STAR_INNER * (PI / 5.0).sin()),
+        ] {
+            let mask = of(shape.clone()).mask(128, 0.0);
+            let measured = mask.sum() * (2.0 / 128f64).powi(2);
+            assert!((measured - area).abs() < 0.004 * area, "{shape:?}: {measured} against {area}");
+        }
+    }
+
+    #[test]
+    fn a_soft_rim_keeps_the_disc_in_its_second_moment() {
+        let (hard, soft) = (of(Shape::Disc).mask(128, 0.0), of(Shape::Disc).mask(128, 0.2));
+        let spread = |m: &Mask| {
+            let at = |i: usize| (i as f64 + 0.5) / 64.0 - 1.0;
+            let sum: f64 = m.values.iter().enumerate().map(|(k, v)| v * at(k % 128).powi(2)).sum();
+            sum / m.sum() * m.extent * m.extent
+        };
+        assert!((spread(&hard) - 0.25).abs() < 1e-3);
+        assert!((spread(&soft) / spread(&hard) - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn symmetry_and_orientation() {
+        assert_eq!(of(Shape::Disc).mask(32, 0.2).symmetry(), (true, true));
+        assert_eq!(of(Shape::Heart).mask(32, 0.0).symmetry(), (true, false));
+        let mask = of(Shape::Heart).mask(64, 0.0);
+        let rows = |r: std::ops::Range<usize>| mask.values[r.start * 64..r.end * 64].iter().sum::<f64>();
+        assert!(rows(0..32) > 1.2 * rows(32..64), "a heart is wider above");
+        let picture = Picture { width: 2, height: 1, grey: vec![1.0, 0.0] };
+        let mask = of(Shape::Picture(Arc::new(picture))).mask(64, 0.0);
+        assert!(mask.values[32 * 64 + 10] > 0.9 && mask.values[32 * 64 + 54] == 0.0);
+    }
+
+    #[test]
+    fn a_black_picture_is_a_pinhole() {
+        let black = of(Shape::Picture(Arc::new(Picture { width: 1, height: 1, grey: vec![0.0] }))).mask(16, 0.1);
+        assert_eq!(black.sum(), 1.0);
+    }
+
+    #[test]
+    fn intensity_moves_light_to_the_rim_or_the_centre() {
+        let centre_over_rim = |intensity: f32| {
+            let mask = Aperture { shape: Shape::Disc, intensity }.mask(64, 0.0);
+            mask.values[32 * 64 + 32] / mask.values[32 * 64 + 4]
+        };
+        assert!(centre_over_rim(1.0) > 3.0 && centre_over_rim(-1.0) < 0.5);
+    }
+
+    #[test]
+    fn lens_points_fill_the_shape() {
+        let points = lens_points(&of(Shape::Polygon { blades: 6, rotation_deg: 0.0, curvature: 0.0 }), 500);
+        assert!((450..550).contains(&points.len()));
+        let mean: glam::DVec2 = points.iter().sum::<glam::DVec2>() / points.len() as f64;
+        assert!(mean.length() < 0.02);
     }
 }

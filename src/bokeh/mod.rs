@@ -4,7 +4,10 @@
 //! ([`gpu`]) run it with the same passes under the same names.
 
 pub mod aperture;
+pub mod bank;
 pub mod cpu;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod low_rank;
 pub mod plan;
 
@@ -152,6 +155,48 @@ pub enum BokehError {
     /// The GPU refused or was lost.
     #[error("GPU: {0}")]
     Gpu(String),
+}
+
+/// Where the blur runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Backend {
+    /// A hardware GPU where there is one, else the CPU: a software Vulkan driver is far slower than plain code.
+    #[default]
+    Auto,
+    /// Any Vulkan adapter, a software one included.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
+/// The executor for pictures of `size` (width, height).
+///
+/// `adapter` is part of a GPU adapter's name; `threads` is for the CPU executor, all cores when `None`.
+///
+/// # Errors
+/// A GPU was asked for and there is none that fits, or it failed.
+pub fn create(
+    settings: &Settings,
+    size: (u32, u32),
+    backend: Backend,
+    adapter: Option<&str>,
+    threads: Option<usize>,
+) -> Result<Box<dyn Bokeh>, BokehError> {
+    let plan = plan::Plan::new(settings, size.0, size.1);
+    #[cfg(feature = "gpu")]
+    if backend != Backend::Cpu {
+        match gpu::GpuBokeh::new(&plan, backend == Backend::Auto, adapter) {
+            Ok(gpu) => return Ok(Box::new(gpu)),
+            Err(error) if backend == Backend::Gpu || adapter.is_some() => return Err(error),
+            Err(error) => tracing::info!("blurring on the CPU: {error}"),
+        }
+    }
+    #[cfg(not(feature = "gpu"))]
+    if backend == Backend::Gpu || adapter.is_some() {
+        let wanted = "at all: this build leaves the GPU out (feature `gpu`)".to_owned();
+        return Err(BokehError::NoAdapter { wanted, found: "none".to_owned() });
+    }
+    Ok(Box::new(cpu::CpuBokeh::new(plan, threads)))
 }
 
 /// An executor of the plan.

@@ -1,1 +1,268 @@
-//! Plan.
+//! The plan: which bins a picture is split into, at which scale each is filtered, and with which filters.
+//!
+//! Everything here is fixed per picture size and settings. Both executors run it pass by pass, under these names:
+//!
+//! 1. `unpack`: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC.
+//! 2. `bin`: every bin's share of each pixel, premultiplied, averaged down to the bin's scale.
+//! 3. `fill` (only with something in front): what near objects hide is filled in before the bins behind are taken.
+//! 4. `reach`: on a coarse grid, the local radius of each bin's content, and the range of its colours.
+//! 5. `blur`: per bin a horizontal and a vertical low-rank pass with the local radius.
+//! 6. `composite`: front to back as disjoint coverage, normalised; back to 8-bit sRGB.
+
+use std::sync::Arc;
+
+use super::bank::{Bank, MASK_CELLS};
+use super::{Effect, Method, Rank, Settings};
+use crate::budget::Quality;
+
+/// Bin pixels a side of a cell of the coarse grid.
+pub const CELL: usize = 8;
+/// Bin pixels between two places where the radius is read; it is linear between them.
+pub const SEGMENT: usize = 16;
+/// Up to this many bins, so that both executors can hold them in fixed arrays.
+pub const MAX_BINS: usize = 13;
+/// A bin pixel with less coverage than this has no colour of its own.
+pub const COVERAGE_FLOOR: f32 = 1e-3;
+
+/// What a quality level trades.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rung {
+    /// Separable terms.
+    pub rank: u32,
+    /// Bins behind the focal plane, and as many in front.
+    pub bins_per_side: u32,
+    /// Bins whose smallest radius is at least this are filtered at half resolution.
+    pub half_from_px: f32,
+    /// The same for quarter resolution.
+    pub quarter_from_px: f32,
+    /// Whether what near objects hide is filled in.
+    pub fill: bool,
+}
+
+/// The rung of a quality level.
+pub fn rung(quality: Quality) -> Rung {
+    let rung = |rank, bins_per_side, half_from_px, quarter_from_px, fill| Rung {
+        rank,
+        bins_per_side,
+        half_from_px,
+        quarter_from_px,
+        fill,
+    };
+    match quality {
+        Quality::Draft => rung(2, 1, 1.0, 6.0, false),
+        Quality::Fast => rung(2, 2, 2.0, 8.0, true),
+        Quality::Balanced => rung(3, 3, 3.0, 12.0, true),
+        Quality::High => rung(4, 4, 4.0, 24.0, true),
+        Quality::Best => rung(4, 6, 6.0, f32::INFINITY, true),
+    }
+}
+
+/// How the blurred bins become one picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compositing {
+    /// A pixel belongs to the bin of its own CoC; bins are stacked front to back.
+    Layers,
+    /// Every bin holds the whole picture; a pixel takes the bin of its own CoC (no depth edges to respect).
+    Select,
+    /// One bin at full scale, every pixel with exactly its own radius.
+    Gather,
+}
+
+/// A range of signed CoC, and how it is filtered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bin {
+    /// Lower border of the CoC, pixels of the picture; `-inf` for the first.
+    pub low_px: f32,
+    /// Upper border.
+    pub high_px: f32,
+    /// A bin pixel covers `scale` x `scale` pixels of the picture: 1, 2 or 4.
+    pub scale: usize,
+    /// Columns of the bin's picture.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Largest radius of its content, in bin pixels, already compensated.
+    pub max_radius_px: f32,
+    /// Whether it lies in front of the focal plane.
+    pub near: bool,
+}
+
+/// The plan of every frame of one size.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Columns of the picture.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// How bins become a picture.
+    pub compositing: Compositing,
+    /// Front to back: by ascending CoC.
+    pub bins: Vec<Bin>,
+    /// The filters, in units of bin pixels.
+    pub bank: Arc<Bank>,
+    /// Whether what near objects hide is filled in.
+    pub fill: bool,
+    /// Highlight recovery: 1 + 1/M, or infinity when off.
+    pub expansion: f32,
+    /// Whether the rank is full and the method the paper's: an exact 2-D gather.
+    pub exact: bool,
+}
+
+impl Plan {
+    /// Plans frames of `width` x `height` pixels.
+    pub fn new(settings: &Settings, width: u32, height: u32) -> Self {
+        let (width, height) = (width as usize, height as usize);
+        let rung = rung(settings.quality);
+        let compositing = match (settings.effect, settings.method) {
+            (Effect::Dof, Method::Layered) => Compositing::Layers,
+            (Effect::Dof, Method::Gather) => Compositing::Gather,
+            (Effect::Blur | Effect::TiltShift, _) => Compositing::Select,
+        };
+        let rank = settings.rank.unwrap_or(Rank::Terms(rung.rank));
+        let mut borders = Vec::new();
+        if compositing == Compositing::Layers {
+            borders.extend(side(settings.near_max_px, rung.bins_per_side).into_iter().rev().map(|b| -b));
+        }
+        match (compositing, settings.effect) {
+            (Compositing::Layers, _) | (_, Effect::TiltShift) => {
+                borders.extend(side(settings.far_max_px, rung.bins_per_side));
+            }
+            // One radius everywhere needs no split, and neither does the gather.
+            _ => {}
+        }
+        let limits = || {
+            let low = std::iter::once(f32::NEG_INFINITY).chain(borders.iter().copied());
+            low.zip(borders.iter().copied().chain(std::iter::once(f32::INFINITY)))
+        };
+        let bins: Vec<Bin> = limits()
+            .map(|(low_px, high_px)| {
+                let near = high_px < 0.0;
+                let (smallest_px, largest_px) = if near {
+                    (-high_px, settings.near_max_px)
+                } else {
+                    (low_px.max(0.0), high_px.min(settings.far_max_px.max(settings.near_max_px)))
+                };
+                let largest_px = if near { (-low_px).min(largest_px) } else { largest_px };
+                let smallest_px = if settings.effect == Effect::Blur { settings.far_max_px } else { smallest_px };
+                let scale = match compositing {
+                    Compositing::Gather => 1,
+                    _ if settings.rank == Some(Rank::Full) => 1,
+                    _ if smallest_px >= rung.quarter_from_px => 4,
+                    _ if smallest_px >= rung.half_from_px => 2,
+                    _ => 1,
+                };
+                Bin {
+                    low_px,
+                    high_px,
+                    scale,
+                    width: width.div_ceil(scale),
+                    height: height.div_ceil(scale),
+                    max_radius_px: compensated_radius_px(largest_px, scale),
+                    near,
+                }
+            })
+            .collect();
+        let max_radius_px = bins.iter().map(|b| b.max_radius_px).fold(0.0, f32::max);
+        let mask = settings.aperture.mask(MASK_CELLS, settings.rim);
+        Self {
+            width,
+            height,
+            compositing,
+            bins,
+            bank: Arc::new(Bank::new(&mask, rank, max_radius_px)),
+            fill: rung.fill,
+            expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
+            exact: compositing == Compositing::Gather && rank == Rank::Full,
+        }
+    }
+
+    /// The largest reach of a filter, in bin pixels.
+    pub fn reach(&self) -> usize {
+        self.bank.reach
+    }
+
+    /// Cells around a cell whose content can reach it (and the whole segment it is read for).
+    pub fn reach_cells(&self, bin: &Bin) -> usize {
+        let node = self.bank.node(bin.max_radius_px);
+        (self.bank.node_reach[node] as usize + SEGMENT).div_ceil(CELL)
+    }
+
+    /// Radius in bin pixels for a CoC radius in pixels of the picture.
+    #[inline(always)]
+    pub fn bin_radius_px(&self, bin: &Bin, coc_px: f32) -> f32 {
+        compensated_radius_px(coc_px, bin.scale).min(bin.max_radius_px)
+    }
+
+    /// The border between bin `index` and the one behind it: its CoC, and 1 over the width of the hand-over.
+    pub fn border(&self, index: usize) -> Option<(f32, f32)> {
+        let at = self.bins[index].high_px;
+        at.is_finite().then(|| (at, 1.0 / (2.0 * HAND_OVER * at.abs())))
+    }
+}
+
+/// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
+const HAND_OVER: f32 = 0.15;
+/// The smallest CoC at which a bin of its own begins, in pixels.
+const FOCUS_BORDER_PX: f32 = 1.0;
+
+/// Borders on one side of the focal plane, ascending in `|c|`: geometric, as a blur's look goes with the ratio.
+fn side(max_px: f32, bins: u32) -> Vec<f32> {
+    let ratio = max_px / FOCUS_BORDER_PX;
+    if ratio <= 1.3 {
+        return Vec::new();
+    }
+    (0..bins).map(|k| FOCUS_BORDER_PX * ratio.powf(k as f32 / bins as f32)).collect()
+}
+
+/// The radius, in pixels of a picture reduced by `scale`, that blurs as much as `coc_px` does at full size.
+///
+/// Averaging down, sampling and linear interpolation back add (4 s^2 - 1) / 12 of variance per axis in pixels of
+/// the picture, a disc of radius R has R^2 / 4: what the way down and up adds is taken off the radius.
+#[inline(always)]
+pub fn compensated_radius_px(coc_px: f32, scale: usize) -> f32 {
+    if scale == 1 {
+        return coc_px;
+    }
+    let s = scale as f32;
+    (coc_px * coc_px - (4.0 * s * s - 1.0) / 3.0).max(0.0).sqrt() / s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::aperture::Aperture;
+    use super::*;
+
+    fn settings(effect: Effect, quality: Quality) -> Settings {
+        Settings {
+            effect,
+            method: Method::Layered,
+            aperture: Aperture::default(),
+            rim: 0.2,
+            rank: None,
+            highlights: 0.0,
+            quality,
+            far_max_px: 16.0,
+            near_max_px: 30.0,
+        }
+    }
+
+    #[test]
+    fn bins_tile_the_line_front_to_back() {
+        for quality in Quality::ALL {
+            let plan = Plan::new(&settings(Effect::Dof, quality), 640, 360);
+            assert_eq!(plan.bins.len(), 2 * rung(quality).bins_per_side as usize + 1);
+            assert!(plan.bins.len() <= MAX_BINS);
+            assert_eq!(plan.bins[0].low_px, f32::NEG_INFINITY);
+            assert_eq!(plan.bins.last().map(|b| b.high_px), Some(f32::INFINITY));
+            assert!(plan.bins.windows(2).all(|w| w[0].high_px == w[1].low_px && w[0].low_px < w[1].low_px));
+            assert!(plan.bins.iter().all(|b| plan.bank.node(b.max_radius_px) < plan.bank.nodes));
+        }
+    }
+
+    #[test]
+    fn one_radius_needs_one_bin() {
+        let plan = Plan::new(&settings(Effect::Blur, Quality::Balanced), 33, 17);
+        assert_eq!(plan.bins.len(), 1);
+        assert_eq!((plan.bins[0].scale, plan.bins[0].width, plan.bins[0].height), (4, 9, 5));
+    }
+}

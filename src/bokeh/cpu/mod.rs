@@ -1,1 +1,353 @@
-//! CPU executor.
+//! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per frame.
+
+mod bin;
+mod blur;
+mod composite;
+mod fill;
+mod gather;
+mod reach;
+mod rows;
+mod simd;
+mod team;
+mod unpack;
+
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use bin::{BinBand, Share};
+use blur::{GROUP, Scratch, Strip};
+use pulp::Arch;
+use rows::{BinRows, CELL_PLANES, Rows, STRIP, TILE_H, TILE_W};
+use team::{Shelf, Team};
+use unpack::Unpack;
+
+use super::plan::{CELL, Compositing, Plan};
+use super::{Bokeh, BokehError, Finished, Job, PassTimes};
+use crate::frame::{ColorImage, DepthMap};
+use crate::optics::CocField;
+
+pub use unpack::{compress, expand, linear_to_srgb, srgb_to_linear};
+
+/// Runs a plan on the CPU.
+pub struct CpuBokeh {
+    plan: Plan,
+    arch: Arch,
+    team: Team,
+    decode: [f32; 256],
+    encode: Vec<u8>,
+    scene: Rows<4>,
+    tiles: Vec<(f32, f32)>,
+    shares: Vec<Share>,
+    bins: Vec<BinRows>,
+    pyramid: Option<fill::Pyramid>,
+    gather: Option<Gather>,
+    members: Vec<Member>,
+    taken: Vec<AtomicBool>,
+    taken_too: Vec<AtomicBool>,
+    taken_three: Vec<AtomicBool>,
+    done: Option<Finished>,
+}
+
+/// Memory of one thread.
+#[derive(Default)]
+struct Member {
+    blur: Scratch,
+    reach: Vec<f32>,
+}
+
+/// Memory of the comparison methods.
+struct Gather {
+    kernels: Vec<[Vec<f32>; 2]>,
+    rows: Vec<f32>,
+    result: Vec<f32>,
+}
+
+impl CpuBokeh {
+    /// An executor of `plan` on `threads` threads (all cores when `None`).
+    pub fn new(plan: Plan, threads: Option<usize>) -> Self {
+        let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+        let (width, height) = (plan.width, plan.height);
+        let team = Team::new(threads);
+        let shares = (0..plan.bins.len())
+            .map(|k| Share::new(k.checked_sub(1).and_then(|k| plan.border(k)), plan.border(k)))
+            .collect();
+        let bins: Vec<BinRows> = plan.bins.iter().map(|bin| BinRows::new(&plan, bin)).collect();
+        let tallest = plan.bins.iter().map(|bin| bin.height).max().unwrap_or(0);
+        let members = (0..team.threads())
+            .map(|_| Member {
+                blur: Scratch {
+                    rows: vec![0.0; tallest * GROUP.min(plan.bank.terms) * 4 * STRIP],
+                    filtered: Vec::with_capacity(tallest.div_ceil(CELL)),
+                },
+                reach: Vec::with_capacity(bins.iter().map(|bin| bin.cells.data.len() * 2).max().unwrap_or(0)),
+            })
+            .collect();
+        let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
+        let most = height.max(bins.iter().map(|bin| bin.strips).sum::<usize>());
+        let has_near = plan.bins.iter().any(|bin| bin.near);
+        let bank = &plan.bank;
+        let gather = (plan.compositing == Compositing::Gather).then(|| Gather {
+            kernels: if plan.exact {
+                (0..bank.nodes).map(|node| [bank.kernel(node, false), bank.kernel(node, true)]).collect()
+            } else {
+                Vec::new()
+            },
+            rows: vec![0.0; if plan.exact { 0 } else { width * height * 3 * bank.terms }],
+            result: vec![0.0; width * height * 3],
+        });
+        Self {
+            decode: unpack::decode_table(plan.expansion),
+            encode: composite::encode_table(),
+            scene: Rows::new(width, height, 0),
+            tiles: vec![(0.0, 0.0); width.div_ceil(TILE_W) * height.div_ceil(TILE_H)],
+            pyramid: (plan.fill && has_near && plan.compositing == Compositing::Layers)
+                .then(|| fill::Pyramid::new(width, height)),
+            arch: Arch::new(),
+            taken: flags(most),
+            taken_too: flags(most),
+            taken_three: flags(most),
+            plan,
+            team,
+            shares,
+            bins,
+            gather,
+            members,
+            done: None,
+        }
+    }
+
+    /// Blurs one picture.
+    ///
+    /// # Errors
+    /// The picture has another size than the plan, or `coc` needs depth and there is none.
+    pub fn blur(
+        &mut self,
+        color: &ColorImage,
+        depth: Option<&DepthMap>,
+        coc: &CocField,
+        out: &mut ColorImage,
+    ) -> Result<PassTimes, BokehError> {
+        let made_for = (self.plan.width as u32, self.plan.height as u32);
+        if color.size() != made_for {
+            return Err(BokehError::Size { made_for, got: color.size() });
+        }
+        if matches!(coc, CocField::Depth(_)) && depth.is_none() {
+            return Err(BokehError::NoDepth);
+        }
+        out.resize(color.width, color.height);
+        let mut times = PassTimes::new();
+        if out.rgb.is_empty() {
+            return Ok(times);
+        }
+        let mut clock = Instant::now();
+        let mut lap = |name| {
+            let now = Instant::now();
+            times.add(name, now - clock);
+            clock = now;
+        };
+        self.unpack(color, depth, coc);
+        lap("unpack");
+        self.bin(|bin| bin.near);
+        lap("bin");
+        self.fill();
+        lap("fill");
+        self.bin(|bin| !bin.near);
+        lap("bin");
+        if self.plan.compositing == Compositing::Gather {
+            self.gather();
+            lap("gather");
+        } else {
+            self.reach();
+            lap("reach");
+            self.blur_bins();
+            lap("blur");
+        }
+        self.composite(out);
+        lap("composite");
+        Ok(times)
+    }
+
+    fn unpack(&mut self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField) {
+        let across = self.plan.width.div_ceil(TILE_W);
+        let stride = self.scene.stride;
+        let band = TILE_H * self.scene.row_len();
+        let out = Shelf::new(&mut self.scene.data, band, &mut self.taken);
+        let tiles = Shelf::new(&mut self.tiles, across, &mut self.taken_too);
+        let (arch, table) = (self.arch, &self.decode);
+        self.team.run(self.plan.height.div_ceil(TILE_H), &|part| {
+            arch.dispatch(Unpack {
+                color,
+                depth,
+                coc,
+                table,
+                y0: part * TILE_H,
+                out: out.part(part),
+                stride,
+                tiles: tiles.part(part),
+            });
+        });
+    }
+
+    fn bin(&mut self, which: impl Fn(&super::plan::Bin) -> bool) {
+        let whole = self.plan.compositing != Compositing::Layers;
+        let across = self.plan.width.div_ceil(TILE_W);
+        for ((bin, rows), share) in self.plan.bins.iter().zip(&mut self.bins).zip(&self.shares) {
+            if !which(bin) {
+                continue;
+            }
+            rows.present = self.tiles.iter().any(|&tile| share.meets(tile));
+            if !rows.present {
+                continue;
+            }
+            let (stride, pad) = (rows.source.stride, rows.source.pad);
+            let cells_row = CELL_PLANES * rows.cells.width;
+            let band = CELL * rows.source.row_len();
+            let out = Shelf::new(&mut rows.source.data, band, &mut self.taken);
+            let cells = Shelf::new(&mut rows.cells.data, cells_row, &mut self.taken_too);
+            let (arch, scene, tiles) = (self.arch, &self.scene, &self.tiles);
+            let size = (self.plan.width, self.plan.height);
+            let filled = Shelf::new(&mut rows.filled, across, &mut self.taken_three);
+            self.team.run(bin.height.div_ceil(CELL), &|part| {
+                arch.dispatch(BinBand {
+                    scene,
+                    size,
+                    tiles,
+                    share: (!whole).then_some(*share),
+                    scale: bin.scale,
+                    band: part,
+                    width: bin.width,
+                    out: out.part(part),
+                    stride,
+                    pad,
+                    cells: cells.part(part),
+                    filled: filled.part(part),
+                });
+            });
+        }
+    }
+
+    fn fill(&mut self) {
+        let Some(pyramid) = &mut self.pyramid else { return };
+        let near = self.plan.bins.iter().zip(&self.bins).filter(|(bin, _)| bin.near);
+        if !near.into_iter().any(|(_, rows)| rows.present) {
+            return;
+        }
+        let Some(index) = self.plan.bins.iter().rposition(|bin| bin.near) else { return };
+        let behind = Share::new(self.plan.border(index), None);
+        let nearest_px = self.plan.bins[index].high_px;
+        pyramid.fill(&mut self.scene, (self.plan.width, self.plan.height), behind, nearest_px);
+        // What was filled in has another CoC: find the tiles' ranges anew.
+        let across = self.plan.width.div_ceil(TILE_W);
+        for (k, tile) in self.tiles.iter_mut().enumerate() {
+            let (x0, y0) = (k % across * TILE_W, k / across * TILE_H);
+            let x1 = (x0 + TILE_W).min(self.plan.width);
+            *tile = (f32::INFINITY, f32::NEG_INFINITY);
+            for y in y0..(y0 + TILE_H).min(self.plan.height) {
+                let coc = &self.scene.row(y)[3 * self.scene.stride..][x0..x1];
+                *tile = coc.iter().fold(*tile, |(low, high), &c| (low.min(c), high.max(c)));
+            }
+        }
+    }
+
+    fn reach(&mut self) {
+        let plan = &self.plan;
+        let parts = Shelf::new(&mut self.bins, 1, &mut self.taken);
+        self.team.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
+            for rows in parts.part(part).iter_mut().filter(|rows| rows.present) {
+                reach::reach(plan, &plan.bins[part], &rows.cells, &mut rows.edges, &mut member.reach);
+            }
+        });
+    }
+
+    fn blur_bins(&mut self) {
+        let (plan, arch) = (&self.plan, self.arch);
+        for (bin, rows) in plan.bins.iter().zip(&mut self.bins) {
+            if !rows.present {
+                continue;
+            }
+            let down = bin.height.div_ceil(CELL);
+            let out = Shelf::new(&mut rows.out, bin.height * 4 * STRIP, &mut self.taken);
+            let active = Shelf::new(&mut rows.active, down, &mut self.taken_too);
+            let (source, cells, edges) = (&rows.source, &rows.cells, &rows.edges);
+            self.team.run_with(&mut self.members, rows.strips, &|member: &mut Member, part| {
+                arch.dispatch(Strip {
+                    source: &source.data,
+                    stride: source.stride,
+                    pad: source.pad,
+                    height: bin.height,
+                    cells,
+                    edges,
+                    bank: &plan.bank,
+                    turned: bin.near,
+                    reach: plan.bank.node_reach[plan.bank.node(bin.max_radius_px)] as usize,
+                    strip: part,
+                    out: out.part(part),
+                    active: active.part(part),
+                    wanted: None,
+                    scratch: &mut member.blur,
+                });
+            });
+        }
+    }
+
+    fn gather(&mut self) {
+        let Some(gather) = &mut self.gather else { return };
+        let (size, arch, bank) = ((self.plan.width, self.plan.height), self.arch, &*self.plan.bank);
+        let (source, scene) = (&self.bins[0].source, &self.scene);
+        let coc = |y: usize| &scene.row(y)[3 * scene.stride..];
+        if self.plan.exact {
+            let out = Shelf::new(&mut gather.result, 3 * size.0, &mut self.taken);
+            let kernels = &gather.kernels;
+            self.team.run(size.1, &|y| {
+                arch.dispatch(gather::Exact { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
+            });
+            return;
+        }
+        let rows = Shelf::new(&mut gather.rows, bank.terms * 3 * size.0, &mut self.taken);
+        self.team.run(size.1, &|y| {
+            arch.dispatch(gather::GatherRow { source, width: size.0, bank, coc: coc(y), y, out: rows.part(y) });
+        });
+        let out = Shelf::new(&mut gather.result, 3 * size.0, &mut self.taken);
+        let rows = &gather.rows;
+        self.team.run(size.1, &|y| {
+            arch.dispatch(gather::GatherColumn { rows, size, bank, coc: coc(y), y, out: out.part(y) });
+        });
+    }
+
+    fn composite(&mut self, out: &mut ColorImage) {
+        let width = self.plan.width;
+        let out = Shelf::new(&mut out.rgb, TILE_H * width * 3, &mut self.taken);
+        let gathered = self.gather.as_ref().map_or(&[][..], |gather| &gather.result);
+        let (plan, bins, shares, scene) = (&self.plan, &self.bins, &self.shares, &self.scene);
+        let (arch, encode) = (self.arch, &self.encode);
+        self.team.run(self.plan.height.div_ceil(TILE_H), &|part| {
+            let y0 = part * TILE_H;
+            let out = out.part(part);
+            arch.dispatch(composite::Composite { plan, bins, shares, scene, gathered, encode, y0, out });
+        });
+    }
+}
+
+impl Bokeh for CpuBokeh {
+    fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
+        let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
+        self.done = Some(Finished { ticket: job.ticket, out: job.out, times });
+        Ok(())
+    }
+
+    fn collect(&mut self, _wait: bool) -> Result<Option<Finished>, BokehError> {
+        Ok(self.done.take())
+    }
+
+    fn in_flight(&self) -> usize {
+        usize::from(self.done.is_some())
+    }
+
+    fn capacity(&self) -> usize {
+        1
+    }
+
+    fn describe(&self) -> String {
+        format!("cpu, {} threads, {}", self.team.threads(), simd::name(self.arch))
+    }
+}

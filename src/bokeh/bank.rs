@@ -1,0 +1,212 @@
+//! One bank of 1-D filters for every radius.
+//!
+//! The singular functions of an aperture scale with the radius, so a filter tap is the integral of one of them over
+//! a pixel: a difference of two readings of its cumulative table. That makes fractional radii exact and continuous.
+
+use super::Rank;
+use super::aperture::Mask;
+use super::low_rank::Decomposition;
+
+/// Filters are tabulated at every `1 / STEPS_PER_PX` of a pixel of radius.
+pub const STEPS_PER_PX: f32 = 16.0;
+
+/// Cells a side of the mask that a bank is made from.
+pub const MASK_CELLS: usize = 128;
+
+/// The separable filters of one aperture, for radii from 0 to a maximum.
+///
+/// The filter of node `k` has the radius `k / STEPS_PER_PX`; `out(p) = sum_t sum_j vertical_t(j) sum_i horizontal_t(i)
+/// in(p + (i, j))`, and its taps sum to 1 at every node.
+#[derive(Clone, Debug)]
+pub struct Bank {
+    /// Separable terms.
+    pub terms: usize,
+    /// Taps reach from `-reach` to `reach` at the largest radius.
+    pub reach: usize,
+    /// Radii tabulated.
+    pub nodes: usize,
+    /// Whether every profile is even, so that taps at `-j` and `j` are equal.
+    pub even: bool,
+    /// Outermost tap of each node.
+    pub node_reach: Vec<u32>,
+    /// Horizontal taps, `[node][reach + j][term]`, as they are for content behind the focal plane.
+    pub horizontal: Vec<f32>,
+    /// Vertical taps, laid out alike, singular values and normalisation included.
+    pub vertical: Vec<f32>,
+}
+
+impl Bank {
+    /// The bank of a mask for radii up to `max_radius_px`.
+    pub fn new(mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
+        let svd = Decomposition::of(mask);
+        let terms = match rank {
+            Rank::Terms(n) => (n as usize).clamp(1, svd.numerical_rank()),
+            Rank::Full => svd.numerical_rank(),
+        };
+        let n = svd.size;
+        // A tap at +j gathers what lies at +j, and so draws the aperture turned; read the profiles backwards.
+        let cumulate = |profile: &[f64]| -> Vec<f64> {
+            std::iter::once(0.0)
+                .chain(profile.iter().rev().scan(0.0, |sum, x| {
+                    *sum += x;
+                    Some(*sum)
+                }))
+                .collect()
+        };
+        let across: Vec<_> = (0..terms).map(|t| cumulate(&svd.v[t * n..][..n])).collect();
+        let mut down: Vec<_> = (0..terms).map(|t| cumulate(&svd.u[t * n..][..n])).collect();
+        let total: f64 = (0..terms).map(|t| svd.sigma[t] * across[t][n] * down[t][n]).sum();
+        for (t, profile) in down.iter_mut().enumerate() {
+            profile.iter_mut().for_each(|x| *x *= svd.sigma[t] / total);
+        }
+
+        let nodes = (max_radius_px.max(0.0) * STEPS_PER_PX).ceil() as usize + 1;
+        let reach_at = |node: usize| (node as f64 / f64::from(STEPS_PER_PX) * mask.extent - 0.5).ceil().max(0.0);
+        let reach = reach_at(nodes - 1) as usize;
+        let symmetry = mask.symmetry();
+        let mut bank = Self {
+            terms,
+            reach,
+            nodes,
+            even: symmetry == (true, true),
+            node_reach: (0..nodes).map(|k| reach_at(k) as u32).collect(),
+            horizontal: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
+            vertical: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
+        };
+        for node in 0..nodes {
+            let radius_px = (node as f64 / f64::from(STEPS_PER_PX) * mask.extent).max(1e-6);
+            for j in -(reach as i64)..=reach as i64 {
+                let (left, right) = ((j as f64 - 0.5) / radius_px, (j as f64 + 0.5) / radius_px);
+                for t in 0..terms {
+                    bank.horizontal.push((read(&across[t], right) - read(&across[t], left)) as f32);
+                    bank.vertical.push((read(&down[t], right) - read(&down[t], left)) as f32);
+                }
+            }
+        }
+        bank
+    }
+
+    /// Index of the first term of tap `j` of `node` in [`Bank::horizontal`] and [`Bank::vertical`].
+    #[inline(always)]
+    pub fn tap(&self, node: usize, j: isize) -> usize {
+        (node * (2 * self.reach + 1) + (self.reach as isize + j) as usize) * self.terms
+    }
+
+    /// The node nearest to a radius.
+    #[inline(always)]
+    pub fn node(&self, radius_px: f32) -> usize {
+        ((radius_px * STEPS_PER_PX + 0.5) as usize).min(self.nodes - 1)
+    }
+
+    /// The 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_reach[node]`, row-major; `turned` is the aperture
+    /// as content in front of the focal plane shows it.
+    pub fn kernel(&self, node: usize, turned: bool) -> Vec<f32> {
+        let reach = self.node_reach[node] as isize;
+        let sign = if turned { -1 } else { 1 };
+        let at = |taps: &[f32], j: isize, t: usize| f64::from(taps[self.tap(node, sign * j) + t]);
+        let range = move || -reach..=reach;
+        range()
+            .flat_map(|y| range().map(move |x| (x, y)))
+            .map(|(x, y)| (0..self.terms).map(|t| at(&self.horizontal, x, t) * at(&self.vertical, y, t)).sum::<f64>())
+            .map(|tap| tap as f32)
+            .collect()
+    }
+}
+
+/// The cumulative profile at `x` in [-1, 1], linear between its nodes, constant outside.
+fn read(cumulative: &[f64], x: f64) -> f64 {
+    let last = cumulative.len() - 1;
+    let at = ((x + 1.0) * 0.5 * last as f64).clamp(0.0, last as f64);
+    let index = (at as usize).min(last - 1);
+    let share = at - index as f64;
+    cumulative[index] * (1.0 - share) + cumulative[index + 1] * share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::aperture::{Aperture, Shape};
+    use super::*;
+
+    fn bank(shape: Shape, rank: Rank) -> Bank {
+        Bank::new(&Aperture { shape, intensity: 0.0 }.mask(MASK_CELLS, 0.2), rank, 10.0)
+    }
+
+    #[test]
+    fn every_filter_sums_to_one_at_every_radius_and_rank() {
+        for shape in [Shape::Disc, Shape::Heart, Shape::Ring { inner: 0.6 }] {
+            for rank in [Rank::Terms(1), Rank::Terms(3), Rank::Full] {
+                let bank = bank(shape.clone(), rank);
+                for node in 0..bank.nodes {
+                    let sum: f32 = bank.kernel(node, false).iter().sum();
+                    assert!((sum - 1.0).abs() < 1e-4, "{shape:?} {rank:?} {node}: {sum}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_full_bank_is_the_area_sampled_aperture() {
+        let mask = Aperture::default().mask(MASK_CELLS, 0.2);
+        let bank = Bank::new(&mask, Rank::Full, 10.0);
+        for node in [5, 40, 101, 160] {
+            let radius_px = node as f64 / f64::from(STEPS_PER_PX) * mask.extent;
+            let reach = bank.node_reach[node] as i64;
+            let side = 2 * reach + 1;
+            // The share of the mask's light that falls on each pixel, summed over the mask's cells.
+            let mut direct = vec![0.0; (side * side) as usize];
+            let (cell, sum) = (2.0 * radius_px / mask.size as f64, mask.sum());
+            let overlap = |index: usize| {
+                let (from, to) = (index as f64 * cell - radius_px, (index + 1) as f64 * cell - radius_px);
+                let border = to.round() + if to.round() > to { -0.5 } else { 0.5 };
+                let first = ((border - from) / cell).clamp(0.0, 1.0);
+                [(border - 0.5, first), (border + 0.5, 1.0 - first)]
+            };
+            for (k, value) in mask.values.iter().enumerate() {
+                for (y, share_y) in overlap(k / mask.size) {
+                    for (x, share_x) in overlap(k % mask.size) {
+                        let (x, y) = (x as i64 + reach, y as i64 + reach);
+                        if share_x * share_y > 0.0 {
+                            direct[(y * side + x) as usize] += value / sum * share_x * share_y;
+                        }
+                    }
+                }
+            }
+            let kernel = bank.kernel(node, true);
+            let peak = direct.iter().copied().fold(0.0, f64::max);
+            for (a, b) in kernel.iter().zip(&direct) {
+                assert!((f64::from(*a) - b).abs() < 1e-4 * peak, "node {node}: {a} against {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_shift_and_the_second_moment_grows_with_the_radius() {
+        let bank = bank(Shape::Disc, Rank::Terms(3));
+        for node in (32..bank.nodes).step_by(16) {
+            let (kernel, reach) = (bank.kernel(node, false), bank.node_reach[node] as i64);
+            let side = 2 * reach + 1;
+            let moment = |power: i32| -> f64 {
+                kernel
+                    .iter()
+                    .enumerate()
+                    .map(|(k, w)| f64::from(*w) * ((k as i64 % side - reach) as f64).powi(power))
+                    .sum()
+            };
+            let radius_px = node as f64 / f64::from(STEPS_PER_PX);
+            assert!(moment(1).abs() < 1e-4);
+            // A disc of radius R has variance R^2 / 4 an axis; pixels add 1 / 12, the rim and the rank a little.
+            assert!((moment(2) / (radius_px * radius_px / 4.0 + 1.0 / 12.0) - 1.0).abs() < 0.05, "{node}");
+        }
+    }
+
+    #[test]
+    fn far_content_shows_the_aperture_upright_and_near_content_turns_it() {
+        let bank = bank(Shape::Heart, Rank::Terms(8));
+        let node = 160;
+        let (reach, side) = (bank.node_reach[node] as usize, 2 * bank.node_reach[node] as usize + 1);
+        let upper = |kernel: &[f32]| kernel[..reach * side].iter().sum::<f32>();
+        // A kernel that gathers draws a point turned by 180 degrees: for an upright heart its weight is below.
+        assert!(upper(&bank.kernel(node, false)) < 0.45);
+        assert!(upper(&bank.kernel(node, true)) > 0.55);
+    }
+}

@@ -1,0 +1,211 @@
+//! Pass `bin`: a bin's share of each pixel, premultiplied and averaged down, and the coarse grid over it.
+
+use pulp::{Simd, WithSimd};
+
+use super::rows::{CELL_PLANES, Rows, TILE_H, TILE_W};
+use super::simd::madd;
+use crate::bokeh::plan::{CELL, COVERAGE_FLOOR};
+
+/// How much of a pixel with a given CoC a bin takes: a step up at the border in front, a step down at the one behind.
+#[derive(Clone, Copy, Debug)]
+pub struct Share {
+    front: (f32, f32),
+    behind: (f32, f32),
+}
+
+impl Share {
+    /// Borders as CoC and slope of the hand-over; `None` where there is no bin beyond.
+    pub fn new(front: Option<(f32, f32)>, behind: Option<(f32, f32)>) -> Self {
+        Self { front: front.unwrap_or((-1e30, 1.0)), behind: behind.unwrap_or((1e30, 1.0)) }
+    }
+
+    /// The share at a CoC, 0 to 1; the shares of all bins of a plan sum to 1.
+    #[inline(always)]
+    pub fn at(&self, coc_px: f32) -> f32 {
+        step(self.front, coc_px) - step(self.behind, coc_px)
+    }
+
+    /// Whether any CoC in a range has a share.
+    pub fn meets(&self, (low_px, high_px): (f32, f32)) -> bool {
+        step(self.front, high_px) > 0.0 && step(self.behind, low_px) < 1.0
+    }
+}
+
+#[inline(always)]
+fn step((at, slope): (f32, f32), coc_px: f32) -> f32 {
+    let value = (coc_px - at) * slope + 0.5;
+    let value = if value > 0.0 { value } else { 0.0 };
+    if value < 1.0 { value } else { 1.0 }
+}
+
+/// One row of cells of one bin.
+pub struct BinBand<'a> {
+    /// The picture from `unpack`.
+    pub scene: &'a Rows<4>,
+    /// Columns and rows of the picture.
+    pub size: (usize, usize),
+    /// CoC range of each tile of the picture.
+    pub tiles: &'a [(f32, f32)],
+    /// The bin's share; `None` takes everything whole (no depth edges to respect).
+    pub share: Option<Share>,
+    /// Pixels of the picture a bin pixel covers, each way.
+    pub scale: usize,
+    /// Which row of cells.
+    pub band: usize,
+    /// Columns of the bin.
+    pub width: usize,
+    /// The bin's rows of this band.
+    pub out: &'a mut [f32],
+    /// Values of a plane row of `out`, and columns in front of its first pixel.
+    pub stride: usize,
+    /// Padding on both sides.
+    pub pad: usize,
+    /// This row of cells.
+    pub cells: &'a mut [f32],
+    /// Per tile across, whether `out` holds anything but zeros there.
+    pub filled: &'a mut [bool],
+}
+
+impl WithSimd for BinBand<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        match self.scale {
+            1 => self.fill::<S, 1>(),
+            2 => self.fill::<S, 2>(),
+            _ => self.fill::<S, 4>(),
+        }
+    }
+}
+
+impl BinBand<'_> {
+    #[inline(always)]
+    fn fill<V: Simd, const S: usize>(mut self) {
+        let across = self.cells.len() / CELL_PLANES;
+        self.cells[..2 * across].fill(0.0);
+        self.cells[2 * across..5 * across].fill(f32::INFINITY);
+        self.cells[5 * across..].fill(f32::NEG_INFINITY);
+        for chunk in 0..self.filled.len() {
+            if self.meets::<S>(chunk) {
+                self.chunk::<V, S>(chunk);
+                self.filled[chunk] = true;
+            } else if std::mem::take(&mut self.filled[chunk]) {
+                for plane in self.out.chunks_exact_mut(self.stride) {
+                    plane[self.pad + chunk * (TILE_W / S)..][..TILE_W / S].fill(0.0);
+                }
+            }
+        }
+        for plane in self.out.chunks_exact_mut(self.stride) {
+            let (first, last) = (plane[self.pad], plane[self.pad + self.width - 1]);
+            plane[..self.pad].fill(first);
+            plane[self.pad + self.width..].fill(last);
+        }
+    }
+
+    /// Whether a chunk of this row of cells has anything for this bin.
+    #[inline(always)]
+    fn meets<const S: usize>(&self, chunk: usize) -> bool {
+        let across = self.filled.len();
+        let first = self.band * CELL * S / TILE_H;
+        let last = (first + S).min(self.tiles.len() / across);
+        self.share.is_none_or(|share| (first..last).any(|row| share.meets(self.tiles[row * across + chunk])))
+    }
+
+    /// One chunk of all rows, and its cells.
+    #[inline(always)]
+    fn chunk<V: Simd, const S: usize>(&mut self, chunk: usize) {
+        let rows = self.out.len() / (5 * self.stride);
+        let (x0, width) = (chunk * TILE_W / S, TILE_W / S);
+        let mut coverage = [[0.0f32; TILE_W]; 2];
+        let mut range = [[f32::INFINITY; TILE_W]; 6];
+        range[3..].fill([f32::NEG_INFINITY; TILE_W]);
+        for row in 0..rows {
+            let sums = self.sums::<V, S>(row, chunk);
+            let mut means = [[0.0f32; TILE_W]; 5];
+            for (mean, sum) in means.iter_mut().zip(&sums) {
+                for (mean, group) in mean.iter_mut().zip(sum.as_chunks::<S>().0) {
+                    let mut total = 0.0;
+                    for value in group {
+                        total += value;
+                    }
+                    *mean = total * (1.0 / (S * S) as f32);
+                }
+            }
+            for (p, mean) in means.iter().enumerate() {
+                self.out[(row * 5 + p) * self.stride + self.pad + x0..][..width].copy_from_slice(&mean[..width]);
+            }
+            for x in 0..width {
+                coverage[0][x] += means[3][x];
+                coverage[1][x] += means[4][x];
+                let counts = means[3][x] > COVERAGE_FLOOR;
+                let inverse = if counts { 1.0 / means[3][x] } else { 0.0 };
+                for p in 0..3 {
+                    let own = means[p][x] * inverse;
+                    let low = if counts { own } else { f32::INFINITY };
+                    let high = if counts { own } else { f32::NEG_INFINITY };
+                    range[p][x] = if low < range[p][x] { low } else { range[p][x] };
+                    range[3 + p][x] = if high > range[3 + p][x] { high } else { range[3 + p][x] };
+                }
+            }
+        }
+        let across = self.cells.len() / CELL_PLANES;
+        let valid = width.min(self.width.saturating_sub(x0));
+        for first in (0..valid).step_by(CELL) {
+            let (cell, span) = ((x0 + first) / CELL, first..(first + CELL).min(valid));
+            for p in 0..2 {
+                self.cells[p * across + cell] = coverage[p][span.clone()].iter().sum();
+                for k in 0..3 {
+                    let values = range[3 * p + k][span.clone()].iter().copied();
+                    let value = &mut self.cells[(2 + 3 * p + k) * across + cell];
+                    *value = if p == 0 { values.fold(*value, f32::min) } else { values.fold(*value, f32::max) };
+                }
+            }
+        }
+    }
+
+    /// The rows of the picture under one row of the bin, weighted and summed.
+    #[inline(always)]
+    fn sums<V: Simd, const S: usize>(&self, row: usize, chunk: usize) -> [[f32; TILE_W]; 5] {
+        let mut sums = [[0.0f32; TILE_W]; 5];
+        for sub in 0..S {
+            let y = ((self.band * CELL + row) * S + sub).min(self.size.1 - 1);
+            let planes = self.scene.row(y);
+            let mut tile = [[0.0f32; TILE_W]; 4];
+            for (p, tile) in tile.iter_mut().enumerate() {
+                tile.copy_from_slice(&planes[p * self.scene.stride + chunk * TILE_W..][..TILE_W]);
+            }
+            let mut shares = [1.0f32; TILE_W];
+            if let Some(share) = self.share {
+                for (share_at, &coc) in shares.iter_mut().zip(&tile[3]) {
+                    *share_at = share.at(coc);
+                }
+            }
+            for x in 0..TILE_W {
+                sums[0][x] = madd::<V>(shares[x], tile[0][x], sums[0][x]);
+                sums[1][x] = madd::<V>(shares[x], tile[1][x], sums[1][x]);
+                sums[2][x] = madd::<V>(shares[x], tile[2][x], sums[2][x]);
+                sums[3][x] += shares[x];
+                sums[4][x] = madd::<V>(shares[x], tile[3][x].abs(), sums[4][x]);
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shares_of_all_bins_sum_to_one() {
+        let borders = [(-7.0, 0.5), (-1.0, 3.0), (1.0, 3.0), (4.0, 0.8)];
+        let bin = |k: usize| Share::new(k.checked_sub(1).map(|k| borders[k]), borders.get(k).copied());
+        for step in -200..200 {
+            let coc_px = step as f32 * 0.1;
+            let sum: f32 = (0..=borders.len()).map(|k| bin(k).at(coc_px)).sum();
+            assert!((sum - 1.0).abs() < 1e-6);
+            assert!((0..=borders.len()).all(|k| bin(k).at(coc_px) >= 0.0));
+            assert!((0..=borders.len()).all(|k| bin(k).at(coc_px) == 0.0 || bin(k).meets((coc_px, coc_px))));
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Pass `reach`: on the coarse grid, what the filters can reach from each cell: the radius of the content there (its
+//! mean, weighted by coverage and nearness), and the range of its colours.
+
+use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges};
+use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
+
+/// Weight of far cells, so that a radius exists wherever the filter finds anything at all.
+const FAR_WEIGHT: f32 = 0.02;
+
+/// Weight of a cell `distance` cells away, along one axis.
+pub fn nearness(distance: usize, bin: &Bin) -> f32 {
+    let sigma = (bin.max_radius_px / (2.0 * CELL as f32)).max(0.5);
+    let d = distance as f32 / sigma;
+    (-0.5 * d * d).exp() + FAR_WEIGHT
+}
+
+/// The neighbourhood of every cell, one axis after the other; `scratch` holds as many values as the grid.
+pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
+    let (width, height, radius) = (cells.width, cells.height, plan.reach_cells(bin));
+    let mut weights = [0.0; 64];
+    let radius = radius.min(weights.len() - 1);
+    (0..=radius).for_each(|d| weights[d] = nearness(d, bin));
+    let row_len = CELL_PLANES * width;
+    scratch.clear();
+    scratch.resize(cells.data.len() + row_len, 0.0);
+    let (across, row) = scratch.split_at_mut(cells.data.len());
+    for (source, target) in cells
+        .data
+        .chunks_exact(width)
+        .zip(across.chunks_exact_mut(width))
+        .enumerate()
+        .map(|(k, (source, target))| ((k % CELL_PLANES, source), target))
+    {
+        let (plane, source) = source;
+        for (x, value) in target.iter_mut().enumerate() {
+            let (from, to) = (x.saturating_sub(radius), (x + radius).min(width - 1));
+            *value = gather(plane, (from..=to).map(|k| (source[k], weights[k.abs_diff(x)])));
+        }
+    }
+    for y in 0..height {
+        row[..2 * width].fill(0.0);
+        row[2 * width..5 * width].fill(f32::INFINITY);
+        row[5 * width..].fill(f32::NEG_INFINITY);
+        for k in y.saturating_sub(radius)..(y + radius + 1).min(height) {
+            let source = &across[k * row_len..][..row_len];
+            let weight = weights[k.abs_diff(y)];
+            let (sums, rest) = row.split_at_mut(2 * width);
+            let (lows, highs) = rest.split_at_mut(3 * width);
+            sums.iter_mut().zip(source).for_each(|(t, s)| *t += weight * s);
+            lows.iter_mut().zip(&source[2 * width..]).for_each(|(t, &s)| *t = if s < *t { s } else { *t });
+            highs.iter_mut().zip(&source[5 * width..]).for_each(|(t, &s)| *t = if s > *t { s } else { *t });
+        }
+        for x in 0..width {
+            let coc_px = if row[x] > 0.0 { row[width + x] / row[x] } else { 0.0 };
+            row[width + x] = plan.bin_radius_px(bin, coc_px);
+        }
+        // Where nothing is in reach there is nothing to keep in range; zero keeps the arithmetic finite.
+        row[2 * width..].iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = 0.0);
+        let out = &mut edges.data[y * edges.across * EDGE_VALUES..][..edges.across * EDGE_VALUES];
+        for (edge, values) in out.chunks_exact_mut(EDGE_VALUES).enumerate() {
+            let right = edge * SEGMENT / CELL;
+            let (left, right) = (right.saturating_sub(1), right.min(width - 1));
+            for (plane, value) in values.iter_mut().take(CELL_PLANES - 1).enumerate() {
+                let plane = &row[(plane + 1) * width..];
+                *value = 0.5 * (plane[left] + plane[right]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn gather(plane: usize, values: impl Iterator<Item = (f32, f32)>) -> f32 {
+    match plane {
+        0 | 1 => values.map(|(value, weight)| value * weight).sum(),
+        2..5 => values.map(|(value, _)| value).fold(f32::INFINITY, f32::min),
+        _ => values.map(|(value, _)| value).fold(f32::NEG_INFINITY, f32::max),
+    }
+}

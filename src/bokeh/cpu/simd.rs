@@ -1,0 +1,44 @@
+//! Run-time choice of the vector instructions.
+//!
+//! Every pass is a [`pulp::WithSimd`]: compiled once per instruction set (AVX-512, AVX2 with FMA, NEON, or what the
+//! target guarantees), and the best that the machine has is taken. Inside, simple loops are left to the compiler, and
+//! the filters use the vectors themselves.
+
+use pulp::{Arch, Simd};
+
+/// `a * b + c`: one instruction where there is one, two where it would be a library call.
+#[inline(always)]
+pub fn madd<S: Simd>(a: f32, b: f32, c: f32) -> f32 {
+    if S::IS_SCALAR { a * b + c } else { a.mul_add(b, c) }
+}
+
+/// [`madd`] of vectors.
+#[inline(always)]
+pub fn fma<S: Simd>(simd: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
+    if S::IS_SCALAR { simd.add_f32s(simd.mul_f32s(a, b), c) } else { simd.mul_add_f32s(a, b, c) }
+}
+
+/// One vector of `values`, from index `at` on.
+#[inline(always)]
+pub fn load<S: Simd>(values: &[f32], at: usize) -> S::f32s {
+    S::as_simd_f32s(&values[at..at + S::F32_LANES]).0[0]
+}
+
+/// Stores one vector at index `at`.
+#[inline(always)]
+pub fn store<S: Simd>(values: &mut [f32], at: usize, vector: S::f32s) {
+    S::as_mut_simd_f32s(&mut values[at..at + S::F32_LANES]).0[0] = vector;
+}
+
+/// The name of the instruction set, for the report.
+pub fn name(arch: Arch) -> &'static str {
+    match arch {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(_) => "AVX-512",
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(_) => "AVX2",
+        #[cfg(target_arch = "aarch64")]
+        Arch::Neon(_) => "NEON",
+        _ => "baseline",
+    }
+}

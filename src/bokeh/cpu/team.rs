@@ -1,0 +1,277 @@
+//! A fixed team of threads that share out the parts of one pass at a time.
+//!
+//! A pass is over when every part is done; a member that sleeps through it is not waited for. Nothing is allocated
+//! and no lock is taken. This is the one file with `unsafe`: the threads outlive the borrow of the work they are
+//! handed, and `run` is what guarantees that they never use it afterwards.
+#![allow(unsafe_code)]
+
+use std::cell::UnsafeCell;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::thread::{self, JoinHandle, Thread};
+
+/// One part of a pass: called with the number of the member that does it, and the part's number.
+type Work<'a> = &'a (dyn Fn(usize, usize) + Sync + 'a);
+
+/// The threads. The thread that calls [`Team::run`] works as one of them.
+pub struct Team {
+    shared: Arc<Shared>,
+    members: Vec<JoinHandle<()>>,
+}
+
+struct Shared {
+    /// `epoch << 16 | open << 15 | members at work`. Opening a pass raises the epoch.
+    gate: AtomicU64,
+    /// Valid from the opening of the gate until it is closed and no member is at work.
+    work: UnsafeCell<Option<Pass>>,
+    next: AtomicUsize,
+    panicked: AtomicBool,
+    stop: AtomicBool,
+}
+
+#[derive(Clone, Copy)]
+struct Pass {
+    work: Work<'static>,
+    parts: usize,
+}
+
+/// The start of the members' scratch memory.
+struct Base<S>(*mut S);
+
+// SAFETY: only hands out addresses; `run_with` argues for each use. `S: Send` as members are other threads.
+unsafe impl<S: Send> Sync for Base<S> {}
+
+impl<S> Base<S> {
+    fn at(&self, member: usize) -> *mut S {
+        self.0.wrapping_add(member)
+    }
+}
+
+const OPEN: u64 = 1 << 15;
+const AT_WORK: u64 = OPEN - 1;
+const EPOCH: u64 = 1 << 16;
+/// Turns of waiting before a member goes to sleep: about as long as the gap between two passes of a frame.
+const SPINS: u32 = 4_000;
+
+// SAFETY: `work` is written only by the thread in `run` (`&mut self`, so there is one) while the gate is closed and
+// nobody is at work, and read only by members that entered through the open gate; the gate's release/acquire pairs
+// order the two.
+unsafe impl Sync for Shared {}
+
+impl Team {
+    /// A team of `threads` (at least 1), the caller included.
+    pub fn new(threads: usize) -> Self {
+        let shared = Arc::new(Shared {
+            gate: AtomicU64::new(0),
+            work: UnsafeCell::new(None),
+            next: AtomicUsize::new(0),
+            panicked: AtomicBool::new(false),
+            stop: AtomicBool::new(false),
+        });
+        let members = (1..threads.max(1))
+            .map_while(|k| {
+                let shared = Arc::clone(&shared);
+                // Without the thread the others do its share.
+                thread::Builder::new().name(format!("blur-{k}")).spawn(move || shared.serve(k)).ok()
+            })
+            .collect();
+        Self { shared, members }
+    }
+
+    /// Threads at work, the caller included.
+    pub fn threads(&self) -> usize {
+        self.members.len() + 1
+    }
+
+    /// Calls `work` once with each of `0..parts`, spread over the team, and returns when all are done.
+    ///
+    /// # Panics
+    /// When a part panicked, after the others are done.
+    pub fn run(&mut self, parts: usize, work: &(dyn Fn(usize) + Sync)) {
+        self.run_members(parts, &|_, part| work(part));
+    }
+
+    /// As [`Team::run`], with scratch memory of its own for every member: `scratch` has one for each thread.
+    ///
+    /// # Panics
+    /// As [`Team::run`], and when `scratch` is too short.
+    pub fn run_with<S: Send>(&mut self, scratch: &mut [S], parts: usize, work: &(dyn Fn(&mut S, usize) + Sync)) {
+        assert!(scratch.len() >= self.threads(), "every thread needs its scratch");
+        let base = Base(scratch.as_mut_ptr());
+        self.run_members(parts, &|member, part| {
+            // SAFETY: `member` is below the team's size, which `scratch` covers, and each member is one thread that
+            // does one part at a time; so nobody else holds this element, and `scratch` is borrowed throughout.
+            work(unsafe { &mut *base.at(member) }, part);
+        });
+    }
+
+    fn run_members(&mut self, parts: usize, work: Work<'_>) {
+        if self.members.is_empty() || parts < 2 {
+            return (0..parts).for_each(|part| work(0, part));
+        }
+        let shared = &*self.shared;
+        // SAFETY: only the lifetime changes. The reference is dropped from `shared.work` below, before `run` returns
+        // and only once no member is at work; nobody can enter after the gate is closed.
+        let work: Work<'static> = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
+        shared.next.store(0, Ordering::Relaxed);
+        // SAFETY: the gate is closed and nobody is at work (see the wait below), so nobody else touches the cell.
+        unsafe { *shared.work.get() = Some(Pass { work, parts }) };
+        // Release: members that see the gate open also see the pass.
+        let closed = shared.gate.load(Ordering::Relaxed);
+        shared.gate.store((closed & !(EPOCH - 1)).wrapping_add(EPOCH) | OPEN, Ordering::Release);
+        let helpers = self.members.iter().take(parts - 1);
+        helpers.map(JoinHandle::thread).for_each(Thread::unpark);
+
+        shared.take_parts(0, Pass { work, parts });
+        shared.gate.fetch_and(!OPEN, Ordering::Relaxed);
+        let mut turns = 0u32;
+        // Acquire: what members wrote is visible once their leaving is.
+        while shared.gate.load(Ordering::Acquire) & AT_WORK != 0 {
+            turns += 1;
+            if turns.is_multiple_of(64) { thread::yield_now() } else { std::hint::spin_loop() }
+        }
+        // SAFETY: closed, and nobody at work.
+        unsafe { *shared.work.get() = None };
+        if shared.panicked.swap(false, Ordering::Relaxed) {
+            resume_unwind(Box::new("a part of a blur pass panicked"));
+        }
+    }
+}
+
+impl Shared {
+    fn serve(&self, member: usize) {
+        let mut seen = 0;
+        loop {
+            let mut turns = 0;
+            let gate = loop {
+                if self.stop.load(Ordering::Relaxed) {
+                    return;
+                }
+                let gate = self.gate.load(Ordering::Relaxed);
+                if gate & OPEN != 0 && gate / EPOCH != seen {
+                    break gate;
+                }
+                turns += 1;
+                if turns < SPINS { std::hint::spin_loop() } else { thread::park() }
+            };
+            // Acquire pairs with the release in `run`; failing means that the gate moved: look again.
+            if self.gate.compare_exchange(gate, gate + 1, Ordering::Acquire, Ordering::Relaxed).is_err() {
+                continue;
+            }
+            seen = gate / EPOCH;
+            // SAFETY: entered through the open gate, so `run` neither writes the cell nor returns until we leave.
+            if let Some(pass) = unsafe { *self.work.get() } {
+                self.take_parts(member, pass);
+            }
+            // Release: `run` sees what we wrote once it sees us gone.
+            self.gate.fetch_sub(1, Ordering::Release);
+        }
+    }
+
+    fn take_parts(&self, member: usize, pass: Pass) {
+        let work = AssertUnwindSafe(|| {
+            loop {
+                let part = self.next.fetch_add(1, Ordering::Relaxed);
+                if part >= pass.parts {
+                    break;
+                }
+                (pass.work)(member, part);
+            }
+        });
+        if catch_unwind(work).is_err() {
+            self.panicked.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Drop for Team {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        for member in self.members.drain(..) {
+            member.thread().unpark();
+            // A member catches its panics, and there is nobody left to tell.
+            let _ = member.join();
+        }
+    }
+}
+
+/// Rows of a picture that several parts write at once, each its own.
+///
+/// Hands out `&mut` slices of one allocation by index; [`Shelf::part`] is safe because each index can be taken once.
+pub struct Shelf<'a, T> {
+    base: *mut T,
+    length: usize,
+    each: usize,
+    taken: &'a [AtomicBool],
+}
+
+// SAFETY: a part goes to one taker only (`taken`), and `T: Send` may move between threads.
+unsafe impl<T: Send> Sync for Shelf<'_, T> {}
+
+impl<'a, T> Shelf<'a, T> {
+    /// Splits `data` into parts of `each` values (the last may be shorter); `taken` has a flag for every part.
+    pub fn new(data: &'a mut [T], each: usize, taken: &'a mut [AtomicBool]) -> Self {
+        let parts = data.len().div_ceil(each.max(1));
+        assert!(each > 0 && parts <= taken.len(), "a shelf needs a flag for every part");
+        taken.iter_mut().for_each(|flag| *flag.get_mut() = false);
+        Self { base: data.as_mut_ptr(), length: data.len(), each, taken }
+    }
+
+    /// The part `index`.
+    ///
+    /// # Panics
+    /// When it is taken a second time, or beyond the end.
+    #[allow(clippy::mut_from_ref)]
+    pub fn part(&self, index: usize) -> &mut [T] {
+        let start = index * self.each;
+        assert!(start < self.length && !self.taken[index].swap(true, Ordering::Relaxed), "each part is taken once");
+        let length = self.each.min(self.length - start);
+        // SAFETY: inside the allocation, which `'a` keeps borrowed; parts do not overlap and each is handed out once.
+        unsafe { std::slice::from_raw_parts_mut(self.base.add(start), length) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_part_is_done_once() {
+        for threads in [1, 2, 5] {
+            let mut team = Team::new(threads);
+            for parts in [0, 1, 2, 7, 100] {
+                for _ in 0..200 {
+                    let done: Vec<AtomicUsize> = (0..parts).map(|_| AtomicUsize::new(0)).collect();
+                    team.run(parts, &|part| {
+                        done[part].fetch_add(1, Ordering::Relaxed);
+                    });
+                    assert!(done.iter().all(|d| d.load(Ordering::Relaxed) == 1));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_panic_in_a_part_reaches_the_caller_and_the_team_lives_on() {
+        let mut team = Team::new(3);
+        let result = catch_unwind(AssertUnwindSafe(|| team.run(8, &|part| assert_ne!(part, 5))));
+        assert!(result.is_err());
+        let sum = AtomicUsize::new(0);
+        team.run(10, &|part| {
+            sum.fetch_add(part, Ordering::Relaxed);
+        });
+        assert_eq!(sum.load(Ordering::Relaxed), 45);
+    }
+
+    #[test]
+    fn a_shelf_hands_out_each_part_once() {
+        let mut data = vec![0; 10];
+        let mut flags: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
+        let shelf = Shelf::new(&mut data, 3, &mut flags);
+        shelf.part(3).fill(7);
+        assert_eq!(shelf.part(0).len(), 3);
+        assert!(catch_unwind(AssertUnwindSafe(|| shelf.part(0).len())).is_err());
+        assert_eq!(data[9], 7);
+    }
+}

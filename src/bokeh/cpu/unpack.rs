@@ -1,0 +1,139 @@
+//! Pass `unpack`: 8-bit sRGB to linear light with highlights expanded, and depth to signed CoC.
+
+use super::rows::TILE_W;
+use pulp::{Simd, WithSimd};
+
+use crate::frame::{ColorImage, DepthMap};
+use crate::optics::CocField;
+
+/// Linear light of an sRGB code value in [0, 1] (IEC 61966-2-1).
+pub fn srgb_to_linear(code: f32) -> f32 {
+    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
+}
+
+/// sRGB code value in [0, 1] of linear light.
+pub fn linear_to_srgb(light: f32) -> f32 {
+    if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// The table from 8-bit sRGB to expanded linear light `y = x / (expansion - x)`, scaled to keep black's slope 1.
+///
+/// With `expansion = 1 + 1/M`, white becomes `M + 1` times as bright as it looks; infinity leaves light as it is.
+pub fn decode_table(expansion: f32) -> [f32; 256] {
+    std::array::from_fn(|code| expand(srgb_to_linear(code as f32 / 255.0), expansion))
+}
+
+/// Highlight expansion, the inverse of [`compress`].
+pub fn expand(light: f32, expansion: f32) -> f32 {
+    if expansion.is_finite() { light * expansion / (expansion - light) } else { light }
+}
+
+/// Undoes [`expand`].
+pub fn compress(light: f32, expansion: f32) -> f32 {
+    if expansion.is_finite() { light * expansion / (expansion + light) } else { light }
+}
+
+/// The rows of one row of tiles.
+pub struct Unpack<'a> {
+    /// The picture.
+    pub color: &'a ColorImage,
+    /// Its depth, of any size.
+    pub depth: Option<&'a DepthMap>,
+    /// The rule of the CoC.
+    pub coc: &'a CocField,
+    /// From [`decode_table`].
+    pub table: &'a [f32; 256],
+    /// First row.
+    pub y0: usize,
+    /// Rows of `[r, g, b, coc][stride]`, no padding in front.
+    pub out: &'a mut [f32],
+    /// Values of a plane row.
+    pub stride: usize,
+    /// Lowest and highest CoC of each tile of this row of tiles.
+    pub tiles: &'a mut [(f32, f32)],
+}
+
+impl WithSimd for Unpack<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let width = self.color.width as usize;
+        self.tiles.fill((f32::INFINITY, f32::NEG_INFINITY));
+        for (dy, planes) in self.out.chunks_exact_mut(self.stride * 4).enumerate() {
+            let y = self.y0 + dy;
+            let (red, rest) = planes.split_at_mut(self.stride);
+            let (green, rest) = rest.split_at_mut(self.stride);
+            let (blue, coc) = rest.split_at_mut(self.stride);
+            let pixels = self.color.rgb[y * width * 3..][..width * 3].chunks_exact(3);
+            for (((pixel, r), g), b) in pixels.zip(red).zip(green).zip(blue) {
+                *r = self.table[pixel[0] as usize];
+                *g = self.table[pixel[1] as usize];
+                *b = self.table[pixel[2] as usize];
+            }
+            coc_row(self.coc, self.depth, y, self.color.height as usize, &mut coc[..width]);
+            // Columns beyond the picture repeat its last one, so that whole tiles can be worked on.
+            for plane in planes.chunks_exact_mut(self.stride) {
+                let last = plane[width - 1];
+                plane[width..].fill(last);
+            }
+            let coc = &planes[3 * self.stride..];
+            for (tile, values) in self.tiles.iter_mut().zip(coc[..width].chunks(TILE_W)) {
+                for &value in values {
+                    tile.0 = if value < tile.0 { value } else { tile.0 };
+                    tile.1 = if value > tile.1 { value } else { tile.1 };
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn coc_row(rule: &CocField, depth: Option<&DepthMap>, y: usize, height: usize, coc: &mut [f32]) {
+    match (rule, depth) {
+        (CocField::Depth(lens), Some(map)) if !map.metres.is_empty() => {
+            let (w, h) = (map.width as usize, map.height as usize);
+            let row = &map.metres[nearest(y, height, h) * w..][..w];
+            if w == coc.len() {
+                coc.iter_mut().zip(row).for_each(|(coc, &metres)| *coc = lens.coc_px(metres));
+            } else {
+                let width = coc.len();
+                coc.iter_mut().enumerate().for_each(|(x, coc)| *coc = lens.coc_px(row[nearest(x, width, w)]));
+            }
+        }
+        (CocField::Depth(lens), _) => coc.fill(lens.coc_px(0.0)),
+        (CocField::Uniform { radius_px }, _) => coc.fill(*radius_px),
+        (CocField::Ramp(ramp), _) => {
+            coc.iter_mut().enumerate().for_each(|(x, coc)| *coc = ramp.coc_px(x as f32, y as f32));
+        }
+    }
+}
+
+/// The sample of a row of `of` values that pixel `index` of `pixels` falls on.
+#[inline(always)]
+pub fn nearest(index: usize, pixels: usize, of: usize) -> usize {
+    ((2 * index + 1) * of / (2 * pixels)).min(of - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn expansion_is_undone_and_keeps_black_and_white() {
+        for expansion in [f32::INFINITY, 1.0 + 1.0 / 8.0, 1.5] {
+            for code in 0..=255 {
+                let light = srgb_to_linear(code as f32 / 255.0);
+                let back = compress(expand(light, expansion), expansion);
+                assert!((back - light).abs() < 1e-5, "{expansion} {code}");
+            }
+            assert_eq!(expand(0.0, expansion), 0.0);
+        }
+        assert!((expand(1.0, 1.0 + 1.0 / 8.0) - 9.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_smaller_depth_map_covers_the_same_view() {
+        assert_eq!((0..6).map(|x| nearest(x, 6, 3)).collect::<Vec<_>>(), [0, 0, 1, 1, 2, 2]);
+        assert_eq!((0..5).map(|x| nearest(x, 5, 5)).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+    }
+}
