@@ -1,0 +1,67 @@
+//! The portable float map: one float a pixel, bottom row first. The usual way to keep disparity and depth.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::decode::{self, Scratch};
+use super::error::PictureFault;
+use crate::frame::DepthMap;
+
+/// Whether the name says that the file is a PFM.
+pub(super) fn is_named(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"))
+}
+
+/// Reads metres; what is not a depth becomes 0.
+pub(super) fn read(path: &Path) -> Result<DepthMap, PictureFault> {
+    let mut scratch = Scratch::default();
+    parse(scratch.read_file(path)?)
+}
+
+fn parse(bytes: &[u8]) -> Result<DepthMap, PictureFault> {
+    let mut rest = bytes;
+    let magic = word(&mut rest)?;
+    if magic != "Pf" {
+        return Err(if magic == "PF" {
+            PictureFault::NotDepth("a colour PFM")
+        } else {
+            PictureFault::Format("grey PFM")
+        });
+    }
+    let width = number(word(&mut rest)?)?;
+    let height = number(word(&mut rest)?)?;
+    decode::check_size(width, height)?;
+    // Only the sign is used: negative means that the low byte comes first.
+    let scale: f32 = number(word(&mut rest)?)?;
+    let row_bytes = width as usize * 4;
+    let data = rest.get(..row_bytes * height as usize).ok_or(PictureFault::Truncated)?;
+
+    let from_bytes = if scale < 0.0 { f32::from_le_bytes } else { f32::from_be_bytes };
+    let rows = data.chunks_exact(row_bytes).rev();
+    let metres = rows.flat_map(|row| row.as_chunks().0).map(|&bytes| from_bytes(bytes));
+    let metres = metres.map(|metres| if DepthMap::is_known(metres) { metres } else { 0.0 }).collect();
+    Ok(DepthMap { width, height, metres })
+}
+
+/// The next word of the header. Exactly one white space ends it, since pixels may follow.
+fn word<'a>(rest: &mut &'a [u8]) -> Result<&'a str, PictureFault> {
+    let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or(PictureFault::Truncated)?;
+    let length = rest[start..].iter().position(u8::is_ascii_whitespace).ok_or(PictureFault::Truncated)?;
+    let word = &rest[start..start + length];
+    *rest = &rest[start + length + 1..];
+    std::str::from_utf8(word).map_err(|_| PictureFault::Damaged("its header is not text".into()))
+}
+
+fn number<T: std::str::FromStr>(word: &str) -> Result<T, PictureFault> {
+    let short: String = word.chars().take(20).collect();
+    word.parse().map_err(|_| PictureFault::Damaged(format!("{short:?} in its header is not a number")))
+}
+
+/// Appends `values` (`height` x `width`, row-major, any unit) to `file`.
+pub(super) fn write(width: u32, height: u32, values: &[f32], file: &mut Vec<u8>) {
+    // Writing to memory does not fail.
+    let _ = write!(file, "Pf\n{width} {height}\n-1\n");
+    for row in values.chunks_exact(width.max(1) as usize).rev() {
+        file.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+    }
+}

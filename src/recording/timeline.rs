@@ -1,0 +1,71 @@
+//! When the frames of a recording are due.
+
+/// Taken where a recording does not tell: 30 frames per second.
+const DEFAULT_PERIOD_NS: u64 = 33_333_333;
+
+/// Median distance of strictly increasing times.
+pub(super) fn median_period_ns(times_ns: impl Iterator<Item = u64> + Clone) -> u64 {
+    let mut periods_ns: Vec<u64> = times_ns.clone().skip(1).zip(times_ns).map(|(next, time)| next - time).collect();
+    let middle = periods_ns.len() / 2;
+    if periods_ns.is_empty() { DEFAULT_PERIOD_NS } else { *periods_ns.select_nth_unstable(middle).1 }
+}
+
+/// A time for every frame, in nanoseconds after the first, strictly increasing. Frames whose time is unknown are
+/// spread evenly between their neighbours, or follow one period apart at the ends. The known times increase strictly.
+pub(super) fn fill(times_ns: &[Option<u64>]) -> Vec<u64> {
+    let known: Vec<(usize, u64)> =
+        times_ns.iter().enumerate().filter_map(|(index, &time)| Some((index, time?))).collect();
+    let period_ns = i128::from(median_period_ns(known.iter().map(|&(_, time)| time)));
+    let estimate_ns = |index: usize| {
+        let at = |(known, time): (usize, u64)| (i128::from(time), index as i128 - known as i128);
+        let next = known.partition_point(|&(known, _)| known < index);
+        let before = next.checked_sub(1).map(|last| at(known[last]));
+        match (before, known.get(next).copied().map(at)) {
+            (Some((time, offset)), Some((next_time, next_offset))) => {
+                time + (next_time - time) * offset / (offset - next_offset)
+            }
+            (Some((time, offset)), None) | (None, Some((time, offset))) => time + period_ns * offset,
+            (None, None) => period_ns * index as i128,
+        }
+    };
+    let start_ns = estimate_ns(0);
+    let mut least_ns = 0;
+    (0..times_ns.len())
+        .map(|index| {
+            // More frames than nanoseconds between two times push the later ones on.
+            let time_ns = u64::try_from(estimate_ns(index) - start_ns).unwrap_or(u64::MAX).max(least_ns);
+            least_ns = time_ns.saturating_add(1);
+            time_ns
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_times_stay_and_the_others_lie_between_them() {
+        assert_eq!(fill(&[Some(50), Some(60), Some(75)]), [0, 10, 25]);
+        assert_eq!(fill(&[Some(100), None, None, Some(130)]), [0, 10, 20, 30]);
+    }
+
+    #[test]
+    fn the_ends_go_on_at_the_median_period() {
+        assert_eq!(fill(&[None, Some(5), Some(15), Some(25), None, None]), [0, 10, 20, 30, 40, 50]);
+        assert_eq!(fill(&[None, None]), [0, DEFAULT_PERIOD_NS]);
+        assert_eq!(fill(&[]), []);
+    }
+
+    #[test]
+    fn times_increase_even_where_there_is_no_room() {
+        assert_eq!(fill(&[Some(7), None, None, Some(8), Some(9)]), [0, 1, 2, 3, 4]);
+        assert_eq!(fill(&[Some(0), Some(u64::MAX), None]), [0, u64::MAX, u64::MAX]);
+    }
+
+    #[test]
+    fn the_period_is_the_median() {
+        assert_eq!(median_period_ns([0, 10, 20, 500].into_iter()), 10);
+        assert_eq!(median_period_ns([7].into_iter()), DEFAULT_PERIOD_NS);
+    }
+}

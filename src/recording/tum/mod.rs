@@ -1,0 +1,25 @@
+//! The layout of the TUM RGB-D benchmark.
+//!
+//! `rgb.txt` and `depth.txt` have lines of `time file`, `associations.txt` has lines of `time file time file`, the
+//! colour or the depth first. Times are decimal seconds, files are named relative to the folder, `#` begins a
+//! comment. `associations.txt` is a ready pairing and used where it exists; else `rgb.txt` is paired with
+//! `depth.txt` by nearest time, as the benchmark's own tool does it; `rgb.txt` alone is a recording without depth.
+
+mod list;
+mod open;
+mod pair;
+mod time;
+mod writer;
+
+pub(super) use open::open;
+pub use writer::{Writer, WriterOptions};
+
+/// The name of the layout.
+pub(super) const LAYOUT: &str = "TUM RGB-D";
+
+/// Units per metre of the benchmark's depth pictures.
+pub(super) const DEPTH_SCALE: f32 = 5000.0;
+
+const COLOR_LIST: &str = "rgb.txt";
+const DEPTH_LIST: &str = "depth.txt";
+const ASSOCIATIONS: &str = "associations.txt";

@@ -1,0 +1,107 @@
+//! Pairing by nearest time.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Stream {
+    Color(usize),
+    Depth(usize),
+}
+
+/// Pairs of indices into two strictly increasing lists of times: the closest pair first, then the closest of what
+/// is left, each time used at most once, as the TUM benchmark's tool does it. For each colour time, its partner.
+///
+/// In the merged order the closest two of different streams are always neighbours, so that only neighbours are
+/// looked at: `n log n` for any tolerance.
+pub(super) fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
+    let colors = color_ns.iter().enumerate().map(|(index, &time)| (time, Stream::Color(index)));
+    let depths = depth_ns.iter().enumerate().map(|(index, &time)| (time, Stream::Depth(index)));
+    let mut merged: Vec<_> = colors.chain(depths).collect();
+    merged.sort_unstable();
+
+    // Neighbours among those not yet paired; the ends point beyond the list.
+    let len = merged.len();
+    let mut before: Vec<usize> = (0..len).map(|at| at.wrapping_sub(1)).collect();
+    let mut after: Vec<usize> = (1..=len).collect();
+
+    let candidate = |left: usize, right: usize| {
+        let (&(left_ns, left_of), &(right_ns, right_of)) = (merged.get(left)?, merged.get(right)?);
+        let (color, depth) = match (left_of, right_of) {
+            (Stream::Color(color), Stream::Depth(depth)) | (Stream::Depth(depth), Stream::Color(color)) => {
+                (color, depth)
+            }
+            _ => return None,
+        };
+        let gap_ns = right_ns - left_ns;
+        // The indices settle ties as the benchmark's tool does, by time.
+        (gap_ns <= tolerance_ns).then_some(Reverse((gap_ns, color, depth, left, right)))
+    };
+    let mut candidates: BinaryHeap<_> = (1..len).filter_map(|right| candidate(right - 1, right)).collect();
+
+    let mut partners = vec![None; color_ns.len()];
+    let mut is_paired = vec![false; len];
+    while let Some(Reverse((_, color, depth, left, right))) = candidates.pop() {
+        if is_paired[left] || is_paired[right] {
+            continue;
+        }
+        partners[color] = Some(depth);
+        (is_paired[left], is_paired[right]) = (true, true);
+        let (outer_left, outer_right) = (before[left], after[right]);
+        if let Some(next) = after.get_mut(outer_left) {
+            *next = outer_right;
+        }
+        if let Some(previous) = before.get_mut(outer_right) {
+            *previous = outer_left;
+        }
+        candidates.extend(candidate(outer_left, outer_right));
+    }
+    partners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+
+    /// The benchmark's tool, word for word: all pairs within the tolerance, sorted, taken greedily.
+    fn all_pairs(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
+        let mut pairs: Vec<_> = (0..color_ns.len())
+            .flat_map(|color| (0..depth_ns.len()).map(move |depth| (color, depth)))
+            .map(|(color, depth)| (color_ns[color].abs_diff(depth_ns[depth]), color, depth))
+            .filter(|&(gap_ns, ..)| gap_ns <= tolerance_ns)
+            .collect();
+        pairs.sort_unstable();
+        let mut partners = vec![None; color_ns.len()];
+        for (_, color, depth) in pairs {
+            if partners[color].is_none() && !partners.contains(&Some(depth)) {
+                partners[color] = Some(depth);
+            }
+        }
+        partners
+    }
+
+    #[test]
+    fn agrees_with_the_greedy_search_over_all_pairs() {
+        let mut state = 1_u64;
+        let mut random = |below: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % below
+        };
+        for _ in 0..500 {
+            let mut times = |count: u64| {
+                let mut times: Vec<_> = (0..random(count)).map(|_| random(60)).collect();
+                times.sort_unstable();
+                times.dedup();
+                times
+            };
+            let (color_ns, depth_ns) = (times(20), times(20));
+            for tolerance_ns in [0, 1, 3, 10, u64::MAX] {
+                assert_eq!(
+                    nearest(&color_ns, &depth_ns, tolerance_ns),
+                    all_pairs(&color_ns, &depth_ns, tolerance_ns),
+                    "{color_ns:?} {depth_ns:?} within {tolerance_ns}"
+                );
+            }
+        }
+    }
+}

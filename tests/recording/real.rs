@@ -1,0 +1,31 @@
+//! Pictures from a real camera, where they are at hand.
+
+use std::path::Path;
+
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::recording::{Options, Recording, Scratch};
+
+#[test]
+#[ignore = "needs BOKEHCAM_DATA, a folder with rgbd/person_turning"]
+fn a_person_turning_before_a_wall() {
+    let data = std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data");
+    let options = Options { depth_scale: 1000.0, ..Options::default() };
+    let recording = Recording::open(&Path::new(&data).join("rgbd/person_turning"), &options).unwrap();
+    assert_eq!((recording.len(), recording.size(), recording.has_depth()), (40, (640, 480), true));
+    assert!((33_333_000..=33_334_000).contains(&recording.period_ns()), "{} ns", recording.period_ns());
+
+    let (mut scratch, mut color, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
+    for index in 0..recording.len() {
+        recording.read_color(index, &mut scratch, &mut color).unwrap();
+        recording.read_depth(index, &mut scratch, &mut depth).unwrap();
+        assert_eq!((color.size(), depth.size()), ((640, 480), (640, 480)));
+
+        let mut known: Vec<f32> = depth.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres)).collect();
+        known.sort_unstable_by(f32::total_cmp);
+        // A quarter is unknown, in some frames more; the person is at 0.8 m, the wall at 2.7 m.
+        let unknown = 1.0 - known.len() as f32 / depth.metres.len() as f32;
+        assert!((0.25..0.45).contains(&unknown), "frame {index}: {unknown} unknown");
+        let (near_m, far_m) = (known[known.len() / 100], known[known.len() * 95 / 100]);
+        assert!((0.5..1.2).contains(&near_m) && (2.3..3.0).contains(&far_m), "frame {index}: {near_m} to {far_m} m");
+    }
+}

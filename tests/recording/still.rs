@@ -1,0 +1,202 @@
+//! Single pictures.
+
+use std::fs;
+use std::path::Path;
+
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::recording::still::{read_color, read_depth, read_grey, write_color, write_depth};
+use image::{DynamicImage, GrayAlphaImage, ImageBuffer, Luma, Rgb, RgbaImage};
+use tempfile::TempDir;
+
+use super::{SIZE, assert_says, png_that_claims, save_grey};
+
+fn gradient() -> ColorImage {
+    let mut image = ColorImage::new(SIZE.0, SIZE.1);
+    for (index, byte) in image.rgb.iter_mut().enumerate() {
+        *byte = (index / 5) as u8;
+    }
+    image
+}
+
+#[test]
+fn colour_of_every_kind_becomes_8_bit_rgb() {
+    let dir = TempDir::new().unwrap();
+    let save = |image: DynamicImage| {
+        let path = dir.path().join("picture.png");
+        image.save(&path).unwrap();
+        read_color(&path).unwrap()
+    };
+    let rgb = save(RgbaImage::from_pixel(3, 2, [10, 20, 30, 128].into()).into());
+    assert_eq!((rgb.size(), &rgb.rgb[..3]), ((3, 2), &[10, 20, 30][..]));
+    assert_eq!(save(GrayAlphaImage::from_pixel(3, 2, [77, 5].into()).into()).rgb, [77; 18]);
+    let wide = ImageBuffer::<Luma<u16>, _>::from_pixel(3, 2, [0x8081].into());
+    assert_eq!(save(wide.into()).rgb, [0x80; 18]);
+    let wide = ImageBuffer::<Rgb<u16>, _>::from_pixel(3, 2, [0, 65535, 300].into());
+    assert_eq!(save(wide.into()).rgb[..3], [0, 255, 1]);
+
+    // A palette of two colours, one bit a pixel: red and green, alternating.
+    let path = dir.path().join("palette.png");
+    fs::write(&path, PALETTE_PNG).unwrap();
+    assert_eq!(read_color(&path).unwrap().rgb, [255, 0, 0, 0, 255, 0]);
+}
+
+/// 2x1, palette red and green, indices 0 and 1.
+const PALETTE_PNG: &[u8] =
+    b"\x89\x50\x4e\x47\x0d\x0a\x1a\x0a\x00\x00\x00\x0d\x49\x48\x44\x52\x00\x00\x00\x02\x00\x00\x00\x01\
+    \x01\x03\x00\x00\x00\xce\xec\xed\xc9\x00\x00\x00\x06\x50\x4c\x54\x45\xff\x00\x00\x00\xff\x00\xd2\
+    \x87\xef\x71\x00\x00\x00\x0a\x49\x44\x41\x54\x78\x9c\x63\x70\x00\x00\x00\x42\x00\x41\x29\x37\xf4\
+    \xef\x00\x00\x00\x00\x49\x45\x4e\x44\xae\x42\x60\x82";
+
+#[test]
+fn png_keeps_colour_exactly_and_jpeg_nearly() {
+    let dir = TempDir::new().unwrap();
+    let image = gradient();
+    for (name, tolerance) in [("a.png", 0), ("a.PNG", 0), ("a.jpg", 24), ("a.jpeg", 24)] {
+        let path = dir.path().join(name);
+        write_color(&path, &image, false).unwrap();
+        let read = read_color(&path).unwrap();
+        assert_eq!(read.size(), image.size());
+        let worst = image.rgb.iter().zip(&read.rgb).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst <= Some(tolerance), "{name}: off by {worst:?}");
+    }
+    // Nothing is left beside the four.
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 4);
+}
+
+#[test]
+fn nothing_is_overwritten_unless_asked() {
+    let dir = TempDir::new().unwrap();
+    let (image, depth) = (gradient(), DepthMap::new(4, 3));
+    for name in ["a.png", "a.pfm"] {
+        let path = dir.path().join(name);
+        fs::write(&path, "mine").unwrap();
+        assert_says(write_depth(&path, &depth, 5000.0, false), &[name, "already there"]);
+        assert_eq!(fs::read(&path).unwrap(), b"mine");
+        write_depth(&path, &depth, 5000.0, true).unwrap();
+        assert_eq!(read_depth(&path, 5000.0, None).unwrap(), depth);
+    }
+    let path = dir.path().join("a.png");
+    assert_says(write_color(&path, &image, false), &["a.png", "already there"]);
+    write_color(&path, &image, true).unwrap();
+    assert_eq!(read_color(&path).unwrap(), image);
+}
+
+#[test]
+fn what_cannot_be_written_leaves_nothing() {
+    let dir = TempDir::new().unwrap();
+    for name in ["a.gif", "a", "a.pfm"] {
+        assert_says(write_color(&dir.path().join(name), &gradient(), false), &[name, "`.png` or `.jpg`"]);
+    }
+    assert_says(write_depth(&dir.path().join("a.jpg"), &DepthMap::new(2, 2), 1.0, false), &["`.png` or `.pfm`"]);
+    assert_says(write_color(&dir.path().join("none/a.png"), &gradient(), false), &["cannot write", "none/a.png"]);
+    // A folder is in the way, which only the last step notices.
+    fs::create_dir_all(dir.path().join("b.png/inside")).unwrap();
+    assert_says(write_color(&dir.path().join("b.png"), &gradient(), true), &["cannot write", "b.png"]);
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn depth_survives_png_within_half_a_unit_and_pfm_exactly() {
+    let dir = TempDir::new().unwrap();
+    let mut depth = DepthMap::new(5, 7);
+    for (index, metres) in depth.metres.iter_mut().enumerate() {
+        *metres = if index % 4 == 0 { 0.0 } else { 0.123_456 * index as f32 };
+    }
+    let png = dir.path().join("depth.png");
+    write_depth(&png, &depth, 1000.0, false).unwrap();
+    let read = read_depth(&png, 1000.0, None).unwrap();
+    assert_eq!(read.size(), (5, 7));
+    assert!(depth.metres.iter().zip(&read.metres).all(|(a, b)| (a - b).abs() <= 0.000_501));
+    assert_eq!(read_depth(&png, 1000.0, Some(123)).unwrap().metres[1], 0.0);
+
+    let pfm = dir.path().join("depth.pfm");
+    write_depth(&pfm, &depth, 1000.0, false).unwrap();
+    assert_eq!(read_depth(&pfm, 1.0, None).unwrap(), depth);
+    assert_says(read_depth(&png, f32::NAN, None), &["depth scale"]);
+}
+
+fn read_pfm(dir: &Path, content: &[u8]) -> Result<DepthMap, bokehcam::recording::RecordingError> {
+    let path = dir.join("map.pfm");
+    fs::write(&path, content).unwrap();
+    read_depth(&path, 5000.0, None)
+}
+
+#[test]
+fn a_pfm_is_read_from_its_bottom_row_in_either_byte_order() {
+    let dir = TempDir::new().unwrap();
+    let values = [3.0, f32::INFINITY, 1.0, -2.0];
+    let little: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let big: Vec<u8> = values.iter().flat_map(|value| value.to_be_bytes()).collect();
+    for (scale, data) in [("-1.0", little), ("1", big)] {
+        let content = [format!("Pf\n2 2\n{scale}\n").as_bytes(), &data].concat();
+        // What is no depth is unknown.
+        assert_eq!(read_pfm(dir.path(), &content).unwrap().metres, [1.0, 0.0, 3.0, 0.0]);
+        assert_says(read_pfm(dir.path(), &content[..content.len() - 1]), &["map.pfm: the file ends before"]);
+    }
+}
+
+#[test]
+fn a_wrong_pfm_is_told() {
+    let dir = TempDir::new().unwrap();
+    for (content, says) in [
+        (&b"PF\n1 1\n-1\n0123456789ab"[..], "a colour PFM is not depth"),
+        (b"P5\n1 1\n255\n0", "not a grey PFM"),
+        (b"Pf\n9999 9999\n-1\n", "claims 9999x9999"),
+        (b"Pf\n0 4\n-1\n", "no pixel"),
+        (b"Pf\n-1 4\n-1\n", "\"-1\" in its header is not a number"),
+        (b"Pf\n1 \xff\n-1\n", "not text"),
+        (b"Pf\n1 1\n", "ends before"),
+        (b"", "ends before"),
+    ] {
+        assert_says(read_pfm(dir.path(), content), &["map.pfm: ", says]);
+    }
+}
+
+#[test]
+fn wrong_pictures_are_told_with_their_name() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("picture.png");
+    assert_says(read_color(&path), &["picture.png: there is no such file"]);
+    fs::write(&path, png_that_claims(100_000, 100_000)).unwrap();
+    assert_says(read_color(&path), &["picture.png: its header claims 100000x100000"]);
+    assert_says(read_grey(&path), &["claims 100000x100000"]);
+    save_grey(&path, SIZE, 9);
+    assert_says(read_depth(&path, 5000.0, None), &["picture.png: an 8-bit grey picture is not depth", "16-bit grey"]);
+}
+
+#[test]
+fn grey_is_luma_as_stored() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("aperture.png");
+    let read = |image: DynamicImage| {
+        image.save(&path).unwrap();
+        let (width, height, grey) = read_grey(&path).unwrap();
+        assert_eq!((width, height, grey.len()), (3, 2, 6));
+        grey[5]
+    };
+    assert_eq!(read(image::GrayImage::from_pixel(3, 2, [51].into()).into()), 0.2);
+    assert_eq!(read(ImageBuffer::<Luma<u16>, Vec<u16>>::from_pixel(3, 2, [13107].into()).into()), 0.2);
+    assert!((read(image::RgbImage::from_pixel(3, 2, [0, 255, 0].into()).into()) - 0.7152).abs() < 1e-6);
+    assert!((read(image::RgbImage::from_pixel(3, 2, [255; 3].into()).into()) - 1.0).abs() < 1e-6);
+    assert!((read(RgbaImage::from_pixel(3, 2, [255, 255, 255, 51].into()).into()) - 0.2).abs() < 1e-6);
+}
+
+/// A photograph says how the camera was held; the blur must not lose that.
+#[test]
+fn a_turned_photograph_is_read_upright() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("photo.jpg");
+    let mut image = ColorImage::new(32, 16);
+    // The left half is white.
+    for (index, pixel) in image.rgb.chunks_exact_mut(3).enumerate() {
+        pixel.fill(if index % 32 < 16 { 255 } else { 0 });
+    }
+    write_color(&path, &image, false).unwrap();
+    let plain = fs::read(&path).unwrap();
+    // EXIF orientation 6: turn by 90 degrees clockwise to stand upright; the left goes to the top.
+    let exif = b"\xff\xe1\x00\x22Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+    fs::write(&path, [&plain[..2], exif, &plain[2..]].concat()).unwrap();
+    let upright = read_color(&path).unwrap();
+    assert_eq!(upright.size(), (16, 32));
+    assert!(upright.rgb[0] > 250 && upright.rgb[16 * 31 * 3] < 5);
+}
