@@ -1,20 +1,237 @@
-//! dev
-use bokehcam::frame::*; use bokehcam::scene::*;
-fn main(){
- let a:Vec<String>=std::env::args().collect();
- let s=Scene::portrait();
- let k:u32=a[1].parse().unwrap(); let spp:u32=a[2].parse().unwrap(); let t:f64=a[3].parse().unwrap();
- let mut v=View::new(640*k,360*k);
- if a.len()>5 { // crop x,y,zoom
-   let z:f32=a[5].parse().unwrap(); v.focal_px*=z;
- }
- let (mut c,mut d)=(ColorImage::default(),DepthMap::default());
- let now=std::time::Instant::now();
- if a.len()>6 { let n:usize=a[6].parse().unwrap(); let pts=lens_points(n,|_|true);
-  let p=s.render_thin_lens(&v,t,&ThinLens{coc_at_infinity_px:14.0,focus_m:s.focus_m(),aperture:&pts},2);
-  eprintln!("{:?}",now.elapsed());
-  let c=p.hdr.to_srgb(); image::save_buffer(&a[4],&c.rgb,c.width,c.height,image::ColorType::Rgb8).unwrap(); return; }
- s.render_pinhole(&v,t,spp,2,&mut c,&mut d);
- eprintln!("{:?}",now.elapsed());
- image::save_buffer(&a[4],&c.rgb,c.width,c.height,image::ColorType::Rgb8).unwrap();
+//! Renders everything in `recordings/` again: `cargo run --release --example make_recordings`.
+//!
+//! With `--check` it writes nothing and compares what is there with what it renders.
+
+use std::error::Error;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::thread;
+
+use bokehcam::bokeh::aperture::{Aperture, Shape, lens_points};
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::scene::{Scene, ThinLens, View};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+
+const SIZE_PX: (u32, u32) = (640, 360);
+const FRAMES_PER_SECOND: u32 = 12;
+const SAMPLES_PER_PIXEL: u32 = 16;
+/// As in the TUM benchmark.
+const DEPTH_UNITS_PER_METRE: f32 = 5000.0;
+const BASELINE_M: f32 = 0.06;
+/// Every so many frames there is a right eye's picture.
+const RIGHT_EVERY: u32 = 4;
+const COC_AT_INFINITY_PX: f32 = 14.0;
+/// Rays per pixel of the true blur: more than half the pixels of the widest disc.
+const LENS_RAYS: usize = 720;
+const DISC_FRAMES: [u32; 3] = [0, 8, 16];
+const HEXAGON_FRAMES: [u32; 1] = [0];
+
+type Outcome = Result<(), Box<dyn Error>>;
+
+fn main() -> ExitCode {
+    let check = match std::env::args().nth(1).as_deref() {
+        None => false,
+        Some("--check") => true,
+        Some(other) => {
+            eprintln!("no option '{other}': use --check, or none to write");
+            return ExitCode::from(2);
+        }
+    };
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let mut folder = Folder { root, check, differing: 0 };
+    match make(&mut folder) {
+        Ok(()) if folder.differing == 0 => ExitCode::SUCCESS,
+        Ok(()) => {
+            eprintln!("{} files differ; render them again without --check", folder.differing);
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn make(folder: &mut Folder) -> Outcome {
+    let scene = Scene::portrait();
+    let view = View::new(SIZE_PX.0, SIZE_PX.1);
+    folder.text("camera.txt", &camera_text(&scene, &view))?;
+    make_sequence(folder, &scene, &view)?;
+    make_right_eye(folder, &scene, &view)?;
+    make_truth(folder, &scene, &view)
+}
+
+fn frames(scene: &Scene) -> u32 {
+    (scene.period_s() * f64::from(FRAMES_PER_SECOND)).round() as u32
+}
+
+fn time_s(frame: u32) -> f64 {
+    f64::from(frame) / f64::from(FRAMES_PER_SECOND)
+}
+
+fn threads() -> usize {
+    thread::available_parallelism().map_or(1, |n| n.get())
+}
+
+/// The left eye's colour and depth, and the lists that make the folder a TUM recording. Not through the crate's own
+/// writer, which compresses for speed: these pictures travel with the source.
+fn make_sequence(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
+    let mut rgb = String::from("# colour pictures, 8-bit RGB PNG\n# timestamp filename\n");
+    let mut depth = format!("# depth maps, 16-bit PNG, {DEPTH_UNITS_PER_METRE} units per metre\n# timestamp filename\n");
+    let mut pairs = String::new();
+    let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
+    for frame in 0..frames(scene) {
+        scene.render_pinhole(view, time_s(frame), SAMPLES_PER_PIXEL, threads(), &mut picture, &mut map);
+        folder.color(&format!("rgb/{frame:06}.png"), &picture)?;
+        folder.depth(&format!("depth/{frame:06}.png"), &map)?;
+        let time = format!("{:.6}", time_s(frame));
+        writeln!(rgb, "{time} rgb/{frame:06}.png")?;
+        writeln!(depth, "{time} depth/{frame:06}.png")?;
+        writeln!(pairs, "{time} rgb/{frame:06}.png {time} depth/{frame:06}.png")?;
+    }
+    folder.text("rgb.txt", &rgb)?;
+    folder.text("depth.txt", &depth)?;
+    folder.text("associations.txt", &pairs)
+}
+
+/// The right eye of a rectified pair for every few frames, with the pair's geometry.
+fn make_right_eye(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
+    let right = view.right_eye(BASELINE_M);
+    let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
+    for frame in (0..frames(scene)).step_by(RIGHT_EVERY as usize) {
+        scene.render_pinhole(&right, time_s(frame), SAMPLES_PER_PIXEL, threads(), &mut picture, &mut map);
+        folder.color(&format!("right/{frame:06}.png"), &picture)?;
+    }
+    folder.text("right/calib.txt", &calibration_text(view))
+}
+
+/// Frames through a true thin lens.
+fn make_truth(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
+    let hexagon = Shape::Polygon { blades: 6, rotation_deg: 0.0, curvature: 0.0 };
+    let sets = [("disc", Shape::Disc, &DISC_FRAMES[..]), ("hexagon", hexagon, &HEXAGON_FRAMES[..])];
+    for (name, shape, frames) in sets {
+        let aperture = lens_points(&Aperture { shape, intensity: 0.0 }, LENS_RAYS);
+        let lens =
+            ThinLens { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: scene.focus_m(), aperture: &aperture };
+        for &frame in frames {
+            let picture = scene.render_thin_lens(view, time_s(frame), &lens, threads());
+            folder.color(&format!("truth/{name}_clipped_{frame:06}.png"), &picture.clipped.to_srgb())?;
+            folder.color(&format!("truth/{name}_hdr_{frame:06}.png"), &picture.hdr.to_srgb())?;
+        }
+    }
+    Ok(())
+}
+
+fn camera_text(scene: &Scene, view: &View) -> String {
+    let centre = view.principal_point_px();
+    format!(
+        "# The camera of this recording; pixel centres are at whole numbers.\n\
+         width {}\nheight {}\nfocal_px {}\ncx {}\ncy {}\n\
+         # Units of the depth pictures; depth is along the optical axis.\n\
+         depth_units_per_metre {DEPTH_UNITS_PER_METRE}\n\
+         # Depth of the subject's face, in metres, and the lens of the pictures in truth/.\n\
+         focus_m {}\ncoc_at_infinity_px {COC_AT_INFINITY_PX}\nlens_rays {LENS_RAYS}\n\
+         # The right eye is this far to the right, in metres.\n\
+         baseline_m {BASELINE_M}\n",
+        view.width,
+        view.height,
+        view.focal_px,
+        centre.x,
+        centre.y,
+        scene.focus_m(),
+    )
+}
+
+/// The pair's geometry as the Middlebury stereo benchmark writes it (baseline in millimetres).
+fn calibration_text(view: &View) -> String {
+    let centre = view.principal_point_px();
+    let matrix = format!("[{f} 0 {x}; 0 {f} {y}; 0 0 1]", f = view.focal_px, x = centre.x, y = centre.y);
+    format!(
+        "cam0={matrix}\ncam1={matrix}\ndoffs=0\nbaseline={}\nwidth={}\nheight={}\nndisp=96\n",
+        BASELINE_M * 1000.0,
+        view.width,
+        view.height,
+    )
+}
+
+/// Where files are written, or compared.
+struct Folder {
+    root: PathBuf,
+    check: bool,
+    differing: usize,
+}
+
+/// Bytes or depth units may differ by this much, and a thousandth of them by more: the mathematical functions of
+/// two machines round differently, and a ray at an edge may then fall on its other side.
+const TOLERANCE: i32 = 2;
+
+impl Folder {
+    fn color(&mut self, name: &str, image: &ColorImage) -> Outcome {
+        if self.check {
+            let there = image::open(self.root.join(name))?.into_rgb8();
+            let same_size = there.dimensions() == image.size();
+            self.compare(name, same_size, there.iter().zip(&image.rgb).map(|(a, b)| i32::from(*a) - i32::from(*b)));
+            return Ok(());
+        }
+        self.encode(name, &image.rgb, image.size(), ExtendedColorType::Rgb8)
+    }
+
+    fn depth(&mut self, name: &str, map: &DepthMap) -> Outcome {
+        let units: Vec<u16> = map.metres.iter().map(|z_m| (z_m * DEPTH_UNITS_PER_METRE).round() as u16).collect();
+        if self.check {
+            let there = image::open(self.root.join(name))?.into_luma16();
+            let same_size = there.dimensions() == map.size();
+            self.compare(name, same_size, there.iter().zip(&units).map(|(a, b)| i32::from(*a) - i32::from(*b)));
+            return Ok(());
+        }
+        let bytes: Vec<u8> = units.iter().flat_map(|unit| unit.to_ne_bytes()).collect();
+        self.encode(name, &bytes, map.size(), ExtendedColorType::L16)
+    }
+
+    fn text(&mut self, name: &str, text: &str) -> Outcome {
+        let path = self.root.join(name);
+        if self.check {
+            if fs::read_to_string(path)? != text {
+                self.differs(name);
+            }
+            return Ok(());
+        }
+        make_parent(&path)?;
+        Ok(fs::write(path, text)?)
+    }
+
+    fn encode(&self, name: &str, bytes: &[u8], size: (u32, u32), color: ExtendedColorType) -> Outcome {
+        let path = self.root.join(name);
+        make_parent(&path)?;
+        let file = BufWriter::new(fs::File::create(&path)?);
+        PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive)
+            .write_image(bytes, size.0, size.1, color)?;
+        eprintln!("{name}: {} kB", fs::metadata(path)?.len() / 1000);
+        Ok(())
+    }
+
+    fn compare(&mut self, name: &str, same_size: bool, differences: impl Iterator<Item = i32>) {
+        let (mut count, mut beyond) = (0usize, 0usize);
+        for difference in differences {
+            count += 1;
+            beyond += usize::from(difference.abs() > TOLERANCE);
+        }
+        eprintln!("{name}: {beyond} of {count} values beyond {TOLERANCE}");
+        if !same_size || beyond * 1000 > count {
+            self.differs(name);
+        }
+    }
+
+    fn differs(&mut self, name: &str) {
+        eprintln!("{name} differs");
+        self.differing += 1;
+    }
+}
+
+fn make_parent(path: &Path) -> Outcome {
+    Ok(path.parent().map_or(Ok(()), fs::create_dir_all)?)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use glam::{Vec2, Vec3};
+use glam::{DVec2, Vec2, Vec3};
 
 use super::ray::Ray;
 use super::{Moment, Scene};
@@ -67,9 +67,9 @@ pub struct ThinLens<'a> {
     pub coc_at_infinity_px: f32,
     /// Depth of the focal plane, in metres, > 0.
     pub focus_m: f32,
-    /// The aperture: points of the unit disc as the camera sees it (x right, y down), evenly spread over its
-    /// opening, one per ray; see [`lens_points`]. Where blurs are wide, use several per pixel of their disc.
-    pub aperture: &'a [Vec2],
+    /// Lens points `u` in the unit disc (x right, y down), evenly spread over the opening, one per ray: pixel `p`
+    /// sees depth `z` at `p + c(z) u`. A blur is smooth when its disc has no more pixels than there are points.
+    pub aperture: &'a [DVec2],
 }
 
 /// Linear light: `height` x `width`, row-major, 1 = white, not limited.
@@ -113,27 +113,6 @@ pub fn encode_srgb(linear: f32) -> u8 {
     let x = linear.clamp(0.0, 1.0);
     let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
     (255.0 * encoded + 0.5) as u8
-}
-
-/// About `count` points spread evenly over the part of the unit disc where `inside` holds (`inside` gets x right,
-/// y down); exactly `count` for the whole disc, none for an empty opening.
-///
-/// They are a part of the sunflower spiral: as even as points come, without the rows that would show in a blur.
-pub fn lens_points(count: usize, inside: impl Fn(Vec2) -> bool) -> Vec<Vec2> {
-    const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
-    let spiral = |count: usize| {
-        (0..count).map(move |k| {
-            let radius = ((k as f64 + 0.5) / count as f64).sqrt();
-            let (sin, cos) = (k as f64 * GOLDEN_ANGLE).sin_cos();
-            Vec2::new((radius * cos) as f32, (radius * sin) as f32)
-        })
-    };
-    const TRIAL: usize = 1 << 14;
-    let open = spiral(TRIAL).filter(|u| inside(*u)).count();
-    if open == 0 {
-        return Vec::new();
-    }
-    spiral(count * TRIAL / open).filter(|u| inside(*u)).collect()
 }
 
 /// Where in its pixel ray `k` goes, in -0.5..0.5; ray 0 goes through the centre.
@@ -196,12 +175,13 @@ impl Scene {
         if lens.aperture.is_empty() || view.width == 0 {
             return picture;
         }
-        // At depth z the ray of lens point u is focal_px * radius_m * (1 / focus_m - 1 / z) px off: c(z) u.
+        // A ray from the side -u of the lens is off by focal_px * radius_m * (1 / focus_m - 1 / z) u px at depth z:
+        // by c(z) u.
         let radius_m = lens.coc_at_infinity_px * lens.focus_m / view.focal_px;
         let moment = self.at(time_s);
         let samples: Vec<(Vec2, Vec2)> = (0..)
             .zip(lens.aperture)
-            .map(|(k, u)| (lens_jitter(k), radius_m * Vec2::new(u.x, -u.y)))
+            .map(|(k, u)| (lens_jitter(k), radius_m * Vec2::new(-u.x as f32, u.y as f32)))
             .collect();
         let width = view.width as usize;
         let rows = picture.clipped.rgb.chunks_exact_mut(width).zip(picture.hdr.rgb.chunks_exact_mut(width));

@@ -38,7 +38,7 @@ pub fn face(p: Vec3) -> f32 {
 fn lid(q: Vec3) -> f32 {
     let p = q - EYE;
     let shell = ball(p, EYE_RADIUS_M + 0.0013);
-    let above = -(p.y - 0.0058 + 0.16 * p.x.abs() + 0.12 * (p.z + EYE_RADIUS_M));
+    let above = -(p.y - 0.0074 + 0.16 * p.x.abs() + 0.12 * (p.z + EYE_RADIUS_M));
     let below = p.y + 0.0078 - 0.10 * p.x.abs();
     shell.max(above.min(below))
 }

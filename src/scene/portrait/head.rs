@@ -40,7 +40,7 @@ fn add_eye_lines(part: &mut Part, mirror: Vec3) {
     let lash: Vec<_> = (0..9)
         .map(|i| {
             let x = -0.0118 + 0.0262 * i as f32 / 8.0;
-            let lift = 0.0062 - 0.16 * x.abs();
+            let lift = 0.0078 - 0.16 * x.abs();
             let radius = EYE_RADIUS_M + 0.0014;
             let z = -(radius * radius - x * x - lift * lift).max(1e-6).sqrt();
             let outer = step(0.008, 0.0144, x);

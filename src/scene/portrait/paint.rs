@@ -32,17 +32,13 @@ pub fn wood(spot: &Spot) -> Surface {
     grain(spot, spot.p)
 }
 
-/// Wood with its grain along `y`.
-pub fn upright_wood(spot: &Spot) -> Surface {
-    grain(spot, Vec3::new(spot.p.y, spot.p.x, spot.p.z))
-}
 
 fn grain(spot: &Spot, p: Vec3) -> Surface {
     let offset = 31.0 * unit(spot.seed);
     let warp = fractal(Vec3::new(1.6 * p.x + offset, 9.0 * p.y, 9.0 * p.z), 3);
     let ring = 0.5 + 0.5 * ((34.0 * (p.z + p.y) + 9.0 * warp) * 2.2).sin();
     let pore = value(Vec3::new(14.0 * p.x, 260.0 * p.y + offset, 260.0 * p.z));
-    let color = spot.tint * (0.72 + 0.30 * ring * warp + 0.16 * pore);
+    let color = spot.tint * (0.75 + 0.30 * ring * warp + 0.10 * pore);
     Surface::matt(spot, color).glossy(0.10, 24.0)
 }
 
@@ -98,7 +94,7 @@ pub fn book(spot: &Spot) -> Surface {
 pub fn cloth(spot: &Spot) -> Surface {
     let weave = value(Vec3::new(300.0, 220.0, 300.0) * spot.p);
     let soft = fractal(14.0 * spot.p, 3);
-    Surface { wrap: 0.3, ..Surface::matt(spot, spot.tint * (0.72 + 0.22 * weave + 0.28 * soft)) }
+    Surface { wrap: 0.3, ..Surface::matt(spot, spot.tint * (0.77 + 0.12 * weave + 0.28 * soft)) }
 }
 
 /// A cloth with wide stripes across its width.

@@ -209,7 +209,7 @@ fn add_fairy_lights(part: &mut Part) {
             let s = (k as f32 + 0.5) / count as f32;
             let centre = at(s) - 0.016 * Vec3::Y;
             let power = 7.0 + 5.0 * unit(k + 31);
-            let bulb = Shape::Sphere { centre, radius: 0.0125 };
+            let bulb = Shape::Sphere { centre, radius: 0.015 };
             part.add(bulb, Material::new(paint::glow, power * Vec3::new(1.0, 0.46, 0.09)));
         }
     }
