@@ -23,7 +23,7 @@ fn bin_radius_px(coc_px: f32) -> f32 {
     var radius_px = coc_px;
     if bin_info.scale > 1u {
         let s = f32(bin_info.scale);
-        radius_px = sqrt(max(coc_px * coc_px - (4.0 * s * s - 1.0) / 3.0, 0.0)) / s;
+        radius_px = sqrt(max(coc_px * coc_px - (5.0 * s * s + 1.0) / 3.0, 0.0)) / s;
     }
     return min(radius_px, bin_info.max_radius_px);
 }

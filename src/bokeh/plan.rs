@@ -52,11 +52,11 @@ pub fn rung(quality: Quality) -> Rung {
         fill,
     };
     match quality {
-        Quality::Draft => rung(2, 1, 1.0, 6.0, false),
-        Quality::Fast => rung(2, 2, 2.0, 8.0, true),
-        Quality::Balanced => rung(3, 3, 3.0, 12.0, true),
-        Quality::High => rung(4, 4, 4.0, 24.0, true),
-        Quality::Best => rung(4, 6, 6.0, f32::INFINITY, true),
+        Quality::Draft => rung(2, 1, 3.0, 8.0, false),
+        Quality::Fast => rung(2, 2, 3.0, 8.0, true),
+        Quality::Balanced => rung(3, 3, 3.5, 14.0, true),
+        Quality::High => rung(4, 4, 5.0, 24.0, true),
+        Quality::Best => rung(4, 6, 8.0, f32::INFINITY, true),
     }
 }
 
@@ -226,15 +226,15 @@ fn side(max_px: f32, bins: u32) -> Vec<f32> {
 
 /// The radius, in pixels of a picture reduced by `scale`, that blurs as much as `coc_px` does at full size.
 ///
-/// Averaging down, sampling and linear interpolation back add (4 s^2 - 1) / 12 of variance per axis in pixels of
-/// the picture, a disc of radius R has R^2 / 4: what the way down and up adds is taken off the radius.
+/// The tents down and up add (2 s^2 + 1) / 12 of variance each, per axis in pixels of the picture, and larger pixels
+/// (s^2 - 1) / 12; a disc of radius R has R^2 / 4. What the way down and up adds is taken off the radius.
 #[inline(always)]
 pub fn compensated_radius_px(coc_px: f32, scale: usize) -> f32 {
     if scale == 1 {
         return coc_px;
     }
     let s = scale as f32;
-    (coc_px * coc_px - (4.0 * s * s - 1.0) / 3.0).max(0.0).sqrt() / s
+    (coc_px * coc_px - (5.0 * s * s + 1.0) / 3.0).max(0.0).sqrt() / s
 }
 
 #[cfg(test)]

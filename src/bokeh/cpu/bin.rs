@@ -2,7 +2,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::rows::{CELL_PLANES, Rows, TILE_H, TILE_W};
+use super::rows::{CELL_PLANES, MARGIN, Rows, TILE_W, repeat_ends};
 use super::simd::madd;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR};
 
@@ -71,23 +71,23 @@ impl WithSimd for BinBand<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         match self.scale {
-            1 => self.fill::<S, 1>(),
-            2 => self.fill::<S, 2>(),
-            _ => self.fill::<S, 4>(),
+            1 => self.fill::<S, 1, TILE_W>(),
+            2 => self.fill::<S, 2, WIDE>(),
+            _ => self.fill::<S, 4, WIDE>(),
         }
     }
 }
 
 impl BinBand<'_> {
     #[inline(always)]
-    fn fill<V: Simd, const S: usize>(mut self) {
+    fn fill<V: Simd, const S: usize, const W: usize>(mut self) {
         let across = self.cells.len() / CELL_PLANES;
         self.cells[..2 * across].fill(0.0);
         self.cells[2 * across..5 * across].fill(f32::INFINITY);
         self.cells[5 * across..].fill(f32::NEG_INFINITY);
         for chunk in 0..self.filled.len() {
             if self.meets::<S>(chunk) {
-                self.chunk::<V, S>(chunk);
+                self.chunk::<V, S, W>(chunk);
                 self.filled[chunk] = true;
             } else if std::mem::take(&mut self.filled[chunk]) {
                 for plane in self.out.chunks_exact_mut(self.stride) {
@@ -96,39 +96,42 @@ impl BinBand<'_> {
             }
         }
         for plane in self.out.chunks_exact_mut(self.stride) {
-            let (first, last) = (plane[self.pad], plane[self.pad + self.width - 1]);
-            plane[..self.pad].fill(first);
-            plane[self.pad + self.width..].fill(last);
+            repeat_ends(plane, self.pad, self.width);
         }
     }
 
-    /// Whether a chunk of this row of cells has anything for this bin.
+    /// Whether a chunk of this row of cells, or what its averages reach beyond it, has anything for this bin.
     #[inline(always)]
     fn meets<const S: usize>(&self, chunk: usize) -> bool {
-        let across = self.filled.len();
-        let first = self.band * CELL * S / TILE_H;
-        let last = (first + S).min(self.tiles.len() / across);
-        self.share.is_none_or(|share| (first..last).any(|row| share.meets(self.tiles[row * across + chunk])))
+        let Some(share) = self.share else { return true };
+        let (across, beyond) = (self.filled.len(), usize::from(S > 1));
+        let rows =
+            (self.band * S).saturating_sub(beyond)..((self.band + 1) * S + beyond).min(self.tiles.len() / across);
+        let columns = chunk.saturating_sub(beyond)..(chunk + beyond + 1).min(across);
+        rows.into_iter().any(|row| self.tiles[row * across..][columns.clone()].iter().any(|&tile| share.meets(tile)))
     }
 
     /// One chunk of all rows, and its cells.
     #[inline(always)]
-    fn chunk<V: Simd, const S: usize>(&mut self, chunk: usize) {
+    fn chunk<V: Simd, const S: usize, const W: usize>(&mut self, chunk: usize) {
         let rows = self.out.len() / (5 * self.stride);
         let (x0, width) = (chunk * TILE_W / S, TILE_W / S);
+        let mut sums = [[[0.0f32; W]; 5]; CELL];
+        self.sum_rows::<V, S, W>(chunk, &mut sums[..rows]);
         let mut coverage = [[0.0f32; TILE_W]; 2];
         let mut range = [[f32::INFINITY; TILE_W]; 6];
         range[3..].fill([f32::NEG_INFINITY; TILE_W]);
-        for row in 0..rows {
-            let sums = self.sums::<V, S>(row, chunk);
+        let taps = tent::<S>();
+        for (row, sum) in sums[..rows].iter().enumerate() {
             let mut means = [[0.0f32; TILE_W]; 5];
-            for (mean, sum) in means.iter_mut().zip(&sums) {
-                for (mean, group) in mean.iter_mut().zip(sum.as_chunks::<S>().0) {
+            for (mean, sum) in means.iter_mut().zip(sum) {
+                let columns = &sum[(W - TILE_W) / 2 - S / 2..];
+                for (x, mean) in mean[..width].iter_mut().enumerate() {
                     let mut total = 0.0;
-                    for value in group {
-                        total += value;
+                    for k in 0..2 * S - 1 + usize::from(S > 1) {
+                        total = madd::<V>(taps[k], columns[S * x + k], total);
                     }
-                    *mean = total * (1.0 / (S * S) as f32);
+                    *mean = total;
                 }
             }
             for (p, mean) in means.iter().enumerate() {
@@ -163,33 +166,60 @@ impl BinBand<'_> {
         }
     }
 
-    /// The rows of the picture under one row of the bin, weighted and summed.
+    /// The rows of the picture around each row of the bin, weighted and summed.
     #[inline(always)]
-    fn sums<V: Simd, const S: usize>(&self, row: usize, chunk: usize) -> [[f32; TILE_W]; 5] {
-        let mut sums = [[0.0f32; TILE_W]; 5];
-        for sub in 0..S {
-            let y = ((self.band * CELL + row) * S + sub).min(self.size.1 - 1);
+    fn sum_rows<V: Simd, const S: usize, const W: usize>(&self, chunk: usize, sums: &mut [[[f32; W]; 5]]) {
+        let taps = tent::<S>();
+        let (before, taps_down) = if S > 1 { (S / 2, 2 * S) } else { (0, 1) };
+        let start = MARGIN + chunk * TILE_W - (W - TILE_W) / 2;
+        // Row `k` of the picture from the first that the first bin row needs.
+        for k in 0..(sums.len() - 1) * S + taps_down {
+            let y = (self.band * CELL * S + k).saturating_sub(before).min(self.size.1 - 1);
             let planes = self.scene.row(y);
-            let mut tile = [[0.0f32; TILE_W]; 4];
-            for (p, tile) in tile.iter_mut().enumerate() {
-                tile.copy_from_slice(&planes[p * self.scene.stride + chunk * TILE_W..][..TILE_W]);
-            }
-            let mut shares = [1.0f32; TILE_W];
+            let plane = |p: usize| planes[p * self.scene.stride + start..].first_chunk::<W>();
+            let (Some(r), Some(g), Some(b), Some(c)) = (plane(0), plane(1), plane(2), plane(3)) else { continue };
+            let mut values = [[1.0f32; W]; 5];
             if let Some(share) = self.share {
-                for (share_at, &coc) in shares.iter_mut().zip(&tile[3]) {
-                    *share_at = share.at(coc);
+                for x in 0..W {
+                    values[3][x] = share.at(c[x]);
                 }
             }
-            for x in 0..TILE_W {
-                sums[0][x] = madd::<V>(shares[x], tile[0][x], sums[0][x]);
-                sums[1][x] = madd::<V>(shares[x], tile[1][x], sums[1][x]);
-                sums[2][x] = madd::<V>(shares[x], tile[2][x], sums[2][x]);
-                sums[3][x] += shares[x];
-                sums[4][x] = madd::<V>(shares[x], tile[3][x].abs(), sums[4][x]);
+            for x in 0..W {
+                let share = values[3][x];
+                values[0][x] = share * r[x];
+                values[1][x] = share * g[x];
+                values[2][x] = share * b[x];
+                values[4][x] = share * c[x].abs();
+            }
+            // The last bin row that starts at or before row `k`, and the one above it while its taps reach here.
+            let last = (k / S).min(sums.len() - 1);
+            for row in last.saturating_sub(1)..=last {
+                let Some(&tap) = (k - row * S < taps_down).then(|| &taps[k - row * S]) else { continue };
+                for (sum, value) in sums[row].iter_mut().zip(&values) {
+                    for x in 0..W {
+                        sum[x] = madd::<V>(tap, value[x], sum[x]);
+                    }
+                }
             }
         }
-        sums
     }
+}
+
+/// Columns summed for a chunk of a reduced bin: the chunk and a margin on both sides.
+const WIDE: usize = TILE_W + 2 * MARGIN;
+
+/// The weights of the `2 S` pixels around a bin pixel: a tent, so that reducing a picture keeps its centroid.
+#[inline(always)]
+fn tent<const S: usize>() -> [f32; 8] {
+    let mut taps = [0.0; 8];
+    if S == 1 {
+        taps[0] = 1.0;
+        return taps;
+    }
+    for (k, tap) in taps[..2 * S].iter_mut().enumerate() {
+        *tap = (1.0 - ((k as f32 + 0.5) / S as f32 - 1.0).abs()) / S as f32;
+    }
+    taps
 }
 
 #[cfg(test)]

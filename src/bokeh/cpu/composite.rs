@@ -128,7 +128,7 @@ fn select<S: Simd>(
 ) -> [[f32; CHUNK]; 3] {
     let mut color = [[0.0; CHUNK]; 3];
     let mut layer = [[0.0; CHUNK]; 4];
-    let coc = &scene.row(y)[3 * scene.stride + x0..];
+    let coc = &scene.plane(y, 3)[x0..];
     let take = CHUNK.min(coc.len());
     for ((bin, rows), share) in plan.bins.iter().zip(bins).zip(shares) {
         if !sample::<S>(bin.scale, bin.height, rows, y, x0, &mut layer) {

@@ -2,7 +2,7 @@
 //! taken. Pull-push: averages over ever larger areas, of known pixels only, flow back into the holes.
 
 use super::bin::Share;
-use super::rows::Rows;
+use super::rows::{Rows, repeat_ends};
 
 /// Planes of a level: premultiplied colour and CoC, and how much of it is known.
 const PLANES: usize = 5;
@@ -61,10 +61,9 @@ impl Pyramid {
                 let mut hidden = 0.0f32;
                 for sub in 0..4 {
                     let (px, py) = ((2 * x + sub % 2).min(width - 1), (2 * y + sub / 2).min(height - 1));
-                    let row = scene.row(py);
-                    let coc = row[3 * scene.stride + px];
+                    let coc = scene.plane(py, 3)[px];
                     hidden = hidden.max(1.0 - front.at(coc));
-                    (0..3).for_each(|p| sum[p] += 0.25 * row[p * scene.stride + px]);
+                    (0..3).for_each(|p| sum[p] += 0.25 * scene.plane(py, p)[px]);
                     sum[3] += 0.25 * coc;
                 }
                 self.hidden[y * w + x] = hidden;
@@ -89,16 +88,17 @@ impl Pyramid {
 
     fn finish(&self, scene: &mut Rows<4>, (width, height): (usize, usize), nearest_px: f32) {
         let level = &self.levels[0];
-        let (stride, row_len) = (scene.stride, scene.row_len());
+        let (stride, pad, row_len) = (scene.stride, scene.pad, scene.row_len());
         for y in 0..height {
             let row = &mut scene.data[y * row_len..][..row_len];
             for x in 0..width {
                 if self.hidden_around(x / 2, y / 2) {
                     let fill = level.data[(y / 2) * level.width + x / 2];
-                    (0..3).for_each(|p| row[p * stride + x] = fill[p]);
-                    row[3 * stride + x] = fill[3].max(nearest_px);
+                    (0..3).for_each(|p| row[p * stride + pad + x] = fill[p]);
+                    row[3 * stride + pad + x] = fill[3].max(nearest_px);
                 }
             }
+            row.chunks_exact_mut(stride).for_each(|plane| repeat_ends(plane, pad, width));
         }
     }
 

@@ -18,7 +18,7 @@ use std::time::Instant;
 use bin::{BinBand, Share};
 use blur::{GROUP, Scratch, Strip};
 use pulp::Arch;
-use rows::{BinRows, CELL_PLANES, Rows, STRIP, TILE_H, TILE_W};
+use rows::{BinRows, CELL_PLANES, MARGIN, Rows, STRIP, TILE_H, TILE_W};
 use team::{Shelf, Team};
 use unpack::Unpack;
 
@@ -99,7 +99,7 @@ impl CpuBokeh {
         Self {
             decode: unpack::decode_table(plan.expansion),
             encode: composite::encode_table(),
-            scene: Rows::new(width, height, 0),
+            scene: Rows::new(width, height, MARGIN),
             tiles: vec![(0.0, 0.0); width.div_ceil(TILE_W) * height.div_ceil(TILE_H)],
             pyramid: (plan.fill && has_near && plan.compositing == Compositing::Layers)
                 .then(|| fill::Pyramid::new(width, height)),
@@ -244,7 +244,7 @@ impl CpuBokeh {
             let x1 = (x0 + TILE_W).min(self.plan.width);
             *tile = (f32::INFINITY, f32::NEG_INFINITY);
             for y in y0..(y0 + TILE_H).min(self.plan.height) {
-                let coc = &self.scene.row(y)[3 * self.scene.stride..][x0..x1];
+                let coc = &self.scene.plane(y, 3)[x0..x1];
                 *tile = coc.iter().fold(*tile, |(low, high), &c| (low.min(c), high.max(c)));
             }
         }
@@ -295,7 +295,7 @@ impl CpuBokeh {
         let Some(gather) = &mut self.gather else { return };
         let (size, arch, bank) = ((self.plan.width, self.plan.height), self.arch, &*self.plan.bank);
         let (source, scene) = (&self.bins[0].source, &self.scene);
-        let coc = |y: usize| &scene.row(y)[3 * scene.stride..];
+        let coc = |y: usize| scene.plane(y, 3);
         if self.plan.exact {
             let out = Shelf::new(&mut gather.result, 3 * size.0, &mut self.taken);
             let kernels = &gather.kernels;

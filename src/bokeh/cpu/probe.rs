@@ -10,10 +10,7 @@ impl CpuBokeh {
         match probe {
             Probe::Scene => {
                 let pixels = |y: usize| (0..self.plan.width).map(move |x| (x, y));
-                let at = |(x, y): (usize, usize)| {
-                    let row = self.scene.row(y);
-                    std::array::from_fn(|p| row[p * self.scene.stride + x])
-                };
+                let at = |(x, y): (usize, usize)| std::array::from_fn(|p| self.scene.plane(y, p)[x]);
                 (0..self.plan.height).flat_map(pixels).map(at).collect()
             }
             Probe::Bin(k) => {

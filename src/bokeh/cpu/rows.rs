@@ -9,6 +9,8 @@ pub const STRIP: usize = 32;
 pub const TILE_W: usize = 64;
 /// Rows of a tile.
 pub const TILE_H: usize = 8;
+/// Columns on both sides of the picture that repeat its outermost ones.
+pub const MARGIN: usize = 8;
 
 /// A picture of `CH` planes, row by row: `[row][plane][stride]`, each plane row with `pad` columns on both sides.
 #[derive(Default)]
@@ -33,11 +35,25 @@ impl<const CH: usize> Rows<CH> {
         self.stride * CH
     }
 
+    /// Plane `p` of row `y`, from its first pixel on.
+    #[inline(always)]
+    pub fn plane(&self, y: usize, p: usize) -> &[f32] {
+        &self.data[y * self.row_len() + p * self.stride + self.pad..][..self.stride - self.pad]
+    }
+
     /// Row `y`, all planes.
     #[inline(always)]
     pub fn row(&self, y: usize) -> &[f32] {
         &self.data[y * self.row_len()..][..self.row_len()]
     }
+}
+
+/// Repeats the outermost pixels of a plane row to both sides.
+#[inline(always)]
+pub fn repeat_ends(plane: &mut [f32], pad: usize, width: usize) {
+    let (first, last) = (plane[pad], plane[pad + width - 1]);
+    plane[..pad].fill(first);
+    plane[pad + width..].fill(last);
 }
 
 /// The coarse grid of a bin: one value per cell of `CELL` x `CELL` bin pixels, row by row.

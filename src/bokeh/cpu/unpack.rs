@@ -1,6 +1,6 @@
 //! Pass `unpack`: 8-bit sRGB to linear light with highlights expanded, and depth to signed CoC.
 
-use super::rows::TILE_W;
+use super::rows::{MARGIN, TILE_W, repeat_ends};
 use pulp::{Simd, WithSimd};
 
 use crate::frame::{ColorImage, DepthMap};
@@ -45,7 +45,7 @@ pub struct Unpack<'a> {
     pub table: &'a [f32; 256],
     /// First row.
     pub y0: usize,
-    /// Rows of `[r, g, b, coc][stride]`, no padding in front.
+    /// Rows of `[r, g, b, coc][stride]`, with `MARGIN` columns in front.
     pub out: &'a mut [f32],
     /// Values of a plane row.
     pub stride: usize,
@@ -65,18 +65,16 @@ impl WithSimd for Unpack<'_> {
             let (green, rest) = rest.split_at_mut(self.stride);
             let (blue, coc) = rest.split_at_mut(self.stride);
             let pixels = self.color.rgb[y * width * 3..][..width * 3].chunks_exact(3);
+            let (red, green, blue) = (&mut red[MARGIN..], &mut green[MARGIN..], &mut blue[MARGIN..]);
             for (((pixel, r), g), b) in pixels.zip(red).zip(green).zip(blue) {
                 *r = self.table[pixel[0] as usize];
                 *g = self.table[pixel[1] as usize];
                 *b = self.table[pixel[2] as usize];
             }
-            coc_row(self.coc, self.depth, y, self.color.height as usize, &mut coc[..width]);
-            // Columns beyond the picture repeat its last one, so that whole tiles can be worked on.
-            for plane in planes.chunks_exact_mut(self.stride) {
-                let last = plane[width - 1];
-                plane[width..].fill(last);
-            }
-            let coc = &planes[3 * self.stride..];
+            coc_row(self.coc, self.depth, y, self.color.height as usize, &mut coc[MARGIN..MARGIN + width]);
+            // Whole tiles can be worked on, and a little around them.
+            planes.chunks_exact_mut(self.stride).for_each(|plane| repeat_ends(plane, MARGIN, width));
+            let coc = &planes[3 * self.stride + MARGIN..];
             for (tile, values) in self.tiles.iter_mut().zip(coc[..width].chunks(TILE_W)) {
                 for &value in values {
                     tile.0 = if value < tile.0 { value } else { tile.0 };
