@@ -2,7 +2,8 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::rows::{CELL_PLANES, MARGIN, Rows, TILE_W, repeat_ends};
+use super::aligned::Line;
+use super::rows::{CELL_PLANES, MARGIN, NO_COLOR, Rows, TILE_W, repeat_ends};
 use super::simd::madd;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR};
 
@@ -83,8 +84,8 @@ impl BinBand<'_> {
     fn fill<V: Simd, const S: usize, const W: usize>(mut self) {
         let across = self.cells.len() / CELL_PLANES;
         self.cells[..2 * across].fill(0.0);
-        self.cells[2 * across..5 * across].fill(f32::INFINITY);
-        self.cells[5 * across..].fill(f32::NEG_INFINITY);
+        self.cells[2 * across..5 * across].fill(NO_COLOR);
+        self.cells[5 * across..].fill(-NO_COLOR);
         for chunk in 0..self.filled.len() {
             if self.meets::<S>(chunk) {
                 self.chunk::<V, S, W>(chunk);
@@ -116,20 +117,27 @@ impl BinBand<'_> {
     fn chunk<V: Simd, const S: usize, const W: usize>(&mut self, chunk: usize) {
         let rows = self.out.len() / (5 * self.stride);
         let (x0, width) = (chunk * TILE_W / S, TILE_W / S);
-        let mut sums = [[[0.0f32; W]; 5]; CELL];
-        self.sum_rows::<V, S, W>(chunk, &mut sums[..rows]);
-        let mut coverage = [[0.0f32; TILE_W]; 2];
-        let mut range = [[f32::INFINITY; TILE_W]; 6];
-        range[3..].fill([f32::NEG_INFINITY; TILE_W]);
+        let mut sums = Line([[[0.0f32; W]; 5]; CELL]);
+        let sums = &mut sums.0[..rows];
+        self.sum_rows::<V, S, W>(chunk, sums);
+        let (mut coverage, mut range) = (Line([[0.0f32; TILE_W]; 2]), Line([[NO_COLOR; TILE_W]; 6]));
+        let (coverage, range) = (&mut coverage.0, &mut range.0);
+        range[3..].fill([-NO_COLOR; TILE_W]);
         let taps = tent::<S>();
-        for (row, sum) in sums[..rows].iter().enumerate() {
-            let mut means = [[0.0f32; TILE_W]; 5];
+        for (row, sum) in sums.iter().enumerate() {
+            let mut means = Line([[0.0f32; TILE_W]; 5]);
+            let means = &mut means.0;
             for (mean, sum) in means.iter_mut().zip(sum) {
-                let columns = &sum[(W - TILE_W) / 2 - S / 2..];
-                for (x, mean) in mean[..width].iter_mut().enumerate() {
+                if S == 1 {
+                    mean.copy_from_slice(&sum[..TILE_W]);
+                    continue;
+                }
+                let groups = sum[(W - TILE_W) / 2 - S / 2..].as_chunks::<S>().0;
+                for (x, mean) in mean[..TILE_W / S].iter_mut().enumerate() {
                     let mut total = 0.0;
-                    for k in 0..2 * S - 1 + usize::from(S > 1) {
-                        total = madd::<V>(taps[k], columns[S * x + k], total);
+                    for k in 0..S {
+                        total = madd::<V>(taps[k], groups[x][k], total);
+                        total = madd::<V>(taps[S + k], groups[x + 1][k], total);
                     }
                     *mean = total;
                 }
@@ -142,10 +150,11 @@ impl BinBand<'_> {
                 coverage[1][x] += means[4][x];
                 let counts = means[3][x] > COVERAGE_FLOOR;
                 let inverse = if counts { 1.0 / means[3][x] } else { 0.0 };
+                // An addition, where a choice would become masked stores that the next row waits for.
+                let out_of_range = if counts { 0.0 } else { NO_COLOR };
                 for p in 0..3 {
                     let own = means[p][x] * inverse;
-                    let low = if counts { own } else { f32::INFINITY };
-                    let high = if counts { own } else { f32::NEG_INFINITY };
+                    let (low, high) = (own + out_of_range, own - out_of_range);
                     range[p][x] = if low < range[p][x] { low } else { range[p][x] };
                     range[3 + p][x] = if high > range[3 + p][x] { high } else { range[3 + p][x] };
                 }
@@ -178,7 +187,8 @@ impl BinBand<'_> {
             let planes = self.scene.row(y);
             let plane = |p: usize| planes[p * self.scene.stride + start..].first_chunk::<W>();
             let (Some(r), Some(g), Some(b), Some(c)) = (plane(0), plane(1), plane(2), plane(3)) else { continue };
-            let mut values = [[1.0f32; W]; 5];
+            let mut values = Line([[1.0f32; W]; 5]);
+            let values = &mut values.0;
             if let Some(share) = self.share {
                 for x in 0..W {
                     values[3][x] = share.at(c[x]);
@@ -195,7 +205,7 @@ impl BinBand<'_> {
             let last = (k / S).min(sums.len() - 1);
             for row in last.saturating_sub(1)..=last {
                 let Some(&tap) = (k - row * S < taps_down).then(|| &taps[k - row * S]) else { continue };
-                for (sum, value) in sums[row].iter_mut().zip(&values) {
+                for (sum, value) in sums[row].iter_mut().zip(values.iter()) {
                     for x in 0..W {
                         sum[x] = madd::<V>(tap, value[x], sum[x]);
                     }

@@ -7,6 +7,7 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::aligned::Aligned;
 use super::rows::{Cells, EDGE_VALUES, Edges, STRIP, STRIP_EDGES};
 use super::simd::{fma, load, store};
 use crate::bokeh::bank::Bank;
@@ -51,7 +52,7 @@ pub struct Strip<'a> {
 #[derive(Default)]
 pub struct Scratch {
     /// `[row][term][4][STRIP]`.
-    pub rows: Vec<f32>,
+    pub rows: Aligned,
     /// Rows of cells whose rows are filtered.
     pub filtered: Vec<bool>,
 }

@@ -43,6 +43,7 @@ pub struct Composite<'a> {
 }
 
 /// What the chunk has so far: colour and what is still open.
+#[repr(align(64))]
 struct Stack {
     color: [[f32; CHUNK]; 3],
     open: [f32; CHUNK],

@@ -1,5 +1,6 @@
 //! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per frame.
 
+mod aligned;
 mod bin;
 mod blur;
 mod composite;
@@ -8,6 +9,7 @@ mod gather;
 mod probe;
 mod reach;
 mod rows;
+mod shelves;
 mod simd;
 mod team;
 mod unpack;
@@ -15,14 +17,16 @@ mod unpack;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use aligned::Aligned;
 use bin::{BinBand, Share};
 use blur::{GROUP, Scratch, Strip};
 use pulp::Arch;
-use rows::{BinRows, CELL_PLANES, MARGIN, Rows, STRIP, TILE_H, TILE_W};
+use rows::{BinRows, MARGIN, Rows, STRIP, TILE_H, TILE_W};
+use shelves::{BinShelves, StripShelves};
 use team::{Shelf, Team};
 use unpack::Unpack;
 
-use super::plan::{CELL, Compositing, Plan};
+use super::plan::{CELL, Compositing, MAX_BINS, Plan};
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
@@ -45,7 +49,6 @@ pub struct CpuBokeh {
     members: Vec<Member>,
     taken: Vec<AtomicBool>,
     taken_too: Vec<AtomicBool>,
-    taken_three: Vec<AtomicBool>,
     done: Option<Finished>,
 }
 
@@ -55,6 +58,9 @@ struct Member {
     blur: Scratch,
     reach: Vec<f32>,
 }
+
+/// Rows of the picture that are binned together: a row of cells at every scale fits in whole.
+const BAND: usize = 4 * CELL;
 
 /// Memory of the comparison methods.
 struct Gather {
@@ -77,7 +83,7 @@ impl CpuBokeh {
         let members = (0..team.threads())
             .map(|_| Member {
                 blur: Scratch {
-                    rows: vec![0.0; tallest * GROUP.min(plan.bank.terms) * 4 * STRIP],
+                    rows: Aligned::zeros(tallest * GROUP.min(plan.bank.terms) * 4 * STRIP),
                     filtered: Vec::with_capacity(tallest.div_ceil(CELL)),
                 },
                 reach: Vec::with_capacity(bins.iter().map(|bin| bin.cells.data.len() * 2).max().unwrap_or(0)),
@@ -106,7 +112,6 @@ impl CpuBokeh {
             arch: Arch::new(),
             taken: flags(most),
             taken_too: flags(most),
-            taken_three: flags(most),
             plan,
             team,
             shares,
@@ -192,39 +197,38 @@ impl CpuBokeh {
     fn bin(&mut self, which: impl Fn(&super::plan::Bin) -> bool) {
         let whole = self.plan.compositing != Compositing::Layers;
         let across = self.plan.width.div_ceil(TILE_W);
-        for ((bin, rows), share) in self.plan.bins.iter().zip(&mut self.bins).zip(&self.shares) {
-            if !which(bin) {
-                continue;
+        let (arch, scene, tiles) = (self.arch, &self.scene, &self.tiles);
+        let size = (self.plan.width, self.plan.height);
+        let mut shelves: [Option<BinShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
+        for (k, (bin, rows)) in self.plan.bins.iter().zip(&mut self.bins).enumerate() {
+            if which(bin) {
+                rows.present = tiles.iter().any(|&tile| self.shares[k].meets(tile));
+                shelves[k] = rows.present.then(|| BinShelves::new(rows, across));
             }
-            rows.present = self.tiles.iter().any(|&tile| share.meets(tile));
-            if !rows.present {
-                continue;
-            }
-            let (stride, pad) = (rows.source.stride, rows.source.pad);
-            let cells_row = CELL_PLANES * rows.cells.width;
-            let band = CELL * rows.source.row_len();
-            let out = Shelf::new(&mut rows.source.data, band, &mut self.taken);
-            let cells = Shelf::new(&mut rows.cells.data, cells_row, &mut self.taken_too);
-            let (arch, scene, tiles) = (self.arch, &self.scene, &self.tiles);
-            let size = (self.plan.width, self.plan.height);
-            let filled = Shelf::new(&mut rows.filled, across, &mut self.taken_three);
-            self.team.run(bin.height.div_ceil(CELL), &|part| {
-                arch.dispatch(BinBand {
-                    scene,
-                    size,
-                    tiles,
-                    share: (!whole).then_some(*share),
-                    scale: bin.scale,
-                    band: part,
-                    width: bin.width,
-                    out: out.part(part),
-                    stride,
-                    pad,
-                    cells: cells.part(part),
-                    filled: filled.part(part),
-                });
-            });
         }
+        // A part is the same rows of the picture for every bin, so that they stay in the cache.
+        self.team.run(size.1.div_ceil(BAND), &|part| {
+            for (k, bin) in self.plan.bins.iter().enumerate() {
+                let Some(shelf) = &shelves[k] else { continue };
+                let bands = BAND / (CELL * bin.scale);
+                for band in part * bands..((part + 1) * bands).min(bin.height.div_ceil(CELL)) {
+                    arch.dispatch(BinBand {
+                        scene,
+                        size,
+                        tiles,
+                        share: (!whole).then_some(self.shares[k]),
+                        scale: bin.scale,
+                        band,
+                        width: bin.width,
+                        out: shelf.source.part(band),
+                        stride: shelf.stride,
+                        pad: shelf.pad,
+                        cells: shelf.cells.part(band),
+                        filled: shelf.filled.part(band),
+                    });
+                }
+            }
+        });
     }
 
     fn fill(&mut self) {
@@ -236,18 +240,18 @@ impl CpuBokeh {
         let Some(index) = self.plan.bins.iter().rposition(|bin| bin.near) else { return };
         let behind = Share::new(self.plan.border(index), None);
         let nearest_px = self.plan.bins[index].high_px;
-        pyramid.fill(&mut self.scene, (self.plan.width, self.plan.height), behind, nearest_px);
+        pyramid.fill(&mut self.team, &mut self.scene, (self.plan.width, self.plan.height), behind, nearest_px);
         // What was filled in has another CoC: find the tiles' ranges anew.
-        let across = self.plan.width.div_ceil(TILE_W);
-        for (k, tile) in self.tiles.iter_mut().enumerate() {
-            let (x0, y0) = (k % across * TILE_W, k / across * TILE_H);
-            let x1 = (x0 + TILE_W).min(self.plan.width);
-            *tile = (f32::INFINITY, f32::NEG_INFINITY);
-            for y in y0..(y0 + TILE_H).min(self.plan.height) {
-                let coc = &self.scene.plane(y, 3)[x0..x1];
-                *tile = coc.iter().fold(*tile, |(low, high), &c| (low.min(c), high.max(c)));
+        let (across, scene) = (self.plan.width.div_ceil(TILE_W), &self.scene);
+        let (width, height) = (self.plan.width, self.plan.height);
+        let tiles = Shelf::new(&mut self.tiles, across, &mut self.taken);
+        self.team.run(height.div_ceil(TILE_H), &|part| {
+            let tiles = tiles.part(part);
+            tiles.fill((f32::INFINITY, f32::NEG_INFINITY));
+            for y in part * TILE_H..((part + 1) * TILE_H).min(height) {
+                unpack::widen(tiles, &scene.plane(y, 3)[..width]);
             }
-        }
+        });
     }
 
     fn reach(&mut self) {
@@ -262,33 +266,35 @@ impl CpuBokeh {
 
     fn blur_bins(&mut self) {
         let (plan, arch) = (&self.plan, self.arch);
-        for (bin, rows) in plan.bins.iter().zip(&mut self.bins) {
-            if !rows.present {
-                continue;
+        let mut shelves: [Option<StripShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
+        let mut parts = 0;
+        for ((bin, rows), shelf) in plan.bins.iter().zip(&mut self.bins).zip(&mut shelves) {
+            if rows.present {
+                *shelf = Some(StripShelves::new(bin, rows, parts));
+                parts += bin.width.div_ceil(STRIP);
             }
-            let down = bin.height.div_ceil(CELL);
-            let out = Shelf::new(&mut rows.out, bin.height * 4 * STRIP, &mut self.taken);
-            let active = Shelf::new(&mut rows.active, down, &mut self.taken_too);
-            let (source, cells, edges) = (&rows.source, &rows.cells, &rows.edges);
-            self.team.run_with(&mut self.members, rows.strips, &|member: &mut Member, part| {
-                arch.dispatch(Strip {
-                    source: &source.data,
-                    stride: source.stride,
-                    pad: source.pad,
-                    height: bin.height,
-                    cells,
-                    edges,
-                    bank: &plan.bank,
-                    turned: bin.near,
-                    reach: plan.bank.node_reach[plan.bank.node(bin.max_radius_px)] as usize,
-                    strip: part,
-                    out: out.part(part),
-                    active: active.part(part),
-                    wanted: None,
-                    scratch: &mut member.blur,
-                });
-            });
         }
+        self.team.run_with(&mut self.members, parts, &|member: &mut Member, part| {
+            let mine = shelves.iter().zip(&plan.bins).filter_map(|(shelf, bin)| shelf.as_ref().zip(Some(bin)));
+            let Some((shelf, bin)) = mine.filter(|(shelf, _)| shelf.first <= part).last() else { return };
+            let strip = part - shelf.first;
+            arch.dispatch(Strip {
+                source: &shelf.source.data,
+                stride: shelf.source.stride,
+                pad: shelf.source.pad,
+                height: bin.height,
+                cells: shelf.cells,
+                edges: shelf.edges,
+                bank: &plan.bank,
+                turned: bin.near,
+                reach: plan.bank.node_reach[plan.bank.node(bin.max_radius_px)] as usize,
+                strip,
+                out: shelf.out.part(strip),
+                active: shelf.active.part(strip),
+                wanted: None,
+                scratch: &mut member.blur,
+            });
+        });
     }
 
     fn gather(&mut self) {

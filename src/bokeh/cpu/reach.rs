@@ -1,7 +1,7 @@
 //! Pass `reach`: on the coarse grid, what the filters can reach from each cell: the radius of the content there (its
 //! mean, weighted by coverage and nearness), and the range of its colours.
 
-use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges};
+use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges, NO_COLOR};
 use crate::bokeh::plan::{Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};
 
 /// Weight of a cell `distance` cells away, along one axis.
@@ -20,23 +20,13 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
     scratch.clear();
     scratch.resize(cells.data.len() + row_len, 0.0);
     let (across, row) = scratch.split_at_mut(cells.data.len());
-    for (source, target) in cells
-        .data
-        .chunks_exact(width)
-        .zip(across.chunks_exact_mut(width))
-        .enumerate()
-        .map(|(k, (source, target))| ((k % CELL_PLANES, source), target))
-    {
-        let (plane, source) = source;
-        for (x, value) in target.iter_mut().enumerate() {
-            let (from, to) = (x.saturating_sub(radius), (x + radius).min(width - 1));
-            *value = gather(plane, (from..=to).map(|k| (source[k], weights[k.abs_diff(x)])));
-        }
+    for (k, (source, target)) in cells.data.chunks_exact(width).zip(across.chunks_exact_mut(width)).enumerate() {
+        along(k % CELL_PLANES, source, target, &weights[..=radius]);
     }
     for y in 0..height {
         row[..2 * width].fill(0.0);
-        row[2 * width..5 * width].fill(f32::INFINITY);
-        row[5 * width..].fill(f32::NEG_INFINITY);
+        row[2 * width..5 * width].fill(NO_COLOR);
+        row[5 * width..].fill(-NO_COLOR);
         for k in y.saturating_sub(radius)..(y + radius + 1).min(height) {
             let source = &across[k * row_len..][..row_len];
             let weight = weights[k.abs_diff(y)];
@@ -50,8 +40,8 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
             let coc_px = if row[x] > 0.0 { row[width + x] / row[x] } else { 0.0 };
             row[width + x] = plan.bin_radius_px(bin, coc_px);
         }
-        // Where nothing is in reach there is nothing to keep in range; zero keeps the arithmetic finite.
-        row[2 * width..].iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = 0.0);
+        // Where nothing is in reach there is nothing to keep in range.
+        row[2 * width..].iter_mut().filter(|value| value.abs() >= NO_COLOR).for_each(|value| *value = 0.0);
         let out = &mut edges.data[y * edges.across * EDGE_VALUES..][..edges.across * EDGE_VALUES];
         for (edge, values) in out.chunks_exact_mut(EDGE_VALUES).enumerate() {
             let right = edge * SEGMENT / CELL;
@@ -64,11 +54,23 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
     }
 }
 
-#[inline(always)]
-fn gather(plane: usize, values: impl Iterator<Item = (f32, f32)>) -> f32 {
-    match plane {
-        0 | 1 => values.map(|(value, weight)| value * weight).sum(),
-        2..5 => values.map(|(value, _)| value).fold(f32::INFINITY, f32::min),
-        _ => values.map(|(value, _)| value).fold(f32::NEG_INFINITY, f32::max),
+/// One plane of one row: each cell with those up to `weights.len() - 1` away.
+fn along(plane: usize, source: &[f32], target: &mut [f32], weights: &[f32]) {
+    let combine = |target: &mut [f32], source: &[f32], weight: f32| {
+        let pairs = target.iter_mut().zip(source);
+        match plane {
+            0 | 1 => pairs.for_each(|(t, s)| *t += weight * s),
+            2..5 => pairs.for_each(|(t, &s)| *t = if s < *t { s } else { *t }),
+            _ => pairs.for_each(|(t, &s)| *t = if s > *t { s } else { *t }),
+        }
+    };
+    target.copy_from_slice(source);
+    if plane < 2 {
+        target.iter_mut().for_each(|value| *value *= weights[0]);
+    }
+    for (distance, &weight) in weights.iter().enumerate().skip(1).take_while(|(d, _)| *d < source.len()) {
+        let inner = source.len() - distance;
+        combine(&mut target[..inner], &source[distance..], weight);
+        combine(&mut target[distance..], &source[..inner], weight);
     }
 }

@@ -1,5 +1,8 @@
 //! The memory of the CPU executor: pictures as rows of planes, and a bin's result as strips.
 
+use std::sync::atomic::AtomicBool;
+
+use super::aligned::Aligned;
 use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
 
 /// Columns of a strip: what one part of the blur pass produces.
@@ -10,13 +13,12 @@ pub const TILE_W: usize = 64;
 /// Rows of a tile.
 pub const TILE_H: usize = 8;
 /// Columns on both sides of the picture that repeat its outermost ones.
-pub const MARGIN: usize = 8;
+pub const MARGIN: usize = 16;
 
 /// A picture of `CH` planes, row by row: `[row][plane][stride]`, each plane row with `pad` columns on both sides.
-#[derive(Default)]
 pub struct Rows<const CH: usize> {
     /// The values.
-    pub data: Vec<f32>,
+    pub data: Aligned,
     /// Values from one plane row to the next.
     pub stride: usize,
     /// Columns before the first pixel, and at least as many after the last.
@@ -27,7 +29,7 @@ impl<const CH: usize> Rows<CH> {
     /// Zeros, `width` rounded up to whole tiles.
     pub fn new(width: usize, height: usize, pad: usize) -> Self {
         let stride = width.next_multiple_of(TILE_W) + 2 * pad;
-        Self { data: vec![0.0; stride * CH * height], stride, pad }
+        Self { data: Aligned::zeros(stride * CH * height), stride, pad }
     }
 
     /// Values in a row, all planes together.
@@ -68,6 +70,8 @@ pub struct Cells {
     pub height: usize,
 }
 
+/// Lowest colour (and, negative, highest colour) of a cell without any.
+pub const NO_COLOR: f32 = 1e30;
 /// Planes of [`Cells`].
 pub const CELL_PLANES: usize = 8;
 
@@ -138,13 +142,15 @@ pub struct BinRows {
     /// The radius and the range of colours within reach.
     pub edges: Edges,
     /// The blurred bin, `[strip][row][4][STRIP]`: premultiplied colour and coverage.
-    pub out: Vec<f32>,
+    pub out: Aligned,
     /// Per strip and row of cells, whether `out` holds anything but zeros.
     pub active: Vec<bool>,
     /// Strips across.
     pub strips: usize,
     /// Whether anything in the frame belongs to this bin.
     pub present: bool,
+    /// Flags for three shelves at once.
+    pub taken: [Vec<AtomicBool>; 3],
 }
 
 impl BinRows {
@@ -157,10 +163,14 @@ impl BinRows {
             filled: vec![false; plan.width.div_ceil(TILE_W) * cells.height],
             edges: Edges::new(&cells),
             cells,
-            out: vec![0.0; strips * bin.height * 4 * STRIP],
+            out: Aligned::zeros(strips * bin.height * 4 * STRIP),
             active: vec![false; strips * bin.height.div_ceil(CELL)],
             strips,
             present: false,
+            taken: std::array::from_fn(|_| {
+                let parts = strips.max(bin.height.div_ceil(CELL));
+                std::iter::repeat_with(|| AtomicBool::new(false)).take(parts).collect()
+            }),
         }
     }
 }

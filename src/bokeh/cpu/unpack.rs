@@ -75,12 +75,18 @@ impl WithSimd for Unpack<'_> {
             // Whole tiles can be worked on, and a little around them.
             planes.chunks_exact_mut(self.stride).for_each(|plane| repeat_ends(plane, MARGIN, width));
             let coc = &planes[3 * self.stride + MARGIN..];
-            for (tile, values) in self.tiles.iter_mut().zip(coc[..width].chunks(TILE_W)) {
-                for &value in values {
-                    tile.0 = if value < tile.0 { value } else { tile.0 };
-                    tile.1 = if value > tile.1 { value } else { tile.1 };
-                }
-            }
+            widen(self.tiles, &coc[..width]);
+        }
+    }
+}
+
+/// Widens the ranges of a row of tiles by a row of CoC.
+#[inline(always)]
+pub fn widen(tiles: &mut [(f32, f32)], coc: &[f32]) {
+    for (tile, values) in tiles.iter_mut().zip(coc.chunks(TILE_W)) {
+        for &value in values {
+            tile.0 = if value < tile.0 { value } else { tile.0 };
+            tile.1 = if value > tile.1 { value } else { tile.1 };
         }
     }
 }
