@@ -3,6 +3,8 @@
 //! The pixels of one view tile the picture, so the coverages of two bins are disjoint, not independent: a bin fills
 //! what is left, and what stays open at the end is filled in proportion.
 
+#![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
+
 use pulp::{Simd, WithSimd};
 
 use super::bin::Share;
@@ -240,13 +242,7 @@ fn encode(color: &[[f32; CHUNK]; 3], expansion: f32, table: &[u8], out: &mut [u8
     for (index, color) in index.iter_mut().zip(color) {
         for (index, &light) in index.iter_mut().zip(color) {
             let light = compress(light, expansion);
-            let light = if light < 0.0 {
-                0.0
-            } else if light > 1.0 {
-                1.0
-            } else {
-                light
-            };
+            let light = light.clamp(0.0, 1.0);
             *index = (light * (ENCODE_STEPS - 1) as f32 + 0.5) as u16;
         }
     }

@@ -13,7 +13,10 @@ const PLANES: usize = 5;
 /// The pyramid, finest level (half the picture's size) first.
 pub struct Pyramid {
     levels: Vec<Level>,
+    /// How far a pixel of the finest level is covered by something near.
     hidden: Vec<f32>,
+    /// The same of a pixel or any of its neighbours.
+    around: Vec<f32>,
     taken: Vec<AtomicBool>,
 }
 
@@ -38,7 +41,7 @@ impl Pyramid {
         }
         let hidden = vec![0.0; levels[0].width * levels[0].height];
         let taken = (0..height).map(|_| AtomicBool::new(false)).collect();
-        Self { levels, hidden, taken }
+        Self { levels, around: hidden.clone(), hidden, taken }
     }
 
     /// Replaces, in `scene`, what belongs to near bins (`front` is the share of everything behind them) and the
@@ -74,12 +77,25 @@ impl Pyramid {
             }
         });
         let hidden = &self.hidden;
+        let around = Shelf::new(&mut self.around, w, &mut self.taken);
+        team.run(h, &|y| {
+            let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(|y| &hidden[y * w..][..w]);
+            let column = |x: usize| rows[0][x].max(rows[1][x]).max(rows[2][x]);
+            let (mut left, mut here) = (0.0f32, column(0));
+            for (x, out) in around.part(y).iter_mut().enumerate() {
+                let right = if x + 1 < w { column(x + 1) } else { 0.0 };
+                *out = left.max(here).max(right);
+                (left, here) = (here, right);
+            }
+        });
+        let around = &self.around;
         let data = Shelf::new(&mut level.data, w, &mut self.taken);
         team.run(h, &|y| {
+            let around = &around[y * w..][..w];
             let plane = |row: usize, p: usize| scene.plane((2 * y + row).min(height - 1), p);
             let planes: [[&[f32]; 4]; 2] = std::array::from_fn(|row| std::array::from_fn(|p| plane(row, p)));
             for (x, pixel) in data.part(y).iter_mut().enumerate() {
-                if hidden_around(hidden, (w, h), x, y) {
+                if around[x] > 0.0 {
                     *pixel = [0.0; PLANES];
                     continue;
                 }
@@ -94,13 +110,17 @@ impl Pyramid {
     }
 
     fn finish(&mut self, team: &mut Team, scene: &mut Rows<4>, (width, height): (usize, usize), nearest_px: f32) {
-        let (level, hidden) = (&self.levels[0], &self.hidden);
+        let (level, around) = (&self.levels[0], &self.around);
         let (stride, pad, row_len) = (scene.stride, scene.pad, scene.row_len());
         let rows = Shelf::new(&mut scene.data, row_len, &mut self.taken);
         team.run(height, &|y| {
+            let around = &around[y / 2 * level.width..][..level.width];
+            if around.iter().all(|&hidden| hidden <= 0.0) {
+                return;
+            }
             let row = rows.part(y);
             for (x, fill) in level.data[y / 2 * level.width..][..level.width].iter().enumerate() {
-                if hidden_around(hidden, (level.width, level.height), x, y / 2) {
+                if around[x] > 0.0 {
                     for x in 2 * x..(2 * x + 2).min(width) {
                         (0..3).for_each(|p| row[p * stride + pad + x] = fill[p]);
                         row[3 * stride + pad + x] = fill[3].max(nearest_px);
@@ -110,13 +130,6 @@ impl Pyramid {
             row.chunks_exact_mut(stride).for_each(|plane| repeat_ends(plane, pad, width));
         });
     }
-}
-
-/// Whether a half-size pixel or one of its neighbours is hidden.
-#[inline]
-fn hidden_around(hidden: &[f32], (w, h): (usize, usize), x: usize, y: usize) -> bool {
-    let columns = x.saturating_sub(1)..(x + 2).min(w);
-    (y.saturating_sub(1)..(y + 2).min(h)).any(|y| hidden[y * w..][columns.clone()].iter().any(|&v| v > 0.0))
 }
 
 /// Averages four pixels; knowing a little is spread, so that the coarsest level knows something if anyone does.

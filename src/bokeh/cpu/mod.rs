@@ -275,8 +275,8 @@ impl CpuBokeh {
             }
         }
         self.team.run_with(&mut self.members, parts, &|member: &mut Member, part| {
-            let mine = shelves.iter().zip(&plan.bins).filter_map(|(shelf, bin)| shelf.as_ref().zip(Some(bin)));
-            let Some((shelf, bin)) = mine.filter(|(shelf, _)| shelf.first <= part).last() else { return };
+            let mut all = shelves.iter().zip(&plan.bins).filter_map(|(shelf, bin)| shelf.as_ref().zip(Some(bin)));
+            let Some((shelf, bin)) = all.rfind(|(shelf, _)| shelf.first <= part) else { return };
             let strip = part - shelf.first;
             arch.dispatch(Strip {
                 source: &shelf.source.data,
