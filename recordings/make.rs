@@ -23,7 +23,7 @@ const SAMPLES_PER_PIXEL: u32 = 16;
 const DEPTH_UNITS_PER_METRE: f32 = 5000.0;
 const BASELINE_M: f32 = 0.06;
 /// Every so many frames there is a right eye's picture.
-const RIGHT_EVERY: u32 = 4;
+const RIGHT_EVERY: u32 = 6;
 const COC_AT_INFINITY_PX: f32 = 14.0;
 /// Rays per pixel of the true blur: more than half the pixels of the widest disc.
 const LENS_RAYS: usize = 720;
@@ -81,7 +81,8 @@ fn threads() -> usize {
 /// writer, which compresses for speed: these pictures travel with the source.
 fn make_sequence(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
     let mut rgb = String::from("# colour pictures, 8-bit RGB PNG\n# timestamp filename\n");
-    let mut depth = format!("# depth maps, 16-bit PNG, {DEPTH_UNITS_PER_METRE} units per metre\n# timestamp filename\n");
+    let mut depth =
+        format!("# depth maps, 16-bit PNG, {DEPTH_UNITS_PER_METRE} units per metre\n# timestamp filename\n");
     let mut pairs = String::new();
     let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
     for frame in 0..frames(scene) {
@@ -115,8 +116,7 @@ fn make_truth(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
     let sets = [("disc", Shape::Disc, &DISC_FRAMES[..]), ("hexagon", hexagon, &HEXAGON_FRAMES[..])];
     for (name, shape, frames) in sets {
         let aperture = lens_points(&Aperture { shape, intensity: 0.0 }, LENS_RAYS);
-        let lens =
-            ThinLens { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: scene.focus_m(), aperture: &aperture };
+        let lens = ThinLens { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: scene.focus_m(), aperture: &aperture };
         for &frame in frames {
             let picture = scene.render_thin_lens(view, time_s(frame), &lens, threads());
             folder.color(&format!("truth/{name}_clipped_{frame:06}.png"), &picture.clipped.to_srgb())?;

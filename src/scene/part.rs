@@ -119,14 +119,7 @@ impl Part {
 
     /// A part without shapes that moves.
     pub fn moving(motion: fn(f32) -> Pose) -> Self {
-        Self {
-            shapes: Vec::new(),
-            materials: Vec::new(),
-            tree: Bvh::default(),
-            motion,
-            form: None,
-            shades: Vec::new(),
-        }
+        Self { shapes: Vec::new(), materials: Vec::new(), tree: Bvh::default(), motion, form: None, shades: Vec::new() }
     }
 
     /// Adds a shape.

@@ -164,13 +164,7 @@ impl Scene {
 
     /// The picture through a thin lens, one ray per point of the aperture to each pixel, averaged in linear light
     /// over the pixel and the lens. The result does not depend on `threads`; an aperture without points gives black.
-    pub fn render_thin_lens(
-        &self,
-        view: &View,
-        time_s: f64,
-        lens: &ThinLens,
-        threads: usize,
-    ) -> LensPicture {
+    pub fn render_thin_lens(&self, view: &View, time_s: f64, lens: &ThinLens, threads: usize) -> LensPicture {
         let mut picture = LensPicture { clipped: LinearImage::black(view), hdr: LinearImage::black(view) };
         if lens.aperture.is_empty() || view.width == 0 {
             return picture;

@@ -114,10 +114,7 @@ impl Shape {
             }
             Shape::Frustum { base, height, low_radius, high_radius } => {
                 let radius = low_radius.max(high_radius);
-                Bounds {
-                    low: base - Vec3::new(radius, 0.0, radius),
-                    high: base + Vec3::new(radius, height, radius),
-                }
+                Bounds { low: base - Vec3::new(radius, 0.0, radius), high: base + Vec3::new(radius, height, radius) }
             }
             Shape::Field { bounds, .. } => bounds,
         }
@@ -160,7 +157,8 @@ impl Shape {
     /// The outward unit normal at `p` on the surface, and surface coordinates: `u`, `v` in -1..1 for a quad, the
     /// way along (0..1) and the direction along a cone in `tangent`; zero where a shape has none.
     pub fn surface(&self, p: Vec3) -> Skin {
-        let skin = |normal: Vec3| Skin { normal: normal.normalize_or(Vec3::NEG_Z), uv: Vec2::ZERO, tangent: Vec3::ZERO };
+        let skin =
+            |normal: Vec3| Skin { normal: normal.normalize_or(Vec3::NEG_Z), uv: Vec2::ZERO, tangent: Vec3::ZERO };
         match *self {
             Shape::Quad { centre, right, up, .. } => Skin {
                 normal: right.cross(up).normalize_or(Vec3::NEG_Z),

@@ -34,12 +34,8 @@ impl Scene {
     pub fn wall(depth_m: f32) -> Scene {
         let mut part = Part::still();
         let size_m = 2.0 * depth_m;
-        let shape = Shape::Quad {
-            centre: depth_m * Vec3::Z,
-            right: size_m * Vec3::X,
-            up: size_m * Vec3::Y,
-            cut: whole,
-        };
+        let shape =
+            Shape::Quad { centre: depth_m * Vec3::Z, right: size_m * Vec3::X, up: size_m * Vec3::Y, cut: whole };
         part.add(shape, Material::new(mottle, Vec3::ONE));
         bare(part, depth_m)
     }

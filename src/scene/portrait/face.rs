@@ -72,4 +72,3 @@ pub fn skin(spot: &Spot) -> Surface {
     let gloss = 0.05 + 0.10 * lip * f32::from(p.z < -0.05);
     Surface { wrap: 0.35, ..Surface::matt(spot, color) }.glossy(gloss, 22.0)
 }
-

@@ -76,9 +76,24 @@ pub fn twig() -> Part {
     });
     let mut dice = Dice::new(23);
     let arms = [
-        [Vec3::new(-0.27, -0.26, 0.53), Vec3::new(-0.21, -0.12, 0.50), Vec3::new(-0.160, -0.045, 0.49), Vec3::new(-0.098, -0.012, 0.50)],
-        [Vec3::new(-0.25, -0.24, 0.56), Vec3::new(-0.20, -0.14, 0.55), Vec3::new(-0.140, -0.105, 0.54), Vec3::new(-0.085, -0.098, 0.53)],
-        [Vec3::new(-0.31, -0.22, 0.50), Vec3::new(-0.27, -0.06, 0.48), Vec3::new(-0.245, 0.03, 0.47), Vec3::new(-0.215, 0.085, 0.47)],
+        [
+            Vec3::new(-0.27, -0.26, 0.53),
+            Vec3::new(-0.21, -0.12, 0.50),
+            Vec3::new(-0.160, -0.045, 0.49),
+            Vec3::new(-0.098, -0.012, 0.50),
+        ],
+        [
+            Vec3::new(-0.25, -0.24, 0.56),
+            Vec3::new(-0.20, -0.14, 0.55),
+            Vec3::new(-0.140, -0.105, 0.54),
+            Vec3::new(-0.085, -0.098, 0.53),
+        ],
+        [
+            Vec3::new(-0.31, -0.22, 0.50),
+            Vec3::new(-0.27, -0.06, 0.48),
+            Vec3::new(-0.245, 0.03, 0.47),
+            Vec3::new(-0.215, 0.085, 0.47),
+        ],
     ];
     for arm in arms {
         add_arm(&mut part, &mut dice, arm);
@@ -117,7 +132,8 @@ fn add_leaf(part: &mut Part, dice: &mut Dice, root: Vec3, out: Vec3, half_length
     let centre = root + (half_length + 0.004) * out;
     part.add_chain(&[(root, 0.0009), (centre, 0.0005)], Material::new(paint::plain, hex(0x73854a)));
     for side in [-1.0f32, 1.0] {
-        let wing = (across * side + 0.28 * normal * -1.0).normalize_or(across) * (0.62 + 0.1 * unit(seed)) * half_length;
+        let wing =
+            (across * side + 0.28 * normal * -1.0).normalize_or(across) * (0.62 + 0.1 * unit(seed)) * half_length;
         let shape = Shape::Quad { centre, right: half_length * out, up: wing, cut: half_leaf };
         part.add(shape, Material::new(paint::leaf, green).seeded(seed));
     }

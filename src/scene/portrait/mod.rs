@@ -64,7 +64,8 @@ fn lights() -> Vec<Light> {
 
 /// The body sways a little, once per loop.
 fn sway(phase: f32) -> Pose {
-    let turn = Mat3::from_rotation_z(0.012 * (TAU * phase).sin()) * Mat3::from_rotation_y(0.06 + 0.02 * (TAU * phase).cos());
+    let turn =
+        Mat3::from_rotation_z(0.012 * (TAU * phase).sin()) * Mat3::from_rotation_y(0.06 + 0.02 * (TAU * phase).cos());
     Pose { turn: Mat3::IDENTITY, place: HEAD }.over(Pose::about(HIP, turn))
 }
 

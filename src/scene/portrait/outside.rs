@@ -33,12 +33,8 @@ pub fn part() -> Part {
         };
         part.add(shape, Material::new(house, hex(0x2a3448)).seeded(k as u32));
     }
-    let street = Shape::Quad {
-        centre: Vec3::new(-3.5, -1.75, 9.0),
-        right: 6.0 * Vec3::X,
-        up: 4.2 * Vec3::Z,
-        cut: whole,
-    };
+    let street =
+        Shape::Quad { centre: Vec3::new(-3.5, -1.75, 9.0), right: 6.0 * Vec3::X, up: 4.2 * Vec3::Z, cut: whole };
     part.add(street, Material::new(asphalt, hex(0x1b2029)));
     add_trees(&mut part);
     add_lights(&mut part);

@@ -32,7 +32,6 @@ pub fn wood(spot: &Spot) -> Surface {
     grain(spot, spot.p)
 }
 
-
 fn grain(spot: &Spot, p: Vec3) -> Surface {
     let offset = 31.0 * unit(spot.seed);
     let warp = fractal(Vec3::new(1.6 * p.x + offset, 9.0 * p.y, 9.0 * p.z), 3);
@@ -122,7 +121,8 @@ pub fn lamp_shade(spot: &Spot) -> Surface {
 pub fn leaf(spot: &Spot) -> Surface {
     let (u, v) = (spot.uv.x, spot.uv.y);
     let rib = step(0.06, 0.02, v.abs()) + 0.5 * step(0.16, 0.04, ((9.0 * (u - 0.55 * v.abs())).sin()).abs());
-    let tone = 0.78 + 0.3 * unit(spot.seed) + 0.25 * (fractal(Vec3::new(3.0 * u, 3.0 * v, unit(spot.seed) * 50.0), 3) - 0.5);
+    let tone =
+        0.78 + 0.3 * unit(spot.seed) + 0.25 * (fractal(Vec3::new(3.0 * u, 3.0 * v, unit(spot.seed) * 50.0), 3) - 0.5);
     let color = (spot.tint * tone).lerp(hex(0xb9cf8a), 0.25 * rib.min(1.0));
     Surface { wrap: 0.5, emission: 0.015 * color, ..Surface::matt(spot, color) }.glossy(0.07, 18.0)
 }

@@ -52,7 +52,8 @@ fn add_walls(part: &mut Part) {
     solid(part, [-4.0, -1.4, WALL_M], [low.x, 1.8, WALL_M + 0.12], wall);
     solid(part, [high.x, -1.4, WALL_M], [4.0, 1.8, WALL_M + 0.12], wall);
     solid(part, [low.x, -1.4, WALL_M], [high.x, low.y, WALL_M + 0.12], wall);
-    let floor = Shape::Quad { centre: Vec3::new(0.0, FLOOR_Y, 3.0), right: 4.0 * Vec3::X, up: 2.0 * Vec3::Z, cut: whole };
+    let floor =
+        Shape::Quad { centre: Vec3::new(0.0, FLOOR_Y, 3.0), right: 4.0 * Vec3::X, up: 2.0 * Vec3::Z, cut: whole };
     part.add(floor, paint(paint::boards, 0x7a5233));
     solid(part, [-4.0, FLOOR_Y, WALL_M - 0.02], [4.0, FLOOR_Y + 0.09, WALL_M], paint(paint::plain, 0x2a4442));
 }
@@ -117,8 +118,7 @@ fn add_pot(part: &mut Part, foot: Vec3, radius: f32, color: u32, seed: u32, spre
     }
 }
 
-const BOOKS: [u32; 9] =
-    [0x9c3b34, 0x2f5d73, 0xd8a24a, 0x54734f, 0x7d4b63, 0xc9bda3, 0x33415e, 0xb5643c, 0x8a8f5c];
+const BOOKS: [u32; 9] = [0x9c3b34, 0x2f5d73, 0xd8a24a, 0x54734f, 0x7d4b63, 0xc9bda3, 0x33415e, 0xb5643c, 0x8a8f5c];
 
 fn add_shelves(part: &mut Part) {
     let board = paint(paint::wood, 0x8a5a33);
@@ -143,7 +143,8 @@ fn add_shelves(part: &mut Part) {
                 let height = dice.between(0.19, 0.30);
                 let depth = dice.between(0.12, 0.17);
                 let lean = if kind > 0.93 { 0.16 } else { 0.0 };
-                let centre = Vec3::new(x + 0.5 * width + 0.5 * height * lean, y + 0.5 * height, WALL_M - 0.04 - 0.5 * depth);
+                let centre =
+                    Vec3::new(x + 0.5 * width + 0.5 * height * lean, y + 0.5 * height, WALL_M - 0.04 - 0.5 * depth);
                 let half = 0.5 * Vec3::new(width - 0.002, height, depth);
                 let code = BOOKS[(dice.next() * 9.0) as usize % 9];
                 let seed = (x * 1e4) as u32;
@@ -157,12 +158,8 @@ fn add_shelves(part: &mut Part) {
     }
     // A framed picture between the window and the shelves.
     solid(part, [0.02, 0.44, 4.165], [0.52, 0.84, WALL_M], paint(paint::wood, 0x5d3b22));
-    let canvas = Shape::Quad {
-        centre: Vec3::new(0.27, 0.64, 4.163),
-        right: 0.225 * Vec3::X,
-        up: 0.175 * Vec3::Y,
-        cut: whole,
-    };
+    let canvas =
+        Shape::Quad { centre: Vec3::new(0.27, 0.64, 4.163), right: 0.225 * Vec3::X, up: 0.175 * Vec3::Y, cut: whole };
     part.add(canvas, paint(paint::landscape, 0xffffff));
 }
 
@@ -262,7 +259,10 @@ fn add_still_life(part: &mut Part) {
         for k in 2..7 {
             let bud = stem[k].0 + 0.018 * dice.direction();
             let color = hex(0xe9c3b0).lerp(hex(0xd98a86), dice.next());
-            part.add(Shape::Sphere { centre: bud, radius: dice.between(0.010, 0.019) }, Material::new(paint::cloth, color));
+            part.add(
+                Shape::Sphere { centre: bud, radius: dice.between(0.010, 0.019) },
+                Material::new(paint::cloth, color),
+            );
         }
     }
     for (x, y, z) in [(0.34, 0.035, -0.2), (0.405, 0.035, -0.165), (0.345, 0.035, -0.13), (0.365, 0.088, -0.165)] {

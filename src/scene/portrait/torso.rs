@@ -57,5 +57,10 @@ fn knit(spot: &Spot) -> Surface {
     let slope = Vec3::new(stitch(p + e * Vec3::X) - height, stitch(p + e * Vec3::Y) - height, 0.0);
     let normal = (spot.normal - 0.35 * (slope - spot.normal * slope.dot(spot.normal))).normalize_or(spot.normal);
     let wool = 0.93 + 0.14 * fractal(90.0 * p, 2);
-    Surface { wrap: 0.30, normal, open: 0.55 + 0.45 * height, ..Surface::matt(spot, spot.tint * wool * (0.72 + 0.28 * height)) }
+    Surface {
+        wrap: 0.30,
+        normal,
+        open: 0.55 + 0.45 * height,
+        ..Surface::matt(spot, spot.tint * wool * (0.72 + 0.28 * height))
+    }
 }
