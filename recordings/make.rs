@@ -23,7 +23,7 @@ const SAMPLES_PER_PIXEL: u32 = 16;
 const DEPTH_UNITS_PER_METRE: f32 = 5000.0;
 const BASELINE_M: f32 = 0.06;
 /// Every so many frames there is a right eye's picture.
-const RIGHT_EVERY: u32 = 4;
+const RIGHT_EVERY: u32 = 6;
 const COC_AT_INFINITY_PX: f32 = 14.0;
 /// Rays per pixel of the true blur: more than half the pixels of the widest disc.
 const LENS_RAYS: usize = 720;
