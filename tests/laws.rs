@@ -21,26 +21,23 @@ fn blur(settings: &Settings, color: &ColorImage, map: &DepthMap, field: &CocFiel
 
 #[test]
 fn a_constant_picture_stays_constant() {
-    let (width, height) = (83, 61);
+    let (width, height) = (67, 45);
     let map = three_depths(width, height);
     for effect in EFFECTS {
         for shape in shapes() {
-            for (quality, rank) in [
-                (Quality::Draft, None),
-                (Quality::Balanced, None),
-                (Quality::Best, None),
-                (Quality::Balanced, Some(Rank::Terms(1))),
-                (Quality::Fast, Some(Rank::Terms(7))),
-                (Quality::Draft, Some(Rank::Full)),
+            for (quality, rank, highlights) in [
+                (Quality::Draft, None, 0.0),
+                (Quality::Balanced, None, 8.0),
+                (Quality::Best, Some(Rank::Terms(7)), 0.0),
+                (Quality::Fast, Some(Rank::Terms(1)), 8.0),
+                (Quality::Draft, Some(Rank::Full), 0.0),
             ] {
-                for highlights in [0.0, 8.0] {
-                    let aperture = Aperture { shape: shape.clone(), intensity: 0.0 };
-                    let settings = Settings { aperture, quality, rank, highlights, ..settings(effect) };
-                    let constant = color(width, height, |_, _| [200, 90, 13]);
-                    let out = blur(&settings, &constant, &map, &coc(effect, height));
-                    let worst = out.rgb.iter().zip(&constant.rgb).map(|(a, b)| a.abs_diff(*b)).max();
-                    assert!(worst <= Some(1), "{effect:?} {shape:?} {quality} {rank:?} {highlights}: {worst:?}");
-                }
+                let aperture = Aperture { shape: shape.clone(), intensity: 0.0 };
+                let settings = Settings { aperture, quality, rank, highlights, ..settings(effect) };
+                let constant = color(width, height, |_, _| [200, 90, 13]);
+                let out = blur(&settings, &constant, &map, &coc(effect, height));
+                let worst = out.rgb.iter().zip(&constant.rgb).map(|(a, b)| a.abs_diff(*b)).max();
+                assert!(worst <= Some(1), "{effect:?} {shape:?} {quality} {rank:?} {highlights}: {worst:?}");
             }
         }
     }
