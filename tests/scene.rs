@@ -10,18 +10,19 @@ const COC_AT_INFINITY_PX: f32 = 14.0;
 const FOCUS_M: f32 = 1.2;
 
 fn view() -> View {
-    View { width: 96, height: 80, focal_px: 600.0, eye_offset_m: 0.0 }
+    View { width: 97, height: 81, focal_px: 600.0, eye_offset_m: 0.0 }
 }
 
-/// A small light on the ray of the picture's middle.
-fn light_at(depth_m: f32) -> PointLight {
-    PointLight { centre_m: depth_m * Vec3::Z, radius_m: 0.3 * depth_m / view().focal_px, radiance: Vec3::splat(50.0) }
+/// A light on the ray of the picture's middle, `radius_px` wide to either side when sharp.
+fn light_at(depth_m: f32, radius_px: f32) -> PointLight {
+    let radius_m = radius_px * depth_m / view().focal_px;
+    PointLight { centre_m: depth_m * Vec3::Z, radius_m, radiance: Vec3::splat(50.0) }
 }
 
 /// The light's picture through an aperture.
-fn blurred(depth_m: f32, points: &[DVec2]) -> LinearImage {
+fn blurred(light: PointLight, points: &[DVec2]) -> LinearImage {
     let lens = ThinLens { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: FOCUS_M, aperture: points };
-    Scene::lights(&[light_at(depth_m)]).render_thin_lens(&view(), 0.0, &lens, 2).hdr
+    Scene::lights(&[light]).render_thin_lens(&view(), 0.0, &lens, 2).hdr
 }
 
 /// Moments of a picture about the optical axis: the mean position and the mean of the squared distance from it.
@@ -48,9 +49,9 @@ fn a_point_becomes_a_disc_of_the_thin_lens_radius() {
     let disc = lens_points(&of(Shape::Disc), 6000);
     let coc = DepthCoc { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: FOCUS_M, max_coc_px: 100.0 };
     for depth_m in [0.5, 0.8, 2.0, 4.0, 12.0] {
-        let (mean, spread) = moments_px(&blurred(depth_m, &disc));
-        // A disc of radius r spreads by r^2 / 2; the light itself, 0.3 px, and the pixel, a square, add theirs.
-        let radius_px = (2.0 * (spread - 0.3f64.powi(2) / 2.0 - 1.0 / 6.0)).sqrt();
+        let (mean, spread) = moments_px(&blurred(light_at(depth_m, 3.0), &disc));
+        // A disc of radius r spreads by r^2 / 2; the light itself, 3 px, and the pixel, a square, add theirs.
+        let radius_px = (2.0 * (spread - 4.5 - 1.0 / 6.0)).sqrt();
         let expected_px = f64::from(coc.coc_px(depth_m).abs());
         assert!((radius_px - expected_px).abs() < 0.1, "{depth_m} m: radius {radius_px}, expected {expected_px}");
         assert!(mean.length() < 0.05, "{depth_m} m: the middle moved by {mean}");
@@ -60,8 +61,8 @@ fn a_point_becomes_a_disc_of_the_thin_lens_radius() {
 #[test]
 fn in_focus_the_lens_is_a_pinhole() {
     let disc = lens_points(&of(Shape::Disc), 4000);
-    let (_, spread) = moments_px(&blurred(FOCUS_M, &disc));
-    assert!(spread < 0.3, "{spread}");
+    let (_, spread) = moments_px(&blurred(light_at(FOCUS_M, 0.3), &disc));
+    assert!(spread < 0.01, "all of it is in one pixel: {spread}");
 }
 
 #[test]
@@ -69,7 +70,7 @@ fn a_far_light_shows_the_aperture_and_a_near_one_the_aperture_turned() {
     // A triangle with one corner to the left: its spread is skewed to that side.
     let triangle = lens_points(&of(Shape::Polygon { blades: 3, rotation_deg: 0.0, curvature: 0.0 }), 3000);
     let reach = |depth_m: f32| {
-        let image = blurred(depth_m, &triangle);
+        let image = blurred(light_at(depth_m, 0.3), &triangle);
         let axis_px = view().principal_point_px().x;
         let lit = image.rgb.iter().enumerate().filter(|(_, light)| light.x > 1e-4);
         let columns = lit.map(|(index, _)| (index % image.width as usize) as f32 - axis_px);
@@ -86,10 +87,10 @@ fn a_far_light_shows_the_aperture_and_a_near_one_the_aperture_turned() {
 fn light_is_neither_made_nor_lost_and_clipping_comes_before_the_lens() {
     let disc = lens_points(&of(Shape::Disc), 2000);
     let lens = ThinLens { coc_at_infinity_px: 6.0, focus_m: FOCUS_M, aperture: &disc };
-    let light = PointLight { radius_m: 0.01, ..light_at(3.0) };
+    let light = light_at(3.0, 2.0);
     let picture = Scene::lights(&[light]).render_thin_lens(&view(), 0.0, &lens, 2);
     let total = |image: &LinearImage| image.rgb.iter().map(|light| f64::from(light.x)).sum::<f64>();
-    let area_px = std::f64::consts::PI * (0.01 * 600.0 / 3.0f64).powi(2);
+    let area_px = std::f64::consts::PI * 2.0f64.powi(2);
     assert!((total(&picture.clipped) / area_px - 1.0).abs() < 0.02, "{}", total(&picture.clipped));
     assert!((total(&picture.hdr) / total(&picture.clipped) - 50.0).abs() < 1e-2);
 }
@@ -167,8 +168,8 @@ fn empty_pictures_and_apertures_are_answered() {
 #[test]
 fn encoding_follows_the_srgb_formula() {
     assert_eq!([0.0, 1.0, 7.0, -1.0].map(encode_srgb), [0, 255, 255, 0]);
-    // 0.0031308 is the end of the linear part; 0.2140 is the middle grey of 8 bits; a NaN is black.
-    assert_eq!([0.003_130_8, 0.214_041_1, f32::NAN].map(encode_srgb), [10, 128, 0]);
+    // 0.0031308 is the end of the linear part; 0.21586 is 128; a NaN is black.
+    assert_eq!([0.003_130_8, 0.215_860_5, f32::NAN].map(encode_srgb), [10, 128, 0]);
 }
 
 #[test]

@@ -112,12 +112,12 @@ impl Pose {
     }
 
     /// A world point in the part's frame.
-    pub fn to_local(&self, p: Vec3) -> Vec3 {
+    pub fn to_local(self, p: Vec3) -> Vec3 {
         self.turn.transpose() * (p - self.place)
     }
 
     /// A point of the part in the world.
-    pub fn to_world(&self, p: Vec3) -> Vec3 {
+    pub fn to_world(self, p: Vec3) -> Vec3 {
         self.turn * p + self.place
     }
 

@@ -256,8 +256,8 @@ fn add_still_life(part: &mut Part) {
             .map(|s| (from + 0.34 * s * (Vec3::Y + lean * s), 0.0032 - 0.0015 * s))
             .collect();
         part.add_chain(&stem, paint(paint::plain, 0x5c4a2c));
-        for k in 2..7 {
-            let bud = stem[k].0 + 0.018 * dice.direction();
+        for (on, _) in &stem[2..] {
+            let bud = *on + 0.018 * dice.direction();
             let color = hex(0xe9c3b0).lerp(hex(0xd98a86), dice.next());
             part.add(
                 Shape::Sphere { centre: bud, radius: dice.between(0.010, 0.019) },
