@@ -56,3 +56,8 @@ fn share_at(front: vec2<f32>, behind: vec2<f32>, coc_px: f32) -> f32 {
 fn node_at(radius_px: f32, steps_per_px: f32, nodes: u32) -> u32 {
     return min(u32(radius_px * steps_per_px + 0.5), nodes - 1u);
 }
+
+// Highlights: all channels share a factor of the luminance, so that the hue stays.
+fn luminance(light: vec3<f32>) -> f32 {
+    return dot(light, vec3(0.2126, 0.7152, 0.0722));
+}

@@ -57,8 +57,7 @@ fn chosen(pixel: vec2<u32>) -> vec3<f32> {
 }
 
 fn code_of(light: f32) -> u32 {
-    let compressed = select(light, light * frame.expansion / (frame.expansion + light), frame.expansion > 0.0);
-    let x = clamp(compressed, 0.0, 1.0);
+    let x = clamp(light, 0.0, 1.0);
     let code = select(1.055 * pow(x, 1.0 / 2.4) - 0.055, x * 12.92, x <= 0.0031308);
     return u32(code * 255.0 + 0.5);
 }
@@ -72,6 +71,9 @@ fn color_of(index: u32) -> vec3<u32> {
         color = chosen(pixel);
     } else {
         color = blurred[index].rgb;
+    }
+    if frame.expansion > 0.0 {
+        color *= frame.expansion / (frame.expansion + luminance(color));
     }
     return vec3(code_of(color.r), code_of(color.g), code_of(color.b));
 }

@@ -8,8 +8,7 @@
 
 fn light_of(index: u32) -> f32 {
     let code = f32((color[index / 4u] >> (8u * (index % 4u))) & 255u) / 255.0;
-    let light = select(pow((code + 0.055) / 1.055, 2.4), code / 12.92, code <= 0.04045);
-    return select(light, light * frame.expansion / (frame.expansion - light), frame.expansion > 0.0);
+    return select(pow((code + 0.055) / 1.055, 2.4), code / 12.92, code <= 0.04045);
 }
 
 fn coc_of(x: u32, y: u32) -> f32 {
@@ -37,5 +36,9 @@ fn unpack(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let pixel = id.y * frame.size.x + id.x;
-    scene[pixel] = vec4(light_of(3u * pixel), light_of(3u * pixel + 1u), light_of(3u * pixel + 2u), coc_of(id.x, id.y));
+    var light = vec3(light_of(3u * pixel), light_of(3u * pixel + 1u), light_of(3u * pixel + 2u));
+    if frame.expansion > 0.0 {
+        light *= frame.expansion / (frame.expansion - luminance(light));
+    }
+    scene[pixel] = vec4(light, coc_of(id.x, id.y));
 }

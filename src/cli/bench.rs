@@ -122,7 +122,7 @@ fn measure(
             "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
         ));
     };
-    let (coc, depth) = render::prepared(&blur, size, Some(depth.clone()))?;
+    let (coc, depth) = render::prepared(&blur, color, Some(depth.clone()))?;
     let mut bokeh = executor.create(&settings, size)?;
     for _ in 0..WARM_UP_FRAMES {
         time_of_a_frame(&mut *bokeh, color, depth.as_ref(), coc)?;

@@ -73,7 +73,7 @@ fn blurred(
 ) -> Result<(ColorImage, String), CliError> {
     let size = color.size();
     let Some(settings) = blur.settings(size) else { return Ok((color, "not blurred".to_string())) };
-    let (coc, depth) = prepared(blur, size, depth)?;
+    let (coc, depth) = prepared(blur, &color, depth)?;
     let mut bokeh = executor.create(&settings, size)?;
     bokeh.submit(Job {
         ticket: 0,
@@ -94,17 +94,17 @@ fn blurred(
 /// [`BokehError::NoDepth`] when the blur follows depth and there is none.
 pub fn prepared(
     blur: &Blur,
-    size: (u32, u32),
+    color: &ColorImage,
     depth: Option<DepthMap>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
-    match (blur.coc_rule(size), depth) {
+    match (blur.coc_rule(color.size()), depth) {
         (CocRule::Fixed(field), _) => Ok((field, None)),
         (CocRule::Depth { .. }, None) => Err(BokehError::NoDepth),
         (CocRule::Depth { focus, lens, max_coc_px }, Some(mut map)) => {
             // Focus looks at what was measured, so it comes before the holes are filled.
             let focus_m = Focus::new(focus).focus_m(&map, 0);
-            Filler::new().fill(&mut map);
-            Ok((lens.field(focus_m, size.0, max_coc_px), Some(map)))
+            Filler::new().fill_by(&mut map, color);
+            Ok((lens.field(focus_m, color.width, max_coc_px), Some(map)))
         }
     }
 }

@@ -6,7 +6,8 @@
 
 use std::mem;
 
-use crate::frame::DepthMap;
+use super::claim::Claimer;
+use crate::frame::{ColorImage, DepthMap};
 
 /// Fills depth maps; owns the memory for it, and the last map that had any depth.
 #[derive(Debug, Default)]
@@ -16,6 +17,8 @@ pub struct Filler {
     /// Nearest known depth above, then below, per column.
     column_m: Vec<f32>,
     last_good: DepthMap,
+    hole: Vec<bool>,
+    claimer: Claimer,
 }
 
 impl Filler {
@@ -42,6 +45,19 @@ impl Filler {
         }
         self.last_good.resize(map.width, map.height);
         self.last_good.metres.copy_from_slice(&map.metres);
+    }
+
+    /// As [`Filler::fill`], and then by the colours of the picture that belongs to the map: what beside a near object
+    /// was filled from behind but looks like the object becomes part of it.
+    pub fn fill_by(&mut self, map: &mut DepthMap, color: &ColorImage) {
+        self.hole.clear();
+        self.hole.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
+        let any = self.hole.iter().any(|&hole| hole) && self.hole.iter().any(|&hole| !hole);
+        self.fill(map);
+        if any {
+            self.claimer.claim(map, &self.hole, color);
+            self.last_good.metres.copy_from_slice(&map.metres);
+        }
     }
 
     /// One round of four scans; returns whether the map is full now.

@@ -1,6 +1,7 @@
 //! Where depth comes from, and what is made of it before the blur: a focus distance ([`focus`]) and a map without
 //! holes ([`fill`]).
 
+mod claim;
 pub mod fill;
 pub mod focus;
 pub mod recorded;

@@ -57,10 +57,10 @@ impl Coc {
 
 impl DepthCoc {
     /// Focuses on what was measured, and only then makes up what was not.
-    fn see(&mut self, map: &mut DepthMap, time_ns: u64, width_px: u32) -> CocField {
+    fn see(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
         let focus_m = self.focus.focus_m(map, time_ns);
-        self.filler.fill(map);
-        self.lens.field(focus_m, width_px, self.max_coc_px)
+        self.filler.fill_by(map, color);
+        self.lens.field(focus_m, color.width, self.max_coc_px)
     }
 }
 
@@ -88,7 +88,7 @@ impl Stage<'_> {
                             continue;
                         }
                     };
-                    let field = coc.see(&mut map, stamp.time_ns, color.width);
+                    let field = coc.see(&mut map, &color, stamp.time_ns);
                     self.times.add(self.clock.now_ns() - began_ns);
                     (Some(map), field)
                 }

@@ -10,7 +10,7 @@ use pulp::{Simd, WithSimd};
 use super::bin::Share;
 use super::rows::{BinRows, Rows, STRIP};
 use super::simd::madd;
-use super::unpack::{compress, linear_to_srgb};
+use super::unpack::{compress, linear_to_srgb, luminance};
 use crate::bokeh::plan::{CELL, Compositing, Plan};
 
 /// Pixels composited at once.
@@ -69,7 +69,7 @@ impl WithSimd for Composite<'_> {
                     Compositing::Select => select::<S>(self.plan, self.bins, self.shares, self.scene, y, x0),
                     Compositing::Gather => gathered(self.gathered, width, y, x0),
                 };
-                encode(&color, self.plan.expansion, self.encode, &mut row[x0 * 3..][..take * 3]);
+                encode(color, self.plan.expansion, self.encode, &mut row[x0 * 3..][..take * 3]);
             }
         }
     }
@@ -237,13 +237,19 @@ fn stretch<V: Simd, const S: usize>(
 }
 
 #[inline(always)]
-fn encode(color: &[[f32; CHUNK]; 3], expansion: f32, table: &[u8], out: &mut [u8]) {
+fn encode(mut color: [[f32; CHUNK]; 3], expansion: f32, table: &[u8], out: &mut [u8]) {
+    if expansion.is_finite() {
+        for x in 0..CHUNK {
+            let factor = compress(luminance(color[0][x], color[1][x], color[2][x]), expansion);
+            for p in 0..3 {
+                color[p][x] *= factor;
+            }
+        }
+    }
     let mut index = [[0u16; CHUNK]; 3];
-    for (index, color) in index.iter_mut().zip(color) {
+    for (index, color) in index.iter_mut().zip(&color) {
         for (index, &light) in index.iter_mut().zip(color) {
-            let light = compress(light, expansion);
-            let light = light.clamp(0.0, 1.0);
-            *index = (light * (ENCODE_STEPS - 1) as f32 + 0.5) as u16;
+            *index = (light.clamp(0.0, 1.0) * (ENCODE_STEPS - 1) as f32 + 0.5) as u16;
         }
     }
     for (x, pixel) in out.chunks_exact_mut(3).enumerate() {
@@ -255,21 +261,16 @@ fn encode(color: &[[f32; CHUNK]; 3], expansion: f32, table: &[u8], out: &mut [u8
 
 #[cfg(test)]
 mod tests {
-    use super::super::unpack::{decode_table, expand};
+    use super::super::unpack::decode_table;
     use super::*;
 
     #[test]
     fn decoding_and_encoding_is_the_identity() {
-        let encode_to = encode_table();
-        for expansion in [f32::INFINITY, 1.125, 2.0] {
-            let decode = decode_table(expansion);
-            for code in 0..=255u8 {
-                assert_eq!(decode[code as usize], expand(decode_table(f32::INFINITY)[code as usize], expansion));
-                let color = [[decode[code as usize]; CHUNK]; 3];
-                let mut out = [0u8; 6];
-                encode(&color, expansion, &encode_to, &mut out);
-                assert_eq!(out, [code; 6]);
-            }
+        let (decode, encode_to) = (decode_table(), encode_table());
+        for code in 0..=255u8 {
+            let mut out = [0u8; 6];
+            encode([[decode[code as usize]; CHUNK]; 3], f32::INFINITY, &encode_to, &mut out);
+            assert_eq!(out, [code; 6]);
         }
     }
 }

@@ -31,7 +31,7 @@ use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
-pub use unpack::{compress, expand, linear_to_srgb, srgb_to_linear};
+pub use unpack::{linear_to_srgb, srgb_to_linear};
 
 /// Runs a plan on the CPU.
 pub struct CpuBokeh {
@@ -103,7 +103,7 @@ impl CpuBokeh {
             result: vec![0.0; width * height * 3],
         });
         Self {
-            decode: unpack::decode_table(plan.expansion),
+            decode: unpack::decode_table(),
             encode: composite::encode_table(),
             scene: Rows::new(width, height, MARGIN),
             tiles: vec![(0.0, 0.0); width.div_ceil(TILE_W) * height.div_ceil(TILE_H)],
@@ -179,13 +179,14 @@ impl CpuBokeh {
         let band = TILE_H * self.scene.row_len();
         let out = Shelf::new(&mut self.scene.data, band, &mut self.taken);
         let tiles = Shelf::new(&mut self.tiles, across, &mut self.taken_too);
-        let (arch, table) = (self.arch, &self.decode);
+        let (arch, table, expansion) = (self.arch, &self.decode, self.plan.expansion);
         self.team.run(self.plan.height.div_ceil(TILE_H), &|part| {
             arch.dispatch(Unpack {
                 color,
                 depth,
                 coc,
                 table,
+                expansion,
                 y0: part * TILE_H,
                 out: out.part(part),
                 stride,

@@ -16,21 +16,30 @@ pub fn linear_to_srgb(light: f32) -> f32 {
     if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The table from 8-bit sRGB to expanded linear light `y = x / (expansion - x)`, scaled to keep black's slope 1.
+/// The table from 8-bit sRGB to linear light.
+pub fn decode_table() -> [f32; 256] {
+    std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0))
+}
+
+/// Luminance of linear light (Rec. 709 weights).
+#[inline(always)]
+pub fn luminance(r: f32, g: f32, b: f32) -> f32 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+/// What a colour of this luminance is multiplied by to recover its highlight; dark colours hardly change.
 ///
-/// With `expansion = 1 + 1/M`, white becomes `M + 1` times as bright as it looks; infinity leaves light as it is.
-pub fn decode_table(expansion: f32) -> [f32; 256] {
-    std::array::from_fn(|code| expand(srgb_to_linear(code as f32 / 255.0), expansion))
+/// With `expansion = 1 + 1/M`, white becomes `M + 1` times as bright as it looks. All channels share the factor, so
+/// that the hue stays.
+#[inline(always)]
+pub fn expand(luminance: f32, expansion: f32) -> f32 {
+    expansion / (expansion - luminance)
 }
 
-/// Highlight expansion, the inverse of [`compress`].
-pub fn expand(light: f32, expansion: f32) -> f32 {
-    if expansion.is_finite() { light * expansion / (expansion - light) } else { light }
-}
-
-/// Undoes [`expand`].
-pub fn compress(light: f32, expansion: f32) -> f32 {
-    if expansion.is_finite() { light * expansion / (expansion + light) } else { light }
+/// Undoes [`expand`]: the factor for a colour of this expanded luminance.
+#[inline(always)]
+pub fn compress(luminance: f32, expansion: f32) -> f32 {
+    expansion / (expansion + luminance)
 }
 
 /// The rows of one row of tiles.
@@ -43,6 +52,8 @@ pub struct Unpack<'a> {
     pub coc: &'a CocField,
     /// From [`decode_table`].
     pub table: &'a [f32; 256],
+    /// Highlight recovery, infinite when off.
+    pub expansion: f32,
     /// First row.
     pub y0: usize,
     /// Rows of `[r, g, b, coc][stride]`, with `MARGIN` columns in front.
@@ -66,10 +77,16 @@ impl WithSimd for Unpack<'_> {
             let (blue, coc) = rest.split_at_mut(self.stride);
             let pixels = self.color.rgb[y * width * 3..][..width * 3].chunks_exact(3);
             let (red, green, blue) = (&mut red[MARGIN..], &mut green[MARGIN..], &mut blue[MARGIN..]);
-            for (((pixel, r), g), b) in pixels.zip(red).zip(green).zip(blue) {
+            for (((pixel, r), g), b) in pixels.zip(&mut *red).zip(&mut *green).zip(&mut *blue) {
                 *r = self.table[pixel[0] as usize];
                 *g = self.table[pixel[1] as usize];
                 *b = self.table[pixel[2] as usize];
+            }
+            if self.expansion.is_finite() {
+                for x in 0..width {
+                    let factor = expand(luminance(red[x], green[x], blue[x]), self.expansion);
+                    (red[x], green[x], blue[x]) = (red[x] * factor, green[x] * factor, blue[x] * factor);
+                }
             }
             coc_row(self.coc, self.depth, y, self.color.height as usize, &mut coc[MARGIN..MARGIN + width]);
             // Whole tiles can be worked on, and a little around them.
@@ -123,15 +140,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn expansion_is_undone_and_keeps_black_and_white() {
-        for expansion in [f32::INFINITY, 1.0 + 1.0 / 8.0, 1.5] {
-            for code in 0..=255 {
-                let light = srgb_to_linear(code as f32 / 255.0);
-                let back = compress(expand(light, expansion), expansion);
-                assert!((back - light).abs() < 1e-5, "{expansion} {code}");
+    fn expansion_is_undone_and_white_is_as_bright_as_said() {
+        for expansion in [1.0 + 1.0 / 8.0, 1.5] {
+            for step in 0..=100 {
+                let light = step as f32 / 100.0;
+                let expanded = light * expand(light, expansion);
+                assert!((expanded * compress(expanded, expansion) - light).abs() < 1e-5, "{expansion} {light}");
             }
-            assert_eq!(expand(0.0, expansion), 0.0);
         }
+        assert_eq!(expand(0.0, 1.125), 1.0);
         assert!((expand(1.0, 1.0 + 1.0 / 8.0) - 9.0).abs() < 1e-4);
     }
 
