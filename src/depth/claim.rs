@@ -23,78 +23,103 @@ pub struct Claimer {
     claims_m: Vec<f32>,
 }
 
+/// A row or a column: its pixels are `first`, `first + step`, and so on.
+#[derive(Clone, Copy)]
+struct Line {
+    first: usize,
+    step: usize,
+    length: usize,
+}
+
+impl Line {
+    fn at(self, k: usize) -> usize {
+        self.first + k * self.step
+    }
+}
+
 impl Claimer {
     /// Moves holes (`hole`, one flag a pixel) of a map that was filled from behind to the near side that has their
-    /// colour. Does nothing when the picture has another size than the map.
-    pub fn claim(&mut self, map: &mut DepthMap, hole: &[bool], color: &ColorImage) {
-        let width = map.width as usize;
-        if color.size() != map.size() || width == 0 {
+    /// colour, along rows and then, for what is left, along columns; what was moved is no hole any more. Does nothing
+    /// when the picture has another size than the map.
+    pub fn claim(&mut self, map: &mut DepthMap, hole: &mut [bool], color: &ColorImage) {
+        let (width, height) = (map.width as usize, map.height as usize);
+        if color.size() != map.size() || map.metres.is_empty() {
             return;
         }
+        let longest = ((width as f32 * LONGEST) as usize).max(4);
+        let rows = (0..height).map(|y| Line { first: y * width, step: 1, length: width });
+        self.along(rows, width, longest, map, hole, color);
+        let columns = (0..width).map(|x| Line { first: x, step: width, length: height });
+        self.along(columns, 1, longest, map, hole, color);
+    }
+
+    /// Claims along each line, then lets two of three neighbours across the lines (`across` apart) agree.
+    fn along(
+        &mut self,
+        lines: impl Iterator<Item = Line>,
+        across: usize,
+        longest: usize,
+        map: &mut DepthMap,
+        hole: &mut [bool],
+        color: &ColorImage,
+    ) {
         self.claims_m.clear();
         self.claims_m.resize(map.metres.len(), 0.0);
-        let rows = map.metres.chunks_exact(width).zip(hole.chunks_exact(width));
-        for ((row, hole), (claims, rgb)) in
-            rows.zip(self.claims_m.chunks_exact_mut(width).zip(color.rgb.chunks_exact(3 * width)))
-        {
-            claim_row(row, hole, rgb, claims);
+        for line in lines {
+            claim_line(line, longest, &map.metres, hole, &color.rgb, &mut self.claims_m);
         }
-        // One row alone may be mistaken: two of three must agree.
-        for (y, row) in map.metres.chunks_exact_mut(width).enumerate() {
-            for (x, metres) in row.iter_mut().enumerate() {
-                let at = |y: usize| self.claims_m.get(y * width + x).copied().unwrap_or(0.0);
-                let beside = [y.checked_sub(1).map_or(0.0, at), at(y + 1)];
-                let votes = beside.iter().filter(|&&claim_m| claim_m > 0.0).count() + usize::from(at(y) > 0.0);
-                if hole[y * width + x] && votes >= 2 {
-                    *metres = metres.min(if at(y) > 0.0 { at(y) } else { beside[0].max(beside[1]) });
-                }
+        for (k, hole) in hole.iter_mut().enumerate().filter(|(_, hole)| **hole) {
+            let claim_m = |k: Option<usize>| k.and_then(|k| self.claims_m.get(k)).copied().unwrap_or(0.0);
+            let claims = [claim_m(k.checked_sub(across)), claim_m(Some(k)), claim_m(Some(k + across))];
+            if claims.iter().filter(|&&claim_m| claim_m > 0.0).count() >= 2 {
+                map.metres[k] = if claims[1] > 0.0 { claims[1] } else { claims[0].min(claims[2]) };
+                *hole = false;
             }
         }
     }
 }
 
-fn claim_row(row: &[f32], hole: &[bool], rgb: &[u8], claims: &mut [f32]) {
-    let longest = ((row.len() as f32 * LONGEST) as usize).max(4);
+fn claim_line(line: Line, longest: usize, metres: &[f32], hole: &[bool], rgb: &[u8], claims: &mut [f32]) {
     let mut start = 0;
-    while let Some(first) = (start..row.len()).find(|&x| hole[x]) {
-        let end = (first..row.len()).find(|&x| !hole[x]).unwrap_or(row.len());
+    while let Some(first) = (start..line.length).find(|&k| hole[line.at(k)]) {
+        let end = (first..line.length).find(|&k| !hole[line.at(k)]).unwrap_or(line.length);
         start = end;
-        if first == 0 || end == row.len() || end - first > longest {
+        if first == 0 || end == line.length || end - first > longest {
             continue;
         }
-        let (left_m, right_m) = (row[first - 1], row[end]);
-        let left = mean_color(rgb, first.saturating_sub(SAMPLE_PX)..first);
-        let right = mean_color(rgb, end..(end + SAMPLE_PX).min(row.len()));
-        if left_m * SAME_SURFACE < right_m {
-            grow(first..end, left_m, left, right, rgb, claims);
-        } else if right_m * SAME_SURFACE < left_m {
-            grow((first..end).rev(), right_m, right, left, rgb, claims);
+        let (before_m, after_m) = (metres[line.at(first - 1)], metres[line.at(end)]);
+        let before = mean_color(rgb, line, first.saturating_sub(SAMPLE_PX)..first);
+        let after = mean_color(rgb, line, end..(end + SAMPLE_PX).min(line.length));
+        if before_m * SAME_SURFACE < after_m {
+            grow(line, first..end, before_m, (before, after), rgb, claims);
+        } else if after_m * SAME_SURFACE < before_m {
+            grow(line, (first..end).rev(), after_m, (after, before), rgb, claims);
         }
     }
 }
 
-/// Takes pixels in order for the near side while they have its colour.
+/// Takes pixels in order for the near side while they have its colour rather than the far side's.
 fn grow(
+    line: Line,
     pixels: impl Iterator<Item = usize>,
     near_m: f32,
-    mut near: [f32; 3],
-    far: [f32; 3],
+    (mut near, far): ([f32; 3], [f32; 3]),
     rgb: &[u8],
     claims: &mut [f32],
 ) {
-    for x in pixels {
-        let own = mean_color(rgb, x..x + 1);
+    for k in pixels {
+        let own = mean_color(rgb, line, k..k + 1);
         if distance(own, near) * PREFERENCE >= distance(own, far) {
             break;
         }
-        claims[x] = near_m;
+        claims[line.at(k)] = near_m;
         near = std::array::from_fn(|p| near[p] + FOLLOW * (own[p] - near[p]));
     }
 }
 
-fn mean_color(rgb: &[u8], columns: std::ops::Range<usize>) -> [f32; 3] {
-    let count = columns.len().max(1) as f32;
-    std::array::from_fn(|p| columns.clone().map(|x| f32::from(rgb[3 * x + p])).sum::<f32>() / count)
+fn mean_color(rgb: &[u8], line: Line, pixels: std::ops::Range<usize>) -> [f32; 3] {
+    let count = pixels.len().max(1) as f32;
+    std::array::from_fn(|p| pixels.clone().map(|k| f32::from(rgb[3 * line.at(k) + p])).sum::<f32>() / count)
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -116,8 +141,8 @@ mod tests {
             map.metres[k] = if x < 40 { 1.0 } else { 3.0 };
             color.rgb[3 * k..3 * k + 3].copy_from_slice(if x < 45 { &[40, 30, 25] } else { &[180, 190, 185] });
         }
-        let hole: Vec<bool> = (0..(width * height) as usize).map(|k| (40..48).contains(&(k % 80))).collect();
-        Claimer::default().claim(&mut map, &hole, &color);
+        let mut hole: Vec<bool> = (0..(width * height) as usize).map(|k| (40..48).contains(&(k % 80))).collect();
+        Claimer::default().claim(&mut map, &mut hole, &color);
         for (k, &metres) in map.metres.iter().enumerate() {
             assert_eq!(metres, if k % 80 < 45 { 1.0 } else { 3.0 }, "column {}", k % 80);
         }
@@ -127,11 +152,11 @@ mod tests {
     fn like_colours_stay_filled_from_behind() {
         let mut map = DepthMap { width: 9, height: 3, metres: [1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0].repeat(3) };
         let before = map.clone();
-        let hole = [false, false, false, true, true, true, false, false, false].repeat(3);
+        let mut hole = [false, false, false, true, true, true, false, false, false].repeat(3);
         let mut claimer = Claimer::default();
-        claimer.claim(&mut map, &hole, &ColorImage::new(9, 3));
+        claimer.claim(&mut map, &mut hole, &ColorImage::new(9, 3));
         assert_eq!(map, before);
-        claimer.claim(&mut map, &hole, &ColorImage::new(3, 1));
+        claimer.claim(&mut map, &mut hole, &ColorImage::new(3, 1));
         assert_eq!(map, before);
     }
 }

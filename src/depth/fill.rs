@@ -55,7 +55,7 @@ impl Filler {
         let any = self.hole.iter().any(|&hole| hole) && self.hole.iter().any(|&hole| !hole);
         self.fill(map);
         if any {
-            self.claimer.claim(map, &self.hole, color);
+            self.claimer.claim(map, &mut self.hole, color);
             self.last_good.metres.copy_from_slice(&map.metres);
         }
     }
