@@ -1,5 +1,6 @@
 //! `bench`: how fast the blur is on this machine.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use clap::{Args, value_parser};
@@ -9,12 +10,12 @@ use super::config::{Blur, Executor};
 use super::error::CliError;
 use super::values::{self, Size, above_zero};
 use super::{defaults, options, print, render};
-use crate::bokeh::{Bokeh, Job};
+use crate::bokeh::{Bokeh, Job, PassTimes};
 use crate::budget::Quality;
 use crate::capture::Camera;
 use crate::capture::synthetic::{Format, Synthetic};
 use crate::frame::{ColorImage, DepthMap};
-use crate::link::pool::Pooled;
+use crate::link::pool::Pool;
 use crate::optics::CocField;
 
 /// Frames before those that are measured: caches and clocks settle.
@@ -58,6 +59,9 @@ pub struct BenchCommand {
     /// One JSON object a line, instead of a table
     #[arg(long)]
     json: bool,
+    /// Also the median of each pass, in milliseconds
+    #[arg(long)]
+    passes: bool,
     #[command(flatten)]
     blur: options::Blur,
     #[command(flatten)]
@@ -76,6 +80,7 @@ struct Measured {
     p95_ms: f64,
     max_ms: f64,
     frames_per_s: f64,
+    passes_ms: BTreeMap<&'static str, f64>,
 }
 
 /// Runs the command; each line is printed as soon as it is measured.
@@ -99,7 +104,7 @@ pub fn run(command: &BenchCommand) -> Result<(), CliError> {
                 for &threads in &threads {
                     let executor = Executor::new(command.backend, command.adapter.clone(), threads);
                     let measured = measure(command, (&color, &depth), coc_px, quality, &executor)?;
-                    print(measured.line(command.json).as_bytes())?;
+                    print(measured.line(command.json, command.passes).as_bytes())?;
                 }
             }
         }
@@ -124,46 +129,70 @@ fn measure(
     };
     let (coc, depth) = render::prepared(&blur, color, Some(depth.clone()))?;
     let mut bokeh = executor.create(&settings, size)?;
+    let buffers = Buffers {
+        colors: Pool::new(bokeh.capacity(), || color.clone()),
+        depths: depth.map(|depth| Pool::new(bokeh.capacity(), || depth.clone())),
+        results: Pool::new(bokeh.capacity(), || ColorImage::new(size.0, size.1)),
+    };
     for _ in 0..WARM_UP_FRAMES {
-        time_of_a_frame(&mut *bokeh, color, depth.as_ref(), coc)?;
+        buffers.frame(&mut *bokeh, coc)?;
     }
-    let times: Result<Vec<Duration>, CliError> =
-        (0..command.frames).map(|_| time_of_a_frame(&mut *bokeh, color, depth.as_ref(), coc)).collect();
-    let mut times = times?;
+    let mut times = Vec::new();
+    let mut passes = BTreeMap::<_, Vec<Duration>>::new();
+    for _ in 0..command.frames {
+        let (time, in_passes) = buffers.frame(&mut *bokeh, coc)?;
+        times.push(time);
+        in_passes.iter().for_each(|(name, time)| passes.entry(name).or_default().push(time));
+    }
     times.sort_unstable();
-    let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3;
     Ok(Measured {
         size_px: size,
         coc_px,
         quality: quality.name(),
         executor: bokeh.describe(),
         frames: command.frames,
-        p50_ms: at(0.5),
-        p95_ms: at(0.95),
-        max_ms: at(1.0),
+        p50_ms: share_ms(&times, 0.5),
+        p95_ms: share_ms(&times, 0.95),
+        max_ms: share_ms(&times, 1.0),
         frames_per_s: times.len() as f64 / times.iter().sum::<Duration>().as_secs_f64(),
+        passes_ms: passes
+            .into_iter()
+            .map(|(name, mut times)| {
+                times.sort_unstable();
+                (name, share_ms(&times, 0.5))
+            })
+            .collect(),
     })
 }
 
-/// Time from handing a frame over until it is back; copying it first is not counted.
-fn time_of_a_frame(
-    bokeh: &mut dyn Bokeh,
-    color: &ColorImage,
-    depth: Option<&DepthMap>,
-    coc: CocField,
-) -> Result<Duration, CliError> {
-    let job = Job {
-        ticket: 0,
-        color: Pooled::detached(color.clone()),
-        depth: depth.cloned().map(Pooled::detached),
-        coc,
-        out: Pooled::detached(ColorImage::new(color.width, color.height)),
-    };
-    let began = Instant::now();
-    bokeh.submit(job)?;
-    let finished = bokeh.collect(true)?;
-    let time = began.elapsed();
-    finished.map(|_| time).ok_or(CliError::NothingCameBack)
+/// The time that this share of the sorted times does not exceed.
+fn share_ms(sorted: &[Duration], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3
+}
+
+/// The same frame again and again, without copying it.
+struct Buffers {
+    colors: Pool<ColorImage>,
+    depths: Option<Pool<DepthMap>>,
+    results: Pool<ColorImage>,
+}
+
+impl Buffers {
+    /// Time from handing a frame over until it is back, and that of its passes.
+    fn frame(&self, bokeh: &mut dyn Bokeh, coc: CocField) -> Result<(Duration, PassTimes), CliError> {
+        let job = Job {
+            ticket: 0,
+            color: self.colors.take(),
+            depth: self.depths.as_ref().map(Pool::take),
+            coc,
+            out: self.results.take(),
+        };
+        let began = Instant::now();
+        bokeh.submit(job)?;
+        let finished = bokeh.collect(true)?;
+        let time = began.elapsed();
+        finished.map(|finished| (time, finished.times)).ok_or(CliError::NothingCameBack)
+    }
 }
 
 fn synthetic_frame(size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
@@ -175,15 +204,20 @@ fn synthetic_frame(size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliError>
 }
 
 impl Measured {
-    fn line(&self, json: bool) -> String {
+    fn line(&self, json: bool, passes: bool) -> String {
         if json {
             // Numbers and texts always have a form in JSON.
             return serde_json::to_string(self).unwrap_or_default() + "\n";
         }
         let Self { size_px: (width, height), coc_px, quality, executor, p50_ms, p95_ms, max_ms, frames_per_s, .. } =
             self;
+        let passes: String = if passes {
+            self.passes_ms.iter().map(|(name, ms)| format!("    {name} {ms:.2}")).collect::<String>() + "\n"
+        } else {
+            String::new()
+        };
         format!(
-            "{:<10} {coc_px:>7.1}  {quality:<9} {p50_ms:>7.2}  {p95_ms:>7.2}  {max_ms:>7.2} {frames_per_s:>7.1}  {executor}\n",
+            "{:<10} {coc_px:>7.1}  {quality:<9} {p50_ms:>7.2}  {p95_ms:>7.2}  {max_ms:>7.2} {frames_per_s:>7.1}  {executor}\n{passes}",
             format!("{width}x{height}")
         )
     }

@@ -15,13 +15,16 @@ use crate::bokeh::plan::{CELL, Compositing, Plan};
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;
-/// Entries of the table back to 8 bits: fine enough that decoding and encoding is the identity.
-const ENCODE_STEPS: usize = 1 << 16;
+/// Entries of one half of the table back to 8 bits: small enough for the nearest cache, fine enough that decoding and
+/// encoding is the identity.
+const ENCODE_STEPS: usize = 1 << 12;
+/// Light below this has a half of its own, as steep as the curve is there.
+const DARK: f32 = 1.0 / 16.0;
 
-/// The table from linear light in `0..=ENCODE_STEPS` to 8-bit sRGB.
+/// The table from linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then all of it.
 pub fn encode_table() -> Vec<u8> {
-    let code = |k: usize| linear_to_srgb(k as f32 / (ENCODE_STEPS - 1) as f32);
-    (0..ENCODE_STEPS).map(|k| (code(k) * 255.0 + 0.5) as u8).collect()
+    let half = |most: f32| (0..=ENCODE_STEPS).map(move |k| k as f32 / ENCODE_STEPS as f32 * most);
+    half(DARK).chain(half(1.0)).map(|light| (linear_to_srgb(light) * 255.0 + 0.5) as u8).collect()
 }
 
 /// Rows `y0..` of the result.
@@ -204,6 +207,12 @@ fn stretch<V: Simd, const S: usize>(
         &rows.out[((strip * height + y) * 4 + p) * STRIP..][..STRIP]
     };
     for (p, out) in out.iter_mut().enumerate() {
+        if S == 1 {
+            for (k, out) in out.as_chunks_mut::<STRIP>().0.iter_mut().enumerate() {
+                out.copy_from_slice(strip_row(first + k, above, p));
+            }
+            continue;
+        }
         // One column more on both sides than the chunk covers.
         let mut line = [0.0; CHUNK + 2];
         let mix = |a: f32, b: f32| madd::<V>(b - a, share, a);
@@ -213,10 +222,6 @@ fn stretch<V: Simd, const S: usize>(
             for i in 0..STRIP {
                 line[i] = mix(a[i], b[i]);
             }
-        }
-        if S == 1 {
-            out.copy_from_slice(&line[1..=CHUNK]);
-            continue;
         }
         let (left, at) = if first > 0 { (first - 1, STRIP - 1) } else { (0, 0) };
         line[0] = mix(strip_row(left, above, p)[at], strip_row(left, below, p)[at]);
@@ -249,7 +254,9 @@ fn encode(mut color: [[f32; CHUNK]; 3], expansion: f32, table: &[u8], out: &mut 
     let mut index = [[0u16; CHUNK]; 3];
     for (index, color) in index.iter_mut().zip(&color) {
         for (index, &light) in index.iter_mut().zip(color) {
-            *index = (light.clamp(0.0, 1.0) * (ENCODE_STEPS - 1) as f32 + 0.5) as u16;
+            let light = light.clamp(0.0, 1.0);
+            let (scale, first) = if light < DARK { (1.0 / DARK, 0.5) } else { (1.0, ENCODE_STEPS as f32 + 1.5) };
+            *index = (light * (scale * ENCODE_STEPS as f32) + first) as u16;
         }
     }
     for (x, pixel) in out.chunks_exact_mut(3).enumerate() {

@@ -24,6 +24,10 @@ impl Device {
     /// # Errors
     /// Nothing fits, or the device could not be had.
     pub fn open(hardware_only: bool, wanted: Option<&str>) -> Result<Self, BokehError> {
+        if hardware_only && wanted.is_none() && !has_gpu_node() {
+            let found = "no device node of one under /dev".to_owned();
+            return Err(BokehError::NoAdapter { wanted: "in hardware".to_owned(), found });
+        }
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::VULKAN;
         let instance = wgpu::Instance::new(descriptor);
@@ -85,6 +89,16 @@ impl Device {
             None => Ok(()),
         }
     }
+}
+
+/// Whether the kernel offers any GPU at all. Asking Vulkan instead takes time, and some drivers write to stderr.
+fn has_gpu_node() -> bool {
+    let render = std::fs::read_dir("/dev/dri")
+        .is_ok_and(|entries| entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("render")));
+    render
+        || ["/dev/nvidiactl", "/dev/dxg", "/dev/kgsl-3d0", "/dev/mali0"]
+            .iter()
+            .any(|node| std::path::Path::new(node).exists())
 }
 
 fn preference(info: &wgpu::AdapterInfo) -> u32 {
