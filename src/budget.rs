@@ -8,9 +8,9 @@ use std::str::FromStr;
 /// A rung of the ladder, from cheapest to finest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Quality {
-    /// The floor: one bin a side. A blur always stays, whatever the load.
+    /// The floor: nothing is filled in behind near objects. A blur always stays, whatever the load.
     Draft,
-    /// Two bins a side.
+    /// Two bins a side, two separable terms.
     Fast,
     /// The default.
     #[default]

@@ -52,7 +52,7 @@ pub fn rung(quality: Quality) -> Rung {
         fill,
     };
     match quality {
-        Quality::Draft => rung(2, 1, 3.0, 8.0, false),
+        Quality::Draft => rung(2, 2, 3.0, 8.0, false),
         Quality::Fast => rung(2, 2, 3.0, 8.0, true),
         Quality::Balanced => rung(3, 3, 3.5, 14.0, true),
         Quality::High => rung(4, 4, 5.0, 24.0, true),
