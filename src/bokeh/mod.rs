@@ -1,7 +1,7 @@
 //! The blur stage: one plan, two executors.
 //!
-//! A [`Settings`] becomes a [`plan::Plan`] once per picture size; the CPU executor ([`cpu`]) and the GPU executor
-//! ([`gpu`]) run it with the same passes under the same names.
+//! A [`Settings`] becomes a [`plan::Plan`] once per picture size; the CPU executor (`cpu`) and the GPU executor
+//! (`gpu`) run it with the same passes under the same names.
 
 pub mod aperture;
 pub mod bank;

@@ -40,10 +40,8 @@ pub struct Strip<'a> {
     pub strip: usize,
     /// `[row][4][STRIP]`: the result.
     pub out: &'a mut [f32],
-    /// Per row of cells: in, whether the result is wanted; out, whether it holds anything.
+    /// Per row of cells, whether the result holds anything: of the last frame before, of this one after.
     pub active: &'a mut [bool],
-    /// Whether a row of cells is wanted whatever it holds (set by the caller), or only if content reaches it.
-    pub wanted: Option<&'a [bool]>,
     /// `height * GROUP * 4 * STRIP` values for the rows' results, and one flag a row of cells.
     pub scratch: &'a mut Scratch,
 }
@@ -93,7 +91,7 @@ impl Strip<'_> {
         filtered.extend((0..rows).map(|y| self.cells.plane(y, 0)[columns.clone()].iter().any(|&c| c > 0.0)));
         for y in 0..rows {
             let reach = y.saturating_sub(down)..(y + down + 1).min(rows);
-            let active = filtered[reach].iter().any(|&f| f) && self.wanted.is_none_or(|wanted| wanted[y]);
+            let active = filtered[reach].iter().any(|&f| f);
             let was = std::mem::replace(&mut self.active[y], active);
             if was && !active {
                 let end = ((y + 1) * CELL).min(self.height);

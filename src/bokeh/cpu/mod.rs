@@ -292,7 +292,6 @@ impl CpuBokeh {
                 strip,
                 out: shelf.out.part(strip),
                 active: shelf.active.part(strip),
-                wanted: None,
                 scratch: &mut member.blur,
             });
         });
