@@ -203,11 +203,56 @@ impl Plan {
         compensated_radius_px(coc_px, bin.scale).min(bin.max_radius_px)
     }
 
+    /// How much bin `index` takes of a pixel.
+    pub fn share(&self, index: usize) -> Share {
+        Share::new(index.checked_sub(1).and_then(|front| self.border(front)), self.border(index))
+    }
+
+    /// What the bins behind the focal plane and at it take together.
+    pub fn rest_share(&self) -> Share {
+        let near = self.bins.iter().filter(|bin| bin.near).count();
+        Share::new(near.checked_sub(1).and_then(|last| self.border(last)), None)
+    }
+
     /// The border between bin `index` and the one behind it: its CoC, and 1 over the width of the hand-over.
     pub fn border(&self, index: usize) -> Option<(f32, f32)> {
         let at = self.bins[index].high_px;
         at.is_finite().then(|| (at, 1.0 / (2.0 * HAND_OVER * at.abs())))
     }
+}
+
+/// How much of a pixel with a given CoC a bin takes: a step up at the border in front, a step down at the one behind.
+#[derive(Clone, Copy, Debug)]
+pub struct Share {
+    /// Border to the bin in front: CoC in pixels and slope of the hand-over.
+    pub front: (f32, f32),
+    /// Border to the bin behind.
+    pub behind: (f32, f32),
+}
+
+impl Share {
+    /// Borders as CoC and slope of the hand-over; `None` where there is no bin beyond.
+    pub fn new(front: Option<(f32, f32)>, behind: Option<(f32, f32)>) -> Self {
+        Self { front: front.unwrap_or((-1e30, 1.0)), behind: behind.unwrap_or((1e30, 1.0)) }
+    }
+
+    /// The share at a CoC, 0 to 1; the shares of all bins of a plan sum to 1.
+    #[inline(always)]
+    pub fn at(&self, coc_px: f32) -> f32 {
+        step(self.front, coc_px) - step(self.behind, coc_px)
+    }
+
+    /// Whether any CoC in a range has a share.
+    pub fn meets(&self, (low_px, high_px): (f32, f32)) -> bool {
+        step(self.front, high_px) > 0.0 && step(self.behind, low_px) < 1.0
+    }
+}
+
+#[inline(always)]
+fn step((at, slope): (f32, f32), coc_px: f32) -> f32 {
+    let value = (coc_px - at) * slope + 0.5;
+    let value = if value > 0.0 { value } else { 0.0 };
+    if value < 1.0 { value } else { 1.0 }
 }
 
 /// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
@@ -274,5 +319,18 @@ mod tests {
         let plan = Plan::new(&settings(Effect::Blur, Quality::Balanced), 33, 17);
         assert_eq!(plan.bins.len(), 1);
         assert_eq!((plan.bins[0].scale, plan.bins[0].width, plan.bins[0].height), (4, 9, 5));
+    }
+
+    #[test]
+    fn the_shares_of_all_bins_sum_to_one() {
+        let borders = [(-7.0, 0.5), (-1.0, 3.0), (1.0, 3.0), (4.0, 0.8)];
+        let bin = |k: usize| Share::new(k.checked_sub(1).map(|k| borders[k]), borders.get(k).copied());
+        for step in -200..200 {
+            let coc_px = step as f32 * 0.1;
+            let sum: f32 = (0..=borders.len()).map(|k| bin(k).at(coc_px)).sum();
+            assert!((sum - 1.0).abs() < 1e-6);
+            assert!((0..=borders.len()).all(|k| bin(k).at(coc_px) >= 0.0));
+            assert!((0..=borders.len()).all(|k| bin(k).at(coc_px) == 0.0 || bin(k).meets((coc_px, coc_px))));
+        }
     }
 }

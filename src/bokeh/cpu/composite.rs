@@ -7,11 +7,10 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::bin::Share;
 use super::rows::{BinRows, Rows, STRIP};
 use super::simd::madd;
 use super::unpack::{compress, linear_to_srgb, luminance};
-use crate::bokeh::plan::{CELL, Compositing, Plan};
+use crate::bokeh::plan::{CELL, Compositing, Plan, Share};
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;

@@ -3,9 +3,9 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::bin::Share;
 use super::rows::{Rows, repeat_ends};
 use super::team::{Shelf, Team};
+use crate::bokeh::plan::Share;
 
 /// Planes of a level: premultiplied colour and CoC, and how much of it is known.
 const PLANES: usize = 5;

@@ -18,7 +18,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use aligned::Aligned;
-use bin::{BinBand, Share};
+use bin::BinBand;
 use blur::{GROUP, Scratch, Strip};
 use pulp::Arch;
 use rows::{BinRows, MARGIN, Rows, STRIP, TILE_H, TILE_W};
@@ -26,7 +26,7 @@ use shelves::{BinShelves, StripShelves};
 use team::{Shelf, Team};
 use unpack::Unpack;
 
-use super::plan::{CELL, Compositing, MAX_BINS, Plan};
+use super::plan::{CELL, Compositing, MAX_BINS, Plan, Share};
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
@@ -75,9 +75,7 @@ impl CpuBokeh {
         let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
         let (width, height) = (plan.width, plan.height);
         let team = Team::new(threads);
-        let shares = (0..plan.bins.len())
-            .map(|k| Share::new(k.checked_sub(1).and_then(|k| plan.border(k)), plan.border(k)))
-            .collect();
+        let shares = (0..plan.bins.len()).map(|k| plan.share(k)).collect();
         let bins: Vec<BinRows> = plan.bins.iter().map(|bin| BinRows::new(&plan, bin)).collect();
         let tallest = plan.bins.iter().map(|bin| bin.height).max().unwrap_or(0);
         let members = (0..team.threads())
@@ -239,7 +237,7 @@ impl CpuBokeh {
             return;
         }
         let Some(index) = self.plan.bins.iter().rposition(|bin| bin.near) else { return };
-        let behind = Share::new(self.plan.border(index), None);
+        let behind = self.plan.rest_share();
         let nearest_px = self.plan.bins[index].high_px;
         pyramid.fill(&mut self.team, &mut self.scene, (self.plan.width, self.plan.height), behind, nearest_px);
         // What was filled in has another CoC: find the tiles' ranges anew.

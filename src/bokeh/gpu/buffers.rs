@@ -67,8 +67,7 @@ pub fn bin_uniforms(plan: &Plan) -> Vec<Bin> {
         .map(|k| {
             let bin = &plan.bins[k];
             let cells_across = bin.width.next_multiple_of(GRID_ROUNDING) / CELL;
-            let front = k.checked_sub(1).and_then(|k| plan.border(k)).unwrap_or((-1e30, 1.0));
-            let behind = plan.border(k).unwrap_or((1e30, 1.0));
+            let share = plan.share(k);
             let uniform = Bin {
                 size: [bin.width as u32, bin.height as u32],
                 cells: [cells_across as u32, bin.height.div_ceil(CELL) as u32],
@@ -76,8 +75,8 @@ pub fn bin_uniforms(plan: &Plan) -> Vec<Bin> {
                 edges: (cells_across * CELL / SEGMENT + 1) as u32,
                 turned: u32::from(bin.near),
                 whole: u32::from(whole),
-                front: [front.0, front.1],
-                behind: [behind.0, behind.1],
+                front: share.front.into(),
+                behind: share.behind.into(),
                 max_radius_px: bin.max_radius_px,
                 sigma_cells: bin.sigma_cells(),
                 reach_cells: plan.reach_cells(bin) as u32,

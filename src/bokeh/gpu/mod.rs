@@ -83,17 +83,10 @@ impl GpuBokeh {
         for &metres in &map.metres {
             occurs[(((lens.coc_px(metres) - first_px) / range_px) as usize).min(RANGES - 1)] = true;
         }
-        let meets = |k: usize, range: usize| {
-            let (low_px, high_px) =
-                (first_px + (range as f32 - 1.0) * range_px, first_px + (range as f32 + 1.0) * range_px);
-            let step = |border: Option<(f32, f32)>, coc_px: f32, without: f32| {
-                border.map_or(without, |(at, slope)| (coc_px - at) * slope + 0.5)
-            };
-            step(k.checked_sub(1).and_then(|k| plan.border(k)), high_px, 1.0) > 0.0
-                && step(plan.border(k), low_px, 0.0) < 1.0
-        };
+        let span =
+            |range: usize| (first_px + (range as f32 - 1.0) * range_px, first_px + (range as f32 + 1.0) * range_px);
         let mask = (0..plan.bins.len())
-            .filter(|&k| (0..RANGES).any(|range| occurs[range] && meets(k, range)))
+            .filter(|&k| (0..RANGES).any(|range| occurs[range] && plan.share(k).meets(span(range))))
             .fold(0, |mask, k| mask | 1 << k);
         let near = plan.bins.iter().enumerate().filter(|(_, bin)| bin.near).fold(0, |near, (k, _)| near | 1 << k);
         // What is filled in behind a near object may have any CoC between those around it.
@@ -103,7 +96,7 @@ impl GpuBokeh {
     fn frame(&self, job: &Job, present: u32) -> shaders::Frame {
         let plan = &self.plan;
         let near = plan.bins.iter().filter(|bin| bin.near).count();
-        let rest_front = near.checked_sub(1).and_then(|k| plan.border(k)).unwrap_or((-1e30, 1.0));
+        let rest_front = plan.rest_share().front;
         let (coc_kind, coc, ramp) = match job.coc {
             CocField::Uniform { radius_px } => (0, [radius_px, 0.0, 0.0, 0.0], [0.0; 2]),
             CocField::Ramp(r) => (1, [r.normal.x, r.normal.y, r.offset_px, r.half_band_px], [r.slope, r.max_px]),
@@ -128,7 +121,7 @@ impl GpuBokeh {
             ramp,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
-            rest_front: [rest_front.0, rest_front.1],
+            rest_front: rest_front.into(),
             nearest_px: rest_front.0,
             unused: 0.0,
         }
