@@ -92,6 +92,11 @@ impl Bank {
         (node * (2 * self.reach + 1) + (self.reach as isize + j) as usize) * self.terms
     }
 
+    /// The largest radius tabulated, in pixels.
+    pub fn max_radius_px(&self) -> f32 {
+        (self.nodes - 1) as f32 / STEPS_PER_PX
+    }
+
     /// The node nearest to a radius.
     #[inline(always)]
     pub fn node(&self, radius_px: f32) -> usize {

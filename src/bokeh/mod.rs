@@ -10,6 +10,7 @@ pub mod cpu;
 pub mod gpu;
 pub mod low_rank;
 pub mod plan;
+pub mod split;
 
 use std::time::Duration;
 

@@ -12,8 +12,11 @@
 use std::sync::Arc;
 
 use super::bank::{Bank, MASK_CELLS};
+use super::split::{Counts, MAX_PIECES, Piece};
 use super::{Effect, Method, Rank, Settings};
 use crate::budget::Quality;
+use crate::frame::DepthMap;
+use crate::optics::CocField;
 
 /// Bin pixels a side of a cell of the coarse grid.
 pub const CELL: usize = 8;
@@ -24,8 +27,16 @@ pub const MAX_BINS: usize = 13;
 /// A bin pixel with less coverage than this has no colour of its own.
 pub const COVERAGE_FLOOR: f32 = 1e-3;
 
+/// From this coverage on, a bin counts as wholly there when the hindmost is looked for.
+pub const HINDMOST_COVERAGE: f32 = 0.2;
+
 /// Weight of far cells in a local radius, so that there is one wherever the filter finds anything at all.
 pub const FAR_WEIGHT: f32 = 0.02;
+
+/// Pixels of the picture that a bin pixel may cover, each way.
+pub const SCALES: [usize; 4] = [1, 2, 4, 8];
+/// A bin is reduced until no radius has more bin pixels than this: the cost of a filter does not grow with the blur.
+const MOST_RADIUS_PX: f32 = 14.0;
 
 /// What a quality level trades.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,29 +45,40 @@ pub struct Rung {
     pub rank: u32,
     /// Bins behind the focal plane, and as many in front.
     pub bins_per_side: u32,
-    /// Bins whose smallest radius is at least this are filtered at half resolution.
-    pub half_from_px: f32,
-    /// The same for quarter resolution.
-    pub quarter_from_px: f32,
+    /// Smallest radius in a bin, in pixels of the picture, from which it is filtered at each of [`SCALES`].
+    pub scale_from_px: [f32; SCALES.len()],
     /// Whether what near objects hide is filled in.
     pub fill: bool,
 }
 
 /// The rung of a quality level.
 pub fn rung(quality: Quality) -> Rung {
-    let rung = |rank, bins_per_side, half_from_px, quarter_from_px, fill| Rung {
+    let rung = |rank, bins_per_side, [half, quarter, eighth]: [f32; 3], fill| Rung {
         rank,
         bins_per_side,
-        half_from_px,
-        quarter_from_px,
+        scale_from_px: [0.0, half, quarter, eighth],
         fill,
     };
     match quality {
-        Quality::Draft => rung(2, 2, 3.0, 8.0, false),
-        Quality::Fast => rung(2, 2, 3.0, 8.0, true),
-        Quality::Balanced => rung(3, 3, 3.5, 14.0, true),
-        Quality::High => rung(4, 4, 5.0, 24.0, true),
-        Quality::Best => rung(4, 6, 8.0, f32::INFINITY, true),
+        Quality::Draft => rung(2, 2, [3.0, 8.0, 20.0], false),
+        Quality::Fast => rung(2, 2, [3.0, 8.0, 20.0], true),
+        Quality::Balanced => rung(3, 3, [3.5, 12.0, 28.0], true),
+        Quality::High => rung(4, 4, [5.0, 20.0, 48.0], true),
+        Quality::Best => rung(4, 6, [8.0, 32.0, 80.0], true),
+    }
+}
+
+impl Rung {
+    /// Bins of a side that may be at full scale.
+    pub fn fine_bins(&self) -> usize {
+        (self.bins_per_side as usize + 1) / 3
+    }
+
+    /// The coarsest scale at which radii from `low_px` on keep their shape and those up to `high_px` stay cheap.
+    fn scale(&self, low_px: f32, high_px: f32) -> usize {
+        let fits = SCALES.into_iter().zip(self.scale_from_px).rev().find(|&(_, from_px)| low_px >= from_px);
+        let cheap = SCALES.into_iter().find(|&scale| high_px <= MOST_RADIUS_PX * scale as f32);
+        fits.map_or(1, |(scale, _)| scale).max(cheap.unwrap_or(SCALES[SCALES.len() - 1]))
     }
 }
 
@@ -78,7 +100,7 @@ pub struct Bin {
     pub low_px: f32,
     /// Upper border.
     pub high_px: f32,
-    /// A bin pixel covers `scale` x `scale` pixels of the picture: 1, 2 or 4.
+    /// A bin pixel covers `scale` x `scale` pixels of the picture: one of [`SCALES`].
     pub scale: usize,
     /// Columns of the bin's picture.
     pub width: usize,
@@ -88,6 +110,8 @@ pub struct Bin {
     pub max_radius_px: f32,
     /// Whether it lies in front of the focal plane.
     pub near: bool,
+    /// Which of the executor's memories it uses: the same one from frame to frame.
+    pub slot: usize,
 }
 
 impl Bin {
@@ -97,7 +121,7 @@ impl Bin {
     }
 }
 
-/// The plan of every frame of one size.
+/// The plan of the frames of one size. What depends on a frame's depth is [`Plan::split`].
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Columns of the picture.
@@ -106,6 +130,8 @@ pub struct Plan {
     pub height: usize,
     /// How bins become a picture.
     pub compositing: Compositing,
+    /// The quality level's trade.
+    pub rung: Rung,
     /// Front to back: by ascending CoC.
     pub bins: Vec<Bin>,
     /// The filters, in units of bin pixels.
@@ -116,12 +142,17 @@ pub struct Plan {
     pub expansion: f32,
     /// Whether the rank is full and the method the paper's: an exact 2-D gather.
     pub exact: bool,
+    /// Whether every bin stays at full scale.
+    full_scale: bool,
+    /// Largest CoC radius behind the focal plane and in front of it.
+    max_px: [f32; 2],
+    counts: Counts,
+    pieces: [Vec<Piece>; 2],
 }
 
 impl Plan {
     /// Plans frames of `width` x `height` pixels.
     pub fn new(settings: &Settings, width: u32, height: u32) -> Self {
-        let (width, height) = (width as usize, height as usize);
         let rung = rung(settings.quality);
         let compositing = match (settings.effect, settings.method) {
             (Effect::Dof, Method::Layered) => Compositing::Layers,
@@ -129,60 +160,102 @@ impl Plan {
             (Effect::Blur | Effect::TiltShift, _) => Compositing::Select,
         };
         let rank = settings.rank.unwrap_or(Rank::Terms(rung.rank));
-        let mut borders = Vec::new();
-        if compositing == Compositing::Layers {
-            borders.extend(side(settings.near_max_px, rung.bins_per_side).into_iter().rev().map(|b| -b));
-        }
-        match (compositing, settings.effect) {
-            (Compositing::Layers, _) | (_, Effect::TiltShift) => {
-                borders.extend(side(settings.far_max_px, rung.bins_per_side));
-            }
-            // One radius everywhere needs no split, and neither does the gather.
-            _ => {}
-        }
-        let limits = || {
-            let low = std::iter::once(f32::NEG_INFINITY).chain(borders.iter().copied());
-            low.zip(borders.iter().copied().chain(std::iter::once(f32::INFINITY)))
-        };
-        let bins: Vec<Bin> = limits()
-            .map(|(low_px, high_px)| {
-                let near = high_px < 0.0;
-                let (smallest_px, largest_px) = if near {
-                    (-high_px, settings.near_max_px)
-                } else {
-                    (low_px.max(0.0), high_px.min(settings.far_max_px.max(settings.near_max_px)))
-                };
-                let largest_px = if near { (-low_px).min(largest_px) } else { largest_px };
-                let smallest_px = if settings.effect == Effect::Blur { settings.far_max_px } else { smallest_px };
-                let scale = match compositing {
-                    Compositing::Gather => 1,
-                    _ if settings.rank == Some(Rank::Full) => 1,
-                    _ if smallest_px >= rung.quarter_from_px => 4,
-                    _ if smallest_px >= rung.half_from_px => 2,
-                    _ => 1,
-                };
-                Bin {
-                    low_px,
-                    high_px,
-                    scale,
-                    width: width.div_ceil(scale),
-                    height: height.div_ceil(scale),
-                    max_radius_px: compensated_radius_px(largest_px, scale),
-                    near,
-                }
-            })
-            .collect();
-        let max_radius_px = bins.iter().map(|b| b.max_radius_px).fold(0.0, f32::max);
+        let most_px = settings.far_max_px.max(settings.near_max_px);
+        let full_scale = compositing == Compositing::Gather || settings.rank == Some(Rank::Full);
+        let coarsest = SCALES[SCALES.len() - 1] as f32;
+        let bank_px = if full_scale { most_px } else { most_px.min((most_px / coarsest).max(MOST_RADIUS_PX)) };
         let mask = settings.aperture.mask(MASK_CELLS, settings.rim);
-        Self {
-            width,
-            height,
+        let mut plan = Self {
+            width: width as usize,
+            height: height as usize,
             compositing,
-            bins,
-            bank: Arc::new(Bank::new(&mask, rank, max_radius_px)),
+            rung,
+            bins: Vec::with_capacity(MAX_BINS),
+            bank: Arc::new(Bank::new(&mask, rank, bank_px)),
             fill: rung.fill,
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
             exact: compositing == Compositing::Gather && rank == Rank::Full,
+            full_scale,
+            max_px: [settings.far_max_px, settings.near_max_px],
+            counts: Counts::new(),
+            pieces: std::array::from_fn(|_| Vec::with_capacity(MAX_PIECES)),
+        };
+        match settings.effect {
+            Effect::TiltShift => plan.pieces[0].extend(even_pieces(settings.far_max_px, rung.bins_per_side)),
+            Effect::Blur => {
+                let [border_px, low_px, high_px] = [0.0, settings.far_max_px, settings.far_max_px];
+                plan.pieces[0].push(Piece { border_px, low_px, high_px });
+            }
+            Effect::Dof => {}
+        }
+        plan.lay_out();
+        plan
+    }
+
+    /// Splits the CoC of a frame into bins, where that follows from its depth.
+    pub fn split(&mut self, depth: Option<&DepthMap>, coc: &CocField) {
+        if self.compositing != Compositing::Layers {
+            return;
+        }
+        match (coc, depth) {
+            (CocField::Depth(lens), Some(depth)) => self.counts.count(depth, lens),
+            _ => self.counts = Counts::new(),
+        }
+        for (near, pieces) in [false, true].into_iter().zip(&mut self.pieces) {
+            self.counts.pieces(near, &self.rung, pieces);
+        }
+        self.lay_out();
+    }
+
+    /// The bins of the current pieces.
+    fn lay_out(&mut self) {
+        let [far, near] = &self.pieces;
+        let side = self.rung.bins_per_side as usize;
+        let first = |pieces: &[Piece]| pieces.first().map_or(f32::INFINITY, |piece| piece.border_px);
+        let beyond = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
+        let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
+            let scale = if self.full_scale { 1 } else { self.rung.scale(content.0, content.1) };
+            Bin {
+                low_px,
+                high_px,
+                scale,
+                width: self.width.div_ceil(scale),
+                height: self.height.div_ceil(scale),
+                max_radius_px: compensated_radius_px(content.1, scale).min(self.bank.max_radius_px()),
+                near: high_px < 0.0,
+                slot,
+            }
+        };
+        self.bins.clear();
+        for (k, piece) in near.iter().enumerate().rev() {
+            let content = (piece.low_px, piece.high_px.min(self.max_px[1]));
+            self.bins.push(bin((-beyond(near, k), -piece.border_px), content, 1 + side + k));
+        }
+        if first(far) > 0.0 {
+            let largest = |(pieces, max_px): (&Vec<Piece>, f32)| first(pieces).min(max_px);
+            let most_px = self.pieces.iter().zip(self.max_px).map(largest).fold(0.0, f32::max);
+            let most_px = if self.compositing == Compositing::Layers { most_px.min(MOST_RADIUS_PX) } else { most_px };
+            self.bins.push(bin((-first(near), first(far)), (0.0, most_px), 0));
+        }
+        for (k, piece) in far.iter().enumerate() {
+            let content = (piece.low_px, piece.high_px.min(self.max_px[0]));
+            let low_px = if piece.border_px > 0.0 { piece.border_px } else { f32::NEG_INFINITY };
+            self.bins.push(bin((low_px, beyond(far, k)), content, 1 + k));
+        }
+    }
+
+    /// The least scale that a bin in this slot can have.
+    pub fn least_scale(&self, slot: usize) -> usize {
+        let side = self.rung.bins_per_side as usize;
+        let fine = slot == 0 || (slot - 1) % side.max(1) < self.rung.fine_bins();
+        if self.full_scale || fine || self.compositing != Compositing::Layers { 1 } else { 2 }
+    }
+
+    /// Memories for bins that an executor needs.
+    pub fn slots(&self) -> usize {
+        match self.compositing {
+            Compositing::Layers => 1 + 2 * self.rung.bins_per_side as usize,
+            _ => self.bins.iter().map(|bin| bin.slot + 1).max().unwrap_or(0),
         }
     }
 
@@ -258,15 +331,17 @@ fn step((at, slope): (f32, f32), coc_px: f32) -> f32 {
 /// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
 const HAND_OVER: f32 = 0.15;
 /// The smallest CoC at which a bin of its own begins, in pixels.
-const FOCUS_BORDER_PX: f32 = 1.0;
+pub const FOCUS_BORDER_PX: f32 = 1.0;
 
-/// Borders on one side of the focal plane, ascending in `|c|`: geometric, as a blur's look goes with the ratio.
-fn side(max_px: f32, bins: u32) -> Vec<f32> {
+/// Pieces of a ramp: geometric, as a blur's look goes with the ratio.
+fn even_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {
     let ratio = max_px / FOCUS_BORDER_PX;
-    if ratio <= 1.3 {
-        return Vec::new();
-    }
-    (0..bins).map(|k| FOCUS_BORDER_PX * ratio.powf(k as f32 / bins as f32)).collect()
+    let border_px = move |k: u32| FOCUS_BORDER_PX * ratio.powf(k as f32 / bins as f32);
+    (0..if ratio > 1.3 { bins } else { 0 }).map(move |k| Piece {
+        border_px: border_px(k),
+        low_px: border_px(k),
+        high_px: border_px(k + 1),
+    })
 }
 
 /// The radius, in pixels of a picture reduced by `scale`, that blurs as much as `coc_px` does at full size.

@@ -128,7 +128,7 @@ impl Strip<'_> {
 
     #[inline(always)]
     fn row<S: Simd, const R: usize, const EVEN: bool>(&self, simd: S, first: usize, y: usize, out: &mut [f32]) {
-        let start = y * 5 * self.stride + self.pad + self.strip * STRIP - self.reach;
+        let start = y * 4 * self.stride + self.pad + self.strip * STRIP - self.reach;
         let span = STRIP + 2 * self.reach;
         let plane = |p: usize| &self.source[start + p * self.stride..][..span];
         let planes = [plane(0), plane(1), plane(2), plane(3)];

@@ -3,12 +3,15 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::rows::{Rows, repeat_ends};
+use super::rows::Rows;
 use super::team::{Shelf, Team};
+use super::unpack::Piece;
 use crate::bokeh::plan::Share;
 
 /// Planes of a level: premultiplied colour and CoC, and how much of it is known.
 const PLANES: usize = 5;
+/// Rows of a level that are one part of the work.
+const PART: usize = 8;
 
 /// The pyramid, finest level (half the picture's size) first.
 pub struct Pyramid {
@@ -17,14 +20,39 @@ pub struct Pyramid {
     hidden: Vec<f32>,
     /// The same of a pixel or any of its neighbours.
     around: Vec<f32>,
-    taken: Vec<AtomicBool>,
+    taken: [Vec<AtomicBool>; 2],
 }
 
 struct Level {
     width: usize,
     height: usize,
-    /// `[pixel][PLANES]`.
-    data: Vec<[f32; PLANES]>,
+    rows: Rows<PLANES>,
+}
+
+/// The finest level, as the bands of the picture lay it.
+pub struct Base<'a> {
+    width: usize,
+    stride: usize,
+    rows: Shelf<'a, f32>,
+    hidden: Shelf<'a, f32>,
+}
+
+/// A band of the finest level.
+pub struct HalfRows<'a> {
+    first: usize,
+    width: usize,
+    height: usize,
+    stride: usize,
+    rows: &'a mut [f32],
+    hidden: &'a mut [f32],
+}
+
+/// What was filled in.
+#[derive(Clone, Copy)]
+pub struct Behind<'a> {
+    level: &'a Level,
+    around: &'a [f32],
+    nearest_px: f32,
 }
 
 impl Pyramid {
@@ -33,179 +61,193 @@ impl Pyramid {
         let mut levels = Vec::new();
         let (mut w, mut h) = (width.div_ceil(2), height.div_ceil(2));
         loop {
-            levels.push(Level { width: w, height: h, data: vec![[0.0; PLANES]; w * h] });
+            levels.push(Level { width: w, height: h, rows: Rows::new(w, h, 0) });
             if w == 1 && h == 1 {
                 break;
             }
             (w, h) = (w.div_ceil(2), h.div_ceil(2));
         }
         let hidden = vec![0.0; levels[0].width * levels[0].height];
-        let taken = (0..height).map(|_| AtomicBool::new(false)).collect();
+        let taken = std::array::from_fn(|_| (0..height).map(|_| AtomicBool::new(false)).collect());
         Self { levels, around: hidden.clone(), hidden, taken }
     }
 
-    /// Replaces, in `scene`, what belongs to near bins (`front` is the share of everything behind them) and the
-    /// mixed pixels around it. Filled CoC is at least `nearest_px`, the border of the near bins.
-    pub fn fill(&mut self, team: &mut Team, scene: &mut Rows<4>, size: (usize, usize), front: Share, nearest_px: f32) {
-        self.start(team, scene, size, front);
+    /// The finest level, to be laid in bands of `rows` rows of the picture.
+    pub fn base(&mut self, rows: usize) -> Base<'_> {
+        let level = &mut self.levels[0];
+        let (width, stride, row_len) = (level.width, level.rows.stride, level.rows.row_len());
+        let [first, second] = &mut self.taken;
+        Base {
+            width,
+            stride,
+            rows: Shelf::new(&mut level.rows.data, rows / 2 * row_len, first),
+            hidden: Shelf::new(&mut self.hidden, rows / 2 * width, second),
+        }
+    }
+
+    /// Fills the holes once the finest level is laid.
+    pub fn fill(&mut self, team: &mut Team) {
+        self.know(team);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
-            let rows = Shelf::new(&mut coarse.data, coarse.width, &mut self.taken);
-            team.run(coarse.height, &|y| pull(fine, y, rows.part(y)));
+            let (width, stride, row_len) = (coarse.width, coarse.rows.stride, coarse.rows.row_len());
+            let rows = Shelf::new(&mut coarse.rows.data, PART * row_len, &mut self.taken[0]);
+            team.run(coarse.height.div_ceil(PART), &|part| {
+                for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
+                    pull(fine, part * PART + k, row, stride, width);
+                }
+            });
         }
         for k in (1..self.levels.len()).rev() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&mut fine[k - 1], &coarse[0]);
-            let rows = Shelf::new(&mut fine.data, fine.width, &mut self.taken);
-            team.run(fine.height, &|y| push(coarse, y, rows.part(y)));
+            let (width, stride, row_len) = (fine.width, fine.rows.stride, fine.rows.row_len());
+            let rows = Shelf::new(&mut fine.rows.data, PART * row_len, &mut self.taken[0]);
+            team.run(fine.height.div_ceil(PART), &|part| {
+                for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
+                    push(coarse, part * PART + k, row, stride, width);
+                }
+            });
         }
-        self.finish(team, scene, size, nearest_px);
     }
 
-    /// The finest level: known is what no near pixel touches, nor its neighbours.
-    fn start(&mut self, team: &mut Team, scene: &Rows<4>, (width, height): (usize, usize), front: Share) {
+    /// What lies behind near objects; no CoC of it is below `nearest_px`.
+    pub fn behind(&self, nearest_px: f32) -> Behind<'_> {
+        Behind { level: &self.levels[0], around: &self.around, nearest_px }
+    }
+
+    /// Known is what no near pixel touches, nor its neighbours.
+    fn know(&mut self, team: &mut Team) {
         let level = &mut self.levels[0];
-        let (w, h) = (level.width, level.height);
-        let hidden = Shelf::new(&mut self.hidden, w, &mut self.taken);
-        team.run(h, &|y| {
-            let rows = [scene.plane(2 * y, 3), scene.plane((2 * y + 1).min(height - 1), 3)];
-            for (x, hidden) in hidden.part(y).iter_mut().enumerate() {
-                let columns = [2 * x, (2 * x + 1).min(width - 1)];
-                let least = |row: &[f32]| front.at(row[columns[0]]).min(front.at(row[columns[1]]));
-                *hidden = 1.0 - least(rows[0]).min(least(rows[1]));
-            }
-        });
+        let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
         let hidden = &self.hidden;
-        let around = Shelf::new(&mut self.around, w, &mut self.taken);
-        team.run(h, &|y| {
-            let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(|y| &hidden[y * w..][..w]);
-            let column = |x: usize| rows[0][x].max(rows[1][x]).max(rows[2][x]);
-            let (mut left, mut here) = (0.0f32, column(0));
-            for (x, out) in around.part(y).iter_mut().enumerate() {
-                let right = if x + 1 < w { column(x + 1) } else { 0.0 };
-                *out = left.max(here).max(right);
-                (left, here) = (here, right);
-            }
-        });
-        let around = &self.around;
-        let data = Shelf::new(&mut level.data, w, &mut self.taken);
-        team.run(h, &|y| {
-            let around = &around[y * w..][..w];
-            let plane = |row: usize, p: usize| scene.plane((2 * y + row).min(height - 1), p);
-            let planes: [[&[f32]; 4]; 2] = std::array::from_fn(|row| std::array::from_fn(|p| plane(row, p)));
-            for (x, pixel) in data.part(y).iter_mut().enumerate() {
-                if around[x] > 0.0 {
-                    *pixel = [0.0; PLANES];
-                    continue;
+        let [first, second] = &mut self.taken;
+        let around = Shelf::new(&mut self.around, PART * w, first);
+        let data = Shelf::new(&mut level.rows.data, PART * row_len, second);
+        team.run(h.div_ceil(PART), &|part| {
+            let rows = around.part(part).chunks_exact_mut(w).zip(data.part(part).chunks_exact_mut(row_len));
+            for (k, (around, planes)) in rows.enumerate() {
+                let y = part * PART + k;
+                let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(|y| &hidden[y * w..][..w]);
+                let column = |x: usize| rows[0][x].max(rows[1][x]).max(rows[2][x]);
+                let (mut left, mut here) = (0.0f32, column(0));
+                for (x, out) in around.iter_mut().enumerate() {
+                    let right = if x + 1 < w { column(x + 1) } else { 0.0 };
+                    *out = left.max(here).max(right);
+                    (left, here) = (here, right);
                 }
-                let columns = [2 * x, (2 * x + 1).min(width - 1)];
-                for (p, value) in pixel[..4].iter_mut().enumerate() {
-                    let sum = |row: &[&[f32]; 4]| row[p][columns[0]] + row[p][columns[1]];
-                    *value = 0.25 * (sum(&planes[0]) + sum(&planes[1]));
-                }
-                pixel[4] = 1.0;
-            }
-        });
-    }
-
-    fn finish(&mut self, team: &mut Team, scene: &mut Rows<4>, (width, height): (usize, usize), nearest_px: f32) {
-        let (level, around) = (&self.levels[0], &self.around);
-        let (stride, pad, row_len) = (scene.stride, scene.pad, scene.row_len());
-        let rows = Shelf::new(&mut scene.data, row_len, &mut self.taken);
-        team.run(height, &|y| {
-            let around = &around[y / 2 * level.width..][..level.width];
-            if around.iter().all(|&hidden| hidden <= 0.0) {
-                return;
-            }
-            let row = rows.part(y);
-            for (x, fill) in level.data[y / 2 * level.width..][..level.width].iter().enumerate() {
-                if around[x] > 0.0 {
-                    for x in 2 * x..(2 * x + 2).min(width) {
-                        (0..3).for_each(|p| row[p * stride + pad + x] = fill[p]);
-                        row[3 * stride + pad + x] = fill[3].max(nearest_px);
+                for (p, plane) in planes.chunks_exact_mut(stride).enumerate() {
+                    for (value, &around) in plane.iter_mut().zip(&*around) {
+                        let known = if p + 1 == PLANES { 1.0 } else { *value };
+                        *value = if around > 0.0 { 0.0 } else { known };
                     }
                 }
             }
-            row.chunks_exact_mut(stride).for_each(|plane| repeat_ends(plane, pad, width));
         });
+    }
+}
+
+impl Base<'_> {
+    /// A band of `rows` rows of the picture (`height` rows in all).
+    pub fn band(&self, band: usize, rows: usize, height: usize) -> HalfRows<'_> {
+        HalfRows {
+            first: band * rows,
+            width: self.width,
+            height,
+            stride: self.stride,
+            rows: self.rows.part(band),
+            hidden: self.hidden.part(band),
+        }
+    }
+}
+
+impl HalfRows<'_> {
+    /// Adds the inner columns of row `y`, which begin at column `x0` of the picture and `margin` of the piece.
+    #[inline(always)]
+    pub fn add<const W: usize>(&mut self, behind: &Share, x0: usize, margin: usize, y: usize, piece: &Piece<W>) {
+        let (row, odd) = ((y - self.first) / 2, y % 2 == 1);
+        let first = x0 / 2;
+        let count = ((W - 2 * margin) / 2).min(self.width - first);
+        let pairs = |p: usize| piece.0[p][margin..].as_chunks::<2>().0.iter().take(count);
+        // A last row without a partner stands for two.
+        let share = if !odd && y + 1 == self.height { 0.5 } else { 0.25 };
+        let planes = &mut self.rows[row * PLANES * self.stride..][..PLANES * self.stride];
+        for (p, plane) in planes.chunks_exact_mut(self.stride).take(4).enumerate() {
+            for (value, &[a, b]) in plane[first..].iter_mut().zip(pairs(p)) {
+                let before = if odd { *value } else { 0.0 };
+                *value = before + share * (a + b);
+            }
+        }
+        for (value, &[a, b]) in self.hidden[row * self.width + first..].iter_mut().zip(pairs(3)) {
+            let (a, b) = (1.0 - behind.at(a), 1.0 - behind.at(b));
+            let here = if a > b { a } else { b };
+            *value = if odd && *value > here { *value } else { here };
+        }
+    }
+}
+
+impl Behind<'_> {
+    /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
+    #[inline(always)]
+    pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, piece: &mut Piece<W>) {
+        let around = &self.around[y / 2 * self.level.width..][..self.level.width];
+        let row = self.level.rows.row(y / 2);
+        let [red, green, blue, coc] = &mut piece.0;
+        for x in 0..W {
+            let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
+            if around[half] > 0.0 {
+                let fill = |p: usize| row[p * self.level.rows.stride + half];
+                (red[x], green[x], blue[x]) = (fill(0), fill(1), fill(2));
+                coc[x] = fill(3).max(self.nearest_px);
+            }
+        }
     }
 }
 
 /// Averages four pixels; knowing a little is spread, so that the coarsest level knows something if anyone does.
-fn pull(fine: &Level, y: usize, row: &mut [[f32; PLANES]]) {
-    for (x, out) in row.iter_mut().enumerate() {
-        let mut sum = [0.0f32; PLANES];
-        for sub in 0..4 {
-            let (px, py) = (2 * x + sub % 2, 2 * y + sub / 2);
-            if px < fine.width && py < fine.height {
-                let pixel = &fine.data[py * fine.width + px];
-                sum.iter_mut().zip(pixel).for_each(|(s, v)| *s += v);
-            }
+fn pull(fine: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
+    let (above, below) = (fine.rows.row(2 * y), (2 * y + 1 < fine.height).then(|| fine.rows.row(2 * y + 1)));
+    for p in 0..PLANES {
+        let out = &mut out[p * stride..][..width];
+        let above = &above[p * fine.rows.stride..].as_chunks::<2>().0[..width];
+        out.iter_mut().zip(above).for_each(|(out, [a, b])| *out = a + b);
+        if let Some(below) = below {
+            let below = &below[p * fine.rows.stride..].as_chunks::<2>().0[..width];
+            out.iter_mut().zip(below).for_each(|(out, [a, b])| *out += a + b);
         }
-        let scale = 1.0 / sum[4].max(1.0);
-        *out = sum.map(|v| v * scale);
     }
+    let (planes, known) = out.split_at_mut((PLANES - 1) * stride);
+    for plane in planes.chunks_exact_mut(stride) {
+        for (value, &known) in plane[..width].iter_mut().zip(&*known) {
+            *value /= if known > 1.0 { known } else { 1.0 };
+        }
+    }
+    known[..width].iter_mut().for_each(|known| *known = if *known > 1.0 { 1.0 } else { *known });
 }
 
-/// Fills what the finer level does not know from the coarser one.
-fn push(coarse: &Level, y: usize, row: &mut [[f32; PLANES]]) {
-    // Linear interpolation: three parts of the coarse pixel above this one, one of its neighbour, each way.
+/// Fills what the finer level does not know from the coarser one: linear interpolation, three parts of the coarse pixel
+/// above this one and one of its neighbour, each way.
+fn push(coarse: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
     let side = |at: usize, limit: usize| {
         let neighbour = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { at / 2 + 1 };
-        [(at / 2, 0.75f32), (neighbour.min(limit - 1), 0.25)]
+        [at / 2, neighbour.min(limit - 1)]
     };
-    for (x, pixel) in row.iter_mut().enumerate() {
-        let missing = 1.0 - pixel[4];
-        if missing <= 0.0 {
+    let [here, there] = side(y, coarse.height).map(|row| coarse.rows.row(row));
+    for x in 0..width {
+        let known = out[(PLANES - 1) * stride + x];
+        if known >= 1.0 {
             continue;
         }
-        let mut sum = [0.0f32; PLANES];
-        for (cy, wy) in side(y, coarse.height) {
-            for (cx, wx) in side(x, coarse.width) {
-                let from = &coarse.data[cy * coarse.width + cx];
-                sum.iter_mut().zip(from).for_each(|(s, v)| *s += wx * wy * v);
-            }
+        let [near, far] = side(x, coarse.width);
+        let at = |p: usize| {
+            let [near, far] =
+                [near, far].map(|x| 0.75 * here[p * coarse.rows.stride + x] + 0.25 * there[p * coarse.rows.stride + x]);
+            0.75 * near + 0.25 * far
+        };
+        let scale = (1.0 - known) / at(PLANES - 1).max(1e-6);
+        for p in 0..PLANES {
+            out[p * stride + x] += at(p) * scale;
         }
-        let scale = missing / sum[4].max(1e-6);
-        pixel.iter_mut().zip(sum).for_each(|(value, sum)| *value += sum * scale);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_near_object_is_replaced_by_what_surrounds_it() {
-        let (width, height) = (37, 23);
-        let mut scene = Rows::<4>::new(width, height, 0);
-        let (stride, row_len) = (scene.stride, scene.row_len());
-        for y in 0..height {
-            for x in 0..width {
-                let near = (10..20).contains(&x) && (5..15).contains(&y);
-                for p in 0..3 {
-                    scene.data[y * row_len + p * stride + x] = if near { 9.0 } else { 0.5 };
-                }
-                scene.data[y * row_len + 3 * stride + x] = if near { -8.0 } else { 2.0 };
-            }
-        }
-        let front = Share::new(Some((-1.0, 3.0)), None);
-        Pyramid::new(width, height).fill(&mut Team::new(2), &mut scene, (width, height), front, -1.0);
-        for y in 0..height {
-            for x in 0..width {
-                assert!((scene.data[y * row_len + x] - 0.5).abs() < 1e-5, "{x} {y}");
-                assert!((scene.data[y * row_len + 3 * stride + x] - 2.0).abs() < 1e-4);
-            }
-        }
-    }
-
-    #[test]
-    fn a_picture_that_is_all_near_keeps_finite() {
-        let mut scene = Rows::<4>::new(5, 3, 0);
-        scene.data.fill(-9.0);
-        let front = Share::new(Some((-1.0, 3.0)), None);
-        Pyramid::new(5, 3).fill(&mut Team::new(2), &mut scene, (5, 3), front, -1.0);
-        assert!(scene.data.iter().all(|v| v.is_finite()));
     }
 }

@@ -9,8 +9,8 @@ use crate::bokeh::bank::Bank;
 
 /// One row of the exact gather: each pixel with the full kernel of its own radius.
 pub struct Exact<'a> {
-    /// Premultiplied colour, coverage (1 everywhere) and |CoC|, padded by the reach.
-    pub source: &'a Rows<5>,
+    /// Colour and coverage (1 everywhere), padded by the reach.
+    pub source: &'a Rows<4>,
     /// Columns and rows.
     pub size: (usize, usize),
     /// Kernels by node, `(2 r + 1)^2` taps each, far and turned.
@@ -62,7 +62,7 @@ impl WithSimd for Exact<'_> {
 /// One row of the horizontal pass of the separable gather: `[term][3][width]`.
 pub struct GatherRow<'a> {
     /// As in [`Exact`].
-    pub source: &'a Rows<5>,
+    pub source: &'a Rows<4>,
     /// Columns.
     pub width: usize,
     /// The filters.

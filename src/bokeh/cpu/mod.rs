@@ -12,21 +12,23 @@ mod rows;
 mod shelves;
 mod simd;
 mod team;
+mod tiles;
 mod unpack;
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use aligned::Aligned;
-use bin::BinBand;
+use bin::{BLOCK, Band, BandSums, Hidden};
 use blur::{GROUP, Scratch, Strip};
 use pulp::Arch;
-use rows::{BinRows, MARGIN, Rows, STRIP, TILE_H, TILE_W};
+use rows::{STRIP, Slot};
 use shelves::{BinShelves, StripShelves};
 use team::{Shelf, Team};
-use unpack::Unpack;
+use tiles::{Survey, TILE_H, Tiles};
+use unpack::Source;
 
-use super::plan::{CELL, Compositing, MAX_BINS, Plan, Share};
+use super::plan::{CELL, Compositing, MAX_BINS, Plan, SCALES};
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
@@ -40,31 +42,28 @@ pub struct CpuBokeh {
     team: Team,
     decode: [f32; 256],
     encode: Vec<u8>,
-    scene: Rows<4>,
-    tiles: Vec<(f32, f32)>,
-    shares: Vec<Share>,
-    bins: Vec<BinRows>,
+    tiles: Tiles,
+    slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
+    waits: Vec<bool>,
     gather: Option<Gather>,
     members: Vec<Member>,
     taken: Vec<AtomicBool>,
-    taken_too: Vec<AtomicBool>,
     done: Option<Finished>,
 }
 
 /// Memory of one thread.
-#[derive(Default)]
 struct Member {
-    blur: Scratch,
+    coc: Vec<f32>,
+    sums: BandSums,
     reach: Vec<f32>,
+    blur: Scratch,
 }
-
-/// Rows of the picture that are binned together: a row of cells at every scale fits in whole.
-const BAND: usize = 4 * CELL;
 
 /// Memory of the comparison methods.
 struct Gather {
     kernels: Vec<[Vec<f32>; 2]>,
+    coc: Vec<f32>,
     rows: Vec<f32>,
     result: Vec<f32>,
 }
@@ -75,21 +74,19 @@ impl CpuBokeh {
         let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
         let (width, height) = (plan.width, plan.height);
         let team = Team::new(threads);
-        let shares = (0..plan.bins.len()).map(|k| plan.share(k)).collect();
-        let bins: Vec<BinRows> = plan.bins.iter().map(|bin| BinRows::new(&plan, bin)).collect();
-        let tallest = plan.bins.iter().map(|bin| bin.height).max().unwrap_or(0);
+        let slots: Vec<Slot> = (0..plan.slots()).map(|slot| Slot::new(&plan, slot)).collect();
         let members = (0..team.threads())
             .map(|_| Member {
+                coc: vec![0.0; width],
+                sums: BandSums::new(),
+                reach: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 blur: Scratch {
-                    rows: Aligned::zeros(tallest * GROUP.min(plan.bank.terms) * 4 * STRIP),
-                    filtered: Vec::with_capacity(tallest.div_ceil(CELL)),
+                    rows: Aligned::zeros(height * GROUP.min(plan.bank.terms) * 4 * STRIP),
+                    filtered: Vec::with_capacity(height.div_ceil(CELL)),
                 },
-                reach: Vec::with_capacity(bins.iter().map(|bin| bin.cells.data.len() * 2).max().unwrap_or(0)),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
-        let most = height.max(bins.iter().map(|bin| bin.strips).sum::<usize>());
-        let has_near = plan.bins.iter().any(|bin| bin.near);
         let bank = &plan.bank;
         let gather = (plan.compositing == Compositing::Gather).then(|| Gather {
             kernels: if plan.exact {
@@ -97,23 +94,21 @@ impl CpuBokeh {
             } else {
                 Vec::new()
             },
+            coc: vec![0.0; width * height],
             rows: vec![0.0; if plan.exact { 0 } else { width * height * 3 * bank.terms }],
             result: vec![0.0; width * height * 3],
         });
         Self {
             decode: unpack::decode_table(),
             encode: composite::encode_table(),
-            scene: Rows::new(width, height, MARGIN),
-            tiles: vec![(0.0, 0.0); width.div_ceil(TILE_W) * height.div_ceil(TILE_H)],
-            pyramid: (plan.fill && has_near && plan.compositing == Compositing::Layers)
-                .then(|| fill::Pyramid::new(width, height)),
+            tiles: Tiles::new(width, height),
+            pyramid: (plan.fill && plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
+            waits: vec![false; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),
-            taken: flags(most),
-            taken_too: flags(most),
+            taken: flags(height),
             plan,
             team,
-            shares,
-            bins,
+            slots,
             gather,
             members,
             done: None,
@@ -149,16 +144,24 @@ impl CpuBokeh {
             times.add(name, now - clock);
             clock = now;
         };
-        self.unpack(color, depth, coc);
-        lap("unpack");
-        self.bin(|bin| bin.near);
+        // The table is small, and the rest of `self` is written to while the frame is read.
+        let table = self.decode;
+        let frame = Source { color, depth, coc, table: &table, expansion: self.plan.expansion };
+        self.split(&frame);
+        lap("split");
+        let fills = self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near);
+        self.bin(&frame, fills, false);
         lap("bin");
-        self.fill();
-        lap("fill");
-        self.bin(|bin| !bin.near);
-        lap("bin");
+        if fills {
+            if let Some(pyramid) = &mut self.pyramid {
+                pyramid.fill(&mut self.team);
+            }
+            lap("fill");
+            self.bin(&frame, true, true);
+            lap("bin");
+        }
         if self.plan.compositing == Compositing::Gather {
-            self.gather();
+            self.gather(&frame);
             lap("gather");
         } else {
             self.reach();
@@ -166,99 +169,83 @@ impl CpuBokeh {
             self.blur_bins();
             lap("blur");
         }
-        self.composite(out);
+        self.composite(&frame, out);
         lap("composite");
         Ok(times)
     }
 
-    fn unpack(&mut self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField) {
-        let across = self.plan.width.div_ceil(TILE_W);
-        let stride = self.scene.stride;
-        let band = TILE_H * self.scene.row_len();
-        let out = Shelf::new(&mut self.scene.data, band, &mut self.taken);
-        let tiles = Shelf::new(&mut self.tiles, across, &mut self.taken_too);
-        let (arch, table, expansion) = (self.arch, &self.decode, self.plan.expansion);
-        self.team.run(self.plan.height.div_ceil(TILE_H), &|part| {
-            arch.dispatch(Unpack {
-                color,
-                depth,
-                coc,
-                table,
-                expansion,
-                y0: part * TILE_H,
-                out: out.part(part),
-                stride,
-                tiles: tiles.part(part),
+    /// What is where, and which bins that makes.
+    fn split(&mut self, frame: &Source<'_>) {
+        self.plan.split(frame.depth, frame.coc);
+        let across = self.tiles.across;
+        let layered = self.plan.compositing == Compositing::Layers;
+        if layered {
+            let ranges = Shelf::new(&mut self.tiles.ranges, across, &mut self.taken);
+            let arch = self.arch;
+            self.team.run_with(&mut self.members, self.tiles.down, &|member: &mut Member, row| {
+                arch.dispatch(Survey { source: frame, row, ranges: ranges.part(row), coc: &mut member.coc });
             });
-        });
+        }
+        self.tiles.settle(layered);
+        let fills = self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near);
+        for k in 0..self.plan.bins.len() {
+            let bin = &self.plan.bins[k];
+            let slot = &mut self.slots[bin.slot];
+            let meets = || self.tiles.meet(&self.plan.share(k), 0..self.tiles.across, 0..self.tiles.down);
+            slot.present = !layered || (fills && !bin.near) || meets();
+            slot.shape(&self.plan, bin);
+        }
     }
 
-    fn bin(&mut self, which: impl Fn(&super::plan::Bin) -> bool) {
-        let whole = self.plan.compositing != Compositing::Layers;
-        let across = self.plan.width.div_ceil(TILE_W);
-        let (arch, scene, tiles) = (self.arch, &self.scene, &self.tiles);
-        let size = (self.plan.width, self.plan.height);
+    /// The bins; `again` for those behind, where they waited for the fill.
+    fn bin(&mut self, frame: &Source<'_>, fills: bool, again: bool) {
+        let plan = &self.plan;
+        let blocks = plan.width.div_ceil(BLOCK);
+        let coarsest = plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1).max(SCALES[2]);
+        let rows = CELL * coarsest;
         let mut shelves: [Option<BinShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
-        for (k, (bin, rows)) in self.plan.bins.iter().zip(&mut self.bins).enumerate() {
-            if which(bin) {
-                rows.present = tiles.iter().any(|&tile| self.shares[k].meets(tile));
-                shelves[k] = rows.present.then(|| BinShelves::new(rows, across));
+        let layered = plan.compositing == Compositing::Layers;
+        for slot in self.slots.iter_mut().filter(|slot| slot.present) {
+            let Some(k) = plan.bins.iter().position(|bin| bin.slot == slot.index) else { continue };
+            let bin = &plan.bins[k];
+            if !(again && bin.near) {
+                shelves[k] = Some(BinShelves::new(bin, slot, rows, blocks, layered.then(|| plan.share(k))));
             }
         }
-        // A part is the same rows of the picture for every bin, so that they stay in the cache.
-        self.team.run(size.1.div_ceil(BAND), &|part| {
-            for (k, bin) in self.plan.bins.iter().enumerate() {
-                let Some(shelf) = &shelves[k] else { continue };
-                let bands = BAND / (CELL * bin.scale);
-                for band in part * bands..((part + 1) * bands).min(bin.height.div_ceil(CELL)) {
-                    arch.dispatch(BinBand {
-                        scene,
-                        size,
-                        tiles,
-                        share: (!whole).then_some(self.shares[k]),
-                        scale: bin.scale,
-                        band,
-                        width: bin.width,
-                        out: shelf.source.part(band),
-                        stride: shelf.stride,
-                        pad: shelf.pad,
-                        cells: shelf.cells.part(band),
-                        filled: shelf.filled.part(band),
-                    });
-                }
-            }
-        });
-    }
-
-    fn fill(&mut self) {
-        let Some(pyramid) = &mut self.pyramid else { return };
-        let near = self.plan.bins.iter().zip(&self.bins).filter(|(bin, _)| bin.near);
-        if !near.into_iter().any(|(_, rows)| rows.present) {
-            return;
-        }
-        let Some(index) = self.plan.bins.iter().rposition(|bin| bin.near) else { return };
-        let behind = self.plan.rest_share();
-        let nearest_px = self.plan.bins[index].high_px;
-        pyramid.fill(&mut self.team, &mut self.scene, (self.plan.width, self.plan.height), behind, nearest_px);
-        // What was filled in has another CoC: find the tiles' ranges anew.
-        let (across, scene) = (self.plan.width.div_ceil(TILE_W), &self.scene);
-        let (width, height) = (self.plan.width, self.plan.height);
-        let tiles = Shelf::new(&mut self.tiles, across, &mut self.taken);
-        self.team.run(height.div_ceil(TILE_H), &|part| {
-            let tiles = tiles.part(part);
-            tiles.fill((f32::INFINITY, f32::NEG_INFINITY));
-            for y in part * TILE_H..((part + 1) * TILE_H).min(height) {
-                unpack::widen(tiles, &scene.plane(y, 3)[..width]);
-            }
+        let (arch, tiles) = (self.arch, &self.tiles);
+        let bands = plan.height.div_ceil(rows);
+        let waits = Shelf::new(&mut self.waits[..bands * blocks], blocks, &mut self.taken);
+        let behind = plan.rest_share();
+        let (base, filled) = match self.pyramid.as_mut().filter(|_| fills) {
+            Some(pyramid) if again => (None, Some(pyramid.behind(behind.front.0))),
+            Some(pyramid) => (Some(pyramid.base(rows)), None),
+            None => (None, None),
+        };
+        self.team.run_with(&mut self.members, bands, &|member: &mut Member, band| {
+            let hidden = match (&base, filled) {
+                (Some(base), _) => Hidden::Waits(behind, base.band(band, rows, plan.height)),
+                (_, Some(filled)) => Hidden::Filled(filled),
+                _ => Hidden::Nothing,
+            };
+            arch.dispatch(Band {
+                source: *frame,
+                tiles,
+                rows: band * rows..(band + 1) * rows,
+                bins: std::array::from_fn(|k| shelves[k].as_ref().map(|shelf| shelf.part(band))),
+                hidden,
+                waits: waits.part(band),
+                sums: &mut member.sums,
+            });
         });
     }
 
     fn reach(&mut self) {
         let plan = &self.plan;
-        let parts = Shelf::new(&mut self.bins, 1, &mut self.taken);
+        let parts = Shelf::new(&mut self.slots, 1, &mut self.taken);
         self.team.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
-            for rows in parts.part(part).iter_mut().filter(|rows| rows.present) {
-                reach::reach(plan, &plan.bins[part], &rows.cells, &mut rows.edges, &mut member.reach);
+            let bin = &plan.bins[part];
+            for slot in parts.part(bin.slot).iter_mut().filter(|slot| slot.present) {
+                reach::reach(plan, bin, &slot.cells, &mut slot.edges, &mut member.reach);
             }
         });
     }
@@ -267,15 +254,18 @@ impl CpuBokeh {
         let (plan, arch) = (&self.plan, self.arch);
         let mut shelves: [Option<StripShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         let mut parts = 0;
-        for ((bin, rows), shelf) in plan.bins.iter().zip(&mut self.bins).zip(&mut shelves) {
-            if rows.present {
-                *shelf = Some(StripShelves::new(bin, rows, parts));
-                parts += bin.width.div_ceil(STRIP);
-            }
+        for slot in self.slots.iter_mut().filter(|slot| slot.present) {
+            let Some(k) = plan.bins.iter().position(|bin| bin.slot == slot.index) else { continue };
+            let strips = slot.strips;
+            shelves[k] = Some(StripShelves::new(&plan.bins[k], slot, parts));
+            parts += strips;
         }
         self.team.run_with(&mut self.members, parts, &|member: &mut Member, part| {
-            let mut all = shelves.iter().zip(&plan.bins).filter_map(|(shelf, bin)| shelf.as_ref().zip(Some(bin)));
-            let Some((shelf, bin)) = all.rfind(|(shelf, _)| shelf.first <= part) else { return };
+            let all = shelves.iter().zip(&plan.bins).filter_map(|(shelf, bin)| shelf.as_ref().zip(Some(bin)));
+            let Some((shelf, bin)) = all.filter(|(shelf, _)| shelf.first <= part).max_by_key(|(shelf, _)| shelf.first)
+            else {
+                return;
+            };
             let strip = part - shelf.first;
             arch.dispatch(Strip {
                 source: &shelf.source.data,
@@ -295,11 +285,13 @@ impl CpuBokeh {
         });
     }
 
-    fn gather(&mut self) {
+    fn gather(&mut self, frame: &Source<'_>) {
         let Some(gather) = &mut self.gather else { return };
         let (size, arch, bank) = ((self.plan.width, self.plan.height), self.arch, &*self.plan.bank);
-        let (source, scene) = (&self.bins[0].source, &self.scene);
-        let coc = |y: usize| scene.plane(y, 3);
+        let source = &self.slots[0].source;
+        let coc = Shelf::new(&mut gather.coc, size.0, &mut self.taken);
+        self.team.run(size.1, &|y| unpack::coc_row(frame, y, 0, coc.part(y)));
+        let coc = |y: usize| &gather.coc[y * size.0..][..size.0];
         if self.plan.exact {
             let out = Shelf::new(&mut gather.result, 3 * size.0, &mut self.taken);
             let kernels = &gather.kernels;
@@ -319,16 +311,16 @@ impl CpuBokeh {
         });
     }
 
-    fn composite(&mut self, out: &mut ColorImage) {
+    fn composite(&mut self, frame: &Source<'_>, out: &mut ColorImage) {
         let width = self.plan.width;
         let out = Shelf::new(&mut out.rgb, TILE_H * width * 3, &mut self.taken);
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| &gather.result);
-        let (plan, bins, shares, scene) = (&self.plan, &self.bins, &self.shares, &self.scene);
+        let (plan, slots, tiles) = (&self.plan, &self.slots, &self.tiles);
         let (arch, encode) = (self.arch, &self.encode);
         self.team.run(self.plan.height.div_ceil(TILE_H), &|part| {
             let y0 = part * TILE_H;
             let out = out.part(part);
-            arch.dispatch(composite::Composite { plan, bins, shares, scene, gathered, encode, y0, out });
+            arch.dispatch(composite::Composite { plan, slots, tiles, frame, gathered, encode, y0, out });
         });
     }
 }

@@ -3,17 +3,12 @@
 use std::sync::atomic::AtomicBool;
 
 use super::aligned::Aligned;
+use super::bin::BLOCK;
+use super::tiles::TILE_W;
 use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
 
 /// Columns of a strip: what one part of the blur pass produces.
 pub const STRIP: usize = 32;
-
-/// Pixels of the picture across a tile: what is converted at once, and has one range of CoC.
-pub const TILE_W: usize = 64;
-/// Rows of a tile.
-pub const TILE_H: usize = 8;
-/// Columns on both sides of the picture that repeat its outermost ones.
-pub const MARGIN: usize = 16;
 
 /// A picture of `CH` planes, row by row: `[row][plane][stride]`, each plane row with `pad` columns on both sides.
 pub struct Rows<const CH: usize> {
@@ -75,11 +70,23 @@ pub const NO_COLOR: f32 = 1e30;
 /// Planes of [`Cells`].
 pub const CELL_PLANES: usize = 8;
 
+/// A cell that holds nothing.
+pub const EMPTY_CELL: [f32; CELL_PLANES] = [0.0, 0.0, NO_COLOR, NO_COLOR, NO_COLOR, -NO_COLOR, -NO_COLOR, -NO_COLOR];
+
 impl Cells {
     /// An empty grid over `width` x `height` bin pixels (`width` in whole tiles).
     pub fn new(width: usize, height: usize) -> Self {
-        let (width, height) = (width.next_multiple_of(TILE_W) / CELL, height.div_ceil(CELL));
-        Self { data: vec![0.0; width * height * CELL_PLANES], width, height }
+        let mut cells = Self { data: Vec::new(), width: 0, height: 0 };
+        cells.shape(width, height);
+        cells
+    }
+
+    /// Empties the grid and gives it another size.
+    pub fn shape(&mut self, width: usize, height: usize) {
+        (self.width, self.height) = (width.next_multiple_of(TILE_W) / CELL, height.div_ceil(CELL));
+        self.data.clear();
+        let planes = (0..self.height).flat_map(|_| EMPTY_CELL);
+        planes.for_each(|value| self.data.extend(std::iter::repeat_n(value, self.width)));
     }
 
     /// A plane of row `y`.
@@ -107,8 +114,15 @@ pub const STRIP_EDGES: usize = STRIP / SEGMENT + 1;
 impl Edges {
     /// Edges of a grid of cells.
     pub fn new(cells: &Cells) -> Self {
-        let across = cells.width * CELL / SEGMENT + 1;
-        Self { data: vec![0.0; across * cells.height * EDGE_VALUES], across, height: cells.height }
+        let mut edges = Self { data: Vec::new(), across: 0, height: 0 };
+        edges.shape(cells);
+        edges
+    }
+
+    /// Gives the edges another size; their content is unspecified after.
+    pub fn shape(&mut self, cells: &Cells) {
+        (self.across, self.height) = (cells.width * CELL / SEGMENT + 1, cells.height);
+        self.data.resize(self.across * self.height * EDGE_VALUES, 0.0);
     }
 
     /// The values at the edges of a strip in row `y` of the bin, linear between the middles of the cells.
@@ -131,13 +145,15 @@ impl Edges {
     }
 }
 
-/// What one bin needs while a frame is blurred.
-pub struct BinRows {
-    /// Premultiplied colour, coverage, coverage times |CoC|.
-    pub source: Rows<5>,
+/// What one bin needs while a frame is blurred: memory for the largest that it can be, in the shape of the current one.
+pub struct Slot {
+    /// Which one.
+    pub index: usize,
+    /// Premultiplied colour and coverage.
+    pub source: Rows<4>,
     /// The coarse grid as measured.
     pub cells: Cells,
-    /// Per row of cells and tile, whether `source` holds anything but zeros.
+    /// Per row of cells and block, whether `source` holds anything but zeros.
     pub filled: Vec<bool>,
     /// The radius and the range of colours within reach.
     pub edges: Edges,
@@ -151,26 +167,62 @@ pub struct BinRows {
     pub present: bool,
     /// Flags for three shelves at once.
     pub taken: [Vec<AtomicBool>; 3],
+    scale: usize,
 }
 
-impl BinRows {
+impl Slot {
     /// Memory for one bin; pages that no frame touches are never really taken.
-    pub fn new(plan: &Plan, bin: &Bin) -> Self {
-        let strips = bin.width.div_ceil(STRIP);
-        let cells = Cells::new(bin.width, bin.height);
+    pub fn new(plan: &Plan, slot: usize) -> Self {
+        let scale = plan.least_scale(slot);
+        let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
+        let pad = plan.reach().next_multiple_of(16);
+        let strips = width.div_ceil(STRIP);
+        let cells = Cells::new(width, height);
+        let rows_of_cells = height.div_ceil(CELL);
         Self {
-            source: Rows::new(bin.width, bin.height, plan.reach().next_multiple_of(16)),
-            filled: vec![false; plan.width.div_ceil(TILE_W) * cells.height],
+            index: slot,
+            source: Rows { data: Aligned::zeros(source_stride(plan, scale, pad) * 4 * height), stride: 0, pad },
+            filled: vec![false; plan.width.div_ceil(BLOCK) * rows_of_cells],
             edges: Edges::new(&cells),
             cells,
-            out: Aligned::zeros(strips * bin.height * 4 * STRIP),
-            active: vec![false; strips * bin.height.div_ceil(CELL)],
-            strips,
+            out: Aligned::zeros(strips * height * 4 * STRIP),
+            active: vec![false; strips * rows_of_cells],
+            strips: 0,
             present: false,
             taken: std::array::from_fn(|_| {
-                let parts = strips.max(bin.height.div_ceil(CELL));
-                std::iter::repeat_with(|| AtomicBool::new(false)).take(parts).collect()
+                std::iter::repeat_with(|| AtomicBool::new(false)).take(strips.max(rows_of_cells)).collect()
             }),
+            scale: 0,
         }
     }
+
+    /// Takes the shape of a bin, empty where it is another than before.
+    pub fn shape(&mut self, plan: &Plan, bin: &Bin) {
+        if self.scale == bin.scale {
+            return;
+        }
+        let old_rows = plan.height.div_ceil(self.scale.max(1));
+        if self.scale > 0 {
+            let row_len = self.source.row_len();
+            self.source.data[..row_len * old_rows].fill(0.0);
+            self.out[..self.strips * old_rows * 4 * STRIP].fill(0.0);
+        }
+        self.filled.fill(false);
+        self.active.fill(false);
+        self.scale = bin.scale;
+        self.source.stride = source_stride(plan, bin.scale, self.source.pad);
+        self.strips = bin.width.div_ceil(STRIP);
+        self.cells.shape(bin.width, bin.height);
+        self.edges.shape(&self.cells);
+    }
+
+    /// The values that the current shape uses: of `source`, and of `out`.
+    pub fn used(&self, bin: &Bin) -> (usize, usize) {
+        (self.source.row_len() * bin.height, self.strips * bin.height * 4 * STRIP)
+    }
+}
+
+/// Values of a plane row of a bin: whole blocks, and columns on both sides for the filters.
+fn source_stride(plan: &Plan, scale: usize, pad: usize) -> usize {
+    plan.width.next_multiple_of(BLOCK) / scale + 2 * pad
 }

@@ -1,29 +1,53 @@
 //! What the parts of a pass that runs over every bin at once read and write, bin by bin.
 #![allow(missing_docs)] // The fields are those of `BinRows`.
 
-use super::rows::{BinRows, CELL_PLANES, Cells, Edges, Rows, STRIP};
+use super::bin::BinRows;
+use super::rows::{CELL_PLANES, Cells, Edges, Rows, STRIP, Slot};
 use super::team::Shelf;
-use crate::bokeh::plan::{Bin, CELL};
+use crate::bokeh::plan::{Bin, CELL, Share};
 
 /// What the parts of the pass `bin` write for one bin.
 pub struct BinShelves<'a> {
-    pub source: Shelf<'a, f32>,
-    pub cells: Shelf<'a, f32>,
-    pub filled: Shelf<'a, bool>,
-    pub stride: usize,
-    pub pad: usize,
+    source: Shelf<'a, f32>,
+    cells: Shelf<'a, f32>,
+    filled: Shelf<'a, bool>,
+    stride: usize,
+    pad: usize,
+    share: Option<Share>,
+    scale: usize,
+    size: (usize, usize),
 }
 
 impl<'a> BinShelves<'a> {
-    pub fn new(rows: &'a mut BinRows, across: usize) -> Self {
-        let [first, second, third] = &mut rows.taken;
-        let (stride, pad, row_len) = (rows.source.stride, rows.source.pad, rows.source.row_len());
+    /// Parts of `rows` rows of the picture; `share` is none when the bin takes everything.
+    pub fn new(bin: &Bin, slot: &'a mut Slot, rows: usize, blocks: usize, share: Option<Share>) -> Self {
+        let used = slot.used(bin).0;
+        let [first, second, third] = &mut slot.taken;
+        let (stride, pad, row_len) = (slot.source.stride, slot.source.pad, slot.source.row_len());
+        let each = rows / bin.scale;
+        let cells = each / CELL;
         Self {
-            source: Shelf::new(&mut rows.source.data, CELL * row_len, first),
-            cells: Shelf::new(&mut rows.cells.data, CELL_PLANES * rows.cells.width, second),
-            filled: Shelf::new(&mut rows.filled, across, third),
+            source: Shelf::new(&mut slot.source.data[..used], each * row_len, first),
+            cells: Shelf::new(&mut slot.cells.data, cells * CELL_PLANES * slot.cells.width, second),
+            filled: Shelf::new(&mut slot.filled[..blocks * bin.height.div_ceil(CELL)], cells * blocks, third),
             stride,
             pad,
+            share,
+            scale: bin.scale,
+            size: (bin.width, bin.height),
+        }
+    }
+
+    pub fn part(&self, band: usize) -> BinRows<'_> {
+        BinRows {
+            share: self.share,
+            scale: self.scale,
+            size: self.size,
+            out: self.source.part(band),
+            stride: self.stride,
+            pad: self.pad,
+            cells: self.cells.part(band),
+            filled: self.filled.part(band),
         }
     }
 }
@@ -32,7 +56,7 @@ impl<'a> BinShelves<'a> {
 pub struct StripShelves<'a> {
     /// The part that is its first strip.
     pub first: usize,
-    pub source: &'a Rows<5>,
+    pub source: &'a Rows<4>,
     pub cells: &'a Cells,
     pub edges: &'a Edges,
     pub out: Shelf<'a, f32>,
@@ -40,15 +64,17 @@ pub struct StripShelves<'a> {
 }
 
 impl<'a> StripShelves<'a> {
-    pub fn new(bin: &Bin, rows: &'a mut BinRows, first: usize) -> Self {
-        let [taken, taken_too, _] = &mut rows.taken;
+    pub fn new(bin: &Bin, slot: &'a mut Slot, first: usize) -> Self {
+        let used = slot.used(bin).1;
+        let down = bin.height.div_ceil(CELL);
+        let [taken, taken_too, _] = &mut slot.taken;
         Self {
             first,
-            source: &rows.source,
-            cells: &rows.cells,
-            edges: &rows.edges,
-            out: Shelf::new(&mut rows.out, bin.height * 4 * STRIP, taken),
-            active: Shelf::new(&mut rows.active, bin.height.div_ceil(CELL), taken_too),
+            source: &slot.source,
+            cells: &slot.cells,
+            edges: &slot.edges,
+            out: Shelf::new(&mut slot.out[..used], bin.height * 4 * STRIP, taken),
+            active: Shelf::new(&mut slot.active[..slot.strips * down], down, taken_too),
         }
     }
 }

@@ -1,8 +1,6 @@
 //! Pass `unpack`: 8-bit sRGB to linear light with highlights expanded, and depth to signed CoC.
 
-use super::rows::{MARGIN, TILE_W, repeat_ends};
-use pulp::{Simd, WithSimd};
-
+use super::aligned::Line;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
@@ -42,8 +40,9 @@ pub fn compress(luminance: f32, expansion: f32) -> f32 {
     expansion / (expansion + luminance)
 }
 
-/// The rows of one row of tiles.
-pub struct Unpack<'a> {
+/// A frame as it came.
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
     /// The picture.
     pub color: &'a ColorImage,
     /// Its depth, of any size.
@@ -54,77 +53,64 @@ pub struct Unpack<'a> {
     pub table: &'a [f32; 256],
     /// Highlight recovery, infinite when off.
     pub expansion: f32,
-    /// First row.
-    pub y0: usize,
-    /// Rows of `[r, g, b, coc][stride]`, with `MARGIN` columns in front.
-    pub out: &'a mut [f32],
-    /// Values of a plane row.
-    pub stride: usize,
-    /// Lowest and highest CoC of each tile of this row of tiles.
-    pub tiles: &'a mut [(f32, f32)],
 }
 
-impl WithSimd for Unpack<'_> {
-    type Output = ();
+/// Some pixels of a row: linear light r, g, b and CoC.
+pub type Piece<const W: usize> = Line<[[f32; W]; 4]>;
+
+impl Source<'_> {
+    /// The `W` pixels of row `y` from column `x0` on; outside, the outermost pixels repeat.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    pub fn unpack<const W: usize>(&self, y: usize, x0: isize, piece: &mut Piece<W>) {
         let width = self.color.width as usize;
-        self.tiles.fill((f32::INFINITY, f32::NEG_INFINITY));
-        for (dy, planes) in self.out.chunks_exact_mut(self.stride * 4).enumerate() {
-            let y = self.y0 + dy;
-            let (red, rest) = planes.split_at_mut(self.stride);
-            let (green, rest) = rest.split_at_mut(self.stride);
-            let (blue, coc) = rest.split_at_mut(self.stride);
-            let pixels = self.color.rgb[y * width * 3..][..width * 3].chunks_exact(3);
-            let (red, green, blue) = (&mut red[MARGIN..], &mut green[MARGIN..], &mut blue[MARGIN..]);
-            for (((pixel, r), g), b) in pixels.zip(&mut *red).zip(&mut *green).zip(&mut *blue) {
-                *r = self.table[pixel[0] as usize];
-                *g = self.table[pixel[1] as usize];
-                *b = self.table[pixel[2] as usize];
+        let row = &self.color.rgb[y * width * 3..][..width * 3];
+        let before = (-x0).clamp(0, W as isize) as usize;
+        let first = x0.max(0) as usize;
+        let end = before + width.saturating_sub(first).min(W - before);
+        let [red, green, blue, coc] = &mut piece.0;
+        let pixels = row[first * 3..].as_chunks::<3>().0;
+        for (((pixel, r), g), b) in
+            pixels.iter().zip(&mut red[before..end]).zip(&mut green[before..end]).zip(&mut blue[before..end])
+        {
+            *r = self.table[pixel[0] as usize];
+            *g = self.table[pixel[1] as usize];
+            *b = self.table[pixel[2] as usize];
+        }
+        coc_row(self, y, first, &mut coc[before..end]);
+        if self.expansion.is_finite() {
+            for x in 0..W {
+                let factor = expand(luminance(red[x], green[x], blue[x]), self.expansion);
+                (red[x], green[x], blue[x]) = (red[x] * factor, green[x] * factor, blue[x] * factor);
             }
-            if self.expansion.is_finite() {
-                for x in 0..width {
-                    let factor = expand(luminance(red[x], green[x], blue[x]), self.expansion);
-                    (red[x], green[x], blue[x]) = (red[x] * factor, green[x] * factor, blue[x] * factor);
-                }
+        }
+        if before > 0 || end < W {
+            for plane in &mut piece.0 {
+                let (left, right) = (plane[before], plane[end - 1]);
+                plane[..before].fill(left);
+                plane[end..].fill(right);
             }
-            coc_row(self.coc, self.depth, y, self.color.height as usize, &mut coc[MARGIN..MARGIN + width]);
-            // Whole tiles can be worked on, and a little around them.
-            planes.chunks_exact_mut(self.stride).for_each(|plane| repeat_ends(plane, MARGIN, width));
-            let coc = &planes[3 * self.stride + MARGIN..];
-            widen(self.tiles, &coc[..width]);
         }
     }
 }
 
-/// Widens the ranges of a row of tiles by a row of CoC.
+/// The CoC of the pixels of row `y` from column `x0` on.
 #[inline(always)]
-pub fn widen(tiles: &mut [(f32, f32)], coc: &[f32]) {
-    for (tile, values) in tiles.iter_mut().zip(coc.chunks(TILE_W)) {
-        for &value in values {
-            tile.0 = if value < tile.0 { value } else { tile.0 };
-            tile.1 = if value > tile.1 { value } else { tile.1 };
-        }
-    }
-}
-
-#[inline(always)]
-fn coc_row(rule: &CocField, depth: Option<&DepthMap>, y: usize, height: usize, coc: &mut [f32]) {
-    match (rule, depth) {
+pub fn coc_row(source: &Source<'_>, y: usize, x0: usize, coc: &mut [f32]) {
+    let (width, height) = (source.color.width as usize, source.color.height as usize);
+    match (source.coc, source.depth) {
         (CocField::Depth(lens), Some(map)) if !map.metres.is_empty() => {
             let (w, h) = (map.width as usize, map.height as usize);
             let row = &map.metres[nearest(y, height, h) * w..][..w];
-            if w == coc.len() {
-                coc.iter_mut().zip(row).for_each(|(coc, &metres)| *coc = lens.coc_px(metres));
+            if w == width {
+                coc.iter_mut().zip(&row[x0..]).for_each(|(coc, &metres)| *coc = lens.coc_px(metres));
             } else {
-                let width = coc.len();
-                coc.iter_mut().enumerate().for_each(|(x, coc)| *coc = lens.coc_px(row[nearest(x, width, w)]));
+                coc.iter_mut().enumerate().for_each(|(x, coc)| *coc = lens.coc_px(row[nearest(x0 + x, width, w)]));
             }
         }
         (CocField::Depth(lens), _) => coc.fill(lens.coc_px(0.0)),
         (CocField::Uniform { radius_px }, _) => coc.fill(*radius_px),
         (CocField::Ramp(ramp), _) => {
-            coc.iter_mut().enumerate().for_each(|(x, coc)| *coc = ramp.coc_px(x as f32, y as f32));
+            coc.iter_mut().enumerate().for_each(|(x, coc)| *coc = ramp.coc_px((x0 + x) as f32, y as f32));
         }
     }
 }

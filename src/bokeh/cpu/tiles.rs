@@ -1,0 +1,122 @@
+//! What is where, before any colour is read: the range of CoC of every tile, and the tiles that stay as they are.
+
+use super::unpack::{Source, coc_row};
+use crate::bokeh::plan::Share;
+
+/// Pixels of the picture across a tile.
+pub const TILE_W: usize = 64;
+/// Rows of a tile.
+pub const TILE_H: usize = 8;
+/// The picture around a tile that can change it, in tiles: the widest filter at full scale in a bin that is in focus,
+/// and the cells that its radius is a mean of.
+const AROUND: (usize, usize) = (1, 3);
+/// Filters of a smaller radius have one tap.
+const SHARP_PX: f32 = 0.4;
+
+/// The tiles of a picture.
+pub struct Tiles {
+    /// Lowest and highest CoC in pixels, row by row.
+    pub ranges: Vec<(f32, f32)>,
+    /// Per tile, whether nothing within its reach is blurred by anything behind: it stays as it is.
+    pub still: Vec<bool>,
+    /// Per tile, whether it and all around it is still, so that no bin needs it.
+    pub idle: Vec<bool>,
+    scratch: Vec<bool>,
+    /// Tiles across.
+    pub across: usize,
+    /// Tiles down.
+    pub down: usize,
+}
+
+impl Tiles {
+    /// Tiles of a picture of `width` x `height` pixels.
+    pub fn new(width: usize, height: usize) -> Self {
+        let (across, down) = (width.div_ceil(TILE_W), height.div_ceil(TILE_H));
+        let flags = vec![false; across * down];
+        Self {
+            ranges: vec![(0.0, 0.0); across * down],
+            still: flags.clone(),
+            idle: flags.clone(),
+            scratch: flags,
+            across,
+            down,
+        }
+    }
+
+    /// Finds the tiles that stay as they are, once all ranges are known.
+    pub fn settle(&mut self, enabled: bool) {
+        let sharp = |&(low, high): &(f32, f32)| low >= -SHARP_PX && high <= SHARP_PX;
+        self.idle.iter_mut().zip(&self.ranges).for_each(|(tile, range)| *tile = enabled && sharp(range));
+        let size = (self.across, self.down);
+        erode(&self.idle, &mut self.scratch, &mut self.still, size);
+        erode(&self.still, &mut self.scratch, &mut self.idle, size);
+    }
+
+    /// Whether any CoC of some tiles does not have the whole share.
+    pub fn lack(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
+        let columns = columns.start.min(self.across)..columns.end.min(self.across);
+        (rows.start..rows.end.min(self.down)).any(|row| {
+            let at = row * self.across;
+            self.ranges[at + columns.start..at + columns.end].iter().any(|range| share.at(range.0) < 1.0)
+        })
+    }
+
+    /// Whether any CoC of some tiles has a share; columns and rows of tiles are cut at the picture's end.
+    pub fn meet(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
+        let columns = columns.start.min(self.across)..columns.end.min(self.across);
+        (rows.start..rows.end.min(self.down)).any(|row| {
+            let at = row * self.across;
+            let tiles = &self.ranges[at + columns.start..at + columns.end];
+            let idle = &self.idle[at + columns.start..at + columns.end];
+            tiles.iter().zip(idle).any(|(&range, &idle)| !idle && share.meets(range))
+        })
+    }
+}
+
+/// A row of tiles.
+pub struct Survey<'a> {
+    pub source: &'a Source<'a>,
+    pub row: usize,
+    pub ranges: &'a mut [(f32, f32)],
+    /// As many values as the picture has columns.
+    pub coc: &'a mut [f32],
+}
+
+impl pulp::WithSimd for Survey<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.ranges.fill((f32::INFINITY, f32::NEG_INFINITY));
+        let height = self.source.color.height as usize;
+        for y in self.row * TILE_H..((self.row + 1) * TILE_H).min(height) {
+            coc_row(self.source, y, 0, self.coc);
+            for (range, values) in self.ranges.iter_mut().zip(self.coc.chunks(TILE_W)) {
+                let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
+                let (vectors, rest) = values.as_chunks::<16>();
+                for values in vectors {
+                    for k in 0..16 {
+                        low[k] = if values[k] < low[k] { values[k] } else { low[k] };
+                        high[k] = if values[k] > high[k] { values[k] } else { high[k] };
+                    }
+                }
+                range.0 = low.iter().chain(rest).copied().fold(range.0, f32::min);
+                range.1 = high.iter().chain(rest).copied().fold(range.1, f32::max);
+            }
+        }
+    }
+}
+
+/// A tile stays set when all around it are set.
+fn erode(from: &[bool], scratch: &mut [bool], to: &mut [bool], (across, down): (usize, usize)) {
+    for (row, out) in from.chunks_exact(across).zip(scratch.chunks_exact_mut(across)) {
+        for (x, out) in out.iter_mut().enumerate() {
+            *out = row[x.saturating_sub(AROUND.0)..(x + AROUND.0 + 1).min(across)].iter().all(|&set| set);
+        }
+    }
+    for y in 0..down {
+        for x in 0..across {
+            to[y * across + x] =
+                (y.saturating_sub(AROUND.1)..(y + AROUND.1 + 1).min(down)).all(|y| scratch[y * across + x]);
+        }
+    }
+}
