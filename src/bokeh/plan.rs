@@ -28,7 +28,10 @@ pub const MAX_BINS: usize = 13;
 pub const COVERAGE_FLOOR: f32 = 1e-3;
 
 /// From this coverage on, a bin counts as wholly there when the hindmost is looked for.
-pub const HINDMOST_COVERAGE: f32 = 0.2;
+pub const HINDMOST_COVERAGE: f32 = 0.8;
+
+/// No colour is brighter: the range of a bin whose filters have no lobes that a range would have to cut.
+pub const ANY_COLOR: f32 = 1e20;
 
 /// Weight of far cells in a local radius, so that there is one wherever the filter finds anything at all.
 pub const FAR_WEIGHT: f32 = 0.02;
@@ -45,6 +48,8 @@ pub struct Rung {
     pub rank: u32,
     /// Bins behind the focal plane, and as many in front.
     pub bins_per_side: u32,
+    /// Radius in front of the focal plane below which everything belongs to the bin in focus.
+    pub near_from_px: f32,
     /// Smallest radius in a bin, in pixels of the picture, from which it is filtered at each of [`SCALES`].
     pub scale_from_px: [f32; SCALES.len()],
     /// Whether what near objects hide is filled in.
@@ -53,18 +58,19 @@ pub struct Rung {
 
 /// The rung of a quality level.
 pub fn rung(quality: Quality) -> Rung {
-    let rung = |rank, bins_per_side, [half, quarter, eighth]: [f32; 3], fill| Rung {
+    let rung = |rank, bins_per_side, near_from_px, [half, quarter, eighth]: [f32; 3], fill| Rung {
         rank,
         bins_per_side,
+        near_from_px,
         scale_from_px: [0.0, half, quarter, eighth],
         fill,
     };
     match quality {
-        Quality::Draft => rung(2, 2, [3.0, 8.0, 20.0], false),
-        Quality::Fast => rung(2, 2, [3.0, 8.0, 20.0], true),
-        Quality::Balanced => rung(3, 3, [3.5, 12.0, 28.0], true),
-        Quality::High => rung(4, 4, [5.0, 20.0, 48.0], true),
-        Quality::Best => rung(4, 6, [8.0, 32.0, 80.0], true),
+        Quality::Draft => rung(2, 2, 2.5, [3.0, 8.0, 20.0], false),
+        Quality::Fast => rung(2, 2, 2.5, [3.0, 8.0, 20.0], true),
+        Quality::Balanced => rung(3, 3, 2.0, [3.5, 12.0, 28.0], true),
+        Quality::High => rung(4, 4, 1.5, [5.0, 20.0, 48.0], true),
+        Quality::Best => rung(4, 6, 1.0, [8.0, 32.0, 80.0], true),
     }
 }
 
@@ -144,6 +150,8 @@ pub struct Plan {
     pub exact: bool,
     /// Whether every bin stays at full scale.
     full_scale: bool,
+    /// Largest radius in the bin in focus.
+    focus_px: f32,
     /// Largest CoC radius behind the focal plane and in front of it.
     max_px: [f32; 2],
     counts: Counts,
@@ -176,12 +184,16 @@ impl Plan {
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
             exact: compositing == Compositing::Gather && rank == Rank::Full,
             full_scale,
+            focus_px: most_px,
             max_px: [settings.far_max_px, settings.near_max_px],
             counts: Counts::new(),
             pieces: std::array::from_fn(|_| Vec::with_capacity(MAX_PIECES)),
         };
         match settings.effect {
-            Effect::TiltShift => plan.pieces[0].extend(even_pieces(settings.far_max_px, rung.bins_per_side)),
+            Effect::TiltShift => {
+                plan.pieces[0].extend(even_pieces(settings.far_max_px, rung.bins_per_side));
+                plan.focus_px = plan.pieces[0].first().map_or(most_px, |piece| piece.border_px);
+            }
             Effect::Blur => {
                 let [border_px, low_px, high_px] = [0.0, settings.far_max_px, settings.far_max_px];
                 plan.pieces[0].push(Piece { border_px, low_px, high_px });
@@ -201,9 +213,9 @@ impl Plan {
             (CocField::Depth(lens), Some(depth)) => self.counts.count(depth, lens),
             _ => self.counts = Counts::new(),
         }
-        for (near, pieces) in [false, true].into_iter().zip(&mut self.pieces) {
-            self.counts.pieces(near, &self.rung, pieces);
-        }
+        let sides = [false, true].into_iter().zip(&mut self.pieces);
+        let inner_px = sides.map(|(near, pieces)| self.counts.pieces(near, &self.rung, pieces));
+        self.focus_px = inner_px.fold(0.0, f32::max).min(self.max_px[0].max(self.max_px[1]));
         self.lay_out();
     }
 
@@ -232,16 +244,19 @@ impl Plan {
             self.bins.push(bin((-beyond(near, k), -piece.border_px), content, 1 + side + k));
         }
         if first(far) > 0.0 {
-            let largest = |(pieces, max_px): (&Vec<Piece>, f32)| first(pieces).min(max_px);
-            let most_px = self.pieces.iter().zip(self.max_px).map(largest).fold(0.0, f32::max);
-            let most_px = if self.compositing == Compositing::Layers { most_px.min(MOST_RADIUS_PX) } else { most_px };
-            self.bins.push(bin((-first(near), first(far)), (0.0, most_px), 0));
+            self.bins.push(bin((-first(near), first(far)), (0.0, self.focus_px), 0));
         }
         for (k, piece) in far.iter().enumerate() {
             let content = (piece.low_px, piece.high_px.min(self.max_px[0]));
             let low_px = if piece.border_px > 0.0 { piece.border_px } else { f32::NEG_INFINITY };
             self.bins.push(bin((low_px, beyond(far, k)), content, 1 + k));
         }
+    }
+
+    /// Whether a bin's filters are truncated: small ones have no more terms than are kept.
+    pub fn has_lobes(&self, bin: &Bin) -> bool {
+        let reach = self.bank.node_reach[self.bank.node(bin.max_radius_px)] as usize;
+        self.bank.terms < if self.bank.even { reach + 1 } else { 2 * reach + 1 }
     }
 
     /// The least scale that a bin in this slot can have.

@@ -6,7 +6,7 @@ use crate::frame::DepthMap;
 use crate::optics::DepthCoc;
 
 /// Buckets to an octave of `|c|`.
-const PER_OCTAVE: usize = 8;
+const PER_OCTAVE: usize = 16;
 /// Buckets on one side of the focal plane: `|c|` from 1 px to 256 px, and beyond in the last.
 const BUCKETS: usize = 8 * PER_OCTAVE;
 /// Bits of a float below those that tell the bucket.
@@ -61,12 +61,18 @@ impl Counts {
         }
     }
 
-    /// The pieces of one side, from the focal plane outwards: at most as many as the rung has bins.
-    pub fn pieces(&self, near: bool, rung: &Rung, pieces: &mut Vec<Piece>) {
+    /// The pieces of one side, from the focal plane outwards: at most as many as the rung has bins. Returns the largest
+    /// radius of what is left to the bin in focus.
+    pub fn pieces(&self, near: bool, rung: &Rung, pieces: &mut Vec<Piece>) -> f32 {
         pieces.clear();
         let side = &self.sides[usize::from(near)];
         let bins = (rung.bins_per_side as usize).min(MAX_PIECES);
-        let Some(last) = side.iter().rposition(|&n| n > 0) else { return };
+        let Some(last) = side.iter().rposition(|&n| n > 0) else { return FOCUS_BORDER_PX };
+        // A nose is not a layer of its own: what is hardly out of focus in front belongs to the subject.
+        let first = if near { rung.near_from_px.log2() * PER_OCTAVE as f32 } else { 0.0 } as usize;
+        if last < first {
+            return edge_px(last + 1);
+        }
         // Sums of counts, of counts times ln |c| and of counts times its square, up to each bucket.
         let mut sums = [[0.0f64; 3]; BUCKETS + 1];
         for (k, &n) in side.iter().enumerate() {
@@ -79,12 +85,12 @@ impl Counts {
         };
         // best[j][e]: least cost of buckets 0..e in j + 1 pieces, and where the last of them begins.
         let mut best = [[(f64::INFINITY, 0usize); BUCKETS + 1]; MAX_PIECES];
-        for to in 1..=last + 1 {
-            best[0][to] = (spread(0, to), 0);
+        for to in first + 1..=last + 1 {
+            best[0][to] = (spread(first, to), first);
         }
         for j in 1..bins {
-            for to in j + 1..=last + 1 {
-                for from in j..to {
+            for to in first + j + 1..=last + 1 {
+                for from in first + j..to {
                     // Bins at full scale are dear: only the first ones may be.
                     if side[from] == 0 || j >= rung.fine_bins() && edge_px(from) < rung.scale_from_px[1] {
                         continue;
@@ -104,6 +110,7 @@ impl Counts {
             to = from;
         }
         pieces.reverse();
+        pieces.first().map_or(FOCUS_BORDER_PX, |piece| piece.border_px)
     }
 
     /// The piece of buckets `from..to`.

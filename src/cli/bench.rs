@@ -12,11 +12,10 @@ use super::values::{self, Size, above_zero};
 use super::{defaults, options, print, render};
 use crate::bokeh::{Bokeh, Job, PassTimes};
 use crate::budget::Quality;
-use crate::capture::Camera;
-use crate::capture::synthetic::{Format, Synthetic};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
 use crate::optics::CocField;
+use crate::scene::{Scene, View};
 
 /// Frames before those that are measured: caches and clocks settle.
 const WARM_UP_FRAMES: usize = 2;
@@ -46,6 +45,9 @@ pub struct BenchCommand {
     #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
           value_parser = value_parser!(u16).range(1..=1024))]
     threads: Vec<u16>,
+    /// What is in the picture
+    #[arg(long, value_enum, value_name = "WHICH", default_value_t = BenchScene::Sitter)]
+    scene: BenchScene,
     /// Frames to measure
     #[arg(id = "benched_frames", long = "frames", value_name = "N", default_value_t = defaults::BENCHED_FRAMES,
           value_parser = value_parser!(u32).range(1..))]
@@ -66,6 +68,15 @@ pub struct BenchCommand {
     blur: options::Blur,
     #[command(flatten)]
     aperture: options::Aperture,
+}
+
+/// The picture that is blurred.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum BenchScene {
+    /// A person in focus, and a room behind
+    Sitter,
+    /// The same with things in front, for which what they hide is filled in
+    Portrait,
 }
 
 /// One line of the result.
@@ -96,7 +107,7 @@ pub fn run(command: &BenchCommand) -> Result<(), CliError> {
         list => list.iter().map(|&threads| Some(usize::from(threads))).collect(),
     };
     for size in &command.sizes {
-        let (color, depth) = synthetic_frame((size.width, size.height))?;
+        let (color, depth) = synthetic_frame(command.scene, (size.width, size.height));
         let default_coc_px = [size.height as f32 * defaults::COC_AT_INFINITY_PER_HEIGHT];
         let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
         for &coc_px in radii_px {
@@ -195,12 +206,15 @@ impl Buffers {
     }
 }
 
-fn synthetic_frame(size: (u32, u32)) -> Result<(ColorImage, DepthMap), CliError> {
+fn synthetic_frame(scene: BenchScene, size: (u32, u32)) -> (ColorImage, DepthMap) {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut camera = Synthetic::new(Format { size, fps: defaults::FPS, frames: Some(1), threads })?;
+    let scene = match scene {
+        BenchScene::Sitter => Scene::sitter(),
+        BenchScene::Portrait => Scene::portrait(),
+    };
     let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
-    camera.next(&mut color, &mut depth)?;
-    Ok((color, depth))
+    scene.render_pinhole(&View::new(size.0, size.1), 0.0, 1, threads, &mut color, &mut depth);
+    (color, depth)
 }
 
 impl Measured {

@@ -40,7 +40,12 @@ impl Scene {
     /// A person at a table in a room in the evening: subject in focus at 1.2 m, a twig in front at half a metre,
     /// furniture, a shelf and a window on a lit street behind.
     pub fn portrait() -> Scene {
-        portrait::scene()
+        portrait::scene(true)
+    }
+
+    /// The same without what stands in front of the person: as a webcam sees most people.
+    pub fn sitter() -> Scene {
+        portrait::scene(false)
     }
 
     /// Length of the seamless loop, in seconds.

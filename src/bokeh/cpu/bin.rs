@@ -8,7 +8,7 @@ use pulp::{Simd, WithSimd};
 use super::aligned::Line;
 use super::fill::{Behind, HalfRows};
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, repeat_ends};
-use super::simd::madd;
+use super::simd::{fma, load, store};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Piece, Source};
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, MAX_BINS, Share};
@@ -18,6 +18,8 @@ pub const BLOCK: usize = 4 * TILE_W;
 /// Columns beyond a block on both sides that its averages reach.
 const MARGIN: usize = 16;
 const WIDE: usize = BLOCK + 2 * MARGIN;
+/// Values of a plane of a block: a line more than needed, as planes at multiples of 4096 bytes hinder each other.
+const PLANE: usize = BLOCK + 16;
 /// Planes of a sum: premultiplied colour, coverage, coverage times |CoC|.
 const SUMS: usize = 5;
 
@@ -29,6 +31,8 @@ pub struct BinRows<'a> {
     pub scale: usize,
     /// Columns and rows of the bin.
     pub size: (usize, usize),
+    /// Whether the range of its colours is wanted.
+    pub ranged: bool,
     /// `[row][4][stride]`: premultiplied colour and coverage.
     pub out: &'a mut [f32],
     /// Values of a plane row of `out`.
@@ -75,14 +79,24 @@ pub struct BandSums(Vec<BinSums>);
 #[derive(Clone)]
 struct BinSums {
     rows: Line<[[[f32; WIDE]; SUMS]; 2]>,
-    cells: Line<[[f32; BLOCK]; CELL_PLANES]>,
+    cells: CellSums,
+    means: Means,
 }
+
+/// A row of a block of the bin: the planes of a sum.
+type Means = Line<[[f32; PLANE]; SUMS]>;
+/// The rows of a row of cells so far, column by column.
+type CellSums = Line<[[f32; PLANE]; CELL_PLANES]>;
 
 impl BandSums {
     /// Zeros.
     pub fn new() -> Self {
-        let mut empty = BinSums { rows: Line([[[0.0; WIDE]; SUMS]; 2]), cells: Line([[0.0; BLOCK]; CELL_PLANES]) };
-        clear_cells(&mut empty.cells.0);
+        let mut empty = BinSums {
+            rows: Line([[[0.0; WIDE]; SUMS]; 2]),
+            cells: Line([[0.0; PLANE]; CELL_PLANES]),
+            means: Line([[0.0; PLANE]; SUMS]),
+        };
+        clear_cells(&mut empty.cells);
         Self(vec![empty; MAX_BINS])
     }
 }
@@ -90,9 +104,9 @@ impl BandSums {
 impl WithSimd for Band<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: Simd>(mut self, _: S) {
+    fn with_simd<S: Simd>(mut self, simd: S) {
         for block in 0..self.waits.len() {
-            self.block::<S>(block);
+            self.block(simd, block);
         }
         for bin in self.bins.iter_mut().flatten() {
             let (pad, width) = (bin.pad, bin.size.0);
@@ -103,7 +117,7 @@ impl WithSimd for Band<'_> {
 
 impl Band<'_> {
     #[inline(always)]
-    fn block<V: Simd>(&mut self, block: usize) {
+    fn block<V: Simd>(&mut self, simd: V, block: usize) {
         let columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
         let rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
         let (again, waits) = match &self.hidden {
@@ -128,7 +142,7 @@ impl Band<'_> {
             };
             if *active {
                 reach = reach.max(bin.scale as isize / 2);
-            } else {
+            } else if !waits || bin.share.as_ref().is_some_and(front) {
                 bin.clear(block);
             }
         }
@@ -159,10 +173,10 @@ impl Band<'_> {
             {
                 let Some(bin) = bin else { continue };
                 match bin.scale {
-                    1 => bin.add::<V, 1>(sums, block, first, y, &piece, range),
-                    2 => bin.add::<V, 2>(sums, block, first, y, &piece, range),
-                    4 => bin.add::<V, 4>(sums, block, first, y, &piece, range),
-                    _ => bin.add::<V, 8>(sums, block, first, y, &piece, range),
+                    1 => bin.add::<V, 1>(simd, sums, block, first, y, &piece, range),
+                    2 => bin.add::<V, 2>(simd, sums, block, first, y, &piece, range),
+                    4 => bin.add::<V, 4>(simd, sums, block, first, y, &piece, range),
+                    _ => bin.add::<V, 8>(simd, sums, block, first, y, &piece, range),
                 }
             }
         }
@@ -183,8 +197,8 @@ fn range_of(values: &[f32; WIDE]) -> (f32, f32) {
 
 /// Cells of nothing.
 #[inline(always)]
-fn clear_cells(cells: &mut [[f32; BLOCK]; CELL_PLANES]) {
-    for (plane, &value) in cells.iter_mut().zip(&EMPTY_CELL) {
+fn clear_cells(cells: &mut CellSums) {
+    for (plane, &value) in cells.0.iter_mut().zip(&EMPTY_CELL) {
         plane.fill(value);
     }
 }
@@ -220,8 +234,10 @@ impl BinRows<'_> {
 
     /// Adds row `y` of the picture (it may lie outside) to the bin rows of a band that begins at row `first`.
     #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
     fn add<V: Simd, const S: usize>(
         &mut self,
+        simd: V,
         sums: &mut BinSums,
         block: usize,
         first: isize,
@@ -229,81 +245,98 @@ impl BinRows<'_> {
         piece: &Piece<WIDE>,
         range: (f32, f32),
     ) {
-        let s = S as isize;
         let rows = (self.out.len() / (4 * self.stride)) as isize;
-        // Row `upper` and the one below it take this row; for both it is the `k`-th (and `k + S`-th) of their tents.
+        let meets = self.share.is_none_or(|share| share.meets(range));
+        if S == 1 {
+            if (0..rows).contains(&(y - first)) {
+                if meets {
+                    let share = ShareAt::new(simd, &self.share);
+                    for x in (0..BLOCK).step_by(V::F32_LANES) {
+                        let values = share.of(simd, piece, MARGIN + x);
+                        for p in 0..SUMS {
+                            store::<V>(&mut sums.means.0[p], x, values[p]);
+                        }
+                    }
+                } else {
+                    sums.means.0 = [[0.0; PLANE]; SUMS];
+                }
+                self.finish_row::<V, S>(simd, block, (y - first) as usize, sums);
+            }
+            return;
+        }
+        // The bin row above takes this row as the `k + S`-th of its tent, the one below as the `k`-th.
+        let s = S as isize;
         let from = y - first + s / 2;
         let (lower, k) = (from.div_euclid(s), from.rem_euclid(s));
-        let upper = lower - if S > 1 { 1 } else { 0 };
+        let upper = lower - 1;
         if from < 0 || upper >= rows {
             return;
         }
-        if self.share.is_none_or(|share| share.meets(range)) {
-            let up = (2.0 - (k as f32 + 0.5) / S as f32 - 0.0) - 1.0;
-            let weights = if S == 1 { [1.0, 0.0] } else { [up / S as f32, (1.0 - up) / S as f32] };
-            let [even, odd] = &mut sums.rows.0;
-            let (above, below) = if upper.rem_euclid(2) == 0 { (even, odd) } else { (odd, even) };
-            match &self.share {
-                None => sum_row::<V, S>(|_| 1.0, piece, weights, above, below),
-                Some(share) => sum_row::<V, S>(|c| share.at(c), piece, weights, above, below),
+        let [even, odd] = &mut sums.rows.0;
+        let (above, below) = if upper.rem_euclid(2) == 0 { (even, odd) } else { (odd, even) };
+        if meets {
+            let rise = (k as f32 + 0.5) / (S * S) as f32;
+            sum_row(simd, &ShareAt::new(simd, &self.share), piece, [1.0 / S as f32 - rise, rise], above, below);
+        }
+        if k == s - 1 {
+            if upper >= 0 {
+                reduce::<V, S>(simd, above, &mut sums.means);
             }
-        }
-        if k == s - 1 && upper >= 0 {
-            let done = &mut sums.rows.0[upper.rem_euclid(2) as usize];
-            let means = reduce::<V, S>(done);
-            done.as_flattened_mut().fill(0.0);
-            self.finish_row::<S>(block, upper as usize, &means, &mut sums.cells.0);
-        } else if k == s - 1 {
-            sums.rows.0[upper.rem_euclid(2) as usize].as_flattened_mut().fill(0.0);
-        }
-        if y - first == rows * s + s / 2 - 1 {
-            sums.rows.0[lower.rem_euclid(2) as usize].as_flattened_mut().fill(0.0);
+            above.as_flattened_mut().fill(0.0);
+            if upper == rows - 1 {
+                below.as_flattened_mut().fill(0.0);
+            }
+            if upper >= 0 {
+                self.finish_row::<V, S>(simd, block, upper as usize, sums);
+            }
         }
     }
 
     /// Stores a row of the bin, and adds it to its cells.
     #[inline(always)]
-    fn finish_row<const S: usize>(
-        &mut self,
-        block: usize,
-        row: usize,
-        means: &Line<[[f32; BLOCK]; SUMS]>,
-        cells: &mut [[f32; BLOCK]; CELL_PLANES],
-    ) {
+    fn finish_row<V: Simd, const S: usize>(&mut self, simd: V, block: usize, row: usize, sums: &mut BinSums) {
         let (x0, width) = (block * BLOCK / S, BLOCK / S);
-        let means = &means.0;
+        let (means, cells) = (&sums.means.0, &mut sums.cells.0);
+        let ranged = self.ranged;
         for p in 0..4 {
             self.out[(row * 4 + p) * self.stride + self.pad + x0..][..width].copy_from_slice(&means[p][..width]);
         }
         let blocks = self.blocks();
         self.filled[row / CELL * blocks + block] = true;
-        for x in 0..width {
-            cells[0][x] += means[3][x];
-            cells[1][x] += means[4][x];
-            let counts = means[3][x] > COVERAGE_FLOOR;
-            let inverse = if counts { 1.0 / means[3][x] } else { 0.0 };
-            // An addition, where a choice would become masked stores that the next row waits for.
-            let out_of_range = if counts { 0.0 } else { NO_COLOR };
+        let [floor, zero, one, nothing] = [COVERAGE_FLOOR, 0.0, 1.0, NO_COLOR].map(|value| simd.splat_f32s(value));
+        for x in (0..width).step_by(V::F32_LANES) {
+            let coverage = load::<V>(&means[3], x);
+            for p in 0..2 {
+                let sum = simd.add_f32s(load::<V>(&cells[p], x), load::<V>(&means[3 + p], x));
+                store::<V>(&mut cells[p], x, sum);
+            }
+            if !ranged {
+                continue;
+            }
+            let counts = simd.greater_than_f32s(coverage, floor);
+            let inverse = simd.div_f32s(one, simd.max_f32s(coverage, floor));
+            let beyond = simd.select_f32s(counts, zero, nothing);
             for p in 0..3 {
-                let own = means[p][x] * inverse;
-                let (low, high) = (own + out_of_range, own - out_of_range);
-                cells[2 + p][x] = if low < cells[2 + p][x] { low } else { cells[2 + p][x] };
-                cells[5 + p][x] = if high > cells[5 + p][x] { high } else { cells[5 + p][x] };
+                let own = simd.mul_f32s(load::<V>(&means[p], x), inverse);
+                let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own, beyond));
+                let high = simd.max_f32s(load::<V>(&cells[5 + p], x), simd.sub_f32s(own, beyond));
+                store::<V>(&mut cells[2 + p], x, low);
+                store::<V>(&mut cells[5 + p], x, high);
             }
         }
         let rows = self.out.len() / (4 * self.stride);
         if row % CELL == CELL - 1 || row == rows - 1 {
-            self.finish_cells::<S>(block, row / CELL, cells);
-            clear_cells(cells);
+            self.finish_cells::<S>(block, row / CELL, &sums.cells);
+            clear_cells(&mut sums.cells);
         }
     }
 
     #[inline(always)]
-    fn finish_cells<const S: usize>(&mut self, block: usize, row: usize, cells: &[[f32; BLOCK]; CELL_PLANES]) {
+    fn finish_cells<const S: usize>(&mut self, block: usize, row: usize, cells: &CellSums) {
         let across = self.cells.len() / (CELL_PLANES * self.rows_of_cells());
         let (x0, width) = (block * BLOCK / S, BLOCK / S);
         let valid = width.min(self.size.0.saturating_sub(x0));
-        for (p, values) in cells.iter().enumerate() {
+        for (p, values) in cells.0.iter().enumerate().take(if self.ranged { CELL_PLANES } else { 2 }) {
             let out = &mut self.cells[(row * CELL_PLANES + p) * across + x0 / CELL..];
             for (out, values) in out.iter_mut().zip(values[..valid].chunks(CELL)) {
                 let values = values.iter().copied();
@@ -319,54 +352,86 @@ impl BinRows<'_> {
 
 /// Adds a row's shares to two rows of sums.
 #[inline(always)]
-fn sum_row<V: Simd, const S: usize>(
-    share: impl Fn(f32) -> f32,
+fn sum_row<S: Simd>(
+    simd: S,
+    share: &ShareAt<S>,
     piece: &Piece<WIDE>,
     weights: [f32; 2],
     above: &mut [[f32; WIDE]; SUMS],
     below: &mut [[f32; WIDE]; SUMS],
 ) {
-    let [r, g, b, c] = &piece.0;
-    let [a0, a1, a2, a3, a4] = above;
-    let [b0, b1, b2, b3, b4] = below;
-    for x in 0..WIDE {
-        let share = share(c[x]);
-        let values = [share * r[x], share * g[x], share * b[x], share, share * c[x].abs()];
-        a0[x] = madd::<V>(values[0], weights[0], a0[x]);
-        a1[x] = madd::<V>(values[1], weights[0], a1[x]);
-        a2[x] = madd::<V>(values[2], weights[0], a2[x]);
-        a3[x] = madd::<V>(values[3], weights[0], a3[x]);
-        a4[x] = madd::<V>(values[4], weights[0], a4[x]);
-        if S > 1 {
-            b0[x] = madd::<V>(values[0], weights[1], b0[x]);
-            b1[x] = madd::<V>(values[1], weights[1], b1[x]);
-            b2[x] = madd::<V>(values[2], weights[1], b2[x]);
-            b3[x] = madd::<V>(values[3], weights[1], b3[x]);
-            b4[x] = madd::<V>(values[4], weights[1], b4[x]);
+    let weights = weights.map(|weight| simd.splat_f32s(weight));
+    for x in (0..WIDE).step_by(S::F32_LANES) {
+        let values = share.of(simd, piece, x);
+        for p in 0..SUMS {
+            let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
+            store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
+            store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], sums[1]));
         }
+    }
+}
+
+/// A share, ready for vectors.
+struct ShareAt<S: Simd> {
+    steps: Option<[[S::f32s; 2]; 2]>,
+}
+
+impl<S: Simd> ShareAt<S> {
+    #[inline(always)]
+    fn new(simd: S, share: &Option<Share>) -> Self {
+        // A step at `at` of a slope: slope c + (1/2 - slope at).
+        let step = |(at, slope): (f32, f32)| [simd.splat_f32s(slope), simd.splat_f32s(0.5 - slope * at)];
+        Self { steps: share.as_ref().map(|share| [step(share.front), step(share.behind)]) }
+    }
+
+    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels.
+    #[inline(always)]
+    fn of(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
+        let [r, g, b, coc] = piece.0.each_ref().map(|plane| load::<S>(plane, x));
+        let [zero, one] = [0.0, 1.0].map(|value| simd.splat_f32s(value));
+        let share = match &self.steps {
+            None => one,
+            Some(steps) => {
+                let at = |[slope, offset]: [S::f32s; 2]| {
+                    simd.min_f32s(simd.max_f32s(fma(simd, coc, slope, offset), zero), one)
+                };
+                simd.sub_f32s(at(steps[0]), at(steps[1]))
+            }
+        };
+        let by = |value| simd.mul_f32s(share, value);
+        [by(r), by(g), by(b), share, by(simd.abs_f32s(coc))]
     }
 }
 
 /// The tent across: a row of sums at the bin's scale.
 #[inline(always)]
-fn reduce<V: Simd, const S: usize>(sums: &[[f32; WIDE]; SUMS]) -> Line<[[f32; BLOCK]; SUMS]> {
-    let mut means = Line([[0.0; BLOCK]; SUMS]);
-    for (mean, sum) in means.0.iter_mut().zip(sums) {
-        if S == 1 {
-            mean.copy_from_slice(&sum[MARGIN..MARGIN + BLOCK]);
-            continue;
+fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], means: &mut Means) {
+    // The ascending half of the tent, and the descending one, as often as they fit.
+    let ramp: [f32; BLOCK] = const {
+        let mut ramp = [0.0; BLOCK];
+        let mut k = 0;
+        while k < BLOCK {
+            ramp[k] = ((k % S) as f32 + 0.5) / (S * S) as f32;
+            k += 1;
         }
-        let groups = sum[MARGIN - S / 2..].as_chunks::<S>().0;
-        for (x, mean) in mean[..BLOCK / S].iter_mut().enumerate() {
-            let (before, after) = (&groups[x], &groups[x + 1]);
-            let mut total = 0.0;
-            for k in 0..S {
-                let weight = (k as f32 + 0.5) / (S * S) as f32;
-                total = madd::<V>(weight, before[k], total);
-                total = madd::<V>(weight, after[S - 1 - k], total);
-            }
-            *mean = total;
+        ramp
+    };
+    let (rise, fall) = (load::<V>(&ramp, 0), {
+        let mut fall = [0.0; BLOCK];
+        for k in 0..V::F32_LANES {
+            fall[k] = 1.0 / S as f32 - ramp[k];
+        }
+        load::<V>(&fall, 0)
+    });
+    let mut weighed = Line([0.0f32; BLOCK]);
+    for (mean, sum) in means.0.iter_mut().zip(sums) {
+        let start = MARGIN - S / 2;
+        for x in (0..BLOCK).step_by(V::F32_LANES) {
+            let (before, after) = (load::<V>(sum, start + x), load::<V>(sum, start + S + x));
+            store::<V>(&mut weighed.0, x, fma(simd, after, fall, simd.mul_f32s(before, rise)));
+        }
+        for (mean, group) in mean[..BLOCK / S].iter_mut().zip(weighed.0.as_chunks::<S>().0) {
+            *mean = group.iter().sum();
         }
     }
-    means
 }

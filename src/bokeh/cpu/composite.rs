@@ -7,11 +7,12 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::aligned::Line;
 use super::rows::{STRIP, Slot};
-use super::simd::madd;
+use super::simd::{fma, load, madd, store};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress, linear_to_srgb, luminance};
-use crate::bokeh::plan::{Bin, CELL, Compositing, HINDMOST_COVERAGE, Plan};
+use crate::bokeh::plan::{Bin, CELL, Compositing, HINDMOST_COVERAGE, MAX_BINS, Plan};
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;
@@ -20,11 +21,22 @@ pub const CHUNK: usize = 128;
 const ENCODE_STEPS: usize = 1 << 12;
 /// Light below this has a half of its own, as steep as the curve is there.
 const DARK: f32 = 1.0 / 16.0;
+/// Entries of the table: two halves and a last step, in whole powers of two.
+const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
 
-/// The table from linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then all of it.
-pub fn encode_table() -> Vec<u8> {
-    let half = |most: f32| (0..=ENCODE_STEPS).map(move |k| k as f32 / ENCODE_STEPS as f32 * most);
-    half(DARK).chain(half(1.0)).map(|light| (linear_to_srgb(light) * 255.0 + 0.5) as u8).collect()
+/// Linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then all of it.
+pub struct EncodeTable(Box<[u8; ENCODE_SIZE]>);
+
+impl EncodeTable {
+    /// The table.
+    pub fn new() -> Self {
+        let mut codes = Box::new([255; ENCODE_SIZE]);
+        let half = |most: f32| (0..=ENCODE_STEPS).map(move |k| k as f32 / ENCODE_STEPS as f32 * most);
+        for (code, light) in codes.iter_mut().zip(half(DARK).chain(half(1.0))) {
+            *code = (linear_to_srgb(light) * 255.0 + 0.5) as u8;
+        }
+        Self(codes)
+    }
 }
 
 /// Rows `y0..` of the result, a row of tiles.
@@ -39,68 +51,106 @@ pub struct Composite<'a> {
     pub frame: &'a Source<'a>,
     /// `[row][3][width]`, from the gather.
     pub gathered: &'a [f32],
-    /// From [`encode_table`].
-    pub encode: &'a [u8],
+    /// Back to 8 bits.
+    pub encode: &'a EncodeTable,
     /// First row.
     pub y0: usize,
     /// Whole rows of RGB.
     pub out: &'a mut [u8],
 }
 
-/// What the chunk has so far.
-#[repr(align(64))]
-struct Stack {
-    color: [[f32; CHUNK]; 3],
+/// What lies along the rays through some pixels, front to back: a bin covers what is still open.
+#[derive(Clone, Copy)]
+struct Pile<S: Simd> {
+    color: [S::f32s; 3],
     /// How much of each pixel nothing has covered yet.
-    open: [f32; CHUNK],
+    open: S::f32s,
     /// The colour of the hindmost bin that counts here, and how far that is known.
-    hindmost: [[f32; CHUNK]; 3],
-    known: [f32; CHUNK],
+    hindmost: [S::f32s; 3],
+    known: S::f32s,
 }
 
-impl Stack {
-    const EMPTY: Self =
-        Self { color: [[0.0; CHUNK]; 3], open: [1.0; CHUNK], hindmost: [[0.0; CHUNK]; 3], known: [0.0; CHUNK] };
-
-    /// Puts a bin behind all there is: it covers what is still open.
+impl<S: Simd> Pile<S> {
     #[inline(always)]
-    fn add<S: Simd>(&mut self, layer: &[[f32; CHUNK]; 4]) {
-        for x in 0..CHUNK {
-            let coverage = layer[3][x];
-            let taken = if coverage < self.open[x] { coverage } else { self.open[x] };
-            let inverse = 1.0 / if coverage > 1e-6 { coverage } else { 1e-6 };
-            let counts = coverage * (1.0 / HINDMOST_COVERAGE);
-            let counts = if counts < 1.0 { counts } else { 1.0 };
-            for p in 0..3 {
-                let own = layer[p][x] * inverse;
-                self.color[p][x] = madd::<S>(own, taken, self.color[p][x]);
-                self.hindmost[p][x] = madd::<S>(own - self.hindmost[p][x], counts, self.hindmost[p][x]);
-            }
-            self.known[x] = madd::<S>(1.0 - self.known[x], counts, self.known[x]);
-            self.open[x] -= taken;
+    fn new(simd: S) -> Self {
+        let [zero, one] = [0.0, 1.0].map(|value| simd.splat_f32s(value));
+        Self { color: [zero; 3], open: one, hindmost: [zero; 3], known: zero }
+    }
+
+    /// Puts a bin behind all there is.
+    #[inline(always)]
+    fn add(&mut self, simd: S, layer: [S::f32s; 4]) {
+        let one = simd.splat_f32s(1.0);
+        let taken = simd.min_f32s(layer[3], self.open);
+        let inverse = simd.div_f32s(one, simd.max_f32s(layer[3], simd.splat_f32s(1e-6)));
+        let counts = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / HINDMOST_COVERAGE)), one);
+        for p in 0..3 {
+            let own = simd.mul_f32s(layer[p], inverse);
+            self.color[p] = fma(simd, own, taken, self.color[p]);
+            self.hindmost[p] = fma(simd, simd.sub_f32s(own, self.hindmost[p]), counts, self.hindmost[p]);
         }
+        self.known = fma(simd, simd.sub_f32s(one, self.known), counts, self.known);
+        self.open = simd.sub_f32s(self.open, taken);
     }
 
     /// What is still open was hidden from the camera, and lies behind all else: it gets the colour of the hindmost.
     #[inline(always)]
-    fn close<S: Simd>(&mut self) {
-        for x in 0..CHUNK {
-            let known = self.known[x];
-            let scale = self.open[x] / if known > 1e-6 { known } else { 1e-6 };
+    fn closed(&self, simd: S) -> [S::f32s; 3] {
+        let scale = simd.div_f32s(self.open, simd.max_f32s(self.known, simd.splat_f32s(1e-6)));
+        std::array::from_fn(|p| fma(simd, self.hindmost[p], scale, self.color[p]))
+    }
+}
+
+/// The layers of a chunk, front to back.
+struct Layers {
+    planes: Line<[[[f32; CHUNK]; 4]; MAX_BINS]>,
+    near: usize,
+    count: usize,
+}
+
+impl Layers {
+    /// One picture out of all layers.
+    #[inline(always)]
+    fn flatten<S: Simd>(&self, simd: S, color: &mut Color) {
+        let (near, rest) = self.planes.0[..self.count].split_at(self.near);
+        let zero = simd.splat_f32s(0.0);
+        for x in (0..CHUNK).step_by(S::F32_LANES) {
+            let layer = |planes: &[[f32; CHUNK]; 4]| planes.each_ref().map(|plane| load::<S>(plane, x));
+            let mut back = Pile::new(simd);
+            rest.iter().for_each(|planes| back.add(simd, layer(planes)));
+            let mut light = back.closed(simd);
+            if !near.is_empty() {
+                let mut front = Pile::new(simd);
+                near.iter().for_each(|planes| front.add(simd, layer(planes)));
+                // Where nothing lies behind, what lies in front is all there is.
+                let some = simd.greater_than_f32s(back.known, simd.splat_f32s(1e-4));
+                let alone = front.closed(simd);
+                let open = simd.select_f32s(some, front.open, zero);
+                for p in 0..3 {
+                    let ahead = simd.select_f32s(some, front.color[p], alone[p]);
+                    light[p] = fma(simd, light[p], open, ahead);
+                }
+            }
             for p in 0..3 {
-                self.color[p][x] = madd::<S>(self.hindmost[p][x], scale, self.color[p][x]);
+                let light = simd.max_f32s(light[p], zero);
+                store::<S>(&mut color.0[p], x, light);
             }
         }
     }
 }
 
+/// Linear light of a chunk.
+type Color = Line<[[f32; CHUNK]; 3]>;
+
 impl WithSimd for Composite<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: Simd>(mut self, _: S) {
+    fn with_simd<S: Simd>(mut self, simd: S) {
         let width = self.plan.width;
         let row_of_tiles = self.y0 / TILE_H * self.tiles.across;
         let out = std::mem::take(&mut self.out);
+        let mut layers = Layers { planes: Line([[[0.0; CHUNK]; 4]; MAX_BINS]), near: 0, count: 0 };
+        let mut color = Line([[0.0; CHUNK]; 3]);
         for x0 in (0..width).step_by(CHUNK) {
             let take = CHUNK.min(width - x0);
             let tiles = row_of_tiles + x0 / TILE_W..row_of_tiles + (x0 + take).div_ceil(TILE_W);
@@ -108,79 +158,55 @@ impl WithSimd for Composite<'_> {
             for (dy, row) in out.chunks_exact_mut(width * 3).enumerate() {
                 let y = self.y0 + dy;
                 let row = &mut row[x0 * 3..][..take * 3];
-                let color = match self.plan.compositing {
-                    Compositing::Layers => match self.layers::<S>(y, x0, still) {
-                        Some(color) => color,
-                        None => {
+                match self.plan.compositing {
+                    Compositing::Layers => {
+                        if !self.read::<S>(y, x0, still, &mut layers) {
                             row.copy_from_slice(&self.frame.color.rgb[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
-                    },
-                    Compositing::Select => self.select::<S>(y, x0, take),
-                    Compositing::Gather => gathered(self.gathered, width, y, x0),
-                };
-                encode(color, self.plan.expansion, self.encode, row);
+                        layers.flatten(simd, &mut color);
+                    }
+                    Compositing::Select => self.select::<S>(y, x0, take, &mut layers.planes.0[0], &mut color.0),
+                    Compositing::Gather => gathered(self.gathered, width, y, x0, &mut color.0),
+                }
+                encode(&mut color.0, self.plan.expansion, self.encode, row);
             }
         }
     }
 }
 
 impl Composite<'_> {
-    /// Disjoint coverage, near bins first; none where a still chunk stays as it is.
+    /// Reads every bin that has something in a chunk; false where a still chunk stays as it is.
     #[inline(always)]
-    fn layers<S: Simd>(&self, y: usize, x0: usize, still: bool) -> Option<[[f32; CHUNK]; 3]> {
-        let mut layer = [[0.0; CHUNK]; 4];
-        let mut back = Stack::EMPTY;
-        let near = self.plan.bins.iter().take_while(|bin| bin.near).count();
-        let (near, rest) = self.plan.bins.split_at(near);
-        let mut front: Option<Stack> = None;
-        for bin in near {
-            if sample::<S>(bin, &self.slots[bin.slot], y, x0, &mut layer) {
-                front.get_or_insert(Stack::EMPTY).add::<S>(&layer);
+    fn read<S: Simd>(&self, y: usize, x0: usize, still: bool, layers: &mut Layers) -> bool {
+        (layers.near, layers.count) = (0, 0);
+        for bin in &self.plan.bins {
+            if still && !bin.near && layers.count == 0 {
+                return false;
+            }
+            if sample::<S>(bin, &self.slots[bin.slot], y, x0, &mut layers.planes.0[layers.count]) {
+                layers.count += 1;
+                layers.near += usize::from(bin.near);
             }
         }
-        if front.is_none() && still {
-            return None;
-        }
-        let mut some = false;
-        for bin in rest {
-            if sample::<S>(bin, &self.slots[bin.slot], y, x0, &mut layer) {
-                back.add::<S>(&layer);
-                some = true;
-            }
-        }
-        let Some(mut front) = front else {
-            back.close::<S>();
-            return Some(back.color);
-        };
-        if !some {
-            // Where nothing lies behind, what lies in front is all there is.
-            front.close::<S>();
-            return Some(front.color);
-        }
-        for x in 0..CHUNK {
-            // A pixel that nothing behind reaches keeps what lies in front alone.
-            let filled = back.known[x] > 1e-4;
-            let scale = back.open[x] / if filled { back.known[x] } else { 1.0 };
-            let (behind, ahead) =
-                if filled { (front.open[x], 1.0) } else { (0.0, 1.0 / (1.0 - front.open[x]).max(1e-4)) };
-            for p in 0..3 {
-                let hidden = madd::<S>(back.hindmost[p][x], scale, back.color[p][x]);
-                front.color[p][x] = madd::<S>(hidden, behind, front.color[p][x] * ahead);
-            }
-        }
-        Some(front.color)
+        true
     }
 
     /// Every pixel takes the bins of its own CoC.
     #[inline(always)]
-    fn select<S: Simd>(&self, y: usize, x0: usize, take: usize) -> [[f32; CHUNK]; 3] {
-        let mut color = [[0.0; CHUNK]; 3];
-        let mut layer = [[0.0; CHUNK]; 4];
+    fn select<S: Simd>(
+        &self,
+        y: usize,
+        x0: usize,
+        take: usize,
+        layer: &mut [[f32; CHUNK]; 4],
+        color: &mut [[f32; CHUNK]; 3],
+    ) {
         let mut coc = [0.0; CHUNK];
         coc_row(self.frame, y, x0, &mut coc[..take]);
+        *color = [[0.0; CHUNK]; 3];
         for (k, bin) in self.plan.bins.iter().enumerate() {
-            if !sample::<S>(bin, &self.slots[bin.slot], y, x0, &mut layer) {
+            if !sample::<S>(bin, &self.slots[bin.slot], y, x0, layer) {
                 continue;
             }
             let share = self.plan.share(k);
@@ -191,18 +217,15 @@ impl Composite<'_> {
                 }
             }
         }
-        color
     }
 }
 
 #[inline(always)]
-fn gathered(rows: &[f32], width: usize, y: usize, x0: usize) -> [[f32; CHUNK]; 3] {
-    let mut color = [[0.0; CHUNK]; 3];
+fn gathered(rows: &[f32], width: usize, y: usize, x0: usize, color: &mut [[f32; CHUNK]; 3]) {
     let take = CHUNK.min(width - x0);
     for (p, color) in color.iter_mut().enumerate() {
         color[..take].copy_from_slice(&rows[(y * 3 + p) * width + x0..][..take]);
     }
-    color
 }
 
 /// Reads a chunk of a bin at the picture's scale (linear interpolation); false when there is nothing in it.
@@ -280,7 +303,7 @@ fn stretch<V: Simd, const S: usize>(
 }
 
 #[inline(always)]
-fn encode(mut color: [[f32; CHUNK]; 3], expansion: f32, table: &[u8], out: &mut [u8]) {
+fn encode(color: &mut [[f32; CHUNK]; 3], expansion: f32, table: &EncodeTable, out: &mut [u8]) {
     if expansion.is_finite() {
         for x in 0..CHUNK {
             let factor = compress(luminance(color[0][x], color[1][x], color[2][x]), expansion);
@@ -289,17 +312,20 @@ fn encode(mut color: [[f32; CHUNK]; 3], expansion: f32, table: &[u8], out: &mut 
             }
         }
     }
-    let mut index = [[0u16; CHUNK]; 3];
-    for (index, color) in index.iter_mut().zip(&color) {
+    let mut index = [[0u32; CHUNK]; 3];
+    for (index, color) in index.iter_mut().zip(&*color) {
         for (index, &light) in index.iter_mut().zip(color) {
-            let light = light.clamp(0.0, 1.0);
-            let (scale, first) = if light < DARK { (1.0 / DARK, 0.5) } else { (1.0, ENCODE_STEPS as f32 + 1.5) };
-            *index = (light * (scale * ENCODE_STEPS as f32) + first) as u16;
+            let light = if light > 0.0 { light } else { 0.0 };
+            let light = if light < 1.0 { light } else { 1.0 };
+            let steps = ENCODE_STEPS as f32;
+            let (scale, first) = if light < DARK { (steps / DARK, 0.0) } else { (steps, steps + 1.0) };
+            // Beyond 2^23 a float has no fraction, and its lowest bits are the integer.
+            *index = (light * scale + first + 8_388_608.0).to_bits();
         }
     }
-    for (x, pixel) in out.chunks_exact_mut(3).enumerate() {
+    for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
         for (p, byte) in pixel.iter_mut().enumerate() {
-            *byte = table[index[p][x] as usize];
+            *byte = table.0[index[p][x] as usize % ENCODE_SIZE];
         }
     }
 }
@@ -311,10 +337,10 @@ mod tests {
 
     #[test]
     fn decoding_and_encoding_is_the_identity() {
-        let (decode, encode_to) = (decode_table(), encode_table());
+        let (decode, table) = (decode_table(), EncodeTable::new());
         for code in 0..=255u8 {
             let mut out = [0u8; 6];
-            encode([[decode[code as usize]; CHUNK]; 3], f32::INFINITY, &encode_to, &mut out);
+            encode(&mut [[decode[code as usize]; CHUNK]; 3], f32::INFINITY, &table, &mut out);
             assert_eq!(out, [code; 6]);
         }
     }

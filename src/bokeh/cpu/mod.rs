@@ -41,7 +41,7 @@ pub struct CpuBokeh {
     arch: Arch,
     team: Team,
     decode: [f32; 256],
-    encode: Vec<u8>,
+    encode: composite::EncodeTable,
     tiles: Tiles,
     slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
@@ -100,7 +100,7 @@ impl CpuBokeh {
         });
         Self {
             decode: unpack::decode_table(),
-            encode: composite::encode_table(),
+            encode: composite::EncodeTable::new(),
             tiles: Tiles::new(width, height),
             pyramid: (plan.fill && plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
             waits: vec![false; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
@@ -204,12 +204,11 @@ impl CpuBokeh {
         let coarsest = plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1).max(SCALES[2]);
         let rows = CELL * coarsest;
         let mut shelves: [Option<BinShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
-        let layered = plan.compositing == Compositing::Layers;
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bins.iter().position(|bin| bin.slot == slot.index) else { continue };
             let bin = &plan.bins[k];
             if !(again && bin.near) {
-                shelves[k] = Some(BinShelves::new(bin, slot, rows, blocks, layered.then(|| plan.share(k))));
+                shelves[k] = Some(BinShelves::new(plan, k, slot, rows));
             }
         }
         let (arch, tiles) = (self.arch, &self.tiles);

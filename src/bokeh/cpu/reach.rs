@@ -2,7 +2,7 @@
 //! mean, weighted by coverage and nearness), and the range of its colours.
 
 use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges, NO_COLOR};
-use crate::bokeh::plan::{Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};
+use crate::bokeh::plan::{ANY_COLOR, Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};
 
 /// Weight of a cell `distance` cells away, along one axis.
 pub fn nearness(distance: usize, bin: &Bin) -> f32 {
@@ -40,8 +40,13 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
             let coc_px = if row[x] > 0.0 { row[width + x] / row[x] } else { 0.0 };
             row[width + x] = plan.bin_radius_px(bin, coc_px);
         }
-        // Where nothing is in reach there is nothing to keep in range.
-        row[2 * width..].iter_mut().filter(|value| value.abs() >= NO_COLOR).for_each(|value| *value = 0.0);
+        if plan.has_lobes(bin) {
+            // Where nothing is in reach there is nothing to keep in range.
+            row[2 * width..].iter_mut().filter(|value| value.abs() >= NO_COLOR).for_each(|value| *value = 0.0);
+        } else {
+            row[2 * width..5 * width].fill(-ANY_COLOR);
+            row[5 * width..].fill(ANY_COLOR);
+        }
         let out = &mut edges.data[y * edges.across * EDGE_VALUES..][..edges.across * EDGE_VALUES];
         for (edge, values) in out.chunks_exact_mut(EDGE_VALUES).enumerate() {
             let right = edge * SEGMENT / CELL;

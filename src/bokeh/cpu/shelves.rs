@@ -1,10 +1,10 @@
 //! What the parts of a pass that runs over every bin at once read and write, bin by bin.
 #![allow(missing_docs)] // The fields are those of `BinRows`.
 
-use super::bin::BinRows;
+use super::bin::{BLOCK, BinRows};
 use super::rows::{CELL_PLANES, Cells, Edges, Rows, STRIP, Slot};
 use super::team::Shelf;
-use crate::bokeh::plan::{Bin, CELL, Share};
+use crate::bokeh::plan::{Bin, CELL, Compositing, Plan, Share};
 
 /// What the parts of the pass `bin` write for one bin.
 pub struct BinShelves<'a> {
@@ -16,11 +16,14 @@ pub struct BinShelves<'a> {
     share: Option<Share>,
     scale: usize,
     size: (usize, usize),
+    ranged: bool,
 }
 
 impl<'a> BinShelves<'a> {
-    /// Parts of `rows` rows of the picture; `share` is none when the bin takes everything.
-    pub fn new(bin: &Bin, slot: &'a mut Slot, rows: usize, blocks: usize, share: Option<Share>) -> Self {
+    /// Parts of `rows` rows of the picture for the `k`-th bin.
+    pub fn new(plan: &Plan, k: usize, slot: &'a mut Slot, rows: usize) -> Self {
+        let bin = &plan.bins[k];
+        let blocks = plan.width.div_ceil(BLOCK);
         let used = slot.used(bin).0;
         let [first, second, third] = &mut slot.taken;
         let (stride, pad, row_len) = (slot.source.stride, slot.source.pad, slot.source.row_len());
@@ -32,7 +35,8 @@ impl<'a> BinShelves<'a> {
             filled: Shelf::new(&mut slot.filled[..blocks * bin.height.div_ceil(CELL)], cells * blocks, third),
             stride,
             pad,
-            share,
+            share: (plan.compositing == Compositing::Layers).then(|| plan.share(k)),
+            ranged: plan.has_lobes(bin),
             scale: bin.scale,
             size: (bin.width, bin.height),
         }
@@ -43,6 +47,7 @@ impl<'a> BinShelves<'a> {
             share: self.share,
             scale: self.scale,
             size: self.size,
+            ranged: self.ranged,
             out: self.source.part(band),
             stride: self.stride,
             pad: self.pad,

@@ -28,11 +28,12 @@ const NAPE: Vec3 = Vec3::new(0.0, -0.15, 0.04);
 /// About which the body sways, in its own frame.
 const HIP: Vec3 = Vec3::new(0.0, -0.75, 0.06);
 
-/// The whole scene.
-pub fn scene() -> Scene {
-    let parts = [head::part(nod), torso::part(sway), front::desk(), front::twig(), room::part(), outside::part()];
+/// The whole scene, or without what stands in front of the person.
+pub fn scene(with_front: bool) -> Scene {
+    let front = if with_front { vec![front::desk(), front::twig()] } else { Vec::new() };
+    let parts = [head::part(nod), torso::part(sway), room::part(), outside::part()];
     Scene {
-        parts: parts.into_iter().map(Part::built).collect(),
+        parts: parts.into_iter().chain(front).map(Part::built).collect(),
         lights: lights(),
         ambient: Ambient { above: Vec3::new(0.155, 0.165, 0.20), below: Vec3::new(0.105, 0.080, 0.066) },
         nothing: Vec3::ZERO,
