@@ -82,8 +82,9 @@ impl DepthCoc {
     pub fn coc_px(&self, depth_m: f32) -> f32 {
         let inverse_m = if depth_m > 0.0 { 1.0 / depth_m } else { 0.0 };
         let coc_px = self.coc_at_infinity_px * (1.0 - self.focus_m * inverse_m);
-        // `max` and `min` also turn a NaN depth (comparison above is false for it) into a finite radius.
-        coc_px.max(-self.max_coc_px).min(self.max_coc_px)
+        let most_px = self.max_coc_px;
+        let coc_px = if coc_px < -most_px { -most_px } else { coc_px };
+        if coc_px > most_px { most_px } else { coc_px }
     }
 }
 

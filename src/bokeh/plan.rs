@@ -253,10 +253,10 @@ impl Plan {
         }
     }
 
-    /// Whether a bin's filters are truncated: small ones have no more terms than are kept.
+    /// Whether a bin's filters are truncated so far that it shows: small ones have hardly more terms than are kept.
     pub fn has_lobes(&self, bin: &Bin) -> bool {
         let reach = self.bank.node_reach[self.bank.node(bin.max_radius_px)] as usize;
-        self.bank.terms < if self.bank.even { reach + 1 } else { 2 * reach + 1 }
+        self.bank.terms < if self.bank.even { reach } else { 2 * reach }
     }
 
     /// The least scale that a bin in this slot can have.

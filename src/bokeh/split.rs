@@ -14,7 +14,7 @@ const BUCKET_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - PER_OCTAVE.ilog2();
 /// The bits of 1.0, where the buckets begin.
 const FIRST: u32 = FOCUS_BORDER_PX.to_bits() >> BUCKET_SHIFT;
 /// About as many samples are taken across a frame.
-const SAMPLES_ACROSS: usize = 480;
+const SAMPLES_ACROSS: usize = 320;
 /// A bin more must lower the spread of `ln |c|` within the bins by this much, as variance times share of the picture.
 const BIN_COST: f64 = 0.002;
 /// This share of a bin's pixels may have a smaller radius than its scale is made for.

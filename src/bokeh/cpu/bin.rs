@@ -150,17 +150,18 @@ impl Band<'_> {
             return;
         }
         let mut piece: Piece<WIDE> = Line([[0.0; WIDE]; 4]);
+        let columns = columns_of(block, self.source.color.width as usize);
         let height = self.source.color.height as isize;
         let (first, end) = (self.rows.start as isize, self.rows.end as isize);
         let last = end.min((height as usize).next_multiple_of(CELL) as isize);
         for y in first - reach..last + reach {
             let inside = y.clamp(0, height - 1) as usize;
-            self.source.unpack(inside, (block * BLOCK) as isize - MARGIN as isize, &mut piece);
+            self.source.unpack::<V, WIDE>(inside, (block * BLOCK) as isize - MARGIN as isize, columns + 2 * MARGIN, &mut piece);
             match &mut self.hidden {
                 Hidden::Nothing => {}
                 Hidden::Waits(behind, halves) => {
                     if (first..end.min(height)).contains(&y) {
-                        halves.add(behind, block * BLOCK, MARGIN, y as usize, &piece);
+                        halves.add(behind, block * BLOCK, MARGIN..MARGIN + columns, y as usize, &piece);
                     }
                 }
                 Hidden::Filled(behind) => {
@@ -168,23 +169,28 @@ impl Band<'_> {
                     behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut piece);
                 }
             }
-            let range = range_of(&piece.0[3]);
+            let range = range_of(&piece.0[3][..columns + 2 * MARGIN]);
             for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
             {
                 let Some(bin) = bin else { continue };
                 match bin.scale {
-                    1 => bin.add::<V, 1>(simd, sums, block, first, y, &piece, range),
-                    2 => bin.add::<V, 2>(simd, sums, block, first, y, &piece, range),
-                    4 => bin.add::<V, 4>(simd, sums, block, first, y, &piece, range),
-                    _ => bin.add::<V, 8>(simd, sums, block, first, y, &piece, range),
+                    1 => bin.add::<V, 1>(simd, sums, (block, columns), first, y, &piece, range),
+                    2 => bin.add::<V, 2>(simd, sums, (block, columns), first, y, &piece, range),
+                    4 => bin.add::<V, 4>(simd, sums, (block, columns), first, y, &piece, range),
+                    _ => bin.add::<V, 8>(simd, sums, (block, columns), first, y, &piece, range),
                 }
             }
         }
     }
 }
 
+/// Columns of a block that hold anything, in whole vectors of the coarsest bin.
+fn columns_of(block: usize, width: usize) -> usize {
+    (width - block * BLOCK).next_multiple_of(2 * TILE_W).min(BLOCK)
+}
+
 #[inline(always)]
-fn range_of(values: &[f32; WIDE]) -> (f32, f32) {
+fn range_of(values: &[f32]) -> (f32, f32) {
     let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
     for values in values.as_chunks::<16>().0 {
         for k in 0..16 {
@@ -239,7 +245,7 @@ impl BinRows<'_> {
         &mut self,
         simd: V,
         sums: &mut BinSums,
-        block: usize,
+        (block, columns): (usize, usize),
         first: isize,
         y: isize,
         piece: &Piece<WIDE>,
@@ -249,18 +255,7 @@ impl BinRows<'_> {
         let meets = self.share.is_none_or(|share| share.meets(range));
         if S == 1 {
             if (0..rows).contains(&(y - first)) {
-                if meets {
-                    let share = ShareAt::new(simd, &self.share);
-                    for x in (0..BLOCK).step_by(V::F32_LANES) {
-                        let values = share.of(simd, piece, MARGIN + x);
-                        for p in 0..SUMS {
-                            store::<V>(&mut sums.means.0[p], x, values[p]);
-                        }
-                    }
-                } else {
-                    sums.means.0 = [[0.0; PLANE]; SUMS];
-                }
-                self.finish_row::<V, S>(simd, block, (y - first) as usize, sums);
+                self.whole_row(simd, (block, columns), (y - first) as usize, sums, meets.then_some(piece));
             }
             return;
         }
@@ -276,26 +271,84 @@ impl BinRows<'_> {
         let (above, below) = if upper.rem_euclid(2) == 0 { (even, odd) } else { (odd, even) };
         if meets {
             let rise = (k as f32 + 0.5) / (S * S) as f32;
-            sum_row(simd, &ShareAt::new(simd, &self.share), piece, [1.0 / S as f32 - rise, rise], above, below);
+            sum_row(simd, &ShareAt::new(simd, &self.share), piece, columns, [1.0 / S as f32 - rise, rise], above, below);
         }
         if k == s - 1 {
             if upper >= 0 {
-                reduce::<V, S>(simd, above, &mut sums.means);
+                reduce::<V, S>(simd, above, columns, &mut sums.means);
             }
             above.as_flattened_mut().fill(0.0);
             if upper == rows - 1 {
                 below.as_flattened_mut().fill(0.0);
             }
             if upper >= 0 {
-                self.finish_row::<V, S>(simd, block, upper as usize, sums);
+                self.finish_row::<V, S>(simd, (block, columns), upper as usize, sums);
             }
+        }
+    }
+
+    /// A row of a bin at full scale, straight from the picture; none holds nothing.
+    #[inline(always)]
+    fn whole_row<V: Simd>(
+        &mut self,
+        simd: V,
+        (block, columns): (usize, usize),
+        row: usize,
+        sums: &mut BinSums,
+        piece: Option<&Piece<WIDE>>,
+    ) {
+        let start = row * 4 * self.stride + self.pad + block * BLOCK;
+        let mut planes = self.out[start..].chunks_mut(self.stride);
+        let mut plane = || planes.next().map_or(&mut [][..], |plane| &mut plane[..columns]);
+        let mut planes = [plane(), plane(), plane(), plane()];
+        match piece {
+            None => planes.iter_mut().for_each(|plane| plane.fill(0.0)),
+            Some(piece) => {
+                let share = ShareAt::new(simd, &self.share);
+                let cells = &mut sums.cells.0;
+                let [floor, nothing] = [COVERAGE_FLOOR, NO_COLOR].map(|value| simd.splat_f32s(value));
+                for x in (0..columns).step_by(V::F32_LANES) {
+                    let values = share.of(simd, piece, MARGIN + x);
+                    for p in 0..4 {
+                        store::<V>(planes[p], x, values[p]);
+                    }
+                    for p in 0..2 {
+                        let sum = simd.add_f32s(load::<V>(&cells[p], x), values[3 + p]);
+                        store::<V>(&mut cells[p], x, sum);
+                    }
+                    if self.ranged {
+                        let counts = simd.greater_than_f32s(values[3], floor);
+                        let beyond = simd.select_f32s(counts, simd.splat_f32s(0.0), nothing);
+                        for p in 0..3 {
+                            let own = load::<V>(&piece.0[p], MARGIN + x);
+                            let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own, beyond));
+                            let high = simd.max_f32s(load::<V>(&cells[5 + p], x), simd.sub_f32s(own, beyond));
+                            store::<V>(&mut cells[2 + p], x, low);
+                            store::<V>(&mut cells[5 + p], x, high);
+                        }
+                    }
+                }
+                let blocks = self.blocks();
+                self.filled[row / CELL * blocks + block] = true;
+            }
+        }
+        self.close_cells::<1>((block, columns), row, sums);
+    }
+
+    /// Stores the row of cells when its last row is done.
+    #[inline(always)]
+    fn close_cells<const S: usize>(&mut self, block: (usize, usize), row: usize, sums: &mut BinSums) {
+        let rows = self.out.len() / (4 * self.stride);
+        if row % CELL == CELL - 1 || row == rows - 1 {
+            self.finish_cells::<S>(block, row / CELL, &sums.cells);
+            clear_cells(&mut sums.cells);
         }
     }
 
     /// Stores a row of the bin, and adds it to its cells.
     #[inline(always)]
-    fn finish_row<V: Simd, const S: usize>(&mut self, simd: V, block: usize, row: usize, sums: &mut BinSums) {
-        let (x0, width) = (block * BLOCK / S, BLOCK / S);
+    fn finish_row<V: Simd, const S: usize>(&mut self, simd: V, (block, columns): (usize, usize), row: usize, sums: &mut BinSums) {
+        let (x0, width) = (block * BLOCK / S, columns / S);
         let (means, cells) = (&sums.means.0, &mut sums.cells.0);
         let ranged = self.ranged;
         for p in 0..4 {
@@ -324,17 +377,13 @@ impl BinRows<'_> {
                 store::<V>(&mut cells[5 + p], x, high);
             }
         }
-        let rows = self.out.len() / (4 * self.stride);
-        if row % CELL == CELL - 1 || row == rows - 1 {
-            self.finish_cells::<S>(block, row / CELL, &sums.cells);
-            clear_cells(&mut sums.cells);
-        }
+        self.close_cells::<S>((block, columns), row, sums);
     }
 
     #[inline(always)]
-    fn finish_cells<const S: usize>(&mut self, block: usize, row: usize, cells: &CellSums) {
+    fn finish_cells<const S: usize>(&mut self, (block, columns): (usize, usize), row: usize, cells: &CellSums) {
         let across = self.cells.len() / (CELL_PLANES * self.rows_of_cells());
-        let (x0, width) = (block * BLOCK / S, BLOCK / S);
+        let (x0, width) = (block * BLOCK / S, columns / S);
         let valid = width.min(self.size.0.saturating_sub(x0));
         for (p, values) in cells.0.iter().enumerate().take(if self.ranged { CELL_PLANES } else { 2 }) {
             let out = &mut self.cells[(row * CELL_PLANES + p) * across + x0 / CELL..];
@@ -356,12 +405,13 @@ fn sum_row<S: Simd>(
     simd: S,
     share: &ShareAt<S>,
     piece: &Piece<WIDE>,
+    columns: usize,
     weights: [f32; 2],
     above: &mut [[f32; WIDE]; SUMS],
     below: &mut [[f32; WIDE]; SUMS],
 ) {
     let weights = weights.map(|weight| simd.splat_f32s(weight));
-    for x in (0..WIDE).step_by(S::F32_LANES) {
+    for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
         let values = share.of(simd, piece, x);
         for p in 0..SUMS {
             let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
@@ -405,7 +455,7 @@ impl<S: Simd> ShareAt<S> {
 
 /// The tent across: a row of sums at the bin's scale.
 #[inline(always)]
-fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], means: &mut Means) {
+fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], columns: usize, means: &mut Means) {
     // The ascending half of the tent, and the descending one, as often as they fit.
     let ramp: [f32; BLOCK] = const {
         let mut ramp = [0.0; BLOCK];
@@ -426,11 +476,11 @@ fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], means: &
     let mut weighed = Line([0.0f32; BLOCK]);
     for (mean, sum) in means.0.iter_mut().zip(sums) {
         let start = MARGIN - S / 2;
-        for x in (0..BLOCK).step_by(V::F32_LANES) {
+        for x in (0..columns).step_by(V::F32_LANES) {
             let (before, after) = (load::<V>(sum, start + x), load::<V>(sum, start + S + x));
             store::<V>(&mut weighed.0, x, fma(simd, after, fall, simd.mul_f32s(before, rise)));
         }
-        for (mean, group) in mean[..BLOCK / S].iter_mut().zip(weighed.0.as_chunks::<S>().0) {
+        for (mean, group) in mean[..columns / S].iter_mut().zip(weighed.0.as_chunks::<S>().0) {
             *mean = group.iter().sum();
         }
     }

@@ -1,6 +1,7 @@
 //! Pass `fill`: what near objects hide is filled in from around them, colour and CoC, before the bins behind are
 //! taken. Pull-push: averages over ever larger areas, of known pixels only, flow back into the holes.
 
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use super::rows::Rows;
@@ -163,13 +164,13 @@ impl Base<'_> {
 }
 
 impl HalfRows<'_> {
-    /// Adds the inner columns of row `y`, which begin at column `x0` of the picture and `margin` of the piece.
+    /// Adds the inner columns of row `y`, `columns` of the piece, which begin at column `x0` of the picture.
     #[inline(always)]
-    pub fn add<const W: usize>(&mut self, behind: &Share, x0: usize, margin: usize, y: usize, piece: &Piece<W>) {
+    pub fn add<const W: usize>(&mut self, behind: &Share, x0: usize, columns: Range<usize>, y: usize, piece: &Piece<W>) {
         let (row, odd) = ((y - self.first) / 2, y % 2 == 1);
         let first = x0 / 2;
-        let count = ((W - 2 * margin) / 2).min(self.width - first);
-        let pairs = |p: usize| piece.0[p][margin..].as_chunks::<2>().0.iter().take(count);
+        let count = (columns.len() / 2).min(self.width - first);
+        let pairs = |p: usize| piece.0[p][columns.start..].as_chunks::<2>().0.iter().take(count);
         // A last row without a partner stands for two.
         let share = if !odd && y + 1 == self.height { 0.5 } else { 0.25 };
         let planes = &mut self.rows[row * PLANES * self.stride..][..PLANES * self.stride];

@@ -40,7 +40,6 @@ pub struct CpuBokeh {
     plan: Plan,
     arch: Arch,
     team: Team,
-    decode: [f32; 256],
     encode: composite::EncodeTable,
     tiles: Tiles,
     slots: Vec<Slot>,
@@ -99,7 +98,6 @@ impl CpuBokeh {
             result: vec![0.0; width * height * 3],
         });
         Self {
-            decode: unpack::decode_table(),
             encode: composite::EncodeTable::new(),
             tiles: Tiles::new(width, height),
             pyramid: (plan.fill && plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
@@ -144,9 +142,7 @@ impl CpuBokeh {
             times.add(name, now - clock);
             clock = now;
         };
-        // The table is small, and the rest of `self` is written to while the frame is read.
-        let table = self.decode;
-        let frame = Source { color, depth, coc, table: &table, expansion: self.plan.expansion };
+        let frame = Source { color, depth, coc, expansion: self.plan.expansion };
         self.split(&frame);
         lap("split");
         let fills = self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near);

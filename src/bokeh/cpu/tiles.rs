@@ -2,6 +2,7 @@
 
 use super::unpack::{Source, coc_row};
 use crate::bokeh::plan::Share;
+use crate::optics::CocField;
 
 /// Pixels of the picture across a tile.
 pub const TILE_W: usize = 64;
@@ -86,24 +87,47 @@ impl pulp::WithSimd for Survey<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
+        let (width, height) = (self.source.color.width as usize, self.source.color.height as usize);
+        // CoC grows with depth: where the two pictures have the same size, the range of depth tells that of CoC.
+        let direct = match (self.source.coc, self.source.depth) {
+            (CocField::Depth(lens), Some(map)) if map.size() == self.source.color.size() => Some((lens, map)),
+            _ => None,
+        };
         self.ranges.fill((f32::INFINITY, f32::NEG_INFINITY));
-        let height = self.source.color.height as usize;
         for y in self.row * TILE_H..((self.row + 1) * TILE_H).min(height) {
-            coc_row(self.source, y, 0, self.coc);
-            for (range, values) in self.ranges.iter_mut().zip(self.coc.chunks(TILE_W)) {
-                let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
-                let (vectors, rest) = values.as_chunks::<16>();
-                for values in vectors {
-                    for k in 0..16 {
-                        low[k] = if values[k] < low[k] { values[k] } else { low[k] };
-                        high[k] = if values[k] > high[k] { values[k] } else { high[k] };
-                    }
+            let values = match direct {
+                Some((_, map)) => &map.metres[y * width..][..width],
+                None => {
+                    coc_row(self.source, y, 0, self.coc);
+                    &*self.coc
                 }
-                range.0 = low.iter().chain(rest).copied().fold(range.0, f32::min);
-                range.1 = high.iter().chain(rest).copied().fold(range.1, f32::max);
+            };
+            for (range, values) in self.ranges.iter_mut().zip(values.chunks(TILE_W)) {
+                // What is unknown is infinitely far.
+                let unknown = |value: f32| direct.is_some() && (value <= 0.0 || value.is_nan());
+                widen(range, values, |value| if unknown(value) { f32::INFINITY } else { value });
             }
         }
+        if let Some((lens, _)) = direct {
+            self.ranges.iter_mut().for_each(|(low, high)| (*low, *high) = (lens.coc_px(*low), lens.coc_px(*high)));
+        }
     }
+}
+
+#[inline(always)]
+fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
+    let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
+    let (vectors, rest) = values.as_chunks::<16>();
+    for values in vectors {
+        for k in 0..16 {
+            let value = of(values[k]);
+            low[k] = if value < low[k] { value } else { low[k] };
+            high[k] = if value > high[k] { value } else { high[k] };
+        }
+    }
+    let rest = || rest.iter().map(|&value| of(value));
+    range.0 = low.into_iter().chain(rest()).fold(range.0, f32::min);
+    range.1 = high.into_iter().chain(rest()).fold(range.1, f32::max);
 }
 
 /// A tile stays set when all around it are set.
