@@ -7,7 +7,7 @@ use pulp::{Simd, WithSimd};
 
 use super::aligned::Line;
 use super::fill::{Behind, HalfRows};
-use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, repeat_ends};
+use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, STRIP, STRIP_CELLS, STRIP_ROW};
 use super::simd::{fma, load, store};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Piece, Source};
@@ -33,12 +33,12 @@ pub struct BinRows<'a> {
     pub size: (usize, usize),
     /// Whether the range of its colours is wanted.
     pub ranged: bool,
-    /// `[row][4][stride]`: premultiplied colour and coverage.
+    /// Rows of the bin in this band.
+    pub rows: usize,
+    /// As [`Strips`](super::rows::Strips) has it.
     pub out: &'a mut [f32],
-    /// Values of a plane row of `out`.
-    pub stride: usize,
-    /// Columns in front of the first pixel.
-    pub pad: usize,
+    /// Strips across.
+    pub across: usize,
     /// `[row of cells][CELL_PLANES][across]`.
     pub cells: &'a mut [f32],
     /// Per block, whether `out` holds anything but zeros there.
@@ -109,8 +109,7 @@ impl WithSimd for Band<'_> {
             self.block(simd, block);
         }
         for bin in self.bins.iter_mut().flatten() {
-            let (pad, width) = (bin.pad, bin.size.0);
-            bin.out.chunks_exact_mut(bin.stride).for_each(|plane| repeat_ends(plane, pad, width));
+            bin.repeat_end();
         }
     }
 }
@@ -156,7 +155,12 @@ impl Band<'_> {
         let last = end.min((height as usize).next_multiple_of(CELL) as isize);
         for y in first - reach..last + reach {
             let inside = y.clamp(0, height - 1) as usize;
-            self.source.unpack::<V, WIDE>(inside, (block * BLOCK) as isize - MARGIN as isize, columns + 2 * MARGIN, &mut piece);
+            self.source.unpack::<V, WIDE>(
+                inside,
+                (block * BLOCK) as isize - MARGIN as isize,
+                columns + 2 * MARGIN,
+                &mut piece,
+            );
             match &mut self.hidden {
                 Hidden::Nothing => {}
                 Hidden::Waits(behind, halves) => {
@@ -182,6 +186,12 @@ impl Band<'_> {
             }
         }
     }
+}
+
+/// Where row `row` of the strip at column `x` begins.
+#[inline(always)]
+fn strip_row(across: usize, x: usize, row: usize) -> usize {
+    (row / CELL * across + x / STRIP) * STRIP_CELLS + row % CELL * STRIP_ROW
 }
 
 /// Columns of a block that hold anything, in whole vectors of the coarsest bin.
@@ -217,9 +227,9 @@ impl BinRows<'_> {
         for row in 0..self.rows_of_cells() {
             let blocks = self.blocks();
             if std::mem::take(&mut self.filled[row * blocks + block]) {
-                for plane in self.out.chunks_exact_mut(self.stride).skip(row * CELL * 4).take(CELL * 4) {
-                    plane[self.pad + x0..][..width].fill(0.0);
-                }
+                let first = row * self.across + x0 / STRIP;
+                let count = (width / STRIP).min(self.across - x0 / STRIP);
+                self.out[first * STRIP_CELLS..][..count * STRIP_CELLS].fill(0.0);
             }
         }
         let across = self.size.0.div_ceil(CELL);
@@ -230,12 +240,29 @@ impl BinRows<'_> {
         }
     }
 
+    /// Row `row` of the strip at column `x`.
+    #[inline(always)]
+    fn strip_row(&mut self, x: usize, row: usize) -> &mut [f32] {
+        &mut self.out[strip_row(self.across, x, row)..][..STRIP_ROW]
+    }
+
+    /// Repeats the last column to the end of the last strip.
+    fn repeat_end(&mut self) {
+        let last = (self.size.0 - 1) % STRIP;
+        for row in 0..self.rows {
+            for plane in self.strip_row(self.size.0 - 1, row).as_chunks_mut::<STRIP>().0 {
+                let value = plane[last];
+                plane[last + 1..].fill(value);
+            }
+        }
+    }
+
     fn blocks(&self) -> usize {
         self.filled.len() / self.rows_of_cells()
     }
 
     fn rows_of_cells(&self) -> usize {
-        (self.out.len() / (4 * self.stride)).div_ceil(CELL)
+        self.rows.div_ceil(CELL)
     }
 
     /// Adds row `y` of the picture (it may lie outside) to the bin rows of a band that begins at row `first`.
@@ -251,7 +278,7 @@ impl BinRows<'_> {
         piece: &Piece<WIDE>,
         range: (f32, f32),
     ) {
-        let rows = (self.out.len() / (4 * self.stride)) as isize;
+        let rows = self.rows as isize;
         let meets = self.share.is_none_or(|share| share.meets(range));
         if S == 1 {
             if (0..rows).contains(&(y - first)) {
@@ -271,7 +298,15 @@ impl BinRows<'_> {
         let (above, below) = if upper.rem_euclid(2) == 0 { (even, odd) } else { (odd, even) };
         if meets {
             let rise = (k as f32 + 0.5) / (S * S) as f32;
-            sum_row(simd, &ShareAt::new(simd, &self.share), piece, columns, [1.0 / S as f32 - rise, rise], above, below);
+            sum_row(
+                simd,
+                &ShareAt::new(simd, &self.share),
+                piece,
+                columns,
+                [1.0 / S as f32 - rise, rise],
+                above,
+                below,
+            );
         }
         if k == s - 1 {
             if upper >= 0 {
@@ -297,20 +332,18 @@ impl BinRows<'_> {
         sums: &mut BinSums,
         piece: Option<&Piece<WIDE>>,
     ) {
-        let start = row * 4 * self.stride + self.pad + block * BLOCK;
-        let mut planes = self.out[start..].chunks_mut(self.stride);
-        let mut plane = || planes.next().map_or(&mut [][..], |plane| &mut plane[..columns]);
-        let mut planes = [plane(), plane(), plane(), plane()];
+        let columns = columns.min(self.across * STRIP - block * BLOCK);
         match piece {
-            None => planes.iter_mut().for_each(|plane| plane.fill(0.0)),
+            None => (0..columns).step_by(STRIP).for_each(|x| self.strip_row(block * BLOCK + x, row).fill(0.0)),
             Some(piece) => {
                 let share = ShareAt::new(simd, &self.share);
                 let cells = &mut sums.cells.0;
                 let [floor, nothing] = [COVERAGE_FLOOR, NO_COLOR].map(|value| simd.splat_f32s(value));
                 for x in (0..columns).step_by(V::F32_LANES) {
                     let values = share.of(simd, piece, MARGIN + x);
+                    let out = self.strip_row(block * BLOCK + x, row);
                     for p in 0..4 {
-                        store::<V>(planes[p], x, values[p]);
+                        store::<V>(out, p * STRIP + x % STRIP, values[p]);
                     }
                     for p in 0..2 {
                         let sum = simd.add_f32s(load::<V>(&cells[p], x), values[3 + p]);
@@ -338,8 +371,7 @@ impl BinRows<'_> {
     /// Stores the row of cells when its last row is done.
     #[inline(always)]
     fn close_cells<const S: usize>(&mut self, block: (usize, usize), row: usize, sums: &mut BinSums) {
-        let rows = self.out.len() / (4 * self.stride);
-        if row % CELL == CELL - 1 || row == rows - 1 {
+        if row % CELL == CELL - 1 || row == self.rows - 1 {
             self.finish_cells::<S>(block, row / CELL, &sums.cells);
             clear_cells(&mut sums.cells);
         }
@@ -347,12 +379,21 @@ impl BinRows<'_> {
 
     /// Stores a row of the bin, and adds it to its cells.
     #[inline(always)]
-    fn finish_row<V: Simd, const S: usize>(&mut self, simd: V, (block, columns): (usize, usize), row: usize, sums: &mut BinSums) {
+    fn finish_row<V: Simd, const S: usize>(
+        &mut self,
+        simd: V,
+        (block, columns): (usize, usize),
+        row: usize,
+        sums: &mut BinSums,
+    ) {
         let (x0, width) = (block * BLOCK / S, columns / S);
         let (means, cells) = (&sums.means.0, &mut sums.cells.0);
         let ranged = self.ranged;
-        for p in 0..4 {
-            self.out[(row * 4 + p) * self.stride + self.pad + x0..][..width].copy_from_slice(&means[p][..width]);
+        for x in (0..width.min(self.across * STRIP - x0)).step_by(STRIP) {
+            let out = &mut self.out[strip_row(self.across, x0 + x, row)..][..STRIP_ROW];
+            for p in 0..4 {
+                out[p * STRIP..][..STRIP].copy_from_slice(&means[p][x..x + STRIP]);
+            }
         }
         let blocks = self.blocks();
         self.filled[row / CELL * blocks + block] = true;

@@ -8,10 +8,10 @@
 use pulp::{Simd, WithSimd};
 
 use super::aligned::Aligned;
-use super::rows::{Cells, EDGE_VALUES, Edges, STRIP, STRIP_EDGES};
+use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_ROW, Strips};
 use super::simd::{fma, load, store};
 use crate::bokeh::bank::Bank;
-use crate::bokeh::plan::{CELL, SEGMENT};
+use crate::bokeh::plan::{CELL, Plan, SEGMENT};
 
 /// Terms filtered at once; more are done in groups.
 pub const GROUP: usize = 4;
@@ -19,13 +19,9 @@ pub const GROUP: usize = 4;
 /// One strip of one bin.
 pub struct Strip<'a> {
     /// The bin; its `out` and `active` are passed on their own.
-    pub source: &'a [f32],
-    /// Values of a plane row of `source`, and its padding.
-    pub stride: usize,
-    /// Columns in front of the first pixel.
-    pub pad: usize,
-    /// Rows of the bin.
-    pub height: usize,
+    pub source: &'a Strips,
+    /// Columns and rows of the bin.
+    pub size: (usize, usize),
     /// The grid as measured (what is where).
     pub cells: &'a Cells,
     /// Radius and range of colours, from `reach`.
@@ -42,17 +38,35 @@ pub struct Strip<'a> {
     pub out: &'a mut [f32],
     /// Per row of cells, whether the result holds anything: of the last frame before, of this one after.
     pub active: &'a mut [bool],
-    /// `height * GROUP * 4 * STRIP` values for the rows' results, and one flag a row of cells.
+    /// Memory of the thread.
     pub scratch: &'a mut Scratch,
 }
 
+/// Rows of the horizontal filters' results that are kept: those that a column of this reach needs, in a power of two.
+fn ring(reach: usize) -> usize {
+    (2 * reach + 1).next_power_of_two()
+}
+
 /// Memory of one thread for the pass `blur`.
-#[derive(Default)]
 pub struct Scratch {
-    /// `[row][term][4][STRIP]`.
-    pub rows: Aligned,
+    /// `[row % ring][term][4][STRIP]`.
+    rows: Aligned,
+    /// A row of a strip and what the filters reach on both sides: `[4][STRIP + 2 pad]`.
+    line: Aligned,
     /// Rows of cells whose rows are filtered.
-    pub filtered: Vec<bool>,
+    filtered: Vec<bool>,
+}
+
+impl Scratch {
+    /// Memory for every bin of a plan.
+    pub fn new(plan: &Plan) -> Self {
+        let reach = plan.reach();
+        Self {
+            rows: Aligned::zeros(ring(reach) * GROUP.min(plan.bank.terms) * STRIP_ROW),
+            line: Aligned::zeros(4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
+            filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
+        }
+    }
 }
 
 impl WithSimd for Strip<'_> {
@@ -94,7 +108,7 @@ impl Strip<'_> {
             let active = filtered[reach].iter().any(|&f| f);
             let was = std::mem::replace(&mut self.active[y], active);
             if was && !active {
-                let end = ((y + 1) * CELL).min(self.height);
+                let end = ((y + 1) * CELL).min(self.size.1);
                 self.out[y * CELL * 4 * STRIP..end * 4 * STRIP].fill(0.0);
             }
         }
@@ -105,41 +119,43 @@ impl Strip<'_> {
     #[inline(always)]
     fn group<S: Simd, const R: usize, const EVEN: bool>(&mut self, simd: S, first: usize) {
         let mut scratch = std::mem::take(&mut self.scratch.rows);
-        let down = self.reach.div_ceil(CELL);
-        for (y, row) in scratch.chunks_exact_mut(R * 4 * STRIP).take(self.height).enumerate() {
-            let cell = y / CELL;
-            let needed = cell.saturating_sub(down)..(cell + down + 1).min(self.active.len());
-            if !self.active[needed].iter().any(|&active| active) {
+        let (row_len, ring) = (R * STRIP_ROW, ring(self.reach));
+        let mut next = 0;
+        for y in 0..self.size.1 {
+            if !self.active[y / CELL] {
                 continue;
             }
-            if self.scratch.filtered[cell] {
-                self.row::<S, R, EVEN>(simd, first, y, row);
-            } else {
-                row.fill(0.0);
+            // A ring of rows, no more than the columns reach, stays in the nearest cache.
+            for above in next.max(y.saturating_sub(self.reach))..(y + self.reach + 1).min(self.size.1) {
+                let row = &mut scratch[above % ring * row_len..][..row_len];
+                if self.scratch.filtered[above / CELL] {
+                    self.row::<S, R, EVEN>(simd, first, above, row);
+                } else {
+                    row.fill(0.0);
+                }
+                next = above + 1;
             }
-        }
-        for y in 0..self.height {
-            if self.active[y / CELL] {
-                self.columns::<S, R, EVEN>(simd, first, y, &scratch);
-            }
+            self.columns::<S, R, EVEN>(simd, first, y, &scratch[..ring * row_len]);
         }
         self.scratch.rows = scratch;
     }
 
     #[inline(always)]
-    fn row<S: Simd, const R: usize, const EVEN: bool>(&self, simd: S, first: usize, y: usize, out: &mut [f32]) {
-        let start = y * 4 * self.stride + self.pad + self.strip * STRIP - self.reach;
-        let span = STRIP + 2 * self.reach;
-        let plane = |p: usize| &self.source[start + p * self.stride..][..span];
+    fn row<S: Simd, const R: usize, const EVEN: bool>(&mut self, simd: S, first: usize, y: usize, out: &mut [f32]) {
+        let mut line = std::mem::take(&mut self.scratch.line);
+        let pad = self.reach.next_multiple_of(PIECE);
+        let span = STRIP + 2 * pad;
+        self.source.line(self.strip, y, self.size.0, pad, &mut line);
+        let plane = |p: usize| &line[p * span..][..span];
         let planes = [plane(0), plane(1), plane(2), plane(3)];
         let edges = self.edges.at(self.strip, y);
         let mut x = 0;
         while x < STRIP {
             let taps = self.taps::<R>(&self.bank.horizontal, first, &edges, x);
             let sums = if taps.steady {
-                along_row::<S, R, EVEN, false>(simd, &taps, &planes, x + self.reach)
+                along_row::<S, R, EVEN, false>(simd, &taps, &planes, x + pad)
             } else {
-                along_row::<S, R, EVEN, true>(simd, &taps, &planes, x + self.reach)
+                along_row::<S, R, EVEN, true>(simd, &taps, &planes, x + pad)
             };
             for r in 0..R {
                 for p in 0..4 {
@@ -148,6 +164,7 @@ impl Strip<'_> {
             }
             x += S::F32_LANES;
         }
+        self.scratch.line = line;
     }
 
     #[inline(always)]
@@ -157,9 +174,9 @@ impl Strip<'_> {
         while x < STRIP {
             let taps = self.taps::<R>(&self.bank.vertical, first, &edges, x);
             let mut sums = if taps.steady {
-                along_column::<S, R, EVEN, false>(simd, &taps, rows, y, x, self.height)
+                along_column::<S, R, EVEN, false>(simd, &taps, rows, y, x, self.size.1)
             } else {
-                along_column::<S, R, EVEN, true>(simd, &taps, rows, y, x, self.height)
+                along_column::<S, R, EVEN, true>(simd, &taps, rows, y, x, self.size.1)
             };
             let out = &mut self.out[y * 4 * STRIP..][..4 * STRIP];
             if first > 0 {
@@ -313,7 +330,9 @@ fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool>(
 ) -> [S::f32s; 4] {
     let row_len = R * 4 * STRIP;
     let weights = taps.at::<S, VARY>(simd, 0);
-    let here = &rows[y * row_len..][..row_len];
+    // A power of two of rows.
+    let last = rows.len() / row_len - 1;
+    let here = &rows[(y & last) * row_len..][..row_len];
     let mut sums = [simd.splat_f32s(0.0); 4];
     for r in 0..R {
         for p in 0..4 {
@@ -321,8 +340,8 @@ fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool>(
         }
     }
     for j in 1..=taps.reach {
-        let below = &rows[(y + j).min(height - 1) * row_len..][..row_len];
-        let above = &rows[y.saturating_sub(j) * row_len..][..row_len];
+        let below = &rows[((y + j).min(height - 1) & last) * row_len..][..row_len];
+        let above = &rows[(y.saturating_sub(j) & last) * row_len..][..row_len];
         let weights = taps.at::<S, VARY>(simd, j as isize);
         let opposite = if EVEN { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
         for r in 0..R {

@@ -239,7 +239,7 @@ fn sample<S: Simd>(bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32;
     let below = (above + 1).min(bin.height - 1);
     let columns = (x0 / bin.scale).saturating_sub(1)..(x0 + CHUNK) / bin.scale + 1;
     let holds = |y: usize| {
-        let strips = columns.start / STRIP..columns.end.div_ceil(STRIP).min(slot.strips);
+        let strips = columns.start / STRIP..columns.end.div_ceil(STRIP).min(slot.source.across);
         let down = bin.height.div_ceil(CELL);
         strips.into_iter().any(|strip| slot.active[strip * down + y / CELL])
     };
@@ -263,7 +263,7 @@ fn stretch<V: Simd, const S: usize>(
     x0: usize,
     out: &mut [[f32; CHUNK]; 4],
 ) {
-    let width = slot.strips * STRIP;
+    let width = slot.source.across * STRIP;
     let strip_row = |strip: usize, y: usize, p: usize| &slot.out[((strip * height + y) * 4 + p) * STRIP..][..STRIP];
     let mix = |a: f32, b: f32| madd::<V>(b - a, share, a);
     for (p, out) in out.iter_mut().enumerate() {

@@ -166,7 +166,14 @@ impl Base<'_> {
 impl HalfRows<'_> {
     /// Adds the inner columns of row `y`, `columns` of the piece, which begin at column `x0` of the picture.
     #[inline(always)]
-    pub fn add<const W: usize>(&mut self, behind: &Share, x0: usize, columns: Range<usize>, y: usize, piece: &Piece<W>) {
+    pub fn add<const W: usize>(
+        &mut self,
+        behind: &Share,
+        x0: usize,
+        columns: Range<usize>,
+        y: usize,
+        piece: &Piece<W>,
+    ) {
         let (row, odd) = ((y - self.first) / 2, y % 2 == 1);
         let first = x0 / 2;
         let count = (columns.len() / 2).min(self.width - first);

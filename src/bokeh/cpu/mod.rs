@@ -18,11 +18,10 @@ mod unpack;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use aligned::Aligned;
 use bin::{BLOCK, Band, BandSums, Hidden};
-use blur::{GROUP, Scratch, Strip};
+use blur::{Scratch, Strip};
 use pulp::Arch;
-use rows::{STRIP, Slot};
+use rows::{Rows, Slot};
 use shelves::{BinShelves, StripShelves};
 use team::{Shelf, Team};
 use tiles::{Survey, TILE_H, Tiles};
@@ -62,6 +61,7 @@ struct Member {
 /// Memory of the comparison methods.
 struct Gather {
     kernels: Vec<[Vec<f32>; 2]>,
+    source: Rows<4>,
     coc: Vec<f32>,
     rows: Vec<f32>,
     result: Vec<f32>,
@@ -79,10 +79,7 @@ impl CpuBokeh {
                 coc: vec![0.0; width],
                 sums: BandSums::new(),
                 reach: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
-                blur: Scratch {
-                    rows: Aligned::zeros(height * GROUP.min(plan.bank.terms) * 4 * STRIP),
-                    filtered: Vec::with_capacity(height.div_ceil(CELL)),
-                },
+                blur: Scratch::new(&plan),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
@@ -93,6 +90,7 @@ impl CpuBokeh {
             } else {
                 Vec::new()
             },
+            source: Rows::new(width, height, plan.reach().next_multiple_of(rows::PIECE)),
             coc: vec![0.0; width * height],
             rows: vec![0.0; if plan.exact { 0 } else { width * height * 3 * bank.terms }],
             result: vec![0.0; width * height * 3],
@@ -251,7 +249,7 @@ impl CpuBokeh {
         let mut parts = 0;
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bins.iter().position(|bin| bin.slot == slot.index) else { continue };
-            let strips = slot.strips;
+            let strips = slot.source.across;
             shelves[k] = Some(StripShelves::new(&plan.bins[k], slot, parts));
             parts += strips;
         }
@@ -263,10 +261,8 @@ impl CpuBokeh {
             };
             let strip = part - shelf.first;
             arch.dispatch(Strip {
-                source: &shelf.source.data,
-                stride: shelf.source.stride,
-                pad: shelf.source.pad,
-                height: bin.height,
+                source: shelf.source,
+                size: (bin.width, bin.height),
                 cells: shelf.cells,
                 edges: shelf.edges,
                 bank: &plan.bank,
@@ -283,7 +279,19 @@ impl CpuBokeh {
     fn gather(&mut self, frame: &Source<'_>) {
         let Some(gather) = &mut self.gather else { return };
         let (size, arch, bank) = ((self.plan.width, self.plan.height), self.arch, &*self.plan.bank);
-        let source = &self.slots[0].source;
+        let strips = &self.slots[0].source;
+        let row_len = gather.source.row_len();
+        let (stride, pad) = (gather.source.stride, gather.source.pad);
+        let rows = Shelf::new(&mut gather.source.data, row_len, &mut self.taken);
+        self.team.run(size.1, &|y| {
+            for (p, plane) in rows.part(y).chunks_exact_mut(stride).enumerate() {
+                for (strip, out) in plane[pad..pad + size.0].chunks_mut(rows::STRIP).enumerate() {
+                    out.copy_from_slice(&strips.row(strip, y)[p * rows::STRIP..][..out.len()]);
+                }
+                rows::repeat_ends(plane, pad, size.0);
+            }
+        });
+        let source = &gather.source;
         let coc = Shelf::new(&mut gather.coc, size.0, &mut self.taken);
         self.team.run(size.1, &|y| unpack::coc_row(frame, y, 0, coc.part(y)));
         let coc = |y: usize| &gather.coc[y * size.0..][..size.0];

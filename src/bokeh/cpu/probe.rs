@@ -13,7 +13,7 @@ impl CpuBokeh {
                 let (bin, source) = (&self.plan.bins[k], &self.slots[self.plan.bins[k].slot].source);
                 let pixels = |y: usize| (0..bin.width).map(move |x| (x, y));
                 let at =
-                    |(x, y): (usize, usize)| std::array::from_fn(|p| source.row(y)[p * source.stride + source.pad + x]);
+                    |(x, y): (usize, usize)| std::array::from_fn(|p| source.row(x / STRIP, y)[p * STRIP + x % STRIP]);
                 (0..bin.height).flat_map(pixels).map(at).collect()
             }
             Probe::Reach(k) => self.slots[self.plan.bins[k].slot].edges.data.as_chunks::<4>().0.to_vec(),

@@ -145,12 +145,57 @@ impl Edges {
     }
 }
 
+/// A bin's picture in strips, so that a filter that goes down a strip reads on and on:
+/// `[row of cells][strip][CELL][4][STRIP]`, premultiplied colour and coverage.
+pub struct Strips {
+    /// The values.
+    pub data: Aligned,
+    /// Strips across.
+    pub across: usize,
+}
+
+/// Columns that are copied at once.
+pub const PIECE: usize = 16;
+/// Values of a row of a strip.
+pub const STRIP_ROW: usize = 4 * STRIP;
+/// Values of a strip of a row of cells.
+pub const STRIP_CELLS: usize = CELL * STRIP_ROW;
+
+impl Strips {
+    /// Row `y` of a strip: `[4][STRIP]`.
+    #[inline(always)]
+    pub fn row(&self, strip: usize, y: usize) -> &[f32] {
+        &self.data[(y / CELL * self.across + strip) * STRIP_CELLS + y % CELL * STRIP_ROW..][..STRIP_ROW]
+    }
+
+    /// Row `y` of a strip with `pad` columns on both sides (whole pieces): `[4][STRIP + 2 pad]`. Outside the picture,
+    /// which has `width` columns, the outermost ones repeat.
+    #[inline(always)]
+    pub fn line(&self, strip: usize, y: usize, width: usize, pad: usize, line: &mut [f32]) {
+        let span = STRIP + 2 * pad;
+        for at in (0..span).step_by(PIECE) {
+            let x = (strip * STRIP + at) as isize - pad as isize;
+            let inside = x.clamp(0, width as isize - 1) as usize;
+            let row = self.row(inside / STRIP, y);
+            for p in 0..4 {
+                let out = &mut line[p * span + at..][..PIECE];
+                let plane = &row[p * STRIP..][..STRIP];
+                if x >= 0 && x as usize / STRIP == inside / STRIP {
+                    out.copy_from_slice(&plane[x as usize % STRIP..][..PIECE]);
+                } else {
+                    out.fill(plane[inside % STRIP]);
+                }
+            }
+        }
+    }
+}
+
 /// What one bin needs while a frame is blurred: memory for the largest that it can be, in the shape of the current one.
 pub struct Slot {
     /// Which one.
     pub index: usize,
-    /// Premultiplied colour and coverage.
-    pub source: Rows<4>,
+    /// What the pass `bin` makes.
+    pub source: Strips,
     /// The coarse grid as measured.
     pub cells: Cells,
     /// Per row of cells and block, whether `source` holds anything but zeros.
@@ -161,8 +206,6 @@ pub struct Slot {
     pub out: Aligned,
     /// Per strip and row of cells, whether `out` holds anything but zeros.
     pub active: Vec<bool>,
-    /// Strips across.
-    pub strips: usize,
     /// Whether anything in the frame belongs to this bin.
     pub present: bool,
     /// Flags for three shelves at once.
@@ -175,19 +218,17 @@ impl Slot {
     pub fn new(plan: &Plan, slot: usize) -> Self {
         let scale = plan.least_scale(slot);
         let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
-        let pad = plan.reach().next_multiple_of(16);
         let strips = width.div_ceil(STRIP);
         let cells = Cells::new(width, height);
         let rows_of_cells = height.div_ceil(CELL);
         Self {
             index: slot,
-            source: Rows { data: Aligned::zeros(source_stride(plan, scale, pad) * 4 * height), stride: 0, pad },
+            source: Strips { data: Aligned::zeros(strips * rows_of_cells * STRIP_CELLS), across: 0 },
             filled: vec![false; plan.width.div_ceil(BLOCK) * rows_of_cells],
             edges: Edges::new(&cells),
             cells,
             out: Aligned::zeros(strips * height * 4 * STRIP),
             active: vec![false; strips * rows_of_cells],
-            strips: 0,
             present: false,
             taken: std::array::from_fn(|_| {
                 std::iter::repeat_with(|| AtomicBool::new(false)).take(strips.max(rows_of_cells)).collect()
@@ -203,26 +244,21 @@ impl Slot {
         }
         let old_rows = plan.height.div_ceil(self.scale.max(1));
         if self.scale > 0 {
-            let row_len = self.source.row_len();
-            self.source.data[..row_len * old_rows].fill(0.0);
-            self.out[..self.strips * old_rows * 4 * STRIP].fill(0.0);
+            let used = self.source.across * old_rows.div_ceil(CELL) * STRIP_CELLS;
+            self.source.data[..used].fill(0.0);
+            self.out[..self.source.across * old_rows * STRIP_ROW].fill(0.0);
         }
         self.filled.fill(false);
         self.active.fill(false);
         self.scale = bin.scale;
-        self.source.stride = source_stride(plan, bin.scale, self.source.pad);
-        self.strips = bin.width.div_ceil(STRIP);
+        self.source.across = bin.width.div_ceil(STRIP);
         self.cells.shape(bin.width, bin.height);
         self.edges.shape(&self.cells);
     }
 
     /// The values that the current shape uses: of `source`, and of `out`.
     pub fn used(&self, bin: &Bin) -> (usize, usize) {
-        (self.source.row_len() * bin.height, self.strips * bin.height * 4 * STRIP)
+        let across = self.source.across;
+        (across * bin.height.div_ceil(CELL) * STRIP_CELLS, across * bin.height * STRIP_ROW)
     }
-}
-
-/// Values of a plane row of a bin: whole blocks, and columns on both sides for the filters.
-fn source_stride(plan: &Plan, scale: usize, pad: usize) -> usize {
-    plan.width.next_multiple_of(BLOCK) / scale + 2 * pad
 }

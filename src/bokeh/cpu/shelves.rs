@@ -2,7 +2,7 @@
 #![allow(missing_docs)] // The fields are those of `BinRows`.
 
 use super::bin::{BLOCK, BinRows};
-use super::rows::{CELL_PLANES, Cells, Edges, Rows, STRIP, Slot};
+use super::rows::{CELL_PLANES, Cells, Edges, STRIP_CELLS, STRIP_ROW, Slot, Strips};
 use super::team::Shelf;
 use crate::bokeh::plan::{Bin, CELL, Compositing, Plan, Share};
 
@@ -11,12 +11,12 @@ pub struct BinShelves<'a> {
     source: Shelf<'a, f32>,
     cells: Shelf<'a, f32>,
     filled: Shelf<'a, bool>,
-    stride: usize,
-    pad: usize,
     share: Option<Share>,
     scale: usize,
     size: (usize, usize),
     ranged: bool,
+    across: usize,
+    rows: usize,
 }
 
 impl<'a> BinShelves<'a> {
@@ -26,15 +26,14 @@ impl<'a> BinShelves<'a> {
         let blocks = plan.width.div_ceil(BLOCK);
         let used = slot.used(bin).0;
         let [first, second, third] = &mut slot.taken;
-        let (stride, pad, row_len) = (slot.source.stride, slot.source.pad, slot.source.row_len());
         let each = rows / bin.scale;
         let cells = each / CELL;
         Self {
-            source: Shelf::new(&mut slot.source.data[..used], each * row_len, first),
+            source: Shelf::new(&mut slot.source.data[..used], cells * slot.source.across * STRIP_CELLS, first),
             cells: Shelf::new(&mut slot.cells.data, cells * CELL_PLANES * slot.cells.width, second),
             filled: Shelf::new(&mut slot.filled[..blocks * bin.height.div_ceil(CELL)], cells * blocks, third),
-            stride,
-            pad,
+            across: slot.source.across,
+            rows: each,
             share: (plan.compositing == Compositing::Layers).then(|| plan.share(k)),
             ranged: plan.has_lobes(bin),
             scale: bin.scale,
@@ -49,8 +48,8 @@ impl<'a> BinShelves<'a> {
             size: self.size,
             ranged: self.ranged,
             out: self.source.part(band),
-            stride: self.stride,
-            pad: self.pad,
+            across: self.across,
+            rows: self.rows.min(self.size.1 - band * self.rows),
             cells: self.cells.part(band),
             filled: self.filled.part(band),
         }
@@ -61,7 +60,7 @@ impl<'a> BinShelves<'a> {
 pub struct StripShelves<'a> {
     /// The part that is its first strip.
     pub first: usize,
-    pub source: &'a Rows<4>,
+    pub source: &'a Strips,
     pub cells: &'a Cells,
     pub edges: &'a Edges,
     pub out: Shelf<'a, f32>,
@@ -78,8 +77,8 @@ impl<'a> StripShelves<'a> {
             source: &slot.source,
             cells: &slot.cells,
             edges: &slot.edges,
-            out: Shelf::new(&mut slot.out[..used], bin.height * 4 * STRIP, taken),
-            active: Shelf::new(&mut slot.active[..slot.strips * down], down, taken_too),
+            out: Shelf::new(&mut slot.out[..used], bin.height * STRIP_ROW, taken),
+            active: Shelf::new(&mut slot.active[..slot.source.across * down], down, taken_too),
         }
     }
 }
