@@ -1,10 +1,13 @@
 // Shared by every pass: the uniforms, whose fields equal those of the Rust structs of the same names, and the numbers
 // that are defined once, in Rust.
 
-override CELL: u32;             // bin pixels a side of a cell
-override SEGMENT: u32;          // bin pixels between two edges
-override COVERAGE_FLOOR: f32;   // less coverage than this has no colour of its own
-override FAR_WEIGHT: f32;       // weight of far cells in the local radius
+override CELL: u32;                 // bin pixels a side of a cell
+override SEGMENT: u32;              // bin pixels between two edges
+override COVERAGE_FLOOR: f32;       // less coverage than this has no colour of its own
+override FAR_WEIGHT: f32;           // weight of far cells in the local radius
+override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the hindmost is looked for
+
+const MAX_BINS = 13;
 
 // One frame.
 struct Frame {
@@ -14,20 +17,20 @@ struct Frame {
     compositing: u32,           // 0 layers, 1 select, 2 gather
     bins: u32,
     near_bins: u32,             // they come first
-    present: u32,               // bit k: something in the frame belongs to bin k
     reach: u32,                 // of the bank
     nodes: u32,
     groups: u32,                // of four terms each
+    unused: u32,
     coc: vec4<f32>,             // uniform: radius; ramp: normal, offset, half band; depth: c_inf, focus, max
     ramp: vec2<f32>,            // slope, max
     expansion: f32,             // 0: highlights stay as they are
     steps_per_px: f32,          // nodes of the bank per pixel of radius
     rest_front: vec2<f32>,      // border between the near bins and the rest: CoC, slope
     nearest_px: f32,            // no filled CoC is below this
-    unused: f32,
+    unused_too: f32,
 }
 
-// One bin.
+// One bin. Offsets are in elements of the buffers that all bins share.
 struct Bin {
     size: vec2<u32>,            // columns, rows
     cells: vec2<u32>,
@@ -40,7 +43,11 @@ struct Bin {
     max_radius_px: f32,
     sigma_cells: f32,
     reach_cells: u32,
-    offset: u32,                // of its pixels in the buffer of all blurred bins
+    pixels_at: u32,             // of its pixels
+    rows_at: u32,               // of its pixels among those filtered at once
+    edges_at: u32,
+    cells_at: u32,
+    rows_apart: u32,            // pixels filtered at once: from one term's rows to the next one's
 }
 
 fn step_at(border: vec2<f32>, coc_px: f32) -> f32 {

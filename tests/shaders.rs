@@ -4,7 +4,8 @@
 
 use std::mem::offset_of;
 
-use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Group, Level};
+use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Level, Work};
+use bokehcam::bokeh::plan::MAX_BINS;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 fn parse(source: &str) -> naga::Module {
@@ -32,7 +33,8 @@ fn every_file_is_a_pass_or_shared_and_short() {
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let known = ["common", "filter"].contains(&name.as_str()) || ALL.iter().any(|shader| shader.name == name);
+        let known = ["common", "work", "filter", "level"].contains(&name.as_str())
+            || ALL.iter().any(|shader| shader.name == name);
         assert!(known, "{} belongs to no pass", path.display());
         let lines = std::fs::read_to_string(&path).expect("a text").lines().count();
         assert!(lines <= 150, "{} has {lines} lines", path.display());
@@ -54,17 +56,17 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             compositing,
             bins,
             near_bins,
-            present,
             reach,
             nodes,
             groups,
+            unused,
             coc,
             ramp,
             expansion,
             steps_per_px,
             rest_front,
             nearest_px,
-            unused
+            unused_too
         }),
         layout!(Bin {
             size,
@@ -78,9 +80,13 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             max_radius_px,
             sigma_cells,
             reach_cells,
-            offset
+            pixels_at,
+            rows_at,
+            edges_at,
+            cells_at,
+            rows_apart
         }),
-        layout!(Group { index, terms, last, unused }),
+        layout!(Work { first, count, group, terms, last, unused_a, unused_b, unused_c }),
         layout!(Level { fine, coarse, fine_offset, coarse_offset, unused }),
     ];
     for (name, size, fields) in expected {
@@ -96,5 +102,18 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             }
         }
         assert!(found, "{name} is in some shader");
+    }
+}
+
+#[test]
+fn the_array_of_bins_holds_as_many_as_a_plan_has() {
+    for shader in ALL {
+        let module = parse(shader.source);
+        for (_, kind) in module.types.iter() {
+            let naga::TypeInner::Array { base, size, .. } = kind.inner else { continue };
+            if module.types[base].name.as_deref() == Some("Bin") {
+                assert_eq!(size, naga::ArraySize::Constant((MAX_BINS as u32).try_into().expect("not zero")));
+            }
+        }
     }
 }

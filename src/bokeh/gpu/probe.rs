@@ -1,7 +1,6 @@
 //! What the passes leave behind, for comparing the executors pass by pass.
 
 use super::GpuBokeh;
-use super::buffers::bin_uniforms;
 use crate::bokeh::{BokehError, Probe};
 
 impl GpuBokeh {
@@ -10,13 +9,15 @@ impl GpuBokeh {
     /// # Errors
     /// The device failed.
     pub fn probe(&self, probe: Probe) -> Result<Vec<[f32; 4]>, BokehError> {
-        let bins = bin_uniforms(&self.plan);
-        let pixels = |k: usize| u64::from(bins[k].size[0] * bins[k].size[1]) * 16;
-        let (buffer, offset, bytes) = match probe {
-            Probe::Scene => (&self.buffers.scene, 0, (self.plan.width * self.plan.height * 16) as u64),
-            Probe::Bin(k) => (&self.buffers.source[k], 0, pixels(k)),
-            Probe::Reach(k) => (&self.buffers.edges[k], 0, u64::from(bins[k].edges * bins[k].cells[1]) * 32),
-            Probe::Blur(k) => (&self.buffers.blurred, u64::from(bins[k].offset) * 16, pixels(k)),
+        let bin = |k: usize| &self.layout.bins[k];
+        let pixels = |k: usize| (u64::from(bin(k).pixels_at) * 16, u64::from(bin(k).size[0] * bin(k).size[1]) * 16);
+        let (buffer, (offset, bytes)) = match probe {
+            Probe::Bin(k) => (&self.buffers.source, pixels(k)),
+            Probe::Reach(k) => {
+                let bin = bin(k);
+                (&self.buffers.edges, (u64::from(bin.edges_at) * 32, u64::from(bin.edges * bin.cells[1]) * 32))
+            }
+            Probe::Blur(k) => (&self.buffers.blurred, pixels(k)),
         };
         let device = &self.device.device;
         let back = device.create_buffer(&wgpu::BufferDescriptor {
