@@ -105,7 +105,7 @@ impl CpuBokeh {
             pyramid: (plan.fill && plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
             waits: vec![false; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),
-            taken: flags(height),
+            taken: flags(height.max(slots.len())),
             plan,
             team,
             slots,

@@ -246,7 +246,8 @@ impl Passes {
             }
         };
         let tiles = |bins: &[Bin], tile: [u32; 2], extent: fn(&Bin) -> [u32; 2]| {
-            let of = |bin: &Bin| std::iter::zip(extent(bin), tile).map(|(size, tile)| size.div_ceil(tile)).product::<u32>();
+            let of =
+                |bin: &Bin| std::iter::zip(extent(bin), tile).map(|(size, tile)| size.div_ceil(tile)).product::<u32>();
             in_two(bins.iter().map(of).sum())
         };
         let (near, rest) = layout.bins.split_at(layout.near);
