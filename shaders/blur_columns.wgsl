@@ -1,5 +1,5 @@
 // Pass blur_columns: the vertical low-rank filters, terms summed; truncation leaves lobes, so the result is kept in
-// the range of the colours in reach.
+// the range of the colours in reach. Writes premultiplied colour and coverage where there is any, and per tile whether.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -7,45 +7,83 @@
 @group(0) @binding(3) var<storage, read> bank: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read> node_reach: array<u32>;
 @group(0) @binding(5) var<storage, read> edges: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> scene: array<vec4<f32>>;
-@group(0) @binding(7) var<storage, read> rows: array<vec4<f32>>;
-@group(0) @binding(8) var<storage, read_write> blurred: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read> scene: array<vec2<u32>>;
+@group(0) @binding(7) var<storage, read> rows: array<vec2<u32>>;
+@group(0) @binding(8) var<storage, read> filtered: array<u32>;
+@group(0) @binding(9) var<storage, read_write> blurred: array<vec2<u32>>;
+@group(0) @binding(10) var<storage, read_write> active_tiles: array<u32>;
 
-const TILE = vec2(64u, 4u);
+// Rows that are held at a time, of one term; most filters need no more for a whole tile.
+const CHUNK = 64i;
+
+var<workgroup> values: array<vec2<u32>, 512>;
+var<workgroup> some: atomic<u32>;
 
 fn extent_of(k: u32) -> vec2<u32> {
     return bins[k].size;
 }
 
-fn coc_at(index: u32) -> f32 {
-    return scene[index].w;
+fn is_filtered(k: u32, pixel: vec2<u32>) -> bool {
+    return filtered[bins[k].filtered_at + tile_of(pixel, bins[k].size.x, ROWS_TILE)] == 1u;
 }
 
-@compute @workgroup_size(64, 4)
+@compute @workgroup_size(8, 32)
 fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
-                @builtin(local_invocation_id) local: vec3<u32>) {
-    let place = place_of(workgroup, workgroups, TILE);
+                @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let place = place_of(workgroup, workgroups, RESULT_TILE);
     let k = place.bin;
-    let pixel = place.tile * TILE + local.xy;
-    if !place.some || any(pixel >= bins[k].size) {
+    let size = bins[k].size;
+    let corner_pixel = place.tile * RESULT_TILE;
+    let pixel = corner_pixel + local.xy;
+    let reach = i32(bins[k].reach);
+    let first = i32(corner_pixel.y) - reach;
+    let length = i32(RESULT_TILE.y) + 2 * reach;
+    let tile_rows = i32(ROWS_TILE.y);
+    for (var y = max(first, 0) / tile_rows + i32(thread); y * tile_rows < min(first + length, i32(size.y)); y += 256) {
+        if place.some && is_filtered(k, vec2(corner_pixel.x, u32(y * tile_rows))) {
+            atomicStore(&some, 1u);
+        }
+    }
+    workgroupBarrier();
+    let here = atomicLoad(&some) == 1u;
+    let inside = here && all(pixel < size);
+    if place.some && thread == 0u {
+        active_tiles[bins[k].active_at + tile_of(pixel, size.x, RESULT_TILE)] = u32(here);
+    }
+    var corner: Corner;
+    var taps: Taps;
+    if inside {
+        corner = corner_of(k, pixel);
+        taps = taps_at(k, pixel, corner);
+    }
+    var sum = vec4(0.0);
+    for (var term = 0u; term < work.terms; term++) {
+        for (var at = 0; at < length; at += CHUNK) {
+            for (var n = i32(thread); here && n < 8 * CHUNK; n += 256) {
+                let x = min(corner_pixel.x + u32(n % 8), size.x - 1u);
+                let y = u32(clamp(first + at + n / 8, 0, i32(size.y) - 1));
+                var value = vec2(0u);
+                if is_filtered(k, vec2(x, y)) {
+                    value = rows[bins[k].rows_at + term * bins[k].rows_apart + y * size.x + x];
+                }
+                values[n] = value;
+            }
+            workgroupBarrier();
+            // The pixel itself is in row `own`; taps that lie in other chunks have their turn then.
+            let own = i32(pixel.y) - first - at;
+            let last = select(-1 - own, min(taps.reach, CHUNK - 1 - own), inside);
+            for (var j = max(-taps.reach, -own); j <= last; j++) {
+                sum += tap_at(taps, corner.along, j)[term] * unpacked(values[8 * (own + j) + i32(local.x)]);
+            }
+            workgroupBarrier();
+        }
+    }
+    if !inside {
         return;
     }
-    let corner = corner_of(k, pixel);
-    let taps = taps_at(k, pixel, corner);
-    let apart = bins[k].rows_apart;
-    var sum = vec4(0.0);
-    for (var j = -taps.reach; j <= taps.reach; j++) {
-        let weight = tap_at(taps, corner.along, j);
-        let y = clamp(i32(pixel.y) + j, 0, i32(bins[k].size.y) - 1);
-        let at = bins[k].rows_at + u32(y) * bins[k].size.x + pixel.x;
-        sum += weight.x * rows[at];
-        if work.terms > 1u { sum += weight.y * rows[apart + at]; }
-        if work.terms > 2u { sum += weight.z * rows[2u * apart + at]; }
-        if work.terms > 3u { sum += weight.w * rows[3u * apart + at]; }
-    }
-    let at = bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x;
+    let at = bins[k].pixels_at + pixel.y * size.x + pixel.x;
     if work.group > 0u {
-        sum += blurred[at];
+        sum += unpacked(blurred[at]);
     }
     if work.last == 1u && frame.compositing != 2u {
         let low = mix(edge_at(corner, 0u), edge_at(corner, 2u), corner.along).yzw;
@@ -53,5 +91,5 @@ fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgr
         sum.a = clamp(sum.a, 0.0, 1.0);
         sum = vec4(min(max(sum.rgb, low * sum.a), high * sum.a), sum.a);
     }
-    blurred[at] = sum;
+    blurred[at] = packed(sum);
 }

@@ -2,22 +2,32 @@
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
-@group(0) @binding(2) var<storage, read> blurred: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read> blurred: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> scene: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> result: array<u32>;
+@group(0) @binding(5) var<storage, read> active_tiles: array<u32>;
+
+// A pixel of a bin; nothing was written where nothing is.
+fn bin_at(k: u32, pixel: vec2<u32>) -> vec4<f32> {
+    if active_tiles[bins[k].active_at + tile_of(pixel, bins[k].size.x, RESULT_TILE)] == 0u {
+        return vec4(0.0);
+    }
+    return unpacked(blurred[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x]);
+}
 
 // A bin at the scale of the picture.
-fn sample_bin(index: u32, pixel: vec2<u32>) -> vec4<f32> {
-    let size = bins[index].size;
-    let along = (vec2<f32>(pixel) + 0.5) / f32(bins[index].scale) - 0.5;
-    let at = clamp(along, vec2(0.0), vec2<f32>(size - 1u));
+fn sample_bin(k: u32, pixel: vec2<u32>) -> vec4<f32> {
+    if bins[k].scale == 1u {
+        return bin_at(k, pixel);
+    }
+    let limit = bins[k].size - 1u;
+    let along = (vec2<f32>(pixel) + 0.5) / f32(bins[k].scale) - 0.5;
+    let at = clamp(along, vec2(0.0), vec2<f32>(limit));
     let first = vec2<u32>(at);
-    let second = min(first + 1u, size - 1u);
+    let second = min(first + 1u, limit);
     let share = at - vec2<f32>(first);
-    let top = bins[index].pixels_at + first.y * size.x;
-    let bottom = bins[index].pixels_at + second.y * size.x;
-    return mix(mix(blurred[top + first.x], blurred[top + second.x], share.x),
-               mix(blurred[bottom + first.x], blurred[bottom + second.x], share.x), share.y);
+    return mix(mix(bin_at(k, first), bin_at(k, vec2(second.x, first.y)), share.x),
+               mix(bin_at(k, vec2(first.x, second.y)), bin_at(k, second), share.x), share.y);
 }
 
 // Bins stacked front to back.
@@ -59,7 +69,7 @@ fn layers(pixel: vec2<u32>) -> vec3<f32> {
 }
 
 fn chosen(pixel: vec2<u32>) -> vec3<f32> {
-    let coc_px = scene[pixel.y * frame.size.x + pixel.x].w;
+    let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.most_px).w;
     var color = vec3(0.0);
     for (var k = 0u; k < frame.bins; k++) {
         let share = share_at(bins[k].front, bins[k].behind, coc_px);
@@ -85,7 +95,7 @@ fn color_of(index: u32) -> vec3<u32> {
     } else if frame.compositing == 1u {
         color = chosen(pixel);
     } else {
-        color = blurred[index].rgb;
+        color = unpacked(blurred[index]).rgb;
     }
     if frame.expansion > 0.0 {
         color *= frame.expansion / (frame.expansion + luminance(color));

@@ -16,7 +16,7 @@ fn parse(source: &str) -> naga::Module {
 fn every_shader_validates_and_is_named_like_its_file() {
     for shader in ALL {
         let module = parse(shader.source);
-        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::default());
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
         if let Err(error) = validator.validate(&module) {
             panic!("{}: {}", shader.name, error.emit_to_string(shader.source));
         }
@@ -33,7 +33,7 @@ fn every_file_is_a_pass_or_shared_and_short() {
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let known = ["common", "work", "filter", "level"].contains(&name.as_str())
+        let known = ["common", "work", "filter", "level", "range"].contains(&name.as_str())
             || ALL.iter().any(|shader| shader.name == name);
         assert!(known, "{} belongs to no pass", path.display());
         let lines = std::fs::read_to_string(&path).expect("a text").lines().count();
@@ -59,14 +59,14 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             reach,
             nodes,
             groups,
-            unused,
+            most_px,
             coc,
             ramp,
             expansion,
             steps_per_px,
             rest_front,
             nearest_px,
-            unused_too
+            unused
         }),
         layout!(Bin {
             size,
@@ -84,7 +84,11 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             rows_at,
             edges_at,
             cells_at,
-            rows_apart
+            rows_apart,
+            reach,
+            filtered_at,
+            active_at,
+            unused
         }),
         layout!(Work { first, count, group, terms, last, unused_a, unused_b, unused_c }),
         layout!(Level { fine, coarse, fine_offset, coarse_offset, unused }),

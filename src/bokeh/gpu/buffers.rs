@@ -25,6 +25,8 @@ pub struct Buffers {
     pub color: wgpu::Buffer,
     /// Linear light and CoC.
     pub scene: wgpu::Buffer,
+    /// Range of CoC of each tile of the picture.
+    pub ranges: wgpu::Buffer,
     /// The pictures of all bins.
     pub source: wgpu::Buffer,
     /// Coarse grids of all bins.
@@ -35,6 +37,10 @@ pub struct Buffers {
     pub rows: wgpu::Buffer,
     /// All blurred bins.
     pub blurred: wgpu::Buffer,
+    /// Per tile of rows, whether anything is there.
+    pub filtered: wgpu::Buffer,
+    /// Per tile of blurred bins, whether anything is there.
+    pub active: wgpu::Buffer,
     /// Packed picture out.
     pub result: wgpu::Buffer,
     /// Half-size flags of what near objects touch.
@@ -94,12 +100,15 @@ impl Buffers {
             level_sizes: levels.iter().map(|level| (level.fine, level.coarse)).collect(),
             levels: levels.iter().map(|level| filled("level", bytemuck::bytes_of(level), Usage::UNIFORM)).collect(),
             color: storage("color", picture_bytes(plan) as usize / 4),
-            scene: storage("scene", width * height * 4),
-            source: storage("source", capacity.pixels * 4),
+            scene: storage("scene", width * height * 2),
+            ranges: storage("ranges", width.div_ceil(16) * height.div_ceil(16) * 2),
+            source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),
             edges: storage("edges", capacity.edges * 8),
-            rows: storage("rows", capacity.rows * 4 * terms.min(4)),
-            blurred: storage("blurred", capacity.pixels * 4),
+            rows: storage("rows", capacity.rows * 2 * terms.min(4)),
+            blurred: storage("blurred", capacity.pixels * 2),
+            filtered: storage("filtered", capacity.filtered),
+            active: storage("active", capacity.active),
             result: storage("result", picture_bytes(plan) as usize / 4),
             hidden: storage("hidden", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),
             pyramid: storage("pyramid", pyramid_pixels * 4),

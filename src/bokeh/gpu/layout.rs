@@ -8,6 +8,10 @@ use crate::bokeh::plan::{CELL, Compositing, MAX_BINS, Plan, SEGMENT};
 /// Columns of a tile of the CPU executor: both executors' grids are as wide, so that their cells agree.
 const GRID_ROUNDING: usize = 64;
 
+/// Pixels of a bin that a workgroup makes in `blur_rows` and in `blur_columns`: the tiles of `common.wgsl`.
+pub const ROWS_TILE: [usize; 2] = [64, 4];
+pub const RESULT_TILE: [usize; 2] = [8, 32];
+
 /// The bins of a frame.
 pub struct Layout {
     /// Uniforms, front to back.
@@ -29,6 +33,10 @@ pub struct Capacity {
     pub cells: usize,
     /// Edges of all bins.
     pub edges: usize,
+    /// Tiles of rows of all bins.
+    pub filtered: usize,
+    /// Tiles of the results of all bins.
+    pub active: usize,
 }
 
 impl Capacity {
@@ -43,6 +51,8 @@ impl Capacity {
             capacity.rows = capacity.rows.max(width * height);
             capacity.cells += cells;
             capacity.edges += edges;
+            capacity.filtered += tiles([width, height], ROWS_TILE);
+            capacity.active += tiles([width, height], RESULT_TILE);
         };
         match plan.compositing {
             Compositing::Layers => (0..plan.slots()).map(scales).for_each(&mut add),
@@ -51,6 +61,11 @@ impl Capacity {
         }
         capacity
     }
+}
+
+/// How many tiles cover a bin.
+pub fn tiles(size: [usize; 2], tile: [usize; 2]) -> usize {
+    size[0].div_ceil(tile[0]) * size[1].div_ceil(tile[1])
 }
 
 /// Cells across and down a bin.
@@ -105,10 +120,19 @@ impl Layout {
                 edges_at: at.edges as u32,
                 cells_at: at.cells as u32,
                 rows_apart: capacity.rows as u32,
+                reach: match plan.compositing {
+                    Compositing::Gather => plan.bank.reach as u32,
+                    _ => plan.bank.node_reach[plan.bank.node(bin.max_radius_px)],
+                },
+                filtered_at: at.filtered as u32,
+                active_at: at.active as u32,
+                unused: 0,
             });
             at.pixels += pixels;
             at.cells += cells_across * down;
             at.edges += edges * down;
+            at.filtered += tiles([bin.width, bin.height], ROWS_TILE);
+            at.active += tiles([bin.width, bin.height], RESULT_TILE);
             rows += pixels;
         }
         if !plan.bins.is_empty() {

@@ -45,7 +45,7 @@ impl GpuBokeh {
         let most = device.device.limits().max_storage_buffer_binding_size;
         let capacity = Capacity::of(plan);
         let rows = capacity.rows * plan.bank.terms.min(4);
-        let largest = capacity.pixels.max(rows).max(1) as u64 * 16;
+        let largest = capacity.pixels.max(rows).max(1) as u64 * 8;
         if largest > most {
             return Err(BokehError::Gpu(format!(
                 "{}: pictures of {} x {} need buffers of {largest} bytes and it allows {most}; use --backend cpu",
@@ -77,6 +77,11 @@ impl GpuBokeh {
     fn frame(&self, job: &Job) -> shaders::Frame {
         let plan = &self.plan;
         let rest_front = plan.rest_share().front;
+        let most_px = match job.coc {
+            CocField::Uniform { radius_px } => radius_px,
+            CocField::Ramp(ramp) => ramp.max_px,
+            CocField::Depth(lens) => lens.max_coc_px,
+        };
         let (coc_kind, coc, ramp) = match job.coc {
             CocField::Uniform { radius_px } => (0, [radius_px, 0.0, 0.0, 0.0], [0.0; 2]),
             CocField::Ramp(r) => (1, [r.normal.x, r.normal.y, r.offset_px, r.half_band_px], [r.slope, r.max_px]),
@@ -96,14 +101,14 @@ impl GpuBokeh {
             reach: plan.bank.reach as u32,
             nodes: plan.bank.nodes as u32,
             groups: plan.bank.terms.div_ceil(4) as u32,
-            unused: 0,
+            most_px: most_px.max(1e-3),
             coc,
             ramp,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
             rest_front: rest_front.into(),
             nearest_px: rest_front.0,
-            unused_too: 0.0,
+            unused: 0.0,
         }
     }
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::buffers::{Buffers, WORK_STRIDE, works};
 use super::device::Device;
-use super::layout::Layout;
+use super::layout::{Layout, RESULT_TILE, ROWS_TILE, tiles};
 use super::readback::MAX_QUERIES;
 use super::shaders::{self, Bin, Shader, Work};
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
@@ -13,11 +13,9 @@ use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
 const TILE: u32 = 16;
 const SMALL_TILE: u32 = 8;
 const LINE: u32 = 64;
-/// What a workgroup does of a bin: pixels of `bin` and of the filters, edges of `reach`.
-const BIN_TILE: [u32; 2] = [16, 16];
-const ROWS_TILE: [u32; 2] = [64, 4];
-const COLUMNS_TILE: [u32; 2] = [64, 4];
-const REACH_TILE: [u32; 2] = [8, 8];
+/// What a workgroup does of a bin: pixels of `bin`, edges of `reach`.
+const BIN_TILE: [usize; 2] = [16, 16];
+const REACH_TILE: [usize; 2] = [8, 8];
 
 /// Where each piece of work has its uniform `Work`.
 const NEAR: usize = 0;
@@ -148,14 +146,16 @@ impl Passes {
             for (level, (fine, _)) in b.levels.iter().zip(&b.level_sizes).rev() {
                 fill.push(maker.fixed("fill", shaders::PUSH, *fine, SMALL_TILE, &[level, &b.pyramid, &b.known]));
             }
-            let filled = [&b.frame, &b.hidden, &b.pyramid, &b.scene];
+            let filled = [&b.frame, &b.hidden, &b.pyramid, &b.scene, &b.ranges];
             fill.push(maker.fixed("fill", shaders::FILL, picture, TILE, &filled));
         }
         let groups = plan.bank.terms.div_ceil(4);
         let filters = (0..MAX_BINS * groups).map(|k| {
             let [horizontal, vertical] = &b.banks;
-            let rows = [&b.frame, horizontal, &b.node_reach, &b.edges, &b.scene, &b.source, &b.rows];
-            let columns = [&b.frame, vertical, &b.node_reach, &b.edges, &b.scene, &b.rows, &b.blurred];
+            let rows =
+                [&b.frame, horizontal, &b.node_reach, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered];
+            let columns =
+                [&b.frame, vertical, &b.node_reach, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active];
             [
                 maker.over_bins("blur_rows", shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
                 maker.over_bins("blur_columns", shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
@@ -167,13 +167,20 @@ impl Passes {
             let buffers = [&b.frame, starts, kernels, &b.scene, &b.node_reach, &b.blurred];
             maker.fixed("gather", shaders::GATHER, picture, TILE, &buffers)
         });
-        let bin = [NEAR, REST]
-            .map(|index| maker.over_bins("bin", shaders::BIN, index, &[&b.frame, &b.scene, &b.source, &b.grid]));
-        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result];
+        let bin = [NEAR, REST].map(|index| {
+            maker.over_bins("bin", shaders::BIN, index, &[&b.frame, &b.scene, &b.source, &b.grid, &b.ranges])
+        });
+        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active];
         let mut composite = maker.fixed("composite", shaders::COMPOSITE, [0; 2], LINE, &composite);
         composite.workgroups = in_two(((plan.width * plan.height).div_ceil(4) as u32).div_ceil(LINE));
         Self {
-            unpack: maker.fixed("unpack", shaders::UNPACK, picture, TILE, &[&b.frame, &b.color, depth, &b.scene]),
+            unpack: maker.fixed(
+                "unpack",
+                shaders::UNPACK,
+                picture,
+                TILE,
+                &[&b.frame, &b.color, depth, &b.scene, &b.ranges],
+            ),
             fill,
             gather,
             bin,
@@ -188,7 +195,7 @@ impl Passes {
     /// Binds another depth buffer.
     pub fn set_depth(&mut self, device: &Device, b: &Buffers, depth: &wgpu::Buffer) {
         let maker = Maker { device: &device.device, buffers: b, made: Vec::new() };
-        let buffers = [&b.frame, &b.color, depth, &b.scene].map(|buffer| buffer.as_entire_buffer_binding());
+        let buffers = [&b.frame, &b.color, depth, &b.scene, &b.ranges].map(|buffer| buffer.as_entire_buffer_binding());
         self.unpack.step.bindings = maker.bindings(&self.unpack.step.pipeline, buffers.into_iter());
     }
 
@@ -245,10 +252,8 @@ impl Passes {
                 names.push(step.name);
             }
         };
-        let tiles = |bins: &[Bin], tile: [u32; 2], extent: fn(&Bin) -> [u32; 2]| {
-            let of =
-                |bin: &Bin| std::iter::zip(extent(bin), tile).map(|(size, tile)| size.div_ceil(tile)).product::<u32>();
-            in_two(bins.iter().map(of).sum())
+        let all = |bins: &[Bin], tile: [usize; 2], extent: fn(&Bin) -> [u32; 2]| {
+            in_two(bins.iter().map(|bin| tiles(extent(bin).map(|size| size as usize), tile) as u32).sum())
         };
         let (near, rest) = layout.bins.split_at(layout.near);
         let cells = |bin: &Bin| bin.cells.map(|cells| cells * CELL as u32);
@@ -257,17 +262,17 @@ impl Passes {
             run(&gather.step, gather.workgroups);
         } else {
             if !near.is_empty() {
-                run(&self.bin[NEAR], tiles(near, BIN_TILE, cells));
+                run(&self.bin[NEAR], all(near, BIN_TILE, cells));
                 self.fill.iter().for_each(|fill| run(&fill.step, fill.workgroups));
             }
-            run(&self.bin[REST], tiles(rest, BIN_TILE, cells));
-            run(&self.reach, tiles(&layout.bins, REACH_TILE, |bin| [bin.edges, bin.cells[1]]));
+            run(&self.bin[REST], all(rest, BIN_TILE, cells));
+            run(&self.reach, all(&layout.bins, REACH_TILE, |bin| [bin.edges, bin.cells[1]]));
             let groups = self.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur.chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];
                 for [rows, columns] in steps {
-                    run(rows, tiles(bins, ROWS_TILE, |bin| bin.size));
-                    run(columns, tiles(bins, COLUMNS_TILE, |bin| bin.size));
+                    run(rows, all(bins, ROWS_TILE, |bin| bin.size));
+                    run(columns, all(bins, RESULT_TILE, |bin| bin.size));
                 }
             }
         }

@@ -27,7 +27,7 @@ macro_rules! shader {
 }
 
 /// 8-bit sRGB and depth to linear light and CoC.
-pub const UNPACK: Shader = shader!("unpack");
+pub const UNPACK: Shader = shader!("unpack", "range");
 /// A bin's share of each pixel, and the coarse grid over it.
 pub const BIN: Shader = shader!("bin", "work");
 /// Local radius and range of colours.
@@ -47,7 +47,7 @@ pub const PULL: Shader = shader!("pull", "level");
 /// Back to the finer level.
 pub const PUSH: Shader = shader!("push", "level");
 /// The filled scene.
-pub const FILL: Shader = shader!("fill");
+pub const FILL: Shader = shader!("fill", "range");
 /// The final picture.
 pub const COMPOSITE: Shader = shader!("composite");
 
@@ -78,14 +78,14 @@ pub struct Frame {
     pub reach: u32,
     pub nodes: u32,
     pub groups: u32,
-    pub unused: u32,
+    pub most_px: f32,
     pub coc: [f32; 4],
     pub ramp: [f32; 2],
     pub expansion: f32,
     pub steps_per_px: f32,
     pub rest_front: [f32; 2],
     pub nearest_px: f32,
-    pub unused_too: f32,
+    pub unused: f32,
 }
 
 /// `Bin` of `common.wgsl`.
@@ -109,6 +109,10 @@ pub struct Bin {
     pub edges_at: u32,
     pub cells_at: u32,
     pub rows_apart: u32,
+    pub reach: u32,
+    pub filtered_at: u32,
+    pub active_at: u32,
+    pub unused: u32,
 }
 
 /// `Work` of `work.wgsl`.
