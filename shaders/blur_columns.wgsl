@@ -59,7 +59,7 @@ fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgr
     var sum = vec4(0.0);
     for (var term = 0u; term < work.terms; term++) {
         for (var at = 0; at < length; at += CHUNK) {
-            for (var n = i32(thread); here && n < 8 * CHUNK; n += 256) {
+            for (var n = i32(thread); here && n < 8 * min(CHUNK, length - at); n += 256) {
                 let x = min(corner_pixel.x + u32(n % 8), size.x - 1u);
                 let y = u32(clamp(first + at + n / 8, 0, i32(size.y) - 1));
                 var value = vec2(0u);

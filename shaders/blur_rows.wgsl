@@ -66,7 +66,7 @@ fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroup
             let x = u32(clamp(first + at + n % CHUNK, 0, i32(size.x) - 1));
             let y = min(corner_pixel.y + u32(n / CHUNK), size.y - 1u);
             var value = vec2(0u);
-            if is_covered(k, vec2(x, y)) {
+            if at + n % CHUNK < length && is_covered(k, vec2(x, y)) {
                 value = source[bins[k].pixels_at + y * size.x + x];
             }
             values[n] = value;

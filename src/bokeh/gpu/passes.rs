@@ -137,7 +137,7 @@ impl Passes {
 
         let mut fill = Vec::new();
         if !b.levels.is_empty() {
-            fill.push(maker.fixed("fill", shaders::HIDE, half, TILE, &[&b.frame, &b.scene, &b.hidden]));
+            fill.push(maker.fixed("fill", shaders::HIDE, half, TILE, &[&b.frame, &b.scene, &b.hidden, &b.ranges]));
             let known = [&b.frame, &b.scene, &b.hidden, &b.pyramid, &b.known];
             fill.push(maker.fixed("fill", shaders::KNOW, half, TILE, &known));
             for (level, (_, coarse)) in b.levels.iter().zip(&b.level_sizes) {
