@@ -21,8 +21,9 @@ use common::{EFFECTS, Numbers, coc, color, depth, noise, settings, shapes, three
 const CODES: u8 = 2;
 /// Largest difference of a radius: a node of the bank.
 const RADIUS_PX: f32 = 1.0 / STEPS_PER_PX;
-/// Largest difference of a bin, before and after it is filtered, in linear light or coverage: the GPU keeps half
-/// precision.
+/// Largest difference of a bin before it is filtered, in linear light or coverage: the GPU keeps half precision.
+const LIGHT_IN: f32 = 5e-4;
+/// Largest difference of a filtered bin.
 const LIGHT: f32 = 2e-3;
 
 fn gpu(plan: &Plan) -> GpuBokeh {
@@ -57,7 +58,7 @@ fn same(settings: &Settings, image: &ColorImage, map: &DepthMap, field: &CocFiel
         for probe in [Probe::Bin(k), Probe::Reach(k), Probe::Blur(k)] {
             // Where a value is, in bin pixels, what of the bin it depends on, and how far it may be off.
             let (at, around, limit): (&dyn Fn(usize) -> (usize, usize), usize, f32) = match probe {
-                Probe::Bin(_) => (&|n| (n % bin.width, n / bin.width), 0, LIGHT),
+                Probe::Bin(_) => (&|n| (n % bin.width, n / bin.width), 0, LIGHT_IN),
                 Probe::Reach(_) => (&|n| (n / 2 % edges * SEGMENT, n / 2 / edges * CELL), around, RADIUS_PX),
                 Probe::Blur(_) => (&|n| (n % bin.width, n / bin.width), 2 * around, LIGHT),
             };
