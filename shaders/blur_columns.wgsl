@@ -1,60 +1,95 @@
 // Pass blur_columns: the vertical low-rank filters, terms summed; truncation leaves lobes, so the result is kept in
-// the range of the colours in reach.
+// the range of the colours in reach. Writes premultiplied colour and coverage where there is any, and per tile whether.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<uniform> bin_info: Bin;
-@group(0) @binding(2) var<uniform> group: Group;
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
+@group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> bank: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read> node_reach: array<u32>;
 @group(0) @binding(5) var<storage, read> edges: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> rows: array<vec4<f32>>;
-@group(0) @binding(7) var<storage, read_write> blurred: array<vec4<f32>>;
-@group(0) @binding(8) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read> scene: array<vec2<u32>>;
+@group(0) @binding(7) var<storage, read> rows: array<vec2<u32>>;
+@group(0) @binding(8) var<storage, read> filtered: array<u32>;
+@group(0) @binding(9) var<storage, read_write> blurred: array<vec2<u32>>;
+@group(0) @binding(10) var<storage, read_write> active_tiles: array<u32>;
 
-@compute @workgroup_size(64, 1)
-fn blur_columns(@builtin(global_invocation_id) id: vec3<u32>) {
-    if any(id.xy >= bin_info.size) {
+// Rows that are held at a time, of one term; most filters need no more for a whole tile.
+const CHUNK = 64i;
+
+var<workgroup> values: array<vec2<u32>, 512>;
+var<workgroup> some: atomic<u32>;
+
+fn extent_of(k: u32) -> vec2<u32> {
+    return bins[k].size;
+}
+
+fn is_filtered(k: u32, pixel: vec2<u32>) -> bool {
+    return filtered[bins[k].filtered_at + tile_of(pixel, bins[k].size.x, ROWS_TILE)] == 1u;
+}
+
+@compute @workgroup_size(8, 32)
+fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+                @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let place = place_of(workgroup, workgroups, RESULT_TILE);
+    let k = place.bin;
+    let size = bins[k].size;
+    let corner_pixel = place.tile * RESULT_TILE;
+    let pixel = corner_pixel + local.xy;
+    let reach = i32(bins[k].reach);
+    let first = i32(corner_pixel.y) - reach;
+    let length = i32(RESULT_TILE.y) + 2 * reach;
+    let tile_rows = i32(ROWS_TILE.y);
+    for (var y = max(first, 0) / tile_rows + i32(thread); y * tile_rows < min(first + length, i32(size.y)); y += 256) {
+        if place.some && is_filtered(k, vec2(corner_pixel.x, u32(y * tile_rows))) {
+            atomicStore(&some, 1u);
+        }
+    }
+    workgroupBarrier();
+    let here = atomicLoad(&some) == 1u;
+    let inside = here && all(pixel < size);
+    if place.some && thread == 0u {
+        active_tiles[bins[k].active_at + tile_of(pixel, size.x, RESULT_TILE)] = u32(here);
+    }
+    var corner: Corner;
+    var taps: Taps;
+    if inside {
+        corner = corner_of(k, pixel);
+        taps = taps_at(k, pixel, corner);
+    }
+    var sum = vec4(0.0);
+    for (var term = 0u; term < work.terms; term++) {
+        for (var at = 0; at < length; at += CHUNK) {
+            for (var n = i32(thread); here && n < 8 * min(CHUNK, length - at); n += 256) {
+                let x = min(corner_pixel.x + u32(n % 8), size.x - 1u);
+                let y = u32(clamp(first + at + n / 8, 0, i32(size.y) - 1));
+                var value = vec2(0u);
+                if is_filtered(k, vec2(x, y)) {
+                    value = rows[bins[k].rows_at + term * bins[k].rows_apart + y * size.x + x];
+                }
+                values[n] = value;
+            }
+            workgroupBarrier();
+            // The pixel itself is in row `own`; taps that lie in other chunks have their turn then.
+            let own = i32(pixel.y) - first - at;
+            let last = select(-1 - own, min(taps.reach, CHUNK - 1 - own), inside);
+            for (var j = max(-taps.reach, -own); j <= last; j++) {
+                sum += tap_at(taps, corner.along, j)[term] * unpacked(values[8 * (own + j) + i32(local.x)]);
+            }
+            workgroupBarrier();
+        }
+    }
+    if !inside {
         return;
     }
-    let pixel = id.y * bin_info.size.x + id.x;
-    let gathers = frame.compositing == 2u;
-    let rows_of = between_cells(id.y, bin_info.cells.y);
-    let above = 2u * (rows_of.above * bin_info.edges + id.x / SEGMENT);
-    let below = 2u * (rows_of.below * bin_info.edges + id.x / SEGMENT);
-    let left_edge = mix(edges[above], edges[below], rows_of.share);
-    let right_edge = mix(edges[above + 2u], edges[below + 2u], rows_of.share);
-    // A gather's only bin has the picture's scale.
-    let coc_px = scene[min(pixel, frame.size.x * frame.size.y - 1u)].w;
-    let radii = select(vec2(left_edge.x, right_edge.x), vec2(abs(coc_px)), gathers);
-    let left = node_at(radii.x, frame.steps_per_px, frame.nodes);
-    let right = node_at(radii.y, frame.steps_per_px, frame.nodes);
-    let left_tap = i32(node_origin(left, frame.reach, frame.groups, group.index));
-    let right_tap = i32(node_origin(right, frame.reach, frame.groups, group.index));
-    let along = (f32(id.x % SEGMENT) + 0.5) / f32(SEGMENT);
-    let reach = i32(node_reach[max(left, right)]);
-    let turned = bin_info.turned == 1u || (gathers && coc_px < 0.0);
-    let pixels = bin_info.size.x * bin_info.size.y;
-
-    var sum = vec4(0.0);
-    for (var j = -reach; j <= reach; j++) {
-        let offset = select(j, -j, turned) * i32(frame.groups);
-        let weight = mix(bank[u32(left_tap + offset)], bank[u32(right_tap + offset)], along);
-        let y = clamp(i32(id.y) + j, 0, i32(bin_info.size.y) - 1);
-        let at = u32(y) * bin_info.size.x + id.x;
-        sum += weight.x * rows[at];
-        if group.terms > 1u { sum += weight.y * rows[pixels + at]; }
-        if group.terms > 2u { sum += weight.z * rows[2u * pixels + at]; }
-        if group.terms > 3u { sum += weight.w * rows[3u * pixels + at]; }
+    let at = bins[k].pixels_at + pixel.y * size.x + pixel.x;
+    if work.group > 0u {
+        sum += unpacked(blurred[at]);
     }
-    if group.index > 0u {
-        sum += blurred[bin_info.offset + pixel];
-    }
-    if group.last == 1u && !gathers {
-        let low = mix(left_edge.yzw, right_edge.yzw, along);
-        let high = mix(mix(edges[above + 1u], edges[below + 1u], rows_of.share),
-                       mix(edges[above + 3u], edges[below + 3u], rows_of.share), along).xyz;
+    if work.last == 1u && frame.compositing != 2u {
+        let low = mix(edge_at(corner, 0u), edge_at(corner, 2u), corner.along).yzw;
+        let high = mix(edge_at(corner, 1u), edge_at(corner, 3u), corner.along).xyz;
         sum.a = clamp(sum.a, 0.0, 1.0);
         sum = vec4(min(max(sum.rgb, low * sum.a), high * sum.a), sum.a);
     }
-    blurred[bin_info.offset + pixel] = sum;
+    blurred[at] = packed(sum);
 }

@@ -1,61 +1,96 @@
-// Pass blur_rows: the horizontal low-rank filters of a bin, four terms at a time.
-// Reads premultiplied colour and coverage; writes one such picture per term.
+// Pass blur_rows: the horizontal low-rank filters of some bins, four terms at a time.
+// Reads premultiplied colour and coverage; writes one such picture per term, and per tile whether anything is there.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<uniform> bin_info: Bin;
-@group(0) @binding(2) var<uniform> group: Group;
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
+@group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> bank: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read> node_reach: array<u32>;
 @group(0) @binding(5) var<storage, read> edges: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> source: array<vec4<f32>>;
-@group(0) @binding(7) var<storage, read_write> rows: array<vec4<f32>>;
-@group(0) @binding(8) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read> scene: array<vec2<u32>>;
+@group(0) @binding(7) var<storage, read> grid: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read> source: array<vec2<u32>>;
+@group(0) @binding(9) var<storage, read_write> rows: array<vec2<u32>>;
+@group(0) @binding(10) var<storage, read_write> filtered: array<u32>;
 
-fn taps_at(pixel: vec2<u32>) -> Taps {
-    var radii = vec2(abs(scene[pixel.y * frame.size.x + pixel.x].w));
-    if frame.compositing != 2u {
-        let rows_of = between_cells(pixel.y, bin_info.cells.y);
-        let edge = pixel.x / SEGMENT;
-        let above = rows_of.above * bin_info.edges + edge;
-        let below = rows_of.below * bin_info.edges + edge;
-        radii = mix(vec2(edges[2u * above].x, edges[2u * above + 2u].x),
-                    vec2(edges[2u * below].x, edges[2u * below + 2u].x), rows_of.share);
-    }
-    let left = node_at(radii.x, frame.steps_per_px, frame.nodes);
-    let right = node_at(radii.y, frame.steps_per_px, frame.nodes);
-    let along = (f32(pixel.x % SEGMENT) + 0.5) / f32(SEGMENT);
-    return Taps(node_origin(left, frame.reach, frame.groups, group.index),
-                node_origin(right, frame.reach, frame.groups, group.index),
-                along, i32(node_reach[max(left, right)]));
+// Columns that are held at a time; most filters need no more for a whole tile.
+const CHUNK = 128i;
+
+var<workgroup> values: array<vec2<u32>, 512>;
+var<workgroup> some: atomic<u32>;
+
+fn extent_of(k: u32) -> vec2<u32> {
+    return bins[k].size;
 }
 
-@compute @workgroup_size(64, 1)
-fn blur_rows(@builtin(global_invocation_id) id: vec3<u32>) {
-    if any(id.xy >= bin_info.size) {
-        return;
+fn is_covered(k: u32, pixel: vec2<u32>) -> bool {
+    let cell = pixel / CELL;
+    return grid[2u * (bins[k].cells_at + cell.y * bins[k].cells.x + cell.x)].x > 0.0;
+}
+
+@compute @workgroup_size(64, 4)
+fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+             @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let place = place_of(workgroup, workgroups, ROWS_TILE);
+    let k = place.bin;
+    let size = bins[k].size;
+    let corner_pixel = place.tile * ROWS_TILE;
+    let pixel = corner_pixel + local.xy;
+    let reach = i32(bins[k].reach);
+    let first = i32(corner_pixel.x) - reach;
+    let length = i32(ROWS_TILE.x) + 2 * reach;
+    // Where no cell within reach is covered, nothing comes of it.
+    for (var x = max(first, 0) / i32(CELL) + i32(thread); x * i32(CELL) < min(first + length, i32(size.x)); x += 256) {
+        if place.some && is_covered(k, vec2(u32(x) * CELL, corner_pixel.y)) {
+            atomicStore(&some, 1u);
+        }
     }
-    let taps = taps_at(id.xy);
-    // A gather's only bin has the picture's scale, and turns where the pixel itself is in front.
-    let gathers = frame.compositing == 2u;
-    let turned = bin_info.turned == 1u || (gathers && scene[id.y * frame.size.x + id.x].w < 0.0);
-    let line = id.y * bin_info.size.x;
+    workgroupBarrier();
+    let here = atomicLoad(&some) == 1u;
+    let inside = here && all(pixel < size);
+    if place.some && thread == 0u {
+        filtered[bins[k].filtered_at + tile_of(pixel, size.x, ROWS_TILE)] = u32(here);
+    }
+    var corner: Corner;
+    var taps: Taps;
+    if inside {
+        corner = corner_of(k, pixel);
+        taps = taps_at(k, pixel, corner);
+    }
     var sum0 = vec4(0.0);
     var sum1 = vec4(0.0);
     var sum2 = vec4(0.0);
     var sum3 = vec4(0.0);
-    for (var j = -taps.reach; j <= taps.reach; j++) {
-        let offset = select(j, -j, turned) * i32(frame.groups);
-        let weight = mix(bank[u32(i32(taps.left) + offset)], bank[u32(i32(taps.right) + offset)], taps.along);
-        let x = clamp(i32(id.x) + j, 0, i32(bin_info.size.x) - 1);
-        let value = source[line + u32(x)];
-        sum0 += weight.x * value;
-        sum1 += weight.y * value;
-        sum2 += weight.z * value;
-        sum3 += weight.w * value;
+    for (var at = 0; at < length; at += CHUNK) {
+        for (var n = i32(thread); here && n < 4 * CHUNK; n += 256) {
+            let x = u32(clamp(first + at + n % CHUNK, 0, i32(size.x) - 1));
+            let y = min(corner_pixel.y + u32(n / CHUNK), size.y - 1u);
+            var value = vec2(0u);
+            if at + n % CHUNK < length && is_covered(k, vec2(x, y)) {
+                value = source[bins[k].pixels_at + y * size.x + x];
+            }
+            values[n] = value;
+        }
+        workgroupBarrier();
+        // The pixel itself is value `own`; taps that lie in other chunks have their turn then.
+        let own = i32(pixel.x) - first - at;
+        let line = i32(local.y) * CHUNK + own;
+        let last = select(-1 - own, min(taps.reach, CHUNK - 1 - own), inside);
+        for (var j = max(-taps.reach, -own); j <= last; j++) {
+            let weight = tap_at(taps, corner.along, j);
+            let value = unpacked(values[line + j]);
+            sum0 += weight.x * value;
+            sum1 += weight.y * value;
+            sum2 += weight.z * value;
+            sum3 += weight.w * value;
+        }
+        workgroupBarrier();
     }
-    let pixels = bin_info.size.x * bin_info.size.y;
-    rows[line + id.x] = sum0;
-    if group.terms > 1u { rows[pixels + line + id.x] = sum1; }
-    if group.terms > 2u { rows[2u * pixels + line + id.x] = sum2; }
-    if group.terms > 3u { rows[3u * pixels + line + id.x] = sum3; }
+    if inside {
+        let at = bins[k].rows_at + pixel.y * size.x + pixel.x;
+        rows[at] = packed(sum0);
+        if work.terms > 1u { rows[at + bins[k].rows_apart] = packed(sum1); }
+        if work.terms > 2u { rows[at + 2u * bins[k].rows_apart] = packed(sum2); }
+        if work.terms > 3u { rows[at + 3u * bins[k].rows_apart] = packed(sum3); }
+    }
 }

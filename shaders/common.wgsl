@@ -1,10 +1,13 @@
 // Shared by every pass: the uniforms, whose fields equal those of the Rust structs of the same names, and the numbers
 // that are defined once, in Rust.
 
-override CELL: u32;             // bin pixels a side of a cell
-override SEGMENT: u32;          // bin pixels between two edges
-override COVERAGE_FLOOR: f32;   // less coverage than this has no colour of its own
-override FAR_WEIGHT: f32;       // weight of far cells in the local radius
+override CELL: u32;                 // bin pixels a side of a cell
+override SEGMENT: u32;              // bin pixels between two edges
+override COVERAGE_FLOOR: f32;       // less coverage than this has no colour of its own
+override FAR_WEIGHT: f32;           // weight of far cells in the local radius
+override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the hindmost is looked for
+
+const MAX_BINS = 13;
 
 // One frame.
 struct Frame {
@@ -14,10 +17,10 @@ struct Frame {
     compositing: u32,           // 0 layers, 1 select, 2 gather
     bins: u32,
     near_bins: u32,             // they come first
-    present: u32,               // bit k: something in the frame belongs to bin k
     reach: u32,                 // of the bank
     nodes: u32,
     groups: u32,                // of four terms each
+    most_px: f32,               // no |CoC| is above this
     coc: vec4<f32>,             // uniform: radius; ramp: normal, offset, half band; depth: c_inf, focus, max
     ramp: vec2<f32>,            // slope, max
     expansion: f32,             // 0: highlights stay as they are
@@ -27,7 +30,7 @@ struct Frame {
     unused: f32,
 }
 
-// One bin.
+// One bin. Offsets are in elements of the buffers that all bins share.
 struct Bin {
     size: vec2<u32>,            // columns, rows
     cells: vec2<u32>,
@@ -40,7 +43,34 @@ struct Bin {
     max_radius_px: f32,
     sigma_cells: f32,
     reach_cells: u32,
-    offset: u32,                // of its pixels in the buffer of all blurred bins
+    pixels_at: u32,             // of its pixels
+    rows_at: u32,               // of its pixels among those filtered at once
+    edges_at: u32,
+    cells_at: u32,
+    rows_apart: u32,            // pixels filtered at once: from one term's rows to the next one's
+    reach: u32,                 // outermost tap of any pixel
+    filtered_at: u32,           // of the flags of its tiles of rows
+    active_at: u32,             // of the flags of its tiles of the result
+    unused: u32,
+}
+
+// Tiles, in pixels: of the picture (ranges of CoC), of a bin's rows and of its result (whether anything is there).
+const SCENE_TILE = vec2(16u, 16u);
+const ROWS_TILE = vec2(64u, 4u);
+const RESULT_TILE = vec2(8u, 32u);
+
+// A tile that a pixel lies in, row by row.
+fn tile_of(pixel: vec2<u32>, width: u32, tile: vec2<u32>) -> u32 {
+    return pixel.y / tile.y * ((width + tile.x - 1u) / tile.x) + pixel.x / tile.x;
+}
+
+// Four values in half the memory: what is moved is what the passes cost.
+fn packed(value: vec4<f32>) -> vec2<u32> {
+    return vec2(pack2x16float(value.xy), pack2x16float(value.zw));
+}
+
+fn unpacked(value: vec2<u32>) -> vec4<f32> {
+    return vec4(unpack2x16float(value.x), unpack2x16float(value.y));
 }
 
 fn step_at(border: vec2<f32>, coc_px: f32) -> f32 {
@@ -55,6 +85,18 @@ fn share_at(front: vec2<f32>, behind: vec2<f32>, coc_px: f32) -> f32 {
 // The node of the bank nearest to a radius.
 fn node_at(radius_px: f32, steps_per_px: f32, nodes: u32) -> u32 {
     return min(u32(radius_px * steps_per_px + 0.5), nodes - 1u);
+}
+
+// A pixel of the scene: light, and CoC as a signed square root, whose steps are fine where bins hand over.
+fn scene_packed(light: vec3<f32>, coc_px: f32, most_px: f32) -> vec2<u32> {
+    let root = sign(coc_px) * sqrt(abs(coc_px) / most_px);
+    let blue = pack2x16float(vec2(light.b, 0.0)) & 0xffffu;
+    return vec2(pack2x16float(light.rg), blue | (pack2x16snorm(vec2(0.0, root)) & 0xffff0000u));
+}
+
+fn scene_unpacked(value: vec2<u32>, most_px: f32) -> vec4<f32> {
+    let root = unpack2x16snorm(value.y).y;
+    return vec4(unpack2x16float(value.x), unpack2x16float(value.y).x, root * abs(root) * most_px);
 }
 
 // Highlights: all channels share a factor of the luminance, so that the hue stays.

@@ -1,54 +1,79 @@
 // Pass composite: the blurred bins, front to back as disjoint coverage, become one picture of packed 8-bit sRGB.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> bins: array<Bin>;
-@group(0) @binding(2) var<storage, read> blurred: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
+@group(0) @binding(2) var<storage, read> blurred: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> scene: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> result: array<u32>;
+@group(0) @binding(5) var<storage, read> active_tiles: array<u32>;
+
+// A pixel of a bin; nothing was written where nothing is.
+fn bin_at(k: u32, pixel: vec2<u32>) -> vec4<f32> {
+    if active_tiles[bins[k].active_at + tile_of(pixel, bins[k].size.x, RESULT_TILE)] == 0u {
+        return vec4(0.0);
+    }
+    return unpacked(blurred[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x]);
+}
 
 // A bin at the scale of the picture.
-fn sample_bin(index: u32, pixel: vec2<u32>) -> vec4<f32> {
-    let size = bins[index].size;
-    let along = (vec2<f32>(pixel) + 0.5) / f32(bins[index].scale) - 0.5;
-    let at = clamp(along, vec2(0.0), vec2<f32>(size - 1u));
+fn sample_bin(k: u32, pixel: vec2<u32>) -> vec4<f32> {
+    if bins[k].scale == 1u {
+        return bin_at(k, pixel);
+    }
+    let limit = bins[k].size - 1u;
+    let along = (vec2<f32>(pixel) + 0.5) / f32(bins[k].scale) - 0.5;
+    let at = clamp(along, vec2(0.0), vec2<f32>(limit));
     let first = vec2<u32>(at);
-    let second = min(first + 1u, size - 1u);
+    let second = min(first + 1u, limit);
     let share = at - vec2<f32>(first);
-    let top = bins[index].offset + first.y * size.x;
-    let bottom = bins[index].offset + second.y * size.x;
-    return mix(mix(blurred[top + first.x], blurred[top + second.x], share.x),
-               mix(blurred[bottom + first.x], blurred[bottom + second.x], share.x), share.y);
+    return mix(mix(bin_at(k, first), bin_at(k, vec2(second.x, first.y)), share.x),
+               mix(bin_at(k, vec2(first.x, second.y)), bin_at(k, second), share.x), share.y);
+}
+
+// Bins stacked front to back.
+struct Stack {
+    color: vec3<f32>,
+    open: f32,              // how much nothing has covered yet
+    hindmost: vec3<f32>,    // the colour of the hindmost bin that counts, and how far that is known
+    known: f32,
+}
+
+// A bin behind all there is covers what is still open.
+fn add(stack: Stack, layer: vec4<f32>) -> Stack {
+    let taken = min(layer.a, stack.open);
+    let own = layer.rgb * (1.0 / max(layer.a, 1.0e-6));
+    let counts = min(layer.a * (1.0 / HINDMOST_COVERAGE), 1.0);
+    return Stack(stack.color + own * taken, stack.open - taken,
+                 mix(stack.hindmost, own, counts), mix(stack.known, 1.0, counts));
+}
+
+// What is still open was hidden from the camera, and lies behind all else: it gets the colour of the hindmost.
+fn closed(stack: Stack) -> vec3<f32> {
+    return stack.color + stack.hindmost * (stack.open / max(stack.known, 1.0e-6));
 }
 
 fn layers(pixel: vec2<u32>) -> vec3<f32> {
-    var front = vec4(vec3(0.0), 1.0);
-    var back = vec4(vec3(0.0), 1.0);
-    for (var k = 0u; k < frame.bins; k++) {
-        if (frame.present & (1u << k)) == 0u {
-            continue;
-        }
-        let layer = sample_bin(k, pixel);
-        let near = k < frame.near_bins;
-        let stack = select(back, front, near);
-        let taken = min(layer.a, stack.a);
-        let next = vec4(stack.rgb + layer.rgb * (taken / max(layer.a, 1.0e-6)), stack.a - taken);
-        front = select(front, next, near);
-        back = select(next, back, near);
+    var front = Stack(vec3(0.0), 1.0, vec3(0.0), 0.0);
+    var back = front;
+    for (var k = 0u; k < frame.near_bins; k++) {
+        front = add(front, sample_bin(k, pixel));
     }
-    let filled = 1.0 - back.a;
-    if filled > 1.0e-4 {
-        return front.rgb + back.rgb * (front.a / filled);
+    for (var k = frame.near_bins; k < frame.bins; k++) {
+        back = add(back, sample_bin(k, pixel));
+    }
+    if back.known > 1.0e-4 || front.known <= 0.0 {
+        return front.color + front.open * closed(back);
     }
     // Where nothing lies behind, what lies in front is all there is.
-    return front.rgb / max(1.0 - front.a, 1.0e-4);
+    return closed(front);
 }
 
 fn chosen(pixel: vec2<u32>) -> vec3<f32> {
-    let coc_px = scene[pixel.y * frame.size.x + pixel.x].w;
+    let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.most_px).w;
     var color = vec3(0.0);
     for (var k = 0u; k < frame.bins; k++) {
         let share = share_at(bins[k].front, bins[k].behind, coc_px);
-        if (frame.present & (1u << k)) != 0u && share > 0.0 {
+        if share > 0.0 {
             let layer = sample_bin(k, pixel);
             color += layer.rgb * (share / max(layer.a, 1.0e-6));
         }
@@ -70,7 +95,7 @@ fn color_of(index: u32) -> vec3<u32> {
     } else if frame.compositing == 1u {
         color = chosen(pixel);
     } else {
-        color = blurred[index].rgb;
+        color = unpacked(blurred[index]).rgb;
     }
     if frame.expansion > 0.0 {
         color *= frame.expansion / (frame.expansion + luminance(color));

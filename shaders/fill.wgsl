@@ -3,15 +3,11 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> hidden: array<f32>;
 @group(0) @binding(2) var<storage, read> pyramid: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read_write> scene: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read_write> scene: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read_write> ranges: array<vec2<f32>>;
 
-@compute @workgroup_size(16, 16)
-fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
-    if any(id.xy >= frame.size) {
-        return;
-    }
+fn hidden_around(at: vec2<u32>) -> f32 {
     let size = (frame.size + 1u) / 2u;
-    let at = id.xy / 2u;
     let first = at - min(at, vec2(1u));
     let last = min(at + 1u, size - 1u);
     var most = 0.0;
@@ -20,8 +16,26 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
             most = max(most, hidden[y * size.x + x]);
         }
     }
-    if most > 0.0 {
-        let value = pyramid[at.y * size.x + at.x];
-        scene[id.y * frame.size.x + id.x] = vec4(value.rgb, max(value.w, frame.nearest_px));
+    return most;
+}
+
+@compute @workgroup_size(16, 16)
+fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
+        @builtin(workgroup_id) tile: vec3<u32>, @builtin(num_workgroups) tiles: vec3<u32>) {
+    let index = tile.y * tiles.x + tile.x;
+    if thread == 0u {
+        atomicStore(&lowest, key_of(ranges[index].x));
+        atomicStore(&highest, key_of(ranges[index].y));
+    }
+    workgroupBarrier();
+    if all(id.xy < frame.size) && hidden_around(id.xy / 2u) > 0.0 {
+        let value = pyramid[id.y / 2u * ((frame.size.x + 1u) / 2u) + id.x / 2u];
+        let filled = scene_packed(value.rgb, max(value.w, frame.nearest_px), frame.most_px);
+        scene[id.y * frame.size.x + id.x] = filled;
+        range_add(scene_unpacked(filled, frame.most_px).w);
+    }
+    workgroupBarrier();
+    if thread == 0u {
+        ranges[index] = vec2(value_of(atomicLoad(&lowest)), value_of(atomicLoad(&highest)));
     }
 }

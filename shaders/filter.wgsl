@@ -1,33 +1,51 @@
 // Shared by the two filter passes: the taps at a pixel, linear between the edges of its segment.
 
-struct Group {
-    index: u32,     // which four terms
-    terms: u32,     // how many of them are there
-    last: u32,      // 1: the sum is complete
-    unused: u32,
+// Where a pixel lies among the edges: between two of them, between two rows of cells.
+struct Corner {
+    above: u32,     // first of the two vectors of the left edge, in the row of cells above
+    below: u32,
+    down: f32,      // 0 in the row above, 1 in the row below
+    along: f32,     // 0 at the left edge, 1 at the right
 }
 
 struct Taps {
-    left: u32,      // tap 0 at the left edge
-    right: u32,
-    along: f32,     // 0 at the left edge, 1 at the right
+    left: i32,      // tap 0 at the left edge
+    right: i32,
+    step: i32,      // from one tap to the next
     reach: i32,
 }
 
-// Row above, row below and how far between them a row of the bin lies, in rows of cells.
-struct Between {
-    above: u32,
-    below: u32,
-    share: f32,
+fn corner_of(k: u32, pixel: vec2<u32>) -> Corner {
+    let down = max((f32(pixel.y) - (f32(CELL) - 1.0) / 2.0) / f32(CELL), 0.0);
+    let above = min(u32(down), bins[k].cells.y - 1u);
+    let below = min(above + 1u, bins[k].cells.y - 1u);
+    let edge = bins[k].edges_at + pixel.x / SEGMENT;
+    return Corner(2u * (edge + above * bins[k].edges), 2u * (edge + below * bins[k].edges), down - f32(above),
+                  (f32(pixel.x % SEGMENT) + 0.5) / f32(SEGMENT));
 }
 
-fn between_cells(y: u32, cells_down: u32) -> Between {
-    let along = max((f32(y) - (f32(CELL) - 1.0) / 2.0) / f32(CELL), 0.0);
-    let above = min(u32(along), cells_down - 1u);
-    return Between(above, min(above + 1u, cells_down - 1u), along - f32(above));
+// One of the vectors of the edge on the left (0, 1) or on the right (2, 3) of a pixel.
+fn edge_at(corner: Corner, index: u32) -> vec4<f32> {
+    return mix(edges[corner.above + index], edges[corner.below + index], corner.down);
 }
 
-// Where tap 0 of a node is in the bank.
-fn node_origin(node: u32, reach: u32, groups: u32, group_index: u32) -> u32 {
-    return (node * (2u * reach + 1u) + reach) * groups + group_index;
+fn taps_at(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
+    var radii = vec2(edge_at(corner, 0u).x, edge_at(corner, 2u).x);
+    var turned = bins[k].turned == 1u;
+    if frame.compositing == 2u {
+        // A gather's only bin has the picture's scale; every pixel has a radius of its own.
+        let coc_px = scene_unpacked(scene[pixel.y * frame.size.x + pixel.x], frame.most_px).w;
+        radii = vec2(abs(coc_px));
+        turned = coc_px < 0.0;
+    }
+    let left = node_at(radii.x, frame.steps_per_px, frame.nodes);
+    let right = node_at(radii.y, frame.steps_per_px, frame.nodes);
+    let origin = (vec2(left, right) * (2u * frame.reach + 1u) + frame.reach) * frame.groups + work.group;
+    let step = select(i32(frame.groups), -i32(frame.groups), turned);
+    return Taps(i32(origin.x), i32(origin.y), step, i32(node_reach[max(left, right)]));
+}
+
+// Tap `j`, four terms.
+fn tap_at(taps: Taps, along: f32, j: i32) -> vec4<f32> {
+    return mix(bank[u32(taps.left + j * taps.step)], bank[u32(taps.right + j * taps.step)], along);
 }

@@ -1,8 +1,9 @@
-// Pass hide: at half size, whether any near object touches a pixel.
+// Pass hide: at half size, whether any near object touches a pixel. Reads the scene only where a tile has any.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(1) var<storage, read> scene: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read_write> hidden: array<f32>;
+@group(0) @binding(3) var<storage, read> ranges: array<vec2<f32>>;
 
 @compute @workgroup_size(16, 16)
 fn hide(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -11,9 +12,10 @@ fn hide(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     var most = 0.0;
-    for (var sub = 0u; sub < 4u; sub++) {
+    let nearest_px = ranges[tile_of(2u * id.xy, frame.size.x, SCENE_TILE)].x;
+    for (var sub = 0u; sub < 4u && step_at(frame.rest_front, nearest_px) < 1.0; sub++) {
         let at = min(2u * id.xy + vec2(sub % 2u, sub / 2u), frame.size - 1u);
-        most = max(most, 1.0 - step_at(frame.rest_front, scene[at.y * frame.size.x + at.x].w));
+        most = max(most, 1.0 - step_at(frame.rest_front, scene_unpacked(scene[at.y * frame.size.x + at.x], frame.most_px).w));
     }
     hidden[id.y * size.x + id.x] = most;
 }

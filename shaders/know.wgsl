@@ -1,7 +1,7 @@
 // Pass know: the finest level of the pyramid: colour and CoC where neither the pixel nor a neighbour is hidden.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> scene: array<vec4<f32>>;
+@group(0) @binding(1) var<storage, read> scene: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> hidden: array<f32>;
 @group(0) @binding(3) var<storage, read_write> pyramid: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> known: array<f32>;
@@ -23,7 +23,7 @@ fn know(@builtin(global_invocation_id) id: vec3<u32>) {
     var sum = vec4(0.0);
     for (var sub = 0u; sub < 4u; sub++) {
         let at = min(2u * id.xy + vec2(sub % 2u, sub / 2u), frame.size - 1u);
-        sum += 0.25 * scene[at.y * frame.size.x + at.x];
+        sum += 0.25 * scene_unpacked(scene[at.y * frame.size.x + at.x], frame.most_px);
     }
     let index = id.y * size.x + id.x;
     let knows = select(0.0, 1.0, most <= 0.0);

@@ -1,17 +1,5 @@
 // Pass push: what a level of the pyramid does not know, from the next coarser one (linear interpolation).
 
-struct Level {
-    fine: vec2<u32>,
-    coarse: vec2<u32>,
-    fine_offset: u32,
-    coarse_offset: u32,
-    unused: vec2<u32>,
-}
-
-@group(0) @binding(0) var<uniform> level: Level;
-@group(0) @binding(1) var<storage, read_write> pyramid: array<vec4<f32>>;
-@group(0) @binding(2) var<storage, read_write> known: array<f32>;
-
 // The other coarse pixel that a fine one lies between, along one axis.
 fn neighbour(at: u32, limit: u32) -> u32 {
     let half = at / 2u;

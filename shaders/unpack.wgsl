@@ -1,10 +1,11 @@
 // Pass unpack: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC.
-// Reads packed RGB bytes and metres; writes linear r, g, b and the CoC in pixels.
+// Reads packed RGB bytes and metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> color: array<u32>;
 @group(0) @binding(2) var<storage, read> depth: array<f32>;
-@group(0) @binding(3) var<storage, read_write> scene: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read_write> scene: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read_write> ranges: array<vec2<f32>>;
 
 fn light_of(index: u32) -> f32 {
     let code = f32((color[index / 4u] >> (8u * (index % 4u))) & 255u) / 255.0;
@@ -31,14 +32,26 @@ fn coc_of(x: u32, y: u32) -> f32 {
 }
 
 @compute @workgroup_size(16, 16)
-fn unpack(@builtin(global_invocation_id) id: vec3<u32>) {
-    if any(id.xy >= frame.size) {
-        return;
+fn unpack(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
+          @builtin(workgroup_id) tile: vec3<u32>, @builtin(num_workgroups) tiles: vec3<u32>) {
+    if thread == 0u {
+        atomicStore(&lowest, 0x7fffffff);
+        atomicStore(&highest, -0x7fffffff);
     }
-    let pixel = id.y * frame.size.x + id.x;
-    var light = vec3(light_of(3u * pixel), light_of(3u * pixel + 1u), light_of(3u * pixel + 2u));
-    if frame.expansion > 0.0 {
-        light *= frame.expansion / (frame.expansion - luminance(light));
+    workgroupBarrier();
+    if all(id.xy < frame.size) {
+        let pixel = id.y * frame.size.x + id.x;
+        var light = vec3(light_of(3u * pixel), light_of(3u * pixel + 1u), light_of(3u * pixel + 2u));
+        if frame.expansion > 0.0 {
+            light *= frame.expansion / (frame.expansion - luminance(light));
+        }
+        let value = scene_packed(light, coc_of(id.x, id.y), frame.most_px);
+        scene[pixel] = value;
+        // What the others read, rounding included.
+        range_add(scene_unpacked(value, frame.most_px).w);
     }
-    scene[pixel] = vec4(light, coc_of(id.x, id.y));
+    workgroupBarrier();
+    if thread == 0u {
+        ranges[tile.y * tiles.x + tile.x] = vec2(value_of(atomicLoad(&lowest)), value_of(atomicLoad(&highest)));
+    }
 }

@@ -4,7 +4,8 @@
 
 use std::mem::offset_of;
 
-use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Group, Level};
+use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Level, Work};
+use bokehcam::bokeh::plan::MAX_BINS;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 fn parse(source: &str) -> naga::Module {
@@ -15,7 +16,7 @@ fn parse(source: &str) -> naga::Module {
 fn every_shader_validates_and_is_named_like_its_file() {
     for shader in ALL {
         let module = parse(shader.source);
-        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::default());
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
         if let Err(error) = validator.validate(&module) {
             panic!("{}: {}", shader.name, error.emit_to_string(shader.source));
         }
@@ -32,7 +33,8 @@ fn every_file_is_a_pass_or_shared_and_short() {
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let known = ["common", "filter"].contains(&name.as_str()) || ALL.iter().any(|shader| shader.name == name);
+        let known = ["common", "work", "filter", "level", "range"].contains(&name.as_str())
+            || ALL.iter().any(|shader| shader.name == name);
         assert!(known, "{} belongs to no pass", path.display());
         let lines = std::fs::read_to_string(&path).expect("a text").lines().count();
         assert!(lines <= 150, "{} has {lines} lines", path.display());
@@ -54,10 +56,10 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             compositing,
             bins,
             near_bins,
-            present,
             reach,
             nodes,
             groups,
+            most_px,
             coc,
             ramp,
             expansion,
@@ -78,9 +80,17 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             max_radius_px,
             sigma_cells,
             reach_cells,
-            offset
+            pixels_at,
+            rows_at,
+            edges_at,
+            cells_at,
+            rows_apart,
+            reach,
+            filtered_at,
+            active_at,
+            unused
         }),
-        layout!(Group { index, terms, last, unused }),
+        layout!(Work { first, count, group, terms, last, unused_a, unused_b, unused_c }),
         layout!(Level { fine, coarse, fine_offset, coarse_offset, unused }),
     ];
     for (name, size, fields) in expected {
@@ -96,5 +106,18 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             }
         }
         assert!(found, "{name} is in some shader");
+    }
+}
+
+#[test]
+fn the_array_of_bins_holds_as_many_as_a_plan_has() {
+    for shader in ALL {
+        let module = parse(shader.source);
+        for (_, kind) in module.types.iter() {
+            let naga::TypeInner::Array { base, size, .. } = kind.inner else { continue };
+            if module.types[base].name.as_deref() == Some("Bin") {
+                assert_eq!(size, naga::ArraySize::Constant((MAX_BINS as u32).try_into().expect("not zero")));
+            }
+        }
     }
 }

@@ -161,8 +161,6 @@ pub enum BokehError {
 /// What a pass has left behind of the last frame: vectors of four values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Probe {
-    /// After `unpack` and `fill`, per pixel: linear r, g, b and CoC in pixels.
-    Scene,
     /// After `bin`, per pixel of a bin: premultiplied r, g, b and coverage.
     Bin(usize),
     /// After `reach`, per row of cells and edge: radius in bin pixels and lowest r, g, b; highest r, g, b and nothing.

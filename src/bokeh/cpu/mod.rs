@@ -101,7 +101,7 @@ impl CpuBokeh {
             pyramid: (plan.fill && plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
             waits: vec![false; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),
-            taken: flags(height),
+            taken: flags(height.max(slots.len())),
             plan,
             team,
             slots,
@@ -181,6 +181,10 @@ impl CpuBokeh {
             });
         }
         self.tiles.settle(layered);
+        // What lies in front spreads over tiles that are in focus, however far; there they are needed.
+        if self.plan.bins.iter().any(|bin| bin.near) {
+            self.tiles.idle.fill(false);
+        }
         let fills = self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near);
         for k in 0..self.plan.bins.len() {
             let bin = &self.plan.bins[k];

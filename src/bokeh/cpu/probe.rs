@@ -2,13 +2,13 @@
 
 use super::CpuBokeh;
 use super::rows::STRIP;
+use super::tiles::{TILE_H, TILE_W};
 use crate::bokeh::Probe;
 
 impl CpuBokeh {
     /// The result of a pass over the last frame, in the layout that [`Probe`] states. Allocates; for tests.
     pub fn probe(&self, probe: Probe) -> Vec<[f32; 4]> {
         match probe {
-            Probe::Scene => Vec::new(),
             Probe::Bin(k) => {
                 let (bin, source) = (&self.plan.bins[k], &self.slots[self.plan.bins[k].slot].source);
                 let pixels = |y: usize| (0..bin.width).map(move |x| (x, y));
@@ -32,5 +32,17 @@ impl CpuBokeh {
     /// Whether anything in the last frame belonged to bin `k`; if not, its passes were left out.
     pub fn is_present(&self, k: usize) -> bool {
         self.slots[self.plan.bins[k].slot].present
+    }
+
+    /// Whether a pixel of a bin of scale `scale`, or any within `around` bin pixels of it, lies in a tile that no bin
+    /// of the last frame needed, all around it being in focus: the bins may be empty there.
+    pub fn is_idle_around(&self, (x, y): (usize, usize), around: usize, scale: usize) -> bool {
+        let tiles = |at: usize, tile: usize, count: usize| {
+            let first = at.saturating_sub(around) * scale / tile;
+            first..((at + around) * scale / tile + 1).min(count).max(first)
+        };
+        let (across, down) = (self.tiles.across, self.tiles.down);
+        let columns = tiles(x, TILE_W, across);
+        tiles(y, TILE_H, down).any(|row| columns.clone().any(|column| self.tiles.idle[row * across + column]))
     }
 }

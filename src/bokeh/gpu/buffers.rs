@@ -1,23 +1,22 @@
 //! What lives on the device: allocated once per picture size.
 
 use super::device::Device;
-use super::shaders::{Bin, Group, Level};
+use super::layout::Capacity;
+use super::shaders::{Bin, Frame, Level};
 use crate::bokeh::bank::Bank;
-use crate::bokeh::plan::{CELL, Compositing, Plan, SEGMENT};
+use crate::bokeh::plan::{Compositing, MAX_BINS, Plan};
 
-/// Columns of a strip of the CPU executor: both executors' grids are as wide, so that their cells agree.
-const GRID_ROUNDING: usize = 64;
+/// Bytes from one uniform `Work` to the next: no device asks for more.
+pub const WORK_STRIDE: u64 = 256;
 
 /// The buffers of a plan.
 pub struct Buffers {
     /// Uniform `Frame`.
     pub frame: wgpu::Buffer,
-    /// Uniform `Bin`, one each.
-    pub bins: Vec<wgpu::Buffer>,
-    /// The same as one array.
-    pub all_bins: wgpu::Buffer,
-    /// Uniform `Group`, one each.
-    pub groups: Vec<wgpu::Buffer>,
+    /// Uniform `Bin`, an array.
+    pub bins: wgpu::Buffer,
+    /// Uniform `Work`, one every [`WORK_STRIDE`] bytes.
+    pub work: wgpu::Buffer,
     /// Uniform `Level`, one for each step of the pyramid.
     pub levels: Vec<wgpu::Buffer>,
     /// Sizes of those steps: fine, coarse.
@@ -26,18 +25,22 @@ pub struct Buffers {
     pub color: wgpu::Buffer,
     /// Linear light and CoC.
     pub scene: wgpu::Buffer,
-    /// A bin's picture.
-    pub source: Vec<wgpu::Buffer>,
-    /// Coverage times |CoC|, shared by all bins.
-    pub weighted_coc: wgpu::Buffer,
-    /// Coarse grid, shared by all bins.
+    /// Range of CoC of each tile of the picture.
+    pub ranges: wgpu::Buffer,
+    /// The pictures of all bins.
+    pub source: wgpu::Buffer,
+    /// Coarse grids of all bins.
     pub grid: wgpu::Buffer,
-    /// Radius and range of colours at the edges of segments.
-    pub edges: Vec<wgpu::Buffer>,
-    /// Results of the horizontal filters, shared by all bins.
+    /// Radius and range of colours at the edges of segments, of all bins.
+    pub edges: wgpu::Buffer,
+    /// Results of the horizontal filters, of the bins that are filtered at once.
     pub rows: wgpu::Buffer,
     /// All blurred bins.
     pub blurred: wgpu::Buffer,
+    /// Per tile of rows, whether anything is there.
+    pub filtered: wgpu::Buffer,
+    /// Per tile of blurred bins, whether anything is there.
+    pub active: wgpu::Buffer,
     /// Packed picture out.
     pub result: wgpu::Buffer,
     /// Half-size flags of what near objects touch.
@@ -59,38 +62,15 @@ pub fn picture_bytes(plan: &Plan) -> u64 {
     (plan.width * plan.height).div_ceil(4) as u64 * 12
 }
 
-/// The uniforms of a plan's bins.
-pub fn bin_uniforms(plan: &Plan) -> Vec<Bin> {
-    let mut offset = 0;
-    let whole = plan.compositing != Compositing::Layers;
-    (0..plan.bins.len())
-        .map(|k| {
-            let bin = &plan.bins[k];
-            let cells_across = bin.width.next_multiple_of(GRID_ROUNDING) / CELL;
-            let share = plan.share(k);
-            let uniform = Bin {
-                size: [bin.width as u32, bin.height as u32],
-                cells: [cells_across as u32, bin.height.div_ceil(CELL) as u32],
-                scale: bin.scale as u32,
-                edges: (cells_across * CELL / SEGMENT + 1) as u32,
-                turned: u32::from(bin.near),
-                whole: u32::from(whole),
-                front: share.front.into(),
-                behind: share.behind.into(),
-                max_radius_px: bin.max_radius_px,
-                sigma_cells: bin.sigma_cells(),
-                reach_cells: plan.reach_cells(bin) as u32,
-                offset,
-            };
-            offset += (bin.width * bin.height) as u32;
-            uniform
-        })
-        .collect()
+/// Pieces of work of a frame that have a uniform `Work` each: two for the pass `bin`, one for `reach`, and every group
+/// of terms of every batch for the filters.
+pub fn works(plan: &Plan) -> usize {
+    3 + MAX_BINS * plan.bank.terms.div_ceil(4)
 }
 
 impl Buffers {
     /// Allocates everything and uploads what never changes.
-    pub fn new(device: &Device, plan: &Plan) -> Self {
+    pub fn new(device: &Device, plan: &Plan, capacity: &Capacity) -> Self {
         use wgpu::BufferUsages as Usage;
         let buffer = |label: &str, bytes: usize, usage: Usage| {
             device.device.create_buffer(&wgpu::BufferDescriptor {
@@ -107,36 +87,28 @@ impl Buffers {
             target
         };
         let storage = |label: &str, values: usize| buffer(label, values * 4, Usage::STORAGE | Usage::COPY_SRC);
-        let uniforms = bin_uniforms(plan);
         let (width, height) = (plan.width, plan.height);
-        let largest = plan.bins.iter().map(|bin| bin.width * bin.height).max().unwrap_or(1);
-        let all: usize = plan.bins.iter().map(|bin| bin.width * bin.height).sum();
-        let cells = uniforms.iter().map(|bin| bin.cells[0] as usize * bin.cells[1] as usize).max().unwrap_or(1);
         let layered = plan.compositing == Compositing::Layers;
         let (levels, pyramid_pixels) = if layered && plan.fill { levels(width, height) } else { (Vec::new(), 1) };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let terms = plan.bank.terms;
-        let groups = (0..terms.div_ceil(4)).map(|k| Group {
-            index: k as u32,
-            terms: (terms - 4 * k).min(4) as u32,
-            last: u32::from(4 * (k + 1) >= terms),
-            unused: 0,
-        });
+        let works = works(plan) as u64;
         Self {
-            frame: buffer("frame", size_of::<super::shaders::Frame>(), Usage::UNIFORM),
-            bins: uniforms.iter().map(|bin| filled("bin", bytemuck::bytes_of(bin), Usage::UNIFORM)).collect(),
-            all_bins: filled("bins", bytemuck::cast_slice(&uniforms), Usage::STORAGE),
-            groups: groups.map(|group| filled("group", bytemuck::bytes_of(&group), Usage::UNIFORM)).collect(),
+            frame: buffer("frame", size_of::<Frame>(), Usage::UNIFORM),
+            bins: buffer("bins", MAX_BINS * size_of::<Bin>(), Usage::UNIFORM),
+            work: buffer("work", (works * WORK_STRIDE) as usize, Usage::UNIFORM),
             level_sizes: levels.iter().map(|level| (level.fine, level.coarse)).collect(),
             levels: levels.iter().map(|level| filled("level", bytemuck::bytes_of(level), Usage::UNIFORM)).collect(),
             color: storage("color", picture_bytes(plan) as usize / 4),
-            scene: storage("scene", width * height * 4),
-            source: uniforms.iter().map(|bin| storage("source", (bin.size[0] * bin.size[1]) as usize * 4)).collect(),
-            weighted_coc: storage("weighted coc", largest),
-            grid: storage("grid", cells * 8),
-            edges: uniforms.iter().map(|bin| storage("edges", (bin.edges * bin.cells[1]) as usize * 8)).collect(),
-            rows: storage("rows", largest * 4 * terms.min(4)),
-            blurred: storage("blurred", all * 4),
+            scene: storage("scene", width * height * 2),
+            ranges: storage("ranges", width.div_ceil(16) * height.div_ceil(16) * 2),
+            source: storage("source", capacity.pixels * 2),
+            grid: storage("grid", capacity.cells * 8),
+            edges: storage("edges", capacity.edges * 8),
+            rows: storage("rows", capacity.rows * 2 * terms.min(4)),
+            blurred: storage("blurred", capacity.pixels * 2),
+            filtered: storage("filtered", capacity.filtered),
+            active: storage("active", capacity.active),
             result: storage("result", picture_bytes(plan) as usize / 4),
             hidden: storage("hidden", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),
             pyramid: storage("pyramid", pyramid_pixels * 4),

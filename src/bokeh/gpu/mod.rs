@@ -2,6 +2,7 @@
 
 mod buffers;
 mod device;
+mod layout;
 mod passes;
 mod probe;
 mod readback;
@@ -11,6 +12,7 @@ use std::time::Instant;
 
 use buffers::Buffers;
 use device::Device;
+use layout::{Capacity, Layout};
 use passes::Passes;
 use readback::{CAPACITY, MAX_QUERIES, Ring};
 
@@ -25,6 +27,8 @@ pub struct GpuBokeh {
     device: Device,
     buffers: Buffers,
     depth: wgpu::Buffer,
+    capacity: Capacity,
+    layout: Layout,
     passes: Passes,
     ring: Ring,
     queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
@@ -39,14 +43,16 @@ impl GpuBokeh {
     pub fn new(plan: &Plan, hardware_only: bool, adapter: Option<&str>) -> Result<Self, BokehError> {
         let device = Device::open(hardware_only, adapter)?;
         let most = device.device.limits().max_storage_buffer_binding_size;
-        let largest: u64 = plan.bins.iter().map(|bin| (bin.width * bin.height) as u64 * 16).sum();
-        if largest.max(16) > most {
+        let capacity = Capacity::of(plan);
+        let rows = capacity.rows * plan.bank.terms.min(4);
+        let largest = capacity.pixels.max(rows).max(1) as u64 * 8;
+        if largest > most {
             return Err(BokehError::Gpu(format!(
                 "{}: pictures of {} x {} need buffers of {largest} bytes and it allows {most}; use --backend cpu",
                 device.name, plan.width, plan.height
             )));
         }
-        let buffers = Buffers::new(&device, plan);
+        let buffers = Buffers::new(&device, plan, &capacity);
         let depth = Buffers::depth(&device, plan.width * plan.height);
         let passes = Passes::new(&device, plan, &buffers, &depth);
         let ring = Ring::new(&device, buffers::picture_bytes(plan));
@@ -65,38 +71,17 @@ impl GpuBokeh {
             (set, resolved)
         });
         device.check()?;
-        Ok(Self { plan: plan.clone(), device, buffers, depth, passes, ring, queries })
+        Ok(Self { plan: plan.clone(), device, buffers, depth, capacity, layout: Layout::new(), passes, ring, queries })
     }
 
-    /// Bit `k`: something in the frame may belong to bin `k`.
-    fn present(&self, job: &Job) -> u32 {
+    fn frame(&self, job: &Job) -> shaders::Frame {
         let plan = &self.plan;
-        let all = (1u32 << plan.bins.len()) - 1;
-        let (CocField::Depth(lens), Some(map), Compositing::Layers) = (&job.coc, &job.depth, plan.compositing) else {
-            return all;
-        };
-        // Which of many small ranges of CoC occur, then which bins those ranges meet.
-        const RANGES: usize = 512;
-        let mut occurs = [false; RANGES];
-        let range_px = 2.0 * lens.max_coc_px.max(1e-3) / (RANGES - 1) as f32;
-        let first_px = -lens.max_coc_px;
-        for &metres in &map.metres {
-            occurs[(((lens.coc_px(metres) - first_px) / range_px) as usize).min(RANGES - 1)] = true;
-        }
-        let span =
-            |range: usize| (first_px + (range as f32 - 1.0) * range_px, first_px + (range as f32 + 1.0) * range_px);
-        let mask = (0..plan.bins.len())
-            .filter(|&k| (0..RANGES).any(|range| occurs[range] && plan.share(k).meets(span(range))))
-            .fold(0, |mask, k| mask | 1 << k);
-        let near = plan.bins.iter().enumerate().filter(|(_, bin)| bin.near).fold(0, |near, (k, _)| near | 1 << k);
-        // What is filled in behind a near object may have any CoC between those around it.
-        if plan.fill && mask & near != 0 { mask | (all & !near) } else { mask }
-    }
-
-    fn frame(&self, job: &Job, present: u32) -> shaders::Frame {
-        let plan = &self.plan;
-        let near = plan.bins.iter().filter(|bin| bin.near).count();
         let rest_front = plan.rest_share().front;
+        let most_px = match job.coc {
+            CocField::Uniform { radius_px } => radius_px,
+            CocField::Ramp(ramp) => ramp.max_px,
+            CocField::Depth(lens) => lens.max_coc_px,
+        };
         let (coc_kind, coc, ramp) = match job.coc {
             CocField::Uniform { radius_px } => (0, [radius_px, 0.0, 0.0, 0.0], [0.0; 2]),
             CocField::Ramp(r) => (1, [r.normal.x, r.normal.y, r.offset_px, r.half_band_px], [r.slope, r.max_px]),
@@ -112,11 +97,11 @@ impl GpuBokeh {
                 Compositing::Gather => 2,
             },
             bins: plan.bins.len() as u32,
-            near_bins: near as u32,
-            present,
+            near_bins: self.layout.near as u32,
             reach: plan.bank.reach as u32,
             nodes: plan.bank.nodes as u32,
             groups: plan.bank.terms.div_ceil(4) as u32,
+            most_px: most_px.max(1e-3),
             coc,
             ramp,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
@@ -163,13 +148,15 @@ impl Bokeh for GpuBokeh {
             self.upload(&self.depth, bytes);
         }
         self.upload(&self.buffers.color, &job.color.rgb);
-        let present = self.present(&job);
-        let frame = self.frame(&job, present);
+        self.plan.split(job.depth.as_deref(), &job.coc);
+        self.layout.lay_out(&self.plan, &self.capacity);
+        self.passes.upload(&self.device, &self.buffers, &self.layout);
+        let frame = self.frame(&job);
         self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
 
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let set = self.queries.as_ref().map(|(set, _)| set);
-        self.passes.encode(&mut encoder, present, set, &mut slot.passes);
+        self.passes.encode(&mut encoder, &self.layout, set, &mut slot.passes);
         encoder.copy_buffer_to_buffer(&self.buffers.result, 0, &slot.picture, 0, slot.picture.size());
         if let (Some((set, resolved)), Some(back)) = (&self.queries, &slot.stamps) {
             let count = 2 * slot.passes.len() as u32;

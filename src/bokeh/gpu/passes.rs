@@ -1,40 +1,60 @@
 //! The passes in their order: pipelines and bind groups made once, one `encode` per frame.
 
-use super::buffers::Buffers;
+use std::ops::Range;
+
+use super::buffers::{Buffers, WORK_STRIDE, works};
 use super::device::Device;
+use super::layout::{Layout, RESULT_TILE, ROWS_TILE, tiles};
 use super::readback::MAX_QUERIES;
-use super::shaders::{self, Shader};
-use crate::bokeh::plan::{Compositing, Plan};
+use super::shaders::{self, Bin, Shader, Work};
+use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
 
 /// Invocations of a workgroup in x and y, as the shaders declare them.
 const TILE: u32 = 16;
 const SMALL_TILE: u32 = 8;
 const LINE: u32 = 64;
+/// What a workgroup does of a bin: pixels of `bin`, edges of `reach`.
+const BIN_TILE: [usize; 2] = [16, 16];
+const REACH_TILE: [usize; 2] = [8, 8];
 
-/// One dispatch: a pipeline, its buffers and how many workgroups.
+/// Where each piece of work has its uniform `Work`.
+const NEAR: usize = 0;
+const REST: usize = 1;
+const ALL: usize = 2;
+const FIRST_BATCH: usize = 3;
+
+/// One pass: a pipeline and its buffers.
 struct Step {
     name: &'static str,
     pipeline: wgpu::ComputePipeline,
     bindings: wgpu::BindGroup,
+}
+
+/// A pass over the picture or a level of the pyramid: always as many workgroups.
+struct Fixed {
+    step: Step,
     workgroups: [u32; 2],
 }
 
 /// Everything that a frame runs.
 pub struct Passes {
-    unpack: Shader,
-    unpack_pipeline: wgpu::ComputePipeline,
-    unpack_bindings: wgpu::BindGroup,
-    unpack_workgroups: [u32; 2],
-    fill: Vec<Step>,
-    /// Per bin.
-    bins: Vec<Vec<Step>>,
-    finish: Vec<Step>,
-    near_bins: usize,
+    unpack: Fixed,
+    fill: Vec<Fixed>,
+    gather: Option<Fixed>,
+    /// Bins in front, and the rest.
+    bin: [Step; 2],
+    reach: Step,
+    /// Rows and columns, for each batch of bins and group of terms.
+    blur: Vec<[Step; 2]>,
+    composite: Fixed,
+    terms: usize,
+    work: Vec<u8>,
 }
 
 /// Makes the steps.
 struct Maker<'a> {
     device: &'a wgpu::Device,
+    buffers: &'a Buffers,
     made: Vec<(&'static str, wgpu::ComputePipeline)>,
 }
 
@@ -62,147 +82,206 @@ impl Maker<'_> {
         pipeline
     }
 
-    fn bindings(&self, pipeline: &wgpu::ComputePipeline, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
-        let entries: Vec<_> = buffers
-            .iter()
-            .enumerate()
-            .map(|(k, buffer)| wgpu::BindGroupEntry { binding: k as u32, resource: buffer.as_entire_binding() })
-            .collect();
+    fn bindings<'a>(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        resources: impl Iterator<Item = wgpu::BufferBinding<'a>>,
+    ) -> wgpu::BindGroup {
+        let entry = |(k, resource)| wgpu::BindGroupEntry {
+            binding: k as u32,
+            resource: wgpu::BindingResource::Buffer(resource),
+        };
         self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
+            entries: &resources.enumerate().map(entry).collect::<Vec<_>>(),
         })
     }
 
-    fn step(
+    /// A pass in the name of `name`, over `size` invocations in workgroups of `tile`.
+    fn fixed(
         &mut self,
         name: &'static str,
         shader: Shader,
         size: [u32; 2],
-        tile: [u32; 2],
+        tile: u32,
         buffers: &[&wgpu::Buffer],
-    ) -> Step {
+    ) -> Fixed {
         let pipeline = self.pipeline(shader);
-        let bindings = self.bindings(&pipeline, buffers);
-        Step { name, pipeline, bindings, workgroups: [size[0].div_ceil(tile[0]), size[1].div_ceil(tile[1])] }
+        let bindings = self.bindings(&pipeline, buffers.iter().map(|buffer| buffer.as_entire_buffer_binding()));
+        Fixed { step: Step { name, pipeline, bindings }, workgroups: size.map(|size| size.div_ceil(tile)) }
+    }
+
+    /// A pass over some bins, with the `index`-th `work` and the `bins` in front of `buffers`.
+    fn over_bins(&mut self, name: &'static str, shader: Shader, index: usize, buffers: &[&wgpu::Buffer]) -> Step {
+        let pipeline = self.pipeline(shader);
+        let b = self.buffers;
+        let work = wgpu::BufferBinding {
+            buffer: &b.work,
+            offset: index as u64 * WORK_STRIDE,
+            size: wgpu::BufferSize::new(size_of::<Work>() as u64),
+        };
+        let uniforms = [work, b.bins.as_entire_buffer_binding()];
+        let buffers = buffers.iter().map(|buffer| buffer.as_entire_buffer_binding());
+        let bindings = self.bindings(&pipeline, uniforms.into_iter().chain(buffers));
+        Step { name, pipeline, bindings }
     }
 }
 
 impl Passes {
     /// The passes of a plan over its buffers.
     pub fn new(device: &Device, plan: &Plan, b: &Buffers, depth: &wgpu::Buffer) -> Self {
-        let mut maker = Maker { device: &device.device, made: Vec::new() };
+        let mut maker = Maker { device: &device.device, buffers: b, made: Vec::new() };
         let picture = [plan.width as u32, plan.height as u32];
         let half = picture.map(|v| v.div_ceil(2));
-        let (square, small, line) = ([TILE; 2], [SMALL_TILE; 2], [LINE, 1]);
-
-        let unpack_pipeline = maker.pipeline(shaders::UNPACK);
-        let unpack_bindings = maker.bindings(&unpack_pipeline, &[&b.frame, &b.color, depth, &b.scene]);
 
         let mut fill = Vec::new();
         if !b.levels.is_empty() {
-            fill.push(maker.step("fill", shaders::HIDE, half, square, &[&b.frame, &b.scene, &b.hidden]));
+            fill.push(maker.fixed("fill", shaders::HIDE, half, TILE, &[&b.frame, &b.scene, &b.hidden, &b.ranges]));
             let known = [&b.frame, &b.scene, &b.hidden, &b.pyramid, &b.known];
-            fill.push(maker.step("fill", shaders::KNOW, half, square, &known));
+            fill.push(maker.fixed("fill", shaders::KNOW, half, TILE, &known));
             for (level, (_, coarse)) in b.levels.iter().zip(&b.level_sizes) {
-                fill.push(maker.step("fill", shaders::PULL, *coarse, small, &[level, &b.pyramid, &b.known]));
+                fill.push(maker.fixed("fill", shaders::PULL, *coarse, SMALL_TILE, &[level, &b.pyramid, &b.known]));
             }
             for (level, (fine, _)) in b.levels.iter().zip(&b.level_sizes).rev() {
-                fill.push(maker.step("fill", shaders::PUSH, *fine, small, &[level, &b.pyramid, &b.known]));
+                fill.push(maker.fixed("fill", shaders::PUSH, *fine, SMALL_TILE, &[level, &b.pyramid, &b.known]));
             }
-            let filled = [&b.frame, &b.hidden, &b.pyramid, &b.scene];
-            fill.push(maker.step("fill", shaders::FILL, picture, square, &filled));
+            let filled = [&b.frame, &b.hidden, &b.pyramid, &b.scene, &b.ranges];
+            fill.push(maker.fixed("fill", shaders::FILL, picture, TILE, &filled));
         }
-
-        let mut bins = Vec::new();
-        for (k, info) in super::buffers::bin_uniforms(plan).iter().enumerate() {
-            let (bin, source, edges) = (&b.bins[k], &b.source[k], &b.edges[k]);
-            if plan.exact {
-                let [starts, kernels] = &b.kernels;
-                let buffers = [&b.frame, starts, kernels, &b.scene, &b.node_reach, &b.blurred];
-                bins.push(vec![maker.step("gather", shaders::GATHER, picture, square, &buffers)]);
-                continue;
-            }
-            let across = [info.edges, info.cells[1]];
-            let mut steps = vec![
-                maker.step("bin", shaders::BIN, info.size, square, &[&b.frame, bin, &b.scene, source, &b.weighted_coc]),
-                maker.step("cells", shaders::CELLS, info.cells, small, &[bin, source, &b.weighted_coc, &b.grid]),
-                maker.step("reach", shaders::REACH, across, small, &[bin, &b.grid, edges]),
-            ];
-            for group in &b.groups {
-                let [horizontal, vertical] = &b.banks;
-                let rows = [&b.frame, bin, group, horizontal, &b.node_reach, edges, source, &b.rows, &b.scene];
-                steps.push(maker.step("blur_rows", shaders::BLUR_ROWS, info.size, line, &rows));
-                let columns = [&b.frame, bin, group, vertical, &b.node_reach, edges, &b.rows, &b.blurred, &b.scene];
-                steps.push(maker.step("blur_columns", shaders::BLUR_COLUMNS, info.size, line, &columns));
-            }
-            bins.push(steps);
-        }
-
-        let quads = (plan.width * plan.height).div_ceil(4) as u32;
-        let columns = quads.div_ceil(LINE).min(32_768);
-        let size = [columns * LINE, quads.div_ceil(columns * LINE)];
-        let composite = [&b.frame, &b.all_bins, &b.blurred, &b.scene, &b.result];
-        let finish = vec![maker.step("composite", shaders::COMPOSITE, size, line, &composite)];
-        let near_bins = match plan.compositing {
-            Compositing::Layers => plan.bins.iter().filter(|bin| bin.near).count(),
-            _ => 0,
-        };
+        let groups = plan.bank.terms.div_ceil(4);
+        let filters = (0..MAX_BINS * groups).map(|k| {
+            let [horizontal, vertical] = &b.banks;
+            let rows =
+                [&b.frame, horizontal, &b.node_reach, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered];
+            let columns =
+                [&b.frame, vertical, &b.node_reach, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active];
+            [
+                maker.over_bins("blur_rows", shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
+                maker.over_bins("blur_columns", shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
+            ]
+        });
+        let blur = filters.collect();
+        let gather = plan.exact.then(|| {
+            let [starts, kernels] = &b.kernels;
+            let buffers = [&b.frame, starts, kernels, &b.scene, &b.node_reach, &b.blurred];
+            maker.fixed("gather", shaders::GATHER, picture, TILE, &buffers)
+        });
+        let bin = [NEAR, REST].map(|index| {
+            maker.over_bins("bin", shaders::BIN, index, &[&b.frame, &b.scene, &b.source, &b.grid, &b.ranges])
+        });
+        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active];
+        let mut composite = maker.fixed("composite", shaders::COMPOSITE, [0; 2], LINE, &composite);
+        composite.workgroups = in_two(((plan.width * plan.height).div_ceil(4) as u32).div_ceil(LINE));
         Self {
-            unpack: shaders::UNPACK,
-            unpack_workgroups: picture.map(|v| v.div_ceil(TILE)),
-            unpack_pipeline,
-            unpack_bindings,
+            unpack: maker.fixed(
+                "unpack",
+                shaders::UNPACK,
+                picture,
+                TILE,
+                &[&b.frame, &b.color, depth, &b.scene, &b.ranges],
+            ),
             fill,
-            bins,
-            finish,
-            near_bins,
+            gather,
+            bin,
+            reach: maker.over_bins("reach", shaders::REACH, ALL, &[&b.grid, &b.edges]),
+            blur,
+            composite,
+            terms: plan.bank.terms,
+            work: vec![0; works(plan) * WORK_STRIDE as usize],
         }
     }
 
     /// Binds another depth buffer.
     pub fn set_depth(&mut self, device: &Device, b: &Buffers, depth: &wgpu::Buffer) {
-        let maker = Maker { device: &device.device, made: Vec::new() };
-        self.unpack_bindings = maker.bindings(&self.unpack_pipeline, &[&b.frame, &b.color, depth, &b.scene]);
+        let maker = Maker { device: &device.device, buffers: b, made: Vec::new() };
+        let buffers = [&b.frame, &b.color, depth, &b.scene, &b.ranges].map(|buffer| buffer.as_entire_buffer_binding());
+        self.unpack.step.bindings = maker.bindings(&self.unpack.step.pipeline, buffers.into_iter());
     }
 
-    /// Records one frame: bins that nothing belongs to (bit `k` of `present`) are left out. `names` gets the name of
-    /// every pass that `queries` times.
+    /// Uploads which bins each pass of this frame does.
+    pub fn upload(&mut self, device: &Device, b: &Buffers, layout: &Layout) {
+        let groups = self.terms.div_ceil(4);
+        let mut set = |index: usize, bins: &Range<usize>, group: usize| {
+            let work = Work {
+                first: bins.start as u32,
+                count: bins.len() as u32,
+                group: group as u32,
+                terms: (self.terms - 4 * group).min(4) as u32,
+                last: u32::from(group + 1 == groups),
+                ..Work::default()
+            };
+            let bytes = bytemuck::bytes_of(&work);
+            self.work[index * WORK_STRIDE as usize..][..bytes.len()].copy_from_slice(bytes);
+        };
+        let count = layout.bins.len();
+        for (index, bins) in [(NEAR, 0..layout.near), (REST, layout.near..count), (ALL, 0..count)] {
+            set(index, &bins, 0);
+        }
+        for (k, bins) in layout.batches.iter().enumerate() {
+            (0..groups).for_each(|group| set(FIRST_BATCH + k * groups + group, bins, group));
+        }
+        device.queue.write_buffer(&b.work, 0, &self.work);
+        device.queue.write_buffer(&b.bins, 0, bytemuck::cast_slice(&layout.bins));
+    }
+
+    /// Records one frame. `names` gets the name of every pass that `queries` times.
     pub fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        present: u32,
+        layout: &Layout,
         queries: Option<&wgpu::QuerySet>,
         names: &mut Vec<&'static str>,
     ) {
-        let unpack =
-            std::iter::once((self.unpack.name, &self.unpack_pipeline, &self.unpack_bindings, self.unpack_workgroups));
-        let here = |k: &usize| present & (1 << k) != 0;
-        let any_near = (0..self.near_bins).any(|k| here(&k));
-        let near = (0..self.near_bins).filter(here).flat_map(|k| &self.bins[k]);
-        let fill = self.fill.iter().filter(|_| any_near);
-        let rest = (self.near_bins..self.bins.len()).filter(here).flat_map(|k| &self.bins[k]);
-        let steps = near.chain(fill).chain(rest).chain(&self.finish);
-        let steps = steps.map(|step| (step.name, &step.pipeline, &step.bindings, step.workgroups));
-        for (name, pipeline, bindings, [x, y]) in unpack.chain(steps) {
+        let mut run = |step: &Step, [x, y]: [u32; 2]| {
             let index = 2 * names.len() as u32;
             let timed = queries.filter(|_| index + 1 < MAX_QUERIES);
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some(name),
+                label: Some(step.name),
                 timestamp_writes: timed.map(|query_set| wgpu::ComputePassTimestampWrites {
                     query_set,
                     beginning_of_pass_write_index: Some(index),
                     end_of_pass_write_index: Some(index + 1),
                 }),
             });
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, bindings, &[]);
+            pass.set_pipeline(&step.pipeline);
+            pass.set_bind_group(0, &step.bindings, &[]);
             pass.dispatch_workgroups(x, y, 1);
             drop(pass);
             if timed.is_some() {
-                names.push(name);
+                names.push(step.name);
+            }
+        };
+        let all = |bins: &[Bin], tile: [usize; 2], extent: fn(&Bin) -> [u32; 2]| {
+            in_two(bins.iter().map(|bin| tiles(extent(bin).map(|size| size as usize), tile) as u32).sum())
+        };
+        let (near, rest) = layout.bins.split_at(layout.near);
+        let cells = |bin: &Bin| bin.cells.map(|cells| cells * CELL as u32);
+        run(&self.unpack.step, self.unpack.workgroups);
+        if let Some(gather) = &self.gather {
+            run(&gather.step, gather.workgroups);
+        } else {
+            if !near.is_empty() {
+                run(&self.bin[NEAR], all(near, BIN_TILE, cells));
+                self.fill.iter().for_each(|fill| run(&fill.step, fill.workgroups));
+            }
+            run(&self.bin[REST], all(rest, BIN_TILE, cells));
+            run(&self.reach, all(&layout.bins, REACH_TILE, |bin| [bin.edges, bin.cells[1]]));
+            let groups = self.terms.div_ceil(4);
+            for (batch, steps) in layout.batches.iter().zip(self.blur.chunks_exact(groups)) {
+                let bins = &layout.bins[batch.clone()];
+                for [rows, columns] in steps {
+                    run(rows, all(bins, ROWS_TILE, |bin| bin.size));
+                    run(columns, all(bins, RESULT_TILE, |bin| bin.size));
+                }
             }
         }
+        run(&self.composite.step, self.composite.workgroups);
     }
+}
+
+/// So many workgroups in rows and columns, as a device limits both; a few more are left over.
+fn in_two(workgroups: u32) -> [u32; 2] {
+    let down = workgroups.div_ceil(32_768).max(1);
+    [workgroups.div_ceil(down), down]
 }

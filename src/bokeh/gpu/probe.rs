@@ -1,7 +1,8 @@
 //! What the passes leave behind, for comparing the executors pass by pass.
 
 use super::GpuBokeh;
-use super::buffers::bin_uniforms;
+use super::layout::RESULT_TILE;
+use crate::bokeh::plan::CELL;
 use crate::bokeh::{BokehError, Probe};
 
 impl GpuBokeh {
@@ -10,29 +11,84 @@ impl GpuBokeh {
     /// # Errors
     /// The device failed.
     pub fn probe(&self, probe: Probe) -> Result<Vec<[f32; 4]>, BokehError> {
-        let bins = bin_uniforms(&self.plan);
-        let pixels = |k: usize| u64::from(bins[k].size[0] * bins[k].size[1]) * 16;
-        let (buffer, offset, bytes) = match probe {
-            Probe::Scene => (&self.buffers.scene, 0, (self.plan.width * self.plan.height * 16) as u64),
-            Probe::Bin(k) => (&self.buffers.source[k], 0, pixels(k)),
-            Probe::Reach(k) => (&self.buffers.edges[k], 0, u64::from(bins[k].edges * bins[k].cells[1]) * 32),
-            Probe::Blur(k) => (&self.buffers.blurred, u64::from(bins[k].offset) * 16, pixels(k)),
+        let b = &self.buffers;
+        match probe {
+            Probe::Reach(k) => {
+                let bin = &self.layout.bins[k];
+                let values = self.read(&b.edges, bin.edges_at * 8, bin.edges * bin.cells[1] * 8)?;
+                Ok(values.as_chunks::<4>().0.iter().map(|value| value.map(f32::from_bits)).collect())
+            }
+            // Where nothing is, nothing was written: which cells hold anything, and which tiles.
+            Probe::Bin(k) => {
+                let bin = &self.layout.bins[k];
+                let cells = self.read(&b.grid, bin.cells_at * 8, bin.cells[0] * bin.cells[1] * 8)?;
+                let covered = |x: usize, y: usize| cells[(y / CELL * bin.cells[0] as usize + x / CELL) * 8] != 0;
+                self.pixels(k, &b.source, covered)
+            }
+            Probe::Blur(k) => {
+                let bin = &self.layout.bins[k];
+                let across = bin.size[0].div_ceil(RESULT_TILE[0] as u32);
+                let tiles =
+                    self.read(&b.active, bin.active_at, across * bin.size[1].div_ceil(RESULT_TILE[1] as u32))?;
+                let active = |x: usize, y: usize| tiles[y / RESULT_TILE[1] * across as usize + x / RESULT_TILE[0]] != 0;
+                self.pixels(k, &b.blurred, active)
+            }
+        }
+    }
+
+    /// The pixels of a bin, zero where there is nothing.
+    fn pixels(
+        &self,
+        k: usize,
+        buffer: &wgpu::Buffer,
+        some: impl Fn(usize, usize) -> bool,
+    ) -> Result<Vec<[f32; 4]>, BokehError> {
+        let bin = &self.layout.bins[k];
+        let words = self.read(buffer, bin.pixels_at * 2, bin.size[0] * bin.size[1] * 2)?;
+        let width = bin.size[0] as usize;
+        let value = |(n, [a, b]): (usize, &[u32; 2])| {
+            let halves = [*a as u16, (a >> 16) as u16, *b as u16, (b >> 16) as u16];
+            if some(n % width, n / width) { halves.map(from_half) } else { [0.0; 4] }
         };
+        Ok(words.as_chunks::<2>().0.iter().enumerate().map(value).collect())
+    }
+
+    /// Words of a buffer.
+    fn read(&self, buffer: &wgpu::Buffer, first: u32, count: u32) -> Result<Vec<u32>, BokehError> {
         let device = &self.device.device;
         let back = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("probe"),
-            size: bytes,
+            size: u64::from(count) * 4,
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(buffer, offset, &back, 0, bytes);
+        encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &back, 0, u64::from(count) * 4);
         self.device.queue.submit([encoder.finish()]);
         back.map_async(wgpu::MapMode::Read, .., |_| {});
         let fault = |error: &dyn std::fmt::Display| BokehError::Gpu(format!("{}: {error}", self.device.name));
         device.poll(wgpu::PollType::Wait { submission_index: None, timeout: None }).map_err(|error| fault(&error))?;
         let mapped = back.get_mapped_range(..).map_err(|error| fault(&error))?;
         self.device.check()?;
-        Ok(bytemuck::cast_slice(&mapped).to_vec())
+        Ok(bytemuck::pod_collect_to_vec(&mapped[..]))
+    }
+}
+
+/// A value of half precision.
+fn from_half(bits: u16) -> f32 {
+    let magnitude = f32::from_bits(u32::from(bits & 0x7fff) << 13) * f32::from_bits(0x7780_0000);
+    if bits & 0x8000 != 0 { -magnitude } else { magnitude }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::from_half;
+
+    #[test]
+    fn half_precision() {
+        for (bits, value) in [(0x3c00, 1.0), (0xc000, -2.0), (0x3555, 0.333_251_95), (0x0001, 5.960_464_5e-8), (0, 0.0)]
+        {
+            assert_eq!(from_half(bits), value);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, FAR_WEIGHT, SEGMENT};
+use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, FAR_WEIGHT, HINDMOST_COVERAGE, SEGMENT};
 
 /// A pass: the name of its entry point and file, and its source.
 #[derive(Clone, Copy, Debug)]
@@ -27,17 +27,15 @@ macro_rules! shader {
 }
 
 /// 8-bit sRGB and depth to linear light and CoC.
-pub const UNPACK: Shader = shader!("unpack");
-/// A bin's share of each pixel.
-pub const BIN: Shader = shader!("bin");
-/// The coarse grid over a bin.
-pub const CELLS: Shader = shader!("cells");
+pub const UNPACK: Shader = shader!("unpack", "range");
+/// A bin's share of each pixel, and the coarse grid over it.
+pub const BIN: Shader = shader!("bin", "work");
 /// Local radius and range of colours.
-pub const REACH: Shader = shader!("reach");
+pub const REACH: Shader = shader!("reach", "work");
 /// Horizontal filters.
-pub const BLUR_ROWS: Shader = shader!("blur_rows", "filter");
+pub const BLUR_ROWS: Shader = shader!("blur_rows", "work", "filter");
 /// Vertical filters.
-pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "filter");
+pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "work", "filter");
 /// The exact two-dimensional gather.
 pub const GATHER: Shader = shader!("gather");
 /// What near objects touch.
@@ -45,24 +43,25 @@ pub const HIDE: Shader = shader!("hide");
 /// What is known behind them.
 pub const KNOW: Shader = shader!("know");
 /// To the coarser level.
-pub const PULL: Shader = shader!("pull");
+pub const PULL: Shader = shader!("pull", "level");
 /// Back to the finer level.
-pub const PUSH: Shader = shader!("push");
+pub const PUSH: Shader = shader!("push", "level");
 /// The filled scene.
-pub const FILL: Shader = shader!("fill");
+pub const FILL: Shader = shader!("fill", "range");
 /// The final picture.
 pub const COMPOSITE: Shader = shader!("composite");
 
 /// Every shader.
-pub const ALL: [Shader; 13] =
-    [UNPACK, BIN, CELLS, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, KNOW, PULL, PUSH, FILL, COMPOSITE];
+pub const ALL: [Shader; 12] =
+    [UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, KNOW, PULL, PUSH, FILL, COMPOSITE];
 
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 4] = [
+pub const CONSTANTS: [(&str, f64); 5] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("COVERAGE_FLOOR", COVERAGE_FLOOR as f64),
     ("FAR_WEIGHT", FAR_WEIGHT as f64),
+    ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
 ];
 
 /// `Frame` of `common.wgsl`, where each field is explained.
@@ -76,10 +75,10 @@ pub struct Frame {
     pub compositing: u32,
     pub bins: u32,
     pub near_bins: u32,
-    pub present: u32,
     pub reach: u32,
     pub nodes: u32,
     pub groups: u32,
+    pub most_px: f32,
     pub coc: [f32; 4],
     pub ramp: [f32; 2],
     pub expansion: f32,
@@ -105,21 +104,33 @@ pub struct Bin {
     pub max_radius_px: f32,
     pub sigma_cells: f32,
     pub reach_cells: u32,
-    pub offset: u32,
-}
-
-/// `Group` of `filter.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[allow(missing_docs)]
-pub struct Group {
-    pub index: u32,
-    pub terms: u32,
-    pub last: u32,
+    pub pixels_at: u32,
+    pub rows_at: u32,
+    pub edges_at: u32,
+    pub cells_at: u32,
+    pub rows_apart: u32,
+    pub reach: u32,
+    pub filtered_at: u32,
+    pub active_at: u32,
     pub unused: u32,
 }
 
-/// `Level` of `pull.wgsl` and `push.wgsl`.
+/// `Work` of `work.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Work {
+    pub first: u32,
+    pub count: u32,
+    pub group: u32,
+    pub terms: u32,
+    pub last: u32,
+    pub unused_a: u32,
+    pub unused_b: u32,
+    pub unused_c: u32,
+}
+
+/// `Level` of `level.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]

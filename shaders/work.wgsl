@@ -1,0 +1,31 @@
+// Shared by the passes that do several bins at once: which part of which bin a workgroup does. Such a pass has the
+// uniforms `work` and `bins`, and says in `extent_of` what of a bin is divided into tiles.
+
+struct Work {
+    first: u32,     // bin
+    count: u32,     // of bins
+    group: u32,     // of four terms: which
+    terms: u32,     // how many of them are there
+    last: u32,      // 1: the sum is complete
+    unused_a: u32,
+    unused_b: u32,
+    unused_c: u32,
+}
+
+struct Place {
+    bin: u32,
+    tile: vec2<u32>,
+    some: bool,     // false past the last tile
+}
+
+fn place_of(workgroup: vec3<u32>, workgroups: vec3<u32>, tile: vec2<u32>) -> Place {
+    var left = workgroup.y * workgroups.x + workgroup.x;
+    for (var k = work.first; k < work.first + work.count; k++) {
+        let tiles = (extent_of(k) + tile - 1u) / tile;
+        if left < tiles.x * tiles.y {
+            return Place(k, vec2(left % tiles.x, left / tiles.x), true);
+        }
+        left -= tiles.x * tiles.y;
+    }
+    return Place(0u, vec2(0u), false);
+}

@@ -1,0 +1,142 @@
+//! Where the bins of a frame lie in the buffers that all bins share, and what is filtered at once.
+
+use std::ops::Range;
+
+use super::shaders::Bin;
+use crate::bokeh::plan::{CELL, Compositing, MAX_BINS, Plan, SEGMENT};
+
+/// Columns of a tile of the CPU executor: both executors' grids are as wide, so that their cells agree.
+const GRID_ROUNDING: usize = 64;
+
+/// Pixels of a bin that a workgroup makes in `blur_rows` and in `blur_columns`: the tiles of `common.wgsl`.
+pub const ROWS_TILE: [usize; 2] = [64, 4];
+pub const RESULT_TILE: [usize; 2] = [8, 32];
+
+/// The bins of a frame.
+pub struct Layout {
+    /// Uniforms, front to back.
+    pub bins: Vec<Bin>,
+    /// How many of them lie in front of the focal plane.
+    pub near: usize,
+    /// Bins that are filtered at once: as many as the memory for rows holds.
+    pub batches: Vec<Range<usize>>,
+}
+
+/// Elements that the shared buffers need for any frame of a plan.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Capacity {
+    /// Pixels of all bins.
+    pub pixels: usize,
+    /// Pixels of the bins that are filtered at once: the largest bin.
+    pub rows: usize,
+    /// Cells of all bins.
+    pub cells: usize,
+    /// Edges of all bins.
+    pub edges: usize,
+    /// Tiles of rows of all bins.
+    pub filtered: usize,
+    /// Tiles of the results of all bins.
+    pub active: usize,
+}
+
+impl Capacity {
+    /// What the bins of any frame need.
+    pub fn of(plan: &Plan) -> Self {
+        let scales = |slot: usize| plan.least_scale(slot);
+        let mut capacity = Self::default();
+        let mut add = |scale: usize| {
+            let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
+            let [cells, edges] = [cells(width, height), edges(width, height)].map(|[a, b]| a * b);
+            capacity.pixels += width * height;
+            capacity.rows = capacity.rows.max(width * height);
+            capacity.cells += cells;
+            capacity.edges += edges;
+            capacity.filtered += tiles([width, height], ROWS_TILE);
+            capacity.active += tiles([width, height], RESULT_TILE);
+        };
+        match plan.compositing {
+            Compositing::Layers => (0..plan.slots()).map(scales).for_each(&mut add),
+            // These bins are the same in every frame.
+            _ => plan.bins.iter().map(|bin| bin.scale).for_each(&mut add),
+        }
+        capacity
+    }
+}
+
+/// How many tiles cover a bin.
+pub fn tiles(size: [usize; 2], tile: [usize; 2]) -> usize {
+    size[0].div_ceil(tile[0]) * size[1].div_ceil(tile[1])
+}
+
+/// Cells across and down a bin.
+fn cells(width: usize, height: usize) -> [usize; 2] {
+    [width.next_multiple_of(GRID_ROUNDING) / CELL, height.div_ceil(CELL)]
+}
+
+/// Edges across, and rows of cells.
+fn edges(width: usize, height: usize) -> [usize; 2] {
+    let [across, down] = cells(width, height);
+    [across * CELL / SEGMENT + 1, down]
+}
+
+impl Layout {
+    /// No bins; room for any plan's, so that laying out allocates nothing.
+    pub fn new() -> Self {
+        Self { bins: Vec::with_capacity(MAX_BINS), near: 0, batches: Vec::with_capacity(MAX_BINS) }
+    }
+
+    /// Lays out the current bins of a plan.
+    pub fn lay_out(&mut self, plan: &Plan, capacity: &Capacity) {
+        self.bins.clear();
+        self.batches.clear();
+        self.near = match plan.compositing {
+            Compositing::Layers => plan.bins.iter().take_while(|bin| bin.near).count(),
+            _ => 0,
+        };
+        let mut at = Capacity::default();
+        let (mut first, mut rows) = (0, 0);
+        for (k, bin) in plan.bins.iter().enumerate() {
+            let ([cells_across, down], [edges, _]) = (cells(bin.width, bin.height), edges(bin.width, bin.height));
+            let pixels = bin.width * bin.height;
+            if rows + pixels > capacity.rows && k > first {
+                self.batches.push(first..k);
+                (first, rows) = (k, 0);
+            }
+            let share = plan.share(k);
+            self.bins.push(Bin {
+                size: [bin.width as u32, bin.height as u32],
+                cells: [cells_across as u32, down as u32],
+                scale: bin.scale as u32,
+                edges: edges as u32,
+                turned: u32::from(bin.near),
+                whole: u32::from(plan.compositing != Compositing::Layers),
+                front: share.front.into(),
+                behind: share.behind.into(),
+                max_radius_px: bin.max_radius_px,
+                sigma_cells: bin.sigma_cells(),
+                reach_cells: plan.reach_cells(bin) as u32,
+                pixels_at: at.pixels as u32,
+                rows_at: rows as u32,
+                edges_at: at.edges as u32,
+                cells_at: at.cells as u32,
+                rows_apart: capacity.rows as u32,
+                reach: match plan.compositing {
+                    Compositing::Gather => plan.bank.reach as u32,
+                    _ => plan.bank.node_reach[plan.bank.node(bin.max_radius_px)],
+                },
+                filtered_at: at.filtered as u32,
+                active_at: at.active as u32,
+                unused: 0,
+            });
+            at.pixels += pixels;
+            at.cells += cells_across * down;
+            at.edges += edges * down;
+            at.filtered += tiles([bin.width, bin.height], ROWS_TILE);
+            at.active += tiles([bin.width, bin.height], RESULT_TILE);
+            rows += pixels;
+        }
+        if !plan.bins.is_empty() {
+            self.batches.push(first..plan.bins.len());
+        }
+    }
+}
