@@ -33,15 +33,15 @@ pub const KINDS: [Kind; 15] = [
     still("wall", "a flat wall, 12 px", |_| Stage::new(14.0).wall(12.0, Pattern::Checks(24.0), 1).scene),
     still("slant", "a slanted wall, 2 to 17 px, behind a subject", |_| slant()),
     still("ground", "a ground plane through focus, -11 to 11 px", |_| ground()),
-    still("lights", "HDR lights behind and before a subject, 16 px", |_| lights(Shape::Disc, 14)),
+    still("lights", "HDR lights behind and before a subject, 16 px", |_| lights(Shape::Disc, 14, 8.0, (1.5, 3.5))),
     still("hair", "a head with strands of hair before a wall, 12 px", |_| hair()),
     still("fence", "a fence before the subject, -10 px", |_| fence(0)),
     still("depths", "a subject in the middle of three depths, -9, 0 and 11 px", |_| depths()),
     still("frame", "a near object cut by the frame's edge, -14 px, the world goes on", |_| frame()),
     still("weak", "weak blur, 2 to 4 px", |_| weak()),
     still("strong", "strong blur, 30 px", |_| strong()),
-    still("pentagon", "HDR lights through five blades", |_| lights(polygon(5), 25)),
-    still("hexagon", "HDR lights through six blades", |_| lights(polygon(6), 36)),
+    still("pentagon", "lights and windows through five blades", |_| lights(polygon(5), 25, 1.0, (3.0, 6.0))),
+    still("hexagon", "lights and windows through six blades", |_| lights(polygon(6), 36, 1.0, (3.0, 6.0))),
     still("bars", "thin bars at eleven depths, -13 to 15 px", |_| bars()),
     still("street", "a ground plane through focus with things on it, and a wall", |_| street()),
     Kind { name: "pan", what: "the fence and the subject in motion", moves: true, at: fence },
@@ -129,20 +129,27 @@ fn ground() -> Scene {
     Stage::new(14.0).plane(0.0, Vec2::new(0.0, -22.0 / 360.0), floor).scene
 }
 
-fn lights(shape: Shape, seed: u64) -> Scene {
+/// A string of lights before a subject and lights behind it, up to `brightest` times white and `radius_px` wide.
+fn lights(shape: Shape, seed: u64, brightest: f32, radius_px: (f32, f32)) -> Scene {
     let size = Vec2::new(SIZE.0 as f32, SIZE.1 as f32);
-    let behind = Lights::scattered(seed, 40, size, (1.5, 3.5), (1.5, 8.0));
+    let behind = Lights::scattered(seed, 40, size, radius_px, (0.2 * brightest, brightest));
     let dark = |p: Vec2, seed| paint(p, SKY, Pattern::Noise, seed).map(|light| 0.3 * light);
-    let mut stage =
-        Stage::new(18.0).cutout(16.0, |_| -1.0, |p| behind.over(p, dark(p, seed as u32))).bust(330.0, seed as u32 + 1);
-    // A string of lights before the subject, on a twig.
+    let berries = |p: Vec2| {
+        let at = |k: i32| Vec2::new(25.0 + 50.0 * k as f32, 292.0 + 11.0 * k as f32);
+        (0..5).map(|k| disc(p, at(k), 4.0)).fold(f32::INFINITY, f32::min)
+    };
     let twig = |p: Vec2| stroke(p, Vec2::new(-20.0, 290.0), Vec2::new(260.0, 350.0), 7.0);
-    let berries =
-        |p: Vec2| (0..5).map(move |k| disc(p, Vec2::new(25.0 + 50.0 * k as f32, 292.0 + 11.0 * k as f32), 4.0));
-    let outline = |p| berries(p).fold(twig(p), f32::min);
-    stage = stage.cutout(-11.0, outline, |p| {
-        if berries(p).any(|d| d < 0.5) { [4.0, 3.0, 1.5] } else { paint(p, LEAF, Pattern::Noise, 5) }
-    });
+    let mut stage = Stage::new(18.0)
+        .cutout(16.0, |_| -1.0, |p| behind.over(p, dark(p, seed as u32)))
+        .bust(330.0, seed as u32 + 1)
+        .cutout(
+            -11.0,
+            |p| berries(p).min(twig(p)),
+            |p| {
+                let is_lit = berries(p) < 0.5;
+                if is_lit { [1.0, 0.75, 0.4].map(|c| c * brightest) } else { paint(p, LEAF, Pattern::Noise, 5) }
+            },
+        );
     stage.scene.aperture = Aperture { shape, intensity: 0.0 };
     stage.scene
 }
@@ -179,7 +186,9 @@ fn fence(frame: usize) -> Scene {
     Stage::new(12.0)
         .wall(10.0, Pattern::Stripes(14.0), 9)
         .bust(330.0 + 4.0 * frame as f32, 10)
-        .cutout(-10.0, outline, move |p| paint(p + Vec2::new(shift, 0.0), BRICK, Pattern::Noise, 11))
+        .cutout(-10.0, outline, move |p| {
+            paint(p + Vec2::new(shift, 0.0), GREY, Pattern::Noise, 11).map(|light| 0.4 + 0.6 * light)
+        })
         .scene
 }
 
