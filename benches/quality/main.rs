@@ -154,20 +154,20 @@ fn scene(
             results.records.push(record);
         }
     }
-    match (&options.out, damage) {
-        (Some(out), None) => show(options, kind, &out.join(kind.name), frames, &pictures, results),
-        _ => Ok(()),
-    }
+    let Some(out) = &options.out else { return Ok(()) };
+    let case = (kind.name, damage.map(Damage::name));
+    let folder = case.1.map_or(kind.name.to_owned(), |damage| format!("{}-{damage}", kind.name));
+    let rival = results.best_rival(case).map_or(Method::None, |rival| rival.method);
+    show(options, rival, &out.join(folder), frames, &pictures)
 }
 
 /// Writes a scene's first frame, and the crops of every frame.
 fn show(
     options: &Options,
-    kind: &Kind,
+    rival: Method,
     out: &Path,
     frames: &[Views],
     pictures: &[(Method, ColorImage)],
-    results: &Results,
 ) -> Outcome<()> {
     fs::create_dir_all(out)?;
     sheet::write(&out.join("image.png"), &frames[0].shot.image)?;
@@ -179,7 +179,6 @@ fn show(
         let all = pictures.iter().filter(|picture| picture.0 == method);
         all.map(|picture| &picture.1).nth(frame).unwrap_or(&frames[frame].shot.image)
     };
-    let rival = results.best_rival((kind.name, None)).map_or(Method::None, |rival| rival.method);
     let ours = options.shown().unwrap_or(Method::None);
     let crop = |frame: usize| sheet::crops(of(ours, frame), &frames[frame].truth, of(rival, frame));
     let crops: Vec<ColorImage> = (0..frames.len()).map(crop).collect();

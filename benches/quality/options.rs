@@ -58,7 +58,7 @@ pub struct Options {
     /// Tables for the documentation and a verdict, instead of a table (which then goes to stderr)
     #[arg(long)]
     pub markdown: bool,
-    /// Folder for pictures of the scenes with exact depth: picture, truth, every method, and crops side by side
+    /// Folder for pictures: for every scene the picture, the truth, every method, and crops side by side
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// List scenes and methods
