@@ -115,7 +115,7 @@ pub fn is_edge(coc_px: &Plane<f32>, x: i32, y: i32) -> bool {
 /// Which pixels are known.
 fn holes(coc_px: &Plane<f32>, seed: u64) -> Plane<bool> {
     let (width, height) = (coc_px.width as i32, coc_px.height as i32);
-    let mut dice = Dice::new(seed ^ 0xC0FF_EE);
+    let mut dice = Dice::new(seed ^ 0x00C0_FFEE);
     let mut known = coc_px.map(|_| true);
     let edges: Vec<(i32, i32)> =
         (0..width * height).map(|k| (k % width, k / width)).filter(|&(x, y)| is_edge(coc_px, x, y)).collect();

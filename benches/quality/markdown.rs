@@ -5,7 +5,7 @@ use std::fmt::Write;
 use bokehcam::budget::Quality;
 
 use super::methods::Method;
-use super::report::{Record, Results};
+use super::report::{Case, Record, Results};
 
 /// Where the error is one code value (RMS): what is better than that counts as this in the verdict, as nobody sees it.
 const ONE_CODE_DB: f64 = 48.13;
@@ -51,7 +51,7 @@ fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
                 [Method::Gather, BALANCED, BEST].map(|method| cell(results.of(case, method)));
             writeln!(text, "| {scene} | {gather} | {rival} | {balanced} | {best} |")?;
         }
-        let mean = |of: &dyn Fn((&str, Option<&str>)) -> Option<Record>| {
+        let mean = |of: &dyn Fn(Case) -> Option<Record>| {
             let records: Vec<Record> = cases.iter().filter_map(|&case| of(case)).collect();
             cell(Record::mean(&records.iter().collect::<Vec<_>>()).as_ref())
         };
@@ -92,16 +92,15 @@ fn verdict(results: &Results, ours: Method, text: &mut String) -> std::fmt::Resu
         writeln!(text, "- {}: {target}: {found}", if is_met { "met" } else { "**missed**" })
     };
     let clean = results.cases(false);
-    let margins = |of: &dyn Fn((&'static str, Option<&'static str>)) -> Option<f64>| -> Vec<(String, f64)> {
-        let name =
-            |case: (&str, Option<&str>)| [Some(case.0), case.1].into_iter().flatten().collect::<Vec<_>>().join(" ");
+    let margins = |of: &dyn Fn(Case<'static>) -> Option<f64>| -> Vec<(String, f64)> {
+        let name = |case: Case| [Some(case.0), case.1].into_iter().flatten().collect::<Vec<_>>().join(" ");
         let all = results.cases(false).into_iter().chain(results.cases(true));
         all.filter_map(|case| Some((name(case), of(case)?))).collect()
     };
     let seen = |record: &Record| record.psnr_db.min(ONE_CODE_DB);
     let psnr = |case, method| results.of(case, method).map(seen);
     let over = |list: Vec<(String, f64)>| list.iter().map(|item| item.1).sum::<f64>() / list.len().max(1) as f64;
-    let is_clean = |case: &(&str, Option<&str>)| clean.contains(case);
+    let is_clean = |case: &Case| clean.contains(case);
     if !clean.is_empty() {
         let gather = over(margins(&|c| is_clean(&c).then_some(psnr(c, ours)? - psnr(c, Method::Gather)?)));
         let target = format!("mean at least {ABOVE_GATHER_DB} dB above the gather");

@@ -5,6 +5,9 @@ use serde::Serialize;
 use super::highlight::Profile;
 use super::methods::Method;
 
+/// Name of a scene, and what was done to its depth map, if anything.
+pub type Case<'a> = (&'a str, Option<&'a str>);
+
 /// A method on a scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct Record {
@@ -114,7 +117,7 @@ impl Flicker {
 
 impl Results {
     /// The scenes, each with its damage, in the order measured.
-    pub fn cases(&self, damaged: bool) -> Vec<(&'static str, Option<&'static str>)> {
+    pub fn cases(&self, damaged: bool) -> Vec<Case<'static>> {
         let mut cases = Vec::new();
         for record in self.records.iter().filter(|record| record.damage.is_some() == damaged) {
             if !cases.contains(&(record.scene, record.damage)) {
@@ -125,17 +128,17 @@ impl Results {
     }
 
     /// A method on a case.
-    pub fn of(&self, case: (&str, Option<&str>), method: Method) -> Option<&Record> {
+    pub fn of(&self, case: Case, method: Method) -> Option<&Record> {
         self.on(case).find(|record| record.method == method)
     }
 
     /// Every method on a case.
-    pub fn on(&self, case: (&str, Option<&str>)) -> impl Iterator<Item = &Record> {
+    pub fn on(&self, case: Case) -> impl Iterator<Item = &Record> {
         self.records.iter().filter(move |record| (record.scene, record.damage) == case)
     }
 
     /// The rival with the highest PSNR on a case.
-    pub fn best_rival(&self, case: (&str, Option<&str>)) -> Option<&Record> {
+    pub fn best_rival(&self, case: Case) -> Option<&Record> {
         let rivals = self.on(case).filter(|record| record.method.is_rival());
         rivals.max_by(|a, b| a.psnr_db.total_cmp(&b.psnr_db))
     }
