@@ -26,7 +26,8 @@ pub enum Part {
 /// Truths are rendered once and kept under the target folder. Lower is better for FLIP, higher for the rest.
 #[derive(Parser, Debug)]
 #[command(
-    name = "cargo bench --bench quality --",
+    name = "quality",
+    bin_name = "cargo bench --bench quality --",
     after_help = "\
 Examples:
   cargo bench --bench quality
