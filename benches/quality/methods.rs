@@ -1,0 +1,177 @@
+//! What is compared: this crate's methods and the rivals, all from the same 8-bit picture and depth map.
+
+use std::fmt;
+
+use bokehcam::bokeh::aperture::Aperture;
+use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Effect, Job, Rank, Settings};
+use bokehcam::budget::Quality;
+use bokehcam::depth::fill::Filler;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::link::pool::Pooled;
+use bokehcam::optics::{CocField, DepthCoc};
+
+use super::picture::{Plane, decode, encode};
+use super::{damage, rivals};
+
+/// The soft rim that is the product's default.
+const RIM: f32 = 0.2;
+/// The largest CoC that the product's command line allows for unless it is told more, as a fraction of the height.
+const MAX_COC_PER_HEIGHT: f32 = 0.06;
+
+/// A way to blur.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// The picture as it is.
+    None,
+    /// This crate's exact 2-D gather: the reference that the paper's form approximates.
+    Gather,
+    /// This crate's separable gather of rank 3: the paper's plain form.
+    Gather3,
+    /// See [`rivals::golden_angle`].
+    GoldenAngle,
+    /// See [`rivals::near_focus_far`].
+    NearFocusFar,
+    /// See [`rivals::scatter`].
+    Scatter,
+    /// See [`rivals::gaussian`].
+    Gaussian,
+    /// This crate's layers.
+    Layered(Quality),
+}
+
+impl Method {
+    /// All methods, in the order in which they are shown.
+    pub fn all() -> Vec<Method> {
+        use Method::{Gather, Gather3, Gaussian, GoldenAngle, NearFocusFar, None, Scatter};
+        let others = [None, Gaussian, Gather3, Gather, NearFocusFar, GoldenAngle, Scatter];
+        others.into_iter().chain(Quality::ALL.map(Method::Layered)).collect()
+    }
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::None => "none",
+            Method::Gather => "gather",
+            Method::Gather3 => "gather-3",
+            Method::GoldenAngle => "golden-angle",
+            Method::NearFocusFar => "near-focus-far",
+            Method::Scatter => "scatter",
+            Method::Gaussian => "gaussian",
+            Method::Layered(quality) => quality.name(),
+        }
+    }
+
+    /// Whether it competes with the layers.
+    pub fn is_rival(self) -> bool {
+        !matches!(self, Method::None | Method::Layered(_))
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What every method is given.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// The sharp picture.
+    pub image: ColorImage,
+    /// Depth in metres, 0 where unknown.
+    pub depth: DepthMap,
+    /// From depth to CoC.
+    pub lens: DepthCoc,
+    /// The opening of the lens.
+    pub aperture: Aperture,
+}
+
+impl Shot {
+    /// The lens for a scene, as the product's command line sets it up from `--coc-at-infinity` and `--focus`.
+    pub fn lens(coc_at_infinity_px: f32, focus_m: f32, height: usize) -> DepthCoc {
+        let max_coc_px = coc_at_infinity_px.max(height as f32 * MAX_COC_PER_HEIGHT);
+        DepthCoc { coc_at_infinity_px, focus_m, max_coc_px }
+    }
+
+    /// The CoC that the rivals see: unknown depth is that of the nearest known pixel.
+    pub fn coc(&self) -> Plane<f32> {
+        let (width, height) = (self.depth.width as usize, self.depth.height as usize);
+        let metres = Plane { width, height, data: self.depth.metres.clone() };
+        damage::filled_nearest(&metres).map(|z_m| self.lens.coc_px(z_m))
+    }
+}
+
+/// Blurs the frames of one scene, one after the other.
+pub struct Blurrer {
+    method: Method,
+    bokeh: Option<Box<dyn Bokeh>>,
+    filler: Filler,
+}
+
+impl Blurrer {
+    /// A method for shots like this one.
+    ///
+    /// # Errors
+    /// This crate's executor cannot be made.
+    pub fn new(method: Method, shot: &Shot) -> Result<Self, BokehError> {
+        let (layers, rank, rim, quality) = match method {
+            Method::Gather => (bokeh::Method::Gather, Some(Rank::Full), 0.0, Quality::Best),
+            Method::Gather3 => (bokeh::Method::Gather, Some(Rank::Terms(3)), 0.0, Quality::Best),
+            Method::Layered(quality) => (bokeh::Method::Layered, None, RIM, quality),
+            _ => return Ok(Self { method, bokeh: None, filler: Filler::new() }),
+        };
+        let settings = Settings {
+            effect: Effect::Dof,
+            method: layers,
+            aperture: shot.aperture.clone(),
+            rim,
+            rank,
+            highlights: 0.0,
+            quality,
+            far_max_px: shot.lens.coc_at_infinity_px,
+            near_max_px: shot.lens.max_coc_px,
+        };
+        let bokeh = bokeh::create(&settings, shot.image.size(), Backend::Cpu, None, None)?;
+        Ok(Self { method, bokeh: Some(bokeh), filler: Filler::new() })
+    }
+
+    /// The blurred picture.
+    ///
+    /// # Errors
+    /// This crate's executor failed.
+    pub fn blur(&mut self, shot: &Shot) -> Result<ColorImage, BokehError> {
+        let rival = |blur: &dyn Fn() -> Plane<_>| Ok(encode(&blur()));
+        let light = || decode(&shot.image);
+        match self.method {
+            Method::None => Ok(shot.image.clone()),
+            Method::GoldenAngle => rival(&|| rivals::golden_angle(&light(), &shot.coc())),
+            Method::NearFocusFar => rival(&|| rivals::near_focus_far(&light(), &shot.coc())),
+            Method::Gaussian => rival(&|| rivals::gaussian(&light(), &shot.coc())),
+            Method::Scatter => rival(&|| rivals::scatter(&light(), &shot.coc(), &shot.aperture.shape)),
+            // The gathers get what the other rivals get, the layers what the product makes of the depth map.
+            Method::Gather | Method::Gather3 => {
+                let (width, height) = (shot.depth.width as usize, shot.depth.height as usize);
+                let metres = damage::filled_nearest(&Plane { width, height, data: shot.depth.metres.clone() }).data;
+                self.run(shot, DepthMap { metres, ..shot.depth })
+            }
+            Method::Layered(_) => {
+                let mut depth = shot.depth.clone();
+                self.filler.fill_by(&mut depth, &shot.image);
+                self.run(shot, depth)
+            }
+        }
+    }
+
+    fn run(&mut self, shot: &Shot, depth: DepthMap) -> Result<ColorImage, BokehError> {
+        let Some(bokeh) = &mut self.bokeh else { return Ok(shot.image.clone()) };
+        bokeh.submit(Job {
+            ticket: 0,
+            color: Pooled::detached(shot.image.clone()),
+            depth: Some(Pooled::detached(depth)),
+            coc: CocField::Depth(shot.lens),
+            out: Pooled::detached(ColorImage::default()),
+        })?;
+        let finished = bokeh.collect(true)?;
+        Ok(finished.map(|mut finished| std::mem::take(&mut *finished.out)).unwrap_or_default())
+    }
+}

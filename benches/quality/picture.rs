@@ -1,0 +1,74 @@
+//! Pictures in linear light, and rows of them in parallel.
+
+use std::sync::Mutex;
+use std::thread;
+
+use bokehcam::bokeh::cpu::{linear_to_srgb, srgb_to_linear};
+use bokehcam::frame::ColorImage;
+
+/// Red, green, blue in linear light, 1 = white; more is light that an 8-bit picture clips.
+pub type Rgb = [f32; 3];
+
+/// A value a pixel, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plane<T> {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// `height * width` values.
+    pub data: Vec<T>,
+}
+
+impl<T: Copy + Send + Sync> Plane<T> {
+    /// The plane whose value at column `x`, row `y` is `of(x, y)`; rows are made in parallel.
+    pub fn from_fn(width: usize, height: usize, of: impl Fn(usize, usize) -> T + Sync) -> Self
+    where
+        T: Default,
+    {
+        let mut data = vec![T::default(); width * height];
+        by_rows(&mut data, width, |y, row| row.iter_mut().enumerate().for_each(|(x, value)| *value = of(x, y)));
+        Self { width, height, data }
+    }
+
+    /// The value at a place; outside, that of the nearest pixel inside.
+    #[inline]
+    pub fn at(&self, x: i32, y: i32) -> T {
+        let (x, y) = (x.clamp(0, self.width as i32 - 1) as usize, y.clamp(0, self.height as i32 - 1) as usize);
+        self.data[y * self.width + x]
+    }
+
+    /// Another value for every value.
+    pub fn map<U>(&self, of: impl Fn(T) -> U) -> Plane<U> {
+        Plane { width: self.width, height: self.height, data: self.data.iter().map(|&value| of(value)).collect() }
+    }
+}
+
+/// Calls `work(y, row)` for every row of `width` values, on all cores.
+pub fn by_rows<T: Send>(data: &mut [T], width: usize, work: impl Fn(usize, &mut [T]) + Sync) {
+    let rows = Mutex::new(data.chunks_exact_mut(width.max(1)).enumerate());
+    let next = || rows.lock().ok().and_then(|mut rows| rows.next());
+    thread::scope(|scope| {
+        for _ in 0..thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some((y, row)) = next() {
+                    work(y, row);
+                }
+            });
+        }
+    });
+}
+
+/// An 8-bit picture in linear light.
+pub fn decode(image: &ColorImage) -> Plane<Rgb> {
+    let light: Vec<f32> = (0..256).map(|code| srgb_to_linear(code as f32 / 255.0)).collect();
+    let data = image.rgb.chunks_exact(3).map(|p| [0, 1, 2].map(|k| light[usize::from(p[k])])).collect();
+    Plane { width: image.width as usize, height: image.height as usize, data }
+}
+
+/// The 8-bit sRGB picture of light, clipped at white as a camera does.
+pub fn encode(light: &Plane<Rgb>) -> ColorImage {
+    let code = |light: f32| (linear_to_srgb(light.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8;
+    let rgb = light.data.iter().flat_map(|pixel| pixel.map(code)).collect();
+    ColorImage { width: light.width as u32, height: light.height as u32, rgb }
+}

@@ -1,0 +1,78 @@
+//! Pictures of a scene, the truth kept between runs: it takes longest to make and never changes.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use bokehcam::frame::{ColorImage, DepthMap};
+
+use super::lens::Scene;
+use super::methods::Shot;
+use super::picture::{Plane, encode};
+use super::scenes::FOCUS_M;
+use super::sheet;
+
+/// To be raised when the renderer changes.
+const RENDERER: u32 = 1;
+/// Rays per pixel: at least the first, else this many per square pixel of the largest disc, at most the last.
+const RAYS: (f32, f32, f32) = (768.0, 2.0, 2048.0);
+
+/// A scene as everything sees it.
+pub struct Views {
+    /// What the methods are given: the pinhole picture and exact depth.
+    pub shot: Shot,
+    /// CoC of each pixel.
+    pub coc_px: Plane<f32>,
+    /// What the lens sees.
+    pub truth: ColorImage,
+}
+
+/// Renders a scene, or reads its truth from `cache`.
+///
+/// # Errors
+/// The cache cannot be written.
+pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
+    let image = encode(&scene.pinhole());
+    let coc_px = scene.coc();
+    let lens = Shot::lens(scene.coc_at_infinity_px, FOCUS_M, scene.height);
+    let depth = depth(&coc_px, scene.coc_at_infinity_px);
+    let most_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
+    let rays = (RAYS.1 * most_px * most_px).clamp(RAYS.0, RAYS.2) as usize;
+    let file = cache.join(format!("{name}-{:016x}.png", key(scene, rays)));
+    let truth = match sheet::read(&file) {
+        Some(truth) => truth,
+        None => {
+            let truth = encode(&scene.through_lens(rays));
+            keep(&truth, &file)?;
+            truth
+        }
+    };
+    Ok(Views { shot: Shot { image, depth, lens, aperture: scene.aperture.clone() }, coc_px, truth })
+}
+
+/// The depth map whose CoC is `coc_px`.
+pub fn depth(coc_px: &Plane<f32>, coc_at_infinity_px: f32) -> DepthMap {
+    let metres = |coc_px: f32| FOCUS_M / (1.0 - coc_px / coc_at_infinity_px).max(1e-3);
+    DepthMap { width: coc_px.width as u32, height: coc_px.height as u32, metres: coc_px.map(metres).data }
+}
+
+/// A number that changes with everything that the truth depends on.
+fn key(scene: &Scene, rays: usize) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (RENDERER, rays, scene.size(), format!("{:?}", scene.aperture)).hash(&mut hasher);
+    for surface in &scene.surfaces {
+        surface.margin_px.hash(&mut hasher);
+        let numbers = [surface.coc_px, surface.slope.x, surface.slope.y];
+        let texels = surface.texture.data.iter().flatten();
+        numbers.iter().chain(texels).for_each(|number| number.to_bits().hash(&mut hasher));
+    }
+    hasher.finish()
+}
+
+/// Writes under another name first, so that a picture that is there is whole.
+fn keep(image: &ColorImage, file: &Path) -> io::Result<()> {
+    fs::create_dir_all(file.parent().unwrap_or(Path::new(".")))?;
+    let part: PathBuf = file.with_extension("part.png");
+    sheet::write(&part, image)?;
+    fs::rename(part, file)
+}
