@@ -44,6 +44,28 @@ pub enum DepthChoice {
     None,
 }
 
+/// Whether depth is refined before the blur.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Refine {
+    /// Depth of a recording in a stream; not exact depth, nor a picture on its own
+    Auto,
+    /// Always
+    On,
+    /// Never: only holes are filled
+    Off,
+}
+
+impl Refine {
+    /// Whether depth is refined, for depth that has the errors of a measured stream or has not.
+    pub fn applies(self, measured: bool) -> bool {
+        match self {
+            Self::Auto => measured,
+            Self::On => true,
+            Self::Off => false,
+        }
+    }
+}
+
 /// What runs the blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Backend {
