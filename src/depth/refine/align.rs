@@ -12,7 +12,7 @@
 
 use pulp::{Arch, WithSimd};
 
-use super::planes::{LANES, Planes};
+use super::planes::{LANES, Planes, SetDepths};
 
 /// How far from a jump a depth may be wrong, in pixels.
 const BAND_PX: usize = 4;
@@ -42,6 +42,8 @@ pub struct Aligner {
     edge: Vec<bool>,
     band: Vec<bool>,
     scratch: Vec<bool>,
+    /// How much each depth weighs.
+    sure: Vec<f32>,
     /// Weight by distance, row by row; the lanes beyond [`SIDE`] weigh nothing.
     nearby: [[f32; LANES]; SIDE],
     /// Pixels to ask, in order: first those at an edge, then the neighbours of those that changed.
@@ -63,6 +65,7 @@ impl Default for Aligner {
             edge: Vec::new(),
             band: Vec::new(),
             scratch: Vec::new(),
+            sure: Vec::new(),
             nearby: std::array::from_fn(row),
             front: Vec::new(),
             moved: Vec::new(),
@@ -77,7 +80,8 @@ impl Aligner {
         let height = inverse.len().checked_div(width).unwrap_or(0);
         self.moved.clear();
         for round in 0..ROUNDS {
-            let Self { planes, edge, band, scratch, nearby, front, moved } = self;
+            let Self { planes, edge, band, scratch, sure, nearby, front, moved } = self;
+            sure.resize(inverse.len(), 0.0);
             arch.dispatch(FindBand { inverse, width, jump, edge, band, scratch });
             front.clear();
             if round == 0 {
@@ -91,7 +95,16 @@ impl Aligner {
             if round == 0 {
                 planes.set_colors(rgb, width, height, REACH_PX / STEP_PX);
             }
-            planes.set_depths(inverse, |k| if unknown[k] { MADE_UP } else if band[k] { UNSURE } else { 1.0 });
+            for ((sure, &band), &unknown) in sure.iter_mut().zip(&*band).zip(unknown) {
+                *sure = if unknown {
+                    MADE_UP
+                } else if band {
+                    UNSURE
+                } else {
+                    1.0
+                };
+            }
+            arch.dispatch(SetDepths { planes, inverse, sure });
             moved.clear();
             arch.dispatch(Vote { planes, band, nearby, inverse, jump, front, moved });
         }
@@ -145,21 +158,22 @@ impl WithSimd for FindBand<'_> {
         for (row, out) in edge.chunks_exact(width).zip(scratch.chunks_exact_mut(width)) {
             out.copy_from_slice(row);
             for px in 1..=REST_PX.min(width - 1) {
-                for ((out, &left), &right) in out[px..].iter_mut().zip(row).zip(row[px..].iter().skip(px).chain([&false; REST_PX])) {
-                    *out |= left | right;
-                }
-                for (out, &right) in out[..px].iter_mut().zip(&row[px..]) {
-                    *out |= right;
-                }
+                spread(&row[..width - px], &mut out[px..]);
+                spread(&row[px..], &mut out[..width - px]);
             }
         }
         for (y, out) in band.chunks_exact_mut(width).enumerate() {
             for near in y.saturating_sub(REST_PX)..(y + BAND_PX).min(height) {
-                for (out, &edge) in out.iter_mut().zip(&scratch[near * width..][..width]) {
-                    *out |= edge;
-                }
+                spread(&scratch[near * width..][..width], out);
             }
         }
+    }
+}
+
+#[inline(always)]
+fn spread(from: &[bool], to: &mut [bool]) {
+    for (to, &from) in to.iter_mut().zip(from) {
+        *to |= from;
     }
 }
 
@@ -205,7 +219,8 @@ impl WithSimd for Vote<'_> {
             }
             inverse[k] = v;
             moved.push(asked);
-            let beside = [(x > 0, k.wrapping_sub(1)), (x + 1 < width, k + 1), (y > 0, k.wrapping_sub(width)), (true, k + width)];
+            let beside =
+                [(x > 0, k.wrapping_sub(1)), (x + 1 < width, k + 1), (y > 0, k.wrapping_sub(width)), (true, k + width)];
             for (inside, beside) in beside {
                 if inside && beside < band.len() && band[beside] {
                     band[beside] = false;
@@ -262,29 +277,26 @@ impl Votes {
     /// The inverse depth of the surface with most votes; `own` where that lies on it.
     #[inline(always)]
     fn surface(&self, own: f32, jump: f32) -> f32 {
-        let mut range = self.range;
-        if range.0 > range.1 {
-            return own;
-        }
-        loop {
-            let (low, high) = range;
-            if high - low <= jump_at(jump, high) {
-                break;
-            }
+        let (mut low, mut high) = self.range;
+        let mut mean = own;
+        while high - low > jump_at(jump, high) {
             let middle = 0.5 * (low + high);
             let halves = self.halves(low, middle, high);
             let own_is_near = (own > middle) & (own <= high);
             let own_is_far = (own <= middle) & (own >= low);
             let near = halves.near * if own_is_near { LOYALTY } else { 1.0 };
             let far = halves.far * if own_is_far { LOYALTY } else { 1.0 };
-            range = if near > far { (halves.near_low, high) } else { (low, halves.far_high) };
-            // Rounding may leave no vote on a side: nothing can be split any more.
-            if range.0 <= low && range.1 >= high {
+            let before = (low, high);
+            if near > far {
+                (low, mean) = (halves.near_low, halves.near_moment / halves.near);
+            } else {
+                (high, mean) = (halves.far_high, halves.far_moment / halves.far);
+            }
+            // Rounding may leave nothing to split.
+            if (low, high) == before {
                 break;
             }
         }
-        let (low, high) = range;
-        let mean = self.mean(low, high);
         let near_enough = 0.5 * jump_at(jump, own);
         let on_it = (own >= low - near_enough) & (own <= high + near_enough) & ((own - mean).abs() < near_enough);
         if on_it { own } else { mean }
@@ -293,40 +305,40 @@ impl Votes {
     #[inline(always)]
     fn halves(&self, low: f32, middle: f32, high: f32) -> Halves {
         let (mut near, mut far) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        let (mut near_moment, mut far_moment) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_low, mut far_high) = ([high; LANES], [low; LANES]);
-        for (depth, weight) in self.depth.iter().zip(&self.weight) {
+        for k in 0..SIDE {
+            let (depth, weight) = (&self.depth[k], &self.weight[k]);
             for lane in 0..LANES {
                 let (v, w) = (depth[lane], weight[lane]);
                 let is_near = (v > middle) & (v <= high) & (w > 0.0);
                 let is_far = (v <= middle) & (v >= low) & (w > 0.0);
-                near[lane] += if is_near { w } else { 0.0 };
-                far[lane] += if is_far { w } else { 0.0 };
+                let (w_near, w_far) = (if is_near { w } else { 0.0 }, if is_far { w } else { 0.0 });
+                near[lane] += w_near;
+                far[lane] += w_far;
+                near_moment[lane] += w_near * v;
+                far_moment[lane] += w_far * v;
                 near_low[lane] = if is_near & (v < near_low[lane]) { v } else { near_low[lane] };
                 far_high[lane] = if is_far & (v > far_high[lane]) { v } else { far_high[lane] };
             }
         }
-        Halves { near: sum(near), far: sum(far), near_low: least(near_low), far_high: largest(far_high) }
-    }
-
-    #[inline(always)]
-    fn mean(&self, low: f32, high: f32) -> f32 {
-        let (mut total, mut moment) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-        for (depth, weight) in self.depth.iter().zip(&self.weight) {
-            for lane in 0..LANES {
-                let inside = (depth[lane] >= low) & (depth[lane] <= high);
-                let w = if inside { weight[lane] } else { 0.0 };
-                total[lane] += w;
-                moment[lane] += w * depth[lane];
-            }
+        Halves {
+            near: sum(near),
+            far: sum(far),
+            near_moment: sum(near_moment),
+            far_moment: sum(far_moment),
+            near_low: least(near_low),
+            far_high: largest(far_high),
         }
-        sum(moment) / sum(total)
     }
 }
 
-/// Votes above and below the middle of a range, and where in it they begin and end.
+/// Votes above and below the middle of a range, their first moments, and where in the range they begin and end.
 struct Halves {
     near: f32,
     far: f32,
+    near_moment: f32,
+    far_moment: f32,
     near_low: f32,
     far_high: f32,
 }

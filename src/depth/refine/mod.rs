@@ -16,7 +16,7 @@ use pulp::Arch;
 
 use self::align::Aligner;
 use self::smooth::Smoother;
-use self::steady::Steadier;
+use self::steady::{Limits, Steadier};
 use self::upsample::Upsampler;
 use super::fill::Filler;
 use crate::frame::{ColorImage, DepthMap};
@@ -26,8 +26,9 @@ use crate::frame::{ColorImage, DepthMap};
 const JUMP: f32 = 0.06;
 /// The same in standard deviations of the noise that smoothing has left.
 const JUMP_SIGMAS: f32 = 4.0;
-/// Changes in time up to this many standard deviations of the measured noise are averaged.
-const GATE_SIGMAS: f32 = 4.0;
+/// Changes in time up to this, in 1/m, or up to this many standard deviations of the measured noise, are averaged.
+const LEAST_CHANGE: f32 = 0.01;
+const CHANGE_SIGMAS: f32 = 4.0;
 
 /// Refines the depth of frame after frame; owns the memory for it, and remembers the last frame.
 #[derive(Debug, Default)]
@@ -68,7 +69,8 @@ impl Refiner {
         let noise = smoother.noise(inverse, unknown, width);
         let jump = JUMP.max(JUMP_SIGMAS * noise);
         aligner.align(arch, inverse, unknown, &color.rgb, width, jump);
-        steadier.steady(arch, inverse, &color.rgb, width, time_ns, (0.5 * jump).max(GATE_SIGMAS * measured_noise));
+        let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
+        steadier.steady(arch, inverse, &color.rgb, width, time_ns, limits);
         for (z_m, &v) in map.metres.iter_mut().zip(&*inverse) {
             *z_m = 1.0 / v;
         }

@@ -1,6 +1,8 @@
 //! Depth and colour of a frame laid out for windows that take every second pixel: even and odd columns apart, so that
 //! the pixels of one row of a window lie side by side.
 
+use pulp::WithSimd;
+
 /// Values that a window reads of a row.
 pub const LANES: usize = 16;
 /// Columns of one parity before the picture's first and after its last, in which nothing weighs anything.
@@ -47,20 +49,6 @@ impl Planes {
         }
     }
 
-    /// Takes inverse depths, and how much each of them weighs.
-    pub fn set_depths(&mut self, inverse: &[f32], weight: impl Fn(usize) -> f32) {
-        let (stride, width, [depth, sure, ..]) = (self.stride, self.width, &mut self.planes);
-        for (y, row) in inverse.chunks_exact(width).enumerate() {
-            for parity in 0..2.min(width) {
-                let at = (2 * y + parity) * stride + MARGIN;
-                let out = depth[at..].iter_mut().zip(&mut sure[at..]);
-                for (x, (depth, sure)) in (parity..width).step_by(2).zip(out) {
-                    (*depth, *sure) = (row[x], weight(y * width + x));
-                }
-            }
-        }
-    }
-
     /// Red, green and blue of a pixel.
     #[inline(always)]
     pub fn color(&self, x: usize, y: usize) -> [f32; 3] {
@@ -74,6 +62,36 @@ impl Planes {
         let at = (2 * y + x % 2) * self.stride + MARGIN + x / 2 - self.reach;
         let [depth, sure, red, green, blue] = &self.planes;
         [chunk(depth, at), chunk(sure, at), chunk(red, at), chunk(green, at), chunk(blue, at)]
+    }
+}
+
+/// Takes inverse depths (1/m), and how much each of them weighs.
+pub struct SetDepths<'a> {
+    /// Where to.
+    pub planes: &'a mut Planes,
+    /// Inverse depths of the picture, row by row.
+    pub inverse: &'a [f32],
+    /// Their weights.
+    pub sure: &'a [f32],
+}
+
+impl WithSimd for SetDepths<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { planes: Planes { width, stride, planes: [depth, weight, ..], .. }, inverse, sure } = self;
+        for (from, to) in [(inverse, depth), (sure, weight)] {
+            for (row, out) in from.chunks_exact(*width).zip(to.chunks_exact_mut(2 * *stride)) {
+                let (even, odd) = out.split_at_mut(*stride);
+                let (even, odd) = (&mut even[MARGIN..][..width.div_ceil(2)], &mut odd[MARGIN..][..*width / 2]);
+                for ((pair, even), odd) in row.chunks_exact(2).zip(even.iter_mut()).zip(odd) {
+                    (*even, *odd) = (pair[0], pair[1]);
+                }
+                if let ([last], Some(even)) = (row.chunks_exact(2).remainder(), even.last_mut()) {
+                    *even = *last;
+                }
+            }
+        }
     }
 }
 

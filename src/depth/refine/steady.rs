@@ -1,8 +1,9 @@
 //! Depth that rests where the picture rests.
 //!
 //! A recursive average of the inverse depth of each pixel. It forgets where the colour changed, because something
-//! moved there. A depth that jumps while the colours around rest is mostly the sensor's: the outline of a still person
-//! flickers by some pixels. Such a jump is believed only once it lasts.
+//! moved there, and follows where the depth changes by more than noise. A depth that jumps from one surface to another
+//! while the colours around rest is mostly the sensor's: the outline of a still person flickers by some pixels. Such a
+//! jump is believed only once it lasts.
 
 use pulp::{Arch, WithSimd};
 
@@ -12,12 +13,21 @@ const LONGEST: f32 = 8.0;
 const HOLD: f32 = 2.0;
 /// Sums of the changes of red, green and blue, in steps of 8-bit sRGB averaged over 3x3 pixels, between which a pixel
 /// counts as moved: this many times the median change, within these bounds.
-const MOVED: f32 = 3.0;
-const MOVED_BOUNDS: (f32, f32) = (12.0, 36.0);
+const MOVED: f32 = 2.5;
+const MOVED_BOUNDS: (f32, f32) = (8.0, 24.0);
 /// Frames further apart than this in media time, or not in order, do not follow each other.
 const LONGEST_GAP_NS: u64 = 500_000_000;
 /// Rows and columns looked at for the median change, at most.
 const LOOKS: usize = 64;
+
+/// What a change of inverse depth means, 1/m.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Below this it is noise, and averaged.
+    pub noise: f32,
+    /// Above this it is another surface.
+    pub jump: f32,
+}
 
 /// Steadies maps of inverse depth; remembers the last frame.
 #[derive(Debug, Default)]
@@ -43,9 +53,8 @@ impl Steadier {
         self.mean.clear();
     }
 
-    /// Steadies `inverse` (1/m) of the frame at `time_ns`, with the picture `rgb`. Changes below `gate` (1/m) are noise
-    /// or slow motion and averaged.
-    pub fn steady(&mut self, arch: Arch, inverse: &mut [f32], rgb: &[u8], width: usize, time_ns: u64, gate: f32) {
+    /// Steadies `inverse` (1/m) of the frame at `time_ns`, with the picture `rgb`.
+    pub fn steady(&mut self, arch: Arch, inverse: &mut [f32], rgb: &[u8], width: usize, time_ns: u64, limits: Limits) {
         let follows = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
         let in_order = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
         if follows && in_order {
@@ -55,7 +64,7 @@ impl Steadier {
             arch.dispatch(Change { rgb, before: &self.rgb, width, change, smooth });
             let moved = (MOVED * self.median_change()).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
             let Self { mean, count, held, smooth_change, .. } = self;
-            arch.dispatch(Average { inverse, mean, count, held, change: smooth_change, moved, gate });
+            arch.dispatch(Average { inverse, mean, count, held, change: smooth_change, moved, limits });
         } else {
             self.mean.clear();
             self.mean.extend_from_slice(inverse);
@@ -129,25 +138,25 @@ struct Average<'a> {
     held: &'a mut [f32],
     change: &'a [f32],
     moved: f32,
-    gate: f32,
+    limits: Limits,
 }
 
 impl WithSimd for Average<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { inverse, mean, count, held, change, moved, gate } = self;
-        let (per_moved, per_gate) = (1.0 / moved, 1.0 / gate);
+        let Self { inverse, mean, count, held, change, moved, limits } = self;
+        let (per_moved, per_noise) = (1.0 / moved, 1.0 / limits.noise);
         let state = mean.iter_mut().zip(count).zip(held).zip(change);
         for (inverse, (((mean, count), held), &change)) in inverse.iter_mut().zip(state) {
             // From 1 at rest to 0 at twice the bound.
             let rest = unit(2.0 - change * per_moved);
             let off = *inverse - *mean;
-            let size = unit(off.abs() * per_gate);
-            let jumped = size >= 1.0;
-            let hold = jumped & (rest >= 1.0) & (*held < HOLD);
+            let size = unit(off.abs() * per_noise);
+            let changed = size >= 1.0;
+            let hold = (off.abs() > limits.jump) & (rest >= 1.0) & (*held < HOLD);
             let frames = *count * rest;
-            // The nearer to the gate, the less it is noise: no step where the average would be left.
+            // The nearer to the limit, the less it is noise: no step where the average would be left.
             let size = size * size;
             let share = 1.0 / (frames + 1.0);
             let share = share + (1.0 - share) * size * size;
@@ -156,7 +165,7 @@ impl WithSimd for Average<'_> {
             let longer = if longer < LONGEST { longer } else { LONGEST };
             *count = if hold {
                 *count
-            } else if jumped {
+            } else if changed {
                 1.0
             } else {
                 longer
