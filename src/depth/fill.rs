@@ -82,17 +82,19 @@ impl Filler {
             }
         }
         // Up: in the holes, the farther one of that and below.
-        let mut full = true;
+        let mut unfilled = 0;
         self.column_m.fill(0.0);
         for (row, filled) in map.metres.chunks_exact(width).zip(self.filled.chunks_exact_mut(width)).rev() {
             for ((&z_m, filled), below_m) in row.iter().zip(filled).zip(&mut self.column_m) {
-                *below_m = if DepthMap::is_known(z_m) { z_m } else { *below_m };
-                *filled = if *below_m > *filled && !DepthMap::is_known(z_m) { *below_m } else { *filled };
-                full &= *filled > 0.0;
+                let known = DepthMap::is_known(z_m);
+                *below_m = if known { z_m } else { *below_m };
+                let far_m = if *below_m > *filled { *below_m } else { *filled };
+                *filled = if known { z_m } else { far_m };
+                unfilled += u32::from(*filled <= 0.0);
             }
         }
         mem::swap(&mut map.metres, &mut self.filled);
-        full
+        unfilled == 0
     }
 }
 

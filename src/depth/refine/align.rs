@@ -16,11 +16,13 @@ use super::planes::{LANES, Planes, SetDepths};
 
 /// How far from a jump a depth may be wrong, in pixels.
 const BAND_PX: usize = 4;
-/// How far the votes come from, in pixels, and the step between them.
+/// How far the votes come from, in pixels, and the steps between them along rows and columns.
 const REACH_PX: usize = 12;
 const STEP_PX: usize = 2;
-/// Votes along each side of the window.
-const SIDE: usize = 2 * REACH_PX / STEP_PX + 1;
+const ROW_STEP_PX: usize = 3;
+/// Votes along the two sides of the window.
+const COLUMNS: usize = 2 * REACH_PX / STEP_PX + 1;
+const ROWS: usize = 2 * REACH_PX / ROW_STEP_PX + 1;
 /// Standard deviation in pixels of the weight by distance.
 const NEARBY_PX: f32 = 8.0;
 /// Standard deviation, in steps of 8-bit sRGB, of the weight by colour.
@@ -32,6 +34,9 @@ const UNSURE: f32 = 0.12;
 const MADE_UP: f32 = 0.02;
 /// By how much the votes of the other side must outweigh those of the pixel's own.
 const LOYALTY: f32 = 1.15;
+/// The same, in addition, where all that votes looks like the pixel: colour does not tell the sides apart, and the mere
+/// majority would round corners off.
+const CLUELESS: f32 = 6.0;
 /// Rounds; each can move an edge by up to [`BAND_PX`].
 const ROUNDS: usize = 2;
 
@@ -44,8 +49,8 @@ pub struct Aligner {
     scratch: Vec<bool>,
     /// How much each depth weighs.
     sure: Vec<f32>,
-    /// Weight by distance, row by row; the lanes beyond [`SIDE`] weigh nothing.
-    nearby: [[f32; LANES]; SIDE],
+    /// Weight by distance, row by row; the lanes beyond [`COLUMNS`] weigh nothing.
+    nearby: [[f32; LANES]; ROWS],
     /// Pixels to ask, in order: first those at an edge, then the neighbours of those that changed.
     front: Vec<u32>,
     /// Pixels that changed in the last round.
@@ -54,12 +59,13 @@ pub struct Aligner {
 
 impl Default for Aligner {
     fn default() -> Self {
-        let squared_px = |k: usize| ((k * STEP_PX) as f32 - REACH_PX as f32).powi(2);
+        let squared_px = |k: usize, step_px: usize| ((k * step_px) as f32 - REACH_PX as f32).powi(2);
         let weight = |squared_px: f32| match squared_px <= ((REACH_PX + 1) * REACH_PX) as f32 {
             true => (-squared_px / (2.0 * NEARBY_PX * NEARBY_PX)).exp(),
             false => 0.0,
         };
-        let row = |y| std::array::from_fn(|x| if x < SIDE { weight(squared_px(x) + squared_px(y)) } else { 0.0 });
+        let at = |x, y| weight(squared_px(x, STEP_PX) + squared_px(y, ROW_STEP_PX));
+        let row = |y| std::array::from_fn(|x| if x < COLUMNS { at(x, y) } else { 0.0 });
         Self {
             planes: Planes::default(),
             edge: Vec::new(),
@@ -190,7 +196,7 @@ struct Vote<'a> {
     planes: &'a Planes,
     /// Where depths may change. A pixel leaves it when it is asked.
     band: &'a mut [bool],
-    nearby: &'a [[f32; LANES]; SIDE],
+    nearby: &'a [[f32; LANES]; ROWS],
     inverse: &'a mut [f32],
     jump: f32,
     front: &'a mut Vec<u32>,
@@ -203,7 +209,8 @@ impl WithSimd for Vote<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { planes, band, nearby, inverse, jump, front, moved } = self;
         let width = planes.width;
-        let mut votes = Votes { depth: [[0.0; LANES]; SIDE], weight: [[0.0; LANES]; SIDE], range: (0.0, 0.0) };
+        let mut votes =
+            Votes { depth: [[0.0; LANES]; ROWS], weight: [[0.0; LANES]; ROWS], range: (0.0, 0.0), loyalty: LOYALTY };
         for &k in &*front {
             band[k as usize] = false;
         }
@@ -234,21 +241,24 @@ impl WithSimd for Vote<'_> {
 /// The votes for one pixel.
 struct Votes {
     /// Inverse depth, 1/m.
-    depth: [[f32; LANES]; SIDE],
-    weight: [[f32; LANES]; SIDE],
+    depth: [[f32; LANES]; ROWS],
+    weight: [[f32; LANES]; ROWS],
     /// Least and largest inverse depth that has a vote.
     range: (f32, f32),
+    /// How many times the own side's votes count.
+    loyalty: f32,
 }
 
 impl Votes {
     #[inline(always)]
-    fn gather(&mut self, planes: &Planes, nearby: &[[f32; LANES]; SIDE], x: usize, y: usize) {
+    fn gather(&mut self, planes: &Planes, nearby: &[[f32; LANES]; ROWS], x: usize, y: usize) {
         const FALL: f32 = 1.0 / (8.0 * ALIKE * ALIKE);
         let own = planes.color(x, y);
         let (mut low, mut high) = ([f32::MAX; LANES], [0.0_f32; LANES]);
-        for k in 0..SIDE {
+        let (mut total, mut alike_total) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        for k in 0..ROWS {
             let (depth, weight, nearby) = (&mut self.depth[k], &mut self.weight[k], &nearby[k]);
-            let row = (y + k * STEP_PX).wrapping_sub(REACH_PX);
+            let row = (y + k * ROW_STEP_PX).wrapping_sub(REACH_PX);
             if row >= planes.height {
                 *weight = [0.0; LANES];
                 continue;
@@ -261,7 +271,10 @@ impl Votes {
                 let alike = 1.0 - apart * FALL;
                 let alike = if alike > 0.0 { alike } else { 0.0 };
                 let alike = alike * alike;
-                let w = sure[lane] * nearby[lane] * (alike * alike + UNLIKE);
+                let any = sure[lane] * nearby[lane];
+                let w = any * (alike * alike + UNLIKE);
+                total[lane] += any;
+                alike_total[lane] += w;
                 let v = from_depth[lane];
                 weight[lane] = w;
                 depth[lane] = v;
@@ -272,6 +285,8 @@ impl Votes {
             }
         }
         self.range = (least(low), largest(high));
+        let share = sum(alike_total) / sum(total);
+        self.loyalty = LOYALTY + CLUELESS * share.powi(8);
     }
 
     /// The inverse depth of the surface with most votes; `own` where that lies on it.
@@ -284,8 +299,8 @@ impl Votes {
             let halves = self.halves(low, middle, high);
             let own_is_near = (own > middle) & (own <= high);
             let own_is_far = (own <= middle) & (own >= low);
-            let near = halves.near * if own_is_near { LOYALTY } else { 1.0 };
-            let far = halves.far * if own_is_far { LOYALTY } else { 1.0 };
+            let near = halves.near * if own_is_near { self.loyalty } else { 1.0 };
+            let far = halves.far * if own_is_far { self.loyalty } else { 1.0 };
             let before = (low, high);
             if near > far {
                 (low, mean) = (halves.near_low, halves.near_moment / halves.near);
@@ -307,7 +322,7 @@ impl Votes {
         let (mut near, mut far) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_moment, mut far_moment) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_low, mut far_high) = ([high; LANES], [low; LANES]);
-        for k in 0..SIDE {
+        for k in 0..ROWS {
             let (depth, weight) = (&self.depth[k], &self.weight[k]);
             for lane in 0..LANES {
                 let (v, w) = (depth[lane], weight[lane]);
