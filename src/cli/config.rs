@@ -147,7 +147,11 @@ impl Blur {
 
     /// Whether depth is refined before the blur; `measured` is the depth of a recorded stream.
     pub fn refines(&self, measured: bool) -> bool {
-        self.refine.applies(measured)
+        match self.refine {
+            Refine::Auto => measured,
+            Refine::On => true,
+            Refine::Off => false,
+        }
     }
 
     /// CoC radius at infinity in pixels, where it does not depend on a focus that is yet to be found.

@@ -55,17 +55,6 @@ pub enum Refine {
     Off,
 }
 
-impl Refine {
-    /// Whether depth is refined, for depth that has the errors of a measured stream or has not.
-    pub fn applies(self, measured: bool) -> bool {
-        match self {
-            Self::Auto => measured,
-            Self::On => true,
-            Self::Off => false,
-        }
-    }
-}
-
 /// What runs the blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Backend {

@@ -48,7 +48,7 @@ struct DepthCoc {
 /// What makes a map for the blur of the depth that was measured.
 enum Maker {
     Fill(Filler),
-    Refine(Refiner),
+    Refine(Box<Refiner>),
 }
 
 impl Coc {
@@ -56,7 +56,7 @@ impl Coc {
         match rule {
             CocRule::Fixed(field) => Self::Fixed(field),
             CocRule::Depth { focus, lens, max_coc_px } => {
-                let maker = if refine { Maker::Refine(Refiner::new()) } else { Maker::Fill(Filler::new()) };
+                let maker = if refine { Maker::Refine(Box::new(Refiner::new())) } else { Maker::Fill(Filler::new()) };
                 Self::Depth(Box::new(DepthCoc { focus: Focus::new(focus), maker, lens, max_coc_px }))
             }
         }

@@ -11,6 +11,7 @@ mod planes;
 mod smooth;
 mod steady;
 mod upsample;
+mod votes;
 
 use pulp::Arch;
 
