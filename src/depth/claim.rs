@@ -105,10 +105,13 @@ fn turn(from: &[bool], width: usize, to: &mut [bool]) {
 
 /// Claims in one line, whose own holes are `hole`.
 fn claim_line(line: Line, longest: usize, metres: &[f32], hole: &[bool], rgb: &[u8], claims: &mut [f32]) {
-    let mut start = 0;
+    const MANY: usize = 16;
+    let none = |some: &[bool]| !some.iter().fold(false, |any, &hole| any | hole);
+    let skip = |start: usize| start + MANY * hole[start..].chunks_exact(MANY).take_while(|some| none(some)).count();
+    let mut start = skip(0);
     while let Some(first) = hole[start..].iter().position(|&hole| hole).map(|k| start + k) {
         let end = hole[first..].iter().position(|&hole| !hole).map_or(line.length, |k| first + k);
-        start = end;
+        start = skip(end);
         if first == 0 || end == line.length || end - first > longest {
             continue;
         }
