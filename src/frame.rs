@@ -69,6 +69,7 @@ impl DepthMap {
     /// Whether a stored value is a depth rather than the mark for "unknown".
     #[inline]
     pub fn is_known(metres: f32) -> bool {
-        metres > 0.0 && metres.is_finite()
+        // Both comparisons are false for NaN; without a branch, so that loops over maps become vector code.
+        (metres > 0.0) & (metres < f32::INFINITY)
     }
 }

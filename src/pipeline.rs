@@ -86,6 +86,8 @@ pub struct Run<'a> {
     pub quality: Quality,
     /// By how much they are blurred.
     pub coc: CocRule,
+    /// Fit depth to the pictures and steady it before it is used; otherwise only its holes are filled.
+    pub refine: bool,
     /// Where they go.
     pub sink: Box<dyn Sink>,
     /// Real time, or all frames.
@@ -168,6 +170,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let depth = depth::Stage {
         // Without a blur nobody asks for depth.
         coc: if executor.is_some() { run.coc } else { UNUSED },
+        refine: run.refine,
         source,
         source_name: &info.name,
         keep_going: run.keep_going,

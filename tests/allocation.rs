@@ -10,7 +10,8 @@ use bokehcam::bokeh::Settings;
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::budget::Quality;
-use bokehcam::frame::ColorImage;
+use bokehcam::depth::refine::Refiner;
+use bokehcam::frame::{ColorImage, DepthMap};
 use common::{EFFECTS, coc, noise, settings, three_depths};
 
 struct Counting;
@@ -34,8 +35,34 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
+/// One test, for another one's allocations would be counted with its own.
 #[test]
 fn a_frame_allocates_nothing() {
+    blur();
+    refinement();
+}
+
+fn refinement() {
+    let (width, height) = (160, 120);
+    let image = noise(width, height);
+    for share in [1, 4] {
+        let mut measured = three_depths(width / share, height / share);
+        measured.metres.iter_mut().step_by(7).for_each(|z_m| *z_m = 0.0);
+        let (mut refiner, mut map) = (Refiner::new(), DepthMap::default());
+        let mut frame = |index: u64| {
+            map.resize(measured.width, measured.height);
+            map.metres.copy_from_slice(&measured.metres);
+            refiner.refine(&mut map, &image, index * 33_000_000);
+        };
+        frame(0);
+        frame(1);
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        (2..7).for_each(&mut frame);
+        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "depth of 1/{share} of the size");
+    }
+}
+
+fn blur() {
     let (width, height) = (160, 120);
     let (image, map) = (noise(width, height), three_depths(width, height));
     for effect in EFFECTS {

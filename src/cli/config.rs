@@ -3,7 +3,7 @@
 use super::defaults;
 use super::error::CliError;
 use super::options;
-use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Tilt};
+use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Refine, Tilt};
 use crate::bokeh::aperture::Aperture;
 use crate::bokeh::{self, Backend, Bokeh};
 use crate::budget::Quality;
@@ -30,6 +30,7 @@ pub struct Blur {
     method: bokeh::Method,
     strength: Strength,
     max_coc_px: Option<f32>,
+    refine: Refine,
     tilt: Tilt,
     aperture: Aperture,
     rim: f32,
@@ -89,6 +90,7 @@ impl Blur {
             },
             strength,
             max_coc_px: blur.max_coc,
+            refine: blur.refine,
             tilt: blur.tilt,
             aperture: aperture.aperture.load(aperture.intensity)?,
             rim: aperture.rim,
@@ -140,6 +142,15 @@ impl Blur {
                 },
                 max_coc_px,
             },
+        }
+    }
+
+    /// Whether depth is refined before the blur; `measured` is the depth of a recorded stream.
+    pub fn refines(&self, measured: bool) -> bool {
+        match self.refine {
+            Refine::Auto => measured,
+            Refine::On => true,
+            Refine::Off => false,
         }
     }
 

@@ -8,8 +8,8 @@ use clap::{Args, value_parser};
 
 use super::defaults;
 use super::values::{
-    ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Size, Tilt, above_zero, between,
-    not_negative, seconds,
+    ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Refine, Size, Tilt, above_zero,
+    between, not_negative, seconds,
 };
 use crate::budget::Quality;
 
@@ -81,6 +81,9 @@ pub struct Blur {
     /// Where depth comes from
     #[arg(long, value_enum, value_name = "FROM", default_value = "auto")]
     pub depth: DepthChoice,
+    /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker
+    #[arg(long, value_enum, value_name = "WHEN", default_value = "auto")]
+    pub refine: Refine,
     /// Distance of the focal plane: METRES, auto, or X,Y as fractions of width and height
     #[arg(long, value_name = "WHERE", default_value = "auto")]
     pub focus: Focus,

@@ -9,7 +9,7 @@ use super::error::CliError;
 use super::files::refuse_overwrite;
 use super::{options, terminal};
 use crate::bokeh::{BokehError, Job};
-use crate::depth::{fill::Filler, focus::Focus};
+use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::optics::CocField;
@@ -88,7 +88,8 @@ fn blurred(
     }
 }
 
-/// What a frame on its own is blurred by: the radius of every pixel, and the depth map (holes filled) if that needs it.
+/// What a frame on its own is blurred by: the radius of every pixel, and the depth map (holes filled, and
+/// refined if that was asked for) if that needs it.
 ///
 /// # Errors
 /// [`BokehError::NoDepth`] when the blur follows depth and there is none.
@@ -103,7 +104,10 @@ pub fn prepared(
         (CocRule::Depth { focus, lens, max_coc_px }, Some(mut map)) => {
             // Focus looks at what was measured, so it comes before the holes are filled.
             let focus_m = Focus::new(focus).focus_m(&map, 0);
-            Filler::new().fill_by(&mut map, color);
+            match blur.refines(false) {
+                true => Refiner::new().refine(&mut map, color, 0),
+                false => Filler::new().fill_by(&mut map, color),
+            }
             Ok((lens.field(focus_m, color.width, max_coc_px), Some(map)))
         }
     }

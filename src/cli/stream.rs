@@ -54,6 +54,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
     refuse_overwrite(stream.report.as_deref(), output.force)?;
     let source = Source::open(&command.source, &command.frames, &command.depth, stream.keep_going)?;
     let info = source.camera.info();
+    let measured = source.depth.is_some();
     let blur = Blur::resolve(&command.blur, &command.aperture, command.computing.quality, source.has_depth())?;
     let executor = Executor::of(&command.computing);
     let bokeh = blur.settings(info.size).map(|settings| executor.create(&settings, info.size)).transpose()?;
@@ -69,6 +70,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         bokeh,
         quality: command.computing.quality,
         coc: blur.coc_rule(info.size),
+        refine: blur.refines(measured),
         sink,
         pace: match stream.pace {
             values::Pace::Realtime => Pace::Realtime,

@@ -44,6 +44,17 @@ pub enum DepthChoice {
     None,
 }
 
+/// Whether depth is refined before the blur.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Refine {
+    /// Depth of a recording in a stream; not exact depth, nor a picture on its own
+    Auto,
+    /// Always
+    On,
+    /// Never: only holes are filled
+    Off,
+}
+
 /// What runs the blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Backend {

@@ -21,6 +21,8 @@ const LONGEST: f32 = 0.12;
 #[derive(Debug, Default)]
 pub struct Claimer {
     claims_m: Vec<f32>,
+    /// The holes line by line.
+    marks: Vec<bool>,
 }
 
 /// A row or a column: its pixels are `first`, `first + step`, and so on.
@@ -48,8 +50,11 @@ impl Claimer {
         }
         let longest = ((width as f32 * LONGEST) as usize).max(4);
         let rows = (0..height).map(|y| Line { first: y * width, step: 1, length: width });
+        self.marks.clear();
+        self.marks.extend_from_slice(hole);
         self.along(rows, width, longest, map, hole, color);
         let columns = (0..width).map(|x| Line { first: x, step: width, length: height });
+        turn(hole, width, &mut self.marks);
         self.along(columns, 1, longest, map, hole, color);
     }
 
@@ -65,7 +70,10 @@ impl Claimer {
     ) {
         self.claims_m.clear();
         self.claims_m.resize(map.metres.len(), 0.0);
+        let mut marks = &self.marks[..];
         for line in lines {
+            let hole;
+            (hole, marks) = marks.split_at(line.length);
             claim_line(line, longest, &map.metres, hole, &color.rgb, &mut self.claims_m);
         }
         for (k, hole) in hole.iter_mut().enumerate().filter(|(_, hole)| **hole) {
@@ -79,11 +87,31 @@ impl Claimer {
     }
 }
 
+/// Columns to rows, in square blocks that fit the cache.
+fn turn(from: &[bool], width: usize, to: &mut [bool]) {
+    const BLOCK: usize = 64;
+    let height = from.len() / width;
+    for top in (0..height).step_by(BLOCK) {
+        for left in (0..width).step_by(BLOCK) {
+            for x in left..(left + BLOCK).min(width) {
+                let rows = top..(top + BLOCK).min(height);
+                for (to, y) in to[x * height..][rows.clone()].iter_mut().zip(rows) {
+                    *to = from[y * width + x];
+                }
+            }
+        }
+    }
+}
+
+/// Claims in one line, whose own holes are `hole`.
 fn claim_line(line: Line, longest: usize, metres: &[f32], hole: &[bool], rgb: &[u8], claims: &mut [f32]) {
-    let mut start = 0;
-    while let Some(first) = (start..line.length).find(|&k| hole[line.at(k)]) {
-        let end = (first..line.length).find(|&k| !hole[line.at(k)]).unwrap_or(line.length);
-        start = end;
+    const MANY: usize = 16;
+    let none = |some: &[bool]| !some.iter().fold(false, |any, &hole| any | hole);
+    let skip = |start: usize| start + MANY * hole[start..].chunks_exact(MANY).take_while(|some| none(some)).count();
+    let mut start = skip(0);
+    while let Some(first) = hole[start..].iter().position(|&hole| hole).map(|k| start + k) {
+        let end = hole[first..].iter().position(|&hole| !hole).map_or(line.length, |k| first + k);
+        start = skip(end);
         if first == 0 || end == line.length || end - first > longest {
             continue;
         }

@@ -4,7 +4,8 @@
 //! the person is the person. Both come out right when a hole takes the farthest of the nearest known depths to its
 //! left, right, above and below. The empty frame around a registered depth picture is continued the same way.
 
-use std::mem;
+use std::ops::Range;
+use std::{iter, mem};
 
 use super::claim::Claimer;
 use crate::frame::{ColorImage, DepthMap};
@@ -66,36 +67,49 @@ impl Filler {
         self.filled.resize(map.metres.len(), 0.0);
         self.column_m.resize(width, 0.0);
 
-        // Down and to the right: known depths, and in the holes the farther one of left and above.
+        // Down: known depths, and in the holes the one above; then in the holes the farther one of that and left.
         self.column_m.fill(0.0);
         for (row, filled) in map.metres.chunks_exact(width).zip(self.filled.chunks_exact_mut(width)) {
-            let mut left_m = 0.0;
-            for ((&z_m, filled), above_m) in row.iter().zip(filled).zip(&mut self.column_m) {
-                *filled = if DepthMap::is_known(z_m) {
-                    left_m = z_m;
-                    *above_m = z_m;
-                    z_m
-                } else {
-                    above_m.max(left_m)
-                };
+            for ((&z_m, filled), above_m) in row.iter().zip(&mut *filled).zip(&mut self.column_m) {
+                *filled = if DepthMap::is_known(z_m) { z_m } else { *above_m };
+                *above_m = *filled;
+            }
+            for hole in holes(row) {
+                let left_m = hole.start.checked_sub(1).map_or(0.0, |x| row[x]);
+                let right_m = row.get(hole.end).copied().unwrap_or(0.0);
+                let beside_m = left_m.max(right_m);
+                filled[hole].iter_mut().for_each(|filled| *filled = filled.max(beside_m));
             }
         }
-        // Up and to the left: in the holes, the farther one of that, right and below.
-        let mut full = true;
+        // Up: in the holes, the farther one of that and below.
+        let mut unfilled = 0;
         self.column_m.fill(0.0);
         for (row, filled) in map.metres.chunks_exact(width).zip(self.filled.chunks_exact_mut(width)).rev() {
-            let mut right_m = 0.0;
-            for ((&z_m, filled), below_m) in row.iter().zip(filled).zip(&mut self.column_m).rev() {
-                if DepthMap::is_known(z_m) {
-                    right_m = z_m;
-                    *below_m = z_m;
-                } else {
-                    *filled = filled.max(*below_m).max(right_m);
-                    full &= *filled > 0.0;
-                }
+            for ((&z_m, filled), below_m) in row.iter().zip(filled).zip(&mut self.column_m) {
+                let known = DepthMap::is_known(z_m);
+                *below_m = if known { z_m } else { *below_m };
+                let far_m = if *below_m > *filled { *below_m } else { *filled };
+                *filled = if known { z_m } else { far_m };
+                unfilled += u32::from(*filled <= 0.0);
             }
         }
         mem::swap(&mut map.metres, &mut self.filled);
-        full
+        unfilled == 0
     }
+}
+
+/// Pixels that are looked at together.
+const MANY: usize = 16;
+
+/// The runs of unknown depths in a row.
+fn holes(row: &[f32]) -> impl Iterator<Item = Range<usize>> {
+    let mut next = 0;
+    iter::from_fn(move || {
+        // Most pixels are known: many at a time.
+        let all_known = |some: &[f32]| some.iter().fold(true, |all, &z_m| all & DepthMap::is_known(z_m));
+        next += MANY * row[next..].chunks_exact(MANY).take_while(|some| all_known(some)).count();
+        let start = next + row[next..].iter().position(|&z_m| !DepthMap::is_known(z_m))?;
+        next = start + row[start..].iter().position(|&z_m| DepthMap::is_known(z_m)).unwrap_or(row.len() - start);
+        Some(start..next)
+    })
 }

@@ -1,10 +1,11 @@
-//! Where depth comes from, and what is made of it before the blur: a focus distance ([`focus`]) and a map without
-//! holes ([`fill`]).
+//! Where depth comes from, and what is made of it before the blur: a focus distance ([`focus`]), a map without
+//! holes ([`fill`]), and, for depth that was measured, one that agrees with the picture ([`refine`]).
 
 mod claim;
 pub mod fill;
 pub mod focus;
 pub mod recorded;
+pub mod refine;
 
 use crate::frame::DepthMap;
 use crate::recording::RecordingError;

@@ -6,6 +6,7 @@ use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::fill::Filler;
 use crate::depth::focus::Focus;
+use crate::depth::refine::Refiner;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Receiver, Sender};
@@ -21,6 +22,7 @@ pub(super) struct Ready {
 
 pub(super) struct Stage<'a> {
     pub coc: CocRule,
+    pub refine: bool,
     pub source: Option<Box<dyn DepthSource>>,
     pub source_name: &'a str,
     pub keep_going: bool,
@@ -38,18 +40,24 @@ enum Coc {
 
 struct DepthCoc {
     focus: Focus,
-    filler: Filler,
+    maker: Maker,
     lens: CocAtInfinity,
     max_coc_px: f32,
 }
 
+/// What makes a map for the blur of the depth that was measured.
+enum Maker {
+    Fill(Filler),
+    Refine(Box<Refiner>),
+}
+
 impl Coc {
-    fn new(rule: CocRule) -> Self {
+    fn new(rule: CocRule, refine: bool) -> Self {
         match rule {
             CocRule::Fixed(field) => Self::Fixed(field),
             CocRule::Depth { focus, lens, max_coc_px } => {
-                let (focus, filler) = (Focus::new(focus), Filler::new());
-                Self::Depth(Box::new(DepthCoc { focus, filler, lens, max_coc_px }))
+                let maker = if refine { Maker::Refine(Box::new(Refiner::new())) } else { Maker::Fill(Filler::new()) };
+                Self::Depth(Box::new(DepthCoc { focus: Focus::new(focus), maker, lens, max_coc_px }))
             }
         }
     }
@@ -59,14 +67,17 @@ impl DepthCoc {
     /// Focuses on what was measured, and only then makes up what was not.
     fn see(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
         let focus_m = self.focus.focus_m(map, time_ns);
-        self.filler.fill_by(map, color);
+        match &mut self.maker {
+            Maker::Fill(filler) => filler.fill_by(map, color),
+            Maker::Refine(refiner) => refiner.refine(map, color, time_ns),
+        }
         self.lens.field(focus_m, color.width, self.max_coc_px)
     }
 }
 
 impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
-        let mut coc = Coc::new(self.coc);
+        let mut coc = Coc::new(self.coc, self.refine);
         let mut complained = false;
         while let Some(Frame { ticket, stamp, item: Shot { color, depth } }) = from.recv() {
             let (depth, coc) = match &mut coc {

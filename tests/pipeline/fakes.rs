@@ -289,6 +289,7 @@ impl Setup {
             bokeh: self.bokeh.map(|bokeh| Box::new(bokeh) as _),
             quality: Quality::Fast,
             coc: self.coc,
+            refine: false,
             sink: Box::new(FakeSink {
                 received: received.clone(),
                 trouble: self.sink,
@@ -362,6 +363,7 @@ pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a Atomic
         bokeh: None,
         quality: Quality::Fast,
         coc: CocRule::Fixed(CocField::Uniform { radius_px: 3.0 }),
+        refine: false,
         sink,
         pace,
         budget_ns: PERIOD_NS,

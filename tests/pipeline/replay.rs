@@ -159,6 +159,7 @@ fn rendered(dir: &Path, file: &Path) -> Vec<u8> {
         depth: Some(Box::new(Recorded::new(recording, "test recording").unwrap())),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         coc: dof(),
+        refine: false,
         ..simple(Box::new(camera), sink, &stop, Pace::Asap)
     })
     .unwrap();

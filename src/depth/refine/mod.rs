@@ -1,0 +1,79 @@
+//! Measured depth, made fit for the blur: as large as the picture, without holes, calm on surfaces, with its edges on
+//! the edges of the colours, and steady in time.
+//!
+//! What the blur shows of an error in depth is where an edge runs, and that it flickers; noise of a surface matters
+//! less. All is done in inverse depth (1/m), in which the circle of confusion is linear, a plane is a plane, and the
+//! noise of a stereo or structured-light sensor is the same at every distance (Khoshelham and Oude Elberink, *Accuracy
+//! and resolution of Kinect depth data*, 2012).
+
+mod align;
+mod planes;
+mod smooth;
+mod steady;
+mod upsample;
+mod votes;
+
+use pulp::Arch;
+
+use self::align::Aligner;
+use self::smooth::Smoother;
+use self::steady::{Limits, Steadier};
+use self::upsample::Upsampler;
+use super::fill::Filler;
+use crate::frame::{ColorImage, DepthMap};
+
+/// A step of inverse depth from here on, in 1/m, is an edge: 0.6 px of CoC at a radius of 10 px at infinity and a
+/// focus at 1 m; less shows no edge in the blur.
+const JUMP: f32 = 0.06;
+/// The same in standard deviations of the noise that smoothing has left.
+const JUMP_SIGMAS: f32 = 4.0;
+/// Changes in time up to this, in 1/m, or up to this many standard deviations of the measured noise, are averaged.
+const LEAST_CHANGE: f32 = 0.01;
+const CHANGE_SIGMAS: f32 = 4.0;
+
+/// Refines the depth of frame after frame; owns the memory for it, and remembers the last frame.
+#[derive(Debug, Default)]
+pub struct Refiner {
+    arch: Arch,
+    upsampler: Upsampler,
+    filler: Filler,
+    unknown: Vec<bool>,
+    inverse: Vec<f32>,
+    smoother: Smoother,
+    aligner: Aligner,
+    steadier: Steadier,
+}
+
+impl Refiner {
+    /// No memory of earlier frames.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Refines the depth `map` of the picture `color` at `time_ns` of media time; the map takes the picture's size.
+    /// A frame that does not follow the one before (another size, a seek, a gap) starts anew. Where no depth was ever
+    /// known, the map stays unknown (0) everywhere.
+    pub fn refine(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
+        self.upsampler.resize(map, color.size());
+        self.unknown.clear();
+        self.unknown.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
+        self.filler.fill_by(map, color);
+        if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
+            return self.steadier.forget();
+        }
+        let Self { arch, unknown, inverse, smoother, aligner, steadier, .. } = self;
+        let (arch, width) = (*arch, map.width as usize);
+        inverse.clear();
+        inverse.extend(map.metres.iter().map(|&z_m| 1.0 / z_m));
+        let measured_noise = smoother.noise(inverse, unknown, width);
+        smoother.smooth(arch, inverse, width, measured_noise);
+        let noise = smoother.noise(inverse, unknown, width);
+        let jump = JUMP.max(JUMP_SIGMAS * noise);
+        aligner.align(arch, inverse, unknown, &color.rgb, width, jump);
+        let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
+        steadier.steady(arch, inverse, &color.rgb, width, time_ns, limits);
+        for (z_m, &v) in map.metres.iter_mut().zip(&*inverse) {
+            *z_m = 1.0 / v;
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! Depth that rests where the picture rests.
+//!
+//! A recursive average of the inverse depth of each pixel. It forgets where the colour changed, because something
+//! moved there, and follows where the depth changes by more than noise. A depth that jumps from one surface to another
+//! while the colours around rest is mostly the sensor's: the outline of a still person flickers by some pixels. Such a
+//! jump is believed only once it lasts.
+
+use pulp::{Arch, WithSimd};
+
+/// Frames that the average spans, at most: the variance of still noise falls to 1/15.
+const LONGEST: f32 = 8.0;
+/// Frames for which a jump under resting colours is held back: a tenth of a second at 30 per second.
+const HOLD: f32 = 2.0;
+/// Sums of the changes of red, green and blue, in steps of 8-bit sRGB averaged over 3x3 pixels, between which a pixel
+/// counts as moved: this many times the median change, within these bounds.
+const MOVED: f32 = 2.5;
+const MOVED_BOUNDS: (f32, f32) = (8.0, 24.0);
+/// Frames further apart than this in media time, or not in order, do not follow each other.
+const LONGEST_GAP_NS: u64 = 500_000_000;
+/// Rows and columns looked at for the median change, at most.
+const LOOKS: usize = 64;
+
+/// What a change of inverse depth means, 1/m.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Below this it is noise, and averaged.
+    pub noise: f32,
+    /// Above this it is another surface.
+    pub jump: f32,
+}
+
+/// Steadies maps of inverse depth; remembers the last frame.
+#[derive(Debug, Default)]
+pub struct Steadier {
+    width: usize,
+    time_ns: u64,
+    /// Inverse depth as it was given out, 1/m; empty before the first frame.
+    mean: Vec<f32>,
+    /// Frames in the mean.
+    count: Vec<f32>,
+    /// Frames for which a jump was held back.
+    held: Vec<f32>,
+    rgb: Vec<u8>,
+    /// Change of colour since the last frame, then its mean over 3x3 pixels.
+    change: Vec<f32>,
+    smooth_change: Vec<f32>,
+    looks: Vec<f32>,
+}
+
+impl Steadier {
+    /// No frame came before the next one.
+    pub fn forget(&mut self) {
+        self.mean.clear();
+    }
+
+    /// Steadies `inverse` (1/m) of the frame at `time_ns`, with the picture `rgb`.
+    pub fn steady(&mut self, arch: Arch, inverse: &mut [f32], rgb: &[u8], width: usize, time_ns: u64, limits: Limits) {
+        let follows = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
+        let in_order = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
+        if follows && in_order {
+            self.change.resize(inverse.len(), 0.0);
+            self.smooth_change.resize(inverse.len(), 0.0);
+            let (change, smooth) = (&mut self.change, &mut self.smooth_change);
+            arch.dispatch(Change { rgb, before: &self.rgb, width, change, smooth });
+            let moved = (MOVED * self.median_change()).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
+            let Self { mean, count, held, smooth_change, .. } = self;
+            arch.dispatch(Average { inverse, mean, count, held, change: smooth_change, moved, limits });
+        } else {
+            self.mean.clear();
+            self.mean.extend_from_slice(inverse);
+            for state in [&mut self.count, &mut self.held] {
+                state.clear();
+                state.resize(inverse.len(), 0.0);
+            }
+            self.count.fill(1.0);
+        }
+        self.rgb.clear();
+        self.rgb.extend_from_slice(rgb);
+        (self.width, self.time_ns) = (width, time_ns);
+    }
+
+    fn median_change(&mut self) -> f32 {
+        let height = self.smooth_change.len() / self.width;
+        self.looks.clear();
+        for y in (0..height).step_by(height.div_ceil(LOOKS)) {
+            let row = &self.smooth_change[y * self.width..][..self.width];
+            self.looks.extend(row.iter().step_by(self.width.div_ceil(LOOKS)));
+        }
+        let middle = self.looks.len() / 2;
+        *self.looks.select_nth_unstable_by(middle, f32::total_cmp).1
+    }
+}
+
+/// How much the colours around each pixel changed.
+struct Change<'a> {
+    rgb: &'a [u8],
+    before: &'a [u8],
+    width: usize,
+    change: &'a mut [f32],
+    smooth: &'a mut [f32],
+}
+
+impl WithSimd for Change<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { rgb, before, width, change, smooth } = self;
+        for ((now, before), change) in rgb.chunks_exact(3).zip(before.chunks_exact(3)).zip(change.iter_mut()) {
+            let apart = |k: usize| u16::from(now[k].abs_diff(before[k]));
+            *change = f32::from(apart(0) + apart(1) + apart(2));
+        }
+        // Along rows, then down the columns; at the border the outermost pixel counts twice.
+        for (row, out) in change.chunks_exact(width).zip(smooth.chunks_exact_mut(width)) {
+            out[0] = row[0] + row[0] + row[1.min(width - 1)];
+            for (out, three) in out[1..].iter_mut().zip(row.windows(3)) {
+                *out = three[0] + three[1] + three[2];
+            }
+            if width > 1 {
+                out[width - 1] = row[width - 2] + 2.0 * row[width - 1];
+            }
+        }
+        change.copy_from_slice(smooth);
+        let height = change.len() / width;
+        let row = |y: usize| &change[y * width..(y + 1) * width];
+        for (y, out) in smooth.chunks_exact_mut(width).enumerate() {
+            let three = row(y.saturating_sub(1)).iter().zip(row(y)).zip(row((y + 1).min(height - 1)));
+            for (out, ((above, here), below)) in out.iter_mut().zip(three) {
+                *out = (above + here + below) / 9.0;
+            }
+        }
+    }
+}
+
+struct Average<'a> {
+    inverse: &'a mut [f32],
+    mean: &'a mut [f32],
+    count: &'a mut [f32],
+    held: &'a mut [f32],
+    change: &'a [f32],
+    moved: f32,
+    limits: Limits,
+}
+
+impl WithSimd for Average<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { inverse, mean, count, held, change, moved, limits } = self;
+        let (per_moved, per_noise) = (1.0 / moved, 1.0 / limits.noise);
+        let state = mean.iter_mut().zip(count).zip(held).zip(change);
+        for (inverse, (((mean, count), held), &change)) in inverse.iter_mut().zip(state) {
+            // From 1 at rest to 0 at twice the bound.
+            let rest = unit(2.0 - change * per_moved);
+            let off = *inverse - *mean;
+            let size = unit(off.abs() * per_noise);
+            let changed = size >= 1.0;
+            let hold = (off.abs() > limits.jump) & (rest >= 1.0) & (*held < HOLD);
+            let frames = *count * rest;
+            // The nearer to the limit, the less it is noise: no step where the average would be left.
+            let size = size * size;
+            let share = 1.0 / (frames + 1.0);
+            let share = share + (1.0 - share) * size * size;
+            let v = if hold { *mean } else { *mean + share * off };
+            let longer = frames + 1.0;
+            let longer = if longer < LONGEST { longer } else { LONGEST };
+            *count = if hold {
+                *count
+            } else if changed {
+                1.0
+            } else {
+                longer
+            };
+            *held = if hold { *held + 1.0 } else { 0.0 };
+            (*mean, *inverse) = (v, v);
+        }
+    }
+}
+
+/// `x` cut to 0 to 1.
+#[inline(always)]
+fn unit(x: f32) -> f32 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    if x < 1.0 { x } else { 1.0 }
+}

@@ -1,0 +1,77 @@
+//! A depth map with fewer pixels than its picture (or more), brought to the picture's size.
+//!
+//! Smooth surfaces are interpolated, in inverse depth, in which planes are linear. Across a jump or beside a hole the
+//! nearest depth is taken, so that no depth comes out that nobody measured; where the edge runs exactly is then for
+//! the colours to say.
+
+use crate::frame::DepthMap;
+
+/// Neighbours whose inverse depths differ by less than this share of the larger are one surface.
+const SAME_SURFACE: f32 = 0.05;
+
+/// Resamples depth maps; owns the memory for it.
+#[derive(Debug, Default)]
+pub struct Upsampler {
+    metres: Vec<f32>,
+    columns: Vec<Tap>,
+}
+
+/// Two neighbouring samples and the share of the second.
+#[derive(Clone, Copy, Debug)]
+struct Tap {
+    first: usize,
+    second: usize,
+    share: f32,
+}
+
+impl Tap {
+    /// What lies under the centre of pixel `at` of `to` pixels among `from` samples that cover the same length.
+    fn new(at: usize, to: usize, from: usize) -> Self {
+        let place = ((at as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
+        let first = place as usize;
+        Self { first, second: (first + 1).min(from - 1), share: place - first as f32 }
+    }
+}
+
+impl Upsampler {
+    /// Gives `map` the size of its picture, in pixels.
+    pub fn resize(&mut self, map: &mut DepthMap, (width, height): (u32, u32)) {
+        let (from_width, from_height) = (map.width as usize, map.height as usize);
+        if map.metres.is_empty() || map.size() == (width, height) {
+            return map.resize(width, height);
+        }
+        self.metres.clear();
+        self.metres.extend_from_slice(&map.metres);
+        self.columns.clear();
+        self.columns.extend((0..width as usize).map(|x| Tap::new(x, width as usize, from_width)));
+        map.resize(width, height);
+        for (y, row) in map.metres.chunks_exact_mut(width as usize).enumerate() {
+            let Tap { first, second, share } = Tap::new(y, height as usize, from_height);
+            let above = &self.metres[first * from_width..][..from_width];
+            let below = &self.metres[second * from_width..][..from_width];
+            for (z_m, tap) in row.iter_mut().zip(&self.columns) {
+                *z_m = between(
+                    [above[tap.first], above[tap.second], below[tap.first], below[tap.second]],
+                    tap.share,
+                    share,
+                );
+            }
+        }
+    }
+}
+
+/// The depth in metres between four neighbours (upper two, then lower two), at a share to the right and down.
+fn between(four_m: [f32; 4], right: f32, down: f32) -> f32 {
+    let nearest_m = four_m[usize::from(right >= 0.5) + 2 * usize::from(down >= 0.5)];
+    if !four_m.into_iter().all(DepthMap::is_known) {
+        return nearest_m;
+    }
+    let inverse = four_m.map(|z_m| 1.0 / z_m);
+    let (low, high) = inverse.into_iter().fold((f32::MAX, 0.0_f32), |(low, high), v| (low.min(v), high.max(v)));
+    if high - low > SAME_SURFACE * high {
+        return nearest_m;
+    }
+    let [a, b, c, d] = inverse;
+    let (upper, lower) = (a + (b - a) * right, c + (d - c) * right);
+    1.0 / (upper + (lower - upper) * down)
+}
