@@ -3,6 +3,7 @@
 
 override CELL: u32;                 // bin pixels a side of a cell
 override SEGMENT: u32;              // bin pixels between two edges
+override ANY_COLOR: f32;            // no colour is brighter
 override COVERAGE_FLOOR: f32;       // less coverage than this has no colour of its own
 override FAR_WEIGHT: f32;           // weight of far cells in the local radius
 override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the hindmost is looked for
@@ -25,7 +26,7 @@ struct Frame {
     ramp: vec2<f32>,            // slope, max
     expansion: f32,             // 0: highlights stay as they are
     steps_per_px: f32,          // nodes of the bank per pixel of radius
-    rest_front: vec2<f32>,      // border between the near bins and the rest: CoC, slope
+    unhidden: vec2<f32>,        // what counts as lying behind the near bins: CoC of the step, slope
     nearest_px: f32,            // no filled CoC is below this
     unused: f32,
 }
@@ -51,7 +52,7 @@ struct Bin {
     reach: u32,                 // outermost tap of any pixel
     filtered_at: u32,           // of the flags of its tiles of rows
     active_at: u32,             // of the flags of its tiles of the result
-    unused: u32,
+    has_lobes: u32,             // 1: its results are kept in the range of the colours around
 }
 
 // Tiles, in pixels: of the picture (ranges of CoC), of a bin's rows and of its result (whether anything is there).

@@ -28,8 +28,10 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
         atomicStore(&highest, key_of(ranges[index].y));
     }
     workgroupBarrier();
-    if all(id.xy < frame.size) && hidden_around(id.xy / 2u) > 0.0 {
-        let value = pyramid[id.y / 2u * ((frame.size.x + 1u) / 2u) + id.x / 2u];
+    let hidden = hidden_around(id.xy / 2u);
+    if all(id.xy < frame.size) && hidden > 0.0 {
+        let own = scene_unpacked(scene[id.y * frame.size.x + id.x], frame.most_px);
+        let value = mix(own, pyramid[id.y / 2u * ((frame.size.x + 1u) / 2u) + id.x / 2u], hidden);
         let filled = scene_packed(value.rgb, max(value.w, frame.nearest_px), frame.most_px);
         scene[id.y * frame.size.x + id.x] = filled;
         range_add(scene_unpacked(filled, frame.most_px).w);

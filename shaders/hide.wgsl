@@ -13,9 +13,9 @@ fn hide(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var most = 0.0;
     let nearest_px = ranges[tile_of(2u * id.xy, frame.size.x, SCENE_TILE)].x;
-    for (var sub = 0u; sub < 4u && step_at(frame.rest_front, nearest_px) < 1.0; sub++) {
+    for (var sub = 0u; sub < 4u && step_at(frame.unhidden, nearest_px) < 1.0; sub++) {
         let at = min(2u * id.xy + vec2(sub % 2u, sub / 2u), frame.size - 1u);
-        most = max(most, 1.0 - step_at(frame.rest_front, scene_unpacked(scene[at.y * frame.size.x + at.x], frame.most_px).w));
+        most = max(most, 1.0 - step_at(frame.unhidden, scene_unpacked(scene[at.y * frame.size.x + at.x], frame.most_px).w));
     }
     hidden[id.y * size.x + id.x] = most;
 }

@@ -1,4 +1,4 @@
-// Pass know: the finest level of the pyramid: colour and CoC where neither the pixel nor a neighbour is hidden.
+// Pass know: the finest level of the pyramid: colour and CoC as far as neither the pixel nor a neighbour is hidden.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> scene: array<vec2<u32>>;
@@ -26,7 +26,7 @@ fn know(@builtin(global_invocation_id) id: vec3<u32>) {
         sum += 0.25 * scene_unpacked(scene[at.y * frame.size.x + at.x], frame.most_px);
     }
     let index = id.y * size.x + id.x;
-    let knows = select(0.0, 1.0, most <= 0.0);
+    let knows = 1.0 - most;
     pyramid[index] = sum * knows;
     known[index] = knows;
 }

@@ -51,6 +51,9 @@ fn around(k: u32, cell: vec2<u32>) -> Around {
         }
     }
     let coc_px = select(0.0, sums.y / sums.x, sums.x > 0.0);
+    if bins[k].has_lobes == 0u {
+        return Around(bin_radius_px(k, coc_px), vec3(-ANY_COLOR), vec3(ANY_COLOR));
+    }
     // Where nothing is in reach there is nothing to keep in range.
     let some = low.r < HUGE;
     return Around(bin_radius_px(k, coc_px), select(vec3(0.0), low, some), select(vec3(0.0), high, some));

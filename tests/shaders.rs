@@ -64,7 +64,7 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             ramp,
             expansion,
             steps_per_px,
-            rest_front,
+            unhidden,
             nearest_px,
             unused
         }),
@@ -88,7 +88,7 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             reach,
             filtered_at,
             active_at,
-            unused
+            has_lobes
         }),
         layout!(Work { first, count, group, terms, last, unused_a, unused_b, unused_c }),
         layout!(Level { fine, coarse, fine_offset, coarse_offset, unused }),

@@ -50,6 +50,8 @@ pub struct Rung {
     pub bins_per_side: u32,
     /// Radius in front of the focal plane below which everything belongs to the bin in focus.
     pub near_from_px: f32,
+    /// The same as a share of the largest radius behind, where that is more: a nose is no layer of its own.
+    pub near_from_share: f32,
     /// Smallest radius in a bin, in pixels of the picture, from which it is filtered at each of [`SCALES`].
     pub scale_from_px: [f32; SCALES.len()],
     /// Whether what near objects hide is filled in.
@@ -62,6 +64,7 @@ pub fn rung(quality: Quality) -> Rung {
         rank,
         bins_per_side,
         near_from_px,
+        near_from_share: if near_from_px > FOCUS_BORDER_PX { 0.07 } else { 0.0 },
         scale_from_px: [0.0, half, quarter, eighth],
         fill,
     };
@@ -213,8 +216,9 @@ impl Plan {
             (CocField::Depth(lens), Some(depth)) => self.counts.count(depth, lens),
             _ => self.counts = Counts::new(),
         }
+        let near_from_px = self.rung.near_from_px.max(self.rung.near_from_share * self.max_px[0]);
         let sides = [false, true].into_iter().zip(&mut self.pieces);
-        let inner_px = sides.map(|(near, pieces)| self.counts.pieces(near, &self.rung, pieces));
+        let inner_px = sides.map(|(near, pieces)| self.counts.pieces(near, &self.rung, near_from_px, pieces));
         self.focus_px = inner_px.fold(0.0, f32::max).min(self.max_px[0].max(self.max_px[1]));
         self.lay_out();
     }
@@ -296,10 +300,17 @@ impl Plan {
         Share::new(index.checked_sub(1).and_then(|front| self.border(front)), self.border(index))
     }
 
-    /// What the bins behind the focal plane and at it take together.
-    pub fn rest_share(&self) -> Share {
+    /// No CoC behind the near bins is below this: there, they take no share any more.
+    pub fn nearest_behind_px(&self) -> f32 {
+        self.bins.iter().rfind(|bin| bin.near).map_or(0.0, |bin| bin.high_px * (1.0 - HAND_OVER))
+    }
+
+    /// How much of a pixel counts as what lies behind the near bins. Just in front of their border that is still the
+    /// pixel itself: a surface that comes nearer hides nothing but its own continuation.
+    pub fn unhidden(&self) -> Share {
         let near = self.bins.iter().filter(|bin| bin.near).count();
-        Share::new(near.checked_sub(1).and_then(|last| self.border(last)), None)
+        let border_px = near.checked_sub(1).map(|last| self.bins[last].high_px);
+        Share::new(border_px.map(|at_px| (at_px * (0.5 + 0.5 * HIDDEN_FROM), 1.0 / ((1.0 - HIDDEN_FROM) * at_px))), None)
     }
 
     /// The border between bin `index` and the one behind it: its CoC, and 1 over the width of the hand-over.
@@ -345,6 +356,8 @@ fn step((at, slope): (f32, f32), coc_px: f32) -> f32 {
 
 /// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
 const HAND_OVER: f32 = 0.15;
+/// What has this many times the CoC of the near bins' border, or more, hides what is behind it.
+const HIDDEN_FROM: f32 = 2.0;
 /// The smallest CoC at which a bin of its own begins, in pixels.
 pub const FOCUS_BORDER_PX: f32 = 1.0;
 

@@ -62,14 +62,14 @@ impl Counts {
     }
 
     /// The pieces of one side, from the focal plane outwards: at most as many as the rung has bins. Returns the largest
-    /// radius of what is left to the bin in focus.
-    pub fn pieces(&self, near: bool, rung: &Rung, pieces: &mut Vec<Piece>) -> f32 {
+    /// radius of what is left to the bin in focus. In front that has everything up to `near_from_px`.
+    pub fn pieces(&self, near: bool, rung: &Rung, near_from_px: f32, pieces: &mut Vec<Piece>) -> f32 {
         pieces.clear();
         let side = &self.sides[usize::from(near)];
         let bins = (rung.bins_per_side as usize).min(MAX_PIECES);
         let Some(last) = side.iter().rposition(|&n| n > 0) else { return FOCUS_BORDER_PX };
         // A nose is not a layer of its own: what is hardly out of focus in front belongs to the subject.
-        let first = if near { rung.near_from_px.log2() * PER_OCTAVE as f32 } else { 0.0 } as usize;
+        let first = if near { near_from_px.log2() * PER_OCTAVE as f32 } else { 0.0 } as usize;
         if last < first {
             return edge_px(last + 1);
         }

@@ -118,7 +118,7 @@ impl Pyramid {
         Behind { level: &self.levels[0], around: &self.around, nearest_px }
     }
 
-    /// Known is what no near pixel touches, nor its neighbours.
+    /// Known is what nothing near touches, nor its neighbours.
     fn know(&mut self, team: &mut Team) {
         let level = &mut self.levels[0];
         let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
@@ -140,8 +140,8 @@ impl Pyramid {
                 }
                 for (p, plane) in planes.chunks_exact_mut(stride).enumerate() {
                     for (value, &around) in plane.iter_mut().zip(&*around) {
-                        let known = if p + 1 == PLANES { 1.0 } else { *value };
-                        *value = if around > 0.0 { 0.0 } else { known };
+                        let whole = if p + 1 == PLANES { 1.0 } else { *value };
+                        *value = whole * (1.0 - around);
                     }
                 }
             }
@@ -206,8 +206,9 @@ impl Behind<'_> {
             let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
             if around[half] > 0.0 {
                 let fill = |p: usize| row[p * self.level.rows.stride + half];
-                (red[x], green[x], blue[x]) = (fill(0), fill(1), fill(2));
-                coc[x] = fill(3).max(self.nearest_px);
+                let mix = |own: f32, p: usize| own + (fill(p) - own) * around[half];
+                (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
+                coc[x] = mix(coc[x], 3).max(self.nearest_px);
             }
         }
     }

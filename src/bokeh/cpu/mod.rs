@@ -212,9 +212,10 @@ impl CpuBokeh {
         let (arch, tiles) = (self.arch, &self.tiles);
         let bands = plan.height.div_ceil(rows);
         let waits = Shelf::new(&mut self.waits[..bands * blocks], blocks, &mut self.taken);
-        let behind = plan.rest_share();
+        let behind = plan.unhidden();
+        let nearest_px = plan.nearest_behind_px();
         let (base, filled) = match self.pyramid.as_mut().filter(|_| fills) {
-            Some(pyramid) if again => (None, Some(pyramid.behind(behind.front.0))),
+            Some(pyramid) if again => (None, Some(pyramid.behind(nearest_px))),
             Some(pyramid) => (Some(pyramid.base(rows)), None),
             None => (None, None),
         };

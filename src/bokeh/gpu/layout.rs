@@ -126,7 +126,7 @@ impl Layout {
                 },
                 filtered_at: at.filtered as u32,
                 active_at: at.active as u32,
-                unused: 0,
+                has_lobes: u32::from(plan.has_lobes(bin)),
             });
             at.pixels += pixels;
             at.cells += cells_across * down;

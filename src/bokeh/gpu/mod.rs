@@ -76,7 +76,7 @@ impl GpuBokeh {
 
     fn frame(&self, job: &Job) -> shaders::Frame {
         let plan = &self.plan;
-        let rest_front = plan.rest_share().front;
+        let unhidden = plan.unhidden().front;
         let most_px = match job.coc {
             CocField::Uniform { radius_px } => radius_px,
             CocField::Ramp(ramp) => ramp.max_px,
@@ -106,8 +106,8 @@ impl GpuBokeh {
             ramp,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
-            rest_front: rest_front.into(),
-            nearest_px: rest_front.0,
+            unhidden: unhidden.into(),
+            nearest_px: plan.nearest_behind_px(),
             unused: 0.0,
         }
     }

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, FAR_WEIGHT, HINDMOST_COVERAGE, SEGMENT};
+use crate::bokeh::plan::{ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HINDMOST_COVERAGE, SEGMENT};
 
 /// A pass: the name of its entry point and file, and its source.
 #[derive(Clone, Copy, Debug)]
@@ -56,9 +56,10 @@ pub const ALL: [Shader; 12] =
     [UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, KNOW, PULL, PUSH, FILL, COMPOSITE];
 
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 5] = [
+pub const CONSTANTS: [(&str, f64); 6] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
+    ("ANY_COLOR", ANY_COLOR as f64),
     ("COVERAGE_FLOOR", COVERAGE_FLOOR as f64),
     ("FAR_WEIGHT", FAR_WEIGHT as f64),
     ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
@@ -83,7 +84,7 @@ pub struct Frame {
     pub ramp: [f32; 2],
     pub expansion: f32,
     pub steps_per_px: f32,
-    pub rest_front: [f32; 2],
+    pub unhidden: [f32; 2],
     pub nearest_px: f32,
     pub unused: f32,
 }
@@ -112,7 +113,7 @@ pub struct Bin {
     pub reach: u32,
     pub filtered_at: u32,
     pub active_at: u32,
-    pub unused: u32,
+    pub has_lobes: u32,
 }
 
 /// `Work` of `work.wgsl`.
