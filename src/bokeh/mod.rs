@@ -10,6 +10,8 @@ pub mod cpu;
 pub mod gpu;
 pub mod low_rank;
 pub mod plan;
+pub mod rung;
+pub mod share;
 pub mod split;
 
 use std::time::Duration;

@@ -12,9 +12,10 @@
 use std::sync::Arc;
 
 use super::bank::{Bank, MASK_CELLS};
+use super::rung::{MOST_RADIUS_PX, Rung, SCALES, rung};
+pub use super::share::Share;
 use super::split::{Counts, MAX_PIECES, Piece};
 use super::{Effect, Method, Rank, Settings};
-use crate::budget::Quality;
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
@@ -35,61 +36,6 @@ pub const ANY_COLOR: f32 = 1e20;
 
 /// Weight of far cells in a local radius, so that there is one wherever the filter finds anything at all.
 pub const FAR_WEIGHT: f32 = 0.02;
-
-/// Pixels of the picture that a bin pixel may cover, each way.
-pub const SCALES: [usize; 4] = [1, 2, 4, 8];
-/// A bin is reduced until no radius has more bin pixels than this: the cost of a filter does not grow with the blur.
-const MOST_RADIUS_PX: f32 = 14.0;
-
-/// What a quality level trades.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rung {
-    /// Separable terms.
-    pub rank: u32,
-    /// Bins behind the focal plane, and as many in front.
-    pub bins_per_side: u32,
-    /// Radius in front of the focal plane below which everything belongs to the bin in focus.
-    pub near_from_px: f32,
-    /// The same as a share of the largest radius behind, where that is more: a nose is no layer of its own.
-    pub near_from_share: f32,
-    /// Smallest radius in a bin, in pixels of the picture, from which it is filtered at each of [`SCALES`].
-    pub scale_from_px: [f32; SCALES.len()],
-    /// Whether what near objects hide is filled in.
-    pub fill: bool,
-}
-
-/// The rung of a quality level.
-pub fn rung(quality: Quality) -> Rung {
-    let rung = |rank, bins_per_side, near_from_px, [half, quarter, eighth]: [f32; 3], fill| Rung {
-        rank,
-        bins_per_side,
-        near_from_px,
-        near_from_share: if near_from_px > FOCUS_BORDER_PX { 0.07 } else { 0.0 },
-        scale_from_px: [0.0, half, quarter, eighth],
-        fill,
-    };
-    match quality {
-        Quality::Draft => rung(2, 2, 2.5, [3.0, 8.0, 20.0], false),
-        Quality::Fast => rung(2, 2, 2.5, [3.0, 8.0, 20.0], true),
-        Quality::Balanced => rung(3, 3, 2.0, [3.5, 12.0, 28.0], true),
-        Quality::High => rung(4, 4, 1.5, [5.0, 20.0, 48.0], true),
-        Quality::Best => rung(4, 6, 1.0, [8.0, 32.0, 80.0], true),
-    }
-}
-
-impl Rung {
-    /// Bins of a side that may be at full scale.
-    pub fn fine_bins(&self) -> usize {
-        (self.bins_per_side as usize + 1) / 3
-    }
-
-    /// The coarsest scale at which radii from `low_px` on keep their shape and those up to `high_px` stay cheap.
-    fn scale(&self, low_px: f32, high_px: f32) -> usize {
-        let fits = SCALES.into_iter().zip(self.scale_from_px).rev().find(|&(_, from_px)| low_px >= from_px);
-        let cheap = SCALES.into_iter().find(|&scale| high_px <= MOST_RADIUS_PX * scale as f32);
-        fits.map_or(1, |(scale, _)| scale).max(cheap.unwrap_or(SCALES[SCALES.len() - 1]))
-    }
-}
 
 /// How the blurred bins become one picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,11 +116,16 @@ impl Plan {
             (Effect::Dof, Method::Gather) => Compositing::Gather,
             (Effect::Blur | Effect::TiltShift, _) => Compositing::Select,
         };
-        let rank = settings.rank.unwrap_or(Rank::Terms(rung.rank));
+        let terms = if settings.effect == Effect::Blur { rung.even_rank } else { rung.rank };
+        let rank = settings.rank.unwrap_or(Rank::Terms(terms));
         let most_px = settings.far_max_px.max(settings.near_max_px);
         let full_scale = compositing == Compositing::Gather || settings.rank == Some(Rank::Full);
         let coarsest = SCALES[SCALES.len() - 1] as f32;
-        let bank_px = if full_scale { most_px } else { most_px.min((most_px / coarsest).max(MOST_RADIUS_PX)) };
+        let bank_px = match settings.effect {
+            _ if full_scale => most_px,
+            Effect::Blur => most_px / rung.even_scale(most_px) as f32,
+            _ => most_px.min((most_px / coarsest).max(MOST_RADIUS_PX)),
+        };
         let mask = settings.aperture.mask(MASK_CELLS, settings.rim);
         let mut plan = Self {
             width: width as usize,
@@ -189,7 +140,7 @@ impl Plan {
             full_scale,
             focus_px: most_px,
             max_px: [settings.far_max_px, settings.near_max_px],
-            counts: Counts::new(),
+            counts: Counts::default(),
             pieces: std::array::from_fn(|_| Vec::with_capacity(MAX_PIECES)),
         };
         match settings.effect {
@@ -214,7 +165,7 @@ impl Plan {
         }
         match (coc, depth) {
             (CocField::Depth(lens), Some(depth)) => self.counts.count(depth, lens),
-            _ => self.counts = Counts::new(),
+            _ => self.counts = Counts::default(),
         }
         let near_from_px = self.rung.near_from_px.max(self.rung.near_from_share * self.max_px[0]);
         let sides = [false, true].into_iter().zip(&mut self.pieces);
@@ -230,7 +181,12 @@ impl Plan {
         let first = |pieces: &[Piece]| pieces.first().map_or(f32::INFINITY, |piece| piece.border_px);
         let beyond = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
-            let scale = if self.full_scale { 1 } else { self.rung.scale(content.0, content.1) };
+            let scale = match self.compositing {
+                _ if self.full_scale => 1,
+                // One radius everywhere.
+                Compositing::Select if content.0 == content.1 => self.rung.even_scale(content.0),
+                _ => self.rung.scale(content.0, content.1),
+            };
             Bin {
                 low_px,
                 high_px,
@@ -310,7 +266,10 @@ impl Plan {
     pub fn unhidden(&self) -> Share {
         let near = self.bins.iter().filter(|bin| bin.near).count();
         let border_px = near.checked_sub(1).map(|last| self.bins[last].high_px);
-        Share::new(border_px.map(|at_px| (at_px * (0.5 + 0.5 * HIDDEN_FROM), 1.0 / ((1.0 - HIDDEN_FROM) * at_px))), None)
+        Share::new(
+            border_px.map(|at_px| (at_px * (0.5 + 0.5 * HIDDEN_FROM), 1.0 / ((1.0 - HIDDEN_FROM) * at_px))),
+            None,
+        )
     }
 
     /// The border between bin `index` and the one behind it: its CoC, and 1 over the width of the hand-over.
@@ -318,40 +277,6 @@ impl Plan {
         let at = self.bins[index].high_px;
         at.is_finite().then(|| (at, 1.0 / (2.0 * HAND_OVER * at.abs())))
     }
-}
-
-/// How much of a pixel with a given CoC a bin takes: a step up at the border in front, a step down at the one behind.
-#[derive(Clone, Copy, Debug)]
-pub struct Share {
-    /// Border to the bin in front: CoC in pixels and slope of the hand-over.
-    pub front: (f32, f32),
-    /// Border to the bin behind.
-    pub behind: (f32, f32),
-}
-
-impl Share {
-    /// Borders as CoC and slope of the hand-over; `None` where there is no bin beyond.
-    pub fn new(front: Option<(f32, f32)>, behind: Option<(f32, f32)>) -> Self {
-        Self { front: front.unwrap_or((-1e30, 1.0)), behind: behind.unwrap_or((1e30, 1.0)) }
-    }
-
-    /// The share at a CoC, 0 to 1; the shares of all bins of a plan sum to 1.
-    #[inline(always)]
-    pub fn at(&self, coc_px: f32) -> f32 {
-        step(self.front, coc_px) - step(self.behind, coc_px)
-    }
-
-    /// Whether any CoC in a range has a share.
-    pub fn meets(&self, (low_px, high_px): (f32, f32)) -> bool {
-        step(self.front, high_px) > 0.0 && step(self.behind, low_px) < 1.0
-    }
-}
-
-#[inline(always)]
-fn step((at, slope): (f32, f32), coc_px: f32) -> f32 {
-    let value = (coc_px - at) * slope + 0.5;
-    let value = if value > 0.0 { value } else { 0.0 };
-    if value < 1.0 { value } else { 1.0 }
 }
 
 /// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
@@ -389,6 +314,8 @@ pub fn compensated_radius_px(coc_px: f32, scale: usize) -> f32 {
 mod tests {
     use super::super::aperture::Aperture;
     use super::*;
+    use crate::budget::Quality;
+    use crate::optics::DepthCoc;
 
     fn settings(effect: Effect, quality: Quality) -> Settings {
         Settings {
@@ -404,36 +331,51 @@ mod tests {
         }
     }
 
+    /// A frame whose pixels have these CoC.
+    fn split(plan: &mut Plan, coc_px: impl Iterator<Item = f32>) {
+        let lens = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 1.0, max_coc_px: 30.0 };
+        let metres: Vec<f32> = coc_px.map(|coc_px| 1.0 / (1.0 - coc_px / 16.0)).collect();
+        let depth = DepthMap { width: metres.len() as u32, height: 1, metres };
+        plan.split(Some(&depth), &CocField::Depth(lens));
+    }
+
     #[test]
     fn bins_tile_the_line_front_to_back() {
         for quality in Quality::ALL {
-            let plan = Plan::new(&settings(Effect::Dof, quality), 640, 360);
-            assert_eq!(plan.bins.len(), 2 * rung(quality).bins_per_side as usize + 1);
-            assert!(plan.bins.len() <= MAX_BINS);
-            assert_eq!(plan.bins[0].low_px, f32::NEG_INFINITY);
-            assert_eq!(plan.bins.last().map(|b| b.high_px), Some(f32::INFINITY));
-            assert!(plan.bins.windows(2).all(|w| w[0].high_px == w[1].low_px && w[0].low_px < w[1].low_px));
-            assert!(plan.bins.iter().all(|b| plan.bank.node(b.max_radius_px) < plan.bank.nodes));
+            let mut plan = Plan::new(&settings(Effect::Dof, quality), 640, 360);
+            for spread in [0.01, 0.1, 1.0] {
+                split(&mut plan, (0..300).map(|k| (k - 200) as f32 * 0.15 * spread));
+                assert!(plan.bins.len() <= MAX_BINS && plan.bins.len() <= plan.slots());
+                assert_eq!(plan.bins[0].low_px, f32::NEG_INFINITY);
+                assert_eq!(plan.bins.last().map(|b| b.high_px), Some(f32::INFINITY));
+                assert!(plan.bins.windows(2).all(|w| w[0].high_px == w[1].low_px && w[0].low_px < w[1].low_px));
+                assert!(plan.bins.iter().all(|b| plan.bank.node(b.max_radius_px) < plan.bank.nodes));
+                assert!(plan.bins.iter().all(|b| b.scale >= plan.least_scale(b.slot)));
+                let mut slots: Vec<usize> = plan.bins.iter().map(|b| b.slot).collect();
+                slots.sort_unstable();
+                assert!(slots.windows(2).all(|w| w[0] < w[1]));
+            }
         }
+    }
+
+    #[test]
+    fn borders_lie_where_no_pixels_do() {
+        let mut plan = Plan::new(&settings(Effect::Dof, Quality::Balanced), 640, 360);
+        // In focus, a thing at 6 px, a wall at 11 to 12 px, and something near at -9 px.
+        let parts = [(0.0, 100), (6.0, 60), (11.0, 100), (12.0, 100), (-9.0, 40)];
+        split(&mut plan, parts.iter().flat_map(|&(coc_px, count)| std::iter::repeat_n(coc_px, count)));
+        let borders: Vec<f32> = plan.bins[1..].iter().map(|bin| bin.low_px).collect();
+        assert_eq!(borders.len(), 3, "{borders:?}");
+        assert!((-9.0..-1.0).contains(&borders[0]), "{borders:?}");
+        assert!((1.0..6.0).contains(&borders[1]) && (6.0..11.0).contains(&borders[2]), "{borders:?}");
+        split(&mut plan, std::iter::repeat_n(0.2, 100));
+        assert_eq!(plan.bins.len(), 1);
     }
 
     #[test]
     fn one_radius_needs_one_bin() {
         let plan = Plan::new(&settings(Effect::Blur, Quality::Balanced), 33, 17);
         assert_eq!(plan.bins.len(), 1);
-        assert_eq!((plan.bins[0].scale, plan.bins[0].width, plan.bins[0].height), (4, 9, 5));
-    }
-
-    #[test]
-    fn the_shares_of_all_bins_sum_to_one() {
-        let borders = [(-7.0, 0.5), (-1.0, 3.0), (1.0, 3.0), (4.0, 0.8)];
-        let bin = |k: usize| Share::new(k.checked_sub(1).map(|k| borders[k]), borders.get(k).copied());
-        for step in -200..200 {
-            let coc_px = step as f32 * 0.1;
-            let sum: f32 = (0..=borders.len()).map(|k| bin(k).at(coc_px)).sum();
-            assert!((sum - 1.0).abs() < 1e-6);
-            assert!((0..=borders.len()).all(|k| bin(k).at(coc_px) >= 0.0));
-            assert!((0..=borders.len()).all(|k| bin(k).at(coc_px) == 0.0 || bin(k).meets((coc_px, coc_px))));
-        }
+        assert_eq!((plan.bins[0].scale, plan.bins[0].width, plan.bins[0].height), (1, 33, 17));
     }
 }

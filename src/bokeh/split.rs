@@ -1,7 +1,8 @@
 //! Where a frame's CoC is split into bins: where few pixels lie, so that a surface stays in one piece and two surfaces
 //! do not share a bin. A flat background then costs one bin, however wide the range that the lens could reach.
 
-use super::plan::{FOCUS_BORDER_PX, Rung};
+use super::plan::FOCUS_BORDER_PX;
+use super::rung::Rung;
 use crate::frame::DepthMap;
 use crate::optics::DepthCoc;
 
@@ -38,15 +39,16 @@ pub struct Counts {
     samples: u32,
 }
 
-impl Counts {
-    /// Counts of no frame.
-    pub fn new() -> Self {
+impl Default for Counts {
+    fn default() -> Self {
         Self { sides: [[0; BUCKETS]; 2], samples: 0 }
     }
+}
 
+impl Counts {
     /// Counts the pixels of a frame, on a grid that is fine enough for the statistics.
     pub fn count(&mut self, depth: &DepthMap, lens: &DepthCoc) {
-        *self = Self::new();
+        *self = Self::default();
         let (width, height) = (depth.width as usize, depth.height as usize);
         let step = (width / SAMPLES_ACROSS).max(1);
         for row in depth.metres.chunks_exact(width.max(1)).take(height).step_by(step) {
@@ -85,8 +87,8 @@ impl Counts {
         };
         // best[j][e]: least cost of buckets 0..e in j + 1 pieces, and where the last of them begins.
         let mut best = [[(f64::INFINITY, 0usize); BUCKETS + 1]; MAX_PIECES];
-        for to in first + 1..=last + 1 {
-            best[0][to] = (spread(first, to), first);
+        for (to, best) in best[0].iter_mut().enumerate().take(last + 2).skip(first + 1) {
+            *best = (spread(first, to), first);
         }
         for j in 1..bins {
             for to in first + j + 1..=last + 1 {

@@ -27,7 +27,8 @@ use team::{Shelf, Team};
 use tiles::{Survey, TILE_H, Tiles};
 use unpack::Source;
 
-use super::plan::{CELL, Compositing, MAX_BINS, Plan, SCALES};
+use super::plan::{CELL, Compositing, MAX_BINS, Plan};
+use super::rung::SCALES;
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;

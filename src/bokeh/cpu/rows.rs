@@ -32,12 +32,6 @@ impl<const CH: usize> Rows<CH> {
         self.stride * CH
     }
 
-    /// Plane `p` of row `y`, from its first pixel on.
-    #[inline(always)]
-    pub fn plane(&self, y: usize, p: usize) -> &[f32] {
-        &self.data[y * self.row_len() + p * self.stride + self.pad..][..self.stride - self.pad]
-    }
-
     /// Row `y`, all planes.
     #[inline(always)]
     pub fn row(&self, y: usize) -> &[f32] {
