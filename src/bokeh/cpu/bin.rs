@@ -1,27 +1,27 @@
-//! Pass `bin`: the picture becomes linear light, and each bin gets its share of every pixel, premultiplied and
-//! averaged down to its scale, with the coarse grid over it. One reading of the picture serves every bin.
+//! One bin in the pass `bin`: rows of the picture in, rows of the bin and of its cells out.
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 
-use pulp::{Simd, WithSimd};
+use pulp::Simd;
 
 use super::aligned::Line;
-use super::fill::{Behind, HalfRows};
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::simd::{fma, load, store};
-use super::tiles::{TILE_H, TILE_W, Tiles};
-use super::unpack::{Piece, Source};
-use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, MAX_BINS, Share};
+use super::simd::{load, store};
+use super::tent::{ShareAt, reduce, sum_row};
+use super::tiles::TILE_W;
+use super::unpack::Piece;
+use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
 
 /// Columns of the picture that are read at once.
 pub const BLOCK: usize = 4 * TILE_W;
 /// Columns beyond a block on both sides that its averages reach.
-const MARGIN: usize = 16;
-const WIDE: usize = BLOCK + 2 * MARGIN;
+pub const MARGIN: usize = 16;
+/// Columns of a block and its margins.
+pub const WIDE: usize = BLOCK + 2 * MARGIN;
 /// Values of a plane of a block: a line more than needed, as planes at multiples of 4096 bytes hinder each other.
-const PLANE: usize = BLOCK + 16;
+pub const PLANE: usize = BLOCK + 16;
 /// Planes of a sum: premultiplied colour, coverage, coverage times |CoC|.
-const SUMS: usize = 5;
+pub const SUMS: usize = 5;
 
 /// One bin's memory of a band.
 pub struct BinRows<'a> {
@@ -45,146 +45,29 @@ pub struct BinRows<'a> {
     pub filled: &'a mut [bool],
 }
 
-/// Some rows of the picture: whole rows of cells of every bin.
-pub struct Band<'a> {
-    /// The frame.
-    pub source: Source<'a>,
-    /// What is where.
-    pub tiles: &'a Tiles,
-    /// First row, and how many.
-    pub rows: std::ops::Range<usize>,
-    /// The bins to be filled, from one of the plan's on.
-    pub bins: [Option<BinRows<'a>>; MAX_BINS],
-    /// What near objects hide is left out (to be done when it is filled in), or put in.
-    pub hidden: Hidden<'a>,
-    /// Per block, whether it has to wait for the fill.
-    pub waits: &'a mut [bool],
-    /// Memory of the thread.
-    pub sums: &'a mut BandSums,
-}
-
-/// How a band treats what near objects hide.
-pub enum Hidden<'a> {
-    /// There is nothing to hide.
-    Nothing,
-    /// Bins behind wait where anything is hidden (the share is that of all of them); the pyramid's base is laid.
-    Waits(Share, HalfRows<'a>),
-    /// Blocks that waited are done, for the bins behind alone.
-    Filled(Behind<'a>),
-}
-
-/// Sums of a thread, for each bin: two rows that are being filled, and the row of cells.
-pub struct BandSums(Vec<BinSums>);
-
+/// Sums of a bin: two of its rows that are being filled, the last one done, and the row of cells.
 #[derive(Clone)]
-struct BinSums {
+pub struct BinSums {
     rows: Line<[[[f32; WIDE]; SUMS]; 2]>,
     cells: CellSums,
     means: Means,
 }
 
 /// A row of a block of the bin: the planes of a sum.
-type Means = Line<[[f32; PLANE]; SUMS]>;
+pub type Means = Line<[[f32; PLANE]; SUMS]>;
 /// The rows of a row of cells so far, column by column.
 type CellSums = Line<[[f32; PLANE]; CELL_PLANES]>;
 
-impl BandSums {
-    /// Zeros.
+impl BinSums {
+    /// Of nothing.
     pub fn new() -> Self {
-        let mut empty = BinSums {
+        let mut empty = Self {
             rows: Line([[[0.0; WIDE]; SUMS]; 2]),
             cells: Line([[0.0; PLANE]; CELL_PLANES]),
             means: Line([[0.0; PLANE]; SUMS]),
         };
         clear_cells(&mut empty.cells);
-        Self(vec![empty; MAX_BINS])
-    }
-}
-
-impl WithSimd for Band<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
-        for block in 0..self.waits.len() {
-            self.block(simd, block);
-        }
-        for bin in self.bins.iter_mut().flatten() {
-            bin.repeat_end();
-        }
-    }
-}
-
-impl Band<'_> {
-    #[inline(always)]
-    fn block<V: Simd>(&mut self, simd: V, block: usize) {
-        let columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
-        let rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
-        let (again, waits) = match &self.hidden {
-            Hidden::Nothing => (false, false),
-            Hidden::Waits(behind, _) => (false, self.tiles.lack(behind, columns.clone(), rows.clone())),
-            Hidden::Filled(_) => (true, false),
-        };
-        if again && !self.waits[block] {
-            return;
-        }
-        self.waits[block] = waits;
-        let mut active = [false; MAX_BINS];
-        let mut reach = 0;
-        for (bin, active) in self.bins.iter_mut().zip(&mut active) {
-            let Some(bin) = bin else { continue };
-            // What waits is written later, but for bins in front.
-            let front = |share: &Share| share.behind.0 <= 0.0;
-            *active = match &bin.share {
-                None => true,
-                Some(share) if waits => front(share) && self.tiles.meet(share, columns.clone(), rows.clone()),
-                Some(share) => again || self.tiles.meet(share, columns.clone(), rows.clone()),
-            };
-            if *active {
-                reach = reach.max(bin.scale as isize / 2);
-            } else if !waits || bin.share.as_ref().is_some_and(front) {
-                bin.clear(block);
-            }
-        }
-        if reach == 0 && !active.contains(&true) && !matches!(self.hidden, Hidden::Waits(..)) {
-            return;
-        }
-        let mut piece: Piece<WIDE> = Line([[0.0; WIDE]; 4]);
-        let columns = columns_of(block, self.source.color.width as usize);
-        let height = self.source.color.height as isize;
-        let (first, end) = (self.rows.start as isize, self.rows.end as isize);
-        let last = end.min((height as usize).next_multiple_of(CELL) as isize);
-        for y in first - reach..last + reach {
-            let inside = y.clamp(0, height - 1) as usize;
-            self.source.unpack::<V, WIDE>(
-                inside,
-                (block * BLOCK) as isize - MARGIN as isize,
-                columns + 2 * MARGIN,
-                &mut piece,
-            );
-            match &mut self.hidden {
-                Hidden::Nothing => {}
-                Hidden::Waits(behind, halves) => {
-                    if (first..end.min(height)).contains(&y) {
-                        halves.add(behind, block * BLOCK, MARGIN..MARGIN + columns, y as usize, &piece);
-                    }
-                }
-                Hidden::Filled(behind) => {
-                    let width = self.source.color.width as usize;
-                    behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut piece);
-                }
-            }
-            let range = range_of(&piece.0[3][..columns + 2 * MARGIN]);
-            for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
-            {
-                let Some(bin) = bin else { continue };
-                match bin.scale {
-                    1 => bin.add::<V, 1>(simd, sums, (block, columns), first, y, &piece, range),
-                    2 => bin.add::<V, 2>(simd, sums, (block, columns), first, y, &piece, range),
-                    4 => bin.add::<V, 4>(simd, sums, (block, columns), first, y, &piece, range),
-                    _ => bin.add::<V, 8>(simd, sums, (block, columns), first, y, &piece, range),
-                }
-            }
-        }
+        empty
     }
 }
 
@@ -192,23 +75,6 @@ impl Band<'_> {
 #[inline(always)]
 fn strip_row(across: usize, x: usize, row: usize) -> usize {
     (row / CELL * across + x / STRIP) * STRIP_CELLS + row % CELL * STRIP_ROW
-}
-
-/// Columns of a block that hold anything, in whole vectors of the coarsest bin.
-fn columns_of(block: usize, width: usize) -> usize {
-    (width - block * BLOCK).next_multiple_of(2 * TILE_W).min(BLOCK)
-}
-
-#[inline(always)]
-fn range_of(values: &[f32]) -> (f32, f32) {
-    let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
-    for values in values.as_chunks::<16>().0 {
-        for k in 0..16 {
-            low[k] = if values[k] < low[k] { values[k] } else { low[k] };
-            high[k] = if values[k] > high[k] { values[k] } else { high[k] };
-        }
-    }
-    (low.into_iter().fold(f32::INFINITY, f32::min), high.into_iter().fold(f32::NEG_INFINITY, f32::max))
 }
 
 /// Cells of nothing.
@@ -222,7 +88,7 @@ fn clear_cells(cells: &mut CellSums) {
 impl BinRows<'_> {
     /// Empties a block.
     #[inline(always)]
-    fn clear(&mut self, block: usize) {
+    pub fn clear(&mut self, block: usize) {
         let (x0, width) = (block * BLOCK / self.scale, BLOCK / self.scale);
         for row in 0..self.rows_of_cells() {
             let blocks = self.blocks();
@@ -247,7 +113,7 @@ impl BinRows<'_> {
     }
 
     /// Repeats the last column to the end of the last strip.
-    fn repeat_end(&mut self) {
+    pub fn repeat_end(&mut self) {
         let last = (self.size.0 - 1) % STRIP;
         for row in 0..self.rows {
             for plane in self.strip_row(self.size.0 - 1, row).as_chunks_mut::<STRIP>().0 {
@@ -268,7 +134,7 @@ impl BinRows<'_> {
     /// Adds row `y` of the picture (it may lie outside) to the bin rows of a band that begins at row `first`.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    fn add<V: Simd, const S: usize>(
+    pub fn add<V: Simd, const S: usize>(
         &mut self,
         simd: V,
         sums: &mut BinSums,
@@ -436,93 +302,6 @@ impl BinRows<'_> {
                     _ => values.fold(-NO_COLOR, f32::max),
                 };
             }
-        }
-    }
-}
-
-/// Adds a row's shares to two rows of sums.
-#[inline(always)]
-fn sum_row<S: Simd>(
-    simd: S,
-    share: &ShareAt<S>,
-    piece: &Piece<WIDE>,
-    columns: usize,
-    weights: [f32; 2],
-    above: &mut [[f32; WIDE]; SUMS],
-    below: &mut [[f32; WIDE]; SUMS],
-) {
-    let weights = weights.map(|weight| simd.splat_f32s(weight));
-    for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
-        let values = share.of(simd, piece, x);
-        for p in 0..SUMS {
-            let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
-            store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
-            store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], sums[1]));
-        }
-    }
-}
-
-/// A share, ready for vectors.
-struct ShareAt<S: Simd> {
-    steps: Option<[[S::f32s; 2]; 2]>,
-}
-
-impl<S: Simd> ShareAt<S> {
-    #[inline(always)]
-    fn new(simd: S, share: &Option<Share>) -> Self {
-        // A step at `at` of a slope: slope c + (1/2 - slope at).
-        let step = |(at, slope): (f32, f32)| [simd.splat_f32s(slope), simd.splat_f32s(0.5 - slope * at)];
-        Self { steps: share.as_ref().map(|share| [step(share.front), step(share.behind)]) }
-    }
-
-    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels.
-    #[inline(always)]
-    fn of(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
-        let [r, g, b, coc] = piece.0.each_ref().map(|plane| load::<S>(plane, x));
-        let [zero, one] = [0.0, 1.0].map(|value| simd.splat_f32s(value));
-        let share = match &self.steps {
-            None => one,
-            Some(steps) => {
-                let at = |[slope, offset]: [S::f32s; 2]| {
-                    simd.min_f32s(simd.max_f32s(fma(simd, coc, slope, offset), zero), one)
-                };
-                simd.sub_f32s(at(steps[0]), at(steps[1]))
-            }
-        };
-        let by = |value| simd.mul_f32s(share, value);
-        [by(r), by(g), by(b), share, by(simd.abs_f32s(coc))]
-    }
-}
-
-/// The tent across: a row of sums at the bin's scale.
-#[inline(always)]
-fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], columns: usize, means: &mut Means) {
-    // The ascending half of the tent, and the descending one, as often as they fit.
-    let ramp: [f32; BLOCK] = const {
-        let mut ramp = [0.0; BLOCK];
-        let mut k = 0;
-        while k < BLOCK {
-            ramp[k] = ((k % S) as f32 + 0.5) / (S * S) as f32;
-            k += 1;
-        }
-        ramp
-    };
-    let (rise, fall) = (load::<V>(&ramp, 0), {
-        let mut fall = [0.0; BLOCK];
-        for k in 0..V::F32_LANES {
-            fall[k] = 1.0 / S as f32 - ramp[k];
-        }
-        load::<V>(&fall, 0)
-    });
-    let mut weighed = Line([0.0f32; BLOCK]);
-    for (mean, sum) in means.0.iter_mut().zip(sums) {
-        let start = MARGIN - S / 2;
-        for x in (0..columns).step_by(V::F32_LANES) {
-            let (before, after) = (load::<V>(sum, start + x), load::<V>(sum, start + S + x));
-            store::<V>(&mut weighed.0, x, fma(simd, after, fall, simd.mul_f32s(before, rise)));
-        }
-        for (mean, group) in mean[..columns / S].iter_mut().zip(weighed.0.as_chunks::<S>().0) {
-            *mean = group.iter().sum();
         }
     }
 }

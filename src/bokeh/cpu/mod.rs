@@ -1,6 +1,7 @@
 //! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per frame.
 
 mod aligned;
+mod band;
 mod bin;
 mod blur;
 mod composite;
@@ -12,13 +13,15 @@ mod rows;
 mod shelves;
 mod simd;
 mod team;
+mod tent;
 mod tiles;
 mod unpack;
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use bin::{BLOCK, Band, BandSums, Hidden};
+use band::{Band, BandSums, Hidden};
+use bin::BLOCK;
 use blur::{Scratch, Strip};
 use pulp::Arch;
 use rows::{Rows, Slot};

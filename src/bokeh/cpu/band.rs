@@ -1,0 +1,153 @@
+//! Pass `bin`: the picture becomes linear light, and each bin gets its share of every pixel, premultiplied and
+//! averaged down to its scale, with the coarse grid over it. One reading of the picture serves every bin.
+
+use pulp::{Simd, WithSimd};
+
+use super::aligned::Line;
+use super::bin::{BLOCK, BinRows, BinSums, MARGIN, WIDE};
+use super::fill::{Behind, HalfRows};
+use super::tiles::{TILE_H, TILE_W, Tiles};
+use super::unpack::{Piece, Source};
+use crate::bokeh::plan::{CELL, MAX_BINS, Share};
+
+/// Some rows of the picture: whole rows of cells of every bin.
+pub struct Band<'a> {
+    /// The frame.
+    pub source: Source<'a>,
+    /// What is where.
+    pub tiles: &'a Tiles,
+    /// First row, and how many.
+    pub rows: std::ops::Range<usize>,
+    /// The bins to be filled, from one of the plan's on.
+    pub bins: [Option<BinRows<'a>>; MAX_BINS],
+    /// What near objects hide is left out (to be done when it is filled in), or put in.
+    pub hidden: Hidden<'a>,
+    /// Per block, whether it has to wait for the fill.
+    pub waits: &'a mut [bool],
+    /// Memory of the thread.
+    pub sums: &'a mut BandSums,
+}
+
+/// How a band treats what near objects hide.
+pub enum Hidden<'a> {
+    /// There is nothing to hide.
+    Nothing,
+    /// Bins behind wait where anything is hidden (the share is that of all of them); the pyramid's base is laid.
+    Waits(Share, HalfRows<'a>),
+    /// Blocks that waited are done, for the bins behind alone.
+    Filled(Behind<'a>),
+}
+
+/// Sums of a thread, for each bin.
+pub struct BandSums(Vec<BinSums>);
+
+impl BandSums {
+    /// Of nothing.
+    pub fn new() -> Self {
+        Self(vec![BinSums::new(); MAX_BINS])
+    }
+}
+
+impl WithSimd for Band<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        for block in 0..self.waits.len() {
+            self.block(simd, block);
+        }
+        for bin in self.bins.iter_mut().flatten() {
+            bin.repeat_end();
+        }
+    }
+}
+
+impl Band<'_> {
+    #[inline(always)]
+    fn block<V: Simd>(&mut self, simd: V, block: usize) {
+        let columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
+        let rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
+        let (again, waits) = match &self.hidden {
+            Hidden::Nothing => (false, false),
+            Hidden::Waits(behind, _) => (false, self.tiles.lack(behind, columns.clone(), rows.clone())),
+            Hidden::Filled(_) => (true, false),
+        };
+        if again && !self.waits[block] {
+            return;
+        }
+        self.waits[block] = waits;
+        let mut active = [false; MAX_BINS];
+        let mut reach = 0;
+        for (bin, active) in self.bins.iter_mut().zip(&mut active) {
+            let Some(bin) = bin else { continue };
+            // What waits is written later, but for bins in front.
+            let front = |share: &Share| share.behind.0 <= 0.0;
+            *active = match &bin.share {
+                None => true,
+                Some(share) if waits => front(share) && self.tiles.meet(share, columns.clone(), rows.clone()),
+                Some(share) => again || self.tiles.meet(share, columns.clone(), rows.clone()),
+            };
+            if *active {
+                reach = reach.max(bin.scale as isize / 2);
+            } else if !waits || bin.share.as_ref().is_some_and(front) {
+                bin.clear(block);
+            }
+        }
+        if reach == 0 && !active.contains(&true) && !matches!(self.hidden, Hidden::Waits(..)) {
+            return;
+        }
+        let mut piece: Piece<WIDE> = Line([[0.0; WIDE]; 4]);
+        let columns = columns_of(block, self.source.color.width as usize);
+        let height = self.source.color.height as isize;
+        let (first, end) = (self.rows.start as isize, self.rows.end as isize);
+        let last = end.min((height as usize).next_multiple_of(CELL) as isize);
+        for y in first - reach..last + reach {
+            let inside = y.clamp(0, height - 1) as usize;
+            self.source.unpack::<V, WIDE>(
+                inside,
+                (block * BLOCK) as isize - MARGIN as isize,
+                columns + 2 * MARGIN,
+                &mut piece,
+            );
+            match &mut self.hidden {
+                Hidden::Nothing => {}
+                Hidden::Waits(behind, halves) => {
+                    if (first..end.min(height)).contains(&y) {
+                        halves.add(behind, block * BLOCK, MARGIN..MARGIN + columns, y as usize, &piece);
+                    }
+                }
+                Hidden::Filled(behind) => {
+                    let width = self.source.color.width as usize;
+                    behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut piece);
+                }
+            }
+            let range = range_of(&piece.0[3][..columns + 2 * MARGIN]);
+            for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
+            {
+                let Some(bin) = bin else { continue };
+                match bin.scale {
+                    1 => bin.add::<V, 1>(simd, sums, (block, columns), first, y, &piece, range),
+                    2 => bin.add::<V, 2>(simd, sums, (block, columns), first, y, &piece, range),
+                    4 => bin.add::<V, 4>(simd, sums, (block, columns), first, y, &piece, range),
+                    _ => bin.add::<V, 8>(simd, sums, (block, columns), first, y, &piece, range),
+                }
+            }
+        }
+    }
+}
+
+/// Columns of a block that hold anything, in whole vectors of the coarsest bin.
+fn columns_of(block: usize, width: usize) -> usize {
+    (width - block * BLOCK).next_multiple_of(2 * TILE_W).min(BLOCK)
+}
+
+#[inline(always)]
+fn range_of(values: &[f32]) -> (f32, f32) {
+    let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
+    for values in values.as_chunks::<16>().0 {
+        for k in 0..16 {
+            low[k] = if values[k] < low[k] { values[k] } else { low[k] };
+            high[k] = if values[k] > high[k] { values[k] } else { high[k] };
+        }
+    }
+    (low.into_iter().fold(f32::INFINITY, f32::min), high.into_iter().fold(f32::NEG_INFINITY, f32::max))
+}

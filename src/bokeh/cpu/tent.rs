@@ -1,0 +1,97 @@
+//! Shares of a row of pixels, and the tent that averages them down: twice as wide as a pixel of the bin, so that
+//! reducing a picture keeps its centroid.
+
+use pulp::Simd;
+
+use super::aligned::Line;
+use super::bin::{BLOCK, MARGIN, Means, SUMS, WIDE};
+use super::simd::{fma, load, store};
+use super::unpack::Piece;
+use crate::bokeh::plan::Share;
+
+/// Adds a row's shares to two rows of sums.
+#[inline(always)]
+pub fn sum_row<S: Simd>(
+    simd: S,
+    share: &ShareAt<S>,
+    piece: &Piece<WIDE>,
+    columns: usize,
+    weights: [f32; 2],
+    above: &mut [[f32; WIDE]; SUMS],
+    below: &mut [[f32; WIDE]; SUMS],
+) {
+    let weights = weights.map(|weight| simd.splat_f32s(weight));
+    for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
+        let values = share.of(simd, piece, x);
+        for p in 0..SUMS {
+            let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
+            store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
+            store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], sums[1]));
+        }
+    }
+}
+
+/// A share, ready for vectors.
+pub struct ShareAt<S: Simd> {
+    steps: Option<[[S::f32s; 2]; 2]>,
+}
+
+impl<S: Simd> ShareAt<S> {
+    #[inline(always)]
+    pub fn new(simd: S, share: &Option<Share>) -> Self {
+        // A step at `at` of a slope: slope c + (1/2 - slope at).
+        let step = |(at, slope): (f32, f32)| [simd.splat_f32s(slope), simd.splat_f32s(0.5 - slope * at)];
+        Self { steps: share.as_ref().map(|share| [step(share.front), step(share.behind)]) }
+    }
+
+    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels.
+    #[inline(always)]
+    pub fn of(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
+        let [r, g, b, coc] = piece.0.each_ref().map(|plane| load::<S>(plane, x));
+        let [zero, one] = [0.0, 1.0].map(|value| simd.splat_f32s(value));
+        let share = match &self.steps {
+            None => one,
+            Some(steps) => {
+                let at = |[slope, offset]: [S::f32s; 2]| {
+                    simd.min_f32s(simd.max_f32s(fma(simd, coc, slope, offset), zero), one)
+                };
+                simd.sub_f32s(at(steps[0]), at(steps[1]))
+            }
+        };
+        let by = |value| simd.mul_f32s(share, value);
+        [by(r), by(g), by(b), share, by(simd.abs_f32s(coc))]
+    }
+}
+
+/// The tent across: a row of sums at the bin's scale.
+#[inline(always)]
+pub fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], columns: usize, means: &mut Means) {
+    // The ascending half of the tent, and the descending one, as often as they fit.
+    let ramp: [f32; BLOCK] = const {
+        let mut ramp = [0.0; BLOCK];
+        let mut k = 0;
+        while k < BLOCK {
+            ramp[k] = ((k % S) as f32 + 0.5) / (S * S) as f32;
+            k += 1;
+        }
+        ramp
+    };
+    let (rise, fall) = (load::<V>(&ramp, 0), {
+        let mut fall = [0.0; BLOCK];
+        for k in 0..V::F32_LANES {
+            fall[k] = 1.0 / S as f32 - ramp[k];
+        }
+        load::<V>(&fall, 0)
+    });
+    let mut weighed = Line([0.0f32; BLOCK]);
+    for (mean, sum) in means.0.iter_mut().zip(sums) {
+        let start = MARGIN - S / 2;
+        for x in (0..columns).step_by(V::F32_LANES) {
+            let (before, after) = (load::<V>(sum, start + x), load::<V>(sum, start + S + x));
+            store::<V>(&mut weighed.0, x, fma(simd, after, fall, simd.mul_f32s(before, rise)));
+        }
+        for (mean, group) in mean[..columns / S].iter_mut().zip(weighed.0.as_chunks::<S>().0) {
+            *mean = group.iter().sum();
+        }
+    }
+}
