@@ -1,23 +1,9 @@
-// Pass fill: in the scene, near objects and the mixed pixels around them become what lies behind.
+// Pass fill: in the scene, near objects become what lies behind.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> hidden: array<f32>;
-@group(0) @binding(2) var<storage, read> pyramid: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read_write> scene: array<vec2<u32>>;
-@group(0) @binding(4) var<storage, read_write> ranges: array<vec2<f32>>;
-
-fn hidden_around(at: vec2<u32>) -> f32 {
-    let size = (frame.size + 1u) / 2u;
-    let first = at - min(at, vec2(1u));
-    let last = min(at + 1u, size - 1u);
-    var most = 0.0;
-    for (var y = first.y; y <= last.y; y++) {
-        for (var x = first.x; x <= last.x; x++) {
-            most = max(most, hidden[y * size.x + x]);
-        }
-    }
-    return most;
-}
+@group(0) @binding(1) var<storage, read> pyramid: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read_write> scene: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> ranges: array<vec2<f32>>;
 
 @compute @workgroup_size(16, 16)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
@@ -28,9 +14,11 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
         atomicStore(&highest, key_of(ranges[index].y));
     }
     workgroupBarrier();
-    let hidden = hidden_around(id.xy / 2u);
+    // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
+    let inside = min(id.xy, frame.size - 1u);
+    let own = scene_unpacked(scene[inside.y * frame.size.x + inside.x], frame.most_px);
+    let hidden = 1.0 - step_at(frame.unhidden, own.w);
     if all(id.xy < frame.size) && hidden > 0.0 {
-        let own = scene_unpacked(scene[id.y * frame.size.x + id.x], frame.most_px);
         let value = mix(own, pyramid[id.y / 2u * ((frame.size.x + 1u) / 2u) + id.x / 2u], hidden);
         let filled = scene_packed(value.rgb, max(value.w, frame.nearest_px), frame.most_px);
         scene[id.y * frame.size.x + id.x] = filled;

@@ -282,7 +282,7 @@ impl Plan {
 /// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
 const HAND_OVER: f32 = 0.15;
 /// What has this many times the CoC of the near bins' border, or more, hides what is behind it.
-const HIDDEN_FROM: f32 = 2.0;
+const HIDDEN_FROM: f32 = 1.5;
 /// The smallest CoC at which a bin of its own begins, in pixels.
 pub const FOCUS_BORDER_PX: f32 = 1.0;
 

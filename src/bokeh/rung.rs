@@ -47,7 +47,7 @@ pub fn rung(quality: Quality) -> Rung {
     match quality {
         Quality::Draft => rung(2, 2, 2.5, [3.0, 8.0, 20.0], false, (2, 6.0)),
         Quality::Fast => rung(2, 2, 2.5, [3.0, 8.0, 20.0], true, (3, 9.0)),
-        Quality::Balanced => rung(3, 3, 2.0, [3.5, 12.0, 28.0], true, (4, 36.0)),
+        Quality::Balanced => rung(3, 3, 2.0, [3.5, 18.0, 40.0], true, (4, 36.0)),
         Quality::High => rung(4, 4, 1.5, [5.0, 20.0, 48.0], true, (4, 48.0)),
         Quality::Best => rung(4, 6, 1.0, [8.0, 32.0, 80.0], true, (6, 96.0)),
     }

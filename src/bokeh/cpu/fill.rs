@@ -52,7 +52,7 @@ pub struct HalfRows<'a> {
 #[derive(Clone, Copy)]
 pub struct Behind<'a> {
     level: &'a Level,
-    around: &'a [f32],
+    unhidden: Share,
     nearest_px: f32,
 }
 
@@ -113,9 +113,9 @@ impl Pyramid {
         }
     }
 
-    /// What lies behind near objects; no CoC of it is below `nearest_px`.
-    pub fn behind(&self, nearest_px: f32) -> Behind<'_> {
-        Behind { level: &self.levels[0], around: &self.around, nearest_px }
+    /// What lies behind near objects, as far as a pixel is not `unhidden`; no CoC of it is below `nearest_px`.
+    pub fn behind(&self, unhidden: Share, nearest_px: f32) -> Behind<'_> {
+        Behind { level: &self.levels[0], unhidden, nearest_px }
     }
 
     /// Known is what nothing near touches, nor its neighbours.
@@ -199,14 +199,15 @@ impl Behind<'_> {
     /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
     #[inline(always)]
     pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, piece: &mut Piece<W>) {
-        let around = &self.around[y / 2 * self.level.width..][..self.level.width];
         let row = self.level.rows.row(y / 2);
         let [red, green, blue, coc] = &mut piece.0;
         for x in 0..W {
-            let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
-            if around[half] > 0.0 {
+            // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
+            let hidden = 1.0 - self.unhidden.at(coc[x]);
+            if hidden > 0.0 {
+                let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
                 let fill = |p: usize| row[p * self.level.rows.stride + half];
-                let mix = |own: f32, p: usize| own + (fill(p) - own) * around[half];
+                let mix = |own: f32, p: usize| own + (fill(p) - own) * hidden;
                 (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
                 coc[x] = mix(coc[x], 3).max(self.nearest_px);
             }

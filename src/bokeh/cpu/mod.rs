@@ -219,7 +219,7 @@ impl CpuBokeh {
         let behind = plan.unhidden();
         let nearest_px = plan.nearest_behind_px();
         let (base, filled) = match self.pyramid.as_mut().filter(|_| fills) {
-            Some(pyramid) if again => (None, Some(pyramid.behind(nearest_px))),
+            Some(pyramid) if again => (None, Some(pyramid.behind(behind, nearest_px))),
             Some(pyramid) => (Some(pyramid.base(rows)), None),
             None => (None, None),
         };
