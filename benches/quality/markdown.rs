@@ -23,7 +23,7 @@ pub fn markdown(results: &Results) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = tables(results, &mut text);
-    for method in [BALANCED, BEST] {
+    for method in [BALANCED, BEST, Method::Refined] {
         let _ = verdict(results, method, &mut text);
     }
     text
@@ -42,14 +42,14 @@ fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
             continue;
         }
         writeln!(text, "## {title}\n\nEach cell: PSNR dB / edge dB / SSIM / FLIP.\n")?;
-        writeln!(text, "| scene | gather | best rival | balanced | best |\n|---|---|---|---|---|")?;
+        writeln!(text, "| scene | gather | best rival | balanced | best | refined |\n|---|---|---|---|---|---|")?;
         for &case in &cases {
             let rival = results.best_rival(case);
             let scene = case.1.map_or(case.0.to_owned(), |damage| format!("{}, {damage}", case.0));
             let rival = rival.map_or("-".to_owned(), |rival| format!("{} ({})", cell(Some(rival)), rival.method));
-            let [gather, balanced, best] =
-                [Method::Gather, BALANCED, BEST].map(|method| cell(results.of(case, method)));
-            writeln!(text, "| {scene} | {gather} | {rival} | {balanced} | {best} |")?;
+            let [gather, balanced, best, refined] =
+                [Method::Gather, BALANCED, BEST, Method::Refined].map(|method| cell(results.of(case, method)));
+            writeln!(text, "| {scene} | {gather} | {rival} | {balanced} | {best} | {refined} |")?;
         }
         let mean = |of: &dyn Fn(Case) -> Option<Record>| {
             let records: Vec<Record> = cases.iter().filter_map(|&case| of(case)).collect();
@@ -57,7 +57,8 @@ fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
         };
         let of = |method| mean(&|case| results.of(case, method).cloned());
         let rival = mean(&|case| results.best_rival(case).cloned());
-        writeln!(text, "| **mean** | {} | {rival} | {} | {} |\n", of(Method::Gather), of(BALANCED), of(BEST))?;
+        let [gather, balanced, best, refined] = [Method::Gather, BALANCED, BEST, Method::Refined].map(of);
+        writeln!(text, "| **mean** | {gather} | {rival} | {balanced} | {best} | {refined} |\n")?;
         writeln!(text, "| method, mean | PSNR / edge / SSIM / FLIP |\n|---|---|")?;
         for method in Method::all() {
             writeln!(text, "| {method} | {} |", of(method))?;

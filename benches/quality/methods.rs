@@ -5,7 +5,7 @@ use std::fmt;
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Effect, Job, Rank, Settings};
 use bokehcam::budget::Quality;
-use bokehcam::depth::fill::Filler;
+use bokehcam::depth::{fill::Filler, refine::Refiner};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::{CocField, DepthCoc};
@@ -35,8 +35,10 @@ pub enum Method {
     Scatter,
     /// See [`rivals::gaussian`].
     Gaussian,
-    /// This crate's layers.
+    /// This crate's layers, by default on the depth map as it is but for its holes.
     Layered(Quality),
+    /// This crate's layers at the default quality, on depth that was refined first: what a recording gets.
+    Refined,
 }
 
 impl Method {
@@ -44,7 +46,7 @@ impl Method {
     pub fn all() -> Vec<Method> {
         use Method::{Gather, Gather3, Gaussian, GoldenAngle, NearFocusFar, None, Scatter};
         let others = [None, Gaussian, Gather3, Gather, NearFocusFar, GoldenAngle, Scatter];
-        others.into_iter().chain(Quality::ALL.map(Method::Layered)).collect()
+        others.into_iter().chain(Quality::ALL.map(Method::Layered)).chain([Method::Refined]).collect()
     }
 
     /// As on the command line.
@@ -58,12 +60,13 @@ impl Method {
             Method::Scatter => "scatter",
             Method::Gaussian => "gaussian",
             Method::Layered(quality) => quality.name(),
+            Method::Refined => "refined",
         }
     }
 
     /// Whether it competes with the layers.
     pub fn is_rival(self) -> bool {
-        !matches!(self, Method::None | Method::Layered(_))
+        !matches!(self, Method::None | Method::Layered(_) | Method::Refined)
     }
 }
 
@@ -106,7 +109,12 @@ pub struct Blurrer {
     method: Method,
     bokeh: Option<Box<dyn Bokeh>>,
     filler: Filler,
+    refiner: Refiner,
+    time_ns: u64,
 }
+
+/// Time between two frames.
+const PERIOD_NS: u64 = 33_333_333;
 
 impl Blurrer {
     /// A method for shots like this one.
@@ -118,7 +126,8 @@ impl Blurrer {
             Method::Gather => (bokeh::Method::Gather, Some(Rank::Full), 0.0, Quality::Best),
             Method::Gather3 => (bokeh::Method::Gather, Some(Rank::Terms(3)), 0.0, Quality::Best),
             Method::Layered(quality) => (bokeh::Method::Layered, None, RIM, quality),
-            _ => return Ok(Self { method, bokeh: None, filler: Filler::new() }),
+            Method::Refined => (bokeh::Method::Layered, None, RIM, Quality::default()),
+            _ => return Ok(Self::of(method, None)),
         };
         let settings = Settings {
             effect: Effect::Dof,
@@ -132,7 +141,11 @@ impl Blurrer {
             near_max_px: shot.lens.max_coc_px,
         };
         let bokeh = bokeh::create(&settings, shot.image.size(), Backend::Cpu, None, None)?;
-        Ok(Self { method, bokeh: Some(bokeh), filler: Filler::new() })
+        Ok(Self::of(method, Some(bokeh)))
+    }
+
+    fn of(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
+        Self { method, bokeh, filler: Filler::new(), refiner: Refiner::new(), time_ns: 0 }
     }
 
     /// The blurred picture.
@@ -157,6 +170,12 @@ impl Blurrer {
             Method::Layered(_) => {
                 let mut depth = shot.depth.clone();
                 self.filler.fill_by(&mut depth, &shot.image);
+                self.run(shot, depth)
+            }
+            Method::Refined => {
+                let mut depth = shot.depth.clone();
+                self.refiner.refine(&mut depth, &shot.image, self.time_ns);
+                self.time_ns += PERIOD_NS;
                 self.run(shot, depth)
             }
         }
