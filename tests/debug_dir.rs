@@ -159,6 +159,18 @@ fn pictures_of_light_are_encoded_as_the_result_is() {
 }
 
 #[test]
+fn what_is_in_focus_all_over_is_still_and_stays_bit_for_bit() {
+    let still = Still::new();
+    let depth = still.path("plane.png");
+    image::ImageBuffer::from_pixel(96, 56, image::Luma([5000u16])).save(&depth).unwrap();
+    let (code, error) = still.render("within", &["--depth-map", &depth, "--focus", "1"]);
+    assert_eq!(code, 0, "{error}");
+    assert_eq!(still.plan("within")["still_share"], 1.0);
+    assert!(still.picture("within/still.png").iter().all(|&value| value == 255));
+    assert!(still.picture("out.png") == still.picture("recording/rgb/000000.png"));
+}
+
+#[test]
 fn methods_without_bins_have_what_there_is() {
     let still = Still::new();
     let found = |dir: &str, (code, error): (i32, String)| {
