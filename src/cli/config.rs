@@ -5,7 +5,7 @@ use super::error::CliError;
 use super::options;
 use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Refine, Tilt};
 use crate::bokeh::aperture::Aperture;
-use crate::bokeh::{self, Backend, Bokeh};
+use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
 use crate::optics::{CocField, Lens, Ramp};
@@ -206,6 +206,18 @@ impl Executor {
     /// There is no such GPU.
     pub fn create(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, CliError> {
         Ok(bokeh::create(settings, size, self.backend, self.adapter.as_deref(), self.threads)?)
+    }
+
+    /// The CPU executor, which can be looked into.
+    ///
+    /// # Errors
+    /// A GPU was asked for.
+    pub fn create_open(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<CpuBokeh, CliError> {
+        if self.backend == Backend::Gpu || self.adapter.is_some() {
+            let text = "--debug-dir looks into the CPU executor: leave --backend gpu and --adapter out";
+            return Err(CliError::Usage(text.to_string()));
+        }
+        Ok(CpuBokeh::new(Plan::new(settings, size.0, size.1), self.threads))
     }
 }
 

@@ -5,6 +5,8 @@ mod aperture_plot;
 mod aperture_sheet;
 mod bench;
 mod config;
+mod debug;
+mod debug_pictures;
 mod defaults;
 mod dump;
 mod error;

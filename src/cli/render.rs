@@ -7,7 +7,7 @@ use clap::Args;
 use super::config::{Blur, Executor};
 use super::error::CliError;
 use super::files::refuse_overwrite;
-use super::{options, terminal};
+use super::{debug, options, terminal};
 use crate::bokeh::{BokehError, Job};
 use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
 use crate::frame::{ColorImage, DepthMap};
@@ -23,7 +23,8 @@ Examples:
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png
   bokehcam render photo.jpg --depth-map depth.pfm --focus 0.5,0.4 --aperture polygon:6 --out portrait.png
   bokehcam render photo.jpg --effect tilt-shift --tilt 0.6:0.1:10 --out small-world.png
-  bokehcam render photo.jpg --effect blur --coc-at-infinity 12 --aperture heart --out hearts.png")]
+  bokehcam render photo.jpg --effect blur --coc-at-infinity 12 --aperture heart --out hearts.png
+  bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/")]
 pub struct RenderCommand {
     /// The picture, PNG or JPEG
     image: PathBuf,
@@ -33,6 +34,10 @@ pub struct RenderCommand {
     /// Where the result goes, .png or .jpg
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Write every intermediate of the blur into this folder: the CoC, each bin before and after its filters, what
+    /// near objects hide, as PNG, and plan.json (CPU executor)
+    #[arg(long, value_name = "DIR")]
+    debug_dir: Option<PathBuf>,
     #[command(flatten)]
     blur: options::Blur,
     #[command(flatten)]
@@ -50,13 +55,18 @@ pub struct RenderCommand {
 /// # Errors
 /// A picture cannot be read or written, the options do not fit it, or the blur failed.
 pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliError> {
-    refuse_overwrite([command.out.as_path()], command.output.force)?;
+    let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
+    refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
     let color = still::read_color(&command.image)?;
     let read_depth =
         |file: &PathBuf| still::read_depth(file, command.depth.depth_scale, Some(command.depth.depth_invalid));
     let depth = command.depth_map.as_ref().map(read_depth).transpose()?;
     let blur = Blur::resolve(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
-    let (result, by) = blurred(color, depth, &blur, &Executor::of(&command.computing))?;
+    let executor = Executor::of(&command.computing);
+    let (result, by) = match &command.debug_dir {
+        Some(dir) => debug::blurred(color, depth, &blur, &executor, (dir, command.output.force))?,
+        None => blurred(color, depth, &blur, &executor)?,
+    };
     still::write_color(&command.out, &result, command.output.force)?;
     if !global.quiet {
         terminal::say(&format!("{}: written ({by})", command.out.display()));

@@ -36,7 +36,7 @@ use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
-pub use unpack::{linear_to_srgb, srgb_to_linear};
+pub use unpack::{compress, expand, linear_to_srgb, luminance, srgb_to_linear};
 
 /// Runs a plan on the CPU.
 pub struct CpuBokeh {

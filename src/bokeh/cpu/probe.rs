@@ -1,12 +1,20 @@
-//! What the passes leave behind, for comparing the executors pass by pass.
+//! What the passes leave behind, for comparing the executors pass by pass and for looking at a blur from within.
 
 use super::CpuBokeh;
+use super::aligned::Line;
 use super::rows::STRIP;
 use super::tiles::{TILE_H, TILE_W};
+use super::unpack::{Piece, Source};
 use crate::bokeh::Probe;
+use crate::bokeh::plan::{Plan, SEGMENT};
+use crate::frame::{ColorImage, DepthMap};
+use crate::optics::CocField;
+
+/// Pixels of a row that are unpacked at once.
+const SPAN: usize = 64;
 
 impl CpuBokeh {
-    /// The result of a pass over the last frame, in the layout that [`Probe`] states. Allocates; for tests.
+    /// The result of a pass over the last frame, in the layout that [`Probe`] states. Allocates; not for every frame.
     pub fn probe(&self, probe: Probe) -> Vec<[f32; 4]> {
         match probe {
             Probe::Bin(k) => {
@@ -27,6 +35,66 @@ impl CpuBokeh {
                 (0..bin.height).flat_map(pixels).map(at).collect()
             }
         }
+    }
+
+    /// The plan, with the bins of the last frame.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The radius that every pixel of bin `k` was filtered with in the last frame, in bin pixels.
+    pub fn radius_px(&self, k: usize) -> Vec<f32> {
+        let bin = &self.plan.bins[k];
+        let edges = &self.slots[bin.slot].edges;
+        let mut radii = Vec::with_capacity(bin.width * bin.height);
+        for y in 0..bin.height {
+            for strip in 0..bin.width.div_ceil(STRIP) {
+                let edges = edges.at(strip, y);
+                radii.extend((0..STRIP.min(bin.width - strip * STRIP)).map(|x| {
+                    let (left, right) = (edges[x / SEGMENT][0], edges[x / SEGMENT + 1][0]);
+                    left + (right - left) * ((x % SEGMENT) as f32 + 0.5) / SEGMENT as f32
+                }));
+            }
+        }
+        radii
+    }
+
+    /// A frame as the bins take it, per pixel: linear r, g, b with highlights expanded, and CoC. With `filled`, which
+    /// has to be the last frame, what near objects hide is filled in, as for the bins behind them.
+    pub fn scene(&self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField, filled: bool) -> Vec<[f32; 4]> {
+        let (width, height) = (color.width as usize, color.height as usize);
+        let source = Source { color, depth, coc, expansion: self.plan.expansion };
+        let pyramid = self.pyramid.as_ref().filter(|_| filled && self.filled());
+        let behind = pyramid.map(|pyramid| pyramid.behind(self.plan.nearest_behind_px()));
+        let mut piece: Piece<SPAN> = Line([[0.0; SPAN]; 4]);
+        let mut scene = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x0 in (0..width).step_by(SPAN) {
+                source.unpack::<pulp::Scalar, SPAN>(y, x0 as isize, SPAN, &mut piece);
+                if let Some(behind) = &behind {
+                    behind.put(x0 as isize, y, width, &mut piece);
+                }
+                let planes = &piece.0;
+                scene.extend((0..SPAN.min(width - x0)).map(|x| planes.each_ref().map(|plane| plane[x])));
+            }
+        }
+        scene
+    }
+
+    /// Whether something in the last frame was in front, and what it hides was filled in.
+    pub fn filled(&self) -> bool {
+        self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near)
+    }
+
+    /// How far a pixel of the last frame, which was [`filled`](Self::filled), was replaced for the bins behind, 0 to 1.
+    pub fn hidden(&self, (x, y): (usize, usize)) -> f32 {
+        self.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.behind(0.0).hidden(x, y))
+    }
+
+    /// Whether a pixel of the last frame lies in a tile where nothing behind is blurred: unless something in front
+    /// reaches it, it stays as it is.
+    pub fn is_still(&self, (x, y): (usize, usize)) -> bool {
+        self.tiles.still[y / TILE_H * self.tiles.across + x / TILE_W]
     }
 
     /// Whether anything in the last frame belonged to bin `k`; if not, its passes were left out.
