@@ -179,7 +179,7 @@ impl Inside {
             self.add("behind_coc", coc(width, behind.iter().map(|pixel| pixel[3]), full_px));
             behind.iter_mut().for_each(|pixel| pixel[3] = 1.0);
             self.add("behind", light(width, &behind, plan.expansion, 1));
-            self.add("hidden", grey(width, (0..scene.len()).map(|k| bokeh.hidden(of_pixels(k))), 1.0));
+            self.add("hidden", grey(width, coc_px.iter().map(|&coc_px| bokeh.hidden(coc_px)), 1.0));
         }
         for (k, bin) in plan.bins.iter().enumerate() {
             self.look_at(bokeh, k, bin);

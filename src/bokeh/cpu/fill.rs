@@ -196,11 +196,6 @@ impl HalfRows<'_> {
 }
 
 impl Behind<'_> {
-    /// How far a pixel of the picture is replaced.
-    pub fn hidden(&self, x: usize, y: usize) -> f32 {
-        self.around[y / 2 * self.level.width + x / 2]
-    }
-
     /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
     #[inline(always)]
     pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, piece: &mut Piece<W>) {

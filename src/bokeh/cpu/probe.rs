@@ -65,7 +65,7 @@ impl CpuBokeh {
         let (width, height) = (color.width as usize, color.height as usize);
         let source = Source { color, depth, coc, expansion: self.plan.expansion };
         let pyramid = self.pyramid.as_ref().filter(|_| filled && self.filled());
-        let behind = pyramid.map(|pyramid| pyramid.behind(self.plan.nearest_behind_px()));
+        let behind = pyramid.map(|pyramid| pyramid.behind(self.plan.unhidden(), self.plan.nearest_behind_px()));
         let mut piece: Piece<SPAN> = Line([[0.0; SPAN]; 4]);
         let mut scene = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -86,9 +86,10 @@ impl CpuBokeh {
         self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near)
     }
 
-    /// How far a pixel of the last frame, which was [`filled`](Self::filled), was replaced for the bins behind, 0 to 1.
-    pub fn hidden(&self, (x, y): (usize, usize)) -> f32 {
-        self.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.behind(0.0).hidden(x, y))
+    /// How far a pixel of this CoC in the last frame, which was [`filled`](Self::filled), was replaced for the bins
+    /// behind, 0 to 1.
+    pub fn hidden(&self, coc_px: f32) -> f32 {
+        1.0 - self.plan.unhidden().at(coc_px)
     }
 
     /// Whether a pixel of the last frame lies in a tile where nothing behind is blurred: unless something in front
