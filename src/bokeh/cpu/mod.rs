@@ -6,6 +6,7 @@ mod bin;
 mod blur;
 mod composite;
 mod fill;
+mod filter;
 mod gather;
 mod probe;
 mod reach;
@@ -275,6 +276,7 @@ impl CpuBokeh {
                 cells: shelf.cells,
                 edges: shelf.edges,
                 bank: &plan.bank,
+                whole: plan.compositing != Compositing::Layers,
                 turned: bin.near,
                 reach: plan.bank.node_reach[plan.bank.node(bin.max_radius_px)] as usize,
                 strip,

@@ -1,0 +1,195 @@
+//! The filters of the pass `blur` for one vector of pixels: along a row, down a column, and what keeps the result in
+//! range. Where every profile is even, taps at -j and j share one multiplication.
+
+#![allow(clippy::needless_range_loop)] // Terms and planes index several arrays at once.
+
+use pulp::Simd;
+
+use super::rows::{EDGE_VALUES, STRIP, STRIP_EDGES};
+use super::simd::{fma, load};
+use crate::bokeh::plan::SEGMENT;
+
+/// Rows of a result that are made at once.
+pub const BLOCK: usize = 4;
+
+/// Truncation leaves lobes: no result may leave the range of the colours that went into it.
+#[inline(always)]
+pub fn keep_in_range<S: Simd>(simd: S, sums: &mut [S::f32s; 4], edges: &[[f32; EDGE_VALUES]; STRIP_EDGES], x: usize) {
+    let (left, right) = (&edges[x / SEGMENT], &edges[x / SEGMENT + 1]);
+    let across = load::<S>(&ACROSS, x % SEGMENT);
+    let coverage = simd.min_f32s(simd.max_f32s(sums[3], simd.splat_f32s(0.0)), simd.splat_f32s(1.0));
+    for p in 0..3 {
+        let low = between(simd, left[1 + p], right[1 + p], across);
+        let high = between(simd, left[4 + p], right[4 + p], across);
+        let at_least = simd.max_f32s(sums[p], simd.mul_f32s(low, coverage));
+        sums[p] = simd.min_f32s(at_least, simd.mul_f32s(high, coverage));
+    }
+    sums[3] = coverage;
+}
+
+/// Where each pixel of a segment lies between the segment's edges.
+const ACROSS: [f32; SEGMENT] = {
+    let mut at = [0.0; SEGMENT];
+    let mut k = 0;
+    while k < SEGMENT {
+        at[k] = (k as f32 + 0.5) / SEGMENT as f32;
+        k += 1;
+    }
+    at
+};
+
+#[inline(always)]
+fn between<S: Simd>(simd: S, left: f32, right: f32, across: S::f32s) -> S::f32s {
+    fma(simd, simd.splat_f32s(right - left), across, simd.splat_f32s(left))
+}
+
+/// The taps of a group of `R` terms for one vector of a segment.
+pub struct Taps<'a, const R: usize> {
+    /// From the bank.
+    pub table: &'a [f32],
+    /// Tap 0 at the left edge of the segment.
+    pub left: usize,
+    /// The same at the right edge.
+    pub right: usize,
+    /// From one tap to the next.
+    pub step: isize,
+    /// Outermost tap.
+    pub reach: usize,
+    /// Where in the segment the vector begins.
+    pub lane: usize,
+    /// Whether the taps are the same all along.
+    pub steady: bool,
+}
+
+impl<const R: usize> Taps<'_, R> {
+    #[inline(always)]
+    fn at<S: Simd, const VARY: bool>(&self, simd: S, j: isize) -> [S::f32s; R] {
+        let left = &self.table[self.left.wrapping_add_signed(j * self.step)..][..R];
+        let mut taps = [simd.splat_f32s(0.0); R];
+        if VARY {
+            let right = &self.table[self.right.wrapping_add_signed(j * self.step)..][..R];
+            let across = load::<S>(&ACROSS, self.lane);
+            for r in 0..R {
+                taps[r] = between(simd, left[r], right[r], across);
+            }
+        } else {
+            for r in 0..R {
+                taps[r] = simd.splat_f32s(left[r]);
+            }
+        }
+        taps
+    }
+}
+
+/// The horizontal pass for one vector: every term of the group, every plane.
+#[inline(always)]
+pub fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, const P: usize>(
+    simd: S,
+    taps: &Taps<'_, R>,
+    planes: &[&[f32]; 4],
+    x: usize,
+) -> [[S::f32s; 4]; R] {
+    let mut sums = [[simd.splat_f32s(0.0); 4]; R];
+    let weights = taps.at::<S, VARY>(simd, 0);
+    for p in 0..P {
+        let here = load::<S>(planes[p], x);
+        for r in 0..R {
+            sums[r][p] = simd.mul_f32s(weights[r], here);
+        }
+    }
+    for j in 1..=taps.reach {
+        let weights = taps.at::<S, VARY>(simd, j as isize);
+        let opposite = if EVEN { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
+        for p in 0..P {
+            let (after, before) = (load::<S>(planes[p], x + j), load::<S>(planes[p], x - j));
+            if EVEN {
+                let both = simd.add_f32s(after, before);
+                for r in 0..R {
+                    sums[r][p] = fma(simd, weights[r], both, sums[r][p]);
+                }
+            } else {
+                for r in 0..R {
+                    sums[r][p] = fma(simd, opposite[r], before, fma(simd, weights[r], after, sums[r][p]));
+                }
+            }
+        }
+    }
+    sums
+}
+
+/// The vertical pass for `BLOCK` rows from `y` on that have the same taps.
+#[inline(always)]
+pub fn along_columns<S: Simd, const R: usize, const P: usize>(
+    simd: S,
+    taps: &Taps<'_, R>,
+    rows: &[f32],
+    y: usize,
+    x: usize,
+    height: usize,
+) -> [[S::f32s; 4]; BLOCK] {
+    let row_len = R * 4 * STRIP;
+    let last = rows.len() / row_len - 1;
+    let mut sums = [[simd.splat_f32s(0.0); 4]; BLOCK];
+    let reach = taps.reach as isize;
+    for above in -reach..BLOCK as isize + reach {
+        let inside = (y as isize + above).clamp(0, height as isize - 1) as usize;
+        let row = &rows[(inside & last) * row_len..][..row_len];
+        for r in 0..R {
+            let mut values = [simd.splat_f32s(0.0); P];
+            for p in 0..P {
+                values[p] = load::<S>(row, (r * 4 + p) * STRIP + x);
+            }
+            for k in 0..BLOCK {
+                let j = above - k as isize;
+                if j.abs() <= reach {
+                    let weight = simd.splat_f32s(taps.table[taps.left.wrapping_add_signed(j * taps.step) + r]);
+                    for p in 0..P {
+                        sums[k][p] = fma(simd, weight, values[p], sums[k][p]);
+                    }
+                }
+            }
+        }
+    }
+    sums
+}
+
+/// The vertical pass for one vector: the terms of the group summed, every plane.
+#[inline(always)]
+pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, const P: usize>(
+    simd: S,
+    taps: &Taps<'_, R>,
+    rows: &[f32],
+    y: usize,
+    x: usize,
+    height: usize,
+) -> [S::f32s; 4] {
+    let row_len = R * 4 * STRIP;
+    let weights = taps.at::<S, VARY>(simd, 0);
+    // A power of two of rows.
+    let last = rows.len() / row_len - 1;
+    let here = &rows[(y & last) * row_len..][..row_len];
+    let mut sums = [simd.splat_f32s(0.0); 4];
+    for r in 0..R {
+        for p in 0..P {
+            sums[p] = fma(simd, weights[r], load::<S>(here, (r * 4 + p) * STRIP + x), sums[p]);
+        }
+    }
+    for j in 1..=taps.reach {
+        let below = &rows[((y + j).min(height - 1) & last) * row_len..][..row_len];
+        let above = &rows[(y.saturating_sub(j) & last) * row_len..][..row_len];
+        let weights = taps.at::<S, VARY>(simd, j as isize);
+        let opposite = if EVEN { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
+        for r in 0..R {
+            for p in 0..P {
+                let at = (r * 4 + p) * STRIP + x;
+                let (below, above) = (load::<S>(below, at), load::<S>(above, at));
+                sums[p] = if EVEN {
+                    fma(simd, weights[r], simd.add_f32s(below, above), sums[p])
+                } else {
+                    fma(simd, opposite[r], above, fma(simd, weights[r], below, sums[p]))
+                };
+            }
+        }
+    }
+    sums
+}
