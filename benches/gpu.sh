@@ -18,7 +18,7 @@ if [[ -z "${BOKEHCAM:-}" ]]; then
     cargo test --release --locked --test parity -- --include-ignored
     BOKEHCAM=${CARGO_TARGET_DIR:-target}/release/bokehcam
 fi
-options=(bench --backend gpu --passes --frames "$frames")
+options=(bench --scene portrait --backend gpu --passes --frames "$frames")
 [[ -n "${ADAPTER:-}" ]] && options+=(--adapter "$ADAPTER")
 
 failed=0
