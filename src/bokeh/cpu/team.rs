@@ -28,6 +28,7 @@ struct Shared {
     next: AtomicUsize,
     panicked: AtomicBool,
     stop: AtomicBool,
+    started: AtomicUsize,
 }
 
 #[derive(Clone, Copy)]
@@ -68,6 +69,7 @@ impl Team {
             next: AtomicUsize::new(0),
             panicked: AtomicBool::new(false),
             stop: AtomicBool::new(false),
+            started: AtomicUsize::new(0),
         });
         let members = (1..threads.max(1))
             .map_while(|k| {
@@ -75,7 +77,11 @@ impl Team {
                 // Without the thread the others do its share.
                 thread::Builder::new().name(format!("blur-{k}")).spawn(move || shared.serve(k)).ok()
             })
-            .collect();
+            .collect::<Vec<_>>();
+        // A thread that starts allocates; from here on nothing does.
+        while shared.started.load(Ordering::Relaxed) < members.len() {
+            thread::yield_now();
+        }
         Self { shared, members }
     }
 
@@ -141,6 +147,7 @@ impl Team {
 
 impl Shared {
     fn serve(&self, member: usize) {
+        self.started.fetch_add(1, Ordering::Relaxed);
         let mut seen = 0;
         loop {
             let mut turns = 0;
