@@ -1,14 +1,94 @@
 //! The paper's plain forms, for comparison: every pixel gathers with exactly its own radius, from all around it,
 //! with no regard to depth edges. Separable (passes `blur`), or exact in two dimensions (pass `gather`).
 
-use pulp::{Simd, WithSimd};
+use std::sync::atomic::AtomicBool;
 
-use super::rows::Rows;
+use pulp::{Arch, Simd, WithSimd};
+
+use super::rows::{PIECE, Rows, STRIP, Strips, repeat_ends};
 use super::simd::madd;
+use super::team::{Shelf, Team};
+use super::unpack::{Source, coc_row};
 use crate::bokeh::bank::Bank;
+use crate::bokeh::plan::Plan;
+
+/// Memory of the gathers.
+pub struct Gather {
+    kernels: Vec<[Vec<f32>; 2]>,
+    source: Rows<4>,
+    coc: Vec<f32>,
+    rows: Vec<f32>,
+    result: Vec<f32>,
+}
+
+impl Gather {
+    /// Memory for pictures of a plan.
+    pub fn new(plan: &Plan) -> Self {
+        let (bank, pixels) = (&plan.bank, plan.width * plan.height);
+        Self {
+            kernels: if plan.exact {
+                (0..bank.nodes).map(|node| [bank.kernel(node, false), bank.kernel(node, true)]).collect()
+            } else {
+                Vec::new()
+            },
+            source: Rows::new(plan.width, plan.height, plan.reach().next_multiple_of(PIECE)),
+            coc: vec![0.0; pixels],
+            rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * bank.terms }],
+            result: vec![0.0; pixels * 3],
+        }
+    }
+
+    /// `[row][3][width]` of the last frame.
+    pub fn result(&self) -> &[f32] {
+        &self.result
+    }
+
+    /// Gathers a frame from the one bin that holds it.
+    pub fn run(
+        &mut self,
+        (team, arch): (&mut Team, Arch),
+        plan: &Plan,
+        frame: &Source<'_>,
+        strips: &Strips,
+        taken: &mut [AtomicBool],
+    ) {
+        let (size, bank) = ((plan.width, plan.height), &*plan.bank);
+        let (stride, pad, row_len) = (self.source.stride, self.source.pad, self.source.row_len());
+        let rows = Shelf::new(&mut self.source.data, row_len, taken);
+        team.run(size.1, &|y| {
+            for (p, plane) in rows.part(y).chunks_exact_mut(stride).enumerate() {
+                for (strip, out) in plane[pad..pad + size.0].chunks_mut(STRIP).enumerate() {
+                    out.copy_from_slice(&strips.row(strip, y)[p * STRIP..][..out.len()]);
+                }
+                repeat_ends(plane, pad, size.0);
+            }
+        });
+        let source = &self.source;
+        let coc = Shelf::new(&mut self.coc, size.0, taken);
+        team.run(size.1, &|y| coc_row(frame, y, 0, coc.part(y)));
+        let coc = |y: usize| &self.coc[y * size.0..][..size.0];
+        if plan.exact {
+            let out = Shelf::new(&mut self.result, 3 * size.0, taken);
+            let kernels = &self.kernels;
+            team.run(size.1, &|y| {
+                arch.dispatch(Exact { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
+            });
+            return;
+        }
+        let rows = Shelf::new(&mut self.rows, bank.terms * 3 * size.0, taken);
+        team.run(size.1, &|y| {
+            arch.dispatch(GatherRow { source, width: size.0, bank, coc: coc(y), y, out: rows.part(y) });
+        });
+        let out = Shelf::new(&mut self.result, 3 * size.0, taken);
+        let rows = &self.rows;
+        team.run(size.1, &|y| {
+            arch.dispatch(GatherColumn { rows, size, bank, coc: coc(y), y, out: out.part(y) });
+        });
+    }
+}
 
 /// One row of the exact gather: each pixel with the full kernel of its own radius.
-pub struct Exact<'a> {
+struct Exact<'a> {
     /// Colour and coverage (1 everywhere), padded by the reach.
     pub source: &'a Rows<4>,
     /// Columns and rows.
@@ -60,7 +140,7 @@ impl WithSimd for Exact<'_> {
 }
 
 /// One row of the horizontal pass of the separable gather: `[term][3][width]`.
-pub struct GatherRow<'a> {
+struct GatherRow<'a> {
     /// As in [`Exact`].
     pub source: &'a Rows<4>,
     /// Columns.
@@ -100,7 +180,7 @@ impl WithSimd for GatherRow<'_> {
 }
 
 /// One row of the vertical pass: `[3][width]`.
-pub struct GatherColumn<'a> {
+struct GatherColumn<'a> {
     /// All rows of the horizontal pass.
     pub rows: &'a [f32],
     /// Columns and rows.

@@ -24,8 +24,9 @@ use std::time::Instant;
 use band::{Band, BandSums, Hidden};
 use bin::BLOCK;
 use blur::{Scratch, Strip};
+use gather::Gather;
 use pulp::Arch;
-use rows::{Rows, Slot};
+use rows::Slot;
 use shelves::{BinShelves, StripShelves};
 use team::{Shelf, Team};
 use tiles::{Survey, TILE_H, Tiles};
@@ -63,15 +64,6 @@ struct Member {
     blur: Scratch,
 }
 
-/// Memory of the comparison methods.
-struct Gather {
-    kernels: Vec<[Vec<f32>; 2]>,
-    source: Rows<4>,
-    coc: Vec<f32>,
-    rows: Vec<f32>,
-    result: Vec<f32>,
-}
-
 impl CpuBokeh {
     /// An executor of `plan` on `threads` threads (all cores when `None`).
     pub fn new(plan: Plan, threads: Option<usize>) -> Self {
@@ -88,18 +80,7 @@ impl CpuBokeh {
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
-        let bank = &plan.bank;
-        let gather = (plan.compositing == Compositing::Gather).then(|| Gather {
-            kernels: if plan.exact {
-                (0..bank.nodes).map(|node| [bank.kernel(node, false), bank.kernel(node, true)]).collect()
-            } else {
-                Vec::new()
-            },
-            source: Rows::new(width, height, plan.reach().next_multiple_of(rows::PIECE)),
-            coc: vec![0.0; width * height],
-            rows: vec![0.0; if plan.exact { 0 } else { width * height * 3 * bank.terms }],
-            result: vec![0.0; width * height * 3],
-        });
+        let gather = (plan.compositing == Compositing::Gather).then(|| Gather::new(&plan));
         Self {
             encode: composite::EncodeTable::new(),
             tiles: Tiles::new(width, height),
@@ -159,8 +140,8 @@ impl CpuBokeh {
             self.bin(&frame, true, true);
             lap("bin");
         }
-        if self.plan.compositing == Compositing::Gather {
-            self.gather(&frame);
+        if let Some(gather) = &mut self.gather {
+            gather.run((&mut self.team, self.arch), &self.plan, &frame, &self.slots[0].source, &mut self.taken);
             lap("gather");
         } else {
             self.reach();
@@ -287,48 +268,10 @@ impl CpuBokeh {
         });
     }
 
-    fn gather(&mut self, frame: &Source<'_>) {
-        let Some(gather) = &mut self.gather else { return };
-        let (size, arch, bank) = ((self.plan.width, self.plan.height), self.arch, &*self.plan.bank);
-        let strips = &self.slots[0].source;
-        let row_len = gather.source.row_len();
-        let (stride, pad) = (gather.source.stride, gather.source.pad);
-        let rows = Shelf::new(&mut gather.source.data, row_len, &mut self.taken);
-        self.team.run(size.1, &|y| {
-            for (p, plane) in rows.part(y).chunks_exact_mut(stride).enumerate() {
-                for (strip, out) in plane[pad..pad + size.0].chunks_mut(rows::STRIP).enumerate() {
-                    out.copy_from_slice(&strips.row(strip, y)[p * rows::STRIP..][..out.len()]);
-                }
-                rows::repeat_ends(plane, pad, size.0);
-            }
-        });
-        let source = &gather.source;
-        let coc = Shelf::new(&mut gather.coc, size.0, &mut self.taken);
-        self.team.run(size.1, &|y| unpack::coc_row(frame, y, 0, coc.part(y)));
-        let coc = |y: usize| &gather.coc[y * size.0..][..size.0];
-        if self.plan.exact {
-            let out = Shelf::new(&mut gather.result, 3 * size.0, &mut self.taken);
-            let kernels = &gather.kernels;
-            self.team.run(size.1, &|y| {
-                arch.dispatch(gather::Exact { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
-            });
-            return;
-        }
-        let rows = Shelf::new(&mut gather.rows, bank.terms * 3 * size.0, &mut self.taken);
-        self.team.run(size.1, &|y| {
-            arch.dispatch(gather::GatherRow { source, width: size.0, bank, coc: coc(y), y, out: rows.part(y) });
-        });
-        let out = Shelf::new(&mut gather.result, 3 * size.0, &mut self.taken);
-        let rows = &gather.rows;
-        self.team.run(size.1, &|y| {
-            arch.dispatch(gather::GatherColumn { rows, size, bank, coc: coc(y), y, out: out.part(y) });
-        });
-    }
-
     fn composite(&mut self, frame: &Source<'_>, out: &mut ColorImage) {
         let width = self.plan.width;
         let out = Shelf::new(&mut out.rgb, TILE_H * width * 3, &mut self.taken);
-        let gathered = self.gather.as_ref().map_or(&[][..], |gather| &gather.result);
+        let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
         let (plan, slots, tiles) = (&self.plan, &self.slots, &self.tiles);
         let (arch, encode) = (self.arch, &self.encode);
         self.team.run(self.plan.height.div_ceil(TILE_H), &|part| {
