@@ -1,13 +1,14 @@
 //! The plan: which bins a picture is split into, at which scale each is filtered, and with which filters.
 //!
-//! Everything here is fixed per picture size and settings. Both executors run it pass by pass, under these names:
+//! Filters and memory are fixed per picture size and settings; the bins follow each frame's depth ([`Plan::split`]).
+//! Both executors run a frame pass by pass, under these names (the CPU's `bin` reads the picture itself and so unpacks):
 //!
 //! 1. `unpack`: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC.
 //! 2. `bin`: every bin's share of each pixel, premultiplied, averaged down to the bin's scale.
 //! 3. `fill` (only with something in front): what near objects hide is filled in before the bins behind are taken.
 //! 4. `reach`: on a coarse grid, the local radius of each bin's content, and the range of its colours.
 //! 5. `blur`: per bin a horizontal and a vertical low-rank pass with the local radius.
-//! 6. `composite`: front to back as disjoint coverage, normalised; back to 8-bit sRGB.
+//! 6. `composite`: front to back as disjoint coverage, what stays open to the hindmost; back to 8-bit sRGB.
 
 use std::sync::Arc;
 
@@ -215,7 +216,7 @@ impl Plan {
 
     /// Whether a bin's filters are truncated so far that it shows: small ones have hardly more terms than are kept.
     pub fn has_lobes(&self, bin: &Bin) -> bool {
-        let reach = self.bank.node_reach[self.bank.node(bin.max_radius_px)] as usize;
+        let reach = self.bin_reach(bin);
         self.bank.terms < if self.bank.even { reach } else { 2 * reach }
     }
 
@@ -239,10 +240,19 @@ impl Plan {
         self.bank.reach
     }
 
+    /// The outermost tap of a bin's filters, in bin pixels.
+    pub fn bin_reach(&self, bin: &Bin) -> usize {
+        self.bank.node_reach[self.bank.node(bin.max_radius_px)] as usize
+    }
+
+    /// The bin that uses a slot, in this frame.
+    pub fn bin_in(&self, slot: usize) -> Option<usize> {
+        self.bins.iter().position(|bin| bin.slot == slot)
+    }
+
     /// Cells around a cell whose content can reach it (and the whole segment it is read for).
     pub fn reach_cells(&self, bin: &Bin) -> usize {
-        let node = self.bank.node(bin.max_radius_px);
-        (self.bank.node_reach[node] as usize + SEGMENT).div_ceil(CELL)
+        (self.bin_reach(bin) + SEGMENT).div_ceil(CELL)
     }
 
     /// Radius in bin pixels for a CoC radius in pixels of the picture.

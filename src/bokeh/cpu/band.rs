@@ -6,7 +6,7 @@ use pulp::{Simd, WithSimd};
 use super::aligned::Line;
 use super::bin::{BLOCK, BinRows, BinSums, MARGIN, WIDE};
 use super::fill::{Behind, HalfRows};
-use super::tiles::{TILE_H, TILE_W, Tiles};
+use super::tiles::{TILE_H, TILE_W, Tiles, widen};
 use super::unpack::{Piece, Source};
 use crate::bokeh::plan::{CELL, MAX_BINS, Share};
 
@@ -92,7 +92,7 @@ impl Band<'_> {
                 bin.clear(block);
             }
         }
-        if reach == 0 && !active.contains(&true) && !matches!(self.hidden, Hidden::Waits(..)) {
+        if !active.contains(&true) && !matches!(self.hidden, Hidden::Waits(..)) {
             return;
         }
         let mut piece: Piece<WIDE> = Line([[0.0; WIDE]; 4]);
@@ -120,7 +120,8 @@ impl Band<'_> {
                     behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut piece);
                 }
             }
-            let range = range_of(&piece.0[3][..columns + 2 * MARGIN]);
+            let mut range = (f32::INFINITY, f32::NEG_INFINITY);
+            widen(&mut range, &piece.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
             for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
             {
                 let Some(bin) = bin else { continue };
@@ -138,16 +139,4 @@ impl Band<'_> {
 /// Columns of a block that hold anything, in whole vectors of the coarsest bin.
 fn columns_of(block: usize, width: usize) -> usize {
     (width - block * BLOCK).next_multiple_of(2 * TILE_W).min(BLOCK)
-}
-
-#[inline(always)]
-fn range_of(values: &[f32]) -> (f32, f32) {
-    let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
-    for values in values.as_chunks::<16>().0 {
-        for k in 0..16 {
-            low[k] = if values[k] < low[k] { values[k] } else { low[k] };
-            high[k] = if values[k] > high[k] { values[k] } else { high[k] };
-        }
-    }
-    (low.into_iter().fold(f32::INFINITY, f32::min), high.into_iter().fold(f32::NEG_INFINITY, f32::max))
 }

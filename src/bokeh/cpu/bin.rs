@@ -85,6 +85,26 @@ fn clear_cells(cells: &mut CellSums) {
     }
 }
 
+/// Adds a vector of bin pixels to the cells: coverage and coverage times |CoC|, and with `own` the range of colours.
+#[inline(always)]
+fn note<V: Simd>(simd: V, cells: &mut CellSums, x: usize, sums: [V::f32s; 2], own: Option<[V::f32s; 3]>) {
+    let cells = &mut cells.0;
+    for p in 0..2 {
+        let sum = simd.add_f32s(load::<V>(&cells[p], x), sums[p]);
+        store::<V>(&mut cells[p], x, sum);
+    }
+    let Some(own) = own else { return };
+    // Without coverage there is no colour: an addition puts it out of range.
+    let counts = simd.greater_than_f32s(sums[0], simd.splat_f32s(COVERAGE_FLOOR));
+    let beyond = simd.select_f32s(counts, simd.splat_f32s(0.0), simd.splat_f32s(NO_COLOR));
+    for p in 0..3 {
+        let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own[p], beyond));
+        let high = simd.max_f32s(load::<V>(&cells[5 + p], x), simd.sub_f32s(own[p], beyond));
+        store::<V>(&mut cells[2 + p], x, low);
+        store::<V>(&mut cells[5 + p], x, high);
+    }
+}
+
 impl BinRows<'_> {
     /// Empties a block.
     #[inline(always)]
@@ -203,29 +223,19 @@ impl BinRows<'_> {
             None => (0..columns).step_by(STRIP).for_each(|x| self.strip_row(block * BLOCK + x, row).fill(0.0)),
             Some(piece) => {
                 let share = ShareAt::new(simd, &self.share);
-                let cells = &mut sums.cells.0;
-                let [floor, nothing] = [COVERAGE_FLOOR, NO_COLOR].map(|value| simd.splat_f32s(value));
                 for x in (0..columns).step_by(V::F32_LANES) {
                     let values = share.of(simd, piece, MARGIN + x);
                     let out = self.strip_row(block * BLOCK + x, row);
                     for p in 0..4 {
                         store::<V>(out, p * STRIP + x % STRIP, values[p]);
                     }
-                    for p in 0..2 {
-                        let sum = simd.add_f32s(load::<V>(&cells[p], x), values[3 + p]);
-                        store::<V>(&mut cells[p], x, sum);
-                    }
+                    let mut own = None;
                     if self.ranged {
-                        let counts = simd.greater_than_f32s(values[3], floor);
-                        let beyond = simd.select_f32s(counts, simd.splat_f32s(0.0), nothing);
-                        for p in 0..3 {
-                            let own = load::<V>(&piece.0[p], MARGIN + x);
-                            let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own, beyond));
-                            let high = simd.max_f32s(load::<V>(&cells[5 + p], x), simd.sub_f32s(own, beyond));
-                            store::<V>(&mut cells[2 + p], x, low);
-                            store::<V>(&mut cells[5 + p], x, high);
-                        }
+                        let [r, g, b, _] = &piece.0;
+                        let at = MARGIN + x;
+                        own = Some([load::<V>(r, at), load::<V>(g, at), load::<V>(b, at)]);
                     }
+                    note(simd, &mut sums.cells, x, [values[3], values[4]], own);
                 }
                 let blocks = self.blocks();
                 self.filled[row / CELL * blocks + block] = true;
@@ -253,8 +263,7 @@ impl BinRows<'_> {
         sums: &mut BinSums,
     ) {
         let (x0, width) = (block * BLOCK / S, columns / S);
-        let (means, cells) = (&sums.means.0, &mut sums.cells.0);
-        let ranged = self.ranged;
+        let means = &sums.means.0;
         for x in (0..width.min(self.across * STRIP - x0)).step_by(STRIP) {
             let out = &mut self.out[strip_row(self.across, x0 + x, row)..][..STRIP_ROW];
             for p in 0..4 {
@@ -263,26 +272,19 @@ impl BinRows<'_> {
         }
         let blocks = self.blocks();
         self.filled[row / CELL * blocks + block] = true;
-        let [floor, zero, one, nothing] = [COVERAGE_FLOOR, 0.0, 1.0, NO_COLOR].map(|value| simd.splat_f32s(value));
+        let [floor, one] = [COVERAGE_FLOOR, 1.0].map(|value| simd.splat_f32s(value));
         for x in (0..width).step_by(V::F32_LANES) {
             let coverage = load::<V>(&means[3], x);
-            for p in 0..2 {
-                let sum = simd.add_f32s(load::<V>(&cells[p], x), load::<V>(&means[3 + p], x));
-                store::<V>(&mut cells[p], x, sum);
+            let mut own = None;
+            if self.ranged {
+                let inverse = simd.div_f32s(one, simd.max_f32s(coverage, floor));
+                let mut colors = [inverse; 3];
+                for p in 0..3 {
+                    colors[p] = simd.mul_f32s(load::<V>(&means[p], x), inverse);
+                }
+                own = Some(colors);
             }
-            if !ranged {
-                continue;
-            }
-            let counts = simd.greater_than_f32s(coverage, floor);
-            let inverse = simd.div_f32s(one, simd.max_f32s(coverage, floor));
-            let beyond = simd.select_f32s(counts, zero, nothing);
-            for p in 0..3 {
-                let own = simd.mul_f32s(load::<V>(&means[p], x), inverse);
-                let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own, beyond));
-                let high = simd.max_f32s(load::<V>(&cells[5 + p], x), simd.sub_f32s(own, beyond));
-                store::<V>(&mut cells[2 + p], x, low);
-                store::<V>(&mut cells[5 + p], x, high);
-            }
+            note(simd, &mut sums.cells, x, [coverage, load::<V>(&means[4], x)], own);
         }
         self.close_cells::<S>((block, columns), row, sums);
     }

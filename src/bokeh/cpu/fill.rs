@@ -19,8 +19,6 @@ pub struct Pyramid {
     levels: Vec<Level>,
     /// How far a pixel of the finest level is covered by something near.
     hidden: Vec<f32>,
-    /// The same of a pixel or any of its neighbours.
-    around: Vec<f32>,
     taken: [Vec<AtomicBool>; 2],
 }
 
@@ -70,7 +68,7 @@ impl Pyramid {
         }
         let hidden = vec![0.0; levels[0].width * levels[0].height];
         let taken = std::array::from_fn(|_| (0..height).map(|_| AtomicBool::new(false)).collect());
-        Self { levels, around: hidden.clone(), hidden, taken }
+        Self { levels, hidden, taken }
     }
 
     /// The finest level, to be laid in bands of `rows` rows of the picture.
@@ -123,26 +121,21 @@ impl Pyramid {
         let level = &mut self.levels[0];
         let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
         let hidden = &self.hidden;
-        let [first, second] = &mut self.taken;
-        let around = Shelf::new(&mut self.around, PART * w, first);
-        let data = Shelf::new(&mut level.rows.data, PART * row_len, second);
+        let data = Shelf::new(&mut level.rows.data, PART * row_len, &mut self.taken[0]);
         team.run(h.div_ceil(PART), &|part| {
-            let rows = around.part(part).chunks_exact_mut(w).zip(data.part(part).chunks_exact_mut(row_len));
-            for (k, (around, planes)) in rows.enumerate() {
+            for (k, planes) in data.part(part).chunks_exact_mut(row_len).enumerate() {
+                let (planes, known) = planes.split_at_mut((PLANES - 1) * stride);
                 let y = part * PART + k;
                 let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(|y| &hidden[y * w..][..w]);
                 let column = |x: usize| rows[0][x].max(rows[1][x]).max(rows[2][x]);
                 let (mut left, mut here) = (0.0f32, column(0));
-                for (x, out) in around.iter_mut().enumerate() {
+                for (x, known) in known[..w].iter_mut().enumerate() {
                     let right = if x + 1 < w { column(x + 1) } else { 0.0 };
-                    *out = left.max(here).max(right);
+                    *known = 1.0 - left.max(here).max(right);
                     (left, here) = (here, right);
                 }
-                for (p, plane) in planes.chunks_exact_mut(stride).enumerate() {
-                    for (value, &around) in plane.iter_mut().zip(&*around) {
-                        let whole = if p + 1 == PLANES { 1.0 } else { *value };
-                        *value = whole * (1.0 - around);
-                    }
+                for plane in planes.chunks_exact_mut(stride) {
+                    plane[..w].iter_mut().zip(&*known).for_each(|(value, known)| *value *= known);
                 }
             }
         });

@@ -129,7 +129,7 @@ impl CpuBokeh {
         let frame = Source { color, depth, coc, expansion: self.plan.expansion };
         self.split(&frame);
         lap("split");
-        let fills = self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near);
+        let fills = self.filled();
         self.bin(&frame, fills, false);
         lap("bin");
         if fills {
@@ -171,7 +171,7 @@ impl CpuBokeh {
         if self.plan.bins.iter().any(|bin| bin.near) {
             self.tiles.idle.fill(false);
         }
-        let fills = self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near);
+        let fills = self.filled();
         for k in 0..self.plan.bins.len() {
             let bin = &self.plan.bins[k];
             let slot = &mut self.slots[bin.slot];
@@ -189,9 +189,8 @@ impl CpuBokeh {
         let rows = CELL * coarsest;
         let mut shelves: [Option<BinShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
-            let Some(k) = plan.bins.iter().position(|bin| bin.slot == slot.index) else { continue };
-            let bin = &plan.bins[k];
-            if !(again && bin.near) {
+            let Some(k) = plan.bin_in(slot.index) else { continue };
+            if !(again && plan.bins[k].near) {
                 shelves[k] = Some(BinShelves::new(plan, k, slot, rows));
             }
         }
@@ -239,7 +238,7 @@ impl CpuBokeh {
         let mut shelves: [Option<StripShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         let mut parts = 0;
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
-            let Some(k) = plan.bins.iter().position(|bin| bin.slot == slot.index) else { continue };
+            let Some(k) = plan.bin_in(slot.index) else { continue };
             let strips = slot.source.across;
             shelves[k] = Some(StripShelves::new(&plan.bins[k], slot, parts));
             parts += strips;
@@ -259,7 +258,7 @@ impl CpuBokeh {
                 bank: &plan.bank,
                 whole: plan.compositing != Compositing::Layers,
                 turned: bin.near,
-                reach: plan.bank.node_reach[plan.bank.node(bin.max_radius_px)] as usize,
+                reach: plan.bin_reach(bin),
                 strip,
                 out: shelf.out.part(strip),
                 active: shelf.active.part(strip),

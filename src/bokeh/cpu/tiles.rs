@@ -114,8 +114,9 @@ impl pulp::WithSimd for Survey<'_> {
     }
 }
 
+/// Widens a range by some values, each as `of` has it.
 #[inline(always)]
-fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
+pub fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
     let (mut low, mut high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
     let (vectors, rest) = values.as_chunks::<16>();
     for values in vectors {

@@ -122,7 +122,7 @@ impl Layout {
                 rows_apart: capacity.rows as u32,
                 reach: match plan.compositing {
                     Compositing::Gather => plan.bank.reach as u32,
-                    _ => plan.bank.node_reach[plan.bank.node(bin.max_radius_px)],
+                    _ => plan.bin_reach(bin) as u32,
                 },
                 filtered_at: at.filtered as u32,
                 active_at: at.active as u32,
