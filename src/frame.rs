@@ -4,6 +4,17 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FrameId(pub u64);
 
+/// Which frame of its source it is, and when.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stamp {
+    /// The source's own number of the frame: its place in a recording, or since a camera was opened.
+    pub index: usize,
+    /// Media time: since the first frame, strictly increasing also where a recording starts over.
+    pub time_ns: u64,
+    /// When a camera took it, on the system's monotonic clock; `None` where frames are stored and have no such time.
+    pub captured_ns: Option<u64>,
+}
+
 /// An 8-bit sRGB picture: `height` x `width` x 3 bytes (R, G, B), row-major, no padding.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ColorImage {

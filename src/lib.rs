@@ -14,14 +14,15 @@
 //! | 4 | [`cli`]: arguments to one resolved configuration, one function per command |
 //! | 3 | [`pipeline`]: the one place that knows all stages |
 //! | 2 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 1 | [`link`], [`budget`], [`stats`], [`recording`], [`scene`] |
+//! | 1 | [`link`], [`budget`], [`stats`], [`recording`], [`scene`], `v4l2` |
 //! | 0 | [`frame`], [`optics`], [`clock`] |
 //!
 //! Words: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in
 //! nanoseconds of a monotonic clock; blurring happens in linear light.
 //!
-//! `unsafe` is allowed in one file, `bokeh/cpu/team.rs`, where each block carries its argument.
+//! `unsafe` is allowed in `bokeh/cpu/team.rs`, `link/slot.rs`, `link/pool.rs` and under `v4l2`, where each block carries
+//! its argument.
 
 pub mod bokeh;
 pub mod budget;
@@ -37,3 +38,5 @@ pub mod recording;
 pub mod scene;
 pub mod sink;
 pub mod stats;
+#[cfg(feature = "camera")]
+pub mod v4l2;

@@ -18,11 +18,12 @@ pub use error::{Fault, PipelineError};
 
 use crate::bokeh::Bokeh;
 use crate::budget::Quality;
-use crate::capture::{Camera, Stamp};
+use crate::capture::Camera;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::link::demand::Demand;
 use crate::link::pool::Pool;
 use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
 use crate::optics::{CocField, DepthCoc, Lens};
@@ -96,6 +97,8 @@ pub struct Run<'a> {
     pub budget_ns: u64,
     /// Count frames that cannot be read, and go on; otherwise the first one ends the run.
     pub keep_going: bool,
+    /// Where the sink tells whether anybody watches; the camera rests while nobody does.
+    pub demand: Option<Demand>,
     /// Flip the pictures left to right on their way out.
     pub mirror: bool,
     /// What measures time.
@@ -141,9 +144,10 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         budget_ns: run.budget_ns,
         elapsed_ns: 0,
     };
+    let sink_hold = sink.hold();
     let tally = Tally::new();
     let mut timings = Timings::default();
-    let Timings { decode, depth: depth_times, blur, passes, rungs, misses, sink: sink_times, latency, frame } =
+    let Timings { decode, depth: depth_times, blur, passes, rungs, misses, sink: sink_times, latency, frame, repeats } =
         &mut timings;
     let began_ns = clock.now_ns();
     let over = AtomicBool::new(false);
@@ -160,6 +164,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         exact_depth: info.exact_depth,
         camera,
         keep_going: run.keep_going,
+        demand: run.demand,
         stop: [run.stop, &over],
         colors: &colors,
         depths: &depths,
@@ -194,9 +199,10 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         mirror: run.mirror,
         total: info.frames,
         progress: run.progress,
+        hold: sink_hold,
         tally: &tally,
         clock: &clock,
-        times: deliver::Times { sink: sink_times, latency, frame },
+        times: deliver::Times { sink: sink_times, latency, frame, repeats },
     };
 
     let ended = thread::scope(|scope| {

@@ -31,4 +31,6 @@ pub struct Timings {
     pub rungs: RungCounts,
     /// Frames whose blur took longer than the budget.
     pub misses: u64,
+    /// Pictures that were shown again because no new one came.
+    pub repeats: u64,
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Modules of the crate by layer, the lowest first.
 const LAYERS: [&[&str]; 6] = [
     &["frame", "optics", "clock"],
-    &["link", "budget", "stats", "recording", "scene"],
+    &["link", "budget", "stats", "recording", "scene", "v4l2"],
     &["capture", "depth", "bokeh", "sink"],
     &["pipeline"],
     &["cli"],
@@ -14,7 +14,7 @@ const LAYERS: [&[&str]; 6] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 9] = [
+const DOORS: [(&str, &[&str]); 12] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
@@ -23,7 +23,10 @@ const DOORS: [(&str, &[&str]); 9] = [
     ("image", &["recording", "sink"]),
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
+    ("rustix", &["clock", "v4l2"]),
+    ("v4l", &["v4l2"]),
     ("wgpu", &["bokeh/gpu"]),
+    ("zune_jpeg", &["capture"]),
 ];
 
 fn layer(module: &str) -> Option<usize> {

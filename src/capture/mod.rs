@@ -3,8 +3,11 @@
 pub mod replay;
 pub mod synthetic;
 
-use crate::frame::{ColorImage, DepthMap};
+use std::time::Duration;
+
+use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::recording::RecordingError;
+use crate::stats::Cause;
 
 /// Produces frames, one after the other.
 pub trait Camera: Send {
@@ -12,8 +15,8 @@ pub trait Camera: Send {
     fn info(&self) -> SourceInfo;
 
     /// Reads the next frame into `color`, and its depth into `depth` if the camera [knows it](SourceInfo::exact_depth).
-    /// A live camera waits for the frame; the others leave it to the caller when the frame is due. On anything but
-    /// [`Captured::Frame`] the buffers are unspecified.
+    /// A live camera waits for the frame, but not much longer than [`PATIENCE`]; the others leave it to the caller
+    /// when the frame is due. On anything but [`Captured::Frame`] the buffers are unspecified.
     ///
     /// # Errors
     /// The camera failed, and there will be no more frames.
@@ -25,7 +28,13 @@ pub trait Camera: Send {
         let _ = until_ns;
         0
     }
+
+    /// Nobody watches: lets go of the device, if there is one, until [`Camera::next`] is called again.
+    fn rest(&mut self) {}
 }
+
+/// How long a live camera may wait in [`Camera::next`] before it says [`Captured::Waiting`].
+pub const PATIENCE: Duration = Duration::from_millis(100);
 
 /// What a camera is.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,19 +59,14 @@ pub struct SourceInfo {
 pub enum Captured {
     /// A frame.
     Frame(Stamp),
+    /// So many frames came and went before they could be read. Not the end: the next call reads on.
+    Lost(u64, Cause),
+    /// No frame yet; the camera may be gone for a while. The caller looks whether it should stop, and asks again.
+    Waiting,
     /// There was a frame, and it cannot be decoded.
     Corrupt(CaptureError),
     /// There are no more.
     End,
-}
-
-/// Which frame it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stamp {
-    /// The camera's own number of the frame: its place in a recording.
-    pub index: usize,
-    /// Media time: since the first frame, strictly increasing also where a recording starts over.
-    pub time_ns: u64,
 }
 
 /// Why there is no frame.

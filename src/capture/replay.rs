@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::{Camera, CaptureError, Captured, SourceInfo, Stamp};
-use crate::frame::{ColorImage, DepthMap};
+use super::{Camera, CaptureError, Captured, SourceInfo};
+use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::recording::{Recording, Scratch};
 
 /// Which part of a recording to play.
@@ -83,7 +83,7 @@ impl Replay {
         let lap_len = self.lap.len() as u64;
         let index = self.lap.start + (self.position % lap_len) as usize;
         let in_lap_ns = self.recording.time_ns(index) - self.recording.time_ns(self.lap.start);
-        Some(Stamp { index, time_ns: self.position / lap_len * self.lap_ns + in_lap_ns })
+        Some(Stamp { index, time_ns: self.position / lap_len * self.lap_ns + in_lap_ns, captured_ns: None })
     }
 }
 

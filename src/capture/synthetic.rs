@@ -1,7 +1,7 @@
 //! The project's own scene as a camera, with exact depth.
 
-use super::{Camera, CaptureError, Captured, SourceInfo, Stamp};
-use crate::frame::{ColorImage, DepthMap};
+use super::{Camera, CaptureError, Captured, SourceInfo};
+use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::scene::{Scene, View};
 
 /// What the synthetic camera makes.
@@ -72,7 +72,7 @@ impl Camera for Synthetic {
         let time_s = self.position as f64 / self.format.fps;
         let threads = self.format.threads.max(1);
         self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, color, depth);
-        let stamp = Stamp { index: self.position as usize, time_ns: self.time_ns(self.position) };
+        let stamp = Stamp { index: self.position as usize, time_ns: self.time_ns(self.position), captured_ns: None };
         self.position += 1;
         Ok(Captured::Frame(stamp))
     }

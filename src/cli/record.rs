@@ -53,10 +53,15 @@ pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliE
         let stamp = match camera.next(&mut color, &mut depth)? {
             Captured::Frame(stamp) => stamp,
             Captured::Corrupt(error) => return Err(error.into()),
+            Captured::Lost(count, _) => {
+                tracing::warn!("{count} frames were lost before they could be read");
+                continue;
+            }
+            Captured::Waiting => continue,
             Captured::End => break,
         };
         if let Some(source) = &mut source {
-            source.read(stamp.index, &mut depth)?;
+            source.read(stamp, &mut depth)?;
         }
         let has_depth = source.is_some() || info.exact_depth;
         writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;

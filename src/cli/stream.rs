@@ -78,6 +78,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         },
         budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
         keep_going: stream.keep_going,
+        demand: None,
         mirror: stream.mirror,
         clock: Clock::system(),
         stop: &stop,

@@ -7,18 +7,18 @@ pub mod focus;
 pub mod recorded;
 pub mod refine;
 
-use crate::frame::DepthMap;
+use crate::frame::{DepthMap, Stamp};
 use crate::recording::RecordingError;
 
 /// Gives each frame its depth.
 ///
 /// Cameras that know the depth of their frames themselves hand it over with the picture and need no source.
 pub trait DepthSource: Send {
-    /// The depth of the frame that its camera numbered `index`, into `map` (resized to fit).
+    /// The depth of the frame `stamp`, into `map` (resized to fit).
     ///
     /// # Errors
     /// There is none, or it cannot be read; `map` is then unspecified.
-    fn read(&mut self, index: usize, map: &mut DepthMap) -> Result<(), DepthError>;
+    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError>;
 }
 
 /// Why a frame has no depth.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{DepthError, DepthSource};
-use crate::frame::DepthMap;
+use crate::frame::{DepthMap, Stamp};
 use crate::recording::{Recording, Scratch};
 
 /// The depth pictures of a recording.
@@ -27,7 +27,7 @@ impl Recorded {
 }
 
 impl DepthSource for Recorded {
-    fn read(&mut self, index: usize, map: &mut DepthMap) -> Result<(), DepthError> {
-        Ok(self.recording.read_depth(index, &mut self.scratch, map)?)
+    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+        Ok(self.recording.read_depth(stamp.index, &mut self.scratch, map)?)
     }
 }

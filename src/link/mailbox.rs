@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
+use crossbeam_channel::RecvTimeoutError;
 use crossbeam_queue::ArrayQueue;
 
-use super::Abandoned;
+use super::{Abandoned, Received};
 
 struct Slot<T> {
     item: ArrayQueue<T>,
@@ -50,6 +52,22 @@ impl<T> Receiver<T> {
             if self.ear.recv().is_err() {
                 // The sender is gone, and whatever it sent last happened before that.
                 return self.slot.item.pop();
+            }
+        }
+    }
+
+    pub(super) fn recv_timeout(&self, patience: Duration) -> Received<T> {
+        let deadline = Instant::now() + patience;
+        loop {
+            if let Some(item) = self.slot.item.pop() {
+                return Received::Item(item);
+            }
+            match self.ear.recv_deadline(deadline) {
+                Ok(()) => {}
+                Err(RecvTimeoutError::Timeout) => return Received::Nothing,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return self.slot.item.pop().map_or(Received::Ended, Received::Item);
+                }
             }
         }
     }

@@ -16,8 +16,11 @@
 //! sleeps, nobody locks. And both rings are Vyukov's, which is not lock-free in the strict sense: a thread suspended by
 //! the scheduler in the middle of moving an item holds up that one slot until it runs again.
 
+pub mod demand;
 mod mailbox;
 pub mod pool;
+
+use std::time::Duration;
 
 /// The receiving end is gone: nobody will read what is sent, and what is pending goes with the sender.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -26,6 +29,17 @@ pub struct Abandoned;
 
 /// Room of a lossless link: one item being made ready behind one that is ready.
 pub const LOSSLESS_ITEMS: usize = 2;
+
+/// What came of waiting for an item.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Received<T> {
+    /// An item.
+    Item(T),
+    /// None in time.
+    Nothing,
+    /// The sender is gone and nothing is pending.
+    Ended,
+}
 
 /// A link in which the newest item wins and sending never waits.
 pub fn live<T>() -> (Sender<T>, Receiver<T>) {
@@ -74,6 +88,18 @@ impl<T> Receiver<T> {
         match &self.0 {
             Rx::Live(mailbox) => mailbox.recv(),
             Rx::Lossless(queue) => queue.recv().ok(),
+        }
+    }
+
+    /// The next item; sleeps until there is one, but no longer than `patience`.
+    pub fn recv_timeout(&mut self, patience: Duration) -> Received<T> {
+        match &self.0 {
+            Rx::Live(mailbox) => mailbox.recv_timeout(patience),
+            Rx::Lossless(queue) => match queue.recv_timeout(patience) {
+                Ok(item) => Received::Item(item),
+                Err(crossbeam_channel::RecvTimeoutError::Timeout) => Received::Nothing,
+                Err(crossbeam_channel::RecvTimeoutError::Disconnected) => Received::Ended,
+            },
         }
     }
 

@@ -4,10 +4,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::pacer::Pacer;
 use super::{Ended, Frame, hand_on};
-use crate::capture::{Camera, Captured};
+use crate::capture::{Camera, Captured, PATIENCE};
 use crate::clock::Clock;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Sender;
+use crate::link::demand::Demand;
 use crate::link::pool::{Pool, Pooled};
 use crate::stats::{Cause, Histogram, Tally};
 
@@ -22,6 +23,8 @@ pub(super) struct Stage<'a> {
     pub pacer: Pacer,
     pub exact_depth: bool,
     pub keep_going: bool,
+    /// `None` captures whether anybody watches or not.
+    pub demand: Option<Demand>,
     pub stop: [&'a AtomicBool; 2],
     pub colors: &'a Pool<ColorImage>,
     pub depths: &'a Pool<DepthMap>,
@@ -36,6 +39,11 @@ impl Stage<'_> {
         let mut no_depth = DepthMap::default();
         let mut complained = false;
         while !stopped() {
+            if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
+                self.camera.rest();
+                demand.wait(PATIENCE);
+                continue;
+            }
             self.tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
             let mut color = self.colors.take();
             let mut depth = self.exact_depth.then(|| self.depths.take());
@@ -44,7 +52,10 @@ impl Stage<'_> {
                 Captured::Frame(stamp) => {
                     let read_ns = self.clock.now_ns() - began_ns;
                     self.times.add(read_ns);
-                    let captured_ns = self.pacer.wait(stamp.time_ns, read_ns, stopped);
+                    let captured_ns = match stamp.captured_ns {
+                        Some(captured_ns) => captured_ns,
+                        None => self.pacer.wait(stamp.time_ns, read_ns, stopped),
+                    };
                     let ticket = self.tally.captured(captured_ns);
                     if !hand_on(&mut to, Frame { ticket, stamp, item: Shot { color, depth } }, self.tally) {
                         break;
@@ -60,6 +71,8 @@ impl Stage<'_> {
                         complained = true;
                     }
                 }
+                Captured::Lost(count, cause) => self.tally.lost(count, cause),
+                Captured::Waiting => {}
                 Captured::End => break,
             }
         }

@@ -1,10 +1,12 @@
 //! Last stage, on the caller's thread: hands pictures to the sink.
 
+use std::time::Duration;
+
 use super::{Ended, Frame, Progress};
 use crate::clock::Clock;
 use crate::frame::ColorImage;
-use crate::link::Receiver;
 use crate::link::pool::Pooled;
+use crate::link::{Received, Receiver};
 use crate::sink::Sink;
 use crate::stats::{Cause, Histogram, Tally};
 
@@ -15,6 +17,8 @@ pub(super) struct Stage<'a> {
     pub progress: &'a dyn Fn(Progress),
     pub tally: &'a Tally,
     pub clock: &'a Clock,
+    /// After so long without a picture the last one is shown again; `None` waits.
+    pub hold: Option<Duration>,
     pub times: Times<'a>,
 }
 
@@ -22,12 +26,24 @@ pub(super) struct Times<'a> {
     pub sink: &'a mut Histogram,
     pub latency: &'a mut Histogram,
     pub frame: &'a mut Histogram,
+    pub repeats: &'a mut u64,
 }
 
 impl Stage<'_> {
     pub(super) fn run(self, mut from: Receiver<Frame<Pooled<ColorImage>>>) -> Ended {
         let mut last_ns = None;
-        while let Some(Frame { ticket, item: mut picture, .. }) = from.recv() {
+        loop {
+            let Frame { ticket, item: mut picture, .. } = match self.next(&mut from) {
+                Received::Item(frame) => frame,
+                Received::Nothing => {
+                    if self.sink.repeat()?.is_break() {
+                        break;
+                    }
+                    *self.times.repeats += 1;
+                    continue;
+                }
+                Received::Ended => break,
+            };
             let began_ns = self.clock.now_ns();
             if self.mirror {
                 mirror(&mut picture);
@@ -56,6 +72,13 @@ impl Stage<'_> {
             });
         }
         Ok(())
+    }
+
+    fn next<T>(&self, from: &mut Receiver<T>) -> Received<T> {
+        match self.hold {
+            Some(hold) => from.recv_timeout(hold),
+            None => from.recv().map_or(Received::Ended, Received::Item),
+        }
     }
 }
 

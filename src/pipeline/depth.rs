@@ -7,7 +7,7 @@ use crate::depth::DepthSource;
 use crate::depth::fill::Filler;
 use crate::depth::focus::Focus;
 use crate::depth::refine::Refiner;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Receiver, Sender};
 use crate::optics::CocField;
@@ -84,7 +84,7 @@ impl Stage<'_> {
                 Coc::Fixed(field) => (None, *field),
                 Coc::Depth(coc) => {
                     let began_ns = self.clock.now_ns();
-                    let mut map = match depth.map_or_else(|| self.read(stamp.index), Ok) {
+                    let mut map = match depth.map_or_else(|| self.read(stamp), Ok) {
                         Ok(map) => map,
                         Err(fault) => {
                             let corrupt = matches!(fault, Fault::Depth(_));
@@ -111,12 +111,12 @@ impl Stage<'_> {
         Ok(())
     }
 
-    fn read(&mut self, index: usize) -> Result<Pooled<DepthMap>, Fault> {
+    fn read(&mut self, stamp: Stamp) -> Result<Pooled<DepthMap>, Fault> {
         let Some(source) = &mut self.source else {
             return Err(Fault::NoDepth { source_name: self.source_name.to_owned() });
         };
         let mut map = self.depths.take();
-        source.read(index, &mut map)?;
+        source.read(stamp, &mut map)?;
         Ok(map)
     }
 }

@@ -13,6 +13,7 @@ pub mod yuv;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
 pub use error::SinkError;
 pub use ffmpeg::Ffmpeg;
@@ -30,6 +31,20 @@ pub trait Sink {
     /// # Errors
     /// The frame could not be written.
     fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError>;
+
+    /// How long a live output may go without a picture; after that, [`Sink::repeat`] is called, again and again.
+    /// `None` for everything that keeps what it was given.
+    fn hold(&self) -> Option<Duration> {
+        None
+    }
+
+    /// Shows the last picture again, or a still card before the first. `Break` as for [`Sink::put`].
+    ///
+    /// # Errors
+    /// It could not be written.
+    fn repeat(&mut self) -> Result<ControlFlow<()>, SinkError> {
+        Ok(ControlFlow::Continue(()))
+    }
 
     /// Completes the output after the last frame.
     ///

@@ -41,6 +41,8 @@ pub struct Report {
     pub budget_ms: f64,
     /// Frames whose blur took longer.
     pub misses: u64,
+    /// Times that a live output was given its last picture again, because no new one came.
+    pub repeats: u64,
     /// `cpu`, `gpu` or `none`.
     pub backend: String,
     /// What executed the blur.
@@ -126,6 +128,7 @@ impl Report {
             quality: timings.rungs.shares(),
             budget_ms: ms(about.budget_ns),
             misses: timings.misses,
+            repeats: timings.repeats,
             backend: about.backend,
             adapter: about.adapter,
             source: about.source,

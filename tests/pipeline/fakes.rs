@@ -10,11 +10,11 @@ use std::time::Duration;
 
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
 use bokehcam::budget::Quality;
-use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo, Stamp};
+use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::{DepthError, DepthSource};
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{CocAtInfinity, CocRule, Pace, PipelineError, Progress, Run, run};
 use bokehcam::sink::{Sink, SinkError};
@@ -96,7 +96,7 @@ impl Camera for FakeCamera {
             depth.resize(SIZE.0, SIZE.1);
             depth.metres.fill(1.0 + index as f32);
         }
-        Ok(Captured::Frame(Stamp { index, time_ns: index as u64 * PERIOD_NS }))
+        Ok(Captured::Frame(Stamp { index, time_ns: index as u64 * PERIOD_NS, captured_ns: None }))
     }
 
     fn skip(&mut self, until_ns: u64) -> u64 {
@@ -110,7 +110,8 @@ impl Camera for FakeCamera {
 pub struct FakeDepth(Trouble);
 
 impl DepthSource for FakeDepth {
-    fn read(&mut self, index: usize, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+        let index = stamp.index;
         if self.0.strikes(index) {
             return Err(DepthError::NoDepth { source_name: format!("frame {index}") });
         }
@@ -299,6 +300,7 @@ impl Setup {
             pace: self.pace,
             budget_ns: 500_000,
             keep_going: self.keep_going,
+            demand: None,
             mirror: false,
             clock: Clock::system(),
             stop: &stop,
@@ -368,6 +370,7 @@ pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a Atomic
         pace,
         budget_ns: PERIOD_NS,
         keep_going: false,
+        demand: None,
         mirror: false,
         clock: Clock::system(),
         stop,

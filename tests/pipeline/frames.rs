@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo, Stamp};
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{CocRule, Fault, Pace, Run, run};
 
@@ -90,7 +90,7 @@ impl Camera for Columns {
         }
         color.resize(SIZE.0, SIZE.1);
         (0..).zip(&mut color.rgb).for_each(|(index, byte)| *byte = index);
-        Ok(Captured::Frame(Stamp { index: 0, time_ns: 0 }))
+        Ok(Captured::Frame(Stamp { index: 0, time_ns: 0, captured_ns: None }))
     }
 }
 

@@ -7,10 +7,10 @@ use std::sync::atomic::AtomicBool;
 
 use bokehcam::capture::replay::{Part, Replay};
 use bokehcam::capture::synthetic::{Format, Synthetic};
-use bokehcam::capture::{Camera, CaptureError, Captured, Stamp};
+use bokehcam::capture::{Camera, CaptureError, Captured};
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::depth::{DepthError, DepthSource};
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::pipeline::{Pace, Run, run};
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::recording::{Options, Recording};
@@ -48,9 +48,10 @@ fn play(camera: &mut dyn Camera, limit: usize) -> Vec<(usize, u64, u8)> {
     let mut frames = Vec::new();
     while frames.len() < limit {
         match camera.next(&mut color, &mut depth).unwrap() {
-            Captured::Frame(Stamp { index, time_ns }) => frames.push((index, time_ns / 1_000_000, color.rgb[0])),
+            Captured::Frame(Stamp { index, time_ns, .. }) => frames.push((index, time_ns / 1_000_000, color.rgb[0])),
             Captured::Corrupt(error) => panic!("{error}"),
             Captured::End => break,
+            other => panic!("{other:?} of a recording"),
         }
     }
     frames
@@ -139,7 +140,7 @@ fn recorded_depth_is_that_of_the_frame() {
     record(folder.path(), true);
     let mut depth = Recorded::new(open(folder.path()), "test recording").unwrap();
     let mut map = DepthMap::default();
-    depth.read(7, &mut map).unwrap();
+    depth.read(Stamp { index: 7, time_ns: 0, captured_ns: None }, &mut map).unwrap();
     assert_eq!(map.size(), SIZE);
     assert!(map.metres.iter().all(|&z_m| (z_m - 1.7).abs() < 1e-3));
 
@@ -187,7 +188,7 @@ fn the_synthetic_camera_knows_its_depth() {
     let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
     for index in 0..3 {
         let Captured::Frame(stamp) = camera.next(&mut color, &mut depth).unwrap() else { panic!("frame {index}") };
-        assert_eq!(stamp, Stamp { index, time_ns: index as u64 * 80_000_000 });
+        assert_eq!(stamp, Stamp { index, time_ns: index as u64 * 80_000_000, captured_ns: None });
         assert_eq!((color.size(), depth.size()), ((48, 27), (48, 27)));
         assert!(color.rgb.iter().any(|&byte| byte != color.rgb[0]));
         assert!(depth.metres.iter().any(|&z_m| DepthMap::is_known(z_m)));

@@ -1,0 +1,94 @@
+//! Whether anybody watches the output: told by sinks, asked by capture, which lets the camera rest while nobody does.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+
+/// A count of watched outputs that can be waited for. Clones share it.
+#[derive(Clone, Debug)]
+pub struct Demand {
+    watched: Arc<AtomicUsize>,
+    bell: Sender<()>,
+    ear: Receiver<()>,
+}
+
+impl Demand {
+    /// Nobody watches yet.
+    pub fn new() -> Self {
+        let (bell, ear) = bounded(1);
+        Self { watched: Arc::default(), bell, ear }
+    }
+
+    /// One more output is watched: until the returned [`Watch`] is dropped.
+    pub fn watch(&self) -> Watch {
+        self.watched.fetch_add(1, Ordering::Release);
+        // After the count, or the waiter could wake, see nobody and sleep on. A bell that is rung already is heard.
+        let _ = self.bell.try_send(());
+        Watch(self.clone())
+    }
+
+    /// Whether any output is watched.
+    pub fn is_watched(&self) -> bool {
+        self.watched.load(Ordering::Acquire) > 0
+    }
+
+    /// Sleeps until an output is watched, but no longer than `patience`; it may also wake for nothing.
+    pub fn wait(&self, patience: Duration) {
+        if !self.is_watched() {
+            // Without a bell, time is up: the caller looks again in either case.
+            let _ = self.ear.recv_timeout(patience);
+        }
+    }
+}
+
+impl Default for Demand {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// An output that is watched; dropping it says that it no longer is.
+#[derive(Debug)]
+pub struct Watch(Demand);
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.0.watched.fetch_sub(1, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use super::*;
+
+    #[test]
+    fn each_watch_counts_until_it_is_dropped() {
+        let demand = Demand::new();
+        assert!(!demand.is_watched());
+        let (first, second) = (demand.watch(), demand.watch());
+        drop(first);
+        assert!(demand.is_watched());
+        drop(second);
+        assert!(!demand.is_watched());
+    }
+
+    #[test]
+    fn a_waiter_wakes_when_somebody_watches() {
+        let demand = Demand::new();
+        let began = Instant::now();
+        let other = demand.clone();
+        let watcher = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(20));
+            other.watch()
+        });
+        while !demand.is_watched() {
+            demand.wait(Duration::from_secs(60));
+        }
+        assert!(began.elapsed() < Duration::from_secs(30));
+        drop(watcher.join());
+    }
+}

@@ -1,0 +1,147 @@
+//! An open device node and its ioctls, each with the one type that the kernel expects.
+
+use std::ffi::c_void;
+use std::io;
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd};
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{Mode, OFlags};
+use v4l::v4l_sys as sys;
+use v4l::v4l2::vidioc;
+
+/// A device node such as `/dev/video0`. Calls never block: where there is nothing to dequeue, they say so.
+#[derive(Debug)]
+pub struct Device {
+    fd: OwnedFd,
+    path: PathBuf,
+}
+
+/// The number of an ioctl.
+pub type Request = std::ffi::c_ulong;
+
+macro_rules! ioctls {
+    ($($(#[$doc:meta])* $name:ident: $request:ident($type:ty);)*) => {
+        $(
+            $(#[$doc])*
+            pub fn $name(&self, argument: &mut $type) -> io::Result<()> {
+                // SAFETY: the type is the one that the request's number was made of, and it holds no pointer.
+                #[allow(unsafe_code)]
+                unsafe { self.ioctl(vidioc::$request as Request, argument) }
+            }
+        )*
+    };
+}
+
+impl Device {
+    /// Opens a node for reading and writing.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        // Closed in child processes, or they would keep the camera busy.
+        let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        let fd = rustix::fs::open(path, flags, Mode::empty())?;
+        Ok(Self { fd, path: path.to_owned() })
+    }
+
+    /// The node.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Calls the driver, again when a signal came between.
+    ///
+    /// # Errors
+    /// What the driver says.
+    ///
+    /// # Safety
+    /// `T` must be the type that `request` reads and writes, and pointers in it must be good for what the driver does
+    /// with them.
+    #[allow(unsafe_code)]
+    pub unsafe fn ioctl<T>(&self, request: Request, argument: &mut T) -> io::Result<()> {
+        loop {
+            let at: *mut T = argument;
+            // SAFETY: the descriptor is open, and the caller vouches for the argument.
+            let done = unsafe { v4l::v4l2::ioctl(self.fd.as_raw_fd(), request as _, at.cast::<c_void>()) };
+            match done {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                done => return done,
+            }
+        }
+    }
+
+    ioctls! {
+        /// What the device is.
+        query_capability: VIDIOC_QUERYCAP(sys::v4l2_capability);
+        /// The format number `index` of a queue.
+        enum_format: VIDIOC_ENUM_FMT(sys::v4l2_fmtdesc);
+        /// The size number `index` of a format.
+        enum_frame_size: VIDIOC_ENUM_FRAMESIZES(sys::v4l2_frmsizeenum);
+        /// The time from frame to frame number `index` of a format and size.
+        enum_frame_interval: VIDIOC_ENUM_FRAMEINTERVALS(sys::v4l2_frmivalenum);
+        /// The format that is set.
+        get_format: VIDIOC_G_FMT(sys::v4l2_format);
+        /// Sets a format; the driver may change every part of it.
+        set_format: VIDIOC_S_FMT(sys::v4l2_format);
+        /// What setting a format would give.
+        try_format: VIDIOC_TRY_FMT(sys::v4l2_format);
+        /// The frame rate.
+        get_parameters: VIDIOC_G_PARM(sys::v4l2_streamparm);
+        /// Sets the frame rate; the driver may change it.
+        set_parameters: VIDIOC_S_PARM(sys::v4l2_streamparm);
+        /// Asks for buffers; the driver says how many it gives.
+        request_buffers: VIDIOC_REQBUFS(sys::v4l2_requestbuffers);
+        /// Starts streaming on a queue of this type.
+        stream_on: VIDIOC_STREAMON(i32);
+        /// Stops streaming; every buffer comes back.
+        stream_off: VIDIOC_STREAMOFF(i32);
+    }
+}
+
+/// A structure of the kernel's, all zero.
+pub fn zeroed<T: KernelStruct>() -> T {
+    // SAFETY: `KernelStruct` says that zero is a value of every field.
+    #[allow(unsafe_code)]
+    unsafe {
+        std::mem::zeroed()
+    }
+}
+
+/// Plain C structures for which all bits zero is a value.
+///
+/// # Safety
+/// Every field must accept zero: integers, unions of them, and pointers, which are then null.
+#[allow(unsafe_code)]
+pub unsafe trait KernelStruct {}
+
+macro_rules! plain {
+    ($($name:ident),* $(,)?) => {
+        // SAFETY: C structures of integers, arrays, unions of those, and pointers.
+        $(#[allow(unsafe_code)] unsafe impl KernelStruct for sys::$name {})*
+    };
+}
+
+plain!(
+    v4l2_buffer,
+    v4l2_capability,
+    v4l2_event,
+    v4l2_event_subscription,
+    v4l2_fmtdesc,
+    v4l2_format,
+    v4l2_frmivalenum,
+    v4l2_frmsizeenum,
+    v4l2_input,
+    v4l2_plane,
+    v4l2_query_ext_ctrl,
+    v4l2_querymenu,
+    v4l2_requestbuffers,
+    v4l2_streamparm,
+    v4l2_ext_control,
+    v4l2_ext_controls,
+);
+
+impl AsFd for Device {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
+    }
+}
