@@ -14,16 +14,15 @@ const LAYERS: [&[&str]; 6] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 12] = [
+const DOORS: [(&str, &[&str]); 11] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
-    ("crossbeam_queue", &["link"]),
     ("ctrlc", &["cli"]),
     ("image", &["recording", "sink"]),
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
-    ("rustix", &["clock", "v4l2"]),
+    ("rustix", &["clock", "link/bell", "v4l2"]),
     ("v4l", &["v4l2"]),
     ("wgpu", &["bokeh/gpu"]),
     ("zune_jpeg", &["capture"]),

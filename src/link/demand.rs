@@ -1,44 +1,44 @@
 //! Whether anybody watches the output: told by sinks, asked by capture, which lets the camera rest while nobody does.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use crossbeam_channel::{Receiver, Sender, bounded};
+use super::bell::Bell;
+use super::sync::{Arc, AtomicUsize, Ordering};
 
 /// A count of watched outputs that can be waited for. Clones share it.
 #[derive(Clone, Debug)]
-pub struct Demand {
-    watched: Arc<AtomicUsize>,
-    bell: Sender<()>,
-    ear: Receiver<()>,
+pub struct Demand(Arc<Shared>);
+
+#[derive(Debug)]
+struct Shared {
+    watched: AtomicUsize,
+    bell: Bell,
 }
 
 impl Demand {
     /// Nobody watches yet.
     pub fn new() -> Self {
-        let (bell, ear) = bounded(1);
-        Self { watched: Arc::default(), bell, ear }
+        Self(Arc::new(Shared { watched: AtomicUsize::new(0), bell: Bell::new() }))
     }
 
     /// One more output is watched: until the returned [`Watch`] is dropped.
     pub fn watch(&self) -> Watch {
-        self.watched.fetch_add(1, Ordering::Release);
-        // After the count, or the waiter could wake, see nobody and sleep on. A bell that is rung already is heard.
-        let _ = self.bell.try_send(());
+        self.0.watched.fetch_add(1, Ordering::Release);
+        // After the count, or the waiter could wake, see nobody and sleep on.
+        self.0.bell.ring();
         Watch(self.clone())
     }
 
     /// Whether any output is watched.
     pub fn is_watched(&self) -> bool {
-        self.watched.load(Ordering::Acquire) > 0
+        self.0.watched.load(Ordering::Acquire) > 0
     }
 
     /// Sleeps until an output is watched, but no longer than `patience`; it may also wake for nothing.
     pub fn wait(&self, patience: Duration) {
         if !self.is_watched() {
-            // Without a bell, time is up: the caller looks again in either case.
-            let _ = self.ear.recv_timeout(patience);
+            // Rung or not, the caller looks again.
+            self.0.bell.wait_timeout(patience);
         }
     }
 }
@@ -55,11 +55,11 @@ pub struct Watch(Demand);
 
 impl Drop for Watch {
     fn drop(&mut self) {
-        self.0.watched.fetch_sub(1, Ordering::Release);
+        self.0.0.watched.fetch_sub(1, Ordering::Release);
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(loom)))]
 mod tests {
     use std::time::Instant;
 

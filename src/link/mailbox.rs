@@ -1,84 +1,94 @@
-//! One slot, newest wins: a queue of one for the item, and a channel of one unit as the doorbell to sleep on.
+//! One slot, newest wins, and a doorbell to sleep on.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::RecvTimeoutError;
-use crossbeam_queue::ArrayQueue;
-
+use super::bell::Bell;
+use super::slot::{Reader, Writer, slot};
+use super::sync::{Arc, AtomicBool, Ordering};
 use super::{Abandoned, Received};
 
-struct Slot<T> {
-    item: ArrayQueue<T>,
+/// What the ends tell each other besides items.
+struct Ends {
+    bell: Bell,
+    /// The sender is gone.
+    ended: AtomicBool,
+    /// The receiver is gone.
     abandoned: AtomicBool,
 }
 
 pub(super) fn mailbox<T>() -> (Sender<T>, Receiver<T>) {
-    let slot = Arc::new(Slot { item: ArrayQueue::new(1), abandoned: AtomicBool::new(false) });
-    let (bell, ear) = crossbeam_channel::bounded(1);
-    (Sender { slot: slot.clone(), bell }, Receiver { slot, ear })
+    let (writer, reader) = slot();
+    let ends = Ends { bell: Bell::new(), ended: AtomicBool::new(false), abandoned: AtomicBool::new(false) };
+    let ends = Arc::new(ends);
+    (Sender { writer, ends: ends.clone() }, Receiver { reader, ends })
 }
 
 pub(super) struct Sender<T> {
-    slot: Arc<Slot<T>>,
-    bell: crossbeam_channel::Sender<()>,
+    writer: Writer<T>,
+    ends: Arc<Ends>,
 }
 
 impl<T> Sender<T> {
-    pub(super) fn send(&self, item: T) -> Result<Option<T>, Abandoned> {
-        if self.slot.abandoned.load(Ordering::Acquire) {
+    pub(super) fn send(&mut self, item: T) -> Result<Option<T>, Abandoned> {
+        // Relaxed: nothing is read on its account. Seen late, one more item lies in the slot, which drops it.
+        if self.ends.abandoned.load(Ordering::Relaxed) {
             return Err(Abandoned);
         }
-        let displaced = self.slot.item.force_push(item);
-        // Only after the item lies in the slot, or the receiver could wake, find nothing and sleep on. A bell that is
-        // already rung (full) will be heard; a bell without an ear is seen by the next send.
-        let _ = self.bell.try_send(());
+        let displaced = self.writer.put(item);
+        // Only after the item lies in the slot, or the receiver could wake, find nothing and sleep on.
+        self.ends.bell.ring();
         Ok(displaced)
     }
 }
 
+impl<T> Drop for Sender<T> {
+    fn drop(&mut self) {
+        // Release: who sees it sees the last item, too. Only then the bell, as for an item.
+        self.ends.ended.store(true, Ordering::Release);
+        self.ends.bell.ring();
+    }
+}
+
 pub(super) struct Receiver<T> {
-    slot: Arc<Slot<T>>,
-    ear: crossbeam_channel::Receiver<()>,
+    reader: Reader<T>,
+    ends: Arc<Ends>,
 }
 
 impl<T> Receiver<T> {
-    pub(super) fn recv(&self) -> Option<T> {
-        loop {
-            if let Some(item) = self.slot.item.pop() {
-                return Some(item);
-            }
-            if self.ear.recv().is_err() {
-                // The sender is gone, and whatever it sent last happened before that.
-                return self.slot.item.pop();
-            }
+    pub(super) fn recv(&mut self) -> Option<T> {
+        match self.recv_until(None) {
+            Received::Item(item) => Some(item),
+            Received::Nothing | Received::Ended => None,
         }
     }
 
-    pub(super) fn recv_timeout(&self, patience: Duration) -> Received<T> {
-        let deadline = Instant::now() + patience;
+    pub(super) fn recv_timeout(&mut self, patience: Duration) -> Received<T> {
+        // A time that the clock cannot tell never comes.
+        self.recv_until(Instant::now().checked_add(patience))
+    }
+
+    pub(super) fn try_recv(&mut self) -> Option<T> {
+        self.reader.take()
+    }
+
+    fn recv_until(&mut self, deadline: Option<Instant>) -> Received<T> {
         loop {
-            if let Some(item) = self.slot.item.pop() {
+            if let Some(item) = self.reader.take() {
                 return Received::Item(item);
             }
-            match self.ear.recv_deadline(deadline) {
-                Ok(()) => {}
-                Err(RecvTimeoutError::Timeout) => return Received::Nothing,
-                Err(RecvTimeoutError::Disconnected) => {
-                    return self.slot.item.pop().map_or(Received::Ended, Received::Item);
-                }
+            // Acquire: whatever was sent last happened before. It may have come since the look above.
+            if self.ends.ended.load(Ordering::Acquire) {
+                return self.reader.take().map_or(Received::Ended, Received::Item);
+            }
+            if !self.ends.bell.wait_until(deadline) {
+                return Received::Nothing;
             }
         }
-    }
-
-    pub(super) fn try_recv(&self) -> Option<T> {
-        self.slot.item.pop()
     }
 }
 
 impl<T> Drop for Receiver<T> {
     fn drop(&mut self) {
-        self.slot.abandoned.store(true, Ordering::Release);
+        self.ends.abandoned.store(true, Ordering::Relaxed);
     }
 }

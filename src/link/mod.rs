@@ -16,9 +16,12 @@
 //! sleeps, nobody locks. And both rings are Vyukov's, which is not lock-free in the strict sense: a thread suspended by
 //! the scheduler in the middle of moving an item holds up that one slot until it runs again.
 
+mod bell;
 pub mod demand;
 mod mailbox;
 pub mod pool;
+mod slot;
+mod sync;
 
 use std::time::Duration;
 
@@ -67,7 +70,7 @@ impl<T> Sender<T> {
     /// # Errors
     /// The receiver is gone; `item` is dropped.
     pub fn send(&mut self, item: T) -> Result<Option<T>, Abandoned> {
-        match &self.0 {
+        match &mut self.0 {
             Tx::Live(mailbox) => mailbox.send(item),
             Tx::Lossless(queue) => queue.send(item).map(|()| None).map_err(|_| Abandoned),
         }
@@ -85,7 +88,7 @@ enum Rx<T> {
 impl<T> Receiver<T> {
     /// The next item; sleeps until there is one. `None` once the sender is gone and nothing is pending.
     pub fn recv(&mut self) -> Option<T> {
-        match &self.0 {
+        match &mut self.0 {
             Rx::Live(mailbox) => mailbox.recv(),
             Rx::Lossless(queue) => queue.recv().ok(),
         }
@@ -93,7 +96,7 @@ impl<T> Receiver<T> {
 
     /// The next item; sleeps until there is one, but no longer than `patience`.
     pub fn recv_timeout(&mut self, patience: Duration) -> Received<T> {
-        match &self.0 {
+        match &mut self.0 {
             Rx::Live(mailbox) => mailbox.recv_timeout(patience),
             Rx::Lossless(queue) => match queue.recv_timeout(patience) {
                 Ok(item) => Received::Item(item),
@@ -105,12 +108,14 @@ impl<T> Receiver<T> {
 
     /// The next item if it is there already.
     pub fn try_recv(&mut self) -> Option<T> {
-        match &self.0 {
+        match &mut self.0 {
             Rx::Live(mailbox) => mailbox.try_recv(),
             Rx::Lossless(queue) => queue.try_recv().ok(),
         }
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, loom))]
+mod models;
+#[cfg(all(test, not(loom)))]
 mod tests;

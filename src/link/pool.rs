@@ -1,53 +1,128 @@
 //! A fixed set of buffers that circulate: taken by a stage, given back by being dropped.
 //!
-//! Buffers come home through a bounded `crossbeam_channel` with room for all of them, so giving one back never waits;
-//! a mutex is touched only when somebody sleeps for a buffer.
+//! One atomic word has a bit for each buffer that is home. Taking clears one, giving back sets it: a bit says nothing
+//! but whether that buffer is there, so a word that has changed and changed back (the ABA problem) misleads nobody.
+//! Both are lock-free and neither allocates; giving back, in a stage or on its way out, never waits. A taker that
+//! finds no buffer sleeps on a doorbell.
+//!
+//! # Memory orders
+//! Giving back is a *release*, taking an *acquire* of the same word: what was done to a buffer, and its return to its
+//! cell, come before it is taken again. Others that change the word in between do so by read-modify-writes, which carry
+//! a release on.
 
 use std::ops::{Deref, DerefMut};
 
-use crossbeam_channel::{Receiver, Sender, bounded};
+use super::bell::Bell;
+use super::sync::{Arc, AtomicU64, Ordering, UnsafeCell};
 
-/// A fixed set of equal buffers. Nothing is allocated after [`Pool::new`].
+/// Most buffers of a [`Pool`]: the bits of a word.
+pub const MOST_BUFFERS: usize = u64::BITS as usize;
+
+/// A fixed set of equal buffers. Nothing is allocated after [`Pool::new`]. A buffer is moved when it is taken and given
+/// back, so let it be a handle of its memory, such as a `Vec`.
 pub struct Pool<T> {
-    home: Receiver<T>,
-    back: Sender<T>,
+    shared: Arc<Shared<T>>,
 }
+
+struct Shared<T> {
+    /// Bit `n` is set while cell `n` holds its buffer.
+    free: AtomicU64,
+    cells: Box<[UnsafeCell<Option<T>>]>,
+    bell: Bell,
+}
+
+// SAFETY: the cells are the only part that is not `Sync` by itself. A cell is accessed by the one thread that cleared
+// its bit, until that or another thread to which the loan was moved sets it again (see `Memory orders`). Buffers are
+// moved between threads, never shared, so `T: Send` suffices.
+#[allow(unsafe_code)]
+unsafe impl<T: Send> Sync for Shared<T> {}
 
 impl<T> Pool<T> {
     /// A pool of `count` buffers, each made by `make`.
+    ///
+    /// # Panics
+    /// `count` is more than [`MOST_BUFFERS`].
     pub fn new(count: usize, make: impl FnMut() -> T) -> Self {
-        let (back, home) = bounded(count);
-        for buffer in std::iter::repeat_with(make).take(count) {
-            // The channel has room for exactly `count`.
-            let _ = back.try_send(buffer);
-        }
-        Self { home, back }
+        assert!(count <= MOST_BUFFERS, "a pool holds at most {MOST_BUFFERS} buffers, not {count}");
+        let buffers = std::iter::repeat_with(make).take(count);
+        let cells = buffers.map(|buffer| UnsafeCell::new(Some(buffer))).collect();
+        let all = if count == 0 { 0 } else { u64::MAX >> (MOST_BUFFERS - count) };
+        Self { shared: Arc::new(Shared { free: AtomicU64::new(all), cells, bell: Bell::new() }) }
     }
 
-    /// A free buffer; waits until one comes home. A pool of none waits forever.
+    /// A free buffer; sleeps until one comes home. A pool of none waits forever.
     pub fn take(&self) -> Pooled<T> {
-        // `recv` fails only when every sender is gone, and the pool holds one itself.
-        let value = self.home.recv().ok();
-        Pooled { value, home: Some(self.back.clone()) }
+        let mut woken = false;
+        loop {
+            if let Some((loan, left)) = self.claim() {
+                // Of several takers only one hears the bell, however many buffers came home before it did. Those that
+                // come home later ring for themselves.
+                if woken && left != 0 {
+                    self.shared.bell.ring();
+                }
+                return loan;
+            }
+            self.shared.bell.wait();
+            woken = true;
+        }
     }
 
-    /// A free buffer, or nothing when all are out.
+    /// A free buffer, or nothing when all are out. Never waits.
     pub fn try_take(&self) -> Option<Pooled<T>> {
-        let value = self.home.try_recv().ok()?;
-        Some(Pooled { value: Some(value), home: Some(self.back.clone()) })
+        self.claim().map(|(loan, _)| loan)
     }
 
     /// Buffers that are home now.
     pub fn free(&self) -> usize {
-        self.home.len()
+        self.shared.free.load(Ordering::Relaxed).count_ones() as usize
+    }
+
+    /// A free buffer, and the bits of those that are left.
+    fn claim(&self) -> Option<(Pooled<T>, u64)> {
+        // Relaxed: only a hint of which one to claim. A buffer whose bell this thread has heard is not overlooked.
+        let mut free = self.shared.free.load(Ordering::Relaxed);
+        while free != 0 {
+            let left = free & (free - 1);
+            // Acquire: what was done to the buffer, and its return, come first. Nothing is released: whatever is done
+            // to it now, its return will. Where this fails, another thread got on.
+            match self.shared.free.compare_exchange_weak(free, left, Ordering::Acquire, Ordering::Relaxed) {
+                Ok(_) => {
+                    let index = free.trailing_zeros() as usize;
+                    let value = self.shared.cell(index, Option::take);
+                    let home = Some(Home { shared: self.shared.clone(), index });
+                    return Some((Pooled { value, home }, left));
+                }
+                Err(now) => free = now,
+            }
+        }
+        None
     }
 }
 
-/// A buffer on loan from a [`Pool`]; dropping it sends it home.
+impl<T> Shared<T> {
+    /// Only for who holds the loan `index`: its bit is clear, and it was this loan that cleared it.
+    fn cell<R>(&self, index: usize, access: impl FnOnce(&mut Option<T>) -> R) -> R {
+        self.cells[index].with_mut(|cell| {
+            // SAFETY: called twice a loan: by the thread that has just cleared the bit, and by the loan's drop before
+            // it sets the bit. Nobody else can clear it in between, so nobody else is at the cell; and the acquire
+            // of the one follows the release of the other.
+            #[allow(unsafe_code)]
+            access(unsafe { &mut *cell })
+        })
+    }
+}
+
+/// A buffer on loan from a [`Pool`]; dropping it gives it back.
 pub struct Pooled<T> {
     /// Empty only while the loan is being dropped.
     value: Option<T>,
-    home: Option<Sender<T>>,
+    home: Option<Home<T>>,
+}
+
+/// Where a loan belongs; the buffers live as long as their pool or any loan of it.
+struct Home<T> {
+    shared: Arc<Shared<T>>,
+    index: usize,
 }
 
 impl<T> Pooled<T> {
@@ -72,14 +147,16 @@ impl<T> DerefMut for Pooled<T> {
 
 impl<T> Drop for Pooled<T> {
     fn drop(&mut self) {
-        if let (Some(value), Some(home)) = (self.value.take(), &self.home) {
-            // Fails only when the pool itself is gone; then the buffer goes too.
-            let _ = home.try_send(value);
+        if let Some(Home { shared, index }) = &self.home {
+            shared.cell(*index, |cell| *cell = self.value.take());
+            // Release: the buffer is home before it is free. Then the bell, or a taker could wake and find nothing.
+            shared.free.fetch_or(1 << index, Ordering::Release);
+            shared.bell.ring();
         }
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
 
