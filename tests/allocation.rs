@@ -5,6 +5,8 @@ mod common;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use bokehcam::bokeh::Settings;
 use bokehcam::bokeh::cpu::CpuBokeh;
@@ -12,6 +14,8 @@ use bokehcam::bokeh::plan::Plan;
 use bokehcam::budget::Quality;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::link::live;
+use bokehcam::link::pool::{Pool, Pooled};
 use common::{EFFECTS, coc, noise, settings, three_depths};
 
 struct Counting;
@@ -40,6 +44,41 @@ static COUNTING: Counting = Counting;
 fn a_frame_allocates_nothing() {
     blur();
     refinement();
+    hand_over();
+}
+
+/// From thread to thread and home again, both ends sleeping now and then.
+fn hand_over() {
+    const READ: usize = 1_000;
+    let pool = Pool::new(2, || ColorImage::new(16, 16));
+    let (mut to, mut from) = live::<Pooled<ColorImage>>();
+    let allocations = thread::scope(|scope| {
+        let reader = scope.spawn(move || {
+            // Threads allocate as they begin; sleeping and waking may do so once.
+            let mut before = 0;
+            for read in 0..READ {
+                if read == READ / 5 {
+                    before = ALLOCATIONS.load(Ordering::Relaxed);
+                }
+                if read % 100 < 50 {
+                    thread::sleep(Duration::from_micros(20));
+                }
+                drop(from.recv().expect("a frame"));
+            }
+            ALLOCATIONS.load(Ordering::Relaxed) - before
+        });
+        // Both buffers are out where the reader is slow: then this end sleeps. It goes on until the reader is gone.
+        for frame in 0.. {
+            if to.send(pool.take()).is_err() {
+                break;
+            }
+            if frame % 100 >= 50 {
+                thread::sleep(Duration::from_micros(20));
+            }
+        }
+        reader.join().expect("the reader")
+    });
+    assert_eq!(allocations, 0, "over {READ} frames");
 }
 
 fn refinement() {

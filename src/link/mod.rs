@@ -9,12 +9,29 @@
 //! Dropping the sender is the end of the stream: what is pending is still delivered. Dropping the receiver makes the
 //! next send fail with [`Abandoned`].
 //!
-//! # What is lock-free
-//! The hand-over is: an item moves through atomic operations alone, in `crossbeam_queue::ArrayQueue` (live) or in the
-//! ring of a bounded `crossbeam_channel` (lossless). Two things are not. Sleeping: a thread that waits on an empty or
-//! full link registers itself under a mutex, and whoever wakes it takes that mutex for a few instructions; while nobody
-//! sleeps, nobody locks. And both rings are Vyukov's, which is not lock-free in the strict sense: a thread suspended by
-//! the scheduler in the middle of moving an item holds up that one slot until it runs again.
+//! # What is lock-free, and what is not
+//! On a live link and in a pool, no thread ever holds anything that another one has to wait for:
+//!
+//! - Sending and looking for an item are *wait-free*: a fixed number of steps, one atomic swap that moves the item and
+//!   one for the doorbell, whatever the other end does and wherever the scheduler suspends it (`slot.rs`).
+//! - Taking a free buffer and giving it back are *lock-free*: a buffer bit is cleared by a compare-and-swap that is
+//!   tried again only if another thread has just succeeded, and set by one instruction ([`pool`]).
+//! - None of this allocates, and none calls the kernel, but for one thing: who sends to, or gives a buffer to, a thread
+//!   that sleeps makes one system call to wake it (`bell.rs`). There is no mutex on that way either.
+//!
+//! What does wait, because it is meant to: a reader without an item and a taker without a buffer sleep in the kernel
+//! (`futex`) until there is one. A live run has buffers for every place along its way, so its capture never does.
+//!
+//! Not lock-free is the lossless link: a bounded `crossbeam_channel`. While nobody sleeps it moves items by atomic
+//! operations, but a thread suspended in the middle of moving one holds up that place of the ring; a thread that goes
+//! to sleep registers under a mutex, which its waker takes as well; and its sender waits for room. It serves files,
+//! where nothing is late.
+//!
+//! # How that is shown
+//! Each memory order has its reason beside it. The models in `models.rs` are run by loom in every order of the threads
+//! up to a number of preemptions; `tests/handover.rs` counts a million frames; `tests/allocation.rs` counts
+//! allocations; `scripts/prove-link` runs these, and Miri and ThreadSanitizer where the toolchain has them.
+//! `cargo bench --bench handover` measures, beside a mutex and a condition variable.
 
 mod bell;
 pub mod demand;
