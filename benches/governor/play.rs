@@ -56,10 +56,10 @@ pub fn play(
     let mut under_way = VecDeque::with_capacity(weather.late + 1);
     let mut rungs = Vec::with_capacity(frames);
     for (frame, &(load, _)) in trace.iter().enumerate() {
-        if under_way.len() > weather.late {
-            if let Some((rung, took)) = under_way.pop_front() {
-                picker.note(rung, took, frame);
-            }
+        if under_way.len() > weather.late
+            && let Some((rung, took)) = under_way.pop_front()
+        {
+            picker.note(rung, took, frame);
         }
         let rung = picker.rung(load);
         let took = load * costs[rung];

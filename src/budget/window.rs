@@ -47,10 +47,10 @@ impl<const N: usize> Window<N> {
             return 0.0;
         }
         let mut sorted = [0.0; N];
-        for k in 0..count {
-            sorted[k] = self.values[(self.next + N - 1 - k) % N];
-        }
         let sorted = &mut sorted[..count];
+        for (back, value) in (1..).zip(sorted.iter_mut()) {
+            *value = self.values[(self.next + N - back) % N];
+        }
         sorted.sort_unstable_by(f64::total_cmp);
         let rank = ((p * count as f64).ceil() as usize).clamp(1, count);
         sorted[rank - 1]
