@@ -10,6 +10,8 @@ mod deliver;
 mod depth;
 mod error;
 mod pacer;
+mod playout;
+mod quality;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, Scope, ScopedJoinHandle};
@@ -37,6 +39,15 @@ pub enum Pace {
     Realtime,
     /// As fast as it goes: every frame is delivered, and the result is the same every time.
     Asap,
+}
+
+/// How finely frames are blurred.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QualityRule {
+    /// All at one rung.
+    Fixed(Quality),
+    /// As the time there is allows, from this rung on; the executor is made for all of them.
+    Auto(Quality),
 }
 
 /// Where the CoC of a frame comes from.
@@ -83,8 +94,8 @@ pub struct Run<'a> {
     pub depth: Option<Box<dyn DepthSource>>,
     /// What blurs them; `None` passes them through (effect `none`).
     pub bokeh: Option<Box<dyn Bokeh>>,
-    /// The rung that `bokeh` was made for, for the report.
-    pub quality: Quality,
+    /// At which rung `bokeh` blurs.
+    pub quality: QualityRule,
     /// By how much they are blurred.
     pub coc: CocRule,
     /// Fit depth to the pictures and steady it before it is used; otherwise only its holes are filled.
@@ -93,7 +104,8 @@ pub struct Run<'a> {
     pub sink: Box<dyn Sink>,
     /// Real time, or all frames.
     pub pace: Pace,
-    /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss.
+    /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss. In real time, depth may take half
+    /// of it before it is made for fewer frames.
     pub budget_ns: u64,
     /// Count frames that cannot be read, and go on; otherwise the first one ends the run.
     pub keep_going: bool,
@@ -147,8 +159,20 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let sink_hold = sink.hold();
     let tally = Tally::new();
     let mut timings = Timings::default();
-    let Timings { decode, depth: depth_times, blur, passes, rungs, misses, sink: sink_times, latency, frame, repeats } =
-        &mut timings;
+    let Timings {
+        decode,
+        depth: depth_times,
+        held,
+        blur,
+        passes,
+        rungs,
+        misses,
+        sink: sink_times,
+        latency,
+        frame,
+        repeats,
+    } = &mut timings;
+    let live_ns = (pace == Pace::Realtime).then_some(info.period_ns);
     let began_ns = clock.now_ns();
     let over = AtomicBool::new(false);
     let places = Places { in_blur: executor.as_ref().map_or(0, |executor| executor.capacity()) };
@@ -182,15 +206,17 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         depths: &depths,
         tally: &tally,
         clock: &clock,
+        rate: live_ns.map(|_| depth::Rate::new(run.budget_ns / 2)),
         times: depth_times,
+        held,
     };
     let blur = blur::Stage {
         executor,
-        late: (pace == Pace::Realtime).then(|| blur::LateRule::new(info.period_ns)),
+        late: live_ns.map(quality::LateRule::new),
+        picker: quality::Picker::new(run.quality, run.budget_ns, live_ns),
         outs: &outs,
         tally: &tally,
         clock: &clock,
-        quality: run.quality,
         budget_ns: run.budget_ns,
         times: blur::Times { blur, passes, rungs, misses },
     };
@@ -200,6 +226,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         total: info.frames,
         progress: run.progress,
         hold: sink_hold,
+        playout: live_ns.map(playout::Playout::new),
         tally: &tally,
         clock: &clock,
         times: deliver::Times { sink: sink_times, latency, frame, repeats },

@@ -17,6 +17,8 @@ pub struct Timings {
     pub decode: Histogram,
     /// Reading depth, focusing and filling holes.
     pub depth: Histogram,
+    /// Frames that took over the depth of the one before, to save time.
+    pub held: u64,
     /// The blur of a frame: the sum of its passes, or the wall time where an executor times none.
     pub blur: Histogram,
     /// The blur's passes.

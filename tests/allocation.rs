@@ -11,7 +11,7 @@ use std::time::Duration;
 use bokehcam::bokeh::Settings;
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
-use bokehcam::budget::Quality;
+use bokehcam::budget::{Governor, Quality, Sample};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::live;
@@ -43,6 +43,7 @@ static COUNTING: Counting = Counting;
 #[test]
 fn a_frame_allocates_nothing() {
     blur();
+    levels();
     refinement();
     hand_over();
 }
@@ -118,4 +119,29 @@ fn blur() {
             assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "{effect:?} {quality}");
         }
     }
+}
+
+/// Nor does a change of the quality level, not even the first one.
+fn levels() {
+    let (width, height) = (160, 120);
+    let (image, map) = (noise(width, height), three_depths(width, height));
+    for effect in EFFECTS {
+        let plan = Plan::new(&Settings { adaptive: true, highlights: 4.0, ..settings(effect) }, width, height);
+        let mut cpu = CpuBokeh::new(plan, Some(2));
+        let mut out = ColorImage::new(width, height);
+        cpu.blur(&image, Some(&map), &coc(effect, height), &mut out).expect("a first frame");
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        for quality in Quality::ALL.into_iter().chain([Quality::Draft, Quality::Best, Quality::Balanced]) {
+            cpu.set_quality(quality);
+            cpu.blur(&image, Some(&map), &coc(effect, height), &mut out).expect("a frame");
+            assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "{effect:?} {quality}");
+        }
+    }
+    let mut governor = Governor::new(&[1.0, 2.0], 1);
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    for at_ns in 0..2000 {
+        let took_ns = if at_ns / 500 % 2 == 0 { 3_000 } else { 300 };
+        governor.note(Sample { rung: governor.rung(), took_ns, at_ns }, 1_000);
+    }
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "governor");
 }

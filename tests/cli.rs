@@ -118,6 +118,7 @@ fn a_flag_goes_before_the_environment_before_the_file_before_the_default() {
     };
     let pair = |value: &str, origin: &str| (value.to_string(), origin.to_string());
     assert_eq!(dumped(&dump(&[], false), "rim").1, "default");
+    assert_eq!(dumped(&dump(&[], false), "quality"), ("\"auto\"".to_string(), "default".to_string()));
 
     fs::create_dir(home.path().join("bokehcam")).unwrap();
     fs::write(home.path().join("bokehcam/config.toml"), "rim = 0.4\nrank = \"full\"\n").unwrap();

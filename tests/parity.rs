@@ -36,6 +36,7 @@ fn job(ticket: u64, color: &ColorImage, map: &DepthMap, field: &CocField) -> Job
         color: Pooled::detached(color.clone()),
         depth: Some(Pooled::detached(map.clone())),
         coc: *field,
+        quality: Quality::default(),
         out: Pooled::detached(ColorImage::default()),
     }
 }
@@ -169,6 +170,36 @@ fn what_the_cpu_leaves_out_makes_no_difference() {
     for (name, metres) in [("far", 4.0), ("slightly far", 1.2), ("near", 0.5)] {
         let map = depth(width, height, |x, y| if x + y < 130 { metres } else { 1.0 + 1e-4 * (x % 7) as f32 });
         same(&settings(Effect::Dof), &image, &map, &coc(Effect::Dof, height), name);
+    }
+}
+
+/// One executor for all levels does at each what one made for that level does, to the bit.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn any_sequence_of_levels_agrees() {
+    let (width, height) = (97, 71);
+    let image = noise(width, height);
+    let maps = [three_depths(width, height), depth(width, height, |x, _| 0.4 + 0.05 * x as f32)];
+    for effect in EFFECTS {
+        let all = Settings { adaptive: true, ..settings(effect) };
+        let field = coc(effect, height);
+        let blurred = |gpu: &mut GpuBokeh, map: &DepthMap, quality| {
+            gpu.submit(Job { quality, ..job(0, &image, map, &field) }).expect("room for a frame");
+            gpu.collect(true).expect("a frame").expect("one is in flight").out.clone()
+        };
+        let alone: Vec<Vec<ColorImage>> = (Quality::ALL.iter())
+            .map(|&quality| {
+                let mut gpu = gpu(&Plan::new(&Settings { quality, ..settings(effect) }, width, height));
+                maps.iter().map(|map| blurred(&mut gpu, map, Quality::Draft)).collect()
+            })
+            .collect();
+        let mut gpu = gpu(&Plan::new(&all, width, height));
+        let mut numbers = Numbers(5);
+        for step in 0..20 {
+            let (level, map) = ((numbers.next() * 5.0) as usize, (numbers.next() * 2.0) as usize);
+            let out = blurred(&mut gpu, &maps[map], Quality::ALL[level]);
+            assert!(out == alone[level][map], "{effect:?}: step {step}, {}", Quality::ALL[level]);
+        }
     }
 }
 

@@ -137,6 +137,7 @@ impl Blurrer {
             rank,
             highlights: 0.0,
             quality,
+            adaptive: false,
             far_max_px: shot.lens.coc_at_infinity_px,
             near_max_px: shot.lens.max_coc_px,
         };
@@ -188,6 +189,7 @@ impl Blurrer {
             color: Pooled::detached(shot.image.clone()),
             depth: Some(Pooled::detached(depth)),
             coc: CocField::Depth(shot.lens),
+            quality: Quality::default(),
             out: Pooled::detached(ColorImage::default()),
         })?;
         let finished = bokeh.collect(true)?;

@@ -38,7 +38,11 @@ pub struct Bank {
 impl Bank {
     /// The bank of a mask for radii up to `max_radius_px`.
     pub fn new(mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
-        let svd = Decomposition::of(mask);
+        Self::of(&Decomposition::of(mask), mask, rank, max_radius_px)
+    }
+
+    /// The same where the mask's decomposition is there already.
+    pub fn of(svd: &Decomposition, mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
         let terms = match rank {
             Rank::Terms(n) => (n as usize).clamp(1, svd.numerical_rank()),
             Rank::Full => svd.numerical_rank(),

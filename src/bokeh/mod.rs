@@ -8,6 +8,7 @@ pub mod bank;
 pub mod cpu;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+pub mod levels;
 pub mod low_rank;
 pub mod plan;
 pub mod rung;
@@ -16,6 +17,7 @@ pub mod split;
 
 use std::time::Duration;
 
+use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::optics::CocField;
@@ -65,7 +67,9 @@ pub struct Settings {
     /// Highlight recovery `M`: clipped white is taken as `M` times as bright; 0 switches it off.
     pub highlights: f32,
     /// Rung of the quality ladder.
-    pub quality: crate::budget::Quality,
+    pub quality: Quality,
+    /// Whether frames may say another one ([`Job::quality`]): the executor is then made for all of them.
+    pub adaptive: bool,
     /// Largest CoC radius behind the focal plane, in pixels.
     pub far_max_px: f32,
     /// Largest CoC radius in front of the focal plane, in pixels (0 when nothing can be there).
@@ -82,6 +86,8 @@ pub struct Job {
     pub depth: Option<Pooled<DepthMap>>,
     /// The radius of every pixel.
     pub coc: CocField,
+    /// The rung of the quality ladder; of an executor made for one ([`Settings::adaptive`]), that one holds.
+    pub quality: Quality,
     /// Where the result goes; resized to the picture's size.
     pub out: Pooled<ColorImage>,
 }

@@ -1,6 +1,7 @@
 //! The plan: which bins a picture is split into, at which scale each is filtered, and with which filters.
 //!
-//! Filters and memory are fixed per picture size and settings; the bins follow each frame's depth ([`Plan::split`]).
+//! Filters and memory are fixed per picture size and settings; the quality may change from frame to frame where the
+//! settings are adaptive ([`Plan::set_quality`]), and the bins follow each frame's depth ([`Plan::split`]).
 //! Both executors run a frame pass by pass, under these names (the CPU's `bin` reads the picture itself and so unpacks):
 //!
 //! 1. `unpack`: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC.
@@ -13,10 +14,12 @@
 use std::sync::Arc;
 
 use super::bank::{Bank, MASK_CELLS};
-use super::rung::{MOST_RADIUS_PX, Rung, SCALES, rung};
+use super::levels::Levels;
+use super::rung::Rung;
 pub use super::share::Share;
 use super::split::{Counts, MAX_PIECES, Piece};
 use super::{Effect, Method, Rank, Settings};
+use crate::budget::Quality;
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
@@ -86,18 +89,25 @@ pub struct Plan {
     pub height: usize,
     /// How bins become a picture.
     pub compositing: Compositing,
-    /// The quality level's trade.
+    /// The quality level.
+    pub quality: Quality,
+    /// What it trades.
     pub rung: Rung,
+    /// Every level that the plan can be set to.
+    pub levels: Arc<Levels>,
     /// Front to back: by ascending CoC.
     pub bins: Vec<Bin>,
     /// The filters, in units of bin pixels.
     pub bank: Arc<Bank>,
+    /// Which of the levels' banks that is.
+    pub bank_index: usize,
     /// Whether what near objects hide is filled in.
     pub fill: bool,
     /// Highlight recovery: 1 + 1/M, or infinity when off.
     pub expansion: f32,
     /// Whether the rank is full and the method the paper's: an exact 2-D gather.
     pub exact: bool,
+    effect: Effect,
     /// Whether every bin stays at full scale.
     full_scale: bool,
     /// Largest radius in the bin in focus.
@@ -109,54 +119,69 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Plans frames of `width` x `height` pixels.
+    /// Plans frames of `width` x `height` pixels, at the settings' quality to begin with.
     pub fn new(settings: &Settings, width: u32, height: u32) -> Self {
-        let rung = rung(settings.quality);
         let compositing = match (settings.effect, settings.method) {
             (Effect::Dof, Method::Layered) => Compositing::Layers,
             (Effect::Dof, Method::Gather) => Compositing::Gather,
             (Effect::Blur | Effect::TiltShift, _) => Compositing::Select,
         };
-        let terms = if settings.effect == Effect::Blur { rung.even_rank } else { rung.rank };
-        let rank = settings.rank.unwrap_or(Rank::Terms(terms));
-        let most_px = settings.far_max_px.max(settings.near_max_px);
         let full_scale = compositing == Compositing::Gather || settings.rank == Some(Rank::Full);
-        let coarsest = SCALES[SCALES.len() - 1] as f32;
-        let bank_px = match settings.effect {
-            _ if full_scale => most_px,
-            Effect::Blur => most_px / rung.even_scale(most_px) as f32,
-            _ => most_px.min((most_px / coarsest).max(MOST_RADIUS_PX)),
-        };
         let mask = settings.aperture.mask(MASK_CELLS, settings.rim);
+        let levels = Arc::new(Levels::new(settings, &mask, full_scale));
+        let level = levels.nearest(settings.quality);
         let mut plan = Self {
             width: width as usize,
             height: height as usize,
             compositing,
-            rung,
+            quality: level.quality,
+            rung: level.rung,
             bins: Vec::with_capacity(MAX_BINS),
-            bank: Arc::new(Bank::new(&mask, rank, bank_px)),
-            fill: rung.fill,
+            bank: Arc::clone(&levels.banks[level.bank]),
+            bank_index: level.bank,
+            fill: level.rung.fill,
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
-            exact: compositing == Compositing::Gather && rank == Rank::Full,
+            exact: compositing == Compositing::Gather && settings.rank == Some(Rank::Full),
+            levels,
+            effect: settings.effect,
             full_scale,
-            focus_px: most_px,
+            focus_px: settings.far_max_px.max(settings.near_max_px),
             max_px: [settings.far_max_px, settings.near_max_px],
             counts: Counts::default(),
             pieces: std::array::from_fn(|_| Vec::with_capacity(MAX_PIECES)),
         };
-        match settings.effect {
+        plan.lay_out_pieces();
+        plan
+    }
+
+    /// Plans the next frames at another quality, or the nearest that the settings allow. Allocates nothing.
+    pub fn set_quality(&mut self, quality: Quality) {
+        let level = self.levels.nearest(quality);
+        if level.quality == self.quality {
+            return;
+        }
+        (self.quality, self.rung, self.fill) = (level.quality, level.rung, level.rung.fill);
+        self.bank_index = level.bank;
+        self.bank = Arc::clone(&self.levels.banks[level.bank]);
+        self.lay_out_pieces();
+    }
+
+    /// The bins where they do not follow from a frame's depth.
+    fn lay_out_pieces(&mut self) {
+        let [far_px, near_px] = self.max_px;
+        let [far, near] = &mut self.pieces;
+        far.clear();
+        near.clear();
+        self.focus_px = far_px.max(near_px);
+        match self.effect {
             Effect::TiltShift => {
-                plan.pieces[0].extend(even_pieces(settings.far_max_px, rung.bins_per_side));
-                plan.focus_px = plan.pieces[0].first().map_or(most_px, |piece| piece.border_px);
+                far.extend(even_pieces(far_px, self.rung.bins_per_side));
+                self.focus_px = far.first().map_or(self.focus_px, |piece| piece.border_px);
             }
-            Effect::Blur => {
-                let [border_px, low_px, high_px] = [0.0, settings.far_max_px, settings.far_max_px];
-                plan.pieces[0].push(Piece { border_px, low_px, high_px });
-            }
+            Effect::Blur => far.push(Piece { border_px: 0.0, low_px: far_px, high_px: far_px }),
             Effect::Dof => {}
         }
-        plan.lay_out();
-        plan
+        self.lay_out();
     }
 
     /// Splits the CoC of a frame into bins, where that follows from its depth.
@@ -178,7 +203,8 @@ impl Plan {
     /// The bins of the current pieces.
     fn lay_out(&mut self) {
         let [far, near] = &self.pieces;
-        let side = self.rung.bins_per_side as usize;
+        // The same memory for the same place, whatever the level.
+        let side = self.levels.most_bins_per_side();
         let first = |pieces: &[Piece]| pieces.first().map_or(f32::INFINITY, |piece| piece.border_px);
         let beyond = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
@@ -220,24 +246,22 @@ impl Plan {
         self.bank.terms < if self.bank.even { reach } else { 2 * reach }
     }
 
-    /// The least scale that a bin in this slot can have.
+    /// The least scale that a bin in this slot can have, at any level.
     pub fn least_scale(&self, slot: usize) -> usize {
-        let side = self.rung.bins_per_side as usize;
-        let fine = slot == 0 || (slot - 1) % side.max(1) < self.rung.fine_bins();
+        let side = self.levels.most_bins_per_side();
+        let fine = slot == 0 || (slot - 1) % side.max(1) < self.levels.most_fine_bins();
         if self.full_scale || fine || self.compositing != Compositing::Layers { 1 } else { 2 }
     }
 
-    /// Memories for bins that an executor needs.
+    /// Memories for bins that an executor needs, whatever the level.
     pub fn slots(&self) -> usize {
-        match self.compositing {
-            Compositing::Layers => 1 + 2 * self.rung.bins_per_side as usize,
-            _ => self.bins.iter().map(|bin| bin.slot + 1).max().unwrap_or(0),
+        match self.effect {
+            Effect::Dof if self.compositing == Compositing::Gather => 1,
+            Effect::Dof => 1 + 2 * self.levels.most_bins_per_side(),
+            Effect::TiltShift if self.pieces[0].is_empty() => 1,
+            Effect::TiltShift => 1 + self.levels.most_bins_per_side(),
+            Effect::Blur => 2,
         }
-    }
-
-    /// The largest reach of a filter, in bin pixels.
-    pub fn reach(&self) -> usize {
-        self.bank.reach
     }
 
     /// The outermost tap of a bin's filters, in bin pixels.
@@ -336,6 +360,7 @@ mod tests {
             rank: None,
             highlights: 0.0,
             quality,
+            adaptive: false,
             far_max_px: 16.0,
             near_max_px: 30.0,
         }

@@ -15,6 +15,7 @@ use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
 use crate::optics::CocField;
+use crate::pipeline::QualityRule;
 use crate::scene::{Scene, View};
 
 /// Frames before those that are measured: caches and clocks settle.
@@ -39,7 +40,7 @@ pub struct BenchCommand {
     coc: Vec<f32>,
     /// Quality levels
     #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
-          default_value = Quality::default().name(), value_parser = options::quality())]
+          default_value = Quality::default().name(), value_parser = super::quality::level())]
     quality: Vec<Quality>,
     /// Numbers of threads of the CPU backend [default: one per core]
     #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
@@ -131,7 +132,7 @@ fn measure(
     executor: &Executor,
 ) -> Result<Measured, CliError> {
     let options = options::Blur { coc_at_infinity: Some(coc_px), ..command.blur.clone() };
-    let blur = Blur::resolve(&options, &command.aperture, quality, true)?;
+    let blur = Blur::resolve(&options, &command.aperture, QualityRule::Fixed(quality), true)?;
     let size = color.size();
     let Some(settings) = blur.settings(size) else {
         return Err(CliError::Usage(
@@ -196,6 +197,7 @@ impl Buffers {
             color: self.colors.take(),
             depth: self.depths.as_ref().map(Pool::take),
             coc,
+            quality: Quality::default(),
             out: self.results.take(),
         };
         let began = Instant::now();

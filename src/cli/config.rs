@@ -6,10 +6,9 @@ use super::options;
 use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Refine, Tilt};
 use crate::bokeh::aperture::Aperture;
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
-use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
 use crate::optics::{CocField, Lens, Ramp};
-use crate::pipeline::{CocAtInfinity, CocRule};
+use crate::pipeline::{CocAtInfinity, CocRule, QualityRule};
 
 /// How strong the blur is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +35,7 @@ pub struct Blur {
     rim: f32,
     rank: Option<bokeh::Rank>,
     highlights: f32,
-    quality: Quality,
+    quality: QualityRule,
 }
 
 impl Blur {
@@ -47,7 +46,7 @@ impl Blur {
     pub fn resolve(
         blur: &options::Blur,
         aperture: &options::Aperture,
-        quality: Quality,
+        quality: QualityRule,
         has_depth: bool,
     ) -> Result<Self, CliError> {
         let usage = |text: &str| Err(CliError::Usage(text.to_string()));
@@ -106,6 +105,10 @@ impl Blur {
     /// The executor's settings for pictures of `size` pixels; none when frames pass through.
     pub fn settings(&self, size: (u32, u32)) -> Option<bokeh::Settings> {
         let effect = self.effect?;
+        let (quality, adaptive) = match self.quality {
+            QualityRule::Fixed(quality) => (quality, false),
+            QualityRule::Auto(quality) => (quality, true),
+        };
         let max_px = self.max_coc_px(size);
         let far_max_px = self.even_px(size).min(max_px);
         let near_max_px = if effect == bokeh::Effect::Dof { max_px } else { 0.0 };
@@ -116,7 +119,8 @@ impl Blur {
             rim: self.rim,
             rank: self.rank,
             highlights: self.highlights,
-            quality: self.quality,
+            quality,
+            adaptive,
             far_max_px,
             near_max_px,
         })
@@ -250,7 +254,7 @@ mod tests {
         let command = options::Every::augment_args(Command::new("test").no_binary_name(true));
         let matches = command.try_get_matches_from(flags).unwrap();
         let every = options::Every::from_arg_matches(&matches).unwrap();
-        Blur::resolve(&every.blur, &every.aperture, every.computing.quality, has_depth)
+        Blur::resolve(&every.blur, &every.aperture, every.computing.quality.still(), has_depth)
     }
 
     fn refusal(flags: &[&str], has_depth: bool) -> String {

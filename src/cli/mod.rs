@@ -12,6 +12,7 @@ mod dump;
 mod error;
 mod files;
 mod options;
+mod quality;
 mod record;
 mod render;
 mod settings;

@@ -3,15 +3,15 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::TypedValueParser;
 use clap::{Args, value_parser};
 
 use super::defaults;
+use super::quality::{QualityChoice, level_or_auto};
 use super::values::{
     ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Refine, Size, Tilt, above_zero,
     between, not_negative, seconds,
 };
-use crate::budget::Quality;
 
 /// Options of every command.
 #[derive(Args, Debug)]
@@ -134,9 +134,10 @@ pub struct Aperture {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Computing")]
 pub struct Computing {
-    /// Quality level: changes fidelity, never the amount of blur
-    #[arg(long, value_name = "LEVEL", default_value_t = Quality::default(), value_parser = quality())]
-    pub quality: Quality,
+    /// Quality level: changes fidelity, never the amount of blur. auto follows the time there is (--budget-ms) where
+    /// frames come in real time, and is balanced elsewhere
+    #[arg(long, value_name = "LEVEL", default_value = "auto", value_parser = level_or_auto())]
+    pub quality: QualityChoice,
     /// What runs the blur
     #[arg(long, value_enum, value_name = "WHICH", default_value = "auto")]
     pub backend: Backend,
@@ -152,7 +153,7 @@ pub struct Computing {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Stream")]
 pub struct Stream {
-    /// Time for one frame, in milliseconds [default: the frame period]
+    /// Time that the blur of one frame may take, in milliseconds [default: the frame period]
     #[arg(long, value_name = "MS", value_parser = above_zero)]
     pub budget_ms: Option<f32>,
     /// Whether frames come when they are due, or as fast as they can be written
@@ -212,9 +213,4 @@ fn rate(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|rate| (0.1..=1000.0).contains(rate))
         .ok_or_else(|| "use frames per second from 0.1 to 1000".to_string())
-}
-
-/// A parser of quality levels.
-pub fn quality() -> impl TypedValueParser<Value = Quality> {
-    PossibleValuesParser::new(Quality::ALL.map(Quality::name)).try_map(|name| name.parse::<Quality>())
 }

@@ -61,7 +61,8 @@ pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliE
     let read_depth =
         |file: &PathBuf| still::read_depth(file, command.depth.depth_scale, Some(command.depth.depth_invalid));
     let depth = command.depth_map.as_ref().map(read_depth).transpose()?;
-    let blur = Blur::resolve(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
+    let quality = command.computing.quality.still();
+    let blur = Blur::resolve(&command.blur, &command.aperture, quality, depth.is_some())?;
     let executor = Executor::of(&command.computing);
     let (result, by) = match &command.debug_dir {
         Some(dir) => debug::blurred(color, depth, &blur, &executor, (dir, command.output.force))?,
@@ -90,6 +91,7 @@ fn blurred(
         color: Pooled::detached(color),
         depth: depth.map(Pooled::detached),
         coc,
+        quality: settings.quality,
         out: Pooled::detached(ColorImage::default()),
     })?;
     match bokeh.collect(true)? {

@@ -55,7 +55,12 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
     let source = Source::open(&command.source, &command.frames, &command.depth, stream.keep_going)?;
     let info = source.camera.info();
     let measured = source.depth.is_some();
-    let blur = Blur::resolve(&command.blur, &command.aperture, command.computing.quality, source.has_depth())?;
+    let pace = match stream.pace {
+        values::Pace::Realtime => Pace::Realtime,
+        values::Pace::Asap => Pace::Asap,
+    };
+    let quality = command.computing.quality.rule(pace);
+    let blur = Blur::resolve(&command.blur, &command.aperture, quality, source.has_depth())?;
     let executor = Executor::of(&command.computing);
     let bokeh = blur.settings(info.size).map(|settings| executor.create(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
@@ -68,14 +73,11 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         camera: source.camera,
         depth: source.depth,
         bokeh,
-        quality: command.computing.quality,
+        quality,
         coc: blur.coc_rule(info.size),
         refine: blur.refines(measured),
         sink,
-        pace: match stream.pace {
-            values::Pace::Realtime => Pace::Realtime,
-            values::Pace::Asap => Pace::Asap,
-        },
+        pace,
         budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
         keep_going: stream.keep_going,
         demand: None,

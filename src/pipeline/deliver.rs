@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::playout::Playout;
 use super::{Ended, Frame, Progress};
 use crate::clock::Clock;
 use crate::frame::ColorImage;
@@ -19,6 +20,8 @@ pub(super) struct Stage<'a> {
     pub clock: &'a Clock,
     /// After so long without a picture the last one is shown again; `None` waits.
     pub hold: Option<Duration>,
+    /// When pictures are due; `None` shows them as they come.
+    pub playout: Option<Playout>,
     pub times: Times<'a>,
 }
 
@@ -30,7 +33,7 @@ pub(super) struct Times<'a> {
 }
 
 impl Stage<'_> {
-    pub(super) fn run(self, mut from: Receiver<Frame<Pooled<ColorImage>>>) -> Ended {
+    pub(super) fn run(mut self, mut from: Receiver<Frame<Pooled<ColorImage>>>) -> Ended {
         let mut last_ns = None;
         loop {
             let Frame { ticket, item: mut picture, .. } = match self.next(&mut from) {
@@ -44,10 +47,13 @@ impl Stage<'_> {
                 }
                 Received::Ended => break,
             };
-            let began_ns = self.clock.now_ns();
             if self.mirror {
                 mirror(&mut picture);
             }
+            if let Some(playout) = &mut self.playout {
+                self.clock.sleep_until_ns(playout.due_ns(ticket.captured_ns, self.clock.now_ns()));
+            }
+            let began_ns = self.clock.now_ns();
             match self.sink.put(&picture) {
                 Ok(flow) if flow.is_break() => break,
                 Ok(_) => {}

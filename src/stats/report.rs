@@ -41,6 +41,8 @@ pub struct Report {
     pub budget_ms: f64,
     /// Frames whose blur took longer.
     pub misses: u64,
+    /// Frames that took over the depth of the one before, to save time.
+    pub depth_held: u64,
     /// Times that a live output was given its last picture again, because no new one came.
     pub repeats: u64,
     /// `cpu`, `gpu` or `none`.
@@ -128,6 +130,7 @@ impl Report {
             quality: timings.rungs.shares(),
             budget_ms: ms(about.budget_ns),
             misses: timings.misses,
+            depth_held: timings.held,
             repeats: timings.repeats,
             backend: about.backend,
             adapter: about.adapter,
@@ -227,6 +230,14 @@ impl fmt::Display for Report {
                 write!(f, "; budget {:.1}, missed by {} frames ({})", self.budget_ms, self.misses, self.adapter)?;
             }
         }
+        if self.quality.switches > 0 {
+            let share = |(rung, share): &(&str, f64)| format!("{rung} {:.0} %", 100.0 * share);
+            let shares: Vec<String> = self.quality.share.iter().map(share).collect();
+            write!(f, "\nquality: {}; {} changes", shares.join(", "), self.quality.switches)?;
+        }
+        if self.depth_held > 0 {
+            write!(f, "\ndepth: {} frames took over that of the one before, to save time", self.depth_held)?;
+        }
         Ok(())
     }
 }
@@ -279,5 +290,6 @@ mod tests {
         let text = report().to_string();
         assert!(text.starts_with("10 of 13 frames delivered in 0.50 s (20.0 per second), 3 late\n"), "{text}");
         assert!(!text.contains("blur.rows"));
+        assert!(text.ends_with("\nquality: fast 25 %, balanced 75 %; 1 changes"), "{text}");
     }
 }

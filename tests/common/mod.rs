@@ -61,6 +61,7 @@ pub fn settings(effect: Effect) -> Settings {
         rank: None,
         highlights: 0.0,
         quality: Quality::Balanced,
+        adaptive: false,
         far_max_px: 12.0,
         near_max_px: if effect == Effect::Dof { 18.0 } else { 0.0 },
     }

@@ -23,6 +23,7 @@ fn lossless_delivers_every_frame_however_slow_a_stage_is() {
         let report = result.unwrap();
         assert_eq!((report.frames.captured, report.frames.delivered), (40, 40), "slow: {name}");
         assert!(received.numbers().into_iter().eq(0..40));
+        assert_eq!(report.depth_held, 0, "slow: {name}");
     }
 }
 
@@ -37,8 +38,10 @@ fn live_accounts_for_every_frame_however_slow_a_stage_is() {
         ("sink", Setup { sink: Trouble::slow(), ..setup() }),
     ] {
         let (result, received) = setup.run();
-        let frames = result.unwrap().frames;
+        let report = result.unwrap();
+        let frames = report.frames;
         assert_eq!((frames.captured, frames.in_flight), (90, 0), "slow {name}: {frames:?}");
+        assert!(name != "depth" || report.depth_held > 0, "slow depth is made for fewer frames");
         assert!(received.count() > 0, "pictures never stop");
         if name == "capture" {
             assert!(frames.dropped.driver > 0, "what cannot be read in time is the driver's: {frames:?}");

@@ -16,7 +16,7 @@ use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::{DepthError, DepthSource};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{CocAtInfinity, CocRule, Pace, PipelineError, Progress, Run, run};
+use bokehcam::pipeline::{CocAtInfinity, CocRule, Pace, PipelineError, Progress, QualityRule, Run, run};
 use bokehcam::sink::{Sink, SinkError};
 use bokehcam::stats::Report;
 
@@ -288,7 +288,7 @@ impl Setup {
             }),
             depth: self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _),
             bokeh: self.bokeh.map(|bokeh| Box::new(bokeh) as _),
-            quality: Quality::Fast,
+            quality: QualityRule::Fixed(Quality::Fast),
             coc: self.coc,
             refine: false,
             sink: Box::new(FakeSink {
@@ -363,7 +363,7 @@ pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a Atomic
         camera,
         depth: None,
         bokeh: None,
-        quality: Quality::Fast,
+        quality: QualityRule::Fixed(Quality::Fast),
         coc: CocRule::Fixed(CocField::Uniform { radius_px: 3.0 }),
         refine: false,
         sink,

@@ -2,11 +2,16 @@
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
+use bokehcam::bokeh::rung::COSTS;
+use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
+use bokehcam::budget::Quality;
 use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{CocRule, Fault, Pace, Run, run};
+use bokehcam::pipeline::{CocRule, Fault, Pace, QualityRule, Run, run};
+use bokehcam::sink::Null;
 
 use crate::fakes::*;
 
@@ -75,6 +80,48 @@ fn the_report_tells_what_ran() {
     assert_eq!(stages, ["decode", "depth", "blur", "blur.rows", "blur.columns", "sink"]);
     assert!((report.stages_ms.0[2].1.p50 - 0.7).abs() < 0.007);
     assert!(report.latency_ms.is_some() && report.frame_ms.is_some());
+}
+
+/// Says that it takes so long at the default quality, and in proportion at the others.
+struct Paced(Duration, Option<Finished>);
+
+impl Bokeh for Paced {
+    fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
+        job.out.resize(SIZE.0, SIZE.1);
+        job.out.rgb.copy_from_slice(&job.color.rgb);
+        let mut times = PassTimes::new();
+        times.add("all", self.0.mul_f64(COSTS[job.quality as usize]));
+        self.1 = Some(Finished { ticket: job.ticket, out: job.out, times });
+        Ok(())
+    }
+    fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {
+        Ok(self.1.take())
+    }
+    fn in_flight(&self) -> usize {
+        usize::from(self.1.is_some())
+    }
+    fn capacity(&self) -> usize {
+        1
+    }
+    fn describe(&self) -> String {
+        "cpu, paced".into()
+    }
+}
+
+#[test]
+fn quality_follows_the_time_there_is() {
+    let stop = AtomicBool::new(false);
+    for (took_us, quality) in [(1000, "best"), (3300, "balanced"), (4500, "fast"), (90_000, "draft")] {
+        let report = run(Run {
+            bokeh: Some(Box::new(Paced(Duration::from_micros(took_us), None))),
+            quality: QualityRule::Auto(Quality::Balanced),
+            budget_ns: 4_000_000,
+            ..simple(Box::new(fake_camera(150)), Box::new(Null), &stop, Pace::Asap)
+        });
+        let quality_use = report.unwrap().quality;
+        let most = quality_use.share.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        assert_eq!((most.0, quality_use.switches <= 1), (quality, true), "{took_us}: {quality_use:?}");
+    }
 }
 
 /// A picture whose columns differ.

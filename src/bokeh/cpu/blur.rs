@@ -65,9 +65,9 @@ pub struct Scratch {
 impl Scratch {
     /// Memory for every bin of a plan.
     pub fn new(plan: &Plan) -> Self {
-        let reach = plan.reach();
+        let reach = plan.levels.most_reach();
         Self {
-            rows: Aligned::zeros(ring(reach) * GROUP.min(plan.bank.terms) * STRIP_ROW),
+            rows: Aligned::zeros(ring(reach) * GROUP.min(plan.levels.most_terms()) * STRIP_ROW),
             line: Aligned::zeros(4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }

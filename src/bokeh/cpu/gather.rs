@@ -31,9 +31,9 @@ impl Gather {
             } else {
                 Vec::new()
             },
-            source: Rows::new(plan.width, plan.height, plan.reach().next_multiple_of(PIECE)),
+            source: Rows::new(plan.width, plan.height, plan.levels.most_reach().next_multiple_of(PIECE)),
             coc: vec![0.0; pixels],
-            rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * bank.terms }],
+            rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * plan.levels.most_terms() }],
             result: vec![0.0; pixels * 3],
         }
     }
@@ -75,7 +75,8 @@ impl Gather {
             });
             return;
         }
-        let rows = Shelf::new(&mut self.rows, bank.terms * 3 * size.0, taken);
+        let rows = &mut self.rows[..bank.terms * 3 * size.0 * size.1];
+        let rows = Shelf::new(rows, bank.terms * 3 * size.0, taken);
         team.run(size.1, &|y| {
             arch.dispatch(GatherRow { source, width: size.0, bank, coc: coc(y), y, out: rows.part(y) });
         });

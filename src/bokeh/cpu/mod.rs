@@ -35,6 +35,7 @@ use unpack::Source;
 use super::plan::{CELL, Compositing, MAX_BINS, Plan};
 use super::rung::SCALES;
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
+use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
@@ -84,7 +85,8 @@ impl CpuBokeh {
         Self {
             encode: composite::EncodeTable::new(),
             tiles: Tiles::new(width, height),
-            pyramid: (plan.fill && plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
+            pyramid: (plan.levels.fill() && plan.compositing == Compositing::Layers)
+                .then(|| fill::Pyramid::new(width, height)),
             waits: vec![false; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),
             taken: flags(height.max(slots.len())),
@@ -95,6 +97,11 @@ impl CpuBokeh {
             members,
             done: None,
         }
+    }
+
+    /// Changes the quality of the frames to come, where the plan has others.
+    pub fn set_quality(&mut self, quality: Quality) {
+        self.plan.set_quality(quality);
     }
 
     /// Blurs one picture.
@@ -283,6 +290,7 @@ impl CpuBokeh {
 
 impl Bokeh for CpuBokeh {
     fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
+        self.plan.set_quality(job.quality);
         let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
         self.done = Some(Finished { ticket: job.ticket, out: job.out, times });
         Ok(())

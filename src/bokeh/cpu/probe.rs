@@ -83,7 +83,7 @@ impl CpuBokeh {
 
     /// Whether something in the last frame was in front, and what it hides was filled in.
     pub fn filled(&self) -> bool {
-        self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near)
+        self.plan.fill && self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near)
     }
 
     /// How far a pixel of this CoC in the last frame, which was [`filled`](Self::filled), was replaced for the bins

@@ -49,12 +49,20 @@ pub struct Buffers {
     pub pyramid: wgpu::Buffer,
     /// How much each of its pixels knows.
     pub known: wgpu::Buffer,
-    /// Horizontal and vertical filters, four terms a vector.
-    pub banks: [wgpu::Buffer; 2],
-    /// Outermost tap of each node.
-    pub node_reach: wgpu::Buffer,
+    /// The filters of each bank.
+    pub banks: Vec<Filters>,
     /// Kernels of the exact gather, and where each node's starts.
     pub kernels: [wgpu::Buffer; 2],
+}
+
+/// The filters of a bank.
+pub struct Filters {
+    /// Separable terms.
+    pub terms: usize,
+    /// Horizontal and vertical, four terms a vector.
+    pub taps: [wgpu::Buffer; 2],
+    /// Outermost tap of each node.
+    pub node_reach: wgpu::Buffer,
 }
 
 /// Bytes of a packed picture, in whole words of whole quads.
@@ -65,7 +73,7 @@ pub fn picture_bytes(plan: &Plan) -> u64 {
 /// Pieces of work of a frame that have a uniform `Work` each: two for the pass `bin`, one for `reach`, and every group
 /// of terms of every batch for the filters.
 pub fn works(plan: &Plan) -> usize {
-    3 + MAX_BINS * plan.bank.terms.div_ceil(4)
+    3 + MAX_BINS * plan.levels.most_terms().div_ceil(4)
 }
 
 impl Buffers {
@@ -89,9 +97,9 @@ impl Buffers {
         let storage = |label: &str, values: usize| buffer(label, values * 4, Usage::STORAGE | Usage::COPY_SRC);
         let (width, height) = (plan.width, plan.height);
         let layered = plan.compositing == Compositing::Layers;
-        let (levels, pyramid_pixels) = if layered && plan.fill { levels(width, height) } else { (Vec::new(), 1) };
+        let (levels, pyramid_pixels) =
+            if layered && plan.levels.fill() { levels(width, height) } else { (Vec::new(), 1) };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
-        let terms = plan.bank.terms;
         let works = works(plan) as u64;
         Self {
             frame: buffer("frame", size_of::<Frame>(), Usage::UNIFORM),
@@ -105,7 +113,7 @@ impl Buffers {
             source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),
             edges: storage("edges", capacity.edges * 8),
-            rows: storage("rows", capacity.rows * 2 * terms.min(4)),
+            rows: storage("rows", capacity.rows * 2 * plan.levels.most_terms().min(4)),
             blurred: storage("blurred", capacity.pixels * 2),
             filtered: storage("filtered", capacity.filtered),
             active: storage("active", capacity.active),
@@ -113,9 +121,17 @@ impl Buffers {
             hidden: storage("hidden", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),
             pyramid: storage("pyramid", pyramid_pixels * 4),
             known: storage("known", pyramid_pixels),
-            banks: [&plan.bank.horizontal, &plan.bank.vertical]
-                .map(|taps| filled("bank", bytemuck::cast_slice(&in_fours(taps, terms)), Usage::STORAGE)),
-            node_reach: filled("node reach", bytemuck::cast_slice(&plan.bank.node_reach), Usage::STORAGE),
+            banks: plan
+                .levels
+                .banks
+                .iter()
+                .map(|bank| Filters {
+                    terms: bank.terms,
+                    taps: [&bank.horizontal, &bank.vertical]
+                        .map(|taps| filled("bank", bytemuck::cast_slice(&in_fours(taps, bank.terms)), Usage::STORAGE)),
+                    node_reach: filled("node reach", bytemuck::cast_slice(&bank.node_reach), Usage::STORAGE),
+                })
+                .collect(),
             kernels: [
                 filled("kernel starts", bytemuck::cast_slice(&starts), Usage::STORAGE),
                 filled("kernels", bytemuck::cast_slice(&kernels), Usage::STORAGE),

@@ -1,6 +1,7 @@
 //! Where the bins of a frame lie in the buffers that all bins share, and what is filtered at once.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::shaders::Bin;
 use crate::bokeh::plan::{CELL, Compositing, MAX_BINS, Plan, SEGMENT};
@@ -40,11 +41,24 @@ pub struct Capacity {
 }
 
 impl Capacity {
-    /// What the bins of any frame need.
+    /// What the bins of any frame need, at any level.
     pub fn of(plan: &Plan) -> Self {
-        let scales = |slot: usize| plan.least_scale(slot);
+        if plan.compositing == Compositing::Layers {
+            return Self::of_scales(plan, (0..plan.slots()).map(|slot| plan.least_scale(slot)));
+        }
+        // These bins are the same in every frame of a level.
+        let mut plan = plan.clone();
+        let levels = Arc::clone(&plan.levels);
+        levels.iter().fold(Self::default(), |most, level| {
+            plan.set_quality(level.quality);
+            most.max(Self::of_scales(&plan, plan.bins.iter().map(|bin| bin.scale)))
+        })
+    }
+
+    /// What bins at these scales need.
+    fn of_scales(plan: &Plan, scales: impl Iterator<Item = usize>) -> Self {
         let mut capacity = Self::default();
-        let mut add = |scale: usize| {
+        for scale in scales {
             let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
             let [cells, edges] = [cells(width, height), edges(width, height)].map(|[a, b]| a * b);
             capacity.pixels += width * height;
@@ -53,13 +67,20 @@ impl Capacity {
             capacity.edges += edges;
             capacity.filtered += tiles([width, height], ROWS_TILE);
             capacity.active += tiles([width, height], RESULT_TILE);
-        };
-        match plan.compositing {
-            Compositing::Layers => (0..plan.slots()).map(scales).for_each(&mut add),
-            // These bins are the same in every frame.
-            _ => plan.bins.iter().map(|bin| bin.scale).for_each(&mut add),
         }
         capacity
+    }
+
+    /// The larger of each.
+    fn max(self, other: Self) -> Self {
+        Self {
+            pixels: self.pixels.max(other.pixels),
+            rows: self.rows.max(other.rows),
+            cells: self.cells.max(other.cells),
+            edges: self.edges.max(other.edges),
+            filtered: self.filtered.max(other.filtered),
+            active: self.active.max(other.active),
+        }
     }
 }
 

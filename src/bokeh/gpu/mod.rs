@@ -44,7 +44,7 @@ impl GpuBokeh {
         let device = Device::open(hardware_only, adapter)?;
         let most = device.device.limits().max_storage_buffer_binding_size;
         let capacity = Capacity::of(plan);
-        let rows = capacity.rows * plan.bank.terms.min(4);
+        let rows = capacity.rows * plan.levels.most_terms().min(4);
         let largest = capacity.pixels.max(rows).max(1) as u64 * 8;
         if largest > most {
             return Err(BokehError::Gpu(format!(
@@ -148,15 +148,16 @@ impl Bokeh for GpuBokeh {
             self.upload(&self.depth, bytes);
         }
         self.upload(&self.buffers.color, &job.color.rgb);
+        self.plan.set_quality(job.quality);
         self.plan.split(job.depth.as_deref(), &job.coc);
         self.layout.lay_out(&self.plan, &self.capacity);
-        self.passes.upload(&self.device, &self.buffers, &self.layout);
+        self.passes.upload(&self.device, &self.buffers, &self.layout, self.plan.bank_index);
         let frame = self.frame(&job);
         self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
 
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let set = self.queries.as_ref().map(|(set, _)| set);
-        self.passes.encode(&mut encoder, &self.layout, set, &mut slot.passes);
+        self.passes.encode(&mut encoder, &self.plan, &self.layout, set, &mut slot.passes);
         encoder.copy_buffer_to_buffer(&self.buffers.result, 0, &slot.picture, 0, slot.picture.size());
         if let (Some((set, resolved)), Some(back)) = (&self.queries, &slot.stamps) {
             let count = 2 * slot.passes.len() as u32;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::buffers::{Buffers, WORK_STRIDE, works};
+use super::buffers::{Buffers, Filters, WORK_STRIDE, works};
 use super::device::Device;
 use super::layout::{Layout, RESULT_TILE, ROWS_TILE, tiles};
 use super::readback::MAX_QUERIES;
@@ -44,10 +44,9 @@ pub struct Passes {
     /// Bins in front, and the rest.
     bin: [Step; 2],
     reach: Step,
-    /// Rows and columns, for each batch of bins and group of terms.
-    blur: Vec<[Step; 2]>,
+    /// For each bank, rows and columns of each batch of bins and group of terms.
+    blur: Vec<Vec<[Step; 2]>>,
     composite: Fixed,
-    terms: usize,
     work: Vec<u8>,
 }
 
@@ -149,22 +148,23 @@ impl Passes {
             let filled = [&b.frame, &b.pyramid, &b.scene, &b.ranges];
             fill.push(maker.fixed("fill", shaders::FILL, picture, TILE, &filled));
         }
-        let groups = plan.bank.terms.div_ceil(4);
-        let filters = (0..MAX_BINS * groups).map(|k| {
-            let [horizontal, vertical] = &b.banks;
-            let rows =
-                [&b.frame, horizontal, &b.node_reach, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered];
-            let columns =
-                [&b.frame, vertical, &b.node_reach, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active];
+        let filters = |maker: &mut Maker, bank: &Filters, k: usize| {
+            let ([horizontal, vertical], reach) = (&bank.taps, &bank.node_reach);
+            let rows = [&b.frame, horizontal, reach, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered];
+            let columns = [&b.frame, vertical, reach, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active];
             [
                 maker.over_bins("blur_rows", shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
                 maker.over_bins("blur_columns", shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
             ]
+        };
+        let blur = b.banks.iter().map(|bank| {
+            let steps = 0..MAX_BINS * bank.terms.div_ceil(4);
+            steps.map(|k| filters(&mut maker, bank, k)).collect()
         });
-        let blur = filters.collect();
+        let blur = blur.collect();
         let gather = plan.exact.then(|| {
             let [starts, kernels] = &b.kernels;
-            let buffers = [&b.frame, starts, kernels, &b.scene, &b.node_reach, &b.blurred];
+            let buffers = [&b.frame, starts, kernels, &b.scene, &b.banks[plan.bank_index].node_reach, &b.blurred];
             maker.fixed("gather", shaders::GATHER, picture, TILE, &buffers)
         });
         let bin = [NEAR, REST].map(|index| {
@@ -187,7 +187,6 @@ impl Passes {
             reach: maker.over_bins("reach", shaders::REACH, ALL, &[&b.grid, &b.edges]),
             blur,
             composite,
-            terms: plan.bank.terms,
             work: vec![0; works(plan) * WORK_STRIDE as usize],
         }
     }
@@ -199,15 +198,16 @@ impl Passes {
         self.unpack.step.bindings = maker.bindings(&self.unpack.step.pipeline, buffers.into_iter());
     }
 
-    /// Uploads which bins each pass of this frame does.
-    pub fn upload(&mut self, device: &Device, b: &Buffers, layout: &Layout) {
-        let groups = self.terms.div_ceil(4);
+    /// Uploads which bins each pass of this frame does, with the terms of a bank.
+    pub fn upload(&mut self, device: &Device, b: &Buffers, layout: &Layout, bank: usize) {
+        let terms = b.banks[bank].terms;
+        let groups = terms.div_ceil(4);
         let mut set = |index: usize, bins: &Range<usize>, group: usize| {
             let work = Work {
                 first: bins.start as u32,
                 count: bins.len() as u32,
                 group: group as u32,
-                terms: (self.terms - 4 * group).min(4) as u32,
+                terms: (terms - 4 * group).min(4) as u32,
                 last: u32::from(group + 1 == groups),
                 ..Work::default()
             };
@@ -225,10 +225,11 @@ impl Passes {
         device.queue.write_buffer(&b.bins, 0, bytemuck::cast_slice(&layout.bins));
     }
 
-    /// Records one frame. `names` gets the name of every pass that `queries` times.
+    /// Records one frame of a plan's level. `names` gets the name of every pass that `queries` times.
     pub fn encode(
         &self,
         encoder: &mut wgpu::CommandEncoder,
+        plan: &Plan,
         layout: &Layout,
         queries: Option<&wgpu::QuerySet>,
         names: &mut Vec<&'static str>,
@@ -263,12 +264,13 @@ impl Passes {
         } else {
             if !near.is_empty() {
                 run(&self.bin[NEAR], all(near, BIN_TILE, cells));
-                self.fill.iter().for_each(|fill| run(&fill.step, fill.workgroups));
+                let fill = self.fill.iter().filter(|_| plan.fill);
+                fill.for_each(|fill| run(&fill.step, fill.workgroups));
             }
             run(&self.bin[REST], all(rest, BIN_TILE, cells));
             run(&self.reach, all(&layout.bins, REACH_TILE, |bin| [bin.edges, bin.cells[1]]));
-            let groups = self.terms.div_ceil(4);
-            for (batch, steps) in layout.batches.iter().zip(self.blur.chunks_exact(groups)) {
+            let groups = plan.bank.terms.div_ceil(4);
+            for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];
                 for [rows, columns] in steps {
                     run(rows, all(bins, ROWS_TILE, |bin| bin.size));

@@ -40,6 +40,8 @@ struct Pending {
 pub struct Ring {
     free: Vec<Slot>,
     pending: VecDeque<Pending>,
+    /// When the last frame was back.
+    last: Option<Instant>,
 }
 
 impl Ring {
@@ -58,7 +60,8 @@ impl Ring {
             stamps: device.timestamps.then(|| buffer("stamps back", u64::from(MAX_QUERIES) * 8)),
             passes: Vec::with_capacity(MAX_QUERIES as usize / 2),
         };
-        Self { free: std::iter::repeat_with(slot).take(CAPACITY).collect(), pending: VecDeque::with_capacity(CAPACITY) }
+        let free = std::iter::repeat_with(slot).take(CAPACITY).collect();
+        Self { free, pending: VecDeque::with_capacity(CAPACITY), last: None }
     }
 
     /// A slot to copy a frame to.
@@ -119,16 +122,22 @@ impl Ring {
                     |k: usize| bytes.get(k * 8..k * 8 + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
                 let period_ns = f64::from(device.queue.get_timestamp_period());
                 for (k, name) in oldest.slot.passes.iter().enumerate() {
-                    // Stamps may run backwards when clocks change; such a sample says nothing.
-                    if let (Some(from), Some(to)) = (stamp(2 * k), stamp(2 * k + 1)) {
-                        times.add(name, Duration::from_nanos((to.saturating_sub(from) as f64 * period_ns) as u64));
+                    let Some((from, to)) = stamp(2 * k).zip(stamp(2 * k + 1)) else { continue };
+                    if to < from {
+                        // Stamps may run backwards when clocks change; such a frame's times say nothing.
+                        times = PassTimes::new();
+                        break;
                     }
+                    times.add(name, Duration::from_nanos(((to - from) as f64 * period_ns) as u64));
                 }
             }
             stamps.unmap();
         } else {
-            times.add("gpu", oldest.started.elapsed());
+            // One frame after the other: what it waited for the one before is not its own time.
+            let began = self.last.map_or(oldest.started, |last| last.max(oldest.started));
+            times.add("gpu", began.elapsed());
         }
+        self.last = Some(Instant::now());
         oldest.slot.passes.clear();
         self.free.push(oldest.slot);
         Ok(Some(Finished { ticket: oldest.job.ticket, out: oldest.job.out, times }))

@@ -1,0 +1,173 @@
+//! The ends of the pipeline, made to be measured.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job};
+use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
+use bokehcam::clock::Clock;
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::recording::{Recording, Scratch};
+use bokehcam::sink::{Sink, SinkError};
+use bokehcam::stats::Cause;
+
+/// From frame to frame.
+pub const PERIOD_NS: u64 = 33_333_333;
+
+/// When pictures were shown.
+#[derive(Clone, Default)]
+pub struct Stamps {
+    /// When the camera began.
+    epoch_ns: Arc<AtomicU64>,
+    /// Time since then, and age.
+    shown: Arc<Mutex<Vec<(u64, u64)>>>,
+}
+
+impl Stamps {
+    pub fn with_room_for(frames: usize) -> Self {
+        Self { shown: Arc::new(Mutex::new(Vec::with_capacity(frames))), ..Self::default() }
+    }
+
+    pub fn take(&self) -> Vec<(u64, u64)> {
+        std::mem::take(&mut self.shown.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// A recording over and over as a live camera of 30 frames a second: a frame is taken when it is due and decoded then;
+/// one that nobody reads for a whole period is overwritten.
+pub struct Looped {
+    recording: Arc<Recording>,
+    scratch: Scratch,
+    name: String,
+    clock: Clock,
+    stamps: Stamps,
+    position: u64,
+    frames: u64,
+}
+
+impl Looped {
+    pub fn new(recording: Arc<Recording>, name: &str, frames: u64, clock: Clock, stamps: Stamps) -> Self {
+        Self { recording, scratch: Scratch::default(), name: name.to_owned(), clock, stamps, position: 0, frames }
+    }
+}
+
+impl Camera for Looped {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: self.name.clone(),
+            size: self.recording.size(),
+            period_ns: PERIOD_NS,
+            frames: Some(self.frames),
+            live: true,
+            exact_depth: false,
+        }
+    }
+
+    fn next(&mut self, color: &mut ColorImage, _: &mut DepthMap) -> Result<Captured, CaptureError> {
+        if self.position >= self.frames {
+            return Ok(Captured::End);
+        }
+        let now_ns = self.clock.now_ns();
+        if self.position == 0 {
+            self.stamps.epoch_ns.store(now_ns, Ordering::Relaxed);
+        }
+        let due_ns = self.stamps.epoch_ns.load(Ordering::Relaxed) + self.position * PERIOD_NS;
+        let overwritten = (now_ns.saturating_sub(due_ns) / PERIOD_NS).min(self.frames - self.position);
+        if overwritten > 0 {
+            self.position += overwritten;
+            return Ok(Captured::Lost(overwritten, Cause::Driver));
+        }
+        self.clock.sleep_until_ns(due_ns);
+        let index = (self.position % self.recording.len() as u64) as usize;
+        let time_ns = self.position * PERIOD_NS;
+        self.position += 1;
+        Ok(match self.recording.read_color(index, &mut self.scratch, color) {
+            Ok(()) => Captured::Frame(Stamp { index, time_ns, captured_ns: Some(due_ns) }),
+            Err(error) => Captured::Corrupt(error.into()),
+        })
+    }
+}
+
+/// An executor that takes so many times as long, and writes into each picture which frame it is.
+pub struct Slowed {
+    inner: Box<dyn Bokeh>,
+    factor: f64,
+    wasted: Duration,
+}
+
+impl Slowed {
+    pub fn new(inner: Box<dyn Bokeh>, factor: f64) -> Self {
+        Self { inner, factor, wasted: Duration::ZERO }
+    }
+}
+
+impl Bokeh for Slowed {
+    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
+        let began = Instant::now();
+        self.inner.submit(job)?;
+        let done = Instant::now();
+        self.wasted = (done - began).mul_f64((self.factor - 1.0).max(0.0));
+        while done.elapsed() < self.wasted {
+            std::hint::spin_loop();
+        }
+        Ok(())
+    }
+
+    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+        let mut finished = self.inner.collect(wait)?;
+        if let Some(finished) = &mut finished {
+            if self.factor > 1.0 {
+                finished.times.add("wasted", self.wasted);
+            }
+            if let Some(first) = finished.out.rgb.first_chunk_mut() {
+                *first = finished.ticket.to_le_bytes();
+            }
+        }
+        Ok(finished)
+    }
+
+    fn in_flight(&self) -> usize {
+        self.inner.in_flight()
+    }
+    fn capacity(&self) -> usize {
+        self.inner.capacity()
+    }
+    fn describe(&self) -> String {
+        self.inner.describe()
+    }
+}
+
+/// Forgets the pictures and keeps when they came.
+pub struct Stamping {
+    clock: Clock,
+    stamps: Stamps,
+    shown: ColorImage,
+}
+
+impl Stamping {
+    pub fn new(clock: Clock, stamps: Stamps) -> Self {
+        Self { clock, stamps, shown: ColorImage::default() }
+    }
+}
+
+impl Sink for Stamping {
+    fn put(&mut self, picture: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+        let now_ns = self.clock.now_ns() - self.stamps.epoch_ns.load(Ordering::Relaxed);
+        let ticket = picture.rgb.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        let age_ns = now_ns.saturating_sub(ticket * PERIOD_NS);
+        self.stamps.shown.lock().unwrap_or_else(PoisonError::into_inner).push((now_ns, age_ns));
+        // As much as handing it to a device costs.
+        self.shown.clone_from(picture);
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+        Ok(())
+    }
+
+    fn describe(&self) -> String {
+        "a sink that stamps".to_string()
+    }
+}

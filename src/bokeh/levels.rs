@@ -1,0 +1,96 @@
+//! The quality levels that an executor is made for, and what they need in common: filters for each, memory for the
+//! most demanding of them. Nothing is made when the level changes.
+
+use std::sync::Arc;
+
+use super::aperture::Mask;
+use super::bank::Bank;
+use super::low_rank::Decomposition;
+use super::rung::{MOST_RADIUS_PX, Rung, SCALES, rung};
+use super::{Effect, Rank, Settings};
+use crate::budget::Quality;
+
+/// One quality level.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// Its name.
+    pub quality: Quality,
+    /// What it trades.
+    pub rung: Rung,
+    /// Which of [`Levels::banks`] has its filters.
+    pub bank: usize,
+}
+
+/// The levels of an executor, cheapest first, and their filters.
+#[derive(Clone, Debug)]
+pub struct Levels {
+    levels: Vec<Level>,
+    /// The filters, in units of bin pixels; levels share them where they can.
+    pub banks: Vec<Arc<Bank>>,
+}
+
+impl Levels {
+    /// The levels of some settings: all of them where these are adaptive, else the one. With `full_scale`, every bin
+    /// stays at full scale.
+    pub fn new(settings: &Settings, mask: &Mask, full_scale: bool) -> Self {
+        let most_px = settings.far_max_px.max(settings.near_max_px);
+        let coarsest = SCALES[SCALES.len() - 1] as f32;
+        let svd = Decomposition::of(mask);
+        let mut made: Vec<(Rank, f32)> = Vec::new();
+        let mut banks = Vec::new();
+        let wanted = |quality: &Quality| settings.adaptive || *quality == settings.quality;
+        let levels = Quality::ALL.into_iter().filter(wanted).map(|quality| {
+            let rung = rung(quality);
+            let terms = if settings.effect == Effect::Blur { rung.even_rank } else { rung.rank };
+            let rank = settings.rank.unwrap_or(Rank::Terms(terms));
+            let bank_px = match settings.effect {
+                _ if full_scale => most_px,
+                Effect::Blur => most_px / rung.even_scale(most_px) as f32,
+                _ => most_px.min((most_px / coarsest).max(MOST_RADIUS_PX)),
+            };
+            let bank = made.iter().position(|&like| like == (rank, bank_px)).unwrap_or_else(|| {
+                made.push((rank, bank_px));
+                banks.push(Arc::new(Bank::of(&svd, mask, rank, bank_px)));
+                banks.len() - 1
+            });
+            Level { quality, rung, bank }
+        });
+        Self { levels: levels.collect(), banks }
+    }
+
+    /// The level of a quality, or the nearest one there is.
+    pub fn nearest(&self, quality: Quality) -> &Level {
+        let apart = |level: &&Level| (level.quality as usize).abs_diff(quality as usize);
+        self.levels.iter().min_by_key(apart).expect("there is at least one level")
+    }
+
+    /// All levels, cheapest first.
+    pub fn iter(&self) -> impl Iterator<Item = &Level> {
+        self.levels.iter()
+    }
+
+    /// Most separable terms of any level.
+    pub fn most_terms(&self) -> usize {
+        self.banks.iter().map(|bank| bank.terms).max().unwrap_or(0)
+    }
+
+    /// The largest reach of any level's filters, in bin pixels.
+    pub fn most_reach(&self) -> usize {
+        self.banks.iter().map(|bank| bank.reach).max().unwrap_or(0)
+    }
+
+    /// Most bins on one side of the focal plane.
+    pub fn most_bins_per_side(&self) -> usize {
+        self.levels.iter().map(|level| level.rung.bins_per_side as usize).max().unwrap_or(0)
+    }
+
+    /// Most bins of a side that may be at full scale.
+    pub fn most_fine_bins(&self) -> usize {
+        self.levels.iter().map(|level| level.rung.fine_bins()).max().unwrap_or(0)
+    }
+
+    /// Whether any level fills in what near objects hide.
+    pub fn fill(&self) -> bool {
+        self.levels.iter().any(|level| level.rung.fill)
+    }
+}

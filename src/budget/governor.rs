@@ -1,0 +1,361 @@
+//! The governor: the finest rung that keeps its time.
+//!
+//! The time of a frame is taken as `load * cost(rung)`, the rung's relative cost times the load of the moment, which
+//! makes frames of all rungs comparable. What a rung would take is then known before it is tried. Down goes at once,
+//! to the rung that will do; up goes only after a while of nothing but surplus, and after ever longer ones where that
+//! was taken back soon. The costs are learnt: where the load seems to jump whenever the rung changes, it is the cost
+//! that is wrong.
+
+use super::window::Window;
+
+/// Most rungs of a ladder.
+pub const MAX_RUNGS: usize = 8;
+
+/// Loads that are looked at.
+const LOADS: usize = 45;
+/// Of these, a step back up looks only at the newest: a load that went down shall not be remembered for long.
+const RECENT: usize = 20;
+/// What counts as the highest load: rare spikes are above it.
+const HIGH: f64 = 0.95;
+const HIGH_RECENT: f64 = 0.9;
+/// A high load may take this share of the budget before the rung changes; the aim of a change is lower, and that of a
+/// change upwards lower still, or noise alone would drive it up and down.
+const KEEP: f64 = 1.03;
+const AIM_DOWN: f64 = 0.97;
+const AIM_UP: f64 = 0.95;
+/// The median of few loads stands for a higher percentile by this factor.
+const ABOVE_MEDIAN: f64 = 1.1;
+/// Frames of nothing but surplus before a step up, and at most after steps that were taken back.
+const PATIENCE: u32 = 30;
+const MOST_PATIENCE: u32 = 960;
+/// A step up that is taken back within so many times the patience was one too many.
+const REGRET: u32 = 2;
+/// Frames at a rung before its cost is learnt, and how far it then moves.
+const LEARN_FROM: usize = 8;
+const LEARN_LEAST: usize = 3;
+const LEARN_SHARE: f64 = 0.3;
+/// No cost strays farther from what it was given as than this factor, either way.
+const LEARN_MOST: f64 = 3.0;
+/// After such a pause nothing is as it was: clocks and caches have gone to sleep.
+const IDLE_NS: u64 = 2_000_000_000;
+
+/// What a frame took.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample {
+    /// The rung that it was made at.
+    pub rung: usize,
+    /// How long that took; 0 is no measurement.
+    pub took_ns: u64,
+    /// When it was done.
+    pub at_ns: u64,
+}
+
+/// Picks the rung of a ladder by what frames took. Memory is fixed.
+#[derive(Clone, Debug)]
+pub struct Governor {
+    costs: [f64; MAX_RUNGS],
+    given: [f64; MAX_RUNGS],
+    rungs: usize,
+    rung: usize,
+    /// Time over cost, in nanoseconds, of the last frames, whatever their rung.
+    loads: Window<LOADS>,
+    /// The same of the last frames at this rung alone.
+    own: Window<LEARN_FROM>,
+    /// The load at the rung before, until it has been learnt from.
+    came_from: Option<f64>,
+    last_ns: u64,
+    /// Frames of nothing but surplus so far, and the finest rung that all of them would have allowed.
+    surplus: u32,
+    allowed: usize,
+    patience: u32,
+    /// Frames since the rung changed, and whether that was upwards.
+    since: u32,
+    went_up: bool,
+}
+
+impl Governor {
+    /// A governor of a ladder with these relative costs, the cheapest first, that begins at rung `start`.
+    ///
+    /// # Panics
+    /// There is no rung, there are more than [`MAX_RUNGS`], or the costs are not positive and ascending.
+    pub fn new(ladder: &[f64], start: usize) -> Self {
+        assert!((1..=MAX_RUNGS).contains(&ladder.len()) && start < ladder.len(), "1 to {MAX_RUNGS} rungs");
+        assert!(ladder[0] > 0.0 && ladder.is_sorted(), "costs ascend from above 0: {ladder:?}");
+        let mut costs = [f64::INFINITY; MAX_RUNGS];
+        costs[..ladder.len()].copy_from_slice(ladder);
+        Self {
+            costs,
+            given: costs,
+            rungs: ladder.len(),
+            rung: start,
+            loads: Window::default(),
+            own: Window::default(),
+            came_from: None,
+            last_ns: 0,
+            surplus: 0,
+            allowed: start,
+            patience: PATIENCE,
+            since: 0,
+            went_up: false,
+        }
+    }
+
+    /// The rung for the next frame.
+    pub fn rung(&self) -> usize {
+        self.rung
+    }
+
+    /// The relative costs as learnt, the cheapest first.
+    pub fn costs(&self) -> &[f64] {
+        &self.costs[..self.rungs]
+    }
+
+    /// How long the next frame is likely to take, in nanoseconds; `None` before the first sample.
+    pub fn expected_ns(&self) -> Option<u64> {
+        (!self.loads.is_empty()).then(|| (self.loads.median(5) * self.costs[self.rung]) as u64)
+    }
+
+    /// Takes in what a frame took, and settles the rung for the next one: the finest that stays within `budget_ns`.
+    /// Samples may come late; those of another rung than the present one tell the load, and decide nothing.
+    pub fn note(&mut self, sample: Sample, budget_ns: u64) {
+        let Sample { rung, took_ns, at_ns } = sample;
+        if took_ns == 0 || rung >= self.rungs {
+            return;
+        }
+        if at_ns.saturating_sub(self.last_ns) > IDLE_NS {
+            self.forget();
+        }
+        self.last_ns = self.last_ns.max(at_ns);
+        let load = took_ns as f64 / self.costs[rung];
+        self.loads.push(load);
+        if rung != self.rung {
+            return;
+        }
+        self.own.push(load);
+        self.since = self.since.saturating_add(1);
+        if self.own.len() == LEARN_FROM {
+            self.learn();
+        }
+        if self.went_up && self.since >= REGRET * self.patience {
+            // The step up has held.
+            (self.patience, self.went_up) = (PATIENCE, false);
+        }
+        let budget_ns = budget_ns as f64;
+        let now = ABOVE_MEDIAN * self.loads.median(5);
+        let over = self.high(LOADS, HIGH).max(now);
+        if self.own.len() >= LEARN_LEAST && over * self.costs[self.rung] > KEEP * budget_ns {
+            let to = self.finest(over, AIM_DOWN * budget_ns);
+            if to < self.rung {
+                return self.change(to);
+            }
+        }
+        let to = self.finest(self.high(RECENT, HIGH_RECENT).max(now), AIM_UP * budget_ns);
+        if to <= self.rung {
+            self.surplus = 0;
+            return;
+        }
+        self.allowed = if self.surplus == 0 { to } else { self.allowed.min(to) };
+        self.surplus += 1;
+        if self.surplus >= self.patience {
+            self.change(self.allowed);
+        }
+    }
+
+    /// The highest load of the last `count` frames but rare ones. Of few frames each is rare: the first ones are cold.
+    fn high(&self, count: usize, p: f64) -> f64 {
+        if self.loads.len() < RECENT { 0.0 } else { self.loads.percentile(count, p) }
+    }
+
+    /// The finest rung that takes no longer than `limit_ns` at this load; the cheapest if none does.
+    fn finest(&self, load: f64, limit_ns: f64) -> usize {
+        self.costs().iter().rposition(|cost| cost * load <= limit_ns).unwrap_or(0)
+    }
+
+    fn change(&mut self, to: usize) {
+        self.learn();
+        if to < self.rung && self.went_up && self.since < REGRET * self.patience {
+            self.patience = (2 * self.patience).min(MOST_PATIENCE);
+        }
+        self.came_from = (!self.own.is_empty()).then(|| self.own.median(5));
+        self.went_up = to > self.rung;
+        (self.rung, self.since, self.surplus) = (to, 0, 0);
+        self.own.clear();
+    }
+
+    /// The load before and after a change should be the same: what is not, is the cost's fault, at least in part.
+    fn learn(&mut self) {
+        if self.own.len() < LEARN_LEAST {
+            return;
+        }
+        let Some(before) = self.came_from.take() else { return };
+        let (rung, ratio) = (self.rung, self.own.median(LEARN_FROM) / before);
+        let (least, most) = (self.given[rung] / LEARN_MOST, self.given[rung] * LEARN_MOST);
+        // The ladder stays one: a rung is no cheaper than those below it.
+        let below = if rung > 0 { self.costs[rung - 1] } else { 0.0 };
+        let above = if rung + 1 < self.rungs { self.costs[rung + 1] } else { f64::INFINITY };
+        self.costs[rung] = (self.costs[rung] * ratio.powf(LEARN_SHARE)).clamp(least.max(below), most.min(above));
+    }
+
+    /// Keeps the rung and the costs, and forgets what the load was.
+    fn forget(&mut self) {
+        self.loads.clear();
+        self.own.clear();
+        self.came_from = None;
+        (self.surplus, self.since, self.went_up, self.patience) = (0, 0, false, PATIENCE);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COSTS: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
+    const BUDGET_NS: u64 = 1_000_000;
+    const PERIOD_NS: u64 = 33_000_000;
+
+    /// A machine of this load (nanoseconds at the cheapest rung) with a governor, its samples `late` frames late.
+    struct Machine {
+        governor: Governor,
+        costs: [f64; 5],
+        under_way: std::collections::VecDeque<(usize, f64)>,
+        late: usize,
+        now_ns: u64,
+        switches: usize,
+    }
+
+    impl Machine {
+        fn new(late: usize) -> Self {
+            let governor = Governor::new(&COSTS, 2);
+            let under_way = std::collections::VecDeque::new();
+            Self { governor, costs: COSTS, under_way, late, now_ns: PERIOD_NS, switches: 0 }
+        }
+
+        /// Plays frames; those of `spike` take ten times as long. Returns the rung of each.
+        fn play(&mut self, load_ns: f64, frames: usize, spike: impl Fn(usize) -> bool) -> Vec<usize> {
+            let mut rungs = Vec::new();
+            for frame in 0..frames {
+                let rung = self.governor.rung();
+                rungs.push(rung);
+                let took_ns = load_ns * self.costs[rung] * if spike(frame) { 10.0 } else { 1.0 };
+                self.under_way.push_back((rung, took_ns));
+                self.now_ns += PERIOD_NS;
+                if self.under_way.len() > self.late {
+                    let (rung, took_ns) = self.under_way.pop_front().unwrap();
+                    let sample = Sample { rung, took_ns: took_ns as u64, at_ns: self.now_ns };
+                    self.governor.note(sample, BUDGET_NS);
+                }
+                self.switches += usize::from(self.governor.rung() != rung);
+            }
+            rungs
+        }
+    }
+
+    #[test]
+    fn the_finest_rung_that_fits_is_found_in_one_step_and_kept() {
+        for late in [0, 3] {
+            for (load_ns, fits) in [(200_000.0, 4), (250_000.0, 3), (400_000.0, 2), (550_000.0, 1), (900_000.0, 0)] {
+                let mut machine = Machine::new(late);
+                machine.play(load_ns, 100, |_| false);
+                assert_eq!((machine.governor.rung(), machine.switches <= 1), (fits, true), "{load_ns} {late}");
+                machine.play(load_ns, 1000, |_| false);
+                assert_eq!((machine.governor.rung(), machine.switches <= 1), (fits, true), "{load_ns} {late}");
+            }
+        }
+    }
+
+    #[test]
+    fn down_at_once_up_after_a_while() {
+        for late in [0, 3] {
+            let mut machine = Machine::new(late);
+            machine.play(200_000.0, 200, |_| false);
+            assert_eq!(machine.governor.rung(), 4);
+            let down = machine.play(550_000.0, 60, |_| false);
+            assert!(down.iter().position(|&rung| rung == 1).is_some_and(|frame| frame <= 3 + late), "{down:?}");
+            let up = machine.play(200_000.0, 200, |_| false);
+            let rose = up.iter().position(|&rung| rung == 4).unwrap();
+            assert!((PATIENCE as usize..PATIENCE as usize + RECENT + late + 1).contains(&rose), "{rose}");
+            assert!(up[..rose].iter().all(|&rung| rung == 1), "in one step");
+        }
+    }
+
+    #[test]
+    fn rare_spikes_change_nothing() {
+        let mut machine = Machine::new(0);
+        machine.play(400_000.0, 100, |_| false);
+        let before = machine.switches;
+        let rungs = machine.play(400_000.0, 3000, |frame| frame % 100 == 50);
+        assert!(rungs.iter().all(|&rung| rung == 2));
+        assert_eq!(machine.switches, before);
+    }
+
+    #[test]
+    fn the_floor_is_the_floor() {
+        let mut machine = Machine::new(0);
+        machine.play(50_000_000.0, 50, |_| false);
+        assert_eq!(machine.governor.rung(), 0);
+        assert_eq!(machine.governor.expected_ns(), Some(50_000_000));
+    }
+
+    #[test]
+    fn costs_are_learnt_until_a_ladder_that_was_misjudged_does_not_pump() {
+        let mut machine = Machine::new(0);
+        // The fourth rung is dearer than it was said to be: it seems to fit, and does not.
+        machine.costs = [1.0, 1.5, 2.0, 3.9, 4.5];
+        let switches_in = |machine: &mut Machine| {
+            let before = machine.switches;
+            machine.play(280_000.0, 1800, |_| false);
+            machine.switches - before
+        };
+        let (first, _, third) = (switches_in(&mut machine), switches_in(&mut machine), switches_in(&mut machine));
+        assert!((2..=6).contains(&first) && third == 0, "{first} switches in the first minute, {third} in the third");
+        let learnt = machine.governor.costs();
+        assert!(learnt.is_sorted() && learnt[3] > 3.08, "{learnt:?}");
+    }
+
+    #[test]
+    fn a_sample_that_measures_nothing_is_none() {
+        let mut governor = Governor::new(&COSTS, 3);
+        for at_ns in [5, 3, 0, 9] {
+            governor.note(Sample { rung: 3, took_ns: 0, at_ns }, BUDGET_NS);
+            governor.note(Sample { rung: 77, took_ns: 9_000_000, at_ns }, BUDGET_NS);
+        }
+        assert_eq!((governor.rung(), governor.expected_ns()), (3, None));
+        // Times that run backwards are taken in order.
+        (0..5).for_each(|k| governor.note(Sample { rung: 3, took_ns: 9_000_000, at_ns: 50 - k }, BUDGET_NS));
+        assert_eq!(governor.rung(), 0);
+    }
+
+    #[test]
+    fn after_a_long_pause_only_what_is_new_counts() {
+        let mut machine = Machine::new(0);
+        machine.play(550_000.0, 100, |_| false);
+        assert_eq!(machine.governor.rung(), 1);
+        machine.now_ns += 10 * IDLE_NS;
+        // The clocks have to wake up first: a slow frame is no reason, and the load before is forgotten.
+        let rungs = machine.play(200_000.0, 60, |frame| frame < 1);
+        assert!(rungs.iter().all(|&rung| rung >= 1));
+        assert_eq!(machine.governor.rung(), 4);
+    }
+
+    #[test]
+    fn late_samples_of_another_rung_decide_nothing() {
+        let mut governor = Governor::new(&COSTS, 4);
+        for at_ns in 1..=20 {
+            governor.note(Sample { rung: 2, took_ns: 50_000_000, at_ns }, BUDGET_NS);
+        }
+        assert_eq!(governor.rung(), 4);
+        // Its own first samples do, with what the others told.
+        (21..24).for_each(|at_ns| governor.note(Sample { rung: 4, took_ns: 90_000_000, at_ns }, BUDGET_NS));
+        assert_eq!(governor.rung(), 0);
+    }
+
+    #[test]
+    fn a_smaller_budget_is_heeded_at_once() {
+        let mut machine = Machine::new(0);
+        machine.play(240_000.0, 200, |_| false);
+        assert_eq!(machine.governor.rung(), 3);
+        let sample = Sample { rung: 3, took_ns: 720_000, at_ns: machine.now_ns };
+        machine.governor.note(sample, BUDGET_NS / 2);
+        assert_eq!(machine.governor.rung(), 1);
+    }
+}
