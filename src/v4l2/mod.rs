@@ -2,5 +2,6 @@
 
 pub mod device;
 pub mod holders;
+pub mod modes;
 
 pub use device::Device;
