@@ -2,5 +2,7 @@
 
 pub mod device;
 pub mod holders;
+pub mod layout;
 
 pub use device::Device;
+pub use layout::{FourCc, Layout};
