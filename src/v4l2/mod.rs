@@ -2,6 +2,8 @@
 
 pub mod device;
 pub mod holders;
+pub mod layout;
 pub mod modes;
 
 pub use device::Device;
+pub use layout::{FourCc, Layout};
