@@ -6,7 +6,7 @@ use std::io;
 use serde::Serialize;
 use v4l::v4l_sys as sys;
 
-use super::Device;
+use super::{Device, FourCc};
 use super::device::zeroed;
 
 /// The two kinds of capture queues. A device has one of them; some have both.
@@ -45,8 +45,9 @@ impl QueueKind {
 pub struct FormatModes {
     /// The queue that gives it.
     pub queue: QueueKind,
-    /// Its four-character code.
-    pub fourcc: u32,
+    /// Its four letters.
+    #[serde(serialize_with = "as_text")]
+    pub fourcc: FourCc,
     /// What the driver calls it.
     pub description: String,
     /// A library would have to convert to it: the device itself does not send it.
@@ -239,10 +240,10 @@ pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
             }
             found.push(FormatModes {
                 queue,
-                fourcc: format.pixelformat,
+                fourcc: FourCc::from_u32(format.pixelformat),
                 description: text(&format.description),
                 emulated: format.flags & sys::V4L2_FMT_FLAG_EMULATED != 0,
-                sizes: sizes(device, format.pixelformat),
+                sizes: sizes(device, FourCc::from_u32(format.pixelformat)),
             });
         }
     }
@@ -250,11 +251,11 @@ pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
 }
 
 /// The sizes of a format, each with its rates.
-fn sizes(device: &Device, fourcc: u32) -> Sizes {
+fn sizes(device: &Device, fourcc: FourCc) -> Sizes {
     let mut discrete = Vec::new();
     for index in 0..ENDLESS {
         let mut entry = zeroed::<sys::v4l2_frmsizeenum>();
-        (entry.index, entry.pixel_format) = (index, fourcc);
+        (entry.index, entry.pixel_format) = (index, fourcc.to_u32());
         if device.enum_frame_size(&mut entry).is_err() {
             break;
         }
@@ -300,11 +301,11 @@ fn size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
 }
 
 /// The rates of a format at a size.
-pub fn rates(device: &Device, fourcc: u32, size_px: (u32, u32)) -> Rates {
+pub fn rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
     let mut discrete = Vec::new();
     for index in 0..ENDLESS {
         let mut entry = zeroed::<sys::v4l2_frmivalenum>();
-        (entry.index, entry.pixel_format, (entry.width, entry.height)) = (index, fourcc, size_px);
+        (entry.index, entry.pixel_format, (entry.width, entry.height)) = (index, fourcc.to_u32(), size_px);
         if device.enum_frame_interval(&mut entry).is_err() {
             break;
         }
@@ -323,6 +324,11 @@ pub fn rates(device: &Device, fourcc: u32, size_px: (u32, u32)) -> Rates {
     }
     discrete.sort_by(|a, b| b.fps().total_cmp(&a.fps()));
     if discrete.is_empty() { Rates::Unknown } else { Rates::Discrete(discrete) }
+}
+
+/// As people write it.
+fn as_text<S: serde::Serializer>(fourcc: &FourCc, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(fourcc)
 }
 
 /// A driver's text: up to the first zero, whatever bytes it is made of.
