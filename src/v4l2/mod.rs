@@ -2,5 +2,6 @@
 
 pub mod device;
 pub mod holders;
+pub mod node;
 
 pub use device::Device;
