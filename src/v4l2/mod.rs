@@ -1,5 +1,6 @@
 //! Video4Linux: what capture, live depth and the virtual camera share. The one place that names the crate `v4l`.
 
+pub mod controls;
 pub mod device;
 pub mod holders;
 pub mod node;
