@@ -91,6 +91,10 @@ impl Device {
         set_parameters: VIDIOC_S_PARM(sys::v4l2_streamparm);
         /// Asks for buffers; the driver says how many it gives.
         request_buffers: VIDIOC_REQBUFS(sys::v4l2_requestbuffers);
+        /// What a control is, or the one after it.
+        query_control: VIDIOC_QUERY_EXT_CTRL(sys::v4l2_query_ext_ctrl);
+        /// An item of a control's menu.
+        query_menu: VIDIOC_QUERYMENU(sys::v4l2_querymenu);
         /// Starts streaming on a queue of this type.
         stream_on: VIDIOC_STREAMON(i32);
         /// Stops streaming; every buffer comes back.
