@@ -4,8 +4,10 @@ pub mod controls;
 pub mod device;
 pub mod holders;
 pub mod layout;
+pub mod live;
 pub mod modes;
 pub mod node;
+pub mod queue;
 
 pub use device::Device;
 pub use layout::{FourCc, Layout};
