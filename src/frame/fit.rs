@@ -73,7 +73,7 @@ fn place(from: (usize, usize), into: (usize, usize)) -> Option<Place> {
         (scaled(from.0, into.1, from.1).min(into.0), into.1)
     };
     // Even, so that pixels that share their colour in the output are of one kind.
-    Some(Place { left: (into.0 - width) / 2 & !1, top: (into.1 - height) / 2 & !1, width, height })
+    Some(Place { left: ((into.0 - width) / 2) & !1, top: ((into.1 - height) / 2) & !1, width, height })
 }
 
 /// The weighted sum of `weights.len()` rows of `stride` values each.
