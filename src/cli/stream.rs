@@ -15,10 +15,12 @@ use crate::pipeline::{self, Pace, Run};
 use crate::sink::{self, Target};
 use crate::stats::Report;
 
-/// Blur a recording or the synthetic scene, frame by frame
+/// Blur a camera, a recording or the synthetic scene, frame by frame
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
+  bokehcam stream /dev/video0 --to /dev/video10
+  bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
   bokehcam stream recordings/portrait --to out/
   bokehcam stream recordings/portrait --to out.mp4 --aperture polygon:6 --focus 1.2
   bokehcam stream recordings/portrait --to - --quiet --pace realtime | ffplay -
@@ -26,7 +28,8 @@ Examples:
   bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
-    /// A folder with a recording, or `synthetic`
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), a folder with a recording,
+    /// or `synthetic`
     source: SourceName,
     /// /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm
     /// (ffmpeg), or null; may be given more than once
@@ -56,6 +59,10 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
     let StreamCommand { stream, output, .. } = command;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
     sinks::check(&command.to, stream, command.source.device())?;
+    if stream.pace == Some(values::Pace::Asap) && command.source.device().is_some() {
+        let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
+        return Err(CliError::Usage(what.to_string()));
+    }
     let source = Source::open(&command.source, &command.frames, &command.depth, stream.keep_going)?;
     let info = source.camera.info();
     let measured = source.depth.is_some();
