@@ -1,5 +1,7 @@
 //! Where frames come from.
 
+#[cfg(feature = "camera")]
+pub mod pixels;
 pub mod replay;
 pub mod synthetic;
 
