@@ -155,9 +155,17 @@ pub struct Stream {
     /// Time for one frame, in milliseconds [default: the frame period]
     #[arg(long, value_name = "MS", value_parser = above_zero)]
     pub budget_ms: Option<f32>,
-    /// Whether frames come when they are due, or as fast as they can be written
-    #[arg(long, value_enum, value_name = "HOW", default_value = "asap")]
-    pub pace: Pace,
+    /// Whether frames come when they are due, or as fast as they can be written [default: realtime from a camera or
+    /// into a virtual one, else asap]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub pace: Option<Pace>,
+    /// Picture size of a virtual camera; pictures of another size are fitted into it [default: the source's]
+    #[arg(long, value_name = "WxH")]
+    pub out_size: Option<Size>,
+    /// Close the source's camera while nobody watches the virtual one
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub on_demand: bool,
     /// Mirror the picture, as a mirror does
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]

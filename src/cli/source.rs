@@ -34,6 +34,15 @@ impl FromStr for SourceName {
     }
 }
 
+impl SourceName {
+    /// The device that frames come from, if it is one.
+    pub fn device(&self) -> Option<&Path> {
+        match self {
+            SourceName::Synthetic | SourceName::Folder(_) => None,
+        }
+    }
+}
+
 /// An opened source.
 pub struct Source {
     /// Gives the frames.
