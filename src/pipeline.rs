@@ -156,7 +156,6 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         budget_ns: run.budget_ns,
         elapsed_ns: 0,
     };
-    let sink_hold = sink.hold();
     let tally = Tally::new();
     let mut timings = Timings::default();
     let Timings {
@@ -225,7 +224,6 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         mirror: run.mirror,
         total: info.frames,
         progress: run.progress,
-        hold: sink_hold,
         playout: live_ns.map(playout::Playout::new),
         tally: &tally,
         clock: &clock,

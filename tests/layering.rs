@@ -14,7 +14,7 @@ const LAYERS: [&[&str]; 6] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 11] = [
+const DOORS: [(&str, &[&str]); 12] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
@@ -23,6 +23,7 @@ const DOORS: [(&str, &[&str]); 11] = [
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
     ("rustix", &["clock", "link/bell", "v4l2"]),
+    ("strsim", &["v4l2"]),
     ("v4l", &["v4l2"]),
     ("wgpu", &["bokeh/gpu"]),
     ("zune_jpeg", &["capture"]),

@@ -16,6 +16,7 @@ mod quality;
 mod record;
 mod render;
 mod settings;
+mod sinks;
 mod source;
 mod stream;
 mod terminal;

@@ -1,7 +1,5 @@
 //! Last stage, on the caller's thread: hands pictures to the sink.
 
-use std::time::Duration;
-
 use super::playout::Playout;
 use super::{Ended, Frame, Progress};
 use crate::clock::Clock;
@@ -18,8 +16,6 @@ pub(super) struct Stage<'a> {
     pub progress: &'a dyn Fn(Progress),
     pub tally: &'a Tally,
     pub clock: &'a Clock,
-    /// After so long without a picture the last one is shown again; `None` waits.
-    pub hold: Option<Duration>,
     /// When pictures are due; `None` shows them as they come.
     pub playout: Option<Playout>,
     pub times: Times<'a>,
@@ -81,7 +77,7 @@ impl Stage<'_> {
     }
 
     fn next<T>(&self, from: &mut Receiver<T>) -> Received<T> {
-        match self.hold {
+        match self.sink.hold() {
             Some(hold) => from.recv_timeout(hold),
             None => from.recv().map_or(Received::Ended, Received::Item),
         }

@@ -91,10 +91,22 @@ impl Device {
         set_parameters: VIDIOC_S_PARM(sys::v4l2_streamparm);
         /// Asks for buffers; the driver says how many it gives.
         request_buffers: VIDIOC_REQBUFS(sys::v4l2_requestbuffers);
+        /// What a control is, or the one after it.
+        query_control: VIDIOC_QUERY_EXT_CTRL(sys::v4l2_query_ext_ctrl);
+        /// An item of a control's menu.
+        query_menu: VIDIOC_QUERYMENU(sys::v4l2_querymenu);
         /// Starts streaming on a queue of this type.
         stream_on: VIDIOC_STREAMON(i32);
         /// Stops streaming; every buffer comes back.
         stream_off: VIDIOC_STREAMOFF(i32);
+    }
+}
+
+/// What a node itself can do; `capabilities` says what all nodes of its device together can.
+pub fn own_caps(capability: &sys::v4l2_capability) -> u32 {
+    match capability.capabilities & sys::V4L2_CAP_DEVICE_CAPS {
+        0 => capability.capabilities,
+        _ => capability.device_caps,
     }
 }
 
@@ -131,6 +143,8 @@ plain!(
     v4l2_frmivalenum,
     v4l2_frmsizeenum,
     v4l2_input,
+    v4l2_pix_format,
+    v4l2_pix_format_mplane,
     v4l2_plane,
     v4l2_query_ext_ctrl,
     v4l2_querymenu,

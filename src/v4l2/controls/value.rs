@@ -1,0 +1,300 @@
+//! Values of controls: how they are written, and which ones a control takes.
+
+use std::fmt;
+use std::io;
+
+use serde::Serialize;
+
+use super::{Control, Item, Kind};
+
+/// What a control is set to.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A number; 0 and 1 for no and yes; the number of a menu's item.
+    Number(i64),
+    /// A text.
+    Text(String),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => number.fmt(f),
+            Self::Text(text) => text.fmt(f),
+        }
+    }
+}
+
+/// Why a control is not set, or not read.
+#[derive(Debug, thiserror::Error)]
+pub enum ControlError {
+    /// The device has none of this name.
+    #[error("control {name}: {}", known(near, *count))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// Names that look alike, or all where none does.
+        near: Vec<String>,
+        /// How many controls there are.
+        count: usize,
+    },
+    /// It does not take this value.
+    #[error("control {name}={value}: {accepted}")]
+    Value {
+        /// The control.
+        name: String,
+        /// The value.
+        value: String,
+        /// What it takes.
+        accepted: String,
+    },
+    /// It cannot be set, or not now.
+    #[error("control {name} {why}")]
+    Fixed {
+        /// The control.
+        name: String,
+        /// Why.
+        why: &'static str,
+    },
+    /// It has no value that one could write down.
+    #[error("control {0} has no value to read")]
+    NoValue(String),
+    /// The device refuses.
+    #[error("control {name}: {source}")]
+    Device {
+        /// The control.
+        name: String,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+fn known(near: &[String], count: usize) -> String {
+    match (near, count) {
+        (_, 0) => "the device has no controls".to_owned(),
+        ([], _) => "the device has none of this name; `bokehcam devices --controls` lists them".to_owned(),
+        (near, _) => format!("the device has none of this name; did you mean {}?", near.join(" or ")),
+    }
+}
+
+impl ControlError {
+    /// No control has this name: what the user may have meant.
+    pub(super) fn unknown(name: &str, controls: &[Control]) -> Self {
+        /// Below this, names have nothing in common.
+        const ALIKE: f64 = 0.75;
+        const MOST: usize = 3;
+        let likeness = |control: &Control| {
+            let part = !name.is_empty() && control.name.contains(name);
+            if part { 1.0 } else { strsim::normalized_damerau_levenshtein(&control.name, name) }
+        };
+        let mut near: Vec<(f64, &str)> = controls.iter().map(|control| (likeness(control), &*control.name)).collect();
+        near.retain(|(likeness, _)| *likeness >= ALIKE);
+        near.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let near = near.iter().take(MOST).map(|(_, name)| (*name).to_owned()).collect();
+        Self::Unknown { name: name.to_owned(), near, count: controls.len() }
+    }
+}
+
+impl Control {
+    /// The value that a text means for this control.
+    ///
+    /// # Errors
+    /// It takes no such value, or none now.
+    pub fn parse(&self, text: &str) -> Result<Value, ControlError> {
+        let why = match () {
+            () if self.kind == Kind::Compound => "is a table, which cannot be set by one value",
+            () if self.read_only => "is read-only",
+            () if self.grabbed => "cannot be set while the device is streaming",
+            () if self.inactive => "has no effect now: another control overrides it, such as an automatic mode",
+            () => return self.value_of(text).ok_or_else(|| self.refuse(text)),
+        };
+        Err(ControlError::Fixed { name: self.name.clone(), why })
+    }
+
+    fn value_of(&self, text: &str) -> Option<Value> {
+        let number = number(text);
+        let value = match self.kind {
+            Kind::Button => Some(1),
+            Kind::Boolean => match text.to_ascii_lowercase().as_str() {
+                "1" | "on" | "yes" | "true" => Some(1),
+                "0" | "off" | "no" | "false" => Some(0),
+                _ => None,
+            },
+            Kind::Integer | Kind::Integer64 => number.filter(|number| {
+                let steps = number.wrapping_sub(self.minimum).cast_unsigned();
+                (self.minimum..=self.maximum).contains(number) && steps.is_multiple_of(self.step)
+            }),
+            Kind::Bitmask => number.filter(|number| (0..=self.bits()).contains(number) && number & !self.bits() == 0),
+            Kind::Menu | Kind::IntegerMenu => self.item(text).map(|item| item.index),
+            Kind::String => {
+                let length = text.len() as i64;
+                let steps = length.wrapping_sub(self.minimum).cast_unsigned();
+                let fits = (self.minimum..=self.maximum).contains(&length) && steps.is_multiple_of(self.step);
+                return (fits && !text.contains('\0')).then(|| Value::Text(text.to_owned()));
+            }
+            Kind::Compound => None,
+        };
+        value.map(Value::Number)
+    }
+
+    /// All bits that a bit mask may have.
+    fn bits(&self) -> i64 {
+        self.maximum & i64::from(u32::MAX)
+    }
+
+    /// By number, by name, or by name as it would be written for a control.
+    fn item(&self, text: &str) -> Option<&Item> {
+        let by = |fits: &dyn Fn(&Item) -> bool| self.items.iter().find(|item| fits(item));
+        let number = number(text);
+        by(&|item| Some(item.index) == number)
+            .or_else(|| by(&|item| item.name.eq_ignore_ascii_case(text)))
+            .or_else(|| by(&|item| !item.name.is_empty() && super::variable(&item.name) == super::variable(text)))
+    }
+
+    fn refuse(&self, text: &str) -> ControlError {
+        ControlError::Value { name: self.name.clone(), value: text.to_owned(), accepted: self.accepted() }
+    }
+
+    /// What it takes, for people.
+    pub fn accepted(&self) -> String {
+        let steps = if self.step > 1 { format!(" in steps of {}", self.step) } else { String::new() };
+        match self.kind {
+            Kind::Integer | Kind::Integer64 => format!("use {} to {}{steps}", self.minimum, self.maximum),
+            Kind::Boolean => "use on or off".to_owned(),
+            Kind::Bitmask => format!("use bits of {:#x}", self.bits()),
+            Kind::Button => "any value will do".to_owned(),
+            Kind::String => format!("use {} to {} bytes of text{steps}", self.minimum, self.maximum),
+            Kind::Compound => "it takes no single value".to_owned(),
+            Kind::Menu | Kind::IntegerMenu => {
+                let items: Vec<_> = self.items.iter().map(|item| format!("{} ({})", item.index, item.name)).collect();
+                format!("use {}", items.join(", "))
+            }
+        }
+    }
+}
+
+/// Decimal, or hexadecimal after 0x.
+fn number(text: &str) -> Option<i64> {
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => i64::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::find;
+    use super::*;
+
+    fn control(name: &str, kind: Kind, (minimum, maximum, step): (i64, i64, u64)) -> Control {
+        Control {
+            name: name.to_owned(),
+            label: name.to_owned(),
+            id: 1,
+            kind,
+            minimum,
+            maximum,
+            step,
+            default: minimum,
+            items: Vec::new(),
+            value: None,
+            read_only: false,
+            inactive: false,
+            grabbed: false,
+        }
+    }
+
+    fn menu(kind: Kind, items: &[(i64, &str)]) -> Control {
+        let items = items.iter().map(|(index, name)| Item { index: *index, name: (*name).to_owned() }).collect();
+        Control { items, ..control("mode", kind, (0, 9, 1)) }
+    }
+
+    #[test]
+    fn each_kind_takes_its_own_values() {
+        let integer = control("exposure", Kind::Integer, (-10, 10, 5));
+        let wide = control("big", Kind::Integer64, (i64::MIN, i64::MAX, 1));
+        let bits = control("flags", Kind::Bitmask, (0, 0x8000_0005_u32.into(), 1));
+        let text = control("title", Kind::String, (2, 4, 1));
+        let holes = menu(Kind::Menu, &[(1, "Manual Mode"), (3, "Aperture Priority Mode"), (4, "50 Hz")]);
+        let numbers = menu(Kind::IntegerMenu, &[(0, "100"), (2, "400")]);
+        let accepted = [
+            (&integer, "-5", -5),
+            (&integer, "0xa", 10),
+            (&wide, "-9223372036854775808", i64::MIN),
+            (&wide, "9223372036854775807", i64::MAX),
+            (&bits, "0x80000004", 0x8000_0004),
+            (&holes, "3", 3),
+            (&holes, "manual mode", 1),
+            (&holes, "aperture_priority_mode", 3),
+            (&holes, "50 hz", 4),
+            (&numbers, "2", 2),
+            (&numbers, "400", 2),
+        ];
+        for (control, text, number) in accepted {
+            assert_eq!(control.parse(text).unwrap(), Value::Number(number), "{} {text}", control.name);
+        }
+        assert_eq!(text.parse("abc").unwrap(), Value::Text("abc".into()));
+        let refused = [
+            (&integer, "3", "control exposure=3: use -10 to 10 in steps of 5"),
+            (&integer, "15", "use -10 to 10"),
+            (&integer, "much", "use -10 to 10"),
+            (&bits, "2", "use bits of 0x80000005"),
+            (&bits, "-1", "use bits"),
+            (&text, "a", "2 to 4 bytes"),
+            (&text, "abcde", "2 to 4 bytes"),
+            (&holes, "2", "use 1 (Manual Mode), 3 (Aperture Priority Mode), 4 (50 Hz)"),
+            (&holes, "", "use 1 (Manual Mode)"),
+            (&numbers, "1", "use 0 (100), 2 (400)"),
+        ];
+        for (control, text, said) in refused {
+            let error = control.parse(text).unwrap_err().to_string();
+            assert!(error.contains(said) && !error.contains('\n'), "{error}");
+        }
+    }
+
+    #[test]
+    fn yes_and_no_have_several_words() {
+        let control = control("flip", Kind::Boolean, (0, 1, 1));
+        for (text, number) in [("1", 1), ("on", 1), ("True", 1), ("0", 0), ("OFF", 0), ("no", 0)] {
+            assert_eq!(control.parse(text).unwrap(), Value::Number(number));
+        }
+        assert!(control.parse("2").unwrap_err().to_string().ends_with("use on or off"));
+    }
+
+    #[test]
+    fn what_cannot_be_set_says_why() {
+        let plain = control("gain", Kind::Integer, (0, 9, 1));
+        let cases = [
+            (Control { read_only: true, ..plain.clone() }, "read-only"),
+            (Control { inactive: true, ..plain.clone() }, "automatic mode"),
+            (Control { grabbed: true, ..plain.clone() }, "streaming"),
+            (Control { kind: Kind::Compound, ..plain }, "table"),
+        ];
+        for (control, why) in cases {
+            let error = control.parse("1").unwrap_err().to_string();
+            assert!(error.starts_with("control gain ") && error.contains(why), "{error}");
+        }
+    }
+
+    #[test]
+    fn former_names_lead_to_the_same_control() {
+        let new = [control("exposure_dynamic_framerate", Kind::Boolean, (0, 1, 1))];
+        let old = [control("exposure_auto_priority", Kind::Boolean, (0, 1, 1))];
+        for controls in [&new, &old] {
+            assert!(find(controls, "exposure_auto_priority").is_some());
+            assert!(find(controls, "exposure_dynamic_framerate").is_some());
+            assert!(find(controls, "exposure_auto").is_none());
+        }
+    }
+
+    #[test]
+    fn near_misses_are_suggested() {
+        let controls = ["brightness", "contrast", "exposure_time_absolute", "auto_exposure"]
+            .map(|name| control(name, Kind::Integer, (0, 9, 1)));
+        let said = |name| ControlError::unknown(name, &controls).to_string();
+        assert!(said("brightnes").ends_with("did you mean brightness?"), "{}", said("brightnes"));
+        assert!(said("exposure").ends_with("did you mean exposure_time_absolute or auto_exposure?"));
+        assert!(said("zoom").contains("devices --controls"));
+    }
+}
