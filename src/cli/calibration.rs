@@ -131,7 +131,7 @@ translation_m = [0.5, 0, 0]
             (GOOD.replace("[1, 0, 0,", "[2, 0, 0,"), 16, "rotation"),
             (GOOD.replace("[1, 0, 0,", "["), 17, "9"),
             (GOOD.replace("[0.5,", "[500,"), 16, "metres"),
-            (GOOD.replace("width = 4\n", "width = -4\n"), 3, "-4"),
+            (GOOD.replacen("width = 4\n", "width = -4\n", 1), 3, "-4"),
             ("fx = ".to_string(), 1, ""),
             (String::new(), 1, "depth"),
         ] {
