@@ -1,18 +1,23 @@
 //! Second stage: gives each frame its depth and its CoC.
 
+use std::time::Duration;
+
 use super::capture::Shot;
 use super::{CocAtInfinity, CocRule, Ended, Fault, Frame, hand_on};
 use crate::budget::{Governor, Sample};
 use crate::clock::Clock;
-use crate::depth::DepthSource;
 use crate::depth::fill::Filler;
 use crate::depth::focus::Focus;
 use crate::depth::refine::Refiner;
+use crate::depth::{DepthError, DepthSource};
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::{Pool, Pooled};
-use crate::link::{Receiver, Sender};
+use crate::link::{Received, Receiver, Sender};
 use crate::optics::CocField;
 use crate::stats::{Cause, Histogram, Tally};
+
+/// Without a frame for so long, nobody watches: a depth camera may rest.
+const IDLE: Duration = Duration::from_secs(3);
 
 /// All that the blur needs of a frame.
 pub(super) struct Ready {
@@ -133,40 +138,38 @@ impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
         let mut coc = Coc::new(self.coc, self.refine);
         let mut complained = false;
-        while let Some(Frame { ticket, stamp, item: Shot { color, depth } }) = from.recv() {
-            let (depth, coc) = match &mut coc {
-                Coc::Fixed(field) => (None, *field),
-                Coc::Depth(coc) => {
-                    if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
-                        let mut map = depth.unwrap_or_else(|| self.depths.take());
-                        copy(&rate.map, &mut map);
-                        *self.held += 1;
-                        (Some(map), field)
-                    } else {
-                        let began_ns = self.clock.now_ns();
-                        let mut map = match depth.map_or_else(|| self.read(stamp), Ok) {
-                            Ok(map) => map,
-                            Err(fault) => {
-                                let corrupt = matches!(fault, Fault::Depth(_));
-                                self.tally.dropped(ticket, if corrupt { Cause::Corrupt } else { Cause::Failed });
-                                if !corrupt || !self.keep_going {
-                                    return Err(fault);
-                                }
-                                if !complained {
-                                    tracing::warn!("{fault}; going on without such frames");
-                                    complained = true;
-                                }
-                                continue;
-                            }
-                        };
-                        let field = coc.see(&mut map, &color, stamp.time_ns);
-                        let now_ns = self.clock.now_ns();
-                        self.times.add(now_ns - began_ns);
-                        if let Some(rate) = &mut self.rate {
-                            rate.made((&map, field), now_ns - began_ns, now_ns);
-                        }
-                        (Some(map), field)
+        loop {
+            let Frame { ticket, stamp, item: Shot { color, depth } } = match from.recv_timeout(IDLE) {
+                Received::Item(frame) => frame,
+                Received::Ended => break,
+                Received::Nothing => {
+                    if let Some(source) = &mut self.source {
+                        source.rest();
                     }
+                    continue;
+                }
+            };
+            let made = match &mut coc {
+                Coc::Fixed(field) => Ok((None, *field)),
+                Coc::Depth(coc) => self.see(coc, depth, &color, stamp).map(|(map, field)| (Some(map), field)),
+            };
+            let (depth, coc) = match made {
+                Ok(made) => made,
+                Err(fault) => {
+                    let (cause, goes_on) = match &fault {
+                        Fault::Depth(DepthError::Unpaired { .. }) => (Cause::Unpaired, true),
+                        Fault::Depth(_) => (Cause::Corrupt, self.keep_going),
+                        _ => (Cause::Failed, false),
+                    };
+                    self.tally.dropped(ticket, cause);
+                    if !goes_on {
+                        return Err(fault);
+                    }
+                    if !complained {
+                        tracing::warn!("{fault}; going on without such frames");
+                        complained = true;
+                    }
+                    continue;
                 }
             };
             if !hand_on(&mut to, Frame { ticket, stamp, item: Ready { color, depth, coc } }, self.tally) {
@@ -174,6 +177,31 @@ impl Stage<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more.
+    fn see(
+        &mut self,
+        coc: &mut DepthCoc,
+        brought: Option<Pooled<DepthMap>>,
+        color: &ColorImage,
+        stamp: Stamp,
+    ) -> Result<(Pooled<DepthMap>, CocField), Fault> {
+        if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
+            let mut map = brought.unwrap_or_else(|| self.depths.take());
+            copy(&rate.map, &mut map);
+            *self.held += 1;
+            return Ok((map, field));
+        }
+        let began_ns = self.clock.now_ns();
+        let mut map = brought.map_or_else(|| self.read(stamp), Ok)?;
+        let field = coc.see(&mut map, color, stamp.time_ns);
+        let now_ns = self.clock.now_ns();
+        self.times.add(now_ns - began_ns);
+        if let Some(rate) = &mut self.rate {
+            rate.made((&map, field), now_ns - began_ns, now_ns);
+        }
+        Ok((map, field))
     }
 
     fn read(&mut self, stamp: Stamp) -> Result<Pooled<DepthMap>, Fault> {
