@@ -3,6 +3,9 @@
 pub mod controls;
 pub mod device;
 pub mod holders;
+pub mod layout;
+pub mod modes;
 pub mod node;
 
 pub use device::Device;
+pub use layout::{FourCc, Layout};

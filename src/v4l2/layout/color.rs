@@ -1,0 +1,108 @@
+//! What the numbers of a picture mean as colours.
+
+use v4l::v4l_sys as sys;
+
+use super::Family;
+
+/// Which weights make luma of red, green and blue.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Matrix {
+    /// Standard definition, JPEG, and what cameras give that do not say.
+    #[default]
+    Bt601,
+    /// High definition.
+    Bt709,
+    /// Ultra high definition, non-constant luminance.
+    Bt2020,
+}
+
+/// Which numbers stand for black and white.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Range {
+    /// Luma from 16 to 235, chroma from 16 to 240.
+    #[default]
+    Limited,
+    /// From 0 to 255.
+    Full,
+}
+
+/// How numbers grow with light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Transfer {
+    /// Made to be shown on a screen: the curves of sRGB and BT.709, and all that is close to them.
+    #[default]
+    Display,
+    /// In proportion to the light.
+    Linear,
+    /// A power of 2.2 (opRGB) or 2.6 (DCI-P3); in tenths.
+    Gamma(u8),
+    /// High dynamic range (SMPTE 2084), of which no faithful 8-bit sRGB picture can be made.
+    Pq,
+}
+
+impl Matrix {
+    /// Luma weights of red and blue; green has the rest.
+    pub fn weights(self) -> (f64, f64) {
+        match self {
+            Self::Bt601 => (0.299, 0.114),
+            Self::Bt709 => (0.2126, 0.0722),
+            Self::Bt2020 => (0.2627, 0.0593),
+        }
+    }
+}
+
+/// The colours of a format as V4L2 defines what it leaves open. SMPTE 240M, an early high definition, counts as BT.709.
+pub(super) fn resolve(
+    family: Family,
+    colorspace: u32,
+    ycbcr_encoding: u32,
+    quantization: u32,
+    transfer: u32,
+) -> (Matrix, Range, Transfer) {
+    // JPEG files define their colours themselves.
+    if family == Family::Jpeg {
+        return (Matrix::Bt601, Range::Full, Transfer::Display);
+    }
+    let matrix = match ycbcr_encoding {
+        sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_601
+        | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_XV601
+        | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_SYCC => Matrix::Bt601,
+        sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_709
+        | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_XV709
+        | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_SMPTE240M => Matrix::Bt709,
+        sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_BT2020 | sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_BT2020_CONST_LUM => {
+            Matrix::Bt2020
+        }
+        _ => match colorspace {
+            sys::v4l2_colorspace_V4L2_COLORSPACE_REC709
+            | sys::v4l2_colorspace_V4L2_COLORSPACE_DCI_P3
+            | sys::v4l2_colorspace_V4L2_COLORSPACE_SMPTE240M => Matrix::Bt709,
+            sys::v4l2_colorspace_V4L2_COLORSPACE_BT2020 => Matrix::Bt2020,
+            _ => Matrix::Bt601,
+        },
+    };
+    let range = match quantization {
+        sys::v4l2_quantization_V4L2_QUANTIZATION_FULL_RANGE => Range::Full,
+        sys::v4l2_quantization_V4L2_QUANTIZATION_LIM_RANGE => Range::Limited,
+        // Brightness alone is no Y'CbCr: sensors give it as they count.
+        _ if matches!(family, Family::Rgb24 { .. } | Family::Grey | Family::Depth16) => Range::Full,
+        _ if colorspace == sys::v4l2_colorspace_V4L2_COLORSPACE_JPEG => Range::Full,
+        _ => Range::Limited,
+    };
+    let transfer = match transfer {
+        sys::v4l2_xfer_func_V4L2_XFER_FUNC_709
+        | sys::v4l2_xfer_func_V4L2_XFER_FUNC_SRGB
+        | sys::v4l2_xfer_func_V4L2_XFER_FUNC_SMPTE240M => Transfer::Display,
+        sys::v4l2_xfer_func_V4L2_XFER_FUNC_OPRGB => Transfer::Gamma(22),
+        sys::v4l2_xfer_func_V4L2_XFER_FUNC_NONE => Transfer::Linear,
+        sys::v4l2_xfer_func_V4L2_XFER_FUNC_DCI_P3 => Transfer::Gamma(26),
+        sys::v4l2_xfer_func_V4L2_XFER_FUNC_SMPTE2084 => Transfer::Pq,
+        _ => match colorspace {
+            sys::v4l2_colorspace_V4L2_COLORSPACE_OPRGB => Transfer::Gamma(22),
+            sys::v4l2_colorspace_V4L2_COLORSPACE_RAW => Transfer::Linear,
+            sys::v4l2_colorspace_V4L2_COLORSPACE_DCI_P3 => Transfer::Gamma(26),
+            _ => Transfer::Display,
+        },
+    };
+    (matrix, range, transfer)
+}

@@ -1,0 +1,410 @@
+//! What a capture device offers: formats, their sizes, and the rates of each size.
+
+use std::fmt;
+use std::io;
+
+use serde::Serialize;
+use v4l::v4l_sys as sys;
+
+use super::{Device, FourCc};
+use super::device::zeroed;
+
+/// The two kinds of capture queues. A device has one of them; some have both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum QueueKind {
+    /// A frame is one piece of memory.
+    SinglePlanar,
+    /// A frame may be several.
+    MultiPlanar,
+}
+
+impl QueueKind {
+    /// Both, the common one first.
+    pub const ALL: [Self; 2] = [Self::SinglePlanar, Self::MultiPlanar];
+
+    /// The buffer type, as the kernel numbers them.
+    pub fn buffer_type(self) -> u32 {
+        match self {
+            Self::SinglePlanar => sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE,
+            Self::MultiPlanar => sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE,
+        }
+    }
+
+    /// The capability that announces it.
+    pub fn capability(self) -> u32 {
+        match self {
+            Self::SinglePlanar => sys::V4L2_CAP_VIDEO_CAPTURE,
+            Self::MultiPlanar => sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE,
+        }
+    }
+}
+
+/// A pixel format that a device offers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FormatModes {
+    /// The queue that gives it.
+    pub queue: QueueKind,
+    /// Its four letters.
+    #[serde(serialize_with = "as_text")]
+    pub fourcc: FourCc,
+    /// What the driver calls it.
+    pub description: String,
+    /// A library would have to convert to it: the device itself does not send it.
+    pub emulated: bool,
+    /// Its sizes.
+    pub sizes: Sizes,
+}
+
+/// The sizes of a format.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sizes {
+    /// The driver does not tell.
+    Unknown,
+    /// These and no others.
+    Discrete(Vec<SizeModes>),
+    /// Every size of a grid.
+    Range {
+        /// Smallest width and height, in pixels.
+        min_px: (u32, u32),
+        /// Largest width and height, in pixels.
+        max_px: (u32, u32),
+        /// From one width, and one height, to the next, in pixels, > 0.
+        step_px: (u32, u32),
+        /// Rates at the largest size.
+        rates: Rates,
+    },
+}
+
+/// One size and its rates.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SizeModes {
+    /// Width and height, in pixels.
+    pub size_px: (u32, u32),
+    /// Rates at this size.
+    pub rates: Rates,
+}
+
+/// The rates of a format at a size.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rates {
+    /// The driver does not tell.
+    Unknown,
+    /// These and no others, the fastest first.
+    Discrete(Vec<Interval>),
+    /// Every rate between two; in steps, where the driver has them.
+    Range {
+        /// The fastest.
+        shortest: Interval,
+        /// The slowest.
+        longest: Interval,
+    },
+}
+
+/// Time from frame to frame: a fraction of seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interval {
+    /// Seconds, > 0 ...
+    pub numerator: u32,
+    /// ... divided by this, > 0.
+    pub denominator: u32,
+}
+
+impl Interval {
+    /// The interval, if the driver gave a usable one.
+    pub fn new(fraction: sys::v4l2_fract) -> Option<Self> {
+        let sys::v4l2_fract { numerator, denominator } = fraction;
+        (numerator > 0 && denominator > 0).then_some(Self { numerator, denominator })
+    }
+
+    /// The interval of a rate, to a thousandth of a frame per second; 29.97 and its kin as the fractions that they are.
+    pub fn from_fps(fps: f64) -> Self {
+        let whole = (fps * 1.001).round();
+        if (fps - whole / 1.001).abs() < 0.004 && (fps - fps.round()).abs() > 0.004 {
+            return Self { numerator: 1001, denominator: (whole * 1000.0) as u32 };
+        }
+        if (fps - fps.round()).abs() < 1e-6 {
+            return Self { numerator: 1, denominator: fps.round().max(1.0) as u32 };
+        }
+        Self { numerator: 1000, denominator: (fps * 1000.0).round().max(1.0) as u32 }
+    }
+
+    /// Frames per second.
+    pub fn fps(self) -> f64 {
+        f64::from(self.denominator) / f64::from(self.numerator)
+    }
+
+    /// The time in nanoseconds.
+    pub fn period_ns(self) -> u64 {
+        (u64::from(self.numerator) * 1_000_000_000 / u64::from(self.denominator)).max(1)
+    }
+
+    /// For the kernel.
+    pub fn fraction(self) -> sys::v4l2_fract {
+        sys::v4l2_fract { numerator: self.numerator, denominator: self.denominator }
+    }
+}
+
+impl fmt::Display for Interval {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Two digits tell 29.97 from 30; a whole rate needs none.
+        let fps = (self.fps() * 100.0).round() / 100.0;
+        write!(f, "{fps}")
+    }
+}
+
+impl Serialize for Interval {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Told {
+            fps: f64,
+            numerator: u32,
+            denominator: u32,
+        }
+        let Self { numerator, denominator } = *self;
+        Told { fps: (self.fps() * 1000.0).round() / 1000.0, numerator, denominator }.serialize(serializer)
+    }
+}
+
+impl fmt::Display for Rates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown => write!(f, "rates unknown"),
+            Self::Discrete(intervals) => {
+                for (place, interval) in intervals.iter().enumerate() {
+                    write!(f, "{}{interval}", if place > 0 { ", " } else { "" })?;
+                }
+                write!(f, " fps")
+            }
+            Self::Range { shortest, longest } => write!(f, "{longest} to {shortest} fps"),
+        }
+    }
+}
+
+impl fmt::Display for Sizes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown => write!(f, "sizes unknown"),
+            Self::Discrete(sizes) => {
+                for (place, SizeModes { size_px, rates }) in sizes.iter().enumerate() {
+                    write!(f, "{}{}x{} ({rates})", if place > 0 { ", " } else { "" }, size_px.0, size_px.1)?;
+                }
+                Ok(())
+            }
+            Self::Range { min_px, max_px, step_px, rates } => {
+                let ((w0, h0), (w1, h1), (sw, sh)) = (min_px, max_px, step_px);
+                write!(f, "{w0}x{h0} to {w1}x{h1} in steps of {sw}x{sh} ({rates})")
+            }
+        }
+    }
+}
+
+impl Rates {
+    /// The offered interval next to `wanted`; `None` where the driver does not tell.
+    pub fn nearest(&self, wanted: Interval) -> Option<Interval> {
+        // By ratio: 1/30 and 333333/10000000 are the same rate.
+        let distance = |interval: &Interval| (interval.fps() / wanted.fps()).ln().abs();
+        match self {
+            Self::Unknown => None,
+            Self::Discrete(intervals) => intervals.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b))),
+            Self::Range { shortest, .. } if wanted.fps() > shortest.fps() => Some(*shortest),
+            Self::Range { longest, .. } if wanted.fps() < longest.fps() => Some(*longest),
+            Self::Range { .. } => Some(wanted),
+        }
+    }
+}
+
+/// No driver offers as many entries of anything; a list that is longer has no end.
+const ENDLESS: u32 = 512;
+
+/// What `device` offers on all its capture queues, in the order of the driver. Empty where it captures nothing.
+///
+/// # Errors
+/// The device answers nothing at all (it is gone).
+pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
+    let mut capability = zeroed::<sys::v4l2_capability>();
+    device.query_capability(&mut capability)?;
+    let own = match capability.capabilities & sys::V4L2_CAP_DEVICE_CAPS {
+        0 => capability.capabilities,
+        _ => capability.device_caps,
+    };
+    let mut found = Vec::new();
+    for queue in QueueKind::ALL.into_iter().filter(|queue| own & queue.capability() != 0) {
+        for index in 0..ENDLESS {
+            let mut format = zeroed::<sys::v4l2_fmtdesc>();
+            (format.index, format.type_) = (index, queue.buffer_type());
+            if device.enum_format(&mut format).is_err() {
+                break;
+            }
+            found.push(FormatModes {
+                queue,
+                fourcc: FourCc::from_u32(format.pixelformat),
+                description: text(&format.description),
+                emulated: format.flags & sys::V4L2_FMT_FLAG_EMULATED != 0,
+                sizes: sizes(device, FourCc::from_u32(format.pixelformat)),
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// The sizes of a format, each with its rates.
+fn sizes(device: &Device, fourcc: FourCc) -> Sizes {
+    let mut discrete = Vec::new();
+    for index in 0..ENDLESS {
+        let mut entry = zeroed::<sys::v4l2_frmsizeenum>();
+        (entry.index, entry.pixel_format) = (index, fourcc.to_u32());
+        if device.enum_frame_size(&mut entry).is_err() {
+            break;
+        }
+        match size_entry(&entry) {
+            Some(SizeEntry::One(size_px)) => {
+                discrete.push(SizeModes { size_px, rates: rates(device, fourcc, size_px) })
+            }
+            Some(SizeEntry::Range { min_px, max_px, step_px }) => {
+                return Sizes::Range { min_px, max_px, step_px, rates: rates(device, fourcc, max_px) };
+            }
+            None => {}
+        }
+    }
+    if discrete.is_empty() { Sizes::Unknown } else { Sizes::Discrete(discrete) }
+}
+
+enum SizeEntry {
+    One((u32, u32)),
+    Range { min_px: (u32, u32), max_px: (u32, u32), step_px: (u32, u32) },
+}
+
+/// What an entry of the list of sizes says; nothing where its type is unknown or its size empty.
+fn size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
+    // SAFETY: every member of the union is made of integers, for which all bits are values.
+    #[allow(unsafe_code)]
+    let (one, range) = unsafe { (entry.__bindgen_anon_1.discrete, entry.__bindgen_anon_1.stepwise) };
+    let found = match entry.type_ {
+        sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_DISCRETE => SizeEntry::One((one.width, one.height)),
+        sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_STEPWISE | sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_CONTINUOUS => {
+            SizeEntry::Range {
+                min_px: (range.min_width, range.min_height),
+                max_px: (range.max_width, range.max_height),
+                step_px: (range.step_width.max(1), range.step_height.max(1)),
+            }
+        }
+        _ => return None,
+    };
+    let largest = match found {
+        SizeEntry::One(size) => size,
+        SizeEntry::Range { max_px, .. } => max_px,
+    };
+    (largest.0 > 0 && largest.1 > 0).then_some(found)
+}
+
+/// The rates of a format at a size.
+pub fn rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
+    let mut discrete = Vec::new();
+    for index in 0..ENDLESS {
+        let mut entry = zeroed::<sys::v4l2_frmivalenum>();
+        (entry.index, entry.pixel_format, (entry.width, entry.height)) = (index, fourcc.to_u32(), size_px);
+        if device.enum_frame_interval(&mut entry).is_err() {
+            break;
+        }
+        // SAFETY: every member of the union is made of integers, for which all bits are values.
+        #[allow(unsafe_code)]
+        let (one, range) = unsafe { (entry.__bindgen_anon_1.discrete, entry.__bindgen_anon_1.stepwise) };
+        if entry.type_ == sys::v4l2_frmivaltypes_V4L2_FRMIVAL_TYPE_DISCRETE {
+            discrete.extend(Interval::new(one));
+        } else {
+            let (shortest, longest) = (Interval::new(range.min), Interval::new(range.max));
+            return match (shortest, longest) {
+                (Some(shortest), Some(longest)) => Rates::Range { shortest, longest },
+                _ => Rates::Unknown,
+            };
+        }
+    }
+    discrete.sort_by(|a, b| b.fps().total_cmp(&a.fps()));
+    if discrete.is_empty() { Rates::Unknown } else { Rates::Discrete(discrete) }
+}
+
+/// As people write it.
+fn as_text<S: serde::Serializer>(fourcc: &FourCc, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(fourcc)
+}
+
+/// A driver's text: up to the first zero, whatever bytes it is made of.
+fn text(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn every(numerator: u32, denominator: u32) -> Interval {
+        Interval { numerator, denominator }
+    }
+
+    #[test]
+    fn rates_are_found_by_ratio_and_written_as_people_do() {
+        assert_eq!(every(1, 30).to_string(), "30");
+        assert_eq!(every(1001, 30_000).to_string(), "29.97");
+        assert_eq!(every(333_333, 10_000_000).to_string(), "30");
+        assert_eq!(every(2, 15).to_string(), "7.5");
+        let offered = Rates::Discrete(vec![every(1, 60), every(333_333, 10_000_000), every(1, 15)]);
+        assert_eq!(offered.nearest(every(1, 30)), Some(every(333_333, 10_000_000)));
+        assert_eq!(offered.nearest(every(1, 120)), Some(every(1, 60)));
+        assert_eq!(Rates::Unknown.nearest(every(1, 30)), None);
+        let range = Rates::Range { shortest: every(1, 60), longest: every(1, 5) };
+        assert_eq!(range.nearest(every(1, 25)), Some(every(1, 25)));
+        assert_eq!(range.nearest(every(1, 1)), Some(every(1, 5)));
+        assert_eq!(range.to_string(), "5 to 60 fps");
+    }
+
+    #[test]
+    fn a_rate_becomes_the_fraction_that_drivers_use() {
+        for (fps, expected) in [
+            (30.0, every(1, 30)),
+            (29.97, every(1001, 30_000)),
+            (59.94, every(1001, 60_000)),
+            (7.5, every(1000, 7500)),
+            (12.5, every(1000, 12_500)),
+            (0.1, every(1000, 100)),
+        ] {
+            assert_eq!(Interval::from_fps(fps), expected, "{fps}");
+        }
+        assert_eq!(every(1, 30).period_ns(), 33_333_333);
+    }
+
+    #[test]
+    fn a_grid_of_sizes_stays_a_grid() {
+        let mut entry = zeroed::<sys::v4l2_frmsizeenum>();
+        entry.type_ = sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_CONTINUOUS;
+        entry.__bindgen_anon_1.stepwise = sys::v4l2_frmsize_stepwise {
+            min_width: 2,
+            max_width: 8192,
+            step_width: 0,
+            min_height: 1,
+            max_height: 8192,
+            step_height: 0,
+        };
+        let Some(SizeEntry::Range { min_px, max_px, step_px }) = size_entry(&entry) else { panic!("no range") };
+        assert_eq!((min_px, max_px, step_px), ((2, 1), (8192, 8192), (1, 1)));
+        entry.type_ = 77;
+        assert!(size_entry(&entry).is_none());
+        let empty = zeroed::<sys::v4l2_frmsizeenum>();
+        assert!(size_entry(&empty).is_none());
+    }
+
+    #[test]
+    fn a_list_of_modes_can_be_read_by_people_and_programs() {
+        let rates = Rates::Discrete(vec![every(1, 30), every(1, 15)]);
+        let sizes = Sizes::Discrete(vec![SizeModes { size_px: (1280, 720), rates }]);
+        assert_eq!(sizes.to_string(), "1280x720 (30, 15 fps)");
+        let json = serde_json::to_value(&sizes).unwrap();
+        assert_eq!(json["discrete"][0]["size_px"], serde_json::json!([1280, 720]));
+        assert_eq!(json["discrete"][0]["rates"]["discrete"][1]["fps"], 15.0);
+        assert_eq!(text(b"Motion-JPEG\0junk"), "Motion-JPEG");
+        assert_eq!(text(b"\xff\xfeno end"), "\u{fffd}\u{fffd}no end");
+    }
+}

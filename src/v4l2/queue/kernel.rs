@@ -1,0 +1,253 @@
+//! What a queue needs of the kernel, and how a real device gives it.
+
+use std::io;
+use std::os::fd::AsFd;
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+use v4l::v4l2::vidioc;
+use v4l::v4l_sys as sys;
+
+use super::{Dequeued, MAX_PLANES, Part};
+use crate::v4l2::device::{Device, Request, zeroed};
+use crate::v4l2::modes::QueueKind;
+
+/// The kernel's side of a queue of buffers.
+pub trait Kernel {
+    /// A mapped plane; dropping it unmaps it.
+    type Memory: AsRef<[u8]>;
+
+    /// Asks for `count` buffers; gives how many there are now.
+    fn request(&mut self, count: u32) -> io::Result<u32>;
+    /// Tells about a buffer.
+    fn query(&mut self, index: u32) -> io::Result<Described>;
+    /// Maps a plane of a buffer.
+    fn map(&mut self, span: Span) -> io::Result<Self::Memory>;
+    /// Gives a buffer to the driver.
+    fn queue(&mut self, index: u32) -> io::Result<()>;
+    /// Takes the oldest filled buffer; [`io::ErrorKind::WouldBlock`] when there is none.
+    fn dequeue(&mut self) -> io::Result<Dequeued>;
+    /// Starts the stream.
+    fn stream_on(&mut self) -> io::Result<()>;
+    /// Stops the stream; all buffers come back.
+    fn stream_off(&mut self) -> io::Result<()>;
+    /// Waits until there is something to dequeue, an error included.
+    fn wait(&mut self, patience: Duration) -> io::Result<Wake>;
+}
+
+/// Why waiting ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wake {
+    /// Time is up.
+    Late,
+    /// A buffer is filled.
+    Filled,
+    /// Something is wrong; dequeuing tells what.
+    Trouble,
+}
+
+/// Where a plane's memory is, as the kernel numbers it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Span {
+    /// What to map.
+    pub offset: u64,
+    /// How much, in bytes.
+    pub length_bytes: usize,
+}
+
+/// What the kernel knows of a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Described {
+    /// Its planes.
+    pub planes: [Span; MAX_PLANES],
+    /// How many of those there are.
+    pub plane_count: usize,
+    /// The driver has it, to fill or filled.
+    pub in_kernel: bool,
+}
+
+/// The capture queue of an open device.
+#[derive(Debug)]
+pub struct DeviceKernel {
+    device: Device,
+    kind: QueueKind,
+}
+
+/// A part of a device's memory, readable.
+#[derive(Debug)]
+pub struct Mapping {
+    address: *mut std::ffi::c_void,
+    length_bytes: usize,
+}
+
+// SAFETY: the memory belongs to the process, not to a thread.
+#[allow(unsafe_code)]
+unsafe impl Send for Mapping {}
+
+/// A buffer's description together with the planes that it points to.
+struct Buffer {
+    head: sys::v4l2_buffer,
+    planes: [sys::v4l2_plane; MAX_PLANES],
+}
+
+impl DeviceKernel {
+    /// The queue of `kind` of a device.
+    pub fn new(device: Device, kind: QueueKind) -> Self {
+        Self { device, kind }
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Calls the driver with a buffer.
+    fn call(&self, request: Request, index: u32) -> io::Result<Buffer> {
+        let mut buffer = Buffer { head: zeroed(), planes: [zeroed(); MAX_PLANES] };
+        buffer.head.index = index;
+        buffer.head.type_ = self.kind.buffer_type();
+        buffer.head.memory = sys::v4l2_memory_V4L2_MEMORY_MMAP;
+        if self.kind == QueueKind::MultiPlanar {
+            buffer.head.length = MAX_PLANES as u32;
+            buffer.head.m.planes = buffer.planes.as_mut_ptr();
+        }
+        // SAFETY: all three requests take a `v4l2_buffer`. Its pointer, used with a multi-planar queue only, leads to
+        // as many planes as its length says, which live until after the call.
+        #[allow(unsafe_code)]
+        unsafe {
+            self.device.ioctl(request, &mut buffer.head)?;
+        }
+        Ok(buffer)
+    }
+
+    fn plane_count(&self, buffer: &Buffer) -> usize {
+        match self.kind {
+            QueueKind::SinglePlanar => 1,
+            QueueKind::MultiPlanar => (buffer.head.length as usize).min(MAX_PLANES),
+        }
+    }
+}
+
+impl Kernel for DeviceKernel {
+    type Memory = Mapping;
+
+    fn request(&mut self, count: u32) -> io::Result<u32> {
+        let mut request = zeroed::<sys::v4l2_requestbuffers>();
+        (request.count, request.type_) = (count, self.kind.buffer_type());
+        request.memory = sys::v4l2_memory_V4L2_MEMORY_MMAP;
+        self.device.request_buffers(&mut request)?;
+        Ok(request.count)
+    }
+
+    fn query(&mut self, index: u32) -> io::Result<Described> {
+        let buffer = self.call(vidioc::VIDIOC_QUERYBUF as Request, index)?;
+        let plane_count = self.plane_count(&buffer);
+        let mut planes = [Span::default(); MAX_PLANES];
+        // SAFETY: the members that are read are integers, and with memory of kind MMAP the kernel writes these.
+        #[allow(unsafe_code)]
+        unsafe {
+            match self.kind {
+                QueueKind::SinglePlanar => {
+                    let offset = u64::from(buffer.head.m.offset);
+                    planes[0] = Span { offset, length_bytes: buffer.head.length as usize };
+                }
+                QueueKind::MultiPlanar => {
+                    for (span, plane) in planes.iter_mut().zip(&buffer.planes[..plane_count]) {
+                        let offset = u64::from(plane.m.mem_offset);
+                        *span = Span { offset, length_bytes: plane.length as usize };
+                    }
+                }
+            }
+        }
+        let in_kernel = buffer.head.flags & (sys::V4L2_BUF_FLAG_QUEUED | sys::V4L2_BUF_FLAG_DONE) != 0;
+        Ok(Described { planes, plane_count, in_kernel })
+    }
+
+    fn map(&mut self, span: Span) -> io::Result<Mapping> {
+        let Span { offset, length_bytes } = span;
+        // SAFETY: a new mapping at a place that the kernel chooses disturbs no other memory.
+        #[allow(unsafe_code)]
+        let address = unsafe {
+            mmap(
+                std::ptr::null_mut(),
+                length_bytes,
+                ProtFlags::READ,
+                MapFlags::SHARED,
+                self.device.as_fd(),
+                offset,
+            )?
+        };
+        Ok(Mapping { address, length_bytes })
+    }
+
+    fn queue(&mut self, index: u32) -> io::Result<()> {
+        self.call(vidioc::VIDIOC_QBUF as Request, index).map(drop)
+    }
+
+    fn dequeue(&mut self) -> io::Result<Dequeued> {
+        let buffer = self.call(vidioc::VIDIOC_DQBUF as Request, 0)?;
+        let mut parts = [Part::default(); MAX_PLANES];
+        match self.kind {
+            QueueKind::SinglePlanar => parts[0] = Part { start: 0, end: buffer.head.bytesused as usize },
+            QueueKind::MultiPlanar => {
+                for (part, plane) in parts.iter_mut().zip(&buffer.planes) {
+                    *part = Part { start: plane.data_offset as usize, end: plane.bytesused as usize };
+                }
+            }
+        }
+        let flags = buffer.head.flags;
+        let monotonic = flags & sys::V4L2_BUF_FLAG_TIMESTAMP_MASK == sys::V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+        let stamp = buffer.head.timestamp;
+        let stamp_ns = stamp.tv_sec as u64 * 1_000_000_000 + stamp.tv_usec as u64 * 1000;
+        Ok(Dequeued {
+            index: buffer.head.index,
+            sequence: buffer.head.sequence,
+            stamp_ns: (monotonic && stamp_ns > 0).then_some(stamp_ns),
+            flagged: flags & sys::V4L2_BUF_FLAG_ERROR != 0,
+            parts,
+        })
+    }
+
+    fn stream_on(&mut self) -> io::Result<()> {
+        self.device.stream_on(&mut (self.kind.buffer_type() as i32))
+    }
+
+    fn stream_off(&mut self) -> io::Result<()> {
+        self.device.stream_off(&mut (self.kind.buffer_type() as i32))
+    }
+
+    fn wait(&mut self, patience: Duration) -> io::Result<Wake> {
+        let timeout = Timespec { tv_sec: patience.as_secs() as i64, tv_nsec: patience.subsec_nanos().into() };
+        // No events are subscribed to; errors come unasked.
+        let mut fds = [PollFd::new(&self.device, PollFlags::IN)];
+        if poll(&mut fds, Some(&timeout))? == 0 {
+            return Ok(Wake::Late);
+        }
+        let woken = fds[0].revents();
+        let trouble = PollFlags::ERR | PollFlags::HUP | PollFlags::NVAL | PollFlags::PRI;
+        Ok(if woken.intersects(trouble) { Wake::Trouble } else { Wake::Filled })
+    }
+}
+
+impl AsRef<[u8]> for Mapping {
+    fn as_ref(&self) -> &[u8] {
+        // SAFETY: the mapping is readable, of this length, and stays until this value is dropped. The driver writes to
+        // it only while it has the buffer, and the queue reads no buffer then.
+        #[allow(unsafe_code)]
+        unsafe {
+            std::slice::from_raw_parts(self.address.cast::<u8>(), self.length_bytes)
+        }
+    }
+}
+
+impl Drop for Mapping {
+    fn drop(&mut self) {
+        // SAFETY: mapped once, with this length, and nothing borrows from it any longer.
+        #[allow(unsafe_code)]
+        let unmapped = unsafe { munmap(self.address, self.length_bytes) };
+        if let Err(error) = unmapped {
+            tracing::debug!("a camera's buffer cannot be unmapped: {error}");
+        }
+    }
+}

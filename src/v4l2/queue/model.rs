@@ -1,0 +1,296 @@
+//! A model of the kernel's side of a queue. It knows every buffer's state, breaks down at random where a kernel may, and
+//! panics where its user breaks a rule that a kernel only punishes.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::io;
+use std::rc::Rc;
+use std::time::Duration;
+
+use super::{Dequeued, Described, Kernel, MAX_PLANES, Part, Span, Wake};
+use crate::clock::Clock;
+
+pub const EINTR: i32 = 4;
+pub const EIO: i32 = 5;
+pub const EAGAIN: i32 = 11;
+pub const EBUSY: i32 = 16;
+pub const ENODEV: i32 = 19;
+pub const EINVAL: i32 = 22;
+pub const ENOSPC: i32 = 28;
+
+pub const PERIOD_NS: u64 = 10_000_000;
+pub const PLANE_BYTES: usize = 64;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Buffer {
+    Dequeued,
+    Queued,
+    Done { sequence: u32, flagged: bool, used_bytes: usize },
+}
+
+/// How likely things go wrong at a call, each from 0 to 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Chances {
+    pub interrupted: f64,
+    pub refused: f64,
+    pub dropped: f64,
+    pub damaged: f64,
+    pub gone: f64,
+}
+
+/// What happened, from the kernel's side.
+#[derive(Clone, Debug, Default)]
+pub struct Facts {
+    /// Frames given out, damaged ones included.
+    pub handed: u64,
+    /// Those of them that are damaged.
+    pub damaged: u64,
+    /// Frames between those, which were not.
+    pub missed: u64,
+    /// Most buffers that were filled or to be filled at once.
+    pub most_queued: usize,
+    pub starts: u64,
+}
+
+pub struct State {
+    random: u64,
+    pub chances: Chances,
+    pub granted: u32,
+    clock: Clock,
+    buffers: Vec<Buffer>,
+    order: VecDeque<u32>,
+    streaming: bool,
+    mapped: usize,
+    sequence: u32,
+    last_handed: Option<u32>,
+    pub gone: bool,
+    pub facts: Facts,
+}
+
+/// The model; clones are the same one.
+#[derive(Clone)]
+pub struct Model(pub Rc<RefCell<State>>);
+
+/// A mapped plane of the model.
+pub struct Memory {
+    bytes: [u8; PLANE_BYTES],
+    model: Rc<RefCell<State>>,
+}
+
+impl AsRef<[u8]> for Memory {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        self.model.borrow_mut().mapped -= 1;
+    }
+}
+
+fn error<T>(errno: i32) -> io::Result<T> {
+    Err(io::Error::from_raw_os_error(errno))
+}
+
+impl Model {
+    pub fn new(seed: u64, chances: Chances, clock: Clock) -> Self {
+        Self(Rc::new(RefCell::new(State {
+            random: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1,
+            chances,
+            granted: 4,
+            clock,
+            buffers: Vec::new(),
+            order: VecDeque::new(),
+            streaming: false,
+            mapped: 0,
+            sequence: 0,
+            last_handed: None,
+            gone: false,
+            facts: Facts::default(),
+        })))
+    }
+
+    /// Nothing mapped, nothing streaming.
+    pub fn is_clean(&self) -> bool {
+        let state = self.0.borrow();
+        state.mapped == 0 && (state.gone || !state.streaming && state.buffers.is_empty())
+    }
+}
+
+impl State {
+    pub fn random(&mut self) -> u64 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 7;
+        self.random ^= self.random << 17;
+        self.random
+    }
+
+    pub fn chance(&mut self, of: f64) -> bool {
+        ((self.random() >> 11) as f64 / (1u64 << 53) as f64) < of
+    }
+
+    /// What may come between any call: a signal, or the end of the device.
+    fn call(&mut self) -> io::Result<()> {
+        if self.gone {
+            return error(ENODEV);
+        }
+        if self.chance(self.chances.interrupted) { error(EINTR) } else { Ok(()) }
+    }
+
+    fn refuse(&mut self, errnos: &[i32]) -> io::Result<()> {
+        if self.chance(self.chances.refused) {
+            let which = self.random() as usize % errnos.len();
+            return error(errnos[which]);
+        }
+        Ok(())
+    }
+
+    /// The camera takes a picture, and fills a buffer if it has one.
+    fn shoot(&mut self) {
+        self.clock.advance_ns(PERIOD_NS);
+        self.sequence += 1;
+        if self.chance(self.chances.dropped) {
+            return;
+        }
+        let Some(free) = self.order.iter().copied().find(|index| self.buffers[*index as usize] == Buffer::Queued) else {
+            return;
+        };
+        let damaged = self.chance(self.chances.damaged);
+        let flagged = damaged && self.chance(0.5);
+        let used_bytes = if damaged && !flagged { self.random() as usize % PLANE_BYTES } else { PLANE_BYTES };
+        self.buffers[free as usize] = Buffer::Done { sequence: self.sequence - 1, flagged, used_bytes };
+    }
+
+    fn done(&self) -> Option<u32> {
+        self.order.front().copied().filter(|index| matches!(self.buffers[*index as usize], Buffer::Done { .. }))
+    }
+}
+
+impl Kernel for Model {
+    type Memory = Memory;
+
+    fn request(&mut self, count: u32) -> io::Result<u32> {
+        let mut state = self.0.borrow_mut();
+        assert!(count > 0 || state.mapped == 0, "buffers are freed while {} planes are mapped", state.mapped);
+        assert!(!state.streaming || count == 0 && state.gone, "buffers are asked for while the stream runs");
+        state.call()?;
+        if count > 0 {
+            state.refuse(&[EBUSY, EINVAL])?;
+        }
+        let granted = count.min(state.granted);
+        state.buffers = vec![Buffer::Dequeued; granted as usize];
+        state.order.clear();
+        Ok(granted)
+    }
+
+    fn query(&mut self, index: u32) -> io::Result<Described> {
+        let mut state = self.0.borrow_mut();
+        state.call()?;
+        let in_kernel = state.buffers[index as usize] != Buffer::Dequeued;
+        let span = |plane: u64| Span { offset: u64::from(index) * 8 + plane, length_bytes: PLANE_BYTES };
+        let mut planes = [Span::default(); MAX_PLANES];
+        (planes[0], planes[1]) = (span(0), span(1));
+        Ok(Described { planes, plane_count: 2, in_kernel })
+    }
+
+    fn map(&mut self, span: Span) -> io::Result<Memory> {
+        let mut state = self.0.borrow_mut();
+        state.call()?;
+        assert!(span.offset / 8 < state.buffers.len() as u64 && span.length_bytes == PLANE_BYTES);
+        state.mapped += 1;
+        drop(state);
+        Ok(Memory { bytes: [0; PLANE_BYTES], model: Rc::clone(&self.0) })
+    }
+
+    fn queue(&mut self, index: u32) -> io::Result<()> {
+        let mut state = self.0.borrow_mut();
+        state.call()?;
+        assert_eq!(state.buffers[index as usize], Buffer::Dequeued, "buffer {index} is queued twice");
+        state.refuse(&[EINVAL, EIO])?;
+        state.buffers[index as usize] = Buffer::Queued;
+        state.order.push_back(index);
+        state.facts.most_queued = state.facts.most_queued.max(state.order.len());
+        Ok(())
+    }
+
+    fn dequeue(&mut self) -> io::Result<Dequeued> {
+        let mut state = self.0.borrow_mut();
+        state.call()?;
+        if !state.streaming {
+            return error(EINVAL);
+        }
+        if state.chance(state.chances.gone) {
+            state.gone = true;
+            return error(ENODEV);
+        }
+        let Some(index) = state.done() else { return error(EAGAIN) };
+        if state.chance(state.chances.refused) {
+            if state.chance(0.5) {
+                // With the buffer.
+                state.order.pop_front();
+                state.buffers[index as usize] = Buffer::Dequeued;
+            }
+            return error(EIO);
+        }
+        state.order.pop_front();
+        let Buffer::Done { sequence, flagged, used_bytes } =
+            std::mem::replace(&mut state.buffers[index as usize], Buffer::Dequeued)
+        else {
+            unreachable!("it was done");
+        };
+        state.facts.handed += 1;
+        state.facts.damaged += u64::from(flagged || used_bytes < PLANE_BYTES);
+        let last = state.last_handed.replace(sequence);
+        state.facts.missed += last.map_or(0, |last| u64::from(sequence - last - 1));
+        let mut parts = [Part::default(); MAX_PLANES];
+        parts[0] = Part { start: 0, end: PLANE_BYTES };
+        parts[1] = Part { start: 0, end: used_bytes };
+        let stamp_ns = Some(1_000_000 + u64::from(sequence) * PERIOD_NS);
+        Ok(Dequeued { index, sequence, stamp_ns, flagged, parts })
+    }
+
+    fn stream_on(&mut self) -> io::Result<()> {
+        let mut state = self.0.borrow_mut();
+        state.call()?;
+        let idle = state.buffers.iter().filter(|buffer| **buffer != Buffer::Queued).count();
+        assert_eq!(idle, 0, "the stream starts with {idle} buffers that are not queued");
+        state.refuse(&[ENOSPC, EINVAL])?;
+        (state.streaming, state.sequence, state.last_handed) = (true, 0, None);
+        state.facts.starts += 1;
+        Ok(())
+    }
+
+    fn stream_off(&mut self) -> io::Result<()> {
+        let mut state = self.0.borrow_mut();
+        state.call()?;
+        state.streaming = false;
+        state.buffers.fill(Buffer::Dequeued);
+        state.order.clear();
+        Ok(())
+    }
+
+    fn wait(&mut self, patience: Duration) -> io::Result<Wake> {
+        let mut state = self.0.borrow_mut();
+        if state.gone {
+            return Ok(Wake::Trouble);
+        }
+        state.clock.advance_ns(1000);
+        state.call()?;
+        let until_ns = state.clock.now_ns() + patience.as_nanos() as u64;
+        if !state.streaming {
+            return Ok(Wake::Trouble);
+        }
+        // The caller may have been away for a while.
+        for _ in 0..state.random() % 4 {
+            state.shoot();
+        }
+        while state.done().is_none() {
+            if state.clock.now_ns() >= until_ns {
+                return Ok(Wake::Late);
+            }
+            state.shoot();
+        }
+        Ok(Wake::Filled)
+    }
+}
