@@ -6,8 +6,8 @@ use std::io;
 use serde::Serialize;
 use v4l::v4l_sys as sys;
 
-use super::{Device, FourCc};
 use super::device::zeroed;
+use super::{Device, FourCc};
 
 /// The two kinds of capture queues. A device has one of them; some have both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
