@@ -144,7 +144,6 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         budget_ns: run.budget_ns,
         elapsed_ns: 0,
     };
-    let sink_hold = sink.hold();
     let tally = Tally::new();
     let mut timings = Timings::default();
     let Timings { decode, depth: depth_times, blur, passes, rungs, misses, sink: sink_times, latency, frame, repeats } =
@@ -199,7 +198,6 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         mirror: run.mirror,
         total: info.frames,
         progress: run.progress,
-        hold: sink_hold,
         tally: &tally,
         clock: &clock,
         times: deliver::Times { sink: sink_times, latency, frame, repeats },

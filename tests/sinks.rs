@@ -13,7 +13,7 @@ use bokehcam::sink::{Options, Sink, SinkError, Target, Y4m};
 const PERIOD_NS: u64 = 40_000_000;
 
 fn options(size: (u32, u32)) -> Options {
-    Options { size, period_ns: PERIOD_NS, force: false }
+    Options::new(size, PERIOD_NS)
 }
 
 fn flat(width: u32, height: u32, rgb: [u8; 3]) -> ColorImage {

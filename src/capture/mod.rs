@@ -1,12 +1,18 @@
 //! Where frames come from.
 
+mod error;
+#[cfg(feature = "camera")]
+pub mod pixels;
 pub mod replay;
 pub mod synthetic;
+#[cfg(feature = "camera")]
+pub mod v4l2;
 
 use std::time::Duration;
 
+pub use error::CaptureError;
+
 use crate::frame::{ColorImage, DepthMap, Stamp};
-use crate::recording::RecordingError;
 use crate::stats::Cause;
 
 /// Produces frames, one after the other.
@@ -67,37 +73,4 @@ pub enum Captured {
     Corrupt(CaptureError),
     /// There are no more.
     End,
-}
-
-/// Why there is no frame.
-#[derive(Debug, thiserror::Error)]
-pub enum CaptureError {
-    /// The recording's picture cannot be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// No frame lies between start and end.
-    #[error(
-        "{source_name} has no frame from {start_s} s to {}; it lasts {length_s:.3} s",
-        end_s.map_or("its end".into(), |end_s| format!("{end_s} s"))
-    )]
-    EmptyRange {
-        /// The recording.
-        source_name: String,
-        /// Start of the range.
-        start_s: f64,
-        /// End of the range.
-        end_s: Option<f64>,
-        /// From the first frame to the end of the last.
-        length_s: f64,
-    },
-    /// A picture size or rate that no frame can have.
-    #[error("a synthetic camera cannot make {width} x {height} pixels at {fps} frames per second")]
-    Format {
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-        /// Frames per second.
-        fps: f64,
-    },
 }

@@ -1,5 +1,7 @@
 //! Every default of the command line, in one place.
 
+use super::values::Size;
+
 /// CoC radius at infinity, as a fraction of the picture's height: a portrait lens wide open.
 pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
 /// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
@@ -19,7 +21,7 @@ pub const DEPTH_SCALE: f32 = 5000.0;
 /// Value of a depth picture that means unknown.
 pub const DEPTH_INVALID: &str = "0";
 /// Picture size of the synthetic scene.
-pub const SIZE: &str = "640x480";
+pub const SIZE: Size = Size { width: 640, height: 480 };
 /// Frame rate of the synthetic scene.
 pub const FPS: f64 = 30.0;
 /// Apertures that the command `aperture` analyses.

@@ -17,6 +17,7 @@ mod options;
 mod record;
 mod render;
 mod settings;
+mod sinks;
 mod source;
 mod stream;
 mod terminal;

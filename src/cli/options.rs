@@ -12,6 +12,8 @@ use super::values::{
     between, not_negative, seconds,
 };
 use crate::budget::Quality;
+#[cfg(feature = "camera")]
+use crate::v4l2::{FourCc, live::Setting};
 
 /// Options of every command.
 #[derive(Args, Debug)]
@@ -48,12 +50,20 @@ pub struct Source {
     /// Stop after this many frames
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
     pub frames: Option<u64>,
-    /// Picture size of `synthetic`
-    #[arg(long, value_name = "WxH", default_value = defaults::SIZE)]
-    pub size: Size,
-    /// Frames per second of `synthetic`
-    #[arg(long, value_name = "RATE", default_value_t = defaults::FPS, value_parser = rate)]
-    pub fps: f64,
+    /// Picture size; of a camera, the nearest that it has [default: 1280x720 of a camera, 640x480 of `synthetic`]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Frames per second; of a camera, the nearest that it has [default: 30]
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    pub fps: Option<f64>,
+    /// Pixel format of a camera, such as MJPG, YUYV or NV12 [default: what its cable carries best]
+    #[cfg(feature = "camera")]
+    #[arg(long, value_name = "FOURCC")]
+    pub format: Option<FourCc>,
+    /// Set a camera's control; may be given more than once, or as a list with commas
+    #[cfg(feature = "camera")]
+    #[arg(long, value_name = "NAME=VALUE", value_delimiter = ',', value_parser = control)]
+    pub control: Vec<Setting>,
 }
 
 /// How depth pictures are read.
@@ -155,9 +165,17 @@ pub struct Stream {
     /// Time for one frame, in milliseconds [default: the frame period]
     #[arg(long, value_name = "MS", value_parser = above_zero)]
     pub budget_ms: Option<f32>,
-    /// Whether frames come when they are due, or as fast as they can be written
-    #[arg(long, value_enum, value_name = "HOW", default_value = "asap")]
-    pub pace: Pace,
+    /// Whether frames come when they are due, or as fast as they can be written [default: realtime from a camera or
+    /// into a virtual one, else asap]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub pace: Option<Pace>,
+    /// Picture size of a virtual camera; pictures of another size are fitted into it [default: the source's]
+    #[arg(long, value_name = "WxH")]
+    pub out_size: Option<Size>,
+    /// Close the source's camera while nobody watches the virtual one
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub on_demand: bool,
     /// Mirror the picture, as a mirror does
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
@@ -205,6 +223,15 @@ pub struct Every {
     /// Overwriting.
     #[command(flatten)]
     pub output: Output,
+}
+
+#[cfg(feature = "camera")]
+fn control(text: &str) -> Result<Setting, String> {
+    let parts = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
+    let (name, value) = parts
+        .filter(|(name, _)| !name.is_empty())
+        .ok_or_else(|| "use NAME=VALUE, such as exposure_dynamic_framerate=0".to_string())?;
+    Ok((name.to_owned(), value.to_owned()))
 }
 
 fn rate(text: &str) -> Result<f64, String> {

@@ -19,10 +19,11 @@ use crate::recording::tum::{Writer, WriterOptions};
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
+  bokehcam record /dev/video0 --size 640x480 --frames 300 --to recordings/me
   bokehcam record synthetic --frames 90 --size 320x240 --to recordings/mine
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
 pub struct RecordCommand {
-    /// A folder with a recording, or `synthetic`
+    /// A camera, a folder with a recording, or `synthetic`
     source: SourceName,
     /// Folder for the recording
     #[arg(long, value_name = "DIR")]
@@ -48,13 +49,13 @@ pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliE
     let stop = terminal::stop_flag()?;
     let progress = terminal::Progress::new(info.frames, global);
     let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
-    let mut recorded = 0;
+    let (mut recorded, mut lost) = (0, 0);
     while !stop.load(Ordering::Relaxed) {
         let stamp = match camera.next(&mut color, &mut depth)? {
             Captured::Frame(stamp) => stamp,
             Captured::Corrupt(error) => return Err(error.into()),
             Captured::Lost(count, _) => {
-                tracing::warn!("{count} frames were lost before they could be read");
+                lost += count;
                 continue;
             }
             Captured::Waiting => continue,
@@ -70,6 +71,9 @@ pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliE
     }
     writer.finish()?;
     drop(progress);
+    if lost > 0 {
+        tracing::warn!("{lost} frames came and went before they could be written");
+    }
     if !global.quiet {
         terminal::say(&format!("{}: {recorded} frames recorded from {}", command.to.display(), info.name));
     }

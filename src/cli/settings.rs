@@ -108,8 +108,11 @@ impl SettingsFile {
         let describe = |arg: &Arg| {
             let name = arg.get_long()?.to_owned();
             let id = arg.get_id().as_str();
-            let value =
-                given.get_raw(id).and_then(|mut values| values.next()).map(|v| v.to_string_lossy().into_owned());
+            // A list as it would be written.
+            let listed = |values: clap::parser::RawValues| {
+                values.map(|value| value.to_string_lossy().into_owned()).collect::<Vec<_>>().join(",")
+            };
+            let value = given.get_raw(id).map(listed);
             let origin = match given.value_source(id) {
                 Some(ValueSource::CommandLine) => "flag".to_string(),
                 Some(ValueSource::EnvVariable) => "environment".to_string(),

@@ -8,27 +8,33 @@ use super::config::{Blur, Executor};
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_whole};
 use super::source::{Source, SourceName};
-use super::{options, terminal, values};
+use super::{options, sinks, terminal, values};
 use crate::clock::Clock;
+use crate::link::demand::Demand;
 use crate::pipeline::{self, Pace, Run};
 use crate::sink::{self, Target};
 use crate::stats::Report;
 
-/// Blur a recording or the synthetic scene, frame by frame
+/// Blur a camera, a recording or the synthetic scene, frame by frame
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
+  bokehcam stream /dev/video0 --to /dev/video10
+  bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
   bokehcam stream recordings/portrait --to out/
   bokehcam stream recordings/portrait --to out.mp4 --aperture polygon:6 --focus 1.2
-  bokehcam stream recordings/portrait --to - --quiet | ffplay -
+  bokehcam stream recordings/portrait --to - --quiet --pace realtime | ffplay -
+  bokehcam stream recordings/portrait --loop --to /dev/video10 --out-size 1280x720
   bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
-    /// A folder with a recording, or `synthetic`
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), a folder with a recording,
+    /// or `synthetic`
     source: SourceName,
-    /// DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null
-    #[arg(long, value_name = "SINK")]
-    to: Target,
+    /// /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm
+    /// (ffmpeg), or null; may be given more than once
+    #[arg(long, value_name = "SINK", required = true)]
+    to: Vec<Target>,
     #[command(flatten)]
     frames: options::Source,
     #[command(flatten)]
@@ -52,6 +58,11 @@ pub struct StreamCommand {
 pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliError> {
     let StreamCommand { stream, output, .. } = command;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
+    sinks::check(&command.to, stream, command.source.device())?;
+    if stream.pace == Some(values::Pace::Asap) && command.source.device().is_some() {
+        let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
+        return Err(CliError::Usage(what.to_string()));
+    }
     let source = Source::open(&command.source, &command.frames, &command.depth, stream.keep_going)?;
     let info = source.camera.info();
     let measured = source.depth.is_some();
@@ -59,8 +70,14 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
     let executor = Executor::of(&command.computing);
     let bokeh = blur.settings(info.size).map(|settings| executor.create(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
-    let sink_options = sink::Options { size: info.size, period_ns: info.period_ns, force: output.force };
-    let sink = command.to.open(&sink_options)?;
+    let demand = stream.on_demand.then(Demand::new);
+    let sink_options = sink::Options {
+        force: output.force,
+        out_size: stream.out_size.map(|size| (size.width, size.height)),
+        demand: demand.clone(),
+        ..sink::Options::new(info.size, info.period_ns)
+    };
+    let sink = sinks::open(&command.to, &sink_options)?;
 
     let stop = terminal::stop_flag()?;
     let bar = terminal::Progress::new(info.frames, global);
@@ -73,12 +90,14 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         refine: blur.refines(measured),
         sink,
         pace: match stream.pace {
-            values::Pace::Realtime => Pace::Realtime,
-            values::Pace::Asap => Pace::Asap,
+            Some(values::Pace::Realtime) => Pace::Realtime,
+            Some(values::Pace::Asap) => Pace::Asap,
+            None if info.live || command.to.iter().any(Target::is_live) => Pace::Realtime,
+            None => Pace::Asap,
         },
         budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
         keep_going: stream.keep_going,
-        demand: None,
+        demand,
         mirror: stream.mirror,
         clock: Clock::system(),
         stop: &stop,

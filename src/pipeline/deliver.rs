@@ -1,7 +1,5 @@
 //! Last stage, on the caller's thread: hands pictures to the sink.
 
-use std::time::Duration;
-
 use super::{Ended, Frame, Progress};
 use crate::clock::Clock;
 use crate::frame::ColorImage;
@@ -17,8 +15,6 @@ pub(super) struct Stage<'a> {
     pub progress: &'a dyn Fn(Progress),
     pub tally: &'a Tally,
     pub clock: &'a Clock,
-    /// After so long without a picture the last one is shown again; `None` waits.
-    pub hold: Option<Duration>,
     pub times: Times<'a>,
 }
 
@@ -75,7 +71,7 @@ impl Stage<'_> {
     }
 
     fn next<T>(&self, from: &mut Receiver<T>) -> Received<T> {
-        match self.hold {
+        match self.sink.hold() {
             Some(hold) => from.recv_timeout(hold),
             None => from.recv().map_or(Received::Ended, Received::Item),
         }

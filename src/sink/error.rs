@@ -1,11 +1,17 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "camera")]
+use crate::v4l2::loopback::LoopbackError;
+
 /// Why a frame could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum SinkError {
     /// Not the name of a sink.
-    #[error("no sink '{name}': use DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm, - (y4m on standard output) or null")]
+    #[error(
+        "no sink '{name}': use /dev/videoN (a virtual camera), DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm, \
+         - (y4m on standard output) or null"
+    )]
     Target {
         /// What was given.
         name: String,
@@ -64,6 +70,17 @@ pub enum SinkError {
         status: String,
         /// Its last lines, joined by ` | `.
         said: String,
+    },
+    /// The virtual camera cannot be written to.
+    #[cfg(feature = "camera")]
+    #[error(transparent)]
+    Loopback(#[from] LoopbackError),
+    /// Built without virtual cameras.
+    #[cfg(not(feature = "camera"))]
+    #[error("{}: this program was built without cameras; build it with the feature camera", path.display())]
+    NoCamera {
+        /// The node.
+        path: PathBuf,
     },
 }
 

@@ -3,24 +3,35 @@
 //! A file appears under its name only when it is whole: it is written beside that name and renamed. Nothing that
 //! exists is overwritten unless that was asked for.
 
+mod card;
 mod error;
 mod ffmpeg;
+#[cfg(feature = "camera")]
+mod loopback;
 mod png;
+mod rate;
 mod staged;
+mod tee;
 mod y4m;
 pub mod yuv;
 
+use std::fs;
 use std::ops::ControlFlow;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
 pub use error::SinkError;
 pub use ffmpeg::Ffmpeg;
+#[cfg(feature = "camera")]
+pub use loopback::Loopback;
 pub use png::PngFolder;
+pub use tee::Tee;
 pub use y4m::{Y4m, Y4mFile};
 
 use crate::frame::ColorImage;
+use crate::link::demand::Demand;
 
 /// Takes finished frames, in order.
 ///
@@ -32,13 +43,13 @@ pub trait Sink {
     /// The frame could not be written.
     fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError>;
 
-    /// How long a live output may go without a picture; after that, [`Sink::repeat`] is called, again and again.
-    /// `None` for everything that keeps what it was given.
+    /// How long a live output may go without a picture from now on; after that, [`Sink::repeat`] is called, again and
+    /// again. `None` for everything that keeps what it was given.
     fn hold(&self) -> Option<Duration> {
         None
     }
 
-    /// Shows the last picture again, or a still card before the first. `Break` as for [`Sink::put`].
+    /// Shows the last picture again; a still card before the first, and while nobody watches. `Break` as for [`Sink::put`].
     ///
     /// # Errors
     /// It could not be written.
@@ -84,6 +95,8 @@ pub enum Target {
     Y4m(PathBuf),
     /// `FILE.mp4`, `FILE.mkv` or `FILE.webm`, through ffmpeg.
     Video(PathBuf),
+    /// `/dev/videoN`, or another name of a device: a virtual camera.
+    Device(PathBuf),
     /// `DIR/`, or any other name without an extension: numbered PNG files.
     Folder(PathBuf),
 }
@@ -98,6 +111,7 @@ impl FromStr for Target {
             ("", _) => Err(SinkError::Target { name: name.into() }),
             ("null", _) => Ok(Self::Null),
             ("-", _) => Ok(Self::Stdout),
+            _ if is_device(&path) => Ok(Self::Device(path)),
             _ if name.ends_with('/') => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
             (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
@@ -108,8 +122,15 @@ impl FromStr for Target {
     }
 }
 
-/// What the frames will be like, and what may be overwritten.
-#[derive(Clone, Copy, Debug)]
+/// Whether a name is that of a device, or of one that is not there yet.
+fn is_device(path: &Path) -> bool {
+    let number = path.to_str().and_then(|name| name.strip_prefix("/dev/video"));
+    number.is_some_and(|number| number.bytes().all(|digit| digit.is_ascii_digit()))
+        || fs::metadata(path).is_ok_and(|node| node.file_type().is_char_device())
+}
+
+/// What the frames will be like, what may be overwritten, and who is told of readers.
+#[derive(Clone, Debug)]
 pub struct Options {
     /// Width and height in pixels.
     pub size: (u32, u32),
@@ -117,6 +138,17 @@ pub struct Options {
     pub period_ns: u64,
     /// Overwrite what exists.
     pub force: bool,
+    /// Width and height of a virtual camera; `None`: those of the frames, the width made even.
+    pub out_size: Option<(u32, u32)>,
+    /// Told by a virtual camera whether somebody watches.
+    pub demand: Option<Demand>,
+}
+
+impl Options {
+    /// Nothing that exists is overwritten, and nobody is told of readers.
+    pub fn new(size: (u32, u32), period_ns: u64) -> Self {
+        Self { size, period_ns, force: false, out_size: None, demand: None }
+    }
 }
 
 impl Target {
@@ -130,16 +162,53 @@ impl Target {
             Self::Stdout => Box::new(Y4m::stdout(options)?),
             Self::Y4m(path) => Box::new(Y4mFile::create(path, options)?),
             Self::Video(path) => Box::new(Ffmpeg::create(path, options)?),
+            #[cfg(feature = "camera")]
+            Self::Device(path) => Box::new(Loopback::open(path, options)?),
+            #[cfg(not(feature = "camera"))]
+            Self::Device(path) => return Err(SinkError::NoCamera { path: path.clone() }),
             Self::Folder(path) => Box::new(PngFolder::create(path, options)?),
         })
     }
 
-    /// The file or folder that this writes to, if it is one.
+    /// Whether frames are seen as they come, and none later.
+    pub fn is_live(&self) -> bool {
+        matches!(self, Self::Device(_))
+    }
+
+    /// Whether both write to the same place.
+    pub fn collides_with(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Null, Self::Null) => false,
+            (Self::Stdout, Self::Stdout) => true,
+            _ => match (self.path(), other.path()) {
+                (Some(own), Some(others)) => same_place(own, others),
+                _ => false,
+            },
+        }
+    }
+
+    /// Whether this is the device node `path`, by whatever name.
+    pub fn is_device(&self, path: &Path) -> bool {
+        matches!(self, Self::Device(own) if same_place(own, path))
+    }
+
+    /// The file, folder or device that this writes to, if it is one.
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::Null | Self::Stdout => None,
-            Self::Y4m(path) | Self::Video(path) | Self::Folder(path) => Some(path),
+            Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => Some(path),
         }
+    }
+}
+
+/// Whether two names lead to one file or device, be it there or not yet.
+fn same_place(one: &Path, other: &Path) -> bool {
+    let whole =
+        |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_else(|_| path.into());
+    let device = |path: &Path| fs::metadata(path).ok().filter(|node| node.file_type().is_char_device());
+    match (device(one), device(other)) {
+        (Some(one), Some(other)) => one.rdev() == other.rdev(),
+        _ => whole(one) == whole(other),
     }
 }
 

@@ -102,6 +102,14 @@ impl Device {
     }
 }
 
+/// What a node itself can do; `capabilities` says what all nodes of its device together can.
+pub fn own_caps(capability: &sys::v4l2_capability) -> u32 {
+    match capability.capabilities & sys::V4L2_CAP_DEVICE_CAPS {
+        0 => capability.capabilities,
+        _ => capability.device_caps,
+    }
+}
+
 /// A structure of the kernel's, all zero.
 pub fn zeroed<T: KernelStruct>() -> T {
     // SAFETY: `KernelStruct` says that zero is a value of every field.
@@ -135,6 +143,8 @@ plain!(
     v4l2_frmivalenum,
     v4l2_frmsizeenum,
     v4l2_input,
+    v4l2_pix_format,
+    v4l2_pix_format_mplane,
     v4l2_plane,
     v4l2_query_ext_ctrl,
     v4l2_querymenu,

@@ -1,11 +1,16 @@
 //! Video4Linux: what capture, live depth and the virtual camera share. The one place that names the crate `v4l`.
 
+pub mod audience;
 pub mod controls;
 pub mod device;
+pub mod events;
 pub mod holders;
 pub mod layout;
+pub mod live;
+pub mod loopback;
 pub mod modes;
 pub mod node;
+pub mod queue;
 
 pub use device::Device;
 pub use layout::{FourCc, Layout};

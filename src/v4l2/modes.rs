@@ -6,7 +6,8 @@ use std::io;
 use serde::Serialize;
 use v4l::v4l_sys as sys;
 
-use super::device::zeroed;
+use super::device::{own_caps, zeroed};
+use super::node::text;
 use super::{Device, FourCc};
 
 /// The two kinds of capture queues. A device has one of them; some have both.
@@ -226,10 +227,7 @@ const ENDLESS: u32 = 512;
 pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
     let mut capability = zeroed::<sys::v4l2_capability>();
     device.query_capability(&mut capability)?;
-    let own = match capability.capabilities & sys::V4L2_CAP_DEVICE_CAPS {
-        0 => capability.capabilities,
-        _ => capability.device_caps,
-    };
+    let own = own_caps(&capability);
     let mut found = Vec::new();
     for queue in QueueKind::ALL.into_iter().filter(|queue| own & queue.capability() != 0) {
         for index in 0..ENDLESS {
@@ -331,12 +329,6 @@ fn as_text<S: serde::Serializer>(fourcc: &FourCc, serializer: S) -> Result<S::Ok
     serializer.collect_str(fourcc)
 }
 
-/// A driver's text: up to the first zero, whatever bytes it is made of.
-fn text(bytes: &[u8]) -> String {
-    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-    String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -404,7 +396,5 @@ mod tests {
         let json = serde_json::to_value(&sizes).unwrap();
         assert_eq!(json["discrete"][0]["size_px"], serde_json::json!([1280, 720]));
         assert_eq!(json["discrete"][0]["rates"]["discrete"][1]["fps"], 15.0);
-        assert_eq!(text(b"Motion-JPEG\0junk"), "Motion-JPEG");
-        assert_eq!(text(b"\xff\xfeno end"), "\u{fffd}\u{fffd}no end");
     }
 }

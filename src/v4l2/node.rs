@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use v4l::v4l_sys as sys;
 
-use super::device::{Device, zeroed};
+use super::device::{Device, own_caps, zeroed};
 
 /// A node of Video4Linux, as it was when the list was made.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -205,11 +205,7 @@ impl Node {
         self.card = text(&capability.card);
         self.driver = text(&capability.driver);
         self.bus = text(&capability.bus_info);
-        // What this node can do; `capabilities` says what all nodes of the device together can.
-        let caps = match capability.capabilities & sys::V4L2_CAP_DEVICE_CAPS {
-            0 => capability.capabilities,
-            _ => capability.device_caps,
-        };
+        let caps = own_caps(capability);
         let can = |any: u32| caps & any != 0;
         let frames = can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE);
         self.captures = frames && can(sys::V4L2_CAP_STREAMING);
@@ -290,6 +286,12 @@ fn names_in(folder: &Path) -> Vec<String> {
 
 fn number(name: &str) -> Option<u32> {
     name.strip_prefix("video")?.parse().ok()
+}
+
+/// How the camera behind a node is connected, where that is USB.
+pub fn usb_of(node: &Path) -> Option<Usb> {
+    let node = fs::canonicalize(node).ok()?;
+    usb(&Places::default().class.join(node.file_name()?))
 }
 
 /// The USB device that a node of the class belongs to: `device` leads to its interface, which lies in its folder.

@@ -103,7 +103,7 @@ fn stop_finishes_what_is_in_hand() {
 fn stop_before_the_first_frame_still_makes_a_whole_file() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("clip.y4m");
-    let options = Options { size: SIZE, period_ns: PERIOD_NS, force: false };
+    let options = Options::new(SIZE, PERIOD_NS);
     let stop = AtomicBool::new(true);
     let sink = Target::Y4m(name.clone()).open(&options).unwrap();
     let report = run(simple(Box::new(fake_camera(9)), sink, &stop, Pace::Asap)).unwrap();
@@ -114,7 +114,7 @@ fn stop_before_the_first_frame_still_makes_a_whole_file() {
 #[test]
 fn a_failed_run_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
-    let options = Options { size: SIZE, period_ns: PERIOD_NS, force: false };
+    let options = Options::new(SIZE, PERIOD_NS);
     let stop = AtomicBool::new(false);
     let failing = || FakeCamera { trouble: Trouble::fails_at(5), ..fake_camera(9) };
     let sink = Target::Y4m(folder.path().join("clip.y4m")).open(&options).unwrap();

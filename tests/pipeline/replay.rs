@@ -131,7 +131,7 @@ fn a_loop_of_nothing_but_bad_frames_ends() {
 }
 
 fn sink_options() -> bokehcam::sink::Options {
-    bokehcam::sink::Options { size: SIZE, period_ns: STEP_NS, force: false }
+    bokehcam::sink::Options::new(SIZE, STEP_NS)
 }
 
 #[test]

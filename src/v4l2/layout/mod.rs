@@ -189,6 +189,18 @@ impl Layout {
         .layout()
     }
 
+    /// The same with `extra_bytes` between rows.
+    #[cfg(test)]
+    pub fn with_strides(mut self, extra_bytes: usize) -> Self {
+        for index in 0..self.plane_count {
+            self.planes[index].stride_bytes += extra_bytes;
+        }
+        for index in 0..self.plane_count {
+            self.planes[index].size_bytes = self.needed_bytes(index) + extra_bytes;
+        }
+        self
+    }
+
     /// Its format's family.
     pub fn family(&self) -> Family {
         // Layouts are made of supported formats only, but the field is open.

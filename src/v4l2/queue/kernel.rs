@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
-use v4l::v4l2::vidioc;
 use v4l::v4l_sys as sys;
+use v4l::v4l2::vidioc;
 
 use super::{Dequeued, MAX_PLANES, Part};
 use crate::v4l2::device::{Device, Request, zeroed};
@@ -169,14 +169,7 @@ impl Kernel for DeviceKernel {
         // SAFETY: a new mapping at a place that the kernel chooses disturbs no other memory.
         #[allow(unsafe_code)]
         let address = unsafe {
-            mmap(
-                std::ptr::null_mut(),
-                length_bytes,
-                ProtFlags::READ,
-                MapFlags::SHARED,
-                self.device.as_fd(),
-                offset,
-            )?
+            mmap(std::ptr::null_mut(), length_bytes, ProtFlags::READ, MapFlags::SHARED, self.device.as_fd(), offset)?
         };
         Ok(Mapping { address, length_bytes })
     }

@@ -153,7 +153,8 @@ impl State {
         if self.chance(self.chances.dropped) {
             return;
         }
-        let Some(free) = self.order.iter().copied().find(|index| self.buffers[*index as usize] == Buffer::Queued) else {
+        let Some(free) = self.order.iter().copied().find(|index| self.buffers[*index as usize] == Buffer::Queued)
+        else {
             return;
         };
         let damaged = self.chance(self.chances.damaged);
@@ -173,7 +174,7 @@ impl Kernel for Model {
     fn request(&mut self, count: u32) -> io::Result<u32> {
         let mut state = self.0.borrow_mut();
         assert!(count > 0 || state.mapped == 0, "buffers are freed while {} planes are mapped", state.mapped);
-        assert!(!state.streaming || count == 0 && state.gone, "buffers are asked for while the stream runs");
+        assert!(!state.streaming || state.gone, "buffers are asked for while the stream runs");
         state.call()?;
         if count > 0 {
             state.refuse(&[EBUSY, EINVAL])?;
@@ -220,12 +221,13 @@ impl Kernel for Model {
         if !state.streaming {
             return error(EINVAL);
         }
-        if state.chance(state.chances.gone) {
+        let chances = state.chances;
+        if state.chance(chances.gone) {
             state.gone = true;
             return error(ENODEV);
         }
         let Some(index) = state.done() else { return error(EAGAIN) };
-        if state.chance(state.chances.refused) {
+        if state.chance(chances.refused) {
             if state.chance(0.5) {
                 // With the buffer.
                 state.order.pop_front();

@@ -1,0 +1,40 @@
+//! Motion JPEG as cameras send it.
+//!
+//! The library decodes what is there and, told to be strict, still fills up what is not: it reads zeros after the end
+//! marker. So each file is copied into one that it cannot misread (see [`repair`]): a picture that ends too early runs
+//! into bits that are no code, and the decoder says so.
+
+mod repair;
+mod tables;
+#[cfg(test)]
+mod tests;
+
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use super::PixelError;
+use crate::frame::ColorImage;
+use crate::v4l2::Layout;
+
+/// Decodes JPEGs; keeps the memory for the repaired file.
+#[derive(Debug, Default)]
+pub(super) struct Jpeg {
+    file: Vec<u8>,
+}
+
+impl Jpeg {
+    pub(super) fn decode(&mut self, layout: &Layout, bytes: &[u8], out: &mut ColorImage) -> Result<(), PixelError> {
+        let expected = (layout.width as usize, layout.height as usize);
+        let found = repair::repair(bytes, &mut self.file).map_err(|fault| PixelError::Jpeg(fault.to_string()))?;
+        if found != expected {
+            return Err(PixelError::Size { found, expected });
+        }
+        let options = DecoderOptions::new_fast().set_strict_mode(true).jpeg_set_out_colorspace(ColorSpace::RGB);
+        let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&self.file[..]), options);
+        out.resize(layout.width, layout.height);
+        // Errors may span lines.
+        decoder.decode_into(&mut out.rgb).map_err(|error| PixelError::Jpeg(error.to_string().replace('\n', " ")))
+    }
+}

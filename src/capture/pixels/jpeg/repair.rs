@@ -1,0 +1,197 @@
+//! From what a camera sends to a JPEG that is complete and says where it is not.
+//!
+//! - What comes before the start marker and after the end is left out, and so are notes and thumbnails.
+//! - Missing Huffman tables are put in.
+//! - Restart markers must count up, and be as many as the picture has.
+//! - After each stretch of coded bits come bits that are no code, the stuffed ones that no table may assign, where a
+//!   good picture is never read. A missing end marker is put in.
+
+use super::tables;
+
+mod marker {
+    pub const SOF: std::ops::RangeInclusive<u8> = 0xC0..=0xCF;
+    pub const BASELINE: u8 = 0xC0;
+    pub const EXTENDED: u8 = 0xC1;
+    pub const PROGRESSIVE: u8 = 0xC2;
+    pub const DHT: u8 = 0xC4;
+    pub const JPG: u8 = 0xC8;
+    pub const DAC: u8 = 0xCC;
+    pub const RST: std::ops::RangeInclusive<u8> = 0xD0..=0xD7;
+    pub const SOI: u8 = 0xD8;
+    pub const EOI: u8 = 0xD9;
+    pub const SOS: u8 = 0xDA;
+    pub const DQT: u8 = 0xDB;
+    pub const DRI: u8 = 0xDD;
+    /// Adobe's mark, which says how colours are coded.
+    pub const APP14: u8 = 0xEE;
+}
+
+/// Ones, stuffed: more than the decoder reads ahead.
+const NO_CODE: [u8; 32] = {
+    let mut ones = [0; 32];
+    let mut at = 0;
+    while at < ones.len() {
+        ones[at] = 0xFF;
+        at += 2;
+    }
+    ones
+};
+
+/// Why a file cannot be a whole picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Fault {
+    #[error("there is no start marker")]
+    NoStart,
+    #[error("it ends within its header")]
+    Header,
+    #[error("there is no picture size before the picture")]
+    NoSize,
+    #[error("coding 0x{0:02X} is not supported")]
+    Coding(u8),
+    #[error("a part of the picture lacks: its restart markers do not count up to the last")]
+    Restart,
+}
+
+/// Writes a whole JPEG to `file`; returns its columns and rows.
+pub(super) fn repair(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), Fault> {
+    let start = bytes.windows(3).position(|three| three == [0xFF, marker::SOI, 0xFF]).ok_or(Fault::NoStart)?;
+    let mut rest = without_padding(&bytes[start + 2..]);
+    file.clear();
+    file.extend([0xFF, marker::SOI]);
+    let (mut frame, mut has_tables, mut has_scan, mut interval) = (None::<Frame>, false, false, 0);
+    while let Some((code, segment, after)) = next_segment(rest) {
+        match code {
+            marker::EOI | marker::SOI => break,
+            marker::DHT => has_tables = true,
+            marker::BASELINE | marker::EXTENDED | marker::PROGRESSIVE => {
+                frame = Some(Frame::parse(segment).ok_or(Fault::Header)?);
+            }
+            marker::DRI => {
+                let &[_, _, _, _, high, low, ..] = segment else { return Err(Fault::Header) };
+                interval = usize::from(u16::from_be_bytes([high, low]));
+            }
+            marker::JPG | marker::DAC => return Err(Fault::Coding(code)),
+            code if marker::SOF.contains(&code) => return Err(Fault::Coding(code)),
+            _ => {}
+        }
+        if code == marker::SOS {
+            let frame = frame.as_ref().ok_or(Fault::NoSize)?;
+            if !has_tables {
+                tables::append(file);
+                has_tables = true;
+            }
+            has_scan = true;
+            file.extend(segment);
+            let restarts;
+            (rest, restarts) = scan(after, !frame.progressive, file)?;
+            // One scan for all components: others have units of their own, and no camera sends them.
+            if !frame.progressive && segment.get(4) == Some(&frame.components) {
+                let expected = if interval == 0 { 0 } else { frame.units.div_ceil(interval) - 1 };
+                // Some end with one more.
+                if restarts < expected || restarts > expected + usize::from(interval != 0) {
+                    return Err(Fault::Restart);
+                }
+            }
+            continue;
+        }
+        if matches!(code, marker::DHT | marker::DQT | marker::DRI | marker::APP14) || marker::SOF.contains(&code) {
+            file.extend(segment);
+        }
+        rest = after;
+    }
+    if !has_scan {
+        return Err(Fault::Header);
+    }
+    file.extend([0xFF, marker::EOI]);
+    frame.map(|frame| frame.size).ok_or(Fault::NoSize)
+}
+
+/// Without the zeros that a driver puts after a picture, which would count as code where its end is lost.
+fn without_padding(bytes: &[u8]) -> &[u8] {
+    /// Coded bits end with fewer.
+    const PADDING_BYTES: usize = 8;
+    let used = bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    if bytes.len() - used < PADDING_BYTES { bytes } else { &bytes[..used] }
+}
+
+/// What the frame's header says.
+struct Frame {
+    size: (usize, usize),
+    components: u8,
+    /// Coded units in a scan of all components.
+    units: usize,
+    progressive: bool,
+}
+
+impl Frame {
+    /// Of a segment with its marker; none where it is too short, or says what cannot be.
+    fn parse(segment: &[u8]) -> Option<Self> {
+        let (&[_, code, _, _, _, height_high, height_low, width_high, width_low, components], sampling) =
+            segment.split_first_chunk()?;
+        let number = |high, low| usize::from(u16::from_be_bytes([high, low]));
+        let (width, height) = (number(width_high, width_low), number(height_high, height_low));
+        let sampling = sampling.as_chunks::<3>().0.get(..usize::from(components))?;
+        let largest = |shift: u8| sampling.iter().map(|&[_, factors, _]| usize::from(factors >> shift & 15)).max();
+        // The only component has units of one block.
+        let (across, down) = if components == 1 { (1, 1) } else { (largest(4)?, largest(0)?) };
+        if width == 0 || height == 0 || across == 0 || down == 0 {
+            return None;
+        }
+        let units = width.div_ceil(8 * across) * height.div_ceil(8 * down);
+        Some(Self { size: (width, height), components, units, progressive: code == marker::PROGRESSIVE })
+    }
+}
+
+/// The marker that `rest` begins with: its code, it with its content, and what follows. None at the end.
+fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+    // A marker may be preceded by fill bytes; anything else between segments is passed over.
+    let at = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xFF))?;
+    let (code, after) = (rest[at + 1], &rest[at + 2..]);
+    if matches!(code, marker::SOI | marker::EOI | 0x01) || marker::RST.contains(&code) {
+        return Some((code, &rest[at..at + 2], after));
+    }
+    let &[high, low] = after.first_chunk()?;
+    let length = usize::from(u16::from_be_bytes([high, low])).max(2);
+    // Cut short within a header: as if it were not there.
+    let end = after.get(length..)?;
+    Some((code, &rest[at..at + 2 + length], end))
+}
+
+/// Copies coded bits up to the next marker that ends them; returns what follows, from that marker on, and the number
+/// of restarts.
+fn scan<'a>(bytes: &'a [u8], baseline: bool, file: &mut Vec<u8>) -> Result<(&'a [u8], usize), Fault> {
+    let (mut from, mut at, mut restarts) = (0, 0, 0);
+    loop {
+        let next = bytes[at..].iter().position(|&byte| byte == 0xFF).map(|found| at + found);
+        let code = next.and_then(|next| bytes.get(next + 1).copied());
+        let end = next.unwrap_or(bytes.len());
+        match code {
+            Some(0) => {
+                at = end + 2;
+                continue;
+            }
+            // Fill bytes before a marker.
+            Some(0xFF) => {
+                file.extend(&bytes[from..end]);
+                (from, at) = (end + 1, end + 1);
+                continue;
+            }
+            _ => file.extend(&bytes[from..end]),
+        }
+        if baseline {
+            file.extend(NO_CODE);
+        }
+        match code {
+            Some(code) if marker::RST.contains(&code) => {
+                if usize::from(code & 7) != restarts & 7 {
+                    return Err(Fault::Restart);
+                }
+                restarts += 1;
+                file.extend([0xFF, code]);
+                (from, at) = (end + 2, end + 2);
+            }
+            // The end of the file, perhaps in the middle of a marker.
+            _ => return Ok((&bytes[end..], restarts)),
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Tables from what a camera's numbers mean to sRGB.
+
+use crate::v4l2::layout::{Range, Transfer};
+
+/// A new byte for each byte.
+pub(super) type Table = [u8; 256];
+
+/// The table for red, green and blue on the curve `transfer`; none where it would change nothing.
+pub(super) fn table(transfer: Transfer, range: Range) -> Option<Box<Table>> {
+    let to_linear = match transfer {
+        Transfer::Linear => Some(1.0),
+        Transfer::Gamma(tenths) => Some(f64::from(tenths) / 10.0),
+        Transfer::Display | Transfer::Pq => None,
+    };
+    if to_linear.is_none() && range == Range::Full {
+        return None;
+    }
+    let mut table = Box::new([0; 256]);
+    for (code, byte) in table.iter_mut().enumerate() {
+        let value = match range {
+            Range::Full => code as f64 / 255.0,
+            Range::Limited => ((code as f64 - 16.0) / 219.0).clamp(0.0, 1.0),
+        };
+        let shown = to_linear.map_or(value, |power| srgb(value.powf(power)));
+        *byte = (shown * 255.0).round() as u8;
+    }
+    Some(table)
+}
+
+/// sRGB's curve, both ways from 0 to 1.
+fn srgb(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn linear_light_becomes_brighter_and_the_ends_stay() {
+        assert!(table(Transfer::Display, Range::Full).is_none());
+        let linear = table(Transfer::Linear, Range::Full).unwrap();
+        // Middle grey reflects 18 to 22 per cent.
+        assert_eq!((linear[0], linear[55], linear[255]), (0, 128, 255));
+        let near = table(Transfer::Gamma(22), Range::Full).unwrap();
+        assert!(near.iter().zip(0u8..).all(|(&byte, code)| byte.abs_diff(code) <= 9), "{near:?}");
+        let limited = table(Transfer::Display, Range::Limited).unwrap();
+        assert_eq!((limited[0], limited[16], limited[126], limited[235], limited[255]), (0, 0, 128, 255, 255));
+    }
+}

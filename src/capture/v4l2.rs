@@ -1,0 +1,168 @@
+//! A camera that is there: frames as they come, whatever happens to it.
+
+use super::pixels::Decoder;
+use super::{Camera, CaptureError, Captured, PATIENCE, SourceInfo};
+use crate::clock::Clock;
+use crate::frame::fit::Fit;
+use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::stats::Cause;
+use crate::v4l2::live::{Live, Next, Setting, Wish};
+use crate::v4l2::queue::Losses;
+
+/// A V4L2 camera. Its frames have one size from beginning to end: where the camera comes back with another one, they
+/// are fitted into the first.
+pub struct V4l2Camera {
+    live: Live,
+    decoder: Decoder,
+    info: SourceInfo,
+    /// Where pictures of another size are decoded.
+    scratch: ColorImage,
+    fit: Fit,
+    times: MediaTime,
+    /// Frames given so far, and how many there may be.
+    given: u64,
+    /// To be told, one cause at a time.
+    losses: Losses,
+    complained: bool,
+}
+
+impl V4l2Camera {
+    /// Opens the camera that `name` means, in the mode next to `wish`, with its controls set to `settings`, and starts
+    /// it. It ends after so many frames, those that were lost not included; with `None` never.
+    ///
+    /// # Errors
+    /// There is none, or it cannot be used.
+    pub fn open(name: &str, wish: Wish, settings: Vec<Setting>, frames: Option<u64>) -> Result<Self, CaptureError> {
+        let live = Live::open(name, wish, settings, Clock::system())?;
+        let layout = *live.layout();
+        let decoder =
+            Decoder::new(&layout).map_err(|source| CaptureError::NoColor { camera: live.name().to_owned(), source })?;
+        let info = SourceInfo {
+            name: format!("{}, {}", live.name(), live.agreed()),
+            size: (layout.width, layout.height),
+            period_ns: live.agreed().interval.period_ns(),
+            frames,
+            live: true,
+            exact_depth: false,
+        };
+        Ok(Self {
+            live,
+            decoder,
+            info,
+            scratch: ColorImage::default(),
+            fit: Fit::default(),
+            times: MediaTime::default(),
+            given: 0,
+            losses: Losses::default(),
+            complained: false,
+        })
+    }
+
+    /// Decodes the current frame into `color`; whether that went well.
+    fn decode(&mut self, color: &mut ColorImage) -> bool {
+        let layout = self.live.layout();
+        if layout != self.decoder.layout() {
+            match Decoder::new(layout) {
+                Ok(decoder) => self.decoder = decoder,
+                Err(error) => return self.complain(&error),
+            }
+        }
+        let Some(planes) = self.live.planes() else { return false };
+        let size = (self.decoder.layout().width, self.decoder.layout().height);
+        let decoded = if size == self.info.size {
+            self.decoder.decode(&planes, color)
+        } else {
+            self.decoder.decode(&planes, &mut self.scratch).map(|()| {
+                color.resize(self.info.size.0, self.info.size.1);
+                self.fit.fit(&self.scratch, color);
+            })
+        };
+        decoded.map_or_else(|error| self.complain(&error), |()| true)
+    }
+
+    /// Says once why frames cannot be decoded. A live camera's damaged frames do not end a run.
+    fn complain(&mut self, error: &dyn std::error::Error) -> bool {
+        if !self.complained {
+            tracing::warn!("{}: {error}; going on without such frames", self.live.name());
+            self.complained = true;
+        }
+        false
+    }
+
+    /// The next kind of loss to be told.
+    fn told(&mut self) -> Option<Captured> {
+        let Losses { missed, stale, corrupt } = &mut self.losses;
+        let causes = [(missed, Cause::Driver), (stale, Cause::Evicted), (corrupt, Cause::Corrupt)];
+        let (count, cause) = causes.into_iter().find(|(count, _)| **count > 0)?;
+        Some(Captured::Lost(std::mem::take(count), cause))
+    }
+}
+
+impl Camera for V4l2Camera {
+    fn info(&self) -> SourceInfo {
+        self.info.clone()
+    }
+
+    fn next(&mut self, color: &mut ColorImage, _depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+        if let Some(lost) = self.told() {
+            return Ok(lost);
+        }
+        if self.info.frames.is_some_and(|frames| self.given >= frames) {
+            return Ok(Captured::End);
+        }
+        let captured_ns = match self.live.next(PATIENCE) {
+            Next::Frame { captured_ns } => captured_ns,
+            Next::Lost(losses) => {
+                self.losses = losses;
+                return Ok(self.told().unwrap_or(Captured::Waiting));
+            }
+            Next::Waiting => return Ok(Captured::Waiting),
+        };
+        let good = self.decode(color);
+        self.live.release();
+        if !good {
+            return Ok(Captured::Lost(1, Cause::Corrupt));
+        }
+        let index = self.given as usize;
+        self.given += 1;
+        Ok(Captured::Frame(Stamp {
+            index,
+            time_ns: self.times.since_first_ns(captured_ns),
+            captured_ns: Some(captured_ns),
+        }))
+    }
+
+    fn rest(&mut self) {
+        self.live.rest();
+    }
+}
+
+/// Media time from times of capture.
+#[derive(Debug, Default)]
+struct MediaTime {
+    first_ns: Option<u64>,
+    last_ns: Option<u64>,
+}
+
+impl MediaTime {
+    /// Time since the first frame; always later than the frame before, also where a driver's times step back.
+    fn since_first_ns(&mut self, captured_ns: u64) -> u64 {
+        let first_ns = *self.first_ns.get_or_insert(captured_ns);
+        let since_ns = captured_ns.saturating_sub(first_ns);
+        let time_ns = self.last_ns.map_or(since_ns, |last_ns| since_ns.max(last_ns + 1));
+        self.last_ns = Some(time_ns);
+        time_ns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn media_time_starts_at_0_and_only_goes_on() {
+        let mut times = MediaTime::default();
+        let told = [500, 533, 520, 520, 566].map(|captured_ns| times.since_first_ns(captured_ns));
+        assert_eq!(told, [0, 33, 34, 35, 66]);
+    }
+}

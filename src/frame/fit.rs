@@ -1,0 +1,249 @@
+//! A picture scaled into another size, whole and undistorted: what is left over on two sides becomes black bars.
+
+use super::ColorImage;
+
+/// Fractional bits of the weights of a row's or column's taps.
+const WEIGHT_BITS: u32 = 14;
+/// Fractional bits of a value that is filtered down the columns but not yet along the row; fits 16 bits.
+const VALUE_BITS: u32 = 8;
+
+/// Scales pictures; keeps its memory and weights from one to the next.
+#[derive(Debug, Default)]
+pub struct Fit {
+    across: Axis,
+    down: Axis,
+    /// One row of the source's width, filtered down the columns.
+    row: Vec<u16>,
+}
+
+/// Where a scaled picture comes to lie, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Place {
+    left: usize,
+    top: usize,
+    width: usize,
+    height: usize,
+}
+
+impl Fit {
+    /// Scales `from` as large as it goes into the size that `into` has, in the middle, with black bars beside it or
+    /// above and below. Enlarges bilinearly; shrinks by a triangle as wide as two of the new pixels, so that nothing
+    /// aliases. Pictures of equal size are copied. Allocates only when either size changes.
+    pub fn fit(&mut self, from: &ColorImage, into: &mut ColorImage) {
+        if from.size() == into.size() {
+            into.rgb.copy_from_slice(&from.rgb);
+            return;
+        }
+        let [from_width, from_height, width, height] =
+            [from.width, from.height, into.width, into.height].map(|side| side as usize);
+        let Some(place) = place((from_width, from_height), (width, height)) else {
+            into.rgb.fill(0);
+            return;
+        };
+        self.across.adapt(from_width, place.width);
+        self.down.adapt(from_height, place.height);
+        self.row.resize(3 * from_width, 0);
+
+        let (above, rest) = into.rgb.split_at_mut(3 * width * place.top);
+        let (rows, below) = rest.split_at_mut(3 * width * place.height);
+        above.fill(0);
+        below.fill(0);
+        for (y, line) in rows.chunks_exact_mut(3 * width).enumerate() {
+            let (left, rest) = line.split_at_mut(3 * place.left);
+            let (scaled, right) = rest.split_at_mut(3 * place.width);
+            left.fill(0);
+            right.fill(0);
+            let (first, weights) = self.down.taps(y);
+            filter_down(&from.rgb[3 * from_width * first..], 3 * from_width, weights, &mut self.row);
+            self.across.filter(&self.row, scaled);
+        }
+    }
+}
+
+/// `None` where either picture has no pixels.
+fn place(from: (usize, usize), into: (usize, usize)) -> Option<Place> {
+    if from.0 == 0 || from.1 == 0 || into.0 == 0 || into.1 == 0 {
+        return None;
+    }
+    // Whichever side fills its own first; the other follows, rounded.
+    let scaled = |side: usize, to: usize, of: usize| ((side * to + of / 2) / of).max(1);
+    let (width, height) = if from.0 * into.1 >= from.1 * into.0 {
+        (into.0, scaled(from.1, into.0, from.0).min(into.1))
+    } else {
+        (scaled(from.0, into.1, from.1).min(into.0), into.1)
+    };
+    // Even, so that pixels that share their colour in the output are of one kind.
+    Some(Place { left: ((into.0 - width) / 2) & !1, top: ((into.1 - height) / 2) & !1, width, height })
+}
+
+/// The weighted sum of `weights.len()` rows of `stride` values each.
+fn filter_down(rows: &[u8], stride: usize, weights: &[u16], row: &mut [u16]) {
+    const SHIFT: u32 = WEIGHT_BITS - VALUE_BITS;
+    match *weights {
+        [weight] if weight == 1 << WEIGHT_BITS => {
+            for (sum, &value) in row.iter_mut().zip(rows) {
+                *sum = u16::from(value) << VALUE_BITS;
+            }
+        }
+        [a, b] => {
+            let (a, b) = (u32::from(a), u32::from(b));
+            for ((sum, &upper), &lower) in row.iter_mut().zip(rows).zip(&rows[stride..]) {
+                *sum = ((a * u32::from(upper) + b * u32::from(lower)) >> SHIFT) as u16;
+            }
+        }
+        _ => {
+            row.fill(0);
+            for (values, &weight) in rows.chunks_exact(stride).zip(weights) {
+                for (sum, &value) in row.iter_mut().zip(values) {
+                    // Each term cut to 8 bits of fraction: below a tenth of a code in all, for every usual size.
+                    *sum += ((u32::from(weight) * u32::from(value)) >> SHIFT) as u16;
+                }
+            }
+        }
+    }
+}
+
+/// The taps of every pixel along one axis of the scaled picture: equally many each, within the source.
+#[derive(Debug, Default)]
+struct Axis {
+    from: usize,
+    firsts: Vec<usize>,
+    taps: usize,
+    /// `taps` of each pixel; they sum to 1.
+    weights: Vec<u16>,
+}
+
+impl Axis {
+    fn adapt(&mut self, from: usize, to: usize) {
+        if (self.from, self.firsts.len()) == (from, to) {
+            return;
+        }
+        let ratio = from as f64 / to as f64;
+        let reach = ratio.max(1.0);
+        self.from = from;
+        self.taps = ((2.0 * reach).ceil() as usize).min(from);
+        self.firsts.clear();
+        self.weights.clear();
+        for pixel in 0..to {
+            let center = (pixel as f64 + 0.5) * ratio - 0.5;
+            let first = ((center - reach).floor() + 1.0).clamp(0.0, (from - self.taps) as f64) as usize;
+            let start = self.weights.len();
+            let tent = |tap: usize| (1.0 - ((first + tap) as f64 - center).abs() / reach).max(0.0);
+            let sum: f64 = (0..self.taps).map(tent).sum();
+            let one = f64::from(1 << WEIGHT_BITS);
+            self.weights.extend((0..self.taps).map(|tap| (tent(tap) / sum * one).round() as u16));
+            // What rounding left over goes where it is least: a constant picture stays as it is.
+            let weights = &mut self.weights[start..];
+            let left_over = (1 << WEIGHT_BITS) - weights.iter().map(|&weight| i32::from(weight)).sum::<i32>();
+            if let Some(largest) = weights.iter_mut().max() {
+                *largest = (i32::from(*largest) + left_over) as u16;
+            }
+            self.firsts.push(first);
+        }
+    }
+
+    fn taps(&self, pixel: usize) -> (usize, &[u16]) {
+        (self.firsts[pixel], &self.weights[pixel * self.taps..][..self.taps])
+    }
+
+    /// Filters a row of 3-channel pixels.
+    fn filter(&self, row: &[u16], scaled: &mut [u8]) {
+        const SHIFT: u32 = WEIGHT_BITS + VALUE_BITS;
+        let pixels = row.as_chunks::<3>().0;
+        let weights = self.weights.chunks_exact(self.taps);
+        for ((pixel, &first), weights) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(&self.firsts).zip(weights) {
+            let mut sums = [1_u32 << (SHIFT - 1); 3];
+            for (values, &weight) in pixels[first..].iter().zip(weights) {
+                for channel in 0..3 {
+                    sums[channel] += u32::from(weight) * u32::from(values[channel]);
+                }
+            }
+            for channel in 0..3 {
+                pixel[channel] = (sums[channel] >> SHIFT) as u8;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(width: u32, height: u32, paint: impl Fn(u32, u32) -> [u8; 3]) -> ColorImage {
+        let rgb = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| paint(x, y)).collect();
+        ColorImage { width, height, rgb }
+    }
+
+    fn fitted(from: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
+        // What was there before must not be seen.
+        let mut into = picture(width, height, |_, _| [77; 3]);
+        Fit::default().fit(from, &mut into);
+        into
+    }
+
+    fn at(image: &ColorImage, x: u32, y: u32) -> [u8; 3] {
+        image.rgb.as_chunks::<3>().0[(y * image.width + x) as usize]
+    }
+
+    #[test]
+    fn equal_sizes_are_copied() {
+        let from = picture(7, 5, |x, y| [x as u8 * 9, y as u8 * 30, 3]);
+        assert_eq!(fitted(&from, (7, 5)), from);
+    }
+
+    #[test]
+    fn a_constant_picture_stays_constant_and_its_bars_are_black() {
+        let color = [200, 3, 255];
+        for (from, into, place) in [
+            ((640, 480), (1280, 720), Place { left: 160, top: 0, width: 960, height: 720 }),
+            ((1920, 1080), (640, 480), Place { left: 0, top: 60, width: 640, height: 360 }),
+            ((640, 480), (640, 360), Place { left: 80, top: 0, width: 480, height: 360 }),
+            ((1, 1), (9, 4), Place { left: 2, top: 0, width: 4, height: 4 }),
+            ((3, 1000), (20, 10), Place { left: 8, top: 0, width: 1, height: 10 }),
+            ((1280, 720), (320, 180), Place { left: 0, top: 0, width: 320, height: 180 }),
+        ] {
+            let scaled = fitted(&picture(from.0, from.1, |_, _| color), into);
+            let inside = |x: u32, y: u32| {
+                (place.left..place.left + place.width).contains(&(x as usize))
+                    && (place.top..place.top + place.height).contains(&(y as usize))
+            };
+            let expected = picture(into.0, into.1, |x, y| if inside(x, y) { color } else { [0; 3] });
+            assert_eq!(scaled, expected, "{from:?} into {into:?}");
+        }
+    }
+
+    #[test]
+    fn a_ramp_stays_where_it_is() {
+        for (from, into) in [((64, 36), (256, 144)), ((256, 144), (64, 36)), ((240, 135), (160, 90))] {
+            let ramp = |size: (u32, u32)| {
+                move |x: u32, y: u32| {
+                    let part = |at: u32, of: u32| (255.0 * (f64::from(at) + 0.5) / f64::from(of)).round() as u8;
+                    [part(x, size.0), part(y, size.1), 128]
+                }
+            };
+            let (scaled, expected) =
+                (fitted(&picture(from.0, from.1, ramp(from)), into), picture(into.0, into.1, ramp(into)));
+            // Away from the edges, where half a filter is missing.
+            for (x, y) in (8..into.1 - 8).flat_map(|y| (8..into.0 - 8).map(move |x| (x, y))) {
+                for (got, wanted) in at(&scaled, x, y).into_iter().zip(at(&expected, x, y)) {
+                    assert!(got.abs_diff(wanted) <= 1, "{from:?} into {into:?} at {x}, {y}: {got} not {wanted}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn shrinking_does_not_alias() {
+        let stripes = picture(1280, 720, |x, _| [255 * (x % 2) as u8; 3]);
+        let scaled = fitted(&stripes, (426, 240));
+        for x in 2..424 {
+            assert!(at(&scaled, x, 100)[0].abs_diff(127) < 16, "{x}: {:?}", at(&scaled, x, 100));
+        }
+    }
+
+    #[test]
+    fn nothing_is_drawn_of_nothing() {
+        assert!(fitted(&ColorImage::new(0, 0), (4, 4)).rgb.iter().all(|&value| value == 0));
+        assert!(fitted(&ColorImage::new(4, 4), (0, 3)).rgb.is_empty());
+    }
+}

@@ -1,0 +1,87 @@
+//! The still card: what a live output shows while there is no picture.
+
+use crate::frame::ColorImage;
+
+/// Background at the top and at the bottom, and the sign; sRGB.
+const TOP: [f32; 3] = [44.0, 48.0, 56.0];
+const BOTTOM: [f32; 3] = [24.0, 26.0, 31.0];
+const SIGN: [f32; 3] = [150.0, 158.0, 170.0];
+
+/// A camera that is crossed out, in the middle of a dark picture: the camera is off.
+pub fn draw(picture: &mut ColorImage) {
+    let (width, height) = (picture.width as usize, picture.height as usize);
+    // The sign's unit: it is about four wide and two high.
+    let unit_px = 0.09 * width.min(height) as f32;
+    let middle = (width as f32 / 2.0, height as f32 / 2.0);
+    for (y, row) in picture.rgb.chunks_exact_mut((3 * width).max(1)).enumerate() {
+        let down = (y as f32 + 0.5) / height as f32;
+        let behind: [f32; 3] = std::array::from_fn(|channel| TOP[channel] + (BOTTOM[channel] - TOP[channel]) * down);
+        for (x, pixel) in row.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let at = ((x as f32 + 0.5 - middle.0) / unit_px, (y as f32 + 0.5 - middle.1) / unit_px);
+            // Signed distances in pixels, outside positive: half a pixel to either side is the edge's softness.
+            let cover = (0.5 - sign(at) * unit_px).clamp(0.0, 1.0);
+            *pixel = std::array::from_fn(|channel| {
+                (behind[channel] + (SIGN[channel] - behind[channel]) * cover).round() as u8
+            });
+        }
+    }
+}
+
+/// Signed distance to the crossed-out camera, in units: its body, its lens at the right, and a stroke across that
+/// stands clear of both.
+fn sign(at: (f32, f32)) -> f32 {
+    let body = rectangle((at.0 + 0.55, at.1), (1.35, 1.0), 0.3);
+    // A trapezium that opens to the right.
+    let beside = at.0 - 1.0;
+    let lens = (-beside).max(beside - 0.9).max((at.1.abs() - 0.3 - 0.5 * beside.clamp(0.0, 0.9)) * 0.9);
+    let stroke = segment(at, (-2.0, -1.55), (2.0, 1.55));
+    body.min(lens).max(0.34 - stroke).min(stroke - 0.13)
+}
+
+/// Signed distance to a rectangle around the origin with rounded corners.
+fn rectangle(at: (f32, f32), half: (f32, f32), corner: f32) -> f32 {
+    let (x, y) = (at.0.abs() - half.0 + corner, at.1.abs() - half.1 + corner);
+    x.max(0.0).hypot(y.max(0.0)) + x.max(y).min(0.0) - corner
+}
+
+/// Distance to a line from `from` to `to`.
+fn segment(at: (f32, f32), from: (f32, f32), to: (f32, f32)) -> f32 {
+    let (along, across) = ((to.0 - from.0, to.1 - from.1), (at.0 - from.0, at.1 - from.1));
+    let part = (across.0 * along.0 + across.1 * along.1) / (along.0 * along.0 + along.1 * along.1);
+    let part = part.clamp(0.0, 1.0);
+    (across.0 - part * along.0).hypot(across.1 - part * along.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_card_is_dark_with_a_light_sign_in_the_middle() {
+        for (width, height) in [(1280, 720), (640, 480), (320, 240), (90, 160)] {
+            let mut card = ColorImage::new(width, height);
+            draw(&mut card);
+            let light = |pixel: &&[u8; 3]| pixel[1] > 120;
+            let pixels = card.rgb.as_chunks::<3>().0;
+            let share = pixels.iter().filter(light).count() as f32 / pixels.len() as f32;
+            assert!((0.01..0.1).contains(&share), "{width} x {height}: {share}");
+            // None of it in the outer quarter.
+            for (at, pixel) in pixels.iter().enumerate() {
+                let (x, y) = (at as u32 % width, at as u32 / width);
+                let outside = |at: u32, of: u32| at < of / 4 || at >= of - of / 4;
+                if outside(y, height) && outside(x, width) {
+                    assert!(pixel.iter().all(|&value| value < 70), "{x}, {y}: {pixel:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_size_is_too_small() {
+        for size in [(0, 0), (1, 1), (2, 1), (2, 400)] {
+            let mut card = ColorImage::new(size.0, size.1);
+            draw(&mut card);
+            assert_eq!(card.size(), size);
+        }
+    }
+}

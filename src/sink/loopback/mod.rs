@@ -1,0 +1,154 @@
+//! A virtual camera: a node of v4l2loopback that call programs read from.
+//!
+//! Its format stays the same for the whole run; pictures of another size are fitted into it. Nothing makes a writer
+//! wait there, so frames go out when they come; where none comes, the last one is written again, so that readers that
+//! come late, or give up on a silent camera, have something to show.
+
+mod encode;
+mod watch;
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Duration;
+
+use self::encode::Encoder;
+use self::watch::Watcher;
+use super::rate::frame_rate;
+use super::{Options, Sink, SinkError, card};
+use crate::frame::ColorImage;
+use crate::frame::fit::Fit;
+use crate::link::demand::Demand;
+use crate::v4l2::audience::Audience;
+use crate::v4l2::loopback::{LoopbackError, Output};
+
+/// The shortest time after which a picture is repeated.
+const SHORTEST_HOLD: Duration = Duration::from_millis(100);
+/// While nobody watches the card is written as often as keeps the node alive.
+const IDLE_HOLD: Duration = Duration::from_secs(1);
+
+/// A virtual camera that is written to.
+pub struct Loopback {
+    output: Output,
+    encoder: Encoder,
+    fit: Fit,
+    fitted: ColorImage,
+    /// The frame as it was written last.
+    bytes: Vec<u8>,
+    /// Whether that is the still card.
+    shows_card: bool,
+    hold: Duration,
+    demand: Option<Demand>,
+    _watcher: Option<Watcher>,
+}
+
+impl Loopback {
+    /// Opens the node, and shows a still card there until the first picture comes. With a demand in the options, that
+    /// is told whether somebody watches.
+    ///
+    /// # Errors
+    /// It is no free node of v4l2loopback, its format is fixed to one that cannot be written, or the system does not
+    /// tell who reads from it.
+    pub fn open(path: &Path, options: &Options) -> Result<Self, SinkError> {
+        let size = options.out_size.unwrap_or(options.size);
+        // Two pixels share their colour.
+        let even = ((size.0 & !1).max(2), size.1.max(1));
+        let output = Output::open(path, even, frame_rate(options.period_ns))?;
+        if output.size() != even {
+            let (width, height) = output.size();
+            tracing::warn!("{} is fixed to {width} x {height} pixels: pictures are fitted into that", path.display());
+        }
+        let _watcher = options.demand.clone().map(|demand| watch(path, &output, demand)).transpose()?;
+        let mut loopback = Self {
+            encoder: Encoder::new(output.layout()),
+            fit: Fit::default(),
+            fitted: ColorImage::new(output.size().0, output.size().1),
+            bytes: Vec::new(),
+            shows_card: true,
+            hold: (2 * Duration::from_nanos(options.period_ns)).clamp(SHORTEST_HOLD, IDLE_HOLD),
+            demand: options.demand.clone(),
+            _watcher,
+            output,
+        };
+        loopback.show_card()?;
+        Ok(loopback)
+    }
+
+    fn rests(&self) -> bool {
+        self.demand.as_ref().is_some_and(|demand| !demand.is_watched())
+    }
+
+    fn show_card(&mut self) -> Result<(), SinkError> {
+        card::draw(&mut self.fitted);
+        self.encoder.encode(&self.fitted, &mut self.bytes);
+        self.shows_card = true;
+        Ok(self.output.write(&self.bytes)?)
+    }
+}
+
+fn watch(path: &Path, output: &Output, demand: Demand) -> Result<Watcher, SinkError> {
+    let refused = |cause| LoopbackError::System {
+        path: path.to_owned(),
+        doing: "it cannot be known whether somebody watches; leave --on-demand out",
+        cause,
+    };
+    let (audience, stop) = Audience::new(output.device().clone()).map_err(refused)?;
+    if !audience.is_told() {
+        tracing::info!(
+            "{}: this version of v4l2loopback does not tell of its readers; whoever has it open counts as one",
+            path.display()
+        );
+    }
+    Ok(Watcher::start((audience, stop), demand).map_err(refused)?)
+}
+
+impl Sink for Loopback {
+    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+        if frame.size() == self.output.size() {
+            self.encoder.encode(frame, &mut self.bytes);
+        } else {
+            self.fit.fit(frame, &mut self.fitted);
+            self.encoder.encode(&self.fitted, &mut self.bytes);
+        }
+        self.shows_card = false;
+        self.output.write(&self.bytes)?;
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// A camera that rests has shown its last picture before that is known here: soon, the card takes its place.
+    fn hold(&self) -> Option<Duration> {
+        match (self.rests(), self.shows_card) {
+            (true, true) => Some(IDLE_HOLD),
+            (true, false) => Some(SHORTEST_HOLD),
+            (false, _) => Some(self.hold),
+        }
+    }
+
+    fn repeat(&mut self) -> Result<ControlFlow<()>, SinkError> {
+        if self.rests() && !self.shows_card {
+            self.show_card()?;
+        } else {
+            self.output.write(&self.bytes)?;
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+        Ok(())
+    }
+
+    fn describe(&self) -> String {
+        let (width, height) = self.output.size();
+        let name = self.output.device().path().display();
+        format!("virtual camera {name} ({}), {} {width}x{height}", self.output.card(), self.output.layout().fourcc())
+    }
+}
+
+impl Drop for Loopback {
+    fn drop(&mut self) {
+        // Whoever still reads would keep the last picture of a person before them for good. What fails here would
+        // have been told by the frames before.
+        if !self.shows_card {
+            let _ = self.show_card();
+        }
+    }
+}

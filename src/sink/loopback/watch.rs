@@ -1,0 +1,136 @@
+//! Watches who reads from the virtual camera, and tells the demand.
+
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+use std::{io, mem};
+
+use crate::clock::Clock;
+use crate::link::demand::Demand;
+use crate::v4l2::audience::{Audience, Heard, Stop};
+
+/// So long after its last reader went an output still counts as watched: calls open a camera more than once.
+const LINGER: Duration = Duration::from_millis(2500);
+
+/// A thread that watches until it is dropped.
+pub(super) struct Watcher {
+    stop: Option<Stop>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Watcher {
+    pub(super) fn start((mut audience, stop): (Audience, Stop), demand: Demand) -> io::Result<Self> {
+        let listen = move || attend(&demand, &Clock::system(), |patience| audience.wait(patience));
+        let thread = thread::Builder::new().name("audience".into()).spawn(listen)?;
+        Ok(Self { stop: Some(stop), thread: Some(thread) })
+    }
+}
+
+impl Drop for Watcher {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        // A panic there has been told; the output is at its end.
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+/// Holds a watch while there are readers, and for a while after. `wait` sleeps until something is heard.
+fn attend(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Duration>) -> Heard) {
+    let mut watch = None;
+    let mut leaves_ns: Option<u64> = None;
+    loop {
+        let patience = leaves_ns.map(|at_ns| Duration::from_nanos(at_ns.saturating_sub(clock.now_ns())));
+        match wait(patience) {
+            Heard::Readers(true) => {
+                leaves_ns = None;
+                if watch.is_none() {
+                    tracing::info!("somebody watches");
+                    watch = Some(demand.watch());
+                }
+            }
+            Heard::Readers(false) if watch.is_some() => {
+                leaves_ns.get_or_insert(clock.now_ns() + LINGER.as_nanos() as u64);
+            }
+            Heard::Readers(false) | Heard::Nothing => {}
+            Heard::Stopped => return,
+        }
+        if leaves_ns.is_some_and(|at_ns| clock.now_ns() >= at_ns) {
+            tracing::info!("nobody watches");
+            leaves_ns = None;
+            drop(mem::take(&mut watch));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    /// Plays what is heard, and when: each after so long, but not beyond what the listener is ready to wait. Returns
+    /// for each whether the demand was watched when it was waited for, and for how long.
+    fn play(heard: &[(Duration, Heard)]) -> Vec<(bool, Option<Duration>)> {
+        let (demand, clock) = (Demand::new(), Clock::manual());
+        let mut left = heard.iter();
+        let mut seen = Vec::new();
+        let mut next = left.next().copied();
+        attend(&demand, &clock, |patience| {
+            seen.push((demand.is_watched(), patience));
+            let Some((after, what)) = next else { return Heard::Stopped };
+            match patience {
+                Some(patience) if patience < after => {
+                    next = Some((after - patience, what));
+                    clock.advance_ns(patience.as_nanos() as u64);
+                    Heard::Nothing
+                }
+                _ => {
+                    next = left.next().copied();
+                    clock.advance_ns(after.as_nanos() as u64);
+                    what
+                }
+            }
+        });
+        assert!(!demand.is_watched(), "the watch outlives its listener");
+        seen
+    }
+
+    #[test]
+    fn a_reader_is_watched_for_at_once_and_for_a_while_after() {
+        let seen = play(&[
+            (Duration::ZERO, Heard::Readers(false)),
+            (60 * SECOND, Heard::Readers(true)),
+            (60 * SECOND, Heard::Readers(false)),
+            (60 * SECOND, Heard::Readers(true)),
+        ]);
+        assert_eq!(
+            seen,
+            [(false, None), (false, None), (true, None), (true, Some(LINGER)), (false, None), (true, None)]
+        );
+    }
+
+    #[test]
+    fn who_comes_back_in_time_is_not_missed_and_nobody_makes_it_longer() {
+        let seen = play(&[
+            (Duration::ZERO, Heard::Readers(true)),
+            (SECOND, Heard::Readers(false)),
+            (SECOND, Heard::Readers(true)),
+            (SECOND, Heard::Readers(false)),
+            (SECOND, Heard::Readers(false)),
+            (SECOND, Heard::Nothing),
+            (60 * SECOND, Heard::Readers(false)),
+        ]);
+        let left = |ms| Some(Duration::from_millis(ms));
+        let wanted = [
+            (false, None),
+            (true, None),
+            (true, left(2500)),
+            (true, None),
+            (true, left(2500)),
+            (true, left(1500)),
+            (true, left(500)),
+            (false, None),
+            (false, None),
+        ];
+        assert_eq!(seen, wanted);
+    }
+}

@@ -1,0 +1,126 @@
+//! Which camera it is, so that it is found again when its number has changed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use v4l::v4l_sys as sys;
+
+use crate::v4l2::device::{Device, own_caps, zeroed};
+use crate::v4l2::node::{Node, nodes, text};
+
+/// A camera, however it is numbered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Address {
+    /// As it was given, a link perhaps.
+    given: PathBuf,
+    /// Its node when it was found last.
+    node: PathBuf,
+    /// Names by serial number or port that led to it.
+    links: Vec<PathBuf>,
+    card: String,
+    bus: String,
+}
+
+impl Address {
+    /// The camera behind `given`, which answered with this capability.
+    pub fn new(given: &Path, capability: &sys::v4l2_capability) -> Self {
+        let node = fs::canonicalize(given).unwrap_or_else(|_| given.to_owned());
+        Self {
+            given: given.to_owned(),
+            links: links_to(&node),
+            node,
+            card: text(&capability.card),
+            bus: text(&capability.bus_info),
+        }
+    }
+
+    /// Its node when it was found last.
+    pub fn node(&self) -> &Path {
+        &self.node
+    }
+
+    /// What it is called.
+    pub fn card(&self) -> &str {
+        &self.card
+    }
+
+    /// Looks for the camera: where its links and its node lead; with `everywhere`, among all nodes, too, each of which
+    /// is opened for that.
+    pub fn find(&mut self, everywhere: bool) -> Option<PathBuf> {
+        let linked = [&self.given].into_iter().chain(&self.links).filter_map(|link| fs::canonicalize(link).ok());
+        let known: Vec<PathBuf> = linked.chain([self.node.clone()]).collect();
+        let found = known.into_iter().find(|node| self.is(node));
+        let found = found.or_else(|| everywhere.then(|| self.among(&nodes())).flatten())?;
+        self.node.clone_from(&found);
+        Some(found)
+    }
+
+    /// Whether the camera of this name is at that node now, wherever it is plugged in. Its other nodes have its name,
+    /// too, but give no frames.
+    fn is(&self, node: &Path) -> bool {
+        let mut capability: sys::v4l2_capability = zeroed();
+        let answered = Device::open(node).and_then(|device| device.query_capability(&mut capability));
+        let frames = sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE;
+        answered.is_ok() && text(&capability.card) == self.card && own_caps(&capability) & frames != 0
+    }
+
+    /// The node of the same camera at the same place, or else the only one of the same name.
+    fn among(&self, nodes: &[Node]) -> Option<PathBuf> {
+        let named: Vec<&Node> = nodes.iter().filter(|node| node.captures && node.card == self.card).collect();
+        let same_place = named.iter().find(|node| node.bus == self.bus);
+        match (same_place, named.as_slice()) {
+            (Some(same), _) => Some(same.path.clone()),
+            (None, [only]) => Some(only.path.clone()),
+            _ => None,
+        }
+    }
+}
+
+/// The names under `/dev/v4l` that lead to a node.
+fn links_to(node: &Path) -> Vec<PathBuf> {
+    let folders = ["/dev/v4l/by-id", "/dev/v4l/by-path"].into_iter().filter_map(|folder| fs::read_dir(folder).ok());
+    let links = folders.flatten().flatten().map(|entry| entry.path());
+    links.filter(|link| fs::canonicalize(link).is_ok_and(|target| target == node)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::v4l2::node::Kind;
+
+    fn node(path: &str, card: &str, bus: &str) -> Node {
+        Node {
+            path: path.into(),
+            index: None,
+            card: card.into(),
+            driver: "uvcvideo".into(),
+            bus: bus.into(),
+            kind: Kind::Capture,
+            captures: true,
+            links: Vec::new(),
+            usb: None,
+            problem: None,
+        }
+    }
+
+    #[test]
+    fn a_camera_is_known_by_its_name_and_place_and_not_by_its_number() {
+        let address = Address {
+            given: "/dev/video0".into(),
+            node: "/dev/video0".into(),
+            links: Vec::new(),
+            card: "C920".into(),
+            bus: "usb-1".into(),
+        };
+        let found = |nodes: &[Node]| address.among(nodes);
+        let moved = node("/dev/video4", "C920", "usb-1");
+        let other = node("/dev/video0", "Laptop", "usb-1");
+        let elsewhere = node("/dev/video2", "C920", "usb-3");
+        let twin = node("/dev/video6", "C920", "usb-4");
+        assert_eq!(found(&[other.clone(), elsewhere.clone(), moved.clone()]), Some("/dev/video4".into()));
+        assert_eq!(found(&[other.clone(), elsewhere.clone()]), Some("/dev/video2".into()), "another port");
+        assert_eq!(found(&[other, elsewhere, twin]), None, "two, and neither is it for sure");
+        let metadata = Node { captures: false, ..moved };
+        assert_eq!(found(&[metadata]), None);
+    }
+}

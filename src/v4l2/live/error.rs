@@ -1,0 +1,182 @@
+//! Why a camera cannot be opened.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::negotiate::NoMode;
+use crate::v4l2::controls::ControlError;
+use crate::v4l2::holders::{Holder, holders};
+use crate::v4l2::layout::LayoutError;
+use crate::v4l2::node::NodeError;
+use crate::v4l2::queue::QueueError;
+
+/// Why a camera cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// No device is meant by the name.
+    #[error(transparent)]
+    Name(#[from] NodeError),
+    /// The node is not there, or nothing is behind it.
+    #[error("{}: there is no camera; is it plugged in? `bokehcam devices` lists what there is", .0.display())]
+    Gone(PathBuf),
+    /// No rights.
+    #[error("{}: permission denied; join the group that may use cameras: sudo usermod -aG video $USER, then log in again", .0.display())]
+    Denied(PathBuf),
+    /// Someone else has it.
+    #[error("{}: the camera is busy{}", path.display(), held_by(.holders))]
+    Busy {
+        /// The node.
+        path: PathBuf,
+        /// Who has it open.
+        holders: Vec<Holder>,
+    },
+    /// Not a camera.
+    #[error("{}: this is no camera: {what}; `bokehcam devices` lists those that are", path.display())]
+    NotACamera {
+        /// The node.
+        path: PathBuf,
+        /// What it is instead.
+        what: &'static str,
+    },
+    /// It has no mode that can be used.
+    #[error("{}: {source}", path.display())]
+    NoMode {
+        /// The node.
+        path: PathBuf,
+        /// Why.
+        source: NoMode,
+    },
+    /// It gives pictures that cannot be read.
+    #[error("{}: {source}", path.display())]
+    Layout {
+        /// The node.
+        path: PathBuf,
+        /// Why.
+        source: LayoutError,
+    },
+    /// The cable is full.
+    #[error(
+        "{}: not enough USB bandwidth to start; choose --format MJPG, a smaller --size or a lower --fps, or plug the \
+         camera into another USB port than other cameras",
+        .0.display()
+    )]
+    Bandwidth(PathBuf),
+    /// A control cannot be set as asked.
+    #[error("{}: {source}", path.display())]
+    Control {
+        /// The node.
+        path: PathBuf,
+        /// Why.
+        source: ControlError,
+    },
+    /// The queue of buffers cannot be had.
+    #[error("{}: the camera cannot be started: {source}", path.display())]
+    Queue {
+        /// The node.
+        path: PathBuf,
+        /// Why.
+        source: QueueError,
+    },
+    /// Anything else that the system says.
+    #[error("{}: {what}: {source}", path.display())]
+    Io {
+        /// The node.
+        path: PathBuf,
+        /// What was tried.
+        what: &'static str,
+        /// What was said.
+        source: io::Error,
+    },
+}
+
+const EPERM: i32 = rustix::io::Errno::PERM.raw_os_error();
+const ENOENT: i32 = rustix::io::Errno::NOENT.raw_os_error();
+const ENXIO: i32 = rustix::io::Errno::NXIO.raw_os_error();
+const EACCES: i32 = rustix::io::Errno::ACCESS.raw_os_error();
+const EBUSY: i32 = rustix::io::Errno::BUSY.raw_os_error();
+const ENODEV: i32 = rustix::io::Errno::NODEV.raw_os_error();
+const ENOSPC: i32 = rustix::io::Errno::NOSPC.raw_os_error();
+
+impl OpenError {
+    /// What an error of the system's means when `what` was tried.
+    pub fn at(path: &Path, what: &'static str, source: io::Error) -> Self {
+        let path = path.to_owned();
+        match source.raw_os_error() {
+            Some(ENOENT | ENXIO | ENODEV) => Self::Gone(path),
+            Some(EACCES | EPERM) => Self::Denied(path),
+            Some(EBUSY) => Self::Busy { holders: holders(&path), path },
+            _ => Self::Io { path, what, source },
+        }
+    }
+
+    /// The same for a queue.
+    pub fn queue(path: &Path, source: QueueError) -> Self {
+        match source {
+            // Elsewhere it means what it says, and never comes.
+            QueueError::Refused { step: "STREAMON", source } if source.raw_os_error() == Some(ENOSPC) => {
+                Self::Bandwidth(path.to_owned())
+            }
+            QueueError::Refused { step, source } => match Self::at(path, step, source) {
+                Self::Io { path, what, source } => {
+                    Self::Queue { path, source: QueueError::Refused { step: what, source } }
+                }
+                known => known,
+            },
+            source => Self::Queue { path: path.to_owned(), source },
+        }
+    }
+
+    /// Whether the device is not there: it may come back.
+    pub fn is_gone(&self) -> bool {
+        matches!(self, Self::Gone(_) | Self::Name(_))
+    }
+}
+
+/// Whether the device behind an open descriptor went away.
+pub fn is_gone(error: &QueueError) -> bool {
+    matches!(error.source().and_then(io::Error::raw_os_error), Some(ENXIO | ENODEV))
+}
+
+fn held_by(holders: &[Holder]) -> String {
+    let own = std::process::id();
+    let name = |holder: &Holder| match holder.pid {
+        pid if pid == own => "this program itself".to_owned(),
+        _ => holder.to_string(),
+    };
+    let names: Vec<String> = holders.iter().map(name).collect();
+    match names.as_slice() {
+        [] => "; another user's program uses it (sudo fuser -v names it)".to_owned(),
+        names => format!(": {} has it open; close that first", names.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(errno: i32) -> String {
+        OpenError::at(Path::new("/dev/video7"), "VIDIOC_S_FMT", io::Error::from_raw_os_error(errno)).to_string()
+    }
+
+    #[test]
+    fn each_refusal_says_what_to_do() {
+        assert!(told(ENODEV).starts_with("/dev/video7: there is no camera"));
+        assert!(told(EACCES).contains("usermod -aG video"));
+        assert!(told(EBUSY).starts_with("/dev/video7: the camera is busy"));
+        assert!(told(5).starts_with("/dev/video7: VIDIOC_S_FMT: Input/output error"));
+        let refused = |step, errno| QueueError::Refused { step, source: io::Error::from_raw_os_error(errno) };
+        let path = Path::new("/dev/video7");
+        let full = OpenError::queue(path, refused("STREAMON", ENOSPC)).to_string();
+        assert!(full.contains("USB bandwidth") && full.contains("--format MJPG"), "{full}");
+        assert!(OpenError::queue(path, refused("QBUF", ENOSPC)).to_string().contains("QBUF"));
+        assert!(OpenError::queue(path, QueueError::TooFewBuffers { granted: 1 }).to_string().contains("1 of 4"));
+    }
+
+    #[test]
+    fn a_holder_is_named() {
+        let holder = |pid| Holder { pid, name: "zoom".into() };
+        assert_eq!(held_by(&[holder(1)]), ": zoom (process 1) has it open; close that first");
+        assert!(held_by(&[holder(std::process::id())]).contains("this program itself"));
+        assert!(held_by(&[]).contains("another user"));
+    }
+}

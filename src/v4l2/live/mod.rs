@@ -1,0 +1,368 @@
+//! A device that gives frames for hours: it is opened once, and after that whatever happens to it is waited out. It
+//! stalls, fails, is unplugged, comes back under another number; frames go on when they can.
+
+mod address;
+pub mod error;
+mod light;
+pub mod negotiate;
+mod session;
+mod watchdog;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+pub use error::OpenError;
+pub use negotiate::Wish;
+pub use session::{Agreed, Setting};
+
+use address::Address;
+use light::Light;
+use session::Session;
+use watchdog::{Remedy, Watchdog};
+
+use crate::clock::Clock;
+use crate::v4l2::controls;
+use crate::v4l2::layout::Layout;
+use crate::v4l2::node;
+use crate::v4l2::queue::{Losses, Planes, QueueError};
+
+/// A device node that gives frames.
+pub struct Live {
+    address: Address,
+    name: String,
+    wish: Wish,
+    settings: Vec<Setting>,
+    clock: Clock,
+    agreed: Agreed,
+    state: State,
+    watchdog: Watchdog,
+    light: Light,
+    /// Not told yet.
+    losses: Losses,
+    /// The current frame was given out.
+    given: bool,
+    /// What was said last about why there are no frames, so that it is said once.
+    said: String,
+    /// When all nodes were searched last.
+    searched_ns: u64,
+}
+
+enum State {
+    Streaming(Box<Session>),
+    /// Closed against its will; to be opened again at this time.
+    Away {
+        retry_ns: u64,
+    },
+    /// Closed because nobody watches.
+    Resting,
+}
+
+/// What came of waiting for a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// A frame, to be read with [`Live::planes`] and given back with [`Live::release`].
+    Frame {
+        /// When it was taken, on the system's monotonic clock; when it was dequeued, where the driver does not tell.
+        captured_ns: u64,
+    },
+    /// Frames that nobody will see. Each is told once, before the frame that follows them.
+    Lost(Losses),
+    /// No frame yet.
+    Waiting,
+}
+
+/// How often a device that is away is looked for.
+const LOOK_NS: u64 = 150_000_000;
+/// How often among all nodes: each is opened for that.
+const SEARCH_NS: u64 = 1_000_000_000;
+/// After an error the driver gets so long to come to itself.
+const ERROR_NAP_NS: u64 = 5_000_000;
+/// Whoever closes a camera may take so long.
+const BUSY_TRIES: u32 = 5;
+const BUSY_NAP_NS: u64 = 200_000_000;
+/// A driver's time that is further from now is no time of ours.
+const CREDIBLE_AGE_NS: u64 = 5_000_000_000;
+
+impl Live {
+    /// Opens the device that `name` means (a path, a number, a link's name, part of a card's name), sets the controls
+    /// `settings` and starts it.
+    ///
+    /// # Errors
+    /// There is none, or it cannot be used; a busy one was given a second.
+    pub fn open(name: &str, wish: Wish, settings: Vec<Setting>, clock: Clock) -> Result<Self, OpenError> {
+        let path = node::resolve(name)?;
+        let mut tries = 1;
+        let session = loop {
+            match Session::open(&path, &wish, &settings, None, &clock) {
+                Err(OpenError::Busy { .. }) if tries < BUSY_TRIES => {
+                    tries += 1;
+                    clock.sleep_until_ns(clock.now_ns() + BUSY_NAP_NS);
+                }
+                opened => break opened?,
+            }
+        };
+        let address = Address::new(&path, &session.capability);
+        let name = format!("{} ({})", path.display(), address.card());
+        let (agreed, now_ns) = (session.agreed, clock.now_ns());
+        tracing::info!("{name}: {agreed}");
+        Ok(Self {
+            address,
+            name,
+            wish,
+            settings,
+            agreed,
+            state: State::Streaming(Box::new(session)),
+            watchdog: Watchdog::new(agreed.interval.period_ns(), now_ns),
+            light: Light::new(agreed.interval.fps(), now_ns),
+            losses: Losses::default(),
+            given: false,
+            said: String::new(),
+            searched_ns: now_ns,
+            clock,
+        })
+    }
+
+    /// Its node and its name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What was agreed on last.
+    pub fn agreed(&self) -> &Agreed {
+        &self.agreed
+    }
+
+    /// How its pictures look in memory. May change whenever it was away.
+    pub fn layout(&self) -> &Layout {
+        &self.agreed.layout
+    }
+
+    /// Waits for a frame, not much longer than `patience`. The newest one counts, the others are lost. Opens the device
+    /// if it is closed.
+    pub fn next(&mut self, patience: Duration) -> Next {
+        if self.given {
+            self.release();
+        }
+        match &mut self.state {
+            State::Streaming(session) => {
+                // One that waits because losses were told before it.
+                if session.queue.current().is_none() {
+                    match session.queue.wait_newest(patience) {
+                        Ok(true) => self.frame_came(),
+                        Ok(false) => {
+                            let remedy = self.watchdog.silence(self.clock.now_ns());
+                            self.apply(remedy, "no frames");
+                        }
+                        Err(error) => self.failed(&error),
+                    }
+                }
+            }
+            State::Away { retry_ns } => {
+                let (now_ns, until_ns) = (self.clock.now_ns(), *retry_ns);
+                if now_ns < until_ns {
+                    self.clock.sleep_until_ns(until_ns.min(now_ns + patience.as_nanos() as u64));
+                } else {
+                    self.reopen();
+                }
+            }
+            State::Resting => {
+                self.watchdog.started(self.clock.now_ns());
+                self.reopen();
+            }
+        }
+        self.tell()
+    }
+
+    /// What there is to say: losses first.
+    fn tell(&mut self) -> Next {
+        if let State::Streaming(session) = &mut self.state {
+            add(&mut self.losses, session.queue.take_losses());
+        }
+        if self.losses.total() > 0 {
+            return Next::Lost(std::mem::take(&mut self.losses));
+        }
+        let State::Streaming(session) = &self.state else { return Next::Waiting };
+        let Some((frame, _)) = session.queue.current() else { return Next::Waiting };
+        let now_ns = self.clock.now_ns();
+        let credible = |stamp_ns: &u64| now_ns.saturating_sub(*stamp_ns) < CREDIBLE_AGE_NS;
+        self.given = true;
+        // Never in the future, by however little clocks differ.
+        Next::Frame { captured_ns: frame.stamp_ns.filter(credible).unwrap_or(now_ns).min(now_ns) }
+    }
+
+    /// The planes of the frame that was given last; nothing after it went back.
+    pub fn planes(&self) -> Option<Planes<'_>> {
+        match &self.state {
+            State::Streaming(session) if self.given => session.queue.current().map(|(_, planes)| planes),
+            _ => None,
+        }
+    }
+
+    /// The frame that was given last was read: its memory goes back to the driver.
+    pub fn release(&mut self) {
+        self.given = false;
+        if let State::Streaming(session) = &mut self.state {
+            session.queue.release();
+        }
+    }
+
+    /// Closes the device until [`Live::next`] is called again.
+    pub fn rest(&mut self) {
+        if matches!(self.state, State::Streaming(_)) {
+            tracing::debug!("{}: closed, nobody watches", self.name);
+        }
+        self.close(State::Resting);
+        self.said.clear();
+    }
+
+    fn frame_came(&mut self) {
+        let State::Streaming(session) = &mut self.state else { return };
+        let now_ns = self.clock.now_ns();
+        let losses = session.queue.take_losses();
+        add(&mut self.losses, losses);
+        if let Some(trouble) = self.watchdog.frame(now_ns) {
+            tracing::info!("{}: frames again after {:.1} s", self.name, trouble.as_secs_f64());
+        }
+        self.said.clear();
+        // What another program writes has the rate that it has.
+        let told = if session.is_loopback() {
+            None
+        } else {
+            self.light.frames(1 + losses.stale + losses.corrupt, losses.missed, now_ns)
+        };
+        if let Some(fps) = told {
+            self.complain_of_light(fps);
+        }
+    }
+
+    fn complain_of_light(&self, fps: f64) {
+        let State::Streaming(session) = &self.state else { return };
+        const CONTROL: &str = "exposure_dynamic_framerate";
+        let controls = controls::list(session.device()).unwrap_or_default();
+        let what = match controls::find(&controls, CONTROL) {
+            Some(control) => format!(
+                "in low light it exposes longer; more light helps, or --control {}=0 (a darker picture)",
+                control.name
+            ),
+            None => "low light makes cameras expose longer, and a shared USB port slows them down".to_owned(),
+        };
+        tracing::warn!("{}: {fps:.1} frames a second instead of {}: {what}", self.name, self.agreed.interval);
+    }
+
+    /// The driver gave an error instead of a frame.
+    fn failed(&mut self, error: &QueueError) {
+        let now_ns = self.clock.now_ns();
+        if error::is_gone(error) {
+            self.watchdog.gone(now_ns);
+            self.say("it is gone (unplugged?); waiting for it to come back".to_owned());
+            self.close(State::Away { retry_ns: now_ns });
+            return;
+        }
+        tracing::debug!("{}: {error}", self.name);
+        self.clock.sleep_until_ns(now_ns + ERROR_NAP_NS);
+        let remedy = self.watchdog.error(self.clock.now_ns());
+        self.apply(remedy, &error.to_string());
+    }
+
+    fn apply(&mut self, remedy: Remedy, because: &str) {
+        let now_ns = self.clock.now_ns();
+        match remedy {
+            Remedy::Wait => {}
+            Remedy::Restart => {
+                self.say(format!("{because}; starting its stream again"));
+                let State::Streaming(session) = &mut self.state else { return };
+                session.queue.stop();
+                let started = session.queue.start();
+                self.watchdog.started(self.clock.now_ns());
+                self.light.restarted(self.clock.now_ns());
+                if let Err(error) = started {
+                    if error::is_gone(&error) {
+                        self.failed(&error);
+                    } else {
+                        let remedy = self.watchdog.remedy(now_ns);
+                        self.apply(remedy, &error.to_string());
+                    }
+                }
+            }
+            Remedy::Reopen(pause) => {
+                let again = match pause {
+                    Duration::ZERO => "opening it again".to_owned(),
+                    pause => format!("opening it again every {:.1} s", pause.as_secs_f32()),
+                };
+                self.say(format!("{because}; {again}"));
+                self.close(State::Away { retry_ns: now_ns + pause.as_nanos() as u64 });
+            }
+        }
+    }
+
+    fn reopen(&mut self) {
+        let opened = match self.find() {
+            Some(path) => Session::open(&path, &self.wish, &self.settings, Some(&self.agreed), &self.clock),
+            None => Err(OpenError::Gone(self.address.node().to_owned())),
+        };
+        let now_ns = self.clock.now_ns();
+        match opened {
+            Ok(session) => {
+                if session.agreed != self.agreed {
+                    tracing::warn!("{}: now it gives {}", self.name, session.agreed);
+                    self.agreed = session.agreed;
+                }
+                self.state = State::Streaming(Box::new(session));
+                self.watchdog.started(now_ns);
+                self.light.restarted(now_ns);
+            }
+            Err(error) if error.is_gone() => {
+                self.watchdog.gone(now_ns);
+                self.say("it is gone (unplugged?); waiting for it to come back".to_owned());
+                self.state = State::Away { retry_ns: now_ns + LOOK_NS };
+            }
+            Err(error) => {
+                self.watchdog.gone(now_ns);
+                let pause = match self.watchdog.remedy(now_ns) {
+                    Remedy::Reopen(pause) => pause.as_nanos() as u64,
+                    Remedy::Restart | Remedy::Wait => 0,
+                };
+                self.say(format!("{error}; trying again"));
+                self.state = State::Away { retry_ns: now_ns + pause.max(LOOK_NS) };
+            }
+        }
+    }
+
+    /// Where the device is now.
+    fn find(&mut self) -> Option<PathBuf> {
+        let now_ns = self.clock.now_ns();
+        let everywhere = now_ns.saturating_sub(self.searched_ns) >= SEARCH_NS;
+        if everywhere {
+            self.searched_ns = now_ns;
+        }
+        let before = self.address.node().to_owned();
+        let found = self.address.find(everywhere);
+        if let Some(path) = found.as_ref().filter(|path| **path != before) {
+            tracing::info!("{}: it is {} now", self.name, path.display());
+        }
+        found
+    }
+
+    fn close(&mut self, state: State) {
+        self.given = false;
+        if let State::Streaming(session) = &mut self.state {
+            session.queue.stop();
+            add(&mut self.losses, session.queue.take_losses());
+        }
+        self.state = state;
+    }
+
+    /// Warns, but not of the same twice in a row.
+    fn say(&mut self, what: String) {
+        if self.said != what {
+            tracing::warn!("{}: {what}", self.name);
+            self.said = what;
+        }
+    }
+}
+
+fn add(sum: &mut Losses, losses: Losses) {
+    sum.missed += losses.missed;
+    sum.stale += losses.stale;
+    sum.corrupt += losses.corrupt;
+}

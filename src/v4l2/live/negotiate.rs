@@ -1,0 +1,305 @@
+//! Which of a camera's modes to take: by what its cable carries, not by taste.
+
+use crate::v4l2::FourCc;
+use crate::v4l2::layout::{Content, Family};
+use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Sizes};
+
+/// What is wanted of a camera. What is not said is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wish {
+    /// Colours or distances.
+    pub content: Content,
+    /// Width and height, in pixels.
+    pub size_px: Option<(u32, u32)>,
+    /// Frames per second.
+    pub fps: Option<f64>,
+    /// Pixel format.
+    pub fourcc: Option<FourCc>,
+}
+
+impl Wish {
+    /// Whatever suits, of this content.
+    pub fn any(content: Content) -> Self {
+        Self { content, size_px: None, fps: None, fourcc: None }
+    }
+}
+
+/// How a camera is connected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wire {
+    /// USB 2 or slower, or not known to be faster: raw pictures beyond VGA take more than it carries.
+    Narrow,
+    /// USB 3, or inside the machine.
+    Wide,
+}
+
+/// A mode to ask for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choice {
+    /// The queue.
+    pub queue: QueueKind,
+    /// Pixel format.
+    pub fourcc: FourCc,
+    /// Width and height, in pixels.
+    pub size_px: (u32, u32),
+    /// Time from frame to frame.
+    pub interval: Interval,
+}
+
+/// Why no mode can be taken.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoMode {
+    /// An empty list.
+    #[error("it offers no picture format; a virtual camera offers one only while something writes to it")]
+    Nothing,
+    /// No format that can be read.
+    #[error("it offers {offered}, of which none can be read as {as_what}; readable are {readable}")]
+    Unreadable {
+        /// Its formats.
+        offered: String,
+        /// Colours or depth.
+        as_what: &'static str,
+        /// Ours.
+        readable: String,
+    },
+    /// Not the one that was asked for.
+    #[error("it does not offer {wanted}; choose --format from {offered}")]
+    Format {
+        /// What was asked for.
+        wanted: FourCc,
+        /// Its readable formats.
+        offered: String,
+    },
+}
+
+/// Wanted where nothing is said.
+const DEFAULT_SIZE_PX: (u32, u32) = (1280, 720);
+const DEFAULT_FPS: f64 = 30.0;
+/// USB 2 carries raw pictures up to this size and rate, in pixels per second.
+const VGA_PX_PER_S: f64 = 640.0 * 480.0 * 30.5;
+/// Rates that differ by less are the same to who watches.
+const SAME_RATE: f64 = 0.1;
+
+/// The best mode of each readable format, the best of all first: never empty.
+///
+/// # Errors
+/// There is none.
+pub fn ranked(modes: &[FormatModes], wish: &Wish, wire: Wire) -> Result<Vec<Choice>, NoMode> {
+    let readable = |fourcc: FourCc| fourcc.content() == Some(wish.content);
+    let suits = |format: &&FormatModes| readable(format.fourcc) && wish.fourcc.is_none_or(|f| f == format.fourcc);
+    let mut best: Vec<(Rank, Choice)> =
+        modes.iter().filter(suits).filter_map(|format| best_mode(format, wish, wire)).collect();
+    if best.is_empty() {
+        let offered = list(modes.iter().map(|format| format.fourcc));
+        let readable_offered = list(modes.iter().map(|format| format.fourcc).filter(|fourcc| readable(*fourcc)));
+        return Err(match wish.fourcc {
+            _ if modes.is_empty() => NoMode::Nothing,
+            Some(wanted) if !readable_offered.is_empty() => NoMode::Format { wanted, offered: readable_offered },
+            _ => NoMode::Unreadable {
+                offered,
+                as_what: if wish.content == Content::Color { "colours" } else { "depth" },
+                readable: list(FourCc::supported().filter(|fourcc| readable(*fourcc))),
+            },
+        });
+    }
+    best.sort_by(|(a, _), (b, _)| {
+        a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+    });
+    Ok(best.into_iter().map(|(_, choice)| choice).collect())
+}
+
+/// What a mode lacks, what matters most first: the least is the best.
+type Rank = [f64; 6];
+
+/// The mode of a format that is nearest to the wish.
+fn best_mode(format: &FormatModes, wish: &Wish, wire: Wire) -> Option<(Rank, Choice)> {
+    let wanted_px = wish.size_px.unwrap_or(DEFAULT_SIZE_PX);
+    let modes: Vec<((u32, u32), &Rates)> = match &format.sizes {
+        Sizes::Unknown => vec![(wanted_px, &Rates::Unknown)],
+        Sizes::Discrete(sizes) => sizes.iter().map(|SizeModes { size_px, rates }| (*size_px, rates)).collect(),
+        Sizes::Range { min_px, max_px, step_px, rates } => {
+            let on_grid = |wanted: u32, min: u32, max: u32, step: u32| {
+                let steps = (wanted.clamp(min, max.max(min)) - min + step / 2) / step.max(1);
+                (min + steps * step).min(max.max(min))
+            };
+            let width = on_grid(wanted_px.0, min_px.0, max_px.0, step_px.0);
+            let height = on_grid(wanted_px.1, min_px.1, max_px.1, step_px.1);
+            vec![((width, height), rates)]
+        }
+    };
+    let ranked = modes.into_iter().map(|(size_px, rates)| rank(format, size_px, rates, wanted_px, wish, wire));
+    ranked.min_by(|(a, _), (b, _)| {
+        a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+    })
+}
+
+fn rank(
+    format: &FormatModes,
+    size_px: (u32, u32),
+    rates: &Rates,
+    wanted_px: (u32, u32),
+    wish: &Wish,
+    wire: Wire,
+) -> (Rank, Choice) {
+    let wanted = Interval::from_fps(wish.fps.unwrap_or(DEFAULT_FPS));
+    // Where the driver does not tell, the wish is as good as anything.
+    let interval = rates.nearest(wanted).unwrap_or(wanted);
+    let choice = Choice { queue: format.queue, fourcc: format.fourcc, size_px, interval };
+    let ratio = |a: f64, b: f64| (a / b).ln();
+    let beyond = |distance: f64| if distance < SAME_RATE { 0.0 } else { distance };
+    let slower = beyond(ratio(wanted.fps(), interval.fps()));
+    let off_rate = beyond(ratio(wanted.fps(), interval.fps()).abs());
+    let off_size =
+        ratio(size_px.0.into(), wanted_px.0.into()).abs() + ratio(size_px.1.into(), wanted_px.1.into()).abs();
+    // Who asks for a size gets it, slow as it may be; who does not gets a fluent picture.
+    let (first, second) = if wish.size_px.is_some() { (off_size, slower) } else { (slower, off_size) };
+    let order = order(format.fourcc, &choice, wire);
+    let second_hand = f64::from(u8::from(format.emulated));
+    let queue = f64::from(u8::from(format.queue == QueueKind::MultiPlanar));
+    ([first, second, off_rate, second_hand, order, queue], choice)
+}
+
+/// Place of a format among those that give the same size and rate.
+fn order(fourcc: FourCc, choice: &Choice, wire: Wire) -> f64 {
+    let table = FourCc::supported().position(|supported| supported == fourcc).unwrap_or(usize::MAX) as f64;
+    let px_per_s = f64::from(choice.size_px.0) * f64::from(choice.size_px.1) * choice.interval.fps();
+    let raw_fits = wire == Wire::Wide || px_per_s <= VGA_PX_PER_S;
+    match fourcc.family() {
+        // Grey only where there are no colours.
+        Some(Family::Grey) => 1000.0,
+        Some(Family::Jpeg) if !raw_fits => table - 100.0,
+        _ => table,
+    }
+}
+
+fn list(fourccs: impl Iterator<Item = FourCc>) -> String {
+    let mut names: Vec<String> = Vec::new();
+    for name in fourccs.map(|fourcc| fourcc.to_string()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn every(denominator: u32) -> Interval {
+        Interval { numerator: 1, denominator }
+    }
+
+    fn format(fourcc: &[u8; 4], sizes: &[(u32, u32, &[u32])]) -> FormatModes {
+        let size = |&(width, height, fps): &(u32, u32, &[u32])| SizeModes {
+            size_px: (width, height),
+            rates: Rates::Discrete(fps.iter().map(|fps| every(*fps)).collect()),
+        };
+        FormatModes {
+            queue: QueueKind::SinglePlanar,
+            fourcc: FourCc(*fourcc),
+            description: String::new(),
+            emulated: false,
+            sizes: Sizes::Discrete(sizes.iter().map(size).collect()),
+        }
+    }
+
+    /// A common office camera on USB 2: raw pictures get slow as they grow.
+    fn office() -> Vec<FormatModes> {
+        vec![
+            format(b"YUYV", &[(640, 480, &[30, 24, 15]), (1280, 720, &[10, 5]), (1920, 1080, &[5]), (320, 240, &[30])]),
+            format(b"MJPG", &[(640, 480, &[30, 15]), (1280, 720, &[60, 30]), (1920, 1080, &[30]), (320, 240, &[30])]),
+            format(b"H264", &[(1920, 1080, &[30])]),
+        ]
+    }
+
+    /// A laptop's camera without compression.
+    fn raw_only() -> Vec<FormatModes> {
+        vec![format(b"YUYV", &[(640, 480, &[30]), (1280, 720, &[10]), (352, 288, &[30])])]
+    }
+
+    /// A capture box on USB 3.
+    fn capture_box() -> Vec<FormatModes> {
+        vec![
+            format(b"MJPG", &[(1920, 1080, &[60, 30]), (1280, 720, &[60, 30])]),
+            format(b"YUYV", &[(1920, 1080, &[60, 30]), (1280, 720, &[60, 30])]),
+            format(b"NV12", &[(1920, 1080, &[60, 30]), (1280, 720, &[60, 30])]),
+        ]
+    }
+
+    fn wish(size_px: Option<(u32, u32)>, fps: Option<f64>, fourcc: Option<&[u8; 4]>) -> Wish {
+        Wish { content: Content::Color, size_px, fps, fourcc: fourcc.map(|f| FourCc(*f)) }
+    }
+
+    fn chosen(modes: &[FormatModes], wish: Wish, wire: Wire) -> String {
+        let best = ranked(modes, &wish, wire).unwrap()[0];
+        format!("{}x{} {} {}", best.size_px.0, best.size_px.1, best.fourcc, best.interval)
+    }
+
+    #[test]
+    fn cameras_on_a_narrow_wire_compress_what_is_large() {
+        let any = wish(None, None, None);
+        assert_eq!(chosen(&office(), any, Wire::Narrow), "1280x720 MJPG 30");
+        let vga = wish(Some((640, 480)), None, None);
+        assert_eq!(chosen(&office(), vga, Wire::Narrow), "640x480 YUYV 30");
+        let full = wish(Some((1920, 1080)), None, None);
+        assert_eq!(chosen(&office(), full, Wire::Narrow), "1920x1080 MJPG 30");
+        assert_eq!(chosen(&capture_box(), any, Wire::Narrow), "1280x720 MJPG 30");
+        assert_eq!(chosen(&capture_box(), any, Wire::Wide), "1280x720 NV12 30");
+        assert_eq!(chosen(&capture_box(), wish(None, Some(60.0), None), Wire::Wide), "1280x720 NV12 60");
+    }
+
+    #[test]
+    fn without_a_wish_the_picture_is_fluent_and_a_wish_is_kept() {
+        assert_eq!(chosen(&raw_only(), wish(None, None, None), Wire::Narrow), "640x480 YUYV 30");
+        assert_eq!(chosen(&raw_only(), wish(Some((1280, 720)), None, None), Wire::Narrow), "1280x720 YUYV 10");
+        assert_eq!(chosen(&raw_only(), wish(None, Some(10.0), None), Wire::Narrow), "1280x720 YUYV 10");
+        assert_eq!(chosen(&office(), wish(None, None, Some(b"YUYV")), Wire::Narrow), "640x480 YUYV 30");
+        assert_eq!(chosen(&office(), wish(Some((1280, 700)), Some(60.0), None), Wire::Narrow), "1280x720 MJPG 60");
+        assert_eq!(chosen(&office(), wish(Some((4000, 3000)), None, None), Wire::Narrow), "1920x1080 MJPG 30");
+    }
+
+    #[test]
+    fn every_format_is_there_to_fall_back_on() {
+        let all = ranked(&office(), &wish(None, None, None), Wire::Narrow).unwrap();
+        let formats: Vec<String> = all.iter().map(|choice| choice.fourcc.to_string()).collect();
+        assert_eq!(formats, ["MJPG", "YUYV"]);
+    }
+
+    #[test]
+    fn grids_and_unknown_sizes_take_the_wish() {
+        let sizes = Sizes::Range { min_px: (16, 16), max_px: (3840, 2160), step_px: (2, 2), rates: Rates::Unknown };
+        let grid = vec![FormatModes { sizes, ..format(b"NV12", &[]) }];
+        assert_eq!(chosen(&grid, wish(None, None, None), Wire::Wide), "1280x720 NV12 30");
+        assert_eq!(chosen(&grid, wish(Some((641, 10)), Some(29.97), None), Wire::Wide), "642x16 NV12 29.97");
+        assert_eq!(chosen(&grid, wish(Some((9000, 9000)), None, None), Wire::Wide), "3840x2160 NV12 30");
+        let unknown = vec![FormatModes { sizes: Sizes::Unknown, ..format(b"YU12", &[]) }];
+        assert_eq!(chosen(&unknown, wish(Some((800, 600)), None, None), Wire::Narrow), "800x600 YU12 30");
+    }
+
+    #[test]
+    fn grey_and_multi_planar_come_last_and_emulated_formats_after_real_ones() {
+        let sizes: &[(u32, u32, &[u32])] = &[(640, 480, &[30])];
+        let any = wish(None, None, None);
+        let both = vec![format(b"GREY", sizes), format(b"YUYV", sizes)];
+        assert_eq!(chosen(&both, any, Wire::Wide), "640x480 YUYV 30");
+        assert_eq!(chosen(&both[..1], any, Wire::Wide), "640x480 GREY 30");
+        let emulated = FormatModes { emulated: true, ..format(b"NV12", sizes) };
+        assert_eq!(chosen(&[emulated, format(b"YUYV", sizes)], any, Wire::Wide), "640x480 YUYV 30");
+        let multi = FormatModes { queue: QueueKind::MultiPlanar, ..format(b"YUYV", sizes) };
+        let best = ranked(&[multi, format(b"YUYV", sizes)], &any, Wire::Wide).unwrap();
+        assert_eq!(best[0].queue, QueueKind::SinglePlanar);
+    }
+
+    #[test]
+    fn what_cannot_be_had_is_said_with_what_can() {
+        let refusal = |modes: &[FormatModes], wish| ranked(modes, &wish, Wire::Wide).unwrap_err().to_string();
+        let refused = refusal(&office(), wish(None, None, Some(b"NV12")));
+        assert_eq!(refused, "it does not offer NV12; choose --format from YUYV, MJPG");
+        let unreadable = refusal(&[format(b"H264", &[(640, 480, &[30])])], wish(None, None, None));
+        assert!(unreadable.starts_with("it offers H264, of which none"), "{unreadable}");
+        assert!(refusal(&[], wish(None, None, None)).contains("virtual camera"));
+        let depth = Wish::any(Content::Depth);
+        assert!(refusal(&office(), depth).contains("as depth; readable are Z16, Y16"));
+    }
+}

@@ -1,0 +1,231 @@
+//! A camera that is open and streams: from the device node to the running queue.
+
+use std::fmt;
+use std::path::Path;
+
+use v4l::v4l_sys as sys;
+
+use super::error::OpenError;
+use super::negotiate::{Choice, Wire, Wish, ranked};
+use crate::clock::Clock;
+use crate::v4l2::device::{Device, own_caps, zeroed};
+use crate::v4l2::layout::{Layout, LayoutError};
+use crate::v4l2::modes::{Interval, QueueKind, modes};
+use crate::v4l2::node::{LOOPBACK_DRIVER, text};
+use crate::v4l2::queue::{DeviceKernel, Queue};
+use crate::v4l2::{controls, node};
+
+/// A control and what to set it to, as they are written.
+pub type Setting = (String, String);
+
+/// What was agreed with the driver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreed {
+    /// What was asked for in the end.
+    pub choice: Choice,
+    /// Its pictures.
+    pub layout: Layout,
+    /// Time from frame to frame, as the driver says.
+    pub interval: Interval,
+}
+
+impl fmt::Display for Agreed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { layout: Layout { width, height, fourcc, .. }, interval, .. } = self;
+        write!(f, "{width}x{height} {fourcc} at {interval} fps")
+    }
+}
+
+/// An open camera that streams.
+pub struct Session {
+    /// Its buffers.
+    pub queue: Queue<DeviceKernel>,
+    /// Its mode.
+    pub agreed: Agreed,
+    /// What it answered when it was opened.
+    pub capability: sys::v4l2_capability,
+}
+
+/// Formats that are tried where the driver does not take the best.
+const TRIES: usize = 6;
+
+impl Session {
+    /// Opens the camera at `path`, agrees on a mode, sets its controls and starts it. With `before`, the same mode as
+    /// then is asked for first, which is quick; and a control that cannot be set is said and passed over.
+    ///
+    /// # Errors
+    /// Any of this is refused.
+    pub fn open(
+        path: &Path,
+        wish: &Wish,
+        settings: &[Setting],
+        before: Option<&Agreed>,
+        clock: &Clock,
+    ) -> Result<Self, OpenError> {
+        let device = Device::open(path).map_err(|error| OpenError::at(path, "it cannot be opened", error))?;
+        let capability = capability(&device)?;
+        let agreed = agree(&device, &capability, wish, before)?;
+        for (name, value) in settings {
+            match controls::set(&device, name, value) {
+                Ok(_) => {}
+                Err(error) if before.is_some() => tracing::warn!("{}: {error}", path.display()),
+                Err(source) => return Err(OpenError::Control { path: path.to_owned(), source }),
+            }
+        }
+        let least_bytes: Vec<usize> =
+            (0..agreed.layout.planes().len()).map(|plane| agreed.layout.needed_bytes(plane)).collect();
+        let kernel = DeviceKernel::new(device, agreed.choice.queue);
+        let refused = |error| OpenError::queue(path, error);
+        let mut queue =
+            Queue::new(kernel, &least_bytes, agreed.interval.period_ns(), clock.clone()).map_err(refused)?;
+        queue.start().map_err(refused)?;
+        Ok(Self { queue, agreed, capability })
+    }
+
+    /// Whether frames come from another program, not from a camera.
+    pub fn is_loopback(&self) -> bool {
+        text(&self.capability.driver) == LOOPBACK_DRIVER
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Device {
+        self.queue.kernel().device()
+    }
+}
+
+/// What the device is, if it is a camera.
+fn capability(device: &Device) -> Result<sys::v4l2_capability, OpenError> {
+    let path = device.path();
+    let mut capability: sys::v4l2_capability = zeroed();
+    device.query_capability(&mut capability).map_err(|error| match error.raw_os_error() {
+        Some(ENOTTY) => OpenError::NotACamera { path: path.to_owned(), what: "it does not answer as one" },
+        _ => OpenError::at(path, "VIDIOC_QUERYCAP", error),
+    })?;
+    let caps = own_caps(&capability);
+    let can = |any: u32| caps & any != 0;
+    let what = if can(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
+        "it converts pictures"
+    } else if !can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE) {
+        match text(&capability.driver) {
+            driver if driver == LOOPBACK_DRIVER => "it is a virtual camera, and nothing writes to it",
+            _ if can(sys::V4L2_CAP_META_CAPTURE) => "it tells about another node's pictures",
+            _ => "it captures no pictures",
+        }
+    } else if !can(sys::V4L2_CAP_STREAMING) {
+        "it does not stream"
+    } else {
+        return Ok(capability);
+    };
+    Err(OpenError::NotACamera { path: path.to_owned(), what })
+}
+
+const ENOTTY: i32 = rustix::io::Errno::NOTTY.raw_os_error();
+
+/// Agrees with the driver on a mode: asks for what suits best, and takes what it makes of that.
+fn agree(
+    device: &Device,
+    capability: &sys::v4l2_capability,
+    wish: &Wish,
+    before: Option<&Agreed>,
+) -> Result<Agreed, OpenError> {
+    if let Some(before) = before {
+        match set_format(device, &before.choice) {
+            Ok(layout) if layout == before.layout => return Ok(with_rate(device, before.choice, layout)),
+            Err(error @ (OpenError::Gone(_) | OpenError::Busy { .. })) => return Err(error),
+            // It is not as it was: from the beginning.
+            _ => {}
+        }
+    }
+    let path = device.path();
+    let offered = modes(device).map_err(|error| OpenError::at(path, "VIDIOC_QUERYCAP", error))?;
+    let choices = ranked(&offered, wish, wire(path, capability))
+        .map_err(|source| OpenError::NoMode { path: path.to_owned(), source })?;
+    let mut refusal = None;
+    for choice in choices.into_iter().take(TRIES) {
+        match set_format(device, &choice) {
+            Ok(layout) if wish.fourcc.is_some_and(|fourcc| fourcc != layout.fourcc) => {
+                let what = "it does not give the format that it offers";
+                let source = std::io::Error::from(std::io::ErrorKind::InvalidInput);
+                refusal.get_or_insert(OpenError::Io { path: path.to_owned(), what, source });
+            }
+            Ok(layout) if layout.fourcc.content() == Some(wish.content) => {
+                let agreed = with_rate(device, choice, layout);
+                tell_differences(device, &agreed, wish);
+                return Ok(agreed);
+            }
+            Ok(_) => {}
+            Err(error @ (OpenError::Gone(_) | OpenError::Busy { .. })) => return Err(error),
+            Err(error) => {
+                refusal.get_or_insert(error);
+            }
+        }
+    }
+    Err(refusal
+        .unwrap_or_else(|| OpenError::NotACamera { path: path.to_owned(), what: "it takes none of its formats" }))
+}
+
+/// Sets a format; gives what the driver made of it.
+fn set_format(device: &Device, choice: &Choice) -> Result<Layout, OpenError> {
+    let mut format: sys::v4l2_format = zeroed();
+    format.type_ = choice.queue.buffer_type();
+    let ((width, height), pixelformat) = (choice.size_px, choice.fourcc.to_u32());
+    let field = sys::v4l2_field_V4L2_FIELD_NONE;
+    match choice.queue {
+        QueueKind::SinglePlanar => {
+            format.fmt.pix = sys::v4l2_pix_format { width, height, pixelformat, field, ..zeroed() };
+        }
+        QueueKind::MultiPlanar => {
+            format.fmt.pix_mp = sys::v4l2_pix_format_mplane { width, height, pixelformat, field, ..zeroed() };
+        }
+    }
+    device.set_format(&mut format).map_err(|error| OpenError::at(device.path(), "VIDIOC_S_FMT", error))?;
+    Layout::from_format(&format)
+        .map_err(|source: LayoutError| OpenError::Layout { path: device.path().to_owned(), source })
+}
+
+/// Sets the rate, where it can be set, and reads it back.
+fn with_rate(device: &Device, choice: Choice, layout: Layout) -> Agreed {
+    let mut parameters: sys::v4l2_streamparm = zeroed();
+    parameters.type_ = choice.queue.buffer_type();
+    // What else is in there stays as it is. Some inputs have the rate that their signal has, and refuse.
+    if device.get_parameters(&mut parameters).is_ok() {
+        parameters.parm.capture.timeperframe = choice.interval.fraction();
+        if let Err(error) = device.set_parameters(&mut parameters) {
+            tracing::debug!("{}: the rate cannot be set: {error}", device.path().display());
+        }
+    }
+    let mut told: sys::v4l2_streamparm = zeroed();
+    told.type_ = choice.queue.buffer_type();
+    let told = device.get_parameters(&mut told).ok().and_then(|()| {
+        // SAFETY: of a capture queue's parameters this member was written, and all its members are integers.
+        #[allow(unsafe_code)]
+        Interval::new(unsafe { told.parm.capture.timeperframe })
+    });
+    Agreed { choice, layout, interval: told.filter(|told| told.period_ns() < MAX_PERIOD_NS).unwrap_or(choice.interval) }
+}
+
+/// A rate slower than a frame in ten seconds is a driver's mistake.
+const MAX_PERIOD_NS: u64 = 10_000_000_000;
+
+/// How the camera is connected, as far as that is known.
+fn wire(path: &Path, capability: &sys::v4l2_capability) -> Wire {
+    const USB_2_MBIT_PER_S: f32 = 480.0;
+    if !text(&capability.bus_info).starts_with("usb-") {
+        return Wire::Wide;
+    }
+    match node::usb_of(path) {
+        Some(usb) if usb.mbit_per_s > USB_2_MBIT_PER_S => Wire::Wide,
+        _ => Wire::Narrow,
+    }
+}
+
+/// Whoever asked for something else should know.
+fn tell_differences(device: &Device, agreed: &Agreed, wish: &Wish) {
+    let size = (agreed.layout.width, agreed.layout.height);
+    let other_size = wish.size_px.is_some_and(|wanted| wanted != size);
+    let other_rate = wish.fps.is_some_and(|wanted| (agreed.interval.fps() / wanted).ln().abs() > 0.02);
+    if other_size || other_rate {
+        let name = device.path().display();
+        tracing::warn!("{name}: the camera cannot do exactly what was asked for and gives {agreed}");
+    }
+}

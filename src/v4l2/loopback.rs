@@ -1,0 +1,412 @@
+//! The module v4l2loopback: nodes that show to others, as a camera's, the frames that are written to them.
+
+use std::fmt;
+use std::fs;
+use std::io;
+use std::os::fd::AsFd;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use v4l::v4l_sys as sys;
+
+use super::device::{Device, zeroed};
+use super::holders::{Holder, holders};
+
+/// What its nodes say that their driver is. What they say they can do depends on who uses them.
+pub const DRIVER: &str = "v4l2 loopback";
+
+const OUTPUT: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT;
+/// How long a write may wait for room; no version of the module has made one wait so far.
+const ROOM: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
+
+/// Why a node takes no frames.
+#[derive(Debug, thiserror::Error)]
+pub enum LoopbackError {
+    /// There is no such node.
+    #[error("there is no {}: make a virtual camera with `{}`{}", path.display(), modprobe(path), others(path))]
+    Missing {
+        /// The node.
+        path: PathBuf,
+    },
+    /// It is no node of Video4Linux.
+    #[error("{} is no video device; make a virtual camera with `{}`{}", path.display(), modprobe(path), others(path))]
+    NoVideo {
+        /// The node.
+        path: PathBuf,
+    },
+    /// It belongs to another driver.
+    #[error(
+        "{} is '{card}', which takes no pictures; make a virtual camera with `{}`{}",
+        path.display(), modprobe(Path::new("")), others(path)
+    )]
+    NotLoopback {
+        /// The node.
+        path: PathBuf,
+        /// Name of the device.
+        card: String,
+    },
+    /// No right to open it.
+    #[error(
+        "{} may not be opened by you: join the group that owns it with `sudo usermod -aG video $USER`, \
+         and log in again",
+        path.display()
+    )]
+    Denied {
+        /// The node.
+        path: PathBuf,
+    },
+    /// Someone else writes to it, or as many have it open as may.
+    #[error("{} is in use{}: stop that, or take another virtual camera", path.display(), By(by))]
+    Taken {
+        /// The node.
+        path: PathBuf,
+        /// Who has it open.
+        by: Vec<Holder>,
+    },
+    /// Its format cannot be changed, and is none that can be written.
+    #[error(
+        "{} is fixed to {fourcc} of {width} x {height} pixels{}: stop that, or set it free with \
+         `v4l2-ctl -d {} -c keep_format=0`",
+        path.display(), By(by), path.display()
+    )]
+    Frozen {
+        /// The node.
+        path: PathBuf,
+        /// Its pixel format.
+        fourcc: String,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Who has it open.
+        by: Vec<Holder>,
+    },
+    /// The system refused.
+    #[error("{}: {doing}: {cause}", path.display())]
+    System {
+        /// The node.
+        path: PathBuf,
+        /// What was tried.
+        doing: &'static str,
+        /// What the system said.
+        cause: io::Error,
+    },
+}
+
+/// ", by this and that", or nothing where nobody is known.
+struct By<'a>(&'a [Holder]);
+
+impl fmt::Display for By<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, holder) in self.0.iter().enumerate() {
+            write!(f, "{} {holder}", if at == 0 { " by" } else { "," })?;
+        }
+        Ok(())
+    }
+}
+
+/// The command that makes `path` a virtual camera; `/dev/video10` if it is no name of a node.
+pub fn modprobe(path: &Path) -> String {
+    let number = path.to_str().and_then(|path| path.strip_prefix("/dev/video")?.parse::<u32>().ok()).unwrap_or(10);
+    // The module takes its options when it is loaded.
+    let unload = if Path::new("/sys/module/v4l2loopback").exists() { "sudo modprobe -r v4l2loopback && " } else { "" };
+    format!(
+        "{unload}sudo modprobe v4l2loopback devices=1 video_nr={number} card_label=\"bokehcam\" exclusive_caps=1 \
+         max_buffers=4"
+    )
+}
+
+/// The module's nodes, by number: those with its own attributes in the system's tree, whether they can be opened or
+/// not.
+pub fn nodes() -> Vec<PathBuf> {
+    let entries = fs::read_dir("/sys/class/video4linux").into_iter().flatten().flatten();
+    let ours = entries.filter(|entry| entry.path().join("max_openers").exists());
+    let mut numbers: Vec<u32> =
+        ours.filter_map(|entry| entry.file_name().to_str()?.strip_prefix("video")?.parse().ok()).collect();
+    numbers.sort_unstable();
+    numbers.into_iter().map(|number| PathBuf::from(format!("/dev/video{number}"))).collect()
+}
+
+/// The virtual cameras that there are besides `path`, for a message.
+fn others(path: &Path) -> String {
+    let others: Vec<String> =
+        nodes().into_iter().filter(|node| node != path).map(|node| node.display().to_string()).collect();
+    if others.is_empty() { String::new() } else { format!("; there is {}", others.join(", ")) }
+}
+
+/// Who has a node open besides this program.
+pub fn other_holders(path: &Path) -> Vec<Holder> {
+    let own = std::process::id();
+    holders(path).into_iter().filter(|holder| holder.pid != own).collect()
+}
+
+/// How the pixels of a frame lie in memory; all without gaps between rows or planes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Y Cb Y Cr: two pixels share their colour.
+    Yuyv,
+    /// Three planes, colour halved both ways.
+    Yu12,
+    /// Two planes, colour halved both ways and interleaved.
+    Nv12,
+    /// R G B.
+    Rgb24,
+    /// B G R.
+    Bgr24,
+}
+
+impl Layout {
+    const ALL: [(Self, &'static [u8; 4]); 5] = [
+        (Self::Yuyv, b"YUYV"),
+        (Self::Yu12, b"YU12"),
+        (Self::Nv12, b"NV12"),
+        (Self::Rgb24, b"RGB3"),
+        (Self::Bgr24, b"BGR3"),
+    ];
+
+    /// Its four characters.
+    pub fn fourcc(self) -> &'static str {
+        let code = Self::ALL.iter().find(|(layout, _)| *layout == self).map_or(b"????", |(_, code)| code);
+        std::str::from_utf8(code).unwrap_or("????")
+    }
+
+    fn of(fourcc: u32) -> Option<Self> {
+        Self::ALL.iter().find(|(_, code)| u32::from_le_bytes(**code) == fourcc).map(|(layout, _)| *layout)
+    }
+
+    /// Bytes of a frame. Columns are even, and so are rows where they share their colour.
+    pub fn frame_bytes(self, (width, height): (u32, u32)) -> usize {
+        let pixels = width as usize * height as usize;
+        match self {
+            Self::Yuyv => 2 * pixels,
+            Self::Yu12 | Self::Nv12 => pixels + pixels / 2,
+            Self::Rgb24 | Self::Bgr24 => 3 * pixels,
+        }
+    }
+
+    fn takes(self, (width, height): (u32, u32)) -> bool {
+        match self {
+            Self::Yuyv => width.is_multiple_of(2),
+            Self::Yu12 | Self::Nv12 => width.is_multiple_of(2) && height.is_multiple_of(2),
+            Self::Rgb24 | Self::Bgr24 => true,
+        }
+    }
+}
+
+/// A node that frames are written to.
+#[derive(Debug)]
+pub struct Output {
+    device: Arc<Device>,
+    card: String,
+    layout: Layout,
+    size: (u32, u32),
+}
+
+impl Output {
+    /// Opens a node and starts to stream to it: YUYV of `size` (the width even) in BT.601 and limited range, which is
+    /// what readers take every picture for, `rate` frames in each of which `scale` seconds. Where a reader or a control
+    /// has fixed the format, that is taken as it is: see [`Output::layout`] and [`Output::size`].
+    ///
+    /// # Errors
+    /// It is no free node of the module, or its fixed format cannot be written.
+    pub fn open(path: &Path, size: (u32, u32), (rate, scale): (u64, u64)) -> Result<Self, LoopbackError> {
+        let device = Device::open(path).map_err(|cause| refused(path, cause))?;
+        let mut about: sys::v4l2_capability = zeroed();
+        if device.query_capability(&mut about).is_err() {
+            return Err(LoopbackError::NoVideo { path: path.to_owned() });
+        }
+        let card = text(&about.card);
+        if text(&about.driver) != DRIVER {
+            return Err(LoopbackError::NotLoopback { path: path.to_owned(), card });
+        }
+        let (layout, size) = set_format(&device, size)?;
+        let mut parameters: sys::v4l2_streamparm = zeroed();
+        parameters.type_ = OUTPUT;
+        let small = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
+        parameters.parm.output.timeperframe = sys::v4l2_fract { numerator: small(scale), denominator: small(rate) };
+        // For readers that ask; the frames come when they are written.
+        if let Err(error) = device.set_parameters(&mut parameters) {
+            tracing::debug!("{}: the frame rate cannot be set: {error}", path.display());
+        }
+        match device.stream_on(&mut (OUTPUT as i32)) {
+            // Versions up to 0.13 forget that they take frames if this is left out, when the node is closed. Those
+            // from 0.14 on want buffers first, and begin by themselves with the first frame.
+            Err(error) if Errno::from_io_error(&error) != Some(Errno::INVAL) => {
+                return Err(busy_or(&device, "the stream cannot be started", error));
+            }
+            _ => {}
+        }
+        Ok(Self { device: Arc::new(device), card, layout, size })
+    }
+
+    /// The open node.
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// The name that it shows to users.
+    pub fn card(&self) -> &str {
+        &self.card
+    }
+
+    /// How pixels are to be laid out.
+    pub fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// Columns and rows of a frame.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// Shows one frame, of exactly [`Layout::frame_bytes`]. Never waits for readers: whoever was too slow for the
+    /// frames before gets this one.
+    ///
+    /// # Errors
+    /// The system refused.
+    pub fn write(&self, frame: &[u8]) -> Result<(), LoopbackError> {
+        let failed = |cause| LoopbackError::System {
+            path: self.device.path().to_owned(),
+            doing: "a frame cannot be written",
+            cause,
+        };
+        let mut waited = false;
+        loop {
+            match rustix::io::write(&*self.device, frame) {
+                Ok(written) if written == frame.len() => return Ok(()),
+                Ok(written) => {
+                    let short = format!("only {written} of {} bytes were taken", frame.len());
+                    return Err(failed(io::Error::other(short)));
+                }
+                Err(Errno::INTR) => {}
+                Err(Errno::AGAIN) if !waited => {
+                    waited = true;
+                    let mut room = [PollFd::from_borrowed_fd(self.device.as_fd(), PollFlags::OUT)];
+                    // Whatever comes of it, the next write tells.
+                    let _ = poll(&mut room, Some(&ROOM));
+                }
+                Err(Errno::BUSY) => return Err(busy_or(&self.device, "a frame cannot be written", Errno::BUSY.into())),
+                Err(error) => return Err(failed(error.into())),
+            }
+        }
+    }
+}
+
+impl Drop for Output {
+    fn drop(&mut self) {
+        // Readers stay; what cannot be stopped ends with the node's closing.
+        let _ = self.device.stream_off(&mut (OUTPUT as i32));
+    }
+}
+
+fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)), LoopbackError> {
+    let mut format: sys::v4l2_format = zeroed();
+    format.type_ = OUTPUT;
+    format.fmt.pix = sys::v4l2_pix_format {
+        width: size.0,
+        height: size.1,
+        pixelformat: u32::from_le_bytes(*b"YUYV"),
+        field: sys::v4l2_field_V4L2_FIELD_NONE,
+        bytesperline: 2 * size.0,
+        sizeimage: Layout::Yuyv.frame_bytes(size) as u32,
+        colorspace: sys::v4l2_colorspace_V4L2_COLORSPACE_SRGB,
+        // Without it the kernel takes the last fields for not set.
+        priv_: sys::V4L2_PIX_FMT_PRIV_MAGIC,
+        flags: 0,
+        __bindgen_anon_1: sys::v4l2_pix_format__bindgen_ty_1 { ycbcr_enc: sys::v4l2_ycbcr_encoding_V4L2_YCBCR_ENC_601 },
+        quantization: sys::v4l2_quantization_V4L2_QUANTIZATION_LIM_RANGE,
+        xfer_func: sys::v4l2_xfer_func_V4L2_XFER_FUNC_SRGB,
+    };
+    let refused = |cause| busy_or(device, "its format cannot be set", cause);
+    device.set_format(&mut format).map_err(refused)?;
+    // What setting gives back is not always what was set: some versions say the buffer's size instead of the frame's.
+    let mut format: sys::v4l2_format = zeroed();
+    format.type_ = OUTPUT;
+    device.get_format(&mut format).map_err(refused)?;
+    // SAFETY: for this type of buffer the driver fills in this field.
+    #[allow(unsafe_code)]
+    let set = unsafe { format.fmt.pix };
+    let size = (set.width, set.height);
+    match Layout::of(set.pixelformat).filter(|layout| layout.takes(size) && set.width > 0 && set.height > 0) {
+        Some(layout) if layout.frame_bytes(size) == set.sizeimage as usize => Ok((layout, size)),
+        _ => Err(LoopbackError::Frozen {
+            path: device.path().to_owned(),
+            fourcc: String::from_utf8_lossy(&set.pixelformat.to_le_bytes()).into_owned(),
+            width: set.width,
+            height: set.height,
+            by: other_holders(device.path()),
+        }),
+    }
+}
+
+/// Why a node could not be opened.
+fn refused(path: &Path, cause: io::Error) -> LoopbackError {
+    let path = path.to_owned();
+    match Errno::from_io_error(&cause) {
+        Some(Errno::NOENT | Errno::NOTDIR | Errno::NODEV | Errno::NXIO) => LoopbackError::Missing { path },
+        Some(Errno::ACCESS | Errno::PERM) => LoopbackError::Denied { path },
+        Some(Errno::ISDIR) => LoopbackError::NoVideo { path },
+        // As many have it open as may.
+        Some(Errno::BUSY) => LoopbackError::Taken { by: other_holders(&path), path },
+        _ => LoopbackError::System { path, doing: "it cannot be opened", cause },
+    }
+}
+
+/// The module says that something is wrong, in many ways, when another writer has the node.
+fn busy_or(device: &Device, doing: &'static str, cause: io::Error) -> LoopbackError {
+    let path = device.path().to_owned();
+    let by = other_holders(&path);
+    match Errno::from_io_error(&cause) {
+        Some(Errno::BUSY) => LoopbackError::Taken { path, by },
+        Some(Errno::INVAL) if !by.is_empty() => LoopbackError::Taken { path, by },
+        _ => LoopbackError::System { path, doing, cause },
+    }
+}
+
+/// A text that ends at its first zero.
+fn text(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
+    String::from_utf8_lossy(&bytes[..end]).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_virtual_camera_is_refused_with_what_to_do() {
+        let open = |path: &str| Output::open(Path::new(path), (640, 480), (30, 1)).unwrap_err().to_string();
+        for path in ["/dev/video199", "/dev/null", "/dev", "/dev/no-such"] {
+            let said = open(path);
+            assert!(said.contains(path) && said.contains("modprobe v4l2loopback devices=1"), "{said}");
+            assert_eq!(said.lines().count(), 1);
+        }
+        assert!(open("/dev/video199").contains("video_nr=199"));
+        assert!(open("/dev/null").contains("no video device"));
+    }
+
+    #[test]
+    fn whoever_holds_a_node_is_named() {
+        let by = vec![Holder { pid: 7, name: "obs".into() }, Holder { pid: 8, name: "mpv".into() }];
+        let taken = LoopbackError::Taken { path: "/dev/video9".into(), by };
+        assert_eq!(
+            taken.to_string(),
+            "/dev/video9 is in use by obs (process 7), mpv (process 8): stop that, or take another virtual camera"
+        );
+    }
+
+    #[test]
+    fn a_frame_has_the_bytes_of_its_layout() {
+        for (layout, fourcc, bytes) in [
+            (Layout::Yuyv, "YUYV", 1_843_200),
+            (Layout::Yu12, "YU12", 1_382_400),
+            (Layout::Nv12, "NV12", 1_382_400),
+            (Layout::Rgb24, "RGB3", 2_764_800),
+            (Layout::Bgr24, "BGR3", 2_764_800),
+        ] {
+            assert_eq!((layout.fourcc(), layout.frame_bytes((1280, 720))), (fourcc, bytes));
+        }
+    }
+}
