@@ -14,8 +14,8 @@ use v4l::v4l_sys as sys;
 use super::device::{Device, zeroed};
 use super::holders::{Holder, holders};
 
-/// What its nodes say that their driver is. What they say they can do depends on who uses them.
-pub const DRIVER: &str = "v4l2 loopback";
+// What its nodes say that they can do depends on who uses them; what their driver is does not.
+pub use super::node::LOOPBACK_DRIVER as DRIVER;
 
 const OUTPUT: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT;
 /// How long a write may wait for room; no version of the module has made one wait so far.

@@ -39,16 +39,7 @@ struct List {
 pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
     let list = match &command.device {
         None => List::of(node::nodes(), false, command.controls),
-        Some(name) => {
-            let path = node::resolve(name)?;
-            // It may be a link.
-            let meant = path.canonicalize().unwrap_or_else(|_| path.clone());
-            let found: Vec<Node> = node::nodes().into_iter().filter(|node| node.path == meant).collect();
-            if found.is_empty() {
-                return Err(CliError::NotVideo(path));
-            }
-            List::of(found, true, command.controls)
-        }
+        Some(name) => List::of(named(name)?, true, command.controls),
     };
     if command.json {
         // Numbers and texts always have a form in JSON.
@@ -59,6 +50,24 @@ pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
         return Ok(());
     }
     print(list.to_string().as_bytes())
+}
+
+/// The node that is meant by a name, also one that gives no pictures now.
+fn named(name: &str) -> Result<Vec<Node>, CliError> {
+    let nodes = node::nodes();
+    let path = match node::resolve(name) {
+        Ok(path) => path,
+        Err(error) => {
+            let wanted = name.to_lowercase();
+            let by_card = |node: &Node| !name.is_empty() && node.card.to_lowercase().contains(&wanted);
+            let found: Vec<Node> = nodes.into_iter().filter(by_card).collect();
+            return if found.is_empty() { Err(error.into()) } else { Ok(found) };
+        }
+    };
+    // It may be a link.
+    let meant = path.canonicalize().unwrap_or_else(|_| path.clone());
+    let found: Vec<Node> = nodes.into_iter().filter(|node| node.path == meant).collect();
+    if found.is_empty() { Err(CliError::NotVideo(path)) } else { Ok(found) }
 }
 
 impl List {
@@ -132,9 +141,14 @@ impl Told {
             let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
             line(format!("opened by {}", names.join(", ")));
         }
+        let (formats, others): (Vec<_>, Vec<_>) = formats.iter().partition(|format| format.fourcc.content().is_some());
         let width = formats.iter().map(|format| format.fourcc.to_string().len()).max().unwrap_or_default();
         for format in formats {
             line(format!("{:width$}  {}", format.fourcc.to_string(), format.sizes));
+        }
+        if !others.is_empty() {
+            let names: Vec<_> = others.iter().map(|format| format.fourcc.to_string()).collect();
+            line(format!("also {}, which cannot be read here", names.join(" ")));
         }
         for control in controls.iter().flatten() {
             line(control_line(control));

@@ -4,6 +4,7 @@ use super::findings::Finding;
 use super::system::System;
 use crate::v4l2::controls::{self, LOW_LIGHT, Value};
 use crate::v4l2::holders::holders;
+use crate::v4l2::layout::Content;
 use crate::v4l2::modes::{FormatModes, Interval, Rates, SizeModes, Sizes, modes};
 use crate::v4l2::node::{Kind, Node};
 use crate::v4l2::{Device, controls::Control};
@@ -91,14 +92,15 @@ fn low_light(node: &Node, controls: &[Control]) -> Option<Finding> {
 /// The largest picture at 30 frames per second or nearly that; the fastest one where there is none.
 fn best(modes: &[FormatModes]) -> String {
     const SMOOTH_FPS: f64 = 24.0;
-    let all = modes.iter().flat_map(|format| sizes(&format.sizes).into_iter().map(move |size| (format, size)));
+    let read = modes.iter().filter(|format| format.fourcc.content() == Some(Content::Color));
+    let all = read.flat_map(|format| sizes(&format.sizes).into_iter().map(move |size| (format, size)));
     let rank = |(_, (size_px, fastest)): &(&FormatModes, ((u32, u32), Option<Interval>))| {
         let fps = fastest.map_or(0.0, Interval::fps);
         let pixels = u64::from(size_px.0) * u64::from(size_px.1);
         if fps >= SMOOTH_FPS { (1, pixels, fps as u64) } else { (0, fps as u64, pixels) }
     };
     match all.max_by_key(rank) {
-        None => "tells no formats".to_owned(),
+        None => "has no format that can be read here".to_owned(),
         Some((format, ((width, height), fastest))) => {
             let rate = fastest.map_or_else(String::new, |fastest| format!(" at {fastest} fps"));
             format!("up to {width}x{height}{rate} ({})", format.fourcc)

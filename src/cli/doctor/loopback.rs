@@ -7,6 +7,7 @@ use super::cameras::denied;
 use super::findings::Finding;
 use super::system::System;
 use crate::v4l2::holders::holders;
+use crate::v4l2::loopback::modprobe;
 use crate::v4l2::node::{Kind, Node};
 
 /// The heading.
@@ -14,9 +15,10 @@ pub const ABOUT: &str = "virtual camera";
 
 const LOADED: &str = "/sys/module/v4l2loopback";
 
-/// A device of this program's own, that browsers list.
-const LOAD: &str =
-    "sudo modprobe v4l2loopback devices=1 video_nr=10 card_label=bokehcam exclusive_caps=1 max_buffers=4";
+/// What gives a virtual camera that browsers list.
+fn load() -> String {
+    modprobe("/dev/video10".as_ref())
+}
 
 /// PipeWire asks for so many buffers, and takes no node that has fewer.
 const PIPEWIRE_BUFFERS: u32 = 16;
@@ -30,8 +32,7 @@ pub fn look(nodes: &[Node], system: &System) -> Vec<Finding> {
     }
     let mut findings = vec![Finding::good(ABOUT, format!("module v4l2loopback {} is loaded", version()))];
     if nodes.is_empty() {
-        let reload = format!("sudo modprobe -r v4l2loopback && {LOAD}");
-        findings.push(Finding::missing(ABOUT, "the module has no device here", reload));
+        findings.push(Finding::missing(ABOUT, "the module has no device here", load()));
     }
     findings.extend(nodes.iter().map(|node| state(node)));
     findings.extend(buffers(system));
@@ -42,7 +43,8 @@ fn not_loaded(system: &System) -> Finding {
     if !installed(&system.kernel) {
         let fix = format!(
             "install it (`sudo apt install v4l2loopback-dkms`, `dnf install akmod-v4l2loopback` of RPM Fusion, \
-             `pacman -S v4l2loopback-dkms`, with the kernel's headers), then `{LOAD}`"
+             `pacman -S v4l2loopback-dkms`, with the kernel's headers), then `{}`",
+            load()
         );
         return Finding::missing(
             ABOUT,
@@ -52,11 +54,12 @@ fn not_loaded(system: &System) -> Finding {
     }
     let fix = if system.secure_boot == Some(true) {
         format!(
-            "`{LOAD}`; if that says \"Key was rejected\": Secure Boot is on, enrol the key that the module is \
-                 signed with (`sudo mokutil --import`), or switch Secure Boot off"
+            "`{}`; if that says \"Key was rejected\": Secure Boot is on, enrol the key that the module is \
+                 signed with (`sudo mokutil --import`), or switch Secure Boot off",
+            load()
         )
     } else {
-        format!("`{LOAD}`")
+        format!("`{}`", load())
     };
     Finding::missing(ABOUT, "module v4l2loopback is installed and not loaded", fix)
 }
@@ -89,7 +92,7 @@ fn state(node: &Node) -> Finding {
         (false, true) => Finding::good(ABOUT, format!("{node}: free; opened by {by}")),
         (true, true) => {
             let found = format!("{node}: free, but made without exclusive_caps=1: browsers will not list it");
-            Finding::note(ABOUT, found, format!("sudo modprobe -r v4l2loopback && {LOAD}"))
+            Finding::note(ABOUT, found, load())
         }
         (true, false) => {
             let found = format!("{node}: in use, opened by {by}");
@@ -97,7 +100,7 @@ fn state(node: &Node) -> Finding {
         }
         (false, false) => {
             let found = format!("{node}: a program left it in a state that takes neither writers nor readers");
-            Finding::missing(ABOUT, found, format!("sudo modprobe -r v4l2loopback && {LOAD}"))
+            Finding::missing(ABOUT, found, load())
         }
     }
 }
