@@ -44,12 +44,14 @@ fn dumped(dump: &str, name: &str) -> (String, String) {
     (value.to_string(), origin.to_string())
 }
 
-const COMMANDS: [&[&str]; 8] = [
+const COMMANDS: [&[&str]; 10] = [
     &["stream"],
     &["render"],
     &["record"],
     &["aperture"],
     &["bench"],
+    &["devices"],
+    &["doctor"],
     &["completions"],
     &["config"],
     &["config", "dump"],
@@ -389,4 +391,71 @@ fn the_aperture_analysis_is_whole_and_is_not_overwritten_unasked() {
     assert_eq!(third.code, 0, "{}", third.stderr);
     assert_ne!(fs::read(out.join("disc.png")).unwrap(), b"mine");
     assert_eq!(fs::read_dir(&out).unwrap().count(), 4, "no leftovers");
+}
+
+#[cfg(feature = "camera")]
+#[test]
+fn devices_are_listed_or_the_way_to_help_is_named() {
+    let (text, json) = (run(&["devices"]), run(&["devices", "--json", "--controls"]));
+    assert_eq!((text.code, json.code, json.stderr.as_str()), (0, 0, ""), "{}", text.stderr);
+    let list: serde_json::Value = serde_json::from_str(&json.stdout).unwrap();
+    let told: Vec<_> =
+        ["cameras", "virtual_cameras"].iter().flat_map(|group| list[group].as_array().unwrap()).collect();
+    for device in &told {
+        let path = device["path"].as_str().unwrap();
+        assert!(path.starts_with("/dev/") && text.stdout.contains(path), "{device}");
+        assert!(device["formats"].is_array() && device["controls"].is_array(), "{device}");
+    }
+    if told.is_empty() {
+        assert_eq!((text.stdout.as_str(), text.stderr.lines().count()), ("", 1));
+        assert!(text.stderr.contains("bokehcam doctor"), "{}", text.stderr);
+    }
+}
+
+#[cfg(feature = "camera")]
+#[test]
+fn a_device_that_is_not_there_costs_one_line() {
+    for (name, said) in [
+        ("no camera has this name", "there is no camera 'no camera has this name'"),
+        ("/dev/video4711", "there is no camera '/dev/video4711'"),
+        ("/dev/null", "no video device"),
+        ("/etc/passwd", "no device node"),
+    ] {
+        let ran = run(&["devices", name]);
+        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{name}");
+        assert!(ran.stderr.contains(said) && ran.stderr.lines().count() == 1, "{}", ran.stderr);
+    }
+}
+
+#[cfg(feature = "camera")]
+#[test]
+fn the_doctor_has_a_fix_for_what_is_not_good() {
+    let (text, json) = (run(&["doctor"]), run(&["doctor", "--json"]));
+    let told: serde_json::Value = serde_json::from_str(&json.stdout).unwrap();
+    let findings = told["findings"].as_array().unwrap();
+    for about in ["camera", "virtual camera", "blur", "programs"] {
+        assert!(findings.iter().any(|finding| finding["about"] == about), "{about}: {told}");
+    }
+    for finding in findings {
+        assert_eq!(finding["level"] == "good", finding["fix"].is_null(), "{finding}");
+        assert!(text.stdout.contains(finding["found"].as_str().unwrap()), "{finding}: {}", text.stdout);
+    }
+    let missing = |about| findings.iter().any(|finding| finding["about"] == about && finding["level"] == "missing");
+    let ready = !missing("camera") && !missing("virtual camera");
+    assert_eq!(told["ready"], ready);
+    for ran in [&text, &json] {
+        assert_eq!((ran.code, ran.stderr.lines().count()), if ready { (0, 0) } else { (1, 1) }, "{}", ran.stderr);
+    }
+    let kernel = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap();
+    assert!(text.stdout.lines().next().unwrap().contains(kernel.trim()), "{}", text.stdout);
+}
+
+#[cfg(not(feature = "camera"))]
+#[test]
+fn without_cameras_the_commands_about_them_say_so() {
+    for command in ["devices", "doctor"] {
+        let ran = run(&[command]);
+        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""));
+        assert!(ran.stderr.contains("built without cameras"), "{}", ran.stderr);
+    }
 }

@@ -47,6 +47,22 @@ pub enum CliError {
     /// The executor took a picture and gave none back.
     #[error("the blur gave no picture back: please report this")]
     NothingCameBack,
+    /// This program was built so.
+    #[error("this bokehcam was built without cameras: build it with the feature camera")]
+    #[cfg(not(feature = "camera"))]
+    NoCameras,
+    /// A name leads to no device.
+    #[error(transparent)]
+    #[cfg(feature = "camera")]
+    Node(#[from] crate::v4l2::node::NodeError),
+    /// A device of another sort.
+    #[error("{}: this is no video device", .0.display())]
+    #[cfg(feature = "camera")]
+    NotVideo(PathBuf),
+    /// `doctor` found something to be missing.
+    #[error("there is no {0} to work with: see above for what to do")]
+    #[cfg(feature = "camera")]
+    NotReady(String),
     /// A picture or a recording cannot be read or written.
     #[error(transparent)]
     Recording(RecordingError),

@@ -11,6 +11,8 @@ mod debug;
 mod debug_pictures;
 mod defaults;
 mod depth;
+mod devices;
+mod doctor;
 mod dump;
 mod error;
 mod files;
@@ -60,6 +62,8 @@ enum Command {
     Record(record::RecordCommand),
     Aperture(aperture::ApertureCommand),
     Bench(Box<bench::BenchCommand>),
+    Devices(devices::DevicesCommand),
+    Doctor(doctor::DoctorCommand),
     /// Print a script that completes commands and options in a shell
     #[command(after_help = "\
 Examples:
@@ -114,6 +118,8 @@ fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile) -> Result<(), Cl
         Command::Record(command) => record::run(&command, &cli.global),
         Command::Aperture(command) => aperture::run(&command, &cli.global),
         Command::Bench(command) => bench::run(&command),
+        Command::Devices(command) => devices::run(&command),
+        Command::Doctor(command) => doctor::run(&command),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "bokehcam", &mut script);

@@ -41,7 +41,9 @@ impl Stage<'_> {
         while !stopped() {
             if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
                 self.camera.rest();
+                let since_ns = self.clock.now_ns();
                 demand.wait(PATIENCE);
+                self.pacer.rested(self.clock.now_ns() - since_ns);
                 continue;
             }
             self.tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);

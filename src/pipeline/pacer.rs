@@ -33,6 +33,11 @@ impl Pacer {
         }
     }
 
+    /// Stands still for as long as nobody took frames: they go on from where they were.
+    pub(super) fn rested(&mut self, rest_ns: u64) {
+        self.epoch_ns = self.epoch_ns.map(|epoch_ns| epoch_ns + rest_ns);
+    }
+
     /// Waits until the frame of media time `time_ns`, which took `read_ns` to read, is due, or until `stop` says so.
     /// Returns the time at which it was captured: when it was due, or now where nothing is paced.
     pub(super) fn wait(&mut self, time_ns: u64, read_ns: u64, stop: impl Fn() -> bool) -> u64 {
@@ -105,6 +110,18 @@ mod tests {
         let (read, latest_ns) = play(350);
         assert!((10..=12).contains(&read), "{read} of 40 at 3.5 periods each");
         assert!(latest_ns <= PERIOD_NS + 50, "never much more than a period late: {latest_ns}");
+    }
+
+    #[test]
+    fn a_rest_passes_over_nothing() {
+        let clock = Clock::manual();
+        let mut pacer = Pacer::new(clock.clone(), true, PERIOD_NS);
+        let mut camera = Positions(1);
+        pacer.wait(0, 0, || false);
+        clock.advance_ns(60 * PERIOD_NS);
+        pacer.rested(60 * PERIOD_NS);
+        assert_eq!(pacer.skip(&mut camera), 0);
+        assert_eq!(pacer.wait(PERIOD_NS, 0, || false), 61 * PERIOD_NS);
     }
 
     #[test]

@@ -14,8 +14,8 @@ use v4l::v4l_sys as sys;
 use super::device::{Device, zeroed};
 use super::holders::{Holder, holders};
 
-/// What its nodes say that their driver is. What they say they can do depends on who uses them.
-pub const DRIVER: &str = "v4l2 loopback";
+// What its nodes say that they can do depends on who uses them; what their driver is does not.
+pub use super::node::LOOPBACK_DRIVER as DRIVER;
 
 const OUTPUT: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT;
 /// How long a write may wait for room; no version of the module has made one wait so far.
@@ -25,22 +25,19 @@ const ROOM: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 #[derive(Debug, thiserror::Error)]
 pub enum LoopbackError {
     /// There is no such node.
-    #[error("there is no {}: make a virtual camera with `{}`{}", path.display(), modprobe(path), others(path))]
+    #[error("there is no {}: {}", path.display(), remedy(path))]
     Missing {
         /// The node.
         path: PathBuf,
     },
     /// It is no node of Video4Linux.
-    #[error("{} is no video device; make a virtual camera with `{}`{}", path.display(), modprobe(path), others(path))]
+    #[error("{} is no video device: {}", path.display(), remedy(path))]
     NoVideo {
         /// The node.
         path: PathBuf,
     },
     /// It belongs to another driver.
-    #[error(
-        "{} is '{card}', which takes no pictures; make a virtual camera with `{}`{}",
-        path.display(), modprobe(Path::new("")), others(path)
-    )]
+    #[error("{} is '{card}', not a virtual camera: {}", path.display(), remedy(Path::new("")))]
     NotLoopback {
         /// The node.
         path: PathBuf,
@@ -129,11 +126,14 @@ pub fn nodes() -> Vec<PathBuf> {
     numbers.into_iter().map(|number| PathBuf::from(format!("/dev/video{number}"))).collect()
 }
 
-/// The virtual cameras that there are besides `path`, for a message.
-fn others(path: &Path) -> String {
-    let others: Vec<String> =
-        nodes().into_iter().filter(|node| node != path).map(|node| node.display().to_string()).collect();
-    if others.is_empty() { String::new() } else { format!("; there is {}", others.join(", ")) }
+/// What gives a virtual camera to someone who has named `path`, which is none.
+fn remedy(path: &Path) -> String {
+    let there: Vec<String> = nodes().iter().map(|node| node.display().to_string()).collect();
+    match there.is_empty() {
+        true => format!("make a virtual camera with `{}`", modprobe(path)),
+        // Loading the module anew would take these away.
+        false => format!("use {}, or make others with `{}`", there.join(" or "), modprobe(path)),
+    }
 }
 
 /// Who has a node open besides this program.

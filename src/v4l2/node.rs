@@ -28,10 +28,14 @@ pub struct Node {
     pub kind: Kind,
     /// Whether frames can be taken from it now. A virtual camera may change its mind when it is written to.
     pub captures: bool,
+    /// Whether frames can be given to it now.
+    pub outputs: bool,
     /// Links that stay the same when numbers change: by the device's serial number first, then by its place.
     pub links: Vec<PathBuf>,
     /// How it is connected, where that is USB.
     pub usb: Option<Usb>,
+    /// Whether this user may not open it.
+    pub denied: bool,
     /// Why less is known of it than of others: it cannot be opened, or does not answer.
     pub problem: Option<String>,
 }
@@ -152,8 +156,10 @@ impl Places {
             bus: String::new(),
             kind: Kind::Other,
             captures: false,
+            outputs: false,
             links: links.iter().filter(|(target, _)| *target == path).map(|(_, link)| link.clone()).collect(),
             usb: usb(&class),
+            denied: false,
             problem: None,
             path,
         };
@@ -165,7 +171,10 @@ impl Places {
                 node.problem =
                     Some(format!("the system has it, but {} is missing (a container?)", node.path.display()));
             }
-            Err(error) => node.problem = Some(error.to_string()),
+            Err(error) => {
+                node.denied = error.kind() == io::ErrorKind::PermissionDenied;
+                node.problem = Some(error.to_string());
+            }
         }
         Some(node)
     }
@@ -200,14 +209,15 @@ impl Node {
         let can = |any: u32| caps & any != 0;
         let frames = can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE);
         self.captures = frames && can(sys::V4L2_CAP_STREAMING);
+        self.outputs = can(sys::V4L2_CAP_VIDEO_OUTPUT | sys::V4L2_CAP_VIDEO_OUTPUT_MPLANE);
         self.kind = if self.driver == LOOPBACK_DRIVER {
             Kind::Virtual
         } else if can(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
-            self.captures = false;
+            (self.captures, self.outputs) = (false, false);
             Kind::MemoryToMemory
         } else if self.captures {
             Kind::Capture
-        } else if can(sys::V4L2_CAP_VIDEO_OUTPUT | sys::V4L2_CAP_VIDEO_OUTPUT_MPLANE) {
+        } else if self.outputs {
             Kind::Output
         } else if can(sys::V4L2_CAP_META_CAPTURE | sys::V4L2_CAP_META_OUTPUT) {
             Kind::Metadata
@@ -293,120 +303,4 @@ fn usb(class: &Path) -> Option<Usb> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn capability(driver: &str, card: &[u8], device_caps: u32) -> sys::v4l2_capability {
-        let mut capability: sys::v4l2_capability = zeroed();
-        capability.driver[..driver.len()].copy_from_slice(driver.as_bytes());
-        capability.card[..card.len()].copy_from_slice(card);
-        // A real driver names here what its other nodes can do.
-        capability.capabilities = sys::V4L2_CAP_DEVICE_CAPS | sys::V4L2_CAP_VIDEO_CAPTURE | device_caps;
-        capability.device_caps = device_caps;
-        capability
-    }
-
-    fn node(index: u32, driver: &str, card: &str, device_caps: u32) -> Node {
-        let mut node = Node {
-            path: format!("/dev/video{index}").into(),
-            index: Some(index),
-            card: String::new(),
-            driver: String::new(),
-            bus: String::new(),
-            kind: Kind::Other,
-            captures: false,
-            links: Vec::new(),
-            usb: None,
-            problem: None,
-        };
-        node.describe(&capability(driver, card.as_bytes(), device_caps));
-        node
-    }
-
-    const CAMERA: u32 = sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_STREAMING;
-    const OUTPUT: u32 = sys::V4L2_CAP_VIDEO_OUTPUT | sys::V4L2_CAP_STREAMING;
-
-    #[test]
-    fn a_node_is_what_its_own_capabilities_say() {
-        let cases = [
-            ("uvcvideo", CAMERA, Kind::Capture, true),
-            ("rkisp1", sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE | sys::V4L2_CAP_STREAMING, Kind::Capture, true),
-            ("uvcvideo", sys::V4L2_CAP_META_CAPTURE | sys::V4L2_CAP_STREAMING, Kind::Metadata, false),
-            ("old", sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_READWRITE, Kind::Other, false),
-            ("codec", sys::V4L2_CAP_VIDEO_M2M_MPLANE | CAMERA, Kind::MemoryToMemory, false),
-            ("vivid", OUTPUT, Kind::Output, false),
-            (LOOPBACK_DRIVER, OUTPUT, Kind::Virtual, false),
-            (LOOPBACK_DRIVER, CAMERA, Kind::Virtual, true),
-        ];
-        for (driver, caps, kind, captures) in cases {
-            let node = node(0, driver, "card", caps);
-            assert_eq!((node.kind, node.captures), (kind, captures), "{driver} {caps:#x}");
-        }
-    }
-
-    #[test]
-    fn names_that_are_no_text_do_not_stop_the_list() {
-        let mut broken = node(0, "uvcvideo", "", CAMERA);
-        broken.describe(&capability("uvcvideo", b"Cam\xff\xfe\0rest", CAMERA));
-        assert_eq!(broken.card, "Cam\u{fffd}\u{fffd}");
-        assert_eq!(text(b"full"), "full");
-    }
-
-    #[test]
-    fn a_part_of_the_cards_name_finds_the_camera_and_only_cameras() {
-        let nodes = [
-            node(0, "uvcvideo", "HD Webcam: Front", CAMERA),
-            node(1, "uvcvideo", "HD Webcam: Front", sys::V4L2_CAP_META_CAPTURE),
-            node(2, "uvcvideo", "Brio", CAMERA),
-            node(3, "uvcvideo", "Brio", CAMERA),
-            node(10, LOOPBACK_DRIVER, "Webcam that is none", CAMERA),
-            node(11, LOOPBACK_DRIVER, "Phone", CAMERA),
-            node(12, LOOPBACK_DRIVER, "Idle", OUTPUT),
-        ];
-        let found = |name| by_card(name, &nodes).map(|node| node.index.unwrap());
-        assert_eq!(found("front"), Ok(0));
-        assert_eq!(found("webcam"), Ok(0), "a real camera goes before a virtual one");
-        assert_eq!(found("pHONE"), Ok(11));
-        let error = found("Brio").unwrap_err().to_string();
-        assert_eq!(error, "'Brio' is the name of /dev/video2 (Brio), /dev/video3 (Brio); use the path of one");
-        for name in ["idle", "laptop", ""] {
-            let error = found(name).unwrap_err().to_string();
-            assert!(error.contains("/dev/video0 (HD Webcam: Front)") && !error.contains("Idle"), "{error}");
-        }
-        let error = by_card("x", &[]).unwrap_err().to_string();
-        assert!(error.contains("no camera is connected") && !error.contains('\n'), "{error}");
-    }
-
-    #[test]
-    fn paths_numbers_and_links_lead_to_nodes() {
-        let root = tempfile::tempdir().unwrap();
-        let dev = root.path().join("dev");
-        let class = root.path().join("class");
-        fs::create_dir_all(dev.join("v4l/by-id")).unwrap();
-        fs::create_dir_all(class.join("video7")).unwrap();
-        fs::create_dir_all(class.join("video8")).unwrap();
-        fs::write(class.join("video7/name"), "Cam\n").unwrap();
-        fs::write(dev.join("video7"), "").unwrap();
-        std::os::unix::fs::symlink("../../video7", dev.join("v4l/by-id/usb-Cam_1-video-index0")).unwrap();
-        let places = Places { class, dev: fs::canonicalize(&dev).unwrap() };
-
-        let nodes = places.nodes();
-        assert_eq!(nodes.iter().map(|node| node.index.unwrap()).collect::<Vec<_>>(), [7, 8]);
-        assert_eq!((nodes[0].card.as_str(), nodes[0].links.len()), ("Cam", 1), "known although it does not answer");
-        assert!(nodes[0].problem.is_some());
-        assert!(nodes[1].problem.as_ref().unwrap().contains("missing"));
-
-        assert_eq!(places.resolve("7").unwrap(), places.dev.join("video7"));
-        assert_eq!(places.resolve("video7").unwrap(), places.dev.join("video7"));
-        assert_eq!(
-            places.resolve("usb-Cam_1-video-index0").unwrap(),
-            places.dev.join("v4l/by-id/usb-Cam_1-video-index0")
-        );
-        assert_eq!(places.resolve("/dev/null").unwrap(), PathBuf::from("/dev/null"));
-        for wrong in ["9", "/dev/video4711", "v4l", "."] {
-            assert!(matches!(places.resolve(wrong), Err(NodeError::None { .. })), "{wrong}");
-        }
-        let file = dev.join("video7");
-        assert_eq!(places.resolve(file.to_str().unwrap()), Err(NodeError::NotADevice(file)));
-    }
-}
+mod tests;

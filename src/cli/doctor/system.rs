@@ -1,0 +1,124 @@
+//! The machine and the session: what someone who is asked for help wants to know first.
+
+use std::fmt;
+use std::fs;
+use std::path::Path;
+
+use serde::Serialize;
+
+/// What this program runs on.
+#[derive(Debug, Serialize)]
+pub struct System {
+    /// Version of this program.
+    pub bokehcam: &'static str,
+    /// Release of the kernel.
+    pub kernel: String,
+    /// Name of the distribution.
+    pub distribution: String,
+    /// How the desktop session shows windows: wayland, x11, tty, or none.
+    pub session: String,
+    /// What shuts this program in, if anything does.
+    pub sandbox: Option<String>,
+    /// Whether the firmware lets signed code only into the kernel. Nothing where it does not tell.
+    pub secure_boot: Option<bool>,
+    /// Whether PipeWire, which many programs get their cameras from, has a socket in this session.
+    pub pipewire: bool,
+    /// Whether a desktop portal, which programs in sandboxes ask for cameras, is running.
+    pub portal: bool,
+}
+
+impl System {
+    /// Looks at files; starts nothing.
+    pub fn look() -> Self {
+        Self {
+            bokehcam: env!("CARGO_PKG_VERSION"),
+            kernel: line("/proc/sys/kernel/osrelease"),
+            distribution: distribution(&fs::read_to_string("/etc/os-release").unwrap_or_default()),
+            session: std::env::var("XDG_SESSION_TYPE").unwrap_or_else(|_| "none".into()),
+            sandbox: sandbox(),
+            secure_boot: secure_boot(),
+            pipewire: pipewire(),
+            portal: runs("xdg-desktop-por"),
+        }
+    }
+}
+
+impl fmt::Display for System {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let secure_boot = match self.secure_boot {
+            Some(true) => "on",
+            Some(false) => "off",
+            None => "unknown",
+        };
+        let running = |is| if is { "running" } else { "not found" };
+        writeln!(f, "bokehcam {} on {}, Linux {}", self.bokehcam, self.distribution, self.kernel)?;
+        writeln!(f, "session {}, sandbox {}", self.session, self.sandbox.as_deref().unwrap_or("none"))?;
+        write!(f, "Secure Boot {secure_boot}, PipeWire {}, ", running(self.pipewire))?;
+        writeln!(f, "desktop portal {}", running(self.portal))
+    }
+}
+
+fn line(path: &str) -> String {
+    fs::read_to_string(path).map_or_else(|_| "unknown".into(), |text| text.trim().to_owned())
+}
+
+fn distribution(os_release: &str) -> String {
+    let value = |key: &str| {
+        let line = os_release.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('='))?;
+        Some(line.trim_matches(['"', '\'']).to_owned())
+    };
+    value("PRETTY_NAME").or_else(|| value("NAME")).unwrap_or_else(|| "an unknown distribution".into())
+}
+
+fn sandbox() -> Option<String> {
+    let there = |path: &str| Path::new(path).exists();
+    let variable = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
+    if there("/.flatpak-info") {
+        Some("Flatpak".into())
+    } else if variable("SNAP_NAME").is_some() {
+        Some("Snap".into())
+    } else if there("/run/.containerenv") || there("/.dockerenv") {
+        Some("container".into())
+    } else {
+        // systemd tells its services so.
+        variable("container")
+    }
+}
+
+fn secure_boot() -> Option<bool> {
+    if !Path::new("/sys/firmware/efi").exists() {
+        return Some(false);
+    }
+    let variable = "/sys/firmware/efi/efivars/SecureBoot-8be4df61-93ca-11d2-aa0d-00e098032b8c";
+    // Four bytes of attributes before the value.
+    fs::read(variable).ok()?.get(4).map(|on| *on == 1)
+}
+
+fn pipewire() -> bool {
+    let folder = std::env::var_os("PIPEWIRE_RUNTIME_DIR").or_else(|| std::env::var_os("XDG_RUNTIME_DIR"));
+    folder.is_some_and(|folder| Path::new(&folder).join("pipewire-0").exists())
+}
+
+/// Whether a process has this name, as the system cuts it.
+fn runs(name: &str) -> bool {
+    let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
+    processes.into_iter().any(|process| {
+        let number = process.file_name().to_str().is_some_and(|name| name.bytes().all(|b| b.is_ascii_digit()));
+        number && fs::read_to_string(process.path().join("comm")).is_ok_and(|comm| comm.trim_end() == name)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_distribution_has_a_name_in_any_file() {
+        assert_eq!(
+            distribution("ID=x\nPRETTY_NAME=\"Debian GNU/Linux 12 (bookworm)\"\n"),
+            "Debian GNU/Linux 12 (bookworm)"
+        );
+        assert_eq!(distribution("NAME='Void'\n"), "Void");
+        assert_eq!(distribution(""), "an unknown distribution");
+    }
+}

@@ -1,0 +1,179 @@
+//! Finding devices, their controls, and what is said of them.
+
+use std::fs;
+use std::process::Command;
+use std::time::Duration;
+
+use bokehcam::v4l2::Device;
+use bokehcam::v4l2::controls::{self, Value};
+use bokehcam::v4l2::holders::holders;
+use bokehcam::v4l2::node::{NodeError, resolve};
+
+use super::machine::{Beside, CAMERA, Machine, VERSIONS, VIRTUAL, bokehcam, sh, until};
+
+fn json(arguments: &str) -> serde_json::Value {
+    serde_json::from_slice(&bokehcam(arguments).output().unwrap().stdout).unwrap()
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn only_nodes_that_give_pictures_are_listed() {
+    // All nodes that the driver can make: outputs, metadata, touch, radio and teletext among them.
+    let _machine = Machine::with("n_devs=1 node_types=0xe1d3d vid_cap_nr=0", VERSIONS[0]);
+    let nodes = fs::read_dir("/sys/class/video4linux").unwrap().count();
+    assert!(nodes > 6, "{nodes} nodes");
+    let list = json("devices --json");
+    let paths = |group: &str| -> Vec<String> {
+        list[group].as_array().unwrap().iter().map(|device| device["path"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(paths("cameras"), [CAMERA]);
+    assert_eq!(paths("virtual_cameras"), [VIRTUAL]);
+    let camera = &list["cameras"][0];
+    let yuyv = camera["formats"].as_array().unwrap().iter().find(|format| format["fourcc"] == "YUYV").unwrap();
+    let size =
+        yuyv["sizes"]["discrete"].as_array().unwrap().iter().find(|s| s["size_px"][0] == 640 && s["size_px"][1] == 480);
+    assert_eq!(size.unwrap()["rates"]["discrete"][0]["fps"], 25.0);
+    assert_eq!(
+        (list["virtual_cameras"][0]["captures"].as_bool(), list["virtual_cameras"][0]["outputs"].as_bool()),
+        (Some(false), Some(true))
+    );
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_camera_has_several_names() {
+    let machine = Machine::new();
+    for name in ["0", "video0", CAMERA, "vivid", "VIV"] {
+        assert_eq!(resolve(name).unwrap().to_str(), Some(CAMERA), "{name}");
+    }
+    // The virtual camera gives no pictures while nobody writes to it.
+    assert!(matches!(resolve("bokehcam-test"), Err(NodeError::None { .. })));
+    let listed = bokehcam("devices bokehcam-test").output().unwrap();
+    assert!(String::from_utf8(listed.stdout).unwrap().contains(VIRTUAL));
+    drop(machine);
+
+    let _machine = Machine::with("n_devs=2 node_types=0x1,0x1 vid_cap_nr=0,1", VERSIONS[0]);
+    let refused = bokehcam("stream vivid --to null").output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.lines().count() == 1 && said.contains("/dev/video0") && said.contains("/dev/video1"), "{said}");
+}
+
+/// What another program says a control is set to.
+fn told(name: &str) -> String {
+    let line = sh(&format!("v4l2-ctl -d {CAMERA} -C {name}"));
+    line.trim().split_once(": ").unwrap().1.to_owned()
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn controls_of_every_type_are_set_by_name() {
+    let _machine = Machine::new();
+    let device = Device::open(CAMERA.as_ref()).unwrap();
+    for (name, value, said) in [
+        ("brightness", "200", "200"),
+        ("hue", "-5", "-5"),
+        ("boolean", "off", "0"),
+        ("menu", "Menu Item 4", "4 (Menu Item 4)"),
+        ("menu", "1", "1 (Menu Item 1)"),
+        ("integer_menu", "42", "8 (42 0x2a)"),
+        ("integer_menu", "3", "3 (3 0x3)"),
+        ("integer_64_bits", "-9223372036854775808", "-9223372036854775808"),
+        ("bitmask", "0x80002000", "0x80002000"),
+        ("bitmask", "0x400010", "0x00400010"),
+        ("string", "abc", "abc"),
+    ] {
+        controls::set(&device, name, value).unwrap_or_else(|error| panic!("{error}"));
+        assert!(told(name).trim_matches('\'').starts_with(said.split(' ').next().unwrap()), "{name}: {}", told(name));
+    }
+    assert_eq!(controls::get(&device, "bitmask").unwrap(), Value::Number(0x40_0010));
+    assert_eq!(controls::get(&device, "string").unwrap(), Value::Text("abc".into()));
+    controls::set(&device, "button", "1").unwrap();
+
+    for (name, value, said) in [
+        ("brightness", "256", "use 0 to 255"),
+        ("menu", "2", "3 (Menu Item 3)"),
+        ("bitmask", "1", "bits of"),
+        ("string", "abcde", "2 to 4 bytes"),
+        ("read_only_integer_32_bits", "1", "read-only"),
+        ("gain", "3", "another control overrides it"),
+        ("brightnes", "1", "did you mean brightness?"),
+    ] {
+        let error = controls::set(&device, name, value).unwrap_err().to_string();
+        assert!(error.contains(said) && error.lines().count() == 1, "{error}");
+    }
+    assert_eq!(controls::get(&device, "brightness").unwrap(), Value::Number(200), "a refused value changes nothing");
+    // What overrides it may be set first.
+    controls::set(&device, "gain_automatic", "no").unwrap();
+    controls::set(&device, "gain", "3").unwrap();
+    assert_eq!(told("gain"), "3");
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn controls_are_listed_as_another_program_lists_them() {
+    let _machine = Machine::new();
+    let list = json("devices --controls --json vivid");
+    let ours: Vec<String> = list["cameras"][0]["controls"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|control| format!("{} {:#010x}", control["name"].as_str().unwrap(), control["id"].as_u64().unwrap()))
+        .collect();
+    let theirs: Vec<String> = sh(&format!("v4l2-ctl -d {CAMERA} -l"))
+        .lines()
+        .filter_map(|line| line.split_once(" ("))
+        .map(|(name, _)| name.split_whitespace().collect::<Vec<_>>().join(" "))
+        .collect();
+    assert!(theirs.len() > 40);
+    for control in &theirs {
+        assert!(ours.contains(control), "{control} is not among {ours:?}");
+    }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn options_set_controls() {
+    let _machine = Machine::new();
+    let ran = bokehcam("stream 0 --to null --frames 1 --effect none --control brightness=7 --control menu=4")
+        .output()
+        .unwrap();
+    super::machine::succeeded(&ran);
+    assert_eq!((told("brightness").as_str(), told("menu").as_str()), ("7", "4 (Menu Item 4)"));
+    let refused = bokehcam("stream 0 --to null --frames 1 --control brightness=999").output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(refused.status.code() == Some(1) && said.lines().count() == 1 && said.contains("use 0 to 255"), "{said}");
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_busy_camera_names_who_has_it() {
+    let _machine = Machine::new();
+    let mut other = Command::new("v4l2-ctl");
+    other.args(["-d", CAMERA, "--stream-mmap", "--stream-count=1000"]);
+    let other = Beside::start(other);
+    until("the other program has it", Duration::from_secs(10), || !holders(CAMERA.as_ref()).is_empty());
+    let refused = bokehcam("stream 0 --to null --frames 1").output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    let name = format!("v4l2-ctl (process {})", other.id());
+    assert!(refused.status.code() == Some(1) && said.lines().count() == 1 && said.contains(&name), "{said}");
+    let list = json("devices --json 0");
+    assert_eq!(list["cameras"][0]["holders"][0]["pid"], other.id());
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn the_doctor_knows_a_machine_that_is_ready_from_one_that_is_not() {
+    let _machine = Machine::new();
+    let ready = bokehcam("doctor").output().unwrap();
+    let said = String::from_utf8(ready.stdout).unwrap();
+    assert!(ready.status.success() && said.contains("/dev/video20 (bokehcam-test): free"), "{said}");
+    sh("rmmod v4l2loopback");
+    let without = bokehcam("doctor").output().unwrap();
+    let said = String::from_utf8(without.stdout).unwrap();
+    assert_eq!(without.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("MISSING") && said.contains("modprobe v4l2loopback") && said.contains("exclusive_caps=1"),
+        "{said}"
+    );
+}

@@ -1,0 +1,169 @@
+//! What goes wrong with cameras: each fault that the test camera can inject, counted or recovered from.
+
+use std::time::{Duration, Instant};
+
+use bokehcam::capture::v4l2::V4l2Camera;
+
+use super::machine::{BARS, CAMERA, Lost, Machine, Stream, VIRTUAL, distance_from, frame, open, sh, until, wish};
+
+const SIZE: (u32, u32) = (320, 180);
+
+fn camera() -> V4l2Camera {
+    open(CAMERA, wish(SIZE, 60.0, Some("YUYV".parse().unwrap())))
+}
+
+/// Reads so many frames, all of them good; gives what was lost.
+fn read(camera: &mut V4l2Camera, frames: usize) -> Lost {
+    let mut lost = Lost::default();
+    for _ in 0..frames {
+        let (image, before) = frame(camera);
+        lost.add(before);
+        assert!(distance_from(&image, &BARS, 3) <= 3);
+    }
+    lost
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn frames_that_the_driver_marks_as_damaged_are_counted_one_by_one() {
+    let machine = Machine::new();
+    let mut camera = camera();
+    let mut lost = read(&mut camera, 10);
+    for _ in 0..5 {
+        machine.control("inject_v4l2_buf_flag_error", "1");
+        lost.add(read(&mut camera, 5));
+    }
+    lost.add(read(&mut camera, 5));
+    assert_eq!(lost.corrupt, 5, "{lost:?}");
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn frames_that_the_driver_drops_are_counted() {
+    let machine = Machine::new();
+    machine.control("percentage_of_dropped_buffers", "40");
+    let mut camera = camera();
+    read(&mut camera, 5);
+    let began = Instant::now();
+    let lost = read(&mut camera, 120);
+    let due = began.elapsed().as_secs_f64() * 60.0;
+    let came = 120.0 + (lost.driver + lost.evicted) as f64;
+    // The clock and the counter agree on how many frames there were.
+    assert!((came / due - 1.0).abs() < 0.1, "{came} frames where {due} were due: {lost:?}");
+    let share = lost.driver as f64 / came;
+    assert!((0.25..0.6).contains(&share), "{share} dropped: {lost:?}");
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_buffer_that_is_refused_once_does_not_stop_the_stream() {
+    let machine = Machine::new();
+    let mut camera = camera();
+    read(&mut camera, 5);
+    for _ in 0..8 {
+        machine.control("inject_vidioc_qbuf_error", "1");
+        read(&mut camera, 5);
+    }
+    // More refusals than there are buffers: none may stay away.
+    let began = Instant::now();
+    read(&mut camera, 60);
+    assert!(began.elapsed() < Duration::from_millis(1500), "the full rate: {:?}", began.elapsed());
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_start_that_fails_once_is_tried_again_or_said() {
+    let machine = Machine::new();
+    for control in ["inject_vidioc_streamon_error", "inject_vidioc_reqbufs_error"] {
+        machine.control(control, "1");
+        let first = V4l2Camera::open(CAMERA, wish(SIZE, 60.0, None), Vec::new(), None);
+        let mut camera = match first {
+            Ok(camera) => camera,
+            Err(error) => {
+                let said = error.to_string();
+                assert!(
+                    said.contains(CAMERA) && said.contains("cannot be started") && said.lines().count() == 1,
+                    "{said}"
+                );
+                camera()
+            }
+        };
+        read(&mut camera, 10);
+    }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_start_that_fails_after_a_fault_is_tried_again() {
+    let machine = Machine::new();
+    let mut camera = camera();
+    read(&mut camera, 5);
+    for control in ["inject_vidioc_streamon_error", "inject_vidioc_reqbufs_error"] {
+        machine.control(control, "1");
+        machine.control("inject_fatal_streaming_error", "1");
+        let began = Instant::now();
+        // Those on the way are still good.
+        read(&mut camera, 30);
+        assert!(began.elapsed() < Duration::from_secs(6), "{control}: {:?}", began.elapsed());
+    }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_fatal_error_is_recovered_from() {
+    let machine = Machine::new();
+    let mut camera = camera();
+    for _ in 0..3 {
+        read(&mut camera, 5);
+        machine.control("inject_fatal_streaming_error", "1");
+        let began = Instant::now();
+        let lost = read(&mut camera, 20);
+        assert!(began.elapsed() < Duration::from_secs(4), "{:?}, {lost:?}", began.elapsed());
+    }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_camera_that_was_disconnected_comes_back() {
+    let machine = Machine::new();
+    let mut camera = camera();
+    for _ in 0..2 {
+        read(&mut camera, 5);
+        machine.control("disconnect", "1");
+        let began = Instant::now();
+        read(&mut camera, 20);
+        assert!(began.elapsed() < Duration::from_secs(6), "{:?}", began.elapsed());
+    }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn the_output_goes_on_while_the_camera_is_unplugged() {
+    let machine = Machine::new();
+    machine.at_30_fps();
+    let stream = Stream::show("0 --size 320x180 --fps 30 --effect none");
+    let mut reader = open(VIRTUAL, wish(SIZE, 30.0, Some("YUYV".parse().unwrap())));
+    until("the camera's picture", Duration::from_secs(10), || distance_from(&frame(&mut reader).0, &BARS, 4) <= 5);
+    for _ in 0..2 {
+        sh("echo vivid.0 > /sys/bus/platform/drivers/vivid/unbind");
+        until("the node is gone", Duration::from_secs(5), || !std::path::Path::new(CAMERA).exists());
+        let began = Instant::now();
+        let mut shown = 0;
+        while began.elapsed() < Duration::from_secs(2) {
+            assert!(distance_from(&frame(&mut reader).0, &BARS, 4) <= 5, "the last picture");
+            shown += 1;
+        }
+        assert!(shown >= 8, "{shown} pictures in 2 s");
+        sh("echo vivid.0 > /sys/bus/platform/drivers/vivid/bind");
+        // Other colours tell that the camera is back: the same bars would not.
+        until("the node is back", Duration::from_secs(5), || std::path::Path::new(CAMERA).exists());
+        machine.control("osd_text_mode", "None");
+        machine.control("test_pattern", "100% White");
+        let white = |image: &bokehcam::frame::ColorImage| image.rgb.iter().all(|code| *code > 240);
+        until("the camera's new picture", Duration::from_secs(6), || white(&frame(&mut reader).0));
+        machine.control("test_pattern", "75% Colorbar");
+        until("and the old one", Duration::from_secs(6), || distance_from(&frame(&mut reader).0, &BARS, 4) <= 5);
+    }
+    let report = stream.report(true);
+    assert!(report["repeats"].as_u64().unwrap() >= 8, "{report}");
+}

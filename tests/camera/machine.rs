@@ -1,0 +1,261 @@
+//! The machine's devices, loaded anew for each test, and what tests do with them.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+use bokehcam::capture::v4l2::V4l2Camera;
+use bokehcam::capture::{Camera, Captured};
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::v4l2::layout::Content;
+use bokehcam::v4l2::live::Wish;
+use bokehcam::v4l2::node::nodes;
+use bokehcam::v4l2::{Device, FourCc, controls};
+
+/// The camera.
+pub const CAMERA: &str = "/dev/video0";
+/// The virtual camera.
+pub const VIRTUAL: &str = "/dev/video20";
+/// The versions of v4l2loopback that there are: without events, with, and with the present rules.
+pub const VERSIONS: [&str; 3] = ["0.12.7", "0.13.2", "0.15.0"];
+
+/// One camera with two inputs: 0 is a webcam, 1 is HDMI, whose signal gives the rate.
+const VIVID: &str = "n_devs=1 node_types=0x1 num_inputs=2 input_types=0xc vid_cap_nr=0";
+
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// The devices, for one test at a time.
+pub struct Machine {
+    _alone: MutexGuard<'static, ()>,
+}
+
+impl Machine {
+    /// A camera, and a virtual camera of v4l2loopback 0.12.7.
+    pub fn new() -> Self {
+        Self::with(VIVID, VERSIONS[0])
+    }
+
+    /// A camera loaded with these arguments, and a virtual camera of this version.
+    pub fn with(vivid: &str, version: &str) -> Self {
+        assert!(std::env::var_os("BOKEHCAM_VM").is_some(), "not in the virtual machine: see tests/vm/run");
+        // A test that failed leaves nothing behind that the next one does not load anew.
+        let machine = Self { _alone: ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) };
+        unload("vivid");
+        sh(&format!("modprobe vivid {vivid}"));
+        machine.loopback(version);
+        let camera = Device::open(CAMERA.as_ref()).unwrap();
+        // Without text, which changes, all frames are equal.
+        controls::set(&camera, "osd_text_mode", "None").unwrap();
+        machine
+    }
+
+    /// Loads the virtual camera anew.
+    pub fn loopback(&self, version: &str) {
+        unload("v4l2loopback");
+        let arguments = "devices=1 video_nr=20 exclusive_caps=1 card_label=bokehcam-test";
+        sh(&format!("insmod /run/vm/v4l2loopback/{version}.ko {arguments}"));
+    }
+
+    /// Sets one of the camera's controls, from outside as it were.
+    pub fn control(&self, name: &str, value: &str) {
+        controls::set(&Device::open(CAMERA.as_ref()).unwrap(), name, value).unwrap();
+    }
+
+    /// Makes the camera one of 30 frames per second at any size.
+    pub fn at_30_fps(&self) {
+        sh(&format!("v4l2-ctl -d {CAMERA} -i 1 && v4l2-ctl -d {CAMERA} --set-dv-bt-timings index=5"));
+    }
+}
+
+fn unload(module: &str) {
+    let deadline = Instant::now() + Duration::from_secs(10);
+    while Path::new("/sys/module").join(module).exists() {
+        let done = Command::new("rmmod").arg(module).output().unwrap();
+        assert!(Instant::now() < deadline, "{module} stays loaded: {}", String::from_utf8_lossy(&done.stderr));
+        std::thread::sleep(Duration::from_millis(if done.status.success() { 0 } else { 100 }));
+    }
+}
+
+/// Runs a line of shell, which must succeed; gives its standard output.
+pub fn sh(line: &str) -> String {
+    let output = Command::new("sh").arg("-c").arg(line).stdin(Stdio::null()).output().unwrap();
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The program itself, without settings of anybody.
+pub fn bokehcam(arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    command.args(arguments.split_whitespace()).env("XDG_CONFIG_HOME", "/nowhere").stdin(Stdio::null());
+    command
+}
+
+/// A stream of the program's that runs beside the test.
+pub struct Stream(Beside);
+
+impl Stream {
+    /// Starts one.
+    pub fn start(arguments: &str) -> Self {
+        Self(Beside::start(bokehcam(&format!("stream {arguments} --force --report {REPORT}"))))
+    }
+
+    /// Starts one to the virtual camera, and waits until that shows something.
+    pub fn show(arguments: &str) -> Self {
+        let mut stream = Self::start(&format!("{arguments} --to {VIRTUAL}"));
+        until("the virtual camera shows something", Duration::from_secs(20), || {
+            assert!(stream.0.runs(), "it ended");
+            nodes().iter().any(|node| node.path == Path::new(VIRTUAL) && node.captures)
+        });
+        stream
+    }
+
+    /// Waits for its end, or ends it with Ctrl-C; it must have done well. Gives its report.
+    pub fn report(self, interrupted: bool) -> serde_json::Value {
+        let ended = if interrupted { self.0.interrupt() } else { self.0.end(Duration::from_secs(60)) };
+        succeeded(&ended);
+        let report: serde_json::Value = serde_json::from_slice(&fs::read(REPORT).unwrap()).unwrap();
+        let frames = &report["frames"];
+        let dropped: u64 = frames["dropped"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
+        let accounted = frames["delivered"].as_u64().unwrap() + dropped + frames["in_flight"].as_u64().unwrap();
+        assert_eq!(frames["captured"].as_u64().unwrap(), accounted, "{frames}");
+        report
+    }
+}
+
+const REPORT: &str = "/tmp/report.json";
+
+/// Fails the test unless the program did well.
+pub fn succeeded(ran: &Output) {
+    assert!(ran.status.success(), "{}: {}", ran.status, String::from_utf8_lossy(&ran.stderr));
+}
+
+/// A program that runs beside the test, and ends with it.
+pub struct Beside(Option<Child>);
+
+impl Beside {
+    /// Starts it.
+    pub fn start(mut command: Command) -> Self {
+        Self(Some(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()))
+    }
+
+    /// Its number.
+    pub fn id(&self) -> u32 {
+        self.0.as_ref().unwrap().id()
+    }
+
+    /// Whether it still runs.
+    pub fn runs(&mut self) -> bool {
+        self.0.as_mut().unwrap().try_wait().unwrap().is_none()
+    }
+
+    /// Waits for its end, which must come soon.
+    pub fn end(mut self, within: Duration) -> Output {
+        until("the program ends", within, || !self.runs());
+        self.0.take().unwrap().wait_with_output().unwrap()
+    }
+
+    /// Asks it to end, as Ctrl-C does, and waits for that.
+    pub fn interrupt(self) -> Output {
+        sh(&format!("kill -INT {}", self.id()));
+        self.end(Duration::from_secs(10))
+    }
+}
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.0.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// Waits until something is so.
+pub fn until(what: &str, within: Duration, mut is: impl FnMut() -> bool) -> Duration {
+    let began = Instant::now();
+    while !is() {
+        assert!(began.elapsed() < within, "not within {within:?}: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    began.elapsed()
+}
+
+/// What is asked of a camera.
+pub fn wish(size_px: (u32, u32), fps: f64, fourcc: Option<FourCc>) -> Wish {
+    Wish { size_px: Some(size_px), fps: Some(fps), fourcc, ..Wish::any(Content::Color) }
+}
+
+/// Opens a camera, in a mode that it has.
+pub fn open(node: &str, wish: Wish) -> V4l2Camera {
+    V4l2Camera::open(node, wish, Vec::new(), None).unwrap()
+}
+
+/// The next frame, and what was lost before it.
+pub fn frame(camera: &mut V4l2Camera) -> (ColorImage, Lost) {
+    let (mut color, mut lost) = (ColorImage::default(), Lost::default());
+    let deadline = Instant::now() + Duration::from_secs(10);
+    while Instant::now() < deadline {
+        match camera.next(&mut color, &mut DepthMap::default()).unwrap() {
+            Captured::Frame(_) => return (color, lost),
+            Captured::Lost(count, cause) => *lost.by(&format!("{cause:?}")) += count,
+            Captured::Waiting => lost.waits += 1,
+            other => panic!("{other:?}"),
+        }
+    }
+    panic!("no frame for 10 s");
+}
+
+/// Frames that were lost, by cause.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lost {
+    /// The driver had no buffer, or said so.
+    pub driver: u64,
+    /// A newer one was there.
+    pub evicted: u64,
+    /// Damaged.
+    pub corrupt: u64,
+    /// How often there was none.
+    pub waits: u64,
+}
+
+impl Lost {
+    fn by(&mut self, cause: &str) -> &mut u64 {
+        match cause {
+            "Driver" => &mut self.driver,
+            "Evicted" => &mut self.evicted,
+            "Corrupt" => &mut self.corrupt,
+            other => panic!("lost by {other}"),
+        }
+    }
+
+    /// Both together.
+    pub fn add(&mut self, other: Self) {
+        self.driver += other.driver;
+        self.evicted += other.evicted;
+        self.corrupt += other.corrupt;
+        self.waits += other.waits;
+    }
+}
+
+/// The camera's picture: eight bars of one width, at three quarters of full intensity.
+pub const BARS: [[u8; 3]; 8] =
+    [[191, 191, 191], [191, 191, 0], [0, 191, 191], [0, 191, 0], [191, 0, 191], [191, 0, 0], [0, 0, 191], [0, 0, 0]];
+
+/// How far a picture is from these bars, at most, in codes; `margin_px` around their edges does not count.
+pub fn distance_from(image: &ColorImage, bars: &[[u8; 3]; 8], margin_px: u32) -> u8 {
+    let width = image.size().0;
+    let mut most = 0;
+    for (k, pixel) in image.rgb.chunks_exact(3).enumerate() {
+        let x = k as u32 % width;
+        let bar = (x * 8 / width) as usize;
+        let (first, end) = (bar as u32 * width / 8, (bar as u32 + 1) * width / 8);
+        if x >= first + margin_px && x + margin_px < end {
+            for channel in 0..3 {
+                most = most.max(pixel[channel].abs_diff(bars[bar][channel]));
+            }
+        }
+    }
+    most
+}

@@ -1,0 +1,212 @@
+//! Into the virtual camera, and out of it by other programs.
+
+use std::fs;
+use std::process::Command;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+use bokehcam::frame::ColorImage;
+use bokehcam::sink::{Options, Target};
+use bokehcam::v4l2::FourCc;
+use bokehcam::v4l2::node::nodes;
+
+use super::machine::{
+    BARS, Beside, CAMERA, Lost, Machine, Stream, VERSIONS, VIRTUAL, distance_from, frame, open, sh, succeeded, until,
+    wish,
+};
+
+/// Through two conversions of colours.
+const STEP: u8 = 5;
+const MARGIN_PX: u32 = 4;
+
+fn yuyv() -> Option<FourCc> {
+    Some("YUYV".parse().unwrap())
+}
+
+/// How far the picture moved in each frame, by the place where the black bar ends and the white one begins.
+fn steps(frames: &[u8], (width, height): (usize, usize)) -> Vec<usize> {
+    let places: Vec<usize> = frames
+        .chunks_exact(2 * width * height)
+        .map(|frame| {
+            let luma: Vec<u8> = frame[..2 * width].iter().step_by(2).copied().collect();
+            (0..width).max_by_key(|&x| luma[(x + 1) % width].saturating_sub(luma[(x + width - 1) % width])).unwrap()
+        })
+        .collect();
+    places.windows(2).map(|pair| (pair[1] + width - pair[0]) % width).collect()
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn what_goes_in_at_30_frames_per_second_comes_out_for_other_programs() {
+    for size in [(640, 480), (1280, 720)] {
+        let machine = Machine::new();
+        machine.at_30_fps();
+        machine.control("horizontal_movement", "Move Right Fast");
+        let (width, height) = size;
+        let stream = Stream::show(&format!("0 --size {width}x{height} --fps 30 --effect none"));
+        let began = Instant::now();
+        sh(&format!(
+            "timeout 20 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-skip=5 --stream-count=60 --stream-to=/tmp/frames 2>&1"
+        ));
+        let took_s = began.elapsed().as_secs_f64();
+        let frames = fs::read("/tmp/frames").unwrap();
+        assert_eq!(frames.len(), 60 * 2 * width * height);
+        let steps = steps(&frames, (width, height));
+        let mut sorted = steps.clone();
+        sorted.sort_unstable();
+        let usual = sorted[sorted.len() / 2];
+        let even = steps.iter().filter(|step| step.abs_diff(usual) <= 1).count();
+        assert!(usual > 0 && even * 10 >= steps.len() * 9, "{width}x{height}: the picture moves by {steps:?}");
+        // 65 frames, and the time that the other program takes to start.
+        assert!((1.9..4.5).contains(&took_s), "{width}x{height}: {took_s} s for 65 frames");
+
+        machine.control("horizontal_movement", "No Movement");
+        sh(&format!(
+            "timeout 20 ffmpeg -v error -y -f v4l2 -i {VIRTUAL} -frames:v 20 -f rawvideo -pix_fmt rgb24 /tmp/frames"
+        ));
+        let frames = fs::read("/tmp/frames").unwrap();
+        assert_eq!(frames.len(), 20 * 3 * width * height);
+        let mut last = ColorImage::new(width as u32, height as u32);
+        last.rgb.copy_from_slice(&frames[19 * 3 * width * height..]);
+        // It moved before: the bars stand where they were stopped.
+        let shift = (0..width)
+            .max_by_key(|&x| last.rgb[3 * ((x + 1) % width)].saturating_sub(last.rgb[3 * ((x + width - 1) % width)]))
+            .unwrap();
+        for row in last.rgb.chunks_exact_mut(3 * width) {
+            row.rotate_left(3 * ((shift + 1) % width) / 6 * 6);
+        }
+        let step = distance_from(&last, &BARS, MARGIN_PX + 2);
+        assert!(step <= STEP, "{width}x{height}: {step} codes from what went in");
+
+        let report = stream.report(true);
+        let frames = &report["frames"];
+        let (captured, delivered) = (frames["captured"].as_f64().unwrap(), frames["delivered"].as_f64().unwrap());
+        assert!(delivered >= 0.9 * captured, "{frames}");
+        let rate = captured / report["elapsed_s"].as_f64().unwrap();
+        assert!((27.0..32.0).contains(&rate), "{rate} frames per second: {frames}");
+        assert_eq!(frames["dropped"]["corrupt"], 0, "{frames}");
+    }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_few_small_frames_are_blurred_on_the_way() {
+    let machine = Machine::new();
+    machine.at_30_fps();
+    let stream = Stream::show("0 --size 320x180 --fps 30 --effect blur --coc-at-infinity 6 --backend cpu");
+    let mut reader = open(VIRTUAL, wish((320, 180), 30.0, yuyv()));
+    let soft = |image: &ColorImage| {
+        // Between the yellow bar and the cyan one, red goes down over some pixels.
+        let red = |x: usize| image.rgb[3 * (90 * 320 + x)];
+        (30..160).contains(&red(80)) && red(68) > 170 && red(92) < 25
+    };
+    until("soft edges", Duration::from_secs(20), || soft(&frame(&mut reader).0));
+    let (image, _) = frame(&mut reader);
+    assert!(distance_from(&image, &BARS, 12) <= STEP + 1, "inside the bars nothing changes");
+    stream.report(true);
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn a_hundred_writers_come_and_go() {
+    let options = Options::new((64, 48), 33_333_333);
+    let mut picture = ColorImage::new(64, 48);
+    for version in VERSIONS {
+        let machine = Machine::new();
+        machine.loopback(version);
+        for turn in 0..100u8 {
+            picture.rgb.fill(2 * turn + 20);
+            let mut sink = Target::from_str(VIRTUAL)
+                .unwrap()
+                .open(&options)
+                .unwrap_or_else(|error| panic!("{version}, {turn}: {error}"));
+            let _ = sink.put(&picture).unwrap();
+            let mut reader = open(VIRTUAL, wish((64, 48), 30.0, yuyv()));
+            // What was written before may come first.
+            for tries in 0.. {
+                let _ = sink.put(&picture).unwrap();
+                let (seen, _) = frame(&mut reader);
+                if seen.rgb.iter().all(|code| code.abs_diff(2 * turn + 20) <= 2) {
+                    break;
+                }
+                assert!(tries < 10, "{version}, {turn}: the reader sees {:?}", &seen.rgb[..3]);
+            }
+            drop(reader);
+            sink.finish().unwrap();
+            let node = nodes().into_iter().find(|node| node.path.to_str() == Some(VIRTUAL)).unwrap();
+            assert!(node.outputs, "{version}, {turn}: it takes no more writers");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn readers_come_and_go() {
+    for version in [VERSIONS[0], VERSIONS[2]] {
+        let machine = Machine::new();
+        machine.loopback(version);
+        machine.at_30_fps();
+        let stream = Stream::show("0 --size 320x180 --fps 30 --effect none");
+        let mut read = Command::new("v4l2-ctl");
+        read.args(["-d", VIRTUAL, "--stream-mmap", "--stream-count=1000"]);
+        let mut lost = Lost::default();
+        for _ in 0..3 {
+            sh(&format!("timeout 20 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-count=10 2>&1"));
+            // Killed in the middle, as a browser is.
+            let killed = Beside::start(clone(&read));
+            std::thread::sleep(Duration::from_millis(600));
+            drop(killed);
+            let mut reader = open(VIRTUAL, wish((320, 180), 30.0, yuyv()));
+            for _ in 0..10 {
+                lost.add(frame(&mut reader).1);
+            }
+            assert!(distance_from(&frame(&mut reader).0, &BARS, MARGIN_PX) <= STEP, "{version}");
+        }
+        let report = stream.report(true);
+        let (captured, delivered) = (&report["frames"]["captured"], &report["frames"]["delivered"]);
+        assert!(delivered.as_f64().unwrap() >= 0.9 * captured.as_f64().unwrap(), "{}", report["frames"]);
+    }
+}
+
+fn clone(command: &Command) -> Command {
+    let mut other = Command::new(command.get_program());
+    other.args(command.get_args());
+    other
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn jpegs_of_a_camera_are_decoded() {
+    let _machine = Machine::new();
+    let mut bars = b"P6 640 480 255\n".to_vec();
+    bars.extend((0..640 * 480).flat_map(|k| BARS[k % 640 / 80]));
+    fs::write("/tmp/bars.ppm", bars).unwrap();
+    let mut ffmpeg = Command::new("ffmpeg");
+    let arguments = "-v error -re -loop 1 -framerate 30 -i /tmp/bars.ppm -c:v mjpeg -huffman default -pix_fmt yuvj422p -q:v 2 -f v4l2";
+    ffmpeg.args(arguments.split(' ')).arg(VIRTUAL);
+    let mut ffmpeg = Beside::start(ffmpeg);
+    until("ffmpeg writes", Duration::from_secs(20), || {
+        assert!(ffmpeg.runs());
+        nodes().iter().any(|node| node.path.to_str() == Some(VIRTUAL) && node.captures)
+    });
+    let mut camera = open(VIRTUAL, wish((640, 480), 30.0, Some("MJPG".parse().unwrap())));
+    let mut lost = Lost::default();
+    for _ in 0..30 {
+        let (image, before) = frame(&mut camera);
+        lost.add(before);
+        let step = distance_from(&image, &BARS, 4);
+        assert!(step <= 8, "{step} codes from what was encoded");
+    }
+    assert!(lost.corrupt <= 1, "all but perhaps the first, which may be an old one: {lost:?}");
+    drop(camera);
+    let ran = super::machine::bokehcam(&format!("stream {VIRTUAL} --format MJPG --effect none --frames 10 --to null"))
+        .output()
+        .unwrap();
+    succeeded(&ran);
+    assert!(resolve_is_real(), "the camera goes before the virtual one");
+}
+
+/// A name that fits both means the camera.
+fn resolve_is_real() -> bool {
+    bokehcam::v4l2::node::resolve("i").unwrap().to_str() == Some(CAMERA)
+}
