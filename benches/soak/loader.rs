@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 /// First argument of the other process.
 pub const ARGUMENT: &str = "--load-one-core";
 const BUSY: Duration = Duration::from_secs(10);
-const CYCLE: Duration = Duration::from_secs(20);
+/// From one busy phase to the next.
+pub const CYCLE: Duration = Duration::from_secs(20);
 
 /// The other process; it ends with this value, or with this process, however that ends.
 pub struct Loader(Child);

@@ -2,6 +2,7 @@
 
 use bokehcam::stats::Report;
 
+use crate::loader;
 use crate::stages::PERIOD_NS;
 
 /// From one picture to the next, for 99 of 100, in periods.
@@ -18,8 +19,10 @@ pub fn verdict(shown: &[(u64, u64)], report: &Report) -> bool {
     let mut intervals: Vec<f64> = shown.windows(2).map(|pair| ms(pair[1].0 - pair[0].0)).collect();
     let mut ages: Vec<f64> = shown.iter().map(|shown| ms(shown.1)).collect();
     let end_ns = shown.last().map_or(0, |last| last.0);
-    // A minute, or half of a shorter run.
-    let part_ns = MINUTE_NS.min(end_ns / 2);
+    // A minute, or up to half of a shorter run, in whole turns of the other process.
+    let half_ns = MINUTE_NS.min(end_ns / 2);
+    let turn_ns = loader::CYCLE.as_nanos() as u64;
+    let part_ns = if half_ns < turn_ns { half_ns } else { half_ns - half_ns % turn_ns };
     let median = |from_ns: u64, to_ns: u64| {
         let part = shown.iter().filter(|shown| (from_ns..=to_ns).contains(&shown.0));
         at(&mut part.map(|shown| ms(shown.1)).collect::<Vec<_>>(), 0.5)
