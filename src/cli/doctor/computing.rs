@@ -29,6 +29,7 @@ fn blur() -> Finding {
         rank: None,
         highlights: 0.0,
         quality: Quality::default(),
+        adaptive: false,
         far_max_px: 2.0,
         near_max_px: 0.0,
     };
