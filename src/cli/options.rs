@@ -158,7 +158,7 @@ pub struct Aperture {
 #[command(next_help_heading = "Computing")]
 pub struct Computing {
     /// Quality level: changes fidelity, never the amount of blur. auto follows the time there is (--budget-ms) where
-    /// frames come in real time, and is balanced elsewhere
+    /// frames come in real time, up to balanced on the CPU and best on a GPU; elsewhere it is balanced
     #[arg(long, value_name = "LEVEL", default_value = "auto", value_parser = level_or_auto())]
     pub quality: QualityChoice,
     /// What runs the blur

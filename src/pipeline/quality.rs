@@ -23,12 +23,15 @@ pub(super) struct Picker {
 }
 
 impl Picker {
-    /// Frames may take `budget_ns`; where they come every `period_ns` in real time, there is a deadline, too.
-    pub(super) fn new(rule: QualityRule, budget_ns: u64, period_ns: Option<u64>) -> Self {
+    /// Frames may take `budget_ns`; where they come every `period_ns` in real time, there is a deadline, too. None is
+    /// blurred more finely than `most` unless that was asked for.
+    pub(super) fn new(rule: QualityRule, most: Quality, budget_ns: u64, period_ns: Option<u64>) -> Self {
         let at = |quality: Quality| quality as usize;
         let (rungs, governor) = match rule {
             QualityRule::Fixed(quality) => (&Quality::ALL[at(quality)..=at(quality)], Governor::new(&[1.0], 0)),
-            QualityRule::Auto(start) => (&Quality::ALL[..], Governor::new(&COSTS, at(start))),
+            QualityRule::Auto(start) => {
+                (&Quality::ALL[..=at(most)], Governor::new(&COSTS[..=at(most)], at(start.min(most))))
+            }
         };
         let deadline_ns = period_ns.map(|period_ns| DEADLINE_PERIODS * period_ns * DEADLINE_TENTHS / 10);
         Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default() }
@@ -123,7 +126,8 @@ mod tests {
     fn the_deadline_leaves_less_time_where_frames_are_old_when_they_come() {
         let period_ns = 30 * MS;
         for (age_ns, expected) in [(10 * MS, Quality::Best), (30 * MS, Quality::Balanced), (70 * MS, Quality::Draft)] {
-            let mut picker = Picker::new(QualityRule::Auto(Quality::Balanced), period_ns, Some(period_ns));
+            let mut picker =
+                Picker::new(QualityRule::Auto(Quality::Balanced), Quality::Best, period_ns, Some(period_ns));
             for frame in 0..200 {
                 picker.begin(age_ns);
                 let quality = picker.quality();
@@ -137,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_fixed_quality_stays() {
-        let mut picker = Picker::new(QualityRule::Fixed(Quality::High), MS, Some(MS));
+        let mut picker = Picker::new(QualityRule::Fixed(Quality::High), Quality::Balanced, MS, Some(MS));
         (0..100).for_each(|frame| picker.note(Quality::High, 50 * MS, frame * MS));
         assert_eq!((picker.quality(), picker.expected_ns()), (Quality::High, 50 * MS));
     }
