@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use v4l::v4l_sys as sys;
 
@@ -18,6 +19,8 @@ use super::holders::{Holder, holders};
 pub const DRIVER: &str = "v4l2 loopback";
 
 const OUTPUT: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT;
+/// The module's control `keep_format`.
+const KEEP_FORMAT: u32 = sys::V4L2_CID_BASE | 0xf000;
 /// How long a write may wait for room; no version of the module has made one wait so far.
 const ROOM: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 
@@ -79,6 +82,16 @@ pub enum LoopbackError {
         height: u32,
         /// Who has it open.
         by: Vec<Holder>,
+    },
+    /// It takes no frames and gives none.
+    #[error(
+        "{} was left by its last writer in a state in which it takes no frames, a fault of v4l2loopback before 0.13: \
+         load the module anew with `{}`",
+        path.display(), modprobe(path)
+    )]
+    Stuck {
+        /// The node.
+        path: PathBuf,
     },
     /// The system refused.
     #[error("{}: {doing}: {cause}", path.display())]
@@ -221,6 +234,17 @@ impl Output {
         if text(&about.driver) != DRIVER {
             return Err(LoopbackError::NotLoopback { path: path.to_owned(), card });
         }
+        let can = |what: u32| about.device_caps & what != 0;
+        // A node with exclusive_caps no longer takes frames once it has a writer, unless its format is kept.
+        let has_writer = can(sys::V4L2_CAP_VIDEO_CAPTURE) && !can(sys::V4L2_CAP_VIDEO_OUTPUT) && !keeps_format(&device);
+        // Versions before 0.14 let others write as well, and without exclusive_caps do not even show that they do.
+        let locked = flock(&device, FlockOperation::NonBlockingLockExclusive);
+        if has_writer || locked.is_err_and(|error| error == Errno::WOULDBLOCK) {
+            return Err(LoopbackError::Taken { path: path.to_owned(), by: other_holders(path) });
+        }
+        if !can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_OUTPUT) {
+            return Err(LoopbackError::Stuck { path: path.to_owned() });
+        }
         let (layout, size) = set_format(&device, size)?;
         let mut parameters: sys::v4l2_streamparm = zeroed();
         parameters.type_ = OUTPUT;
@@ -320,7 +344,14 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
         xfer_func: sys::v4l2_xfer_func_V4L2_XFER_FUNC_SRGB,
     };
     let refused = |cause| busy_or(device, "its format cannot be set", cause);
-    device.set_format(&mut format).map_err(refused)?;
+    match device.set_format(&mut format) {
+        Err(error) if Errno::from_io_error(&error) == Some(Errno::BUSY) => {
+            // Versions 0.13 refuse what differs from a format that is fixed; whoever has a writer refuses this, too.
+            device.get_format(&mut format).map_err(refused)?;
+            device.set_format(&mut format).map_err(refused)?;
+        }
+        done => done.map_err(refused)?,
+    }
     // What setting gives back is not always what was set: some versions say the buffer's size instead of the frame's.
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = OUTPUT;
@@ -339,6 +370,12 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
             by: other_holders(device.path()),
         }),
     }
+}
+
+/// Whether the module's control of this name is set: the format then stays when nobody writes.
+fn keeps_format(device: &Device) -> bool {
+    let mut control = sys::v4l2_control { id: KEEP_FORMAT, value: 0 };
+    device.get_control(&mut control).is_ok() && control.value != 0
 }
 
 /// Why a node could not be opened.
