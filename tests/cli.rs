@@ -76,7 +76,7 @@ fn the_version_is_the_packages() {
 
 #[test]
 fn wrong_arguments_cost_one_line_and_exit_code_2() {
-    let cases: [(&[&str], &str); 20] = [
+    let cases: [(&[&str], &str); 27] = [
         (&["stream", "nowhere", "--to", "null"], "a folder with a recording, or synthetic"),
         (&["stream", "Cargo.toml", "--to", "null"], "a folder with a recording, or synthetic"),
         (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
@@ -84,6 +84,13 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
         (&["stream", "synthetic", "--to", "null", "--f-number", "2"], "--sensor-width"),
         (&["stream", "synthetic", "--to", "null", "--size", "640"], "1280x720"),
         (&["stream", "synthetic", "--to", "null", "--depth", "none", "--effect", "dof"], "--effect blur"),
+        (&["stream", "synthetic"], "--to"),
+        (&["stream", "synthetic", "--to", "-", "--to", "-"], "twice"),
+        (&["stream", "synthetic", "--to", "x/a.y4m", "--to", "null", "--to", "./x/a.y4m"], "twice"),
+        (&["stream", "synthetic", "--to", "/dev/null", "--to", "/dev/../dev/null"], "twice"),
+        (&["stream", "synthetic", "--to", "null", "--on-demand"], "--to /dev/videoN"),
+        (&["stream", "synthetic", "--to", "null", "--out-size", "640x480"], "--to /dev/videoN"),
+        (&["stream", "synthetic", "--to", "/dev/video99", "--out-size", "641x480"], "642"),
         (&["render", "x.png"], "--out"),
         (&["frobnicate"], "frobnicate"),
         (&["aperture"], "--out"),
@@ -314,6 +321,25 @@ fn y4m_on_standard_output_is_nothing_but_y4m() {
     let header_end = output.stdout.iter().position(|&byte| byte == b'\n').unwrap() + 1;
     assert!(output.stdout.starts_with(b"YUV4MPEG2 W64 H48 "));
     assert_eq!(output.stdout.len() - header_end, 3 * ("FRAME\n".len() + 64 * 48 * 3 / 2));
+}
+
+#[test]
+#[cfg(feature = "camera")]
+fn a_virtual_camera_that_is_not_there_is_refused_with_the_way_to_make_one() {
+    let refused = run(&["stream", "synthetic", "--size", "64x48", "--frames", "1", "--to", "/dev/video199"]);
+    assert_eq!((refused.code, refused.stdout.as_str(), refused.stderr.lines().count()), (1, "", 1));
+    assert!(refused.stderr.contains("sudo modprobe v4l2loopback devices=1 video_nr=199"), "{}", refused.stderr);
+}
+
+#[test]
+fn one_stream_goes_to_several_sinks() {
+    let home = tempfile::tempdir().unwrap();
+    let file = home.path().join("a.y4m");
+    let args = ["stream", "synthetic", "--size", "16x12", "--frames", "2", "--effect", "none", "--quiet", "--to", "-"];
+    let output = bokehcam(home.path(), &args).arg("--to").arg(&file).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.stdout.windows(6).filter(|bytes| bytes == b"FRAME\n").count(), 2);
+    assert_eq!(fs::read(&file).unwrap(), output.stdout);
 }
 
 #[test]

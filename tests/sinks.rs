@@ -79,6 +79,10 @@ fn names_become_sinks() {
         ("b.mp4", Target::Video("b.mp4".into())),
         ("b.mkv", Target::Video("b.mkv".into())),
         ("b.webm", Target::Video("b.webm".into())),
+        ("/dev/video10", Target::Device("/dev/video10".into())),
+        ("/dev/null", Target::Device("/dev/null".into())),
+        ("/dev/shm/out", Target::Folder("/dev/shm/out".into())),
+        ("/dev/video10.mp4", Target::Video("/dev/video10.mp4".into())),
     ] {
         assert_eq!(name.parse::<Target>().unwrap(), target);
     }
@@ -86,6 +90,64 @@ fn names_become_sinks() {
         let error = name.parse::<Target>().unwrap_err().to_string();
         assert!(error.contains(&format!("'{name}'")) && error.contains("FILE.y4m"), "{error}");
     }
+}
+
+#[test]
+fn a_device_has_many_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("camera");
+    std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+    let target: Target = link.to_str().unwrap().parse().unwrap();
+    assert_eq!(target, Target::Device(link.clone()));
+    assert!(target.is_device(Path::new("/dev/null")) && !target.is_device(Path::new("/dev/zero")));
+    assert!(target.collides_with(&Target::Device("/dev/null".into())));
+    assert!(!target.collides_with(&Target::Null) && !Target::Null.collides_with(&Target::Null));
+}
+
+/// Pictures go into a pipe one by one; each is whole at its other end before the next one comes.
+#[test]
+fn a_picture_is_not_held_back() {
+    let (mut reader, writer) = io::pipe().unwrap();
+    let mut stream = Y4m::new(writer, Path::new("pipe"), &options((16, 12)));
+    let mut bytes = [0; 1024];
+    for frame in 0..3 {
+        stream.write(&picture(16, 12, frame)).unwrap();
+        // Less than a pipe holds: all that was written is there, or it never comes.
+        let read = io::Read::read(&mut reader, &mut bytes).unwrap();
+        let whole = b"FRAME\n".len() + 16 * 12 * 3 / 2;
+        let header = bytes[..read].windows(6).position(|bytes| bytes == b"FRAME\n").unwrap();
+        assert_eq!(read - header, whole, "frame {frame}");
+    }
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_player_shows_pictures_as_they_come() {
+    // Decodes each picture as soon as it has it, and writes it on.
+    let mut player = Command::new("ffmpeg")
+        .args(["-v", "error", "-probesize", "32", "-analyzeduration", "0"])
+        .args(["-threads", "1", "-f", "yuv4mpegpipe", "-i", "pipe:0"])
+        .args(["-f", "rawvideo", "-flush_packets", "1", "pipe:1"])
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stream = Y4m::new(player.stdin.take().unwrap(), Path::new("player"), &options((64, 48)));
+    let mut shown = player.stdout.take().unwrap();
+    let mut picture_shown = vec![0; 64 * 48 * 3 / 2];
+    // It may keep a few in hand; what it does not have, it cannot show: the second half would never come.
+    const IN_HAND: u32 = 4;
+    for frame in 0..20 {
+        stream.write(&picture(64, 48, frame)).unwrap();
+        if frame >= IN_HAND {
+            io::Read::read_exact(&mut shown, &mut picture_shown).unwrap();
+        }
+    }
+    drop(stream);
+    let mut rest = Vec::new();
+    io::Read::read_to_end(&mut shown, &mut rest).unwrap();
+    assert_eq!(rest.len(), IN_HAND as usize * picture_shown.len());
+    assert!(player.wait().unwrap().success());
 }
 
 #[test]

@@ -89,6 +89,8 @@ impl Device {
         get_parameters: VIDIOC_G_PARM(sys::v4l2_streamparm);
         /// Sets the frame rate; the driver may change it.
         set_parameters: VIDIOC_S_PARM(sys::v4l2_streamparm);
+        /// The value of a control.
+        get_control: VIDIOC_G_CTRL(sys::v4l2_control);
         /// Asks for buffers; the driver says how many it gives.
         request_buffers: VIDIOC_REQBUFS(sys::v4l2_requestbuffers);
         /// What a control is, or the one after it.

@@ -1,15 +1,18 @@
 //! The module v4l2loopback: nodes that show to others, as a camera's, the frames that are written to them.
 
-use std::fmt;
-use std::fs;
+mod error;
+
 use std::io;
 use std::os::fd::AsFd;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use v4l::v4l_sys as sys;
+
+pub use self::error::{LoopbackError, modprobe, nodes};
 
 use super::device::{Device, zeroed};
 use super::holders::{Holder, holders};
@@ -18,123 +21,10 @@ use super::holders::{Holder, holders};
 pub use super::node::LOOPBACK_DRIVER as DRIVER;
 
 const OUTPUT: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT;
+/// The module's control `keep_format`.
+const KEEP_FORMAT: u32 = sys::V4L2_CID_BASE | 0xf000;
 /// How long a write may wait for room; no version of the module has made one wait so far.
 const ROOM: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
-
-/// Why a node takes no frames.
-#[derive(Debug, thiserror::Error)]
-pub enum LoopbackError {
-    /// There is no such node.
-    #[error("there is no {}: {}", path.display(), remedy(path))]
-    Missing {
-        /// The node.
-        path: PathBuf,
-    },
-    /// It is no node of Video4Linux.
-    #[error("{} is no video device: {}", path.display(), remedy(path))]
-    NoVideo {
-        /// The node.
-        path: PathBuf,
-    },
-    /// It belongs to another driver.
-    #[error("{} is '{card}', not a virtual camera: {}", path.display(), remedy(Path::new("")))]
-    NotLoopback {
-        /// The node.
-        path: PathBuf,
-        /// Name of the device.
-        card: String,
-    },
-    /// No right to open it.
-    #[error(
-        "{} may not be opened by you: join the group that owns it with `sudo usermod -aG video $USER`, \
-         and log in again",
-        path.display()
-    )]
-    Denied {
-        /// The node.
-        path: PathBuf,
-    },
-    /// Someone else writes to it, or as many have it open as may.
-    #[error("{} is in use{}: stop that, or take another virtual camera", path.display(), By(by))]
-    Taken {
-        /// The node.
-        path: PathBuf,
-        /// Who has it open.
-        by: Vec<Holder>,
-    },
-    /// Its format cannot be changed, and is none that can be written.
-    #[error(
-        "{} is fixed to {fourcc} of {width} x {height} pixels{}: stop that, or set it free with \
-         `v4l2-ctl -d {} -c keep_format=0`",
-        path.display(), By(by), path.display()
-    )]
-    Frozen {
-        /// The node.
-        path: PathBuf,
-        /// Its pixel format.
-        fourcc: String,
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-        /// Who has it open.
-        by: Vec<Holder>,
-    },
-    /// The system refused.
-    #[error("{}: {doing}: {cause}", path.display())]
-    System {
-        /// The node.
-        path: PathBuf,
-        /// What was tried.
-        doing: &'static str,
-        /// What the system said.
-        cause: io::Error,
-    },
-}
-
-/// ", by this and that", or nothing where nobody is known.
-struct By<'a>(&'a [Holder]);
-
-impl fmt::Display for By<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (at, holder) in self.0.iter().enumerate() {
-            write!(f, "{} {holder}", if at == 0 { " by" } else { "," })?;
-        }
-        Ok(())
-    }
-}
-
-/// The command that makes `path` a virtual camera; `/dev/video10` if it is no name of a node.
-pub fn modprobe(path: &Path) -> String {
-    let number = path.to_str().and_then(|path| path.strip_prefix("/dev/video")?.parse::<u32>().ok()).unwrap_or(10);
-    // The module takes its options when it is loaded.
-    let unload = if Path::new("/sys/module/v4l2loopback").exists() { "sudo modprobe -r v4l2loopback && " } else { "" };
-    format!(
-        "{unload}sudo modprobe v4l2loopback devices=1 video_nr={number} card_label=\"bokehcam\" exclusive_caps=1 \
-         max_buffers=4"
-    )
-}
-
-/// The module's nodes, by number: those with its own attributes in the system's tree, whether they can be opened or
-/// not.
-pub fn nodes() -> Vec<PathBuf> {
-    let entries = fs::read_dir("/sys/class/video4linux").into_iter().flatten().flatten();
-    let ours = entries.filter(|entry| entry.path().join("max_openers").exists());
-    let mut numbers: Vec<u32> =
-        ours.filter_map(|entry| entry.file_name().to_str()?.strip_prefix("video")?.parse().ok()).collect();
-    numbers.sort_unstable();
-    numbers.into_iter().map(|number| PathBuf::from(format!("/dev/video{number}"))).collect()
-}
-
-/// What gives a virtual camera to someone who has named `path`, which is none.
-fn remedy(path: &Path) -> String {
-    let there: Vec<String> = nodes().iter().map(|node| node.display().to_string()).collect();
-    match there.is_empty() {
-        true => format!("make a virtual camera with `{}`", modprobe(path)),
-        // Loading the module anew would take these away.
-        false => format!("use {}, or make others with `{}`", there.join(" or "), modprobe(path)),
-    }
-}
 
 /// Who has a node open besides this program.
 pub fn other_holders(path: &Path) -> Vec<Holder> {
@@ -220,6 +110,17 @@ impl Output {
         let card = text(&about.card);
         if text(&about.driver) != DRIVER {
             return Err(LoopbackError::NotLoopback { path: path.to_owned(), card });
+        }
+        let can = |what: u32| about.device_caps & what != 0;
+        // A node with exclusive_caps no longer takes frames once it has a writer, unless its format is kept.
+        let has_writer = can(sys::V4L2_CAP_VIDEO_CAPTURE) && !can(sys::V4L2_CAP_VIDEO_OUTPUT) && !keeps_format(&device);
+        // Versions before 0.14 let others write as well, and without exclusive_caps do not even show that they do.
+        let locked = flock(&device, FlockOperation::NonBlockingLockExclusive);
+        if has_writer || locked.is_err_and(|error| error == Errno::WOULDBLOCK) {
+            return Err(LoopbackError::Taken { path: path.to_owned(), by: other_holders(path) });
+        }
+        if !can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_OUTPUT) {
+            return Err(LoopbackError::Stuck { path: path.to_owned() });
         }
         let (layout, size) = set_format(&device, size)?;
         let mut parameters: sys::v4l2_streamparm = zeroed();
@@ -320,7 +221,14 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
         xfer_func: sys::v4l2_xfer_func_V4L2_XFER_FUNC_SRGB,
     };
     let refused = |cause| busy_or(device, "its format cannot be set", cause);
-    device.set_format(&mut format).map_err(refused)?;
+    match device.set_format(&mut format) {
+        Err(error) if Errno::from_io_error(&error) == Some(Errno::BUSY) => {
+            // Versions 0.13 refuse what differs from a format that is fixed; whoever has a writer refuses this, too.
+            device.get_format(&mut format).map_err(refused)?;
+            device.set_format(&mut format).map_err(refused)?;
+        }
+        done => done.map_err(refused)?,
+    }
     // What setting gives back is not always what was set: some versions say the buffer's size instead of the frame's.
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = OUTPUT;
@@ -339,6 +247,12 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
             by: other_holders(device.path()),
         }),
     }
+}
+
+/// Whether the module's control of this name is set: the format then stays when nobody writes.
+fn keeps_format(device: &Device) -> bool {
+    let mut control = sys::v4l2_control { id: KEEP_FORMAT, value: 0 };
+    device.get_control(&mut control).is_ok() && control.value != 0
 }
 
 /// Why a node could not be opened.
@@ -385,16 +299,6 @@ mod tests {
         }
         assert!(open("/dev/video199").contains("video_nr=199"));
         assert!(open("/dev/null").contains("no video device"));
-    }
-
-    #[test]
-    fn whoever_holds_a_node_is_named() {
-        let by = vec![Holder { pid: 7, name: "obs".into() }, Holder { pid: 8, name: "mpv".into() }];
-        let taken = LoopbackError::Taken { path: "/dev/video9".into(), by };
-        assert_eq!(
-            taken.to_string(),
-            "/dev/video9 is in use by obs (process 7), mpv (process 8): stop that, or take another virtual camera"
-        );
     }
 
     #[test]

@@ -4,4 +4,5 @@ mod accounting;
 mod fakes;
 mod faults;
 mod frames;
+mod live;
 mod replay;

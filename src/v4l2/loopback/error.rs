@@ -1,0 +1,148 @@
+//! What is wrong with a node, and what to do about it.
+
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::v4l2::holders::Holder;
+
+/// Why a node takes no frames.
+#[derive(Debug, thiserror::Error)]
+pub enum LoopbackError {
+    /// There is no such node.
+    #[error("there is no {}: {}", path.display(), remedy(path))]
+    Missing {
+        /// The node.
+        path: PathBuf,
+    },
+    /// It is no node of Video4Linux.
+    #[error("{} is no video device: {}", path.display(), remedy(path))]
+    NoVideo {
+        /// The node.
+        path: PathBuf,
+    },
+    /// It belongs to another driver.
+    #[error("{} is '{card}', not a virtual camera: {}", path.display(), remedy(Path::new("")))]
+    NotLoopback {
+        /// The node.
+        path: PathBuf,
+        /// Name of the device.
+        card: String,
+    },
+    /// No right to open it.
+    #[error(
+        "{} may not be opened by you: join the group that owns it with `sudo usermod -aG video $USER`, \
+         and log in again",
+        path.display()
+    )]
+    Denied {
+        /// The node.
+        path: PathBuf,
+    },
+    /// Someone else writes to it, or as many have it open as may.
+    #[error("{} is in use{}: stop that, or take another virtual camera", path.display(), By(by))]
+    Taken {
+        /// The node.
+        path: PathBuf,
+        /// Who has it open.
+        by: Vec<Holder>,
+    },
+    /// Its format cannot be changed, and is none that can be written.
+    #[error(
+        "{} is fixed to {fourcc} of {width} x {height} pixels{}: stop that, or set it free with \
+         `v4l2-ctl -d {} -c keep_format=0`",
+        path.display(), By(by), path.display()
+    )]
+    Frozen {
+        /// The node.
+        path: PathBuf,
+        /// Its pixel format.
+        fourcc: String,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Who has it open.
+        by: Vec<Holder>,
+    },
+    /// It takes no frames and gives none.
+    #[error(
+        "{} was left by its last writer in a state in which it takes no frames, a fault of v4l2loopback before 0.13: \
+         load the module anew with `{}`",
+        path.display(), modprobe(path)
+    )]
+    Stuck {
+        /// The node.
+        path: PathBuf,
+    },
+    /// The system refused.
+    #[error("{}: {doing}: {cause}", path.display())]
+    System {
+        /// The node.
+        path: PathBuf,
+        /// What was tried.
+        doing: &'static str,
+        /// What the system said.
+        cause: io::Error,
+    },
+}
+
+/// ", by this and that", or nothing where nobody is known.
+struct By<'a>(&'a [Holder]);
+
+impl fmt::Display for By<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, holder) in self.0.iter().enumerate() {
+            write!(f, "{} {holder}", if at == 0 { " by" } else { "," })?;
+        }
+        Ok(())
+    }
+}
+
+/// The command that makes `path` a virtual camera; `/dev/video10` if it is no name of a node.
+pub fn modprobe(path: &Path) -> String {
+    let number = path.to_str().and_then(|path| path.strip_prefix("/dev/video")?.parse::<u32>().ok()).unwrap_or(10);
+    // The module takes its options when it is loaded.
+    let unload = if Path::new("/sys/module/v4l2loopback").exists() { "sudo modprobe -r v4l2loopback && " } else { "" };
+    format!(
+        "{unload}sudo modprobe v4l2loopback devices=1 video_nr={number} card_label=\"bokehcam\" exclusive_caps=1 \
+         max_buffers=4"
+    )
+}
+
+/// The module's nodes, by number: those with its own attributes in the system's tree, whether they can be opened or
+/// not.
+pub fn nodes() -> Vec<PathBuf> {
+    let entries = fs::read_dir("/sys/class/video4linux").into_iter().flatten().flatten();
+    let ours = entries.filter(|entry| entry.path().join("max_openers").exists());
+    let mut numbers: Vec<u32> =
+        ours.filter_map(|entry| entry.file_name().to_str()?.strip_prefix("video")?.parse().ok()).collect();
+    numbers.sort_unstable();
+    numbers.into_iter().map(|number| PathBuf::from(format!("/dev/video{number}"))).collect()
+}
+
+/// What gives a virtual camera to someone who has named `path`, which is none.
+fn remedy(path: &Path) -> String {
+    let there: Vec<String> = nodes().iter().map(|node| node.display().to_string()).collect();
+    match there.is_empty() {
+        true => format!("make a virtual camera with `{}`", modprobe(path)),
+        // Loading the module anew would take these away.
+        false => format!("use {}, or make others with `{}`", there.join(" or "), modprobe(path)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_holds_a_node_is_named() {
+        let by = vec![Holder { pid: 7, name: "obs".into() }, Holder { pid: 8, name: "mpv".into() }];
+        let taken = LoopbackError::Taken { path: "/dev/video9".into(), by };
+        assert_eq!(
+            taken.to_string(),
+            "/dev/video9 is in use by obs (process 7), mpv (process 8): stop that, or take another virtual camera"
+        );
+    }
+}
