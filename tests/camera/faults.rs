@@ -50,8 +50,9 @@ fn frames_that_the_driver_drops_are_counted() {
     let came = 120.0 + (lost.driver + lost.evicted) as f64;
     // The clock and the counter agree on how many frames there were.
     assert!((came / due - 1.0).abs() < 0.1, "{came} frames where {due} were due: {lost:?}");
+    // The driver drops more where nobody is in time to give it buffers.
     let share = lost.driver as f64 / came;
-    assert!((0.25..0.6).contains(&share), "{share} dropped: {lost:?}");
+    assert!((0.3..0.9).contains(&share), "{share} dropped: {lost:?}");
 }
 
 #[test]
@@ -59,15 +60,19 @@ fn frames_that_the_driver_drops_are_counted() {
 fn a_buffer_that_is_refused_once_does_not_stop_the_stream() {
     let machine = Machine::new();
     let mut camera = camera();
-    read(&mut camera, 5);
+    let timed = |camera: &mut V4l2Camera| {
+        let began = Instant::now();
+        read(camera, 60);
+        began.elapsed().as_secs_f64()
+    };
+    let before_s = timed(&mut camera);
+    // More refusals than there are buffers: none may stay away.
     for _ in 0..8 {
         machine.control("inject_vidioc_qbuf_error", "1");
         read(&mut camera, 5);
     }
-    // More refusals than there are buffers: none may stay away.
-    let began = Instant::now();
-    read(&mut camera, 60);
-    assert!(began.elapsed() < Duration::from_millis(1500), "the full rate: {:?}", began.elapsed());
+    let after_s = timed(&mut camera);
+    assert!(after_s < 1.7 * before_s, "60 frames took {before_s} s before, and {after_s} s after");
 }
 
 #[test]

@@ -28,7 +28,8 @@ fn check(fourcc: FourCc) {
     assert!(first.rgb == second.rgb, "{name}: two frames of a picture that stands still");
     let luma_only = first.rgb.chunks_exact(3).all(|pixel| pixel[0] == pixel[1] && pixel[1] == pixel[2]);
     let greys = BARS.map(|[r, g, b]| {
-        let luma = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
+        // The driver's grey is that of BT.709.
+        let luma = 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
         [luma.round() as u8; 3]
     });
     let bars = if luma_only { &greys } else { &BARS };
