@@ -105,6 +105,26 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
 }
 
 #[test]
+#[cfg(feature = "camera")]
+fn what_a_camera_cannot_do_is_said_in_one_line() {
+    let cases: [(&[&str], i32, &str); 6] = [
+        (&["--pace", "asap"], 2, "leave --pace out"),
+        (&["--start", "1"], 2, "--loop are for recordings: a camera never ends"),
+        (&["--control", "exposure"], 2, "NAME=VALUE"),
+        (&["--format", "MJPEG"], 2, "such as MJPG"),
+        (&["--fps", "0"], 2, "from 0.1 to 1000"),
+        // A device, but no camera.
+        (&["--control", "a=1,b=2", "--format", "YUYV", "--size", "640x480"], 1, "/dev/null: this is no camera"),
+    ];
+    for (more, code, told) in cases {
+        let refused = run(&[&["stream", "/dev/null", "--to", "null"], more].concat());
+        assert_eq!((refused.code, refused.stdout.as_str()), (code, ""), "{more:?}: {}", refused.stderr);
+        assert!(refused.stderr.starts_with("error: ") && refused.stderr.contains(told), "{}", refused.stderr);
+        assert_eq!(refused.stderr.lines().count(), 1, "{}", refused.stderr);
+    }
+}
+
+#[test]
 fn a_flag_goes_before_the_environment_before_the_file_before_the_default() {
     let home = tempfile::tempdir().unwrap();
     let dump = |flags: &[&str], environment: bool| {

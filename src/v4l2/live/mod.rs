@@ -39,6 +39,8 @@ pub struct Live {
     light: Light,
     /// Not told yet.
     losses: Losses,
+    /// The first frame was asked for.
+    begun: bool,
     /// The current frame was given out.
     given: bool,
     /// What was said last about why there are no frames, so that it is said once.
@@ -115,6 +117,7 @@ impl Live {
             watchdog: Watchdog::new(agreed.interval.period_ns(), now_ns),
             light: Light::new(agreed.interval.fps(), now_ns),
             losses: Losses::default(),
+            begun: false,
             given: false,
             said: String::new(),
             searched_ns: now_ns,
@@ -145,6 +148,12 @@ impl Live {
         }
         match &mut self.state {
             State::Streaming(session) => {
+                if !std::mem::replace(&mut self.begun, true) {
+                    // Frames that came while the program got ready are nobody's loss.
+                    session.queue.begin();
+                    self.watchdog.started(self.clock.now_ns());
+                    self.light.restarted(self.clock.now_ns());
+                }
                 // One that waits because losses were told before it.
                 if session.queue.current().is_none() {
                     match session.queue.wait_newest(patience) {

@@ -312,6 +312,14 @@ impl<K: Kernel> Queue<K> {
         }
     }
 
+    /// Passes over all that is filled by now, without counting it; nor are frames counted that were dropped until now.
+    pub fn begin(&mut self) {
+        let _ = self.drain();
+        self.release();
+        self.sequence.restart();
+        self.losses = Losses::default();
+    }
+
     /// The frames lost since this was asked last.
     pub fn take_losses(&mut self) -> Losses {
         std::mem::take(&mut self.losses)

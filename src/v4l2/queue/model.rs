@@ -147,7 +147,7 @@ impl State {
     }
 
     /// The camera takes a picture, and fills a buffer if it has one.
-    fn shoot(&mut self) {
+    pub fn shoot(&mut self) {
         self.clock.advance_ns(PERIOD_NS);
         self.sequence += 1;
         if self.chance(self.chances.dropped) {

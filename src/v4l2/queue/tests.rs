@@ -102,6 +102,22 @@ fn a_frame_that_was_not_released_goes_back_and_counts() {
     assert!(model.is_clean());
 }
 
+#[test]
+fn what_came_before_the_beginning_is_not_counted() {
+    let clock = Clock::manual();
+    let model = Model::new(7, Chances::default(), clock.clone());
+    let mut queue = open(&model, &clock).unwrap();
+    queue.start().unwrap();
+    // All buffers are filled, and more frames than those are dropped.
+    for _ in 0..9 {
+        model.0.borrow_mut().shoot();
+    }
+    queue.begin();
+    assert!(queue.wait_newest(PATIENCE).unwrap());
+    let (before, losses) = (queue.current().unwrap().0.sequence, queue.take_losses());
+    assert!(before >= 9 && losses.missed == 0 && losses.stale <= 3, "{before} {losses:?}");
+}
+
 /// Runs a queue against a kernel that fails at random: opens, starts, reads, stops. The model panics where a rule is
 /// broken. Returns frames taken, what was lost, and how often each of these errors came.
 fn fuzz(seed: u64, chances: Chances, errors: &mut [u64; 256]) -> (u64, Losses, Facts) {
