@@ -54,9 +54,17 @@ pub fn beside(
 fn device(name: &str, depth: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, CliError> {
     use super::{calibration, defaults};
     use crate::depth::live::{LiveDepth, Units};
+    use crate::v4l2::live::OpenError;
     let registration = depth.depth_calibration.as_deref().map(calibration::load).transpose()?;
     let units = Units { per_m: depth.depth_scale.unwrap_or(defaults::LIVE_DEPTH_SCALE), invalid: depth.depth_invalid };
-    Ok(Box::new(LiveDepth::open(name, units, registration, clock.clone())?))
+    match LiveDepth::open(name, units, registration, clock.clone()) {
+        Ok(camera) => Ok(Box::new(camera)),
+        // A slip of the pen, as like as not.
+        Err(error @ OpenError::Name(_)) => Err(CliError::Usage(format!(
+            "--depth {name}: {error}; or use auto, recorded, none or a folder with a recording"
+        ))),
+        Err(error) => Err(error.into()),
+    }
 }
 
 #[cfg(not(feature = "camera"))]
