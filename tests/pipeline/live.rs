@@ -10,7 +10,7 @@ use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::link::demand::{Demand, Watch};
-use bokehcam::pipeline::{Pace, Run, run};
+use bokehcam::pipeline::{Pace, QualityRule, Run, run};
 use bokehcam::sink::{Sink, SinkError};
 
 use crate::fakes::{PERIOD_NS, SIZE, dof};
@@ -101,7 +101,7 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
         camera: Box::new(Sleeper { opened: Arc::clone(&opened), open: false, index: 0 }),
         depth: None,
         bokeh: None,
-        quality: Quality::Fast,
+        quality: QualityRule::Fixed(Quality::Fast),
         coc: dof(),
         refine: false,
         sink: Box::new(Screen { demand: demand.clone(), watch: None, shown: 0, phases: Arc::clone(&phases) }),
