@@ -35,6 +35,11 @@ pub trait Camera: Send {
         0
     }
 
+    /// How long the last call of [`Camera::next`] waited for the frame to come, in nanoseconds.
+    fn waited_ns(&self) -> u64 {
+        0
+    }
+
     /// Nobody watches: lets go of the device, if there is one, until [`Camera::next`] is called again.
     fn rest(&mut self) {}
 }

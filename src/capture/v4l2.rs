@@ -13,6 +13,8 @@ use crate::v4l2::queue::Losses;
 /// are fitted into the first.
 pub struct V4l2Camera {
     live: Live,
+    clock: Clock,
+    waited_ns: u64,
     decoder: Decoder,
     info: SourceInfo,
     /// Where pictures of another size are decoded.
@@ -33,7 +35,8 @@ impl V4l2Camera {
     /// # Errors
     /// There is none, or it cannot be used.
     pub fn open(name: &str, wish: Wish, settings: Vec<Setting>, frames: Option<u64>) -> Result<Self, CaptureError> {
-        let live = Live::open(name, wish, settings, Clock::system())?;
+        let clock = Clock::system();
+        let live = Live::open(name, wish, settings, clock.clone())?;
         let layout = *live.layout();
         let decoder =
             Decoder::new(&layout).map_err(|source| CaptureError::NoColor { camera: live.name().to_owned(), source })?;
@@ -47,6 +50,8 @@ impl V4l2Camera {
         };
         Ok(Self {
             live,
+            clock,
+            waited_ns: 0,
             decoder,
             info,
             scratch: ColorImage::default(),
@@ -110,7 +115,10 @@ impl Camera for V4l2Camera {
         if self.info.frames.is_some_and(|frames| self.given >= frames) {
             return Ok(Captured::End);
         }
-        let captured_ns = match self.live.next(PATIENCE) {
+        let began_ns = self.clock.now_ns();
+        let next = self.live.next(PATIENCE);
+        self.waited_ns = self.clock.now_ns() - began_ns;
+        let captured_ns = match next {
             Next::Frame { captured_ns } => captured_ns,
             Next::Lost(losses) => {
                 self.losses = losses;
@@ -130,6 +138,10 @@ impl Camera for V4l2Camera {
             time_ns: self.times.since_first_ns(captured_ns),
             captured_ns: Some(captured_ns),
         }))
+    }
+
+    fn waited_ns(&self) -> u64 {
+        self.waited_ns
     }
 
     fn rest(&mut self) {

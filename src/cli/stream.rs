@@ -88,6 +88,15 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
     };
     let sink = sinks::open(&command.to, &sink_options)?;
 
+    if info.live && !global.quiet {
+        terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
+        if command.blur.effect.is_none() && !source.has_depth() {
+            terminal::say(
+                "there is no depth, so the whole picture is blurred: --depth NAME takes a depth camera's, --effect \
+                 tilt-shift keeps a band sharp",
+            );
+        }
+    }
     let stop = terminal::stop_flag()?;
     let bar = terminal::Progress::new(info.frames, global);
     let ended = pipeline::run(Run {

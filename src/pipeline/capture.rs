@@ -52,7 +52,7 @@ impl Stage<'_> {
             let began_ns = self.clock.now_ns();
             match self.camera.next(&mut color, depth.as_deref_mut().unwrap_or(&mut no_depth))? {
                 Captured::Frame(stamp) => {
-                    let read_ns = self.clock.now_ns() - began_ns;
+                    let read_ns = (self.clock.now_ns() - began_ns).saturating_sub(self.camera.waited_ns());
                     self.times.add(read_ns);
                     let captured_ns = match stamp.captured_ns {
                         Some(captured_ns) => captured_ns,

@@ -231,7 +231,7 @@ impl Live {
         let losses = session.queue.take_losses();
         add(&mut self.losses, losses);
         if let Some(trouble) = self.watchdog.frame(now_ns) {
-            tracing::info!("{}: frames again after {:.1} s", self.name, trouble.as_secs_f64());
+            tracing::warn!("{}: frames again after {:.1} s", self.name, trouble.as_secs_f64());
         }
         self.said.clear();
         // What another program writes has the rate that it has.
