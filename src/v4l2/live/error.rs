@@ -126,6 +126,11 @@ impl OpenError {
         }
     }
 
+    /// Whether it may be otherwise in a moment: another program lets go of it, or a driver comes to itself.
+    pub fn may_pass(&self) -> bool {
+        matches!(self, Self::Busy { .. } | Self::Queue { .. } | Self::Io { .. })
+    }
+
     /// Whether the device is not there: it may come back.
     pub fn is_gone(&self) -> bool {
         matches!(self, Self::Gone(_) | Self::Name(_))
@@ -138,12 +143,9 @@ pub fn is_gone(error: &QueueError) -> bool {
 }
 
 fn held_by(holders: &[Holder]) -> String {
-    let own = std::process::id();
-    let name = |holder: &Holder| match holder.pid {
-        pid if pid == own => "this program itself".to_owned(),
-        _ => holder.to_string(),
-    };
-    let names: Vec<String> = holders.iter().map(name).collect();
+    // This program has it open as well, to find out.
+    let others = holders.iter().filter(|holder| holder.pid != std::process::id());
+    let names: Vec<String> = others.map(ToString::to_string).collect();
     match names.as_slice() {
         [] => "; another user's program uses it (sudo fuser -v names it)".to_owned(),
         names => format!(": {} has it open; close that first", names.join(", ")),
@@ -176,7 +178,7 @@ mod tests {
     fn a_holder_is_named() {
         let holder = |pid| Holder { pid, name: "zoom".into() };
         assert_eq!(held_by(&[holder(1)]), ": zoom (process 1) has it open; close that first");
-        assert!(held_by(&[holder(std::process::id())]).contains("this program itself"));
-        assert!(held_by(&[]).contains("another user"));
+        assert_eq!(held_by(&[holder(std::process::id()), holder(1)]), held_by(&[holder(1)]));
+        assert!(held_by(&[holder(std::process::id())]).contains("another user"));
     }
 }

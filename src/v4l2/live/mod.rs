@@ -79,9 +79,9 @@ const LOOK_NS: u64 = 150_000_000;
 const SEARCH_NS: u64 = 1_000_000_000;
 /// After an error the driver gets so long to come to itself.
 const ERROR_NAP_NS: u64 = 5_000_000;
-/// Whoever closes a camera may take so long.
-const BUSY_TRIES: u32 = 5;
-const BUSY_NAP_NS: u64 = 200_000_000;
+/// How often a camera is tried at the start, and how long between: whoever closes it may take a while.
+const TRIES: u32 = 5;
+const TRY_NAP_NS: u64 = 200_000_000;
 /// A driver's time that is further from now is no time of ours.
 const CREDIBLE_AGE_NS: u64 = 5_000_000_000;
 
@@ -90,15 +90,16 @@ impl Live {
     /// `settings` and starts it.
     ///
     /// # Errors
-    /// There is none, or it cannot be used; a busy one was given a second.
+    /// There is none, or it cannot be used; one that is busy or fails was given a second.
     pub fn open(name: &str, wish: Wish, settings: Vec<Setting>, clock: Clock) -> Result<Self, OpenError> {
         let path = node::resolve(name)?;
         let mut tries = 1;
         let session = loop {
             match Session::open(&path, &wish, &settings, None, &clock) {
-                Err(OpenError::Busy { .. }) if tries < BUSY_TRIES => {
+                Err(error) if error.may_pass() && tries < TRIES => {
+                    tracing::debug!("{error}; trying again");
                     tries += 1;
-                    clock.sleep_until_ns(clock.now_ns() + BUSY_NAP_NS);
+                    clock.sleep_until_ns(clock.now_ns() + TRY_NAP_NS);
                 }
                 opened => break opened?,
             }

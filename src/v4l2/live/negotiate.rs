@@ -1,5 +1,7 @@
 //! Which of a camera's modes to take: by what its cable carries, not by taste.
 
+use std::cmp::Ordering;
+
 use crate::v4l2::FourCc;
 use crate::v4l2::layout::{Content, Family};
 use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Sizes};
@@ -102,14 +104,16 @@ pub fn ranked(modes: &[FormatModes], wish: &Wish, wire: Wire) -> Result<Vec<Choi
             },
         });
     }
-    best.sort_by(|(a, _), (b, _)| {
-        a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
-    });
+    best.sort_by(|(a, _), (b, _)| compare(a, b));
     Ok(best.into_iter().map(|(_, choice)| choice).collect())
 }
 
 /// What a mode lacks, what matters most first: the least is the best.
 type Rank = [f64; 6];
+
+fn compare(a: &Rank, b: &Rank) -> Ordering {
+    a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+}
 
 /// The mode of a format that is nearest to the wish.
 fn best_mode(format: &FormatModes, wish: &Wish, wire: Wire) -> Option<(Rank, Choice)> {
@@ -128,9 +132,7 @@ fn best_mode(format: &FormatModes, wish: &Wish, wire: Wire) -> Option<(Rank, Cho
         }
     };
     let ranked = modes.into_iter().map(|(size_px, rates)| rank(format, size_px, rates, wanted_px, wish, wire));
-    ranked.min_by(|(a, _), (b, _)| {
-        a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
-    })
+    ranked.min_by(|(a, _), (b, _)| compare(a, b))
 }
 
 fn rank(
