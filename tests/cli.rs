@@ -239,6 +239,28 @@ fn a_recording_becomes_pictures_and_a_report_that_adds_up() {
 }
 
 #[test]
+fn depth_can_come_from_another_recording() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let stream = |flags: &[&str]| -> Ran {
+        let args = ["stream", &recording, "--backend", "cpu", "--to", "null"];
+        bokehcam(home.path(), &[&args, flags].concat()).output().unwrap().into()
+    };
+    let ran = stream(&["--depth", &recording]);
+    assert!(ran.code == 0 && ran.stderr.starts_with("3 of 3 frames delivered"), "{}", ran.stderr);
+    for (flags, said) in [
+        (&["--depth", &recording, "--effect", "blur"][..], "only --effect dof"),
+        (&["--depth-calibration", "c.toml"], "--depth-calibration is for a depth camera"),
+    ] {
+        let ran = stream(flags);
+        assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
+    }
+    let ran = stream(&["--depth", "no such camera"]);
+    assert!(ran.code != 0 && ran.stderr.starts_with("error: --depth"), "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+}
+
+#[test]
 fn effect_none_passes_frames_through_and_mirror_turns_them() {
     let home = tempfile::tempdir().unwrap();
     let recording = recording(home.path());

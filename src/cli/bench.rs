@@ -130,6 +130,9 @@ fn measure(
     quality: Quality,
     executor: &Executor,
 ) -> Result<Measured, CliError> {
+    if command.blur.depth.is_elsewhere() {
+        return Err(CliError::Usage("--depth FOLDER or a depth camera are for `stream`".to_string()));
+    }
     let options = options::Blur { coc_at_infinity: Some(coc_px), ..command.blur.clone() };
     let blur = Blur::resolve(&options, &command.aperture, quality, true)?;
     let size = color.size();

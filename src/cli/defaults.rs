@@ -18,6 +18,9 @@ pub const APERTURE: &str = "disc";
 pub const TILT: &str = "0.55:0.15:0";
 /// Units of a 16-bit depth picture per metre: the TUM convention.
 pub const DEPTH_SCALE: f32 = 5000.0;
+/// The same of depth cameras, most of which give millimetres.
+#[cfg(feature = "camera")]
+pub const LIVE_DEPTH_SCALE: f32 = 1000.0;
 /// Value of a depth picture that means unknown.
 pub const DEPTH_INVALID: &str = "0";
 /// Picture size of the synthetic scene.

@@ -72,6 +72,10 @@ pub enum CliError {
     /// There is no depth.
     #[error(transparent)]
     Depth(#[from] DepthError),
+    /// The depth camera cannot be opened.
+    #[cfg(feature = "camera")]
+    #[error("--depth: {0}")]
+    DepthCamera(#[from] crate::v4l2::live::OpenError),
     /// The output failed.
     #[error(transparent)]
     Sink(#[from] SinkError),

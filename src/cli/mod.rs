@@ -4,10 +4,13 @@ mod aperture;
 mod aperture_plot;
 mod aperture_sheet;
 mod bench;
+#[cfg(feature = "camera")]
+mod calibration;
 mod config;
 mod debug;
 mod debug_pictures;
 mod defaults;
+mod depth;
 mod devices;
 mod doctor;
 mod dump;

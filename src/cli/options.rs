@@ -70,12 +70,24 @@ pub struct Source {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Depth")]
 pub struct Depth {
-    /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000)
-    #[arg(long, value_name = "UNITS", default_value_t = defaults::DEPTH_SCALE, value_parser = above_zero)]
-    pub depth_scale: f32,
+    /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000; 1000 from a camera]
+    #[arg(long, value_name = "UNITS", value_parser = above_zero)]
+    pub depth_scale: Option<f32>,
     /// Value of a depth picture that means unknown
     #[arg(long, value_name = "VALUE", default_value = defaults::DEPTH_INVALID)]
     pub depth_invalid: u16,
+    /// How a depth camera stands beside the colour camera: TOML with the tables [depth] and [color] (width, height, fx,
+    /// fy, cx, cy, in pixels) and [depth-to-color] (rotation: 9 numbers row by row; translation_m: 3 numbers)
+    /// [default: both see the same]
+    #[arg(long, value_name = "FILE.toml")]
+    pub depth_calibration: Option<PathBuf>,
+}
+
+impl Depth {
+    /// Units per metre of depth pictures in files.
+    pub fn file_scale(&self) -> f32 {
+        self.depth_scale.unwrap_or(defaults::DEPTH_SCALE)
+    }
 }
 
 /// What the blur does.
@@ -88,8 +100,9 @@ pub struct Blur {
     /// How dof is composited
     #[arg(long, value_enum, value_name = "HOW", default_value = "layered")]
     pub method: Method,
-    /// Where depth comes from
-    #[arg(long, value_enum, value_name = "FROM", default_value = "auto")]
+    /// Where depth comes from: auto (the source's, when the effect needs it), recorded (the source's), none, a folder
+    /// with a recording whose depth is played in a loop, or a depth camera (/dev/videoN, N, or part of its name)
+    #[arg(long, value_name = "FROM", default_value = "auto")]
     pub depth: DepthChoice,
     /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker
     #[arg(long, value_enum, value_name = "WHEN", default_value = "auto")]

@@ -57,9 +57,13 @@ pub struct RenderCommand {
 pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
+    if command.blur.depth.is_elsewhere() {
+        let what = "--depth FOLDER or a depth camera are for `stream`: give a picture's depth with --depth-map";
+        return Err(CliError::Usage(what.to_string()));
+    }
     let color = still::read_color(&command.image)?;
     let read_depth =
-        |file: &PathBuf| still::read_depth(file, command.depth.depth_scale, Some(command.depth.depth_invalid));
+        |file: &PathBuf| still::read_depth(file, command.depth.file_scale(), Some(command.depth.depth_invalid));
     let depth = command.depth_map.as_ref().map(read_depth).transpose()?;
     let blur = Blur::resolve(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
     let executor = Executor::of(&command.computing);

@@ -132,7 +132,7 @@ impl Source {
             }
             SourceName::Folder(folder) => {
                 let options = Options {
-                    depth_scale: depth.depth_scale,
+                    depth_scale: depth.file_scale(),
                     depth_invalid: Some(depth.depth_invalid),
                     keep_going,
                     ..Options::default()

@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::Args;
 
 use super::config::{Blur, Executor};
+use super::depth;
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_whole};
 use super::source::{Source, SourceName};
@@ -64,6 +65,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         return Err(CliError::Usage(what.to_string()));
     }
     let source = Source::open(&command.source, &command.frames, &command.depth, stream.keep_going)?;
+    let source = depth::beside(source, &command.blur, &command.depth, stream.keep_going, &Clock::system())?;
     let info = source.camera.info();
     let measured = source.depth.is_some();
     let blur = Blur::resolve(&command.blur, &command.aperture, command.computing.quality, source.has_depth())?;

@@ -1,7 +1,7 @@
 //! Values of options that are more than a number: how they are written, read and checked.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -34,14 +34,39 @@ pub enum Method {
 }
 
 /// Where depth comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DepthChoice {
-    /// The recording's, when the effect needs it
+    /// The source's, when the effect needs it.
     Auto,
-    /// The recording's
+    /// The source's.
     Recorded,
-    /// None: for the effects that need none
+    /// None: for the effects that need none.
     None,
+    /// The depth of the recording in this folder.
+    Folder(PathBuf),
+    /// A depth camera, by its path or name.
+    Device(String),
+}
+
+impl DepthChoice {
+    /// Whether it names depth that is not the source's own.
+    pub fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Folder(_) | Self::Device(_))
+    }
+}
+
+impl FromStr for DepthChoice {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            "recorded" => Self::Recorded,
+            "none" => Self::None,
+            "" => return Err("use auto, recorded, none, a folder with a recording, or a depth camera".to_string()),
+            folder if Path::new(folder).is_dir() => Self::Folder(folder.into()),
+            device => Self::Device(device.to_owned()),
+        })
+    }
 }
 
 /// Whether depth is refined before the blur.

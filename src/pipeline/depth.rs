@@ -1,17 +1,22 @@
 //! Second stage: gives each frame its depth and its CoC.
 
+use std::time::Duration;
+
 use super::capture::Shot;
 use super::{CocAtInfinity, CocRule, Ended, Fault, Frame, hand_on};
 use crate::clock::Clock;
-use crate::depth::DepthSource;
 use crate::depth::fill::Filler;
 use crate::depth::focus::Focus;
 use crate::depth::refine::Refiner;
+use crate::depth::{DepthError, DepthSource};
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::{Pool, Pooled};
-use crate::link::{Receiver, Sender};
+use crate::link::{Received, Receiver, Sender};
 use crate::optics::CocField;
 use crate::stats::{Cause, Histogram, Tally};
+
+/// Without a frame for so long, nobody watches: a depth camera may rest.
+const IDLE: Duration = Duration::from_secs(3);
 
 /// All that the blur needs of a frame.
 pub(super) struct Ready {
@@ -79,7 +84,17 @@ impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
         let mut coc = Coc::new(self.coc, self.refine);
         let mut complained = false;
-        while let Some(Frame { ticket, stamp, item: Shot { color, depth } }) = from.recv() {
+        loop {
+            let Frame { ticket, stamp, item: Shot { color, depth } } = match from.recv_timeout(IDLE) {
+                Received::Item(frame) => frame,
+                Received::Ended => break,
+                Received::Nothing => {
+                    if let Some(source) = &mut self.source {
+                        source.rest();
+                    }
+                    continue;
+                }
+            };
             let (depth, coc) = match &mut coc {
                 Coc::Fixed(field) => (None, *field),
                 Coc::Depth(coc) => {
@@ -87,9 +102,13 @@ impl Stage<'_> {
                     let mut map = match depth.map_or_else(|| self.read(stamp), Ok) {
                         Ok(map) => map,
                         Err(fault) => {
-                            let corrupt = matches!(fault, Fault::Depth(_));
-                            self.tally.dropped(ticket, if corrupt { Cause::Corrupt } else { Cause::Failed });
-                            if !corrupt || !self.keep_going {
+                            let (cause, goes_on) = match &fault {
+                                Fault::Depth(DepthError::Unpaired { .. }) => (Cause::Unpaired, true),
+                                Fault::Depth(_) => (Cause::Corrupt, self.keep_going),
+                                _ => (Cause::Failed, false),
+                            };
+                            self.tally.dropped(ticket, cause);
+                            if !goes_on {
                                 return Err(fault);
                             }
                             if !complained {

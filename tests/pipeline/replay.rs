@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 use bokehcam::capture::replay::{Part, Replay};
 use bokehcam::capture::synthetic::{Format, Synthetic};
 use bokehcam::capture::{Camera, CaptureError, Captured};
+use bokehcam::depth::beside::Beside;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::depth::{DepthError, DepthSource};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
@@ -148,6 +149,59 @@ fn recorded_depth_is_that_of_the_frame() {
     record(without.path(), false);
     let error = Recorded::new(open(without.path()), "test recording").err().unwrap();
     assert!(matches!(&error, DepthError::NoDepth { .. }) && error.to_string().contains("test recording"), "{error}");
+}
+
+#[test]
+fn depth_beside_other_colours_follows_their_time_in_a_loop() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), true);
+    let recording = Recording::open(folder.path(), &Options::default()).unwrap();
+    let mut depth = Beside::new(recording, "test recording").unwrap();
+    let mut map = DepthMap::default();
+    // A lap lasts 400 ms; the camera counts its frames as it likes.
+    for (time_ms, frame) in [(0, 0), (39, 0), (40, 1), (41, 1), (399, 9), (400, 0), (850, 1), (40_000_120, 3), (0, 0)] {
+        depth.read(Stamp { index: 77, time_ns: time_ms * 1_000_000, captured_ns: Some(5) }, &mut map).unwrap();
+        assert_eq!(map.size(), SIZE);
+        assert!(map.metres.iter().all(|&z_m| (z_m - 1.0 - 0.1 * frame as f32).abs() < 1e-3), "{time_ms} ms");
+    }
+    let without = tempfile::tempdir().unwrap();
+    record(without.path(), false);
+    let recording = Recording::open(without.path(), &Options::default()).unwrap();
+    assert!(matches!(Beside::new(recording, "test recording"), Err(DepthError::NoDepth { .. })));
+}
+
+/// A depth camera whose first map comes late.
+struct Late(usize);
+
+impl DepthSource for Late {
+    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+        if stamp.index < self.0 {
+            return Err(DepthError::Unpaired { source_name: "a depth camera".to_owned() });
+        }
+        map.resize(SIZE.0, SIZE.1);
+        map.metres.fill(1.0);
+        Ok(())
+    }
+}
+
+#[test]
+fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    let stop = AtomicBool::new(false);
+    let camera = replay(folder.path(), Part::default()).unwrap();
+    let sink = Target::Null.open(&sink_options()).unwrap();
+    let frames = run(Run {
+        depth: Some(Box::new(Late(4))),
+        bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
+        coc: dof(),
+        refine: false,
+        keep_going: false,
+        ..simple(Box::new(camera), sink, &stop, Pace::Asap)
+    })
+    .unwrap()
+    .frames;
+    assert_eq!((frames.captured, frames.dropped.unpaired, frames.delivered), (10, 4, 6));
 }
 
 /// The recording through depth and blur into a file; its bytes.

@@ -1,0 +1,54 @@
+//! Recorded depth beside colours from elsewhere: paired by media time, over and over.
+
+use super::{DepthError, DepthSource};
+use crate::frame::{DepthMap, Stamp};
+use crate::recording::{Recording, Scratch};
+
+/// The depth pictures of a recording, played in a loop by the frames' own time.
+pub struct Beside {
+    recording: Recording,
+    scratch: Scratch,
+    lap_ns: u64,
+    /// The picture that was read last.
+    last: Option<usize>,
+    map: DepthMap,
+}
+
+impl Beside {
+    /// Depth of `recording`, which `name` stands for in messages.
+    ///
+    /// # Errors
+    /// The recording has no depth.
+    pub fn new(recording: Recording, name: &str) -> Result<Self, DepthError> {
+        if !recording.has_depth() || recording.is_empty() {
+            return Err(DepthError::NoDepth { source_name: name.to_owned() });
+        }
+        let lap_ns = recording.time_ns(recording.len() - 1) + recording.period_ns();
+        Ok(Self { recording, scratch: Scratch::default(), lap_ns, last: None, map: DepthMap::default() })
+    }
+
+    /// The frame of the recording that is shown at media time `time_ns`.
+    fn index_at(&self, time_ns: u64) -> usize {
+        let in_lap_ns = time_ns % self.lap_ns.max(1);
+        let (mut low, mut high) = (0, self.recording.len());
+        while high - low > 1 {
+            let middle = low.midpoint(high);
+            if self.recording.time_ns(middle) <= in_lap_ns { low = middle } else { high = middle }
+        }
+        low
+    }
+}
+
+impl DepthSource for Beside {
+    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+        let index = self.index_at(stamp.time_ns);
+        if self.last != Some(index) {
+            self.last = None;
+            self.recording.read_depth(index, &mut self.scratch, &mut self.map)?;
+            self.last = Some(index);
+        }
+        map.resize(self.map.width, self.map.height);
+        map.metres.copy_from_slice(&self.map.metres);
+        Ok(())
+    }
+}

@@ -1,0 +1,124 @@
+//! Depth from a camera of its own, beside the one that gives the colours.
+//!
+//! The newest maps are kept and paired with the colours by the time they were taken. When none comes any more, the last
+//! one stays: a blur that follows an old map is wrong at its edges, but a blur that vanishes shows the room. That is
+//! said once, and so is its end. Before the first map, and after a rest, there is none, and frames go without being
+//! shown.
+
+mod pairing;
+mod units;
+
+use std::time::Duration;
+
+pub use units::Units;
+
+use super::registration::Registration;
+use super::{DepthError, DepthSource};
+use crate::clock::Clock;
+use crate::frame::{DepthMap, Stamp};
+use crate::v4l2::layout::Content;
+use crate::v4l2::live::{Live, Next, OpenError, Wish};
+use pairing::Pairing;
+
+/// A map that is this much older than its picture is worth a word.
+const STALE_NS: u64 = 1_000_000_000;
+
+/// The share of a depth period that a picture waits for a map that fits better than those that are there.
+const WAIT_PER_PERIOD: u32 = 4;
+
+/// Calls for news in a row: a driver that never runs dry must not keep a picture waiting.
+const MOST_NEWS: usize = 8;
+
+/// A depth camera.
+pub struct LiveDepth {
+    live: Live,
+    units: Units,
+    registration: Option<Registration>,
+    pairing: Pairing,
+    clock: Clock,
+    stale: bool,
+}
+
+impl LiveDepth {
+    /// Opens the depth camera that `name` means. Without a registration its view is taken to be that of the colours.
+    ///
+    /// # Errors
+    /// There is none, it is busy, or it gives no depth.
+    pub fn open(name: &str, units: Units, registration: Option<Registration>, clock: Clock) -> Result<Self, OpenError> {
+        let live = Live::open(name, Wish::any(Content::Depth), Vec::new(), clock.clone())?;
+        if registration.is_none() {
+            tracing::info!(
+                "{}: taken to see what the colour camera sees; --depth-calibration says how it stands beside it",
+                live.name()
+            );
+        }
+        Ok(Self { live, units, registration, pairing: Pairing::default(), clock, stale: false })
+    }
+
+    /// Takes what the camera has, and waits for it no longer than `patience`.
+    fn take_news(&mut self, mut patience: Duration) {
+        for _ in 0..MOST_NEWS {
+            match self.live.next(patience) {
+                Next::Frame { captured_ns } => {
+                    let (layout, planes) = (*self.live.layout(), self.live.planes());
+                    if let Some(plane) = planes.and_then(|planes| planes.first().copied()) {
+                        let map = self.pairing.oldest();
+                        if self.units.decode(&layout, plane, map) {
+                            self.pairing.keep(captured_ns);
+                        }
+                    }
+                    self.live.release();
+                    patience = Duration::ZERO;
+                }
+                Next::Lost(_) => {}
+                Next::Waiting => return,
+            }
+        }
+    }
+
+    /// Says when maps grow old, and when new ones come.
+    fn watch(&mut self, now_ns: u64, newest_ns: u64) {
+        let stale = now_ns.saturating_sub(newest_ns) > STALE_NS;
+        if stale != self.stale {
+            match stale {
+                true => tracing::warn!("{}: no depth for a second; the last map stays", self.live.name()),
+                false => tracing::info!("{}: depth again", self.live.name()),
+            }
+            self.stale = stale;
+        }
+    }
+}
+
+impl DepthSource for LiveDepth {
+    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+        self.take_news(Duration::ZERO);
+        let now_ns = self.clock.now_ns();
+        let taken_ns = stamp.captured_ns.unwrap_or(now_ns);
+        let period_ns = self.live.agreed().interval.period_ns();
+        if self.pairing.is_worth_waiting(taken_ns, period_ns) {
+            self.take_news(Duration::from_nanos(period_ns) / WAIT_PER_PERIOD);
+        }
+        let Some(newest_ns) = self.pairing.newest_ns() else {
+            return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
+        };
+        self.watch(now_ns, newest_ns);
+        let Some(nearest) = self.pairing.nearest(taken_ns) else {
+            return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
+        };
+        match &mut self.registration {
+            Some(registration) => registration.register(nearest, map),
+            None => {
+                map.resize(nearest.width, nearest.height);
+                map.metres.copy_from_slice(&nearest.metres);
+            }
+        }
+        Ok(())
+    }
+
+    fn rest(&mut self) {
+        self.live.rest();
+        // Who sits there when it is watched again is not known.
+        self.pairing.clear();
+        self.stale = false;
+    }
+}

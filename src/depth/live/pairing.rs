@@ -1,0 +1,113 @@
+//! Which depth map belongs to a picture.
+
+use crate::frame::DepthMap;
+
+/// Maps that are kept: depth may lead or lag by a frame.
+const KEPT: usize = 3;
+
+/// After this many periods without a map the camera has stopped, and waiting for it would only add delay.
+const STOPPED_PERIODS: u64 = 4;
+
+/// The newest maps with the times they were taken at.
+#[derive(Debug, Default)]
+pub(super) struct Pairing {
+    maps: [DepthMap; KEPT],
+    /// None where there is no map.
+    taken_ns: [Option<u64>; KEPT],
+    /// Where the oldest is.
+    next: usize,
+}
+
+impl Pairing {
+    /// The map to overwrite; [`Pairing::keep`] makes it the newest. Until then there is one less.
+    pub(super) fn oldest(&mut self) -> &mut DepthMap {
+        self.taken_ns[self.next] = None;
+        &mut self.maps[self.next]
+    }
+
+    /// What was written over the oldest map was taken at this time.
+    pub(super) fn keep(&mut self, taken_ns: u64) {
+        self.taken_ns[self.next] = Some(taken_ns);
+        self.next = (self.next + 1) % KEPT;
+    }
+
+    /// Forgets all.
+    pub(super) fn clear(&mut self) {
+        self.taken_ns = [None; KEPT];
+    }
+
+    /// When the newest was taken.
+    pub(super) fn newest_ns(&self) -> Option<u64> {
+        self.taken_ns.into_iter().flatten().max()
+    }
+
+    /// Whether a better map for a picture of this time may come at once: none lies within half a period, and the camera
+    /// runs.
+    pub(super) fn is_worth_waiting(&self, taken_ns: u64, period_ns: u64) -> bool {
+        self.newest_ns().is_some_and(|newest_ns| {
+            let behind_ns = taken_ns.saturating_sub(newest_ns);
+            (period_ns / 2 + 1..STOPPED_PERIODS * period_ns).contains(&behind_ns)
+        })
+    }
+
+    /// The map that was taken nearest to this time.
+    pub(super) fn nearest(&self, taken_ns: u64) -> Option<&DepthMap> {
+        let kept = self.maps.iter().zip(self.taken_ns).filter_map(|(map, at_ns)| Some((map, at_ns?)));
+        kept.min_by_key(|(_, at_ns)| at_ns.abs_diff(taken_ns)).map(|(map, _)| map)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn pairing(times_ms: &[u64]) -> Pairing {
+        let mut pairing = Pairing::default();
+        for &time_ms in times_ms {
+            let map = pairing.oldest();
+            map.resize(1, 1);
+            map.metres[0] = time_ms as f32;
+            pairing.keep(time_ms * MS);
+        }
+        pairing
+    }
+
+    #[test]
+    fn the_nearest_in_time_is_taken_however_old_it_is() {
+        let pairing = pairing(&[10, 43, 76, 110]);
+        let at = |ms: u64| pairing.nearest(ms * MS).map(|map| map.metres[0]);
+        assert_eq!(
+            [at(0), at(43), at(60), at(90), at(10_000)],
+            [Some(43.0), Some(43.0), Some(76.0), Some(76.0), Some(110.0)]
+        );
+        assert_eq!(pairing.newest_ns(), Some(110 * MS));
+    }
+
+    #[test]
+    fn before_the_first_and_after_a_rest_there_is_none() {
+        assert!(Pairing::default().nearest(5).is_none());
+        let mut pairing = pairing(&[10, 20]);
+        pairing.clear();
+        assert!(pairing.nearest(20 * MS).is_none() && pairing.newest_ns().is_none());
+        assert!(!pairing.is_worth_waiting(20 * MS, 33 * MS));
+    }
+
+    #[test]
+    fn one_that_failed_to_decode_is_not_taken() {
+        let mut pairing = pairing(&[10, 20, 30]);
+        pairing.oldest().metres[0] = -1.0;
+        assert_eq!(pairing.nearest(0).map(|map| map.metres[0]), Some(20.0));
+        pairing.oldest().metres[0] = 40.0;
+        pairing.keep(40 * MS);
+        assert_eq!(pairing.nearest(50 * MS).map(|map| map.metres[0]), Some(40.0));
+    }
+
+    #[test]
+    fn a_picture_waits_only_for_a_map_that_is_due() {
+        let pairing = pairing(&[100]);
+        let waits = |ms: u64| pairing.is_worth_waiting(ms * MS, 33 * MS);
+        assert_eq!([waits(90), waits(110), waits(120), waits(150), waits(240)], [false, false, true, true, false]);
+    }
+}
