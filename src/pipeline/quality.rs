@@ -140,6 +140,13 @@ mod tests {
     }
 
     #[test]
+    fn auto_goes_no_further_than_it_may() {
+        let mut picker = Picker::new(QualityRule::Auto(Quality::Best), Quality::Balanced, 30 * MS, None);
+        (0..100).for_each(|frame| picker.note(picker.quality(), MS, frame * 30 * MS));
+        assert_eq!(picker.quality(), Quality::Balanced);
+    }
+
+    #[test]
     fn a_fixed_quality_stays() {
         let mut picker = Picker::new(QualityRule::Fixed(Quality::High), Quality::Balanced, MS, Some(MS));
         (0..100).for_each(|frame| picker.note(Quality::High, 50 * MS, frame * MS));

@@ -207,6 +207,15 @@ pub fn frame(camera: &mut V4l2Camera) -> (ColorImage, Lost) {
     panic!("no frame for 10 s");
 }
 
+/// The next frame, if there is one now.
+pub fn frame_now(camera: &mut V4l2Camera) -> Option<ColorImage> {
+    let mut color = ColorImage::default();
+    match camera.next(&mut color, &mut DepthMap::default()).unwrap() {
+        Captured::Frame(_) => Some(color),
+        _ => None,
+    }
+}
+
 /// Frames that were lost, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lost {

@@ -104,7 +104,7 @@ impl Bokeh for Paced {
         1
     }
     fn describe(&self) -> String {
-        "cpu, paced".into()
+        "a GPU, paced".into()
     }
 }
 

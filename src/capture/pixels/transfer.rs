@@ -43,7 +43,7 @@ mod tests {
         // Middle grey reflects 18 to 22 per cent.
         assert_eq!((linear[0], linear[55], linear[255]), (0, 128, 255));
         let near = table(Transfer::Gamma(22), Range::Full).unwrap();
-        assert!(near.iter().zip(0u8..).all(|(&byte, code)| byte.abs_diff(code) <= 9), "{near:?}");
+        assert!(near.iter().zip(0..=255u8).all(|(&byte, code)| byte.abs_diff(code) <= 9), "{near:?}");
         let limited = table(Transfer::Display, Range::Limited).unwrap();
         assert_eq!((limited[0], limited[16], limited[126], limited[235], limited[255]), (0, 0, 128, 255, 255));
     }
