@@ -59,7 +59,7 @@ pub struct Bin {
     pub low_px: f32,
     /// Upper border.
     pub high_px: f32,
-    /// A bin pixel covers `scale` x `scale` pixels of the picture: one of [`SCALES`].
+    /// A bin pixel covers `scale` x `scale` pixels of the picture: one of [`super::rung::SCALES`].
     pub scale: usize,
     /// Columns of the bin's picture.
     pub width: usize,

@@ -2,6 +2,7 @@
 
 mod error;
 
+use std::fs;
 use std::io;
 use std::os::fd::AsFd;
 use std::path::Path;
@@ -94,6 +95,15 @@ pub struct Output {
     size: (u32, u32),
 }
 
+/// Frames that a node keeps, as the module was loaded; `None` where it does not tell.
+pub fn buffers() -> Option<u32> {
+    let text = fs::read_to_string("/sys/module/v4l2loopback/parameters/max_buffers").ok()?;
+    text.trim().parse().ok().filter(|buffers| (1..=MOST_BUFFERS).contains(buffers))
+}
+
+/// The module keeps no more.
+const MOST_BUFFERS: u32 = 32;
+
 impl Output {
     /// Opens a node and starts to stream to it: YUYV of `size` (the width even) in BT.601 and limited range, which is
     /// what readers take every picture for, `rate` frames in each of which `scale` seconds. Where a reader or a control
@@ -160,6 +170,15 @@ impl Output {
     /// Columns and rows of a frame.
     pub fn size(&self) -> (u32, u32) {
         self.size
+    }
+
+    /// Shows one frame in place of all that readers may still find there: a reader that comes is first given what lies
+    /// in the module's buffers, however old.
+    ///
+    /// # Errors
+    /// The system refused.
+    pub fn overwrite(&self, frame: &[u8]) -> Result<(), LoopbackError> {
+        (0..buffers().unwrap_or(MOST_BUFFERS)).try_for_each(|_| self.write(frame))
     }
 
     /// Shows one frame, of exactly [`Layout::frame_bytes`]. Never waits for readers: whoever was too slow for the

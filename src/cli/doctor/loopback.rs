@@ -7,7 +7,7 @@ use super::cameras::denied;
 use super::findings::Finding;
 use super::system::System;
 use crate::v4l2::holders::holders;
-use crate::v4l2::loopback::modprobe;
+use crate::v4l2::loopback::{self, modprobe};
 use crate::v4l2::node::{Kind, Node};
 
 /// The heading.
@@ -107,8 +107,7 @@ fn state(node: &Node) -> Finding {
 
 /// Few buffers keep PipeWire out.
 fn buffers(system: &System) -> Option<Finding> {
-    let buffers: u32 =
-        fs::read_to_string(Path::new(LOADED).join("parameters/max_buffers")).ok()?.trim().parse().ok()?;
+    let buffers = loopback::buffers()?;
     let fix = "load the module with max_buffers=16 if programs that get their cameras from PipeWire do not list it";
     (system.pipewire && buffers < PIPEWIRE_BUFFERS).then(|| {
         let found = format!("max_buffers={buffers}: fine for programs that open the node, too few for PipeWire");

@@ -81,7 +81,8 @@ impl Loopback {
         card::draw(&mut self.fitted);
         self.encoder.encode(&self.fitted, &mut self.bytes);
         self.shows_card = true;
-        Ok(self.output.write(&self.bytes)?)
+        // Nobody who comes now may find a picture from before.
+        Ok(self.output.overwrite(&self.bytes)?)
     }
 }
 
