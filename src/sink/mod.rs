@@ -3,6 +3,7 @@
 //! A file appears under its name only when it is whole: it is written beside that name and renamed. Nothing that
 //! exists is overwritten unless that was asked for.
 
+#[cfg(feature = "camera")]
 mod card;
 mod error;
 mod ffmpeg;

@@ -97,6 +97,8 @@ mod tests {
             bus: bus.into(),
             kind: Kind::Capture,
             captures: true,
+            outputs: false,
+            denied: false,
             links: Vec::new(),
             usb: None,
             problem: None,
