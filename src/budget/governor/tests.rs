@@ -1,0 +1,151 @@
+use super::*;
+
+const COSTS: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
+const BUDGET_NS: u64 = 1_000_000;
+const PERIOD_NS: u64 = 33_000_000;
+
+/// A machine of this load (nanoseconds at the cheapest rung) with a governor, its samples `late` frames late.
+struct Machine {
+    governor: Governor,
+    costs: [f64; 5],
+    under_way: std::collections::VecDeque<(usize, f64)>,
+    late: usize,
+    now_ns: u64,
+    switches: usize,
+}
+
+impl Machine {
+    fn new(late: usize) -> Self {
+        let governor = Governor::new(&COSTS, 2);
+        let under_way = std::collections::VecDeque::new();
+        Self { governor, costs: COSTS, under_way, late, now_ns: PERIOD_NS, switches: 0 }
+    }
+
+    /// Plays frames; those of `spike` take ten times as long. Returns the rung of each.
+    fn play(&mut self, load_ns: f64, frames: usize, spike: impl Fn(usize) -> bool) -> Vec<usize> {
+        let mut rungs = Vec::new();
+        for frame in 0..frames {
+            let rung = self.governor.rung();
+            rungs.push(rung);
+            let took_ns = load_ns * self.costs[rung] * if spike(frame) { 10.0 } else { 1.0 };
+            self.under_way.push_back((rung, took_ns));
+            self.now_ns += PERIOD_NS;
+            if self.under_way.len() > self.late {
+                let (rung, took_ns) = self.under_way.pop_front().unwrap();
+                let sample = Sample { rung, took_ns: took_ns as u64, at_ns: self.now_ns };
+                self.governor.note(sample, BUDGET_NS);
+            }
+            self.switches += usize::from(self.governor.rung() != rung);
+        }
+        rungs
+    }
+}
+
+#[test]
+fn the_finest_rung_that_fits_is_found_in_one_step_and_kept() {
+    for late in [0, 3] {
+        for (load_ns, fits) in [(200_000.0, 4), (250_000.0, 3), (400_000.0, 2), (550_000.0, 1), (900_000.0, 0)] {
+            let mut machine = Machine::new(late);
+            machine.play(load_ns, 100, |_| false);
+            assert_eq!((machine.governor.rung(), machine.switches <= 1), (fits, true), "{load_ns} {late}");
+            machine.play(load_ns, 1000, |_| false);
+            assert_eq!((machine.governor.rung(), machine.switches <= 1), (fits, true), "{load_ns} {late}");
+        }
+    }
+}
+
+#[test]
+fn down_at_once_up_after_a_while() {
+    for late in [0, 3] {
+        let mut machine = Machine::new(late);
+        machine.play(200_000.0, 200, |_| false);
+        assert_eq!(machine.governor.rung(), 4);
+        let down = machine.play(550_000.0, 60, |_| false);
+        assert!(down.iter().position(|&rung| rung == 1).is_some_and(|frame| frame <= 3 + late), "{down:?}");
+        let up = machine.play(200_000.0, 200, |_| false);
+        let rose = up.iter().position(|&rung| rung == 4).unwrap();
+        assert!((PATIENCE as usize..PATIENCE as usize + RECENT + late + 1).contains(&rose), "{rose}");
+        assert!(up[..rose].iter().all(|&rung| rung == 1), "in one step");
+    }
+}
+
+#[test]
+fn rare_spikes_change_nothing() {
+    let mut machine = Machine::new(0);
+    machine.play(400_000.0, 100, |_| false);
+    let before = machine.switches;
+    let rungs = machine.play(400_000.0, 3000, |frame| frame % 100 == 50);
+    assert!(rungs.iter().all(|&rung| rung == 2));
+    assert_eq!(machine.switches, before);
+}
+
+#[test]
+fn the_floor_is_the_floor() {
+    let mut machine = Machine::new(0);
+    machine.play(50_000_000.0, 50, |_| false);
+    assert_eq!(machine.governor.rung(), 0);
+    assert_eq!(machine.governor.expected_ns(), Some(50_000_000));
+}
+
+#[test]
+fn costs_are_learnt_until_a_ladder_that_was_misjudged_does_not_pump() {
+    let mut machine = Machine::new(0);
+    // The fourth rung is dearer than it was said to be: it seems to fit, and does not.
+    machine.costs = [1.0, 1.5, 2.0, 3.9, 4.5];
+    let switches_in = |machine: &mut Machine| {
+        let before = machine.switches;
+        machine.play(280_000.0, 1800, |_| false);
+        machine.switches - before
+    };
+    let (first, _, third) = (switches_in(&mut machine), switches_in(&mut machine), switches_in(&mut machine));
+    assert!((2..=6).contains(&first) && third == 0, "{first} switches in the first minute, {third} in the third");
+    let learnt = machine.governor.costs();
+    assert!(learnt.is_sorted() && learnt[3] > 3.08, "{learnt:?}");
+}
+
+#[test]
+fn a_sample_that_measures_nothing_is_none() {
+    let mut governor = Governor::new(&COSTS, 3);
+    for at_ns in [5, 3, 0, 9] {
+        governor.note(Sample { rung: 3, took_ns: 0, at_ns }, BUDGET_NS);
+        governor.note(Sample { rung: 77, took_ns: 9_000_000, at_ns }, BUDGET_NS);
+    }
+    assert_eq!((governor.rung(), governor.expected_ns()), (3, None));
+    // Times that run backwards are taken in order.
+    (0..5).for_each(|k| governor.note(Sample { rung: 3, took_ns: 9_000_000, at_ns: 50 - k }, BUDGET_NS));
+    assert_eq!(governor.rung(), 0);
+}
+
+#[test]
+fn after_a_long_pause_only_what_is_new_counts() {
+    let mut machine = Machine::new(0);
+    machine.play(550_000.0, 100, |_| false);
+    assert_eq!(machine.governor.rung(), 1);
+    machine.now_ns += 10 * IDLE_NS;
+    // The clocks have to wake up first: a slow frame is no reason, and the load before is forgotten.
+    let rungs = machine.play(200_000.0, 60, |frame| frame < 1);
+    assert!(rungs.iter().all(|&rung| rung >= 1));
+    assert_eq!(machine.governor.rung(), 4);
+}
+
+#[test]
+fn late_samples_of_another_rung_decide_nothing() {
+    let mut governor = Governor::new(&COSTS, 4);
+    for at_ns in 1..=20 {
+        governor.note(Sample { rung: 2, took_ns: 50_000_000, at_ns }, BUDGET_NS);
+    }
+    assert_eq!(governor.rung(), 4);
+    // Its own first samples do, with what the others told.
+    (21..24).for_each(|at_ns| governor.note(Sample { rung: 4, took_ns: 90_000_000, at_ns }, BUDGET_NS));
+    assert_eq!(governor.rung(), 0);
+}
+
+#[test]
+fn a_smaller_budget_is_heeded_at_once() {
+    let mut machine = Machine::new(0);
+    machine.play(240_000.0, 200, |_| false);
+    assert_eq!(machine.governor.rung(), 3);
+    let sample = Sample { rung: 3, took_ns: 720_000, at_ns: machine.now_ns };
+    machine.governor.note(sample, BUDGET_NS / 2);
+    assert_eq!(machine.governor.rung(), 1);
+}
