@@ -6,6 +6,8 @@
 //! | `rivals` | what picks the rung |
 //! | `play` | one run of one of them, and what is counted |
 
+#[path = "../common/mod.rs"]
+mod common;
 mod load;
 mod play;
 mod rivals;
@@ -73,13 +75,9 @@ struct Case {
 }
 
 fn main() -> ExitCode {
-    let options = match Options::try_parse() {
+    let options: Options = match common::options() {
         Ok(options) => options,
-        Err(error) if error.use_stderr() => {
-            eprintln!("{}", error.to_string().lines().next().unwrap_or("error: bad options"));
-            return ExitCode::from(2);
-        }
-        Err(help) => help.exit(),
+        Err(code) => return code,
     };
     if !options.bench {
         println!("nothing measured: run it by `cargo bench --bench governor`");

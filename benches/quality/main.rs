@@ -11,6 +11,8 @@
 //!
 //! Every method gets the same 8-bit picture and the same depth map. `tests/quality.rs` holds the laws of all this.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod damage;
 mod flip;
 mod highlight;
@@ -33,7 +35,6 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use bokehcam::frame::{ColorImage, DepthMap};
-use clap::Parser;
 
 use damage::Damage;
 use methods::{Blurrer, Method, Shot};
@@ -55,13 +56,9 @@ const CACHE: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/quality");
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
 fn main() -> ExitCode {
-    let options = match Options::try_parse() {
+    let options: Options = match common::options() {
         Ok(options) => options,
-        Err(error) if error.use_stderr() => {
-            eprintln!("{}", error.to_string().lines().next().unwrap_or("error: bad options"));
-            return ExitCode::from(2);
-        }
-        Err(help) => help.exit(),
+        Err(code) => return code,
     };
     if options.list {
         KINDS.iter().for_each(|kind| println!("{:16} {}", kind.name, kind.what));

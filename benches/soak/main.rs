@@ -7,6 +7,8 @@
 //! | `loader` | the other process |
 //! | `verdict` | what is measured, and against what |
 
+#[path = "../common/mod.rs"]
+mod common;
 mod loader;
 mod stages;
 mod verdict;
@@ -96,13 +98,9 @@ fn main() -> ExitCode {
     if std::env::args().nth(1).as_deref() == Some(loader::ARGUMENT) {
         loader::load();
     }
-    let options = match Options::try_parse() {
+    let options: Options = match common::options() {
         Ok(options) => options,
-        Err(error) if error.use_stderr() => {
-            eprintln!("{}", error.to_string().lines().next().unwrap_or("error: bad options"));
-            return ExitCode::from(2);
-        }
-        Err(help) => help.exit(),
+        Err(code) => return code,
     };
     if !options.bench {
         println!("nothing measured: run it by `cargo bench --bench soak`");
