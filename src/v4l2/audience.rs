@@ -15,7 +15,7 @@ use rustix::io::Errno;
 
 use super::device::Device;
 use super::events::{PRIVATE_START, SEND_INITIAL};
-use super::loopback::other_holders;
+use super::holders::other_holders;
 
 /// The module's event "client usage"; its data begin with a `u32`: 1 while a reader streams, else 0.
 const CLIENT_USAGE: u32 = PRIVATE_START + 0x08E0_0000 + 1;

@@ -14,6 +14,13 @@ pub struct Holder {
     pub name: String,
 }
 
+impl Holder {
+    /// Whether it is this program: who looks into a device has it open, too.
+    pub fn is_this_program(&self) -> bool {
+        self.pid == std::process::id()
+    }
+}
+
 impl fmt::Display for Holder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} (process {})", self.name, self.pid)
@@ -27,6 +34,11 @@ pub fn holders(path: &Path) -> Vec<Holder> {
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse::<u32>().ok());
     pids.filter(|pid| holds(*pid, device)).map(|pid| Holder { pid, name: name(pid) }).collect()
+}
+
+/// The same without this program.
+pub fn other_holders(path: &Path) -> Vec<Holder> {
+    holders(path).into_iter().filter(|holder| !holder.is_this_program()).collect()
 }
 
 /// Whether a process has the character device of this number open.
@@ -50,7 +62,7 @@ mod tests {
     #[test]
     fn an_open_device_is_held_by_this_process() {
         let open = fs::File::open("/dev/zero").unwrap();
-        let own = holders(Path::new("/dev/zero")).into_iter().find(|holder| holder.pid == std::process::id());
+        let own = holders(Path::new("/dev/zero")).into_iter().find(Holder::is_this_program);
         assert!(own.is_some_and(|own| !own.name.is_empty()));
         drop(open);
         assert_eq!(holders(Path::new("/dev/no-such-node")), []);

@@ -16,7 +16,7 @@ use v4l::v4l_sys as sys;
 pub use self::error::{LoopbackError, modprobe, nodes};
 
 use super::device::{Device, zeroed};
-use super::holders::{Holder, holders};
+use super::holders::other_holders;
 
 // What its nodes say that they can do depends on who uses them; what their driver is does not.
 pub use super::node::LOOPBACK_DRIVER as DRIVER;
@@ -26,12 +26,6 @@ const OUTPUT: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT;
 const KEEP_FORMAT: u32 = sys::V4L2_CID_BASE | 0xf000;
 /// How long a write may wait for room; no version of the module has made one wait so far.
 const ROOM: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
-
-/// Who has a node open besides this program.
-pub fn other_holders(path: &Path) -> Vec<Holder> {
-    let own = std::process::id();
-    holders(path).into_iter().filter(|holder| holder.pid != own).collect()
-}
 
 /// How the pixels of a frame lie in memory; all without gaps between rows or planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -143,8 +143,7 @@ pub fn is_gone(error: &QueueError) -> bool {
 }
 
 fn held_by(holders: &[Holder]) -> String {
-    // This program has it open as well, to find out.
-    let others = holders.iter().filter(|holder| holder.pid != std::process::id());
+    let others = holders.iter().filter(|holder| !holder.is_this_program());
     let names: Vec<String> = others.map(ToString::to_string).collect();
     match names.as_slice() {
         [] => "; another user's program uses it (sudo fuser -v names it)".to_owned(),
