@@ -48,6 +48,64 @@ impl ColorImage {
     }
 }
 
+/// An 8-bit grey picture: `height` x `width` bytes of sRGB luma, row-major, no padding.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct GrayImage {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `height * width` bytes.
+    pub luma: Vec<u8>,
+}
+
+impl GrayImage {
+    /// Gives the picture another size, keeping its memory where that suffices. The content is unspecified after.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        (self.width, self.height) = (width, height);
+        self.luma.resize(width as usize * height as usize, 0);
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    /// Becomes the luma of a colour picture (BT.601 weights, as usual for matching).
+    pub fn set_luma_of(&mut self, color: &ColorImage) {
+        self.resize(color.width, color.height);
+        for (luma, rgb) in self.luma.iter_mut().zip(color.rgb.as_chunks::<3>().0) {
+            let [r, g, b] = rgb.map(u32::from);
+            *luma = ((r * 9_798 + g * 19_235 + b * 3_735 + (1 << 14)) >> 15) as u8;
+        }
+    }
+}
+
+/// Disparity of the left picture of a rectified pair: `height` x `width` pixels, row-major; what is left column `x` is
+/// seen by the right eye in column `x - disparity`. 0 or a non-finite value means unknown.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DisparityMap {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `height * width` disparities in pixels.
+    pub px: Vec<f32>,
+}
+
+impl DisparityMap {
+    /// Gives the map another size, keeping its memory where that suffices. The content is unspecified after.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        (self.width, self.height) = (width, height);
+        self.px.resize(width as usize * height as usize, 0.0);
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+}
+
 /// Depth along the optical axis: `height` x `width` metres, row-major; 0 or a non-finite value means unknown.
 /// It covers the same view as its colour picture, and may have fewer pixels.
 #[derive(Clone, Debug, Default, PartialEq)]

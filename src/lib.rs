@@ -11,24 +11,27 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 4 | [`cli`]: arguments to one resolved configuration, one function per command |
-//! | 3 | [`pipeline`]: the one place that knows all stages |
-//! | 2 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 1 | [`link`], [`budget`], [`stats`], [`recording`], [`scene`], `v4l2` |
+//! | 5 | [`cli`]: arguments to one resolved configuration, one function per command |
+//! | 4 | [`pipeline`]: the one place that knows all stages |
+//! | 3 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
+//! | 2 | [`link`], [`budget`], [`stats`], [`recording`], [`scene`], `v4l2` |
+//! | 1 | [`compute`], [`calibration`] |
 //! | 0 | [`frame`], [`optics`], [`clock`] |
 //!
 //! Words: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in
 //! nanoseconds of a monotonic clock; blurring happens in linear light.
 //!
-//! `unsafe` is allowed in `bokeh/cpu/team.rs`, `link/slot.rs`, `link/pool.rs` and under `v4l2`, where each block carries
+//! `unsafe` is allowed in `compute/team.rs`, `link/slot.rs`, `link/pool.rs` and under `v4l2`, where each block carries
 //! its argument.
 
 pub mod bokeh;
 pub mod budget;
+pub mod calibration;
 pub mod capture;
 pub mod cli;
 pub mod clock;
+pub mod compute;
 pub mod depth;
 pub mod frame;
 pub mod link;

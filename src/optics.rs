@@ -26,6 +26,40 @@ impl Lens {
     }
 }
 
+/// Two parallel eyes of one focal length: from disparity to depth, `z = f B / (d + doffs)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StereoRig {
+    /// Focal length of the rectified pictures in pixels, > 0.
+    pub focal_px: f32,
+    /// Distance of the eyes in metres, > 0.
+    pub baseline_m: f32,
+    /// Column of the right principal point less that of the left, in pixels: the disparity of infinity is its negative.
+    pub doffs_px: f32,
+    /// Whether the numbers are those of the cameras. Otherwise they are [`StereoRig::assumed`], and so are distances:
+    /// the blur, whose CoC is affine in the disparity, is none the worse for it.
+    pub metric: bool,
+}
+
+impl StereoRig {
+    /// Eyes 60 mm apart that see 53 degrees, of which nothing is known.
+    pub fn assumed(width_px: u32) -> Self {
+        Self { focal_px: width_px as f32, baseline_m: 0.06, doffs_px: 0.0, metric: false }
+    }
+
+    /// Depth in metres of a point with this disparity; infinite at or beyond infinity.
+    #[inline(always)]
+    pub fn depth_m(&self, disparity_px: f32) -> f32 {
+        let above_px = disparity_px + self.doffs_px;
+        if above_px > 0.0 { self.focal_px * self.baseline_m / above_px } else { f32::INFINITY }
+    }
+
+    /// Disparity in pixels of a point at this depth, > 0 metres.
+    #[inline(always)]
+    pub fn disparity_px(&self, depth_m: f32) -> f32 {
+        self.focal_px * self.baseline_m / depth_m - self.doffs_px
+    }
+}
+
 /// The signed CoC radius of every pixel of a frame, as a rule that any executor can evaluate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CocField {

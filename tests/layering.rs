@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the crate by layer, the lowest first.
-const LAYERS: [&[&str]; 6] = [
+const LAYERS: [&[&str]; 7] = [
     &["frame", "optics", "clock"],
+    &["compute", "calibration"],
     &["link", "budget", "stats", "recording", "scene", "v4l2"],
     &["capture", "depth", "bokeh", "sink"],
     &["pipeline"],
@@ -25,7 +26,7 @@ const DOORS: [(&str, &[&str]); 12] = [
     ("rustix", &["clock", "link/bell", "v4l2"]),
     ("strsim", &["v4l2"]),
     ("v4l", &["v4l2"]),
-    ("wgpu", &["bokeh/gpu"]),
+    ("wgpu", &["bokeh/gpu", "compute/device", "depth/stereo/gpu"]),
     ("zune_jpeg", &["capture"]),
 ];
 

@@ -18,6 +18,7 @@ pub mod split;
 use std::time::Duration;
 
 use crate::budget::Quality;
+use crate::compute::GpuError;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::optics::CocField;
@@ -153,17 +154,9 @@ pub enum BokehError {
         /// Width and height of the frame.
         got: (u32, u32),
     },
-    /// No adapter fits what was asked for.
-    #[error("no GPU adapter {wanted}; found: {found}. Use --backend cpu, or install a Vulkan driver")]
-    NoAdapter {
-        /// What was asked for.
-        wanted: String,
-        /// What there is.
-        found: String,
-    },
-    /// The GPU refused or was lost.
-    #[error("GPU: {0}")]
-    Gpu(String),
+    /// No GPU, or it refused or was lost.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
 }
 
 /// What a pass has left behind of the last frame: vectors of four values.
@@ -214,7 +207,7 @@ pub fn create(
     #[cfg(not(feature = "gpu"))]
     if backend == Backend::Gpu || adapter.is_some() {
         let wanted = "at all: this build leaves the GPU out (feature `gpu`)".to_owned();
-        return Err(BokehError::NoAdapter { wanted, found: "none".to_owned() });
+        return Err(GpuError::NoAdapter { wanted, found: "none".to_owned() }.into());
     }
     Ok(Box::new(cpu::CpuBokeh::new(plan, threads)))
 }

@@ -10,6 +10,7 @@ pub mod live;
 pub mod recorded;
 pub mod refine;
 pub mod registration;
+pub mod stereo;
 
 use crate::frame::{DepthMap, Stamp};
 use crate::recording::RecordingError;

@@ -12,6 +12,7 @@ use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
 use bokehcam::budget::Quality;
 use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
 use bokehcam::clock::Clock;
+use bokehcam::compute::GpuError;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::{DepthError, DepthSource};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
@@ -138,7 +139,7 @@ impl Bokeh for FakeBokeh {
         let index = self.submitted;
         self.submitted += 1;
         if self.trouble.strikes(index) && !self.collect_fails {
-            return Err(BokehError::Gpu("lost".into()));
+            return Err(GpuError::Failed("lost".into()).into());
         }
         self.held.push_back(job);
         Ok(())
@@ -146,7 +147,7 @@ impl Bokeh for FakeBokeh {
 
     fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
         if self.collect_fails && self.trouble.fails_at.is_some_and(|frame| self.submitted > frame) {
-            return Err(BokehError::Gpu("lost".into()));
+            return Err(GpuError::Failed("lost".into()).into());
         }
         if self.loses_frames || !wait && self.held.len() < self.capacity {
             return Ok(None);

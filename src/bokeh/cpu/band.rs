@@ -3,12 +3,12 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::aligned::Line;
 use super::bin::{BLOCK, BinRows, BinSums, MARGIN, WIDE};
 use super::fill::{Behind, HalfRows};
 use super::tiles::{TILE_H, TILE_W, Tiles, widen};
 use super::unpack::{Piece, Source};
 use crate::bokeh::plan::{CELL, MAX_BINS, Share};
+use crate::compute::aligned::Line;
 
 /// Some rows of the picture: whole rows of cells of every bin.
 pub struct Band<'a> {

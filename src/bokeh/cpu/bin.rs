@@ -4,13 +4,13 @@
 
 use pulp::Simd;
 
-use super::aligned::Line;
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::simd::{load, store};
 use super::tent::{ShareAt, reduce, sum_row};
 use super::tiles::TILE_W;
 use super::unpack::Piece;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
+use crate::compute::aligned::Line;
+use crate::compute::simd::{load, store};
 
 /// Columns of the picture that are read at once.
 pub const BLOCK: usize = 4 * TILE_W;

@@ -9,12 +9,12 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::aligned::Aligned;
 use super::filter::{BLOCK, Taps, along_column, along_columns, along_row, keep_in_range};
 use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_ROW, Strips};
-use super::simd::{load, store};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
+use crate::compute::aligned::Aligned;
+use crate::compute::simd::{load, store};
 
 /// Terms filtered at once; more are done in groups.
 pub const GROUP: usize = 4;

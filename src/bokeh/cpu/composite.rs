@@ -7,12 +7,12 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::aligned::Line;
 use super::rows::{STRIP, Slot};
-use super::simd::{fma, load, madd, store};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress, linear_to_srgb, luminance};
 use crate::bokeh::plan::{Bin, CELL, Compositing, HINDMOST_COVERAGE, MAX_BINS, Plan};
+use crate::compute::aligned::Line;
+use crate::compute::simd::{fma, load, madd, store};
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;

@@ -5,9 +5,9 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use super::rows::Rows;
-use super::team::{Shelf, Team};
 use super::unpack::Piece;
 use crate::bokeh::plan::Share;
+use crate::compute::team::{Shelf, Team};
 
 /// Planes of a level: premultiplied colour and CoC, and how much of it is known.
 const PLANES: usize = 5;

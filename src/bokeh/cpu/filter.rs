@@ -6,8 +6,8 @@
 use pulp::Simd;
 
 use super::rows::{EDGE_VALUES, STRIP, STRIP_EDGES};
-use super::simd::{fma, load};
 use crate::bokeh::plan::SEGMENT;
+use crate::compute::simd::{fma, load};
 
 /// Rows of a result that are made at once.
 pub const BLOCK: usize = 4;

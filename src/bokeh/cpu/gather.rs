@@ -6,11 +6,11 @@ use std::sync::atomic::AtomicBool;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::rows::{PIECE, Rows, STRIP, Strips, repeat_ends};
-use super::simd::madd;
-use super::team::{Shelf, Team};
 use super::unpack::{Source, coc_row};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::Plan;
+use crate::compute::simd::madd;
+use crate::compute::team::{Shelf, Team};
 
 /// Memory of the gathers.
 pub struct Gather {

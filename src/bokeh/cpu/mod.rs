@@ -1,6 +1,5 @@
 //! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per frame.
 
-mod aligned;
 mod band;
 mod bin;
 mod blur;
@@ -12,8 +11,6 @@ mod probe;
 mod reach;
 mod rows;
 mod shelves;
-mod simd;
-mod team;
 mod tent;
 mod tiles;
 mod unpack;
@@ -28,7 +25,6 @@ use gather::Gather;
 use pulp::Arch;
 use rows::Slot;
 use shelves::{BinShelves, StripShelves};
-use team::{Shelf, Team};
 use tiles::{Survey, TILE_H, Tiles};
 use unpack::Source;
 
@@ -36,6 +32,8 @@ use super::plan::{CELL, Compositing, MAX_BINS, Plan};
 use super::rung::SCALES;
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::budget::Quality;
+use crate::compute::simd;
+use crate::compute::team::{Shelf, Team};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
@@ -70,7 +68,7 @@ impl CpuBokeh {
     pub fn new(plan: Plan, threads: Option<usize>) -> Self {
         let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
         let (width, height) = (plan.width, plan.height);
-        let team = Team::new(threads);
+        let team = Team::new("blur", threads);
         let slots: Vec<Slot> = (0..plan.slots()).map(|slot| Slot::new(&plan, slot)).collect();
         let members = (0..team.threads())
             .map(|_| Member {

@@ -1,12 +1,12 @@
 //! What the passes leave behind, for comparing the executors pass by pass and for looking at a blur from within.
 
 use super::CpuBokeh;
-use super::aligned::Line;
 use super::rows::STRIP;
 use super::tiles::{TILE_H, TILE_W};
 use super::unpack::{Piece, Source};
 use crate::bokeh::Probe;
 use crate::bokeh::plan::{Plan, SEGMENT};
+use crate::compute::aligned::Line;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 

@@ -2,10 +2,10 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::aligned::Aligned;
 use super::bin::BLOCK;
 use super::tiles::TILE_W;
 use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
+use crate::compute::aligned::Aligned;
 
 /// Columns of a strip: what one part of the blur pass produces.
 pub const STRIP: usize = 32;

@@ -3,8 +3,8 @@
 
 use super::bin::{BLOCK, BinRows};
 use super::rows::{CELL_PLANES, Cells, Edges, STRIP_CELLS, STRIP_ROW, Slot, Strips};
-use super::team::Shelf;
 use crate::bokeh::plan::{Bin, CELL, Compositing, Plan, Share};
+use crate::compute::team::Shelf;
 
 /// What the parts of the pass `bin` write for one bin.
 pub struct BinShelves<'a> {

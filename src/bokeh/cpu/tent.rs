@@ -3,11 +3,11 @@
 
 use pulp::Simd;
 
-use super::aligned::Line;
 use super::bin::{BLOCK, MARGIN, Means, SUMS, WIDE};
-use super::simd::{fma, load, store};
 use super::unpack::Piece;
 use crate::bokeh::plan::Share;
+use crate::compute::aligned::Line;
+use crate::compute::simd::{fma, load, store};
 
 /// Adds a row's shares to two rows of sums.
 #[inline(always)]

@@ -2,8 +2,8 @@
 
 use pulp::Simd;
 
-use super::aligned::Line;
-use super::simd::madd;
+use crate::compute::aligned::Line;
+use crate::compute::simd::madd;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 

@@ -1,10 +1,10 @@
 //! What lives on the device: allocated once per picture size.
 
-use super::device::Device;
 use super::layout::Capacity;
 use super::shaders::{Bin, Frame, Level};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{Compositing, MAX_BINS, Plan};
+use crate::compute::device::Device;
 
 /// Bytes from one uniform `Work` to the next: no device asks for more.
 pub const WORK_STRIDE: u64 = 256;

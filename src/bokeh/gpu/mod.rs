@@ -1,7 +1,6 @@
 //! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the CPU's passes.
 
 mod buffers;
-mod device;
 mod layout;
 mod passes;
 mod probe;
@@ -11,7 +10,6 @@ pub mod shaders;
 use std::time::Instant;
 
 use buffers::Buffers;
-use device::Device;
 use layout::{Capacity, Layout};
 use passes::Passes;
 use readback::{CAPACITY, MAX_QUERIES, Ring};
@@ -19,6 +17,7 @@ use readback::{CAPACITY, MAX_QUERIES, Ring};
 use super::bank::STEPS_PER_PX;
 use super::plan::{Compositing, Plan};
 use super::{Bokeh, BokehError, Finished, Job};
+use crate::compute::{GpuError, device::Device};
 use crate::optics::CocField;
 
 /// Runs a plan with wgpu compute passes.
@@ -47,10 +46,11 @@ impl GpuBokeh {
         let rows = capacity.rows * plan.levels.most_terms().min(4);
         let largest = capacity.pixels.max(rows).max(1) as u64 * 8;
         if largest > most {
-            return Err(BokehError::Gpu(format!(
+            return Err(GpuError::Failed(format!(
                 "{}: pictures of {} x {} need buffers of {largest} bytes and it allows {most}; use --backend cpu",
                 device.name, plan.width, plan.height
-            )));
+            ))
+            .into());
         }
         let buffers = Buffers::new(&device, plan, &capacity);
         let depth = Buffers::depth(&device, plan.width * plan.height);
@@ -135,7 +135,7 @@ impl Bokeh for GpuBokeh {
         }
         self.device.check()?;
         let Some(mut slot) = self.ring.take() else {
-            return Err(BokehError::Gpu(format!("more than {CAPACITY} frames submitted and not collected")));
+            return Err(GpuError::Failed(format!("more than {CAPACITY} frames submitted and not collected")).into());
         };
         let started = Instant::now();
         job.out.resize(made_for.0, made_for.1);

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use super::buffers::{Buffers, Filters, WORK_STRIDE, works};
-use super::device::Device;
 use super::layout::{Layout, RESULT_TILE, ROWS_TILE, tiles};
 use super::readback::MAX_QUERIES;
 use super::shaders::{self, Bin, Shader, Work};
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
+use crate::compute::device::Device;
 
 /// Invocations of a workgroup in x and y, as the shaders declare them.
 const TILE: u32 = 16;

@@ -4,6 +4,7 @@ use super::GpuBokeh;
 use super::layout::RESULT_TILE;
 use crate::bokeh::plan::CELL;
 use crate::bokeh::{BokehError, Probe};
+use crate::compute::GpuError;
 
 impl GpuBokeh {
     /// The result of a pass over the last frame, in the layout that [`Probe`] states. Waits and allocates; for tests.
@@ -66,7 +67,7 @@ impl GpuBokeh {
         encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &back, 0, u64::from(count) * 4);
         self.device.queue.submit([encoder.finish()]);
         back.map_async(wgpu::MapMode::Read, .., |_| {});
-        let fault = |error: &dyn std::fmt::Display| BokehError::Gpu(format!("{}: {error}", self.device.name));
+        let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", self.device.name));
         device.poll(wgpu::PollType::Wait { submission_index: None, timeout: None }).map_err(|error| fault(&error))?;
         let mapped = back.get_mapped_range(..).map_err(|error| fault(&error))?;
         self.device.check()?;

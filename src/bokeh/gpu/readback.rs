@@ -6,8 +6,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
-use super::device::Device;
 use crate::bokeh::{BokehError, Finished, Job, PassTimes};
+use crate::compute::GpuError;
+use crate::compute::device::Device;
 
 /// Frames that may be in flight: one on the device, one waiting, one on its way back.
 pub const CAPACITY: usize = 3;
@@ -98,15 +99,17 @@ impl Ring {
         } else {
             wgpu::PollType::Poll
         };
-        device.device.poll(poll).map_err(|error| BokehError::Gpu(format!("{}: {error}", device.name)))?;
+        device.device.poll(poll).map_err(|error| GpuError::Failed(format!("{}: {error}", device.name)))?;
         device.check()?;
         match oldest.state.load(Ordering::Acquire) {
             READY => {}
-            FAILED => return Err(BokehError::Gpu(format!("{}: the picture could not be read back", device.name))),
+            FAILED => {
+                return Err(GpuError::Failed(format!("{}: the picture could not be read back", device.name)).into());
+            }
             _ => return Ok(None),
         }
         let Some(mut oldest) = self.pending.pop_front() else { return Ok(None) };
-        let fault = |error: wgpu::MapRangeError| BokehError::Gpu(error.to_string());
+        let fault = |error: wgpu::MapRangeError| GpuError::Failed(error.to_string());
         {
             let bytes = oldest.slot.picture.get_mapped_range(..).map_err(fault)?;
             let out = &mut oldest.job.out.rgb;

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use crate::bokeh::BokehError;
+use super::GpuError;
 
 /// A device and its queue.
 pub struct Device {
@@ -23,10 +23,10 @@ impl Device {
     ///
     /// # Errors
     /// Nothing fits, or the device could not be had.
-    pub fn open(hardware_only: bool, wanted: Option<&str>) -> Result<Self, BokehError> {
+    pub fn open(hardware_only: bool, wanted: Option<&str>) -> Result<Self, GpuError> {
         if hardware_only && wanted.is_none() && !has_gpu_node() {
             let found = "no device node of one under /dev".to_owned();
-            return Err(BokehError::NoAdapter { wanted: "in hardware".to_owned(), found });
+            return Err(GpuError::NoAdapter { wanted: "in hardware".to_owned(), found });
         }
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::VULKAN;
@@ -40,7 +40,7 @@ impl Device {
         let best = (0..adapters.len()).filter(|&k| fits(&infos[k])).min_by_key(|&k| preference(&infos[k]));
         let Some(best) = best else {
             let names: Vec<_> = infos.iter().map(describe).collect();
-            return Err(BokehError::NoAdapter {
+            return Err(GpuError::NoAdapter {
                 wanted: match wanted {
                     Some(name) => format!("named '{name}'"),
                     None if hardware_only => "in hardware".to_owned(),
@@ -58,7 +58,7 @@ impl Device {
             required_limits: adapter.limits(),
             ..Default::default()
         }))
-        .map_err(|error| BokehError::Gpu(format!("{name}: {error}")))?;
+        .map_err(|error| GpuError::Failed(format!("{name}: {error}")))?;
         let fault = Arc::new(Mutex::new(None));
         let report = |fault: &Arc<Mutex<Option<String>>>| {
             let fault = Arc::clone(fault);
@@ -83,9 +83,9 @@ impl Device {
     ///
     /// # Errors
     /// That thing.
-    pub fn check(&self) -> Result<(), BokehError> {
+    pub fn check(&self) -> Result<(), GpuError> {
         match self.fault.lock().ok().and_then(|fault| fault.clone()) {
-            Some(message) => Err(BokehError::Gpu(format!("{}: {message}", self.name))),
+            Some(message) => Err(GpuError::Failed(format!("{}: {message}", self.name))),
             None => Ok(()),
         }
     }

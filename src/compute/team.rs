@@ -61,8 +61,8 @@ const SPINS: u32 = 4_000;
 unsafe impl Sync for Shared {}
 
 impl Team {
-    /// A team of `threads` (at least 1), the caller included.
-    pub fn new(threads: usize) -> Self {
+    /// A team of `threads` (at least 1), the caller included; `name` is what the others are called, with a number.
+    pub fn new(name: &str, threads: usize) -> Self {
         let shared = Arc::new(Shared {
             gate: AtomicU64::new(0),
             work: UnsafeCell::new(None),
@@ -75,7 +75,7 @@ impl Team {
             .map_while(|k| {
                 let shared = Arc::clone(&shared);
                 // Without the thread the others do its share.
-                thread::Builder::new().name(format!("blur-{k}")).spawn(move || shared.serve(k)).ok()
+                thread::Builder::new().name(format!("{name}-{k}")).spawn(move || shared.serve(k)).ok()
             })
             .collect::<Vec<_>>();
         // A thread that starts allocates; from here on nothing does.
@@ -140,7 +140,7 @@ impl Team {
         // SAFETY: closed, and nobody at work.
         unsafe { *shared.work.get() = None };
         if shared.panicked.swap(false, Ordering::Relaxed) {
-            resume_unwind(Box::new("a part of a blur pass panicked"));
+            resume_unwind(Box::new("a part of a pass panicked"));
         }
     }
 }
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn every_part_is_done_once() {
         for threads in [1, 2, 5] {
-            let mut team = Team::new(threads);
+            let mut team = Team::new("test", threads);
             for parts in [0, 1, 2, 7, 100] {
                 for _ in 0..200 {
                     let done: Vec<AtomicUsize> = (0..parts).map(|_| AtomicUsize::new(0)).collect();
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn a_panic_in_a_part_reaches_the_caller_and_the_team_lives_on() {
-        let mut team = Team::new(3);
+        let mut team = Team::new("test", 3);
         let result = catch_unwind(AssertUnwindSafe(|| team.run(8, &|part| assert_ne!(part, 5))));
         assert!(result.is_err());
         let sum = AtomicUsize::new(0);
