@@ -15,7 +15,7 @@ const BITS: usize = 24;
 /// The bits as bytes, each in a plane of its own.
 pub const PLANES: usize = BITS / 8;
 /// Columns and rows from a pixel to its outermost neighbours.
-const REACH: usize = 4;
+pub const REACH: usize = 4;
 
 /// Column and row of the neighbour of bit `bit`, from the corner of the window.
 const fn neighbour(bit: usize) -> (usize, usize) {

@@ -3,92 +3,93 @@
 
 use pulp::WithSimd;
 
+use super::GROUP;
 use super::census::PLANES;
 
 /// The cost of a partner beyond the border of the right picture: that of a poor one, so that the outermost columns may
 /// take the disparity of their neighbours.
 const OUTSIDE: u8 = 8;
 
-/// Differences of one row, `[column][disparity]`, 0 to 24.
-pub struct Differences<'a, const L: usize> {
-    /// The census of the left row.
-    pub left: [&'a [u8]; PLANES],
-    /// The census of the right row from its last column to its first.
-    pub right: [&'a [u8]; PLANES],
+/// Rows whose differences the costs of a group are made of: one more above and one below.
+pub const ROWS: usize = GROUP + 2;
+
+/// Census of a left row, and of the right one from its last column to its first.
+pub type Codes<'a> = [[&'a [u8]; PLANES]; 2];
+
+/// The costs of a group of rows, 0 to 27: an eighth of the sum of the differences over three rows and columns.
+pub struct Costs<'a, const N: usize> {
+    /// From the row above the group to the one below it.
+    pub codes: [Codes<'a>; ROWS],
     /// Columns.
     pub width: usize,
-    /// Disparities, a multiple of `L`.
-    pub disparities: usize,
-    /// At least `width * disparities`.
+    /// `[column][row][disparity]`, at least `width * GROUP * N`.
     pub out: &'a mut [u8],
 }
 
-impl<const L: usize> WithSimd for Differences<'_, L> {
+impl<const N: usize> WithSimd for Costs<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { left, right, width, disparities, out } = self;
-        for (x, cells) in out.chunks_exact_mut(disparities).take(width).enumerate() {
-            // The partner at disparity d is in column x - d, which is this one plus d in the mirrored row.
-            let first = width - 1 - x;
-            for (block, cells) in cells.as_chunks_mut::<L>().0.iter_mut().enumerate() {
-                *cells = [0; L];
-                for plane in 0..PLANES {
-                    let code = left[plane][x];
-                    let partners = &right[plane][first + block * L..][..L];
-                    for (cell, &partner) in cells.iter_mut().zip(partners) {
-                        *cell += (code ^ partner).count_ones() as u8;
-                    }
-                }
+        let Self { codes, width, out } = self;
+        let out = out.as_chunks_mut::<N>().0;
+        // Sums over three rows, of the columns before, here, and after.
+        let mut before = [[0u8; N]; GROUP];
+        let mut here = [[0u8; N]; GROUP];
+        let mut after = [[0u8; N]; GROUP];
+        columns(&codes, width, 0, &mut here);
+        before.copy_from_slice(&here);
+        for x in 0..width {
+            if x + 1 < width {
+                columns(&codes, width, x + 1, &mut after);
             }
-            if x + 1 < disparities {
-                cells[x + 1..].fill(OUTSIDE);
+            for row in 0..GROUP {
+                let out = &mut out[x * GROUP + row];
+                let (before, here, after) = (&mut before[row], &mut here[row], &after[row]);
+                for d in 0..N {
+                    out[d] = (before[d] + here[d] + after[d] + 4) >> 3;
+                    before[d] = here[d];
+                    here[d] = after[d];
+                }
             }
         }
     }
 }
 
-/// The costs of one row, 0 to 27: an eighth of the sum of the differences in three rows and columns.
-pub struct Costs<'a, const L: usize> {
-    /// The differences of the rows above, here, and below.
-    pub rows: [&'a [u8]; 3],
-    /// Columns.
-    pub width: usize,
-    /// Disparities, a multiple of `L`.
-    pub disparities: usize,
-    /// At least `width * disparities`.
-    pub out: &'a mut [u8],
-}
-
-impl<const L: usize> WithSimd for Costs<'_, L> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { rows, width, disparities, out } = self;
-        for block in 0..disparities / L {
-            let at = |x: usize| x * disparities + block * L;
-            let mut before = column::<L>(rows, at(0));
-            let mut here = before;
-            for x in 0..width {
-                let after = column::<L>(rows, at((x + 1).min(width - 1)));
-                let out = &mut out[at(x)..at(x) + L];
-                for i in 0..L {
-                    out[i] = (before[i] + here[i] + after[i] + 4) >> 3;
-                }
-                (before, here) = (here, after);
-            }
-        }
-    }
-}
-
-/// The sum of the three rows at `at`.
+/// The differences of column `x`, summed over three rows, 0 to 72.
 #[inline(always)]
-fn column<const L: usize>(rows: [&[u8]; 3], at: usize) -> [u8; L] {
-    let mut sum = [0; L];
-    let [above, here, below] = rows;
-    let (above, here, below) = (&above[at..at + L], &here[at..at + L], &below[at..at + L]);
-    for i in 0..L {
-        sum[i] = above[i] + here[i] + below[i];
+fn columns<const N: usize>(codes: &[Codes; ROWS], width: usize, x: usize, sums: &mut [[u8; N]; GROUP]) {
+    let mut two = [[0u8; N]; 2];
+    for (k, codes) in codes.iter().enumerate() {
+        let one = differences::<N>(codes, width, x);
+        for d in 0..N {
+            if k >= 2 {
+                sums[k - 2][d] = two[0][d] + two[1][d] + one[d];
+            }
+            two[0][d] = two[1][d];
+            two[1][d] = one[d];
+        }
     }
-    sum
+}
+
+/// The bits that differ between pixel `x` and each partner, 0 to 24.
+#[inline(always)]
+fn differences<const N: usize>([left, right]: &Codes, width: usize, x: usize) -> [u8; N] {
+    // The partner at disparity d is in column x - d, which is this one plus d in the mirrored row.
+    let first = width - 1 - x;
+    let [a, b, c] = left.map(|plane| plane[x]);
+    let [of_a, of_b, of_c] = right;
+    let (of_a, of_b, of_c) = (&of_a[first..first + N], &of_b[first..first + N], &of_c[first..first + N]);
+    let mut out = [0u8; N];
+    for d in 0..N {
+        let (a, b, c) = (a ^ of_a[d], b ^ of_b[d], c ^ of_c[d]);
+        // Bits add up to ones and twos, so that two bytes are counted for three.
+        let (ones, twos) = (a ^ b ^ c, (a & b) | (c & (a ^ b)));
+        out[d] = ones.count_ones() as u8 + 2 * twos.count_ones() as u8;
+    }
+    if x + 1 < N {
+        for (d, out) in out.iter_mut().enumerate() {
+            *out = if d > x { OUTSIDE } else { *out };
+        }
+    }
+    out
 }

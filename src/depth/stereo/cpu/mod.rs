@@ -13,8 +13,8 @@ use std::iter;
 use std::sync::atomic::AtomicBool;
 
 use census::Census;
-use cost::{Costs, Differences};
-use path::{Columns, Order, Penalties, Rows, STRIPE, TOGETHER};
+use cost::Costs;
+use path::{Columns, Penalties, Rows, STRIPE, States, Volumes};
 use pulp::Arch;
 use winner::Winners;
 
@@ -24,8 +24,13 @@ use crate::compute::aligned::Aligned;
 use crate::compute::simd;
 use crate::compute::team::{Shelf, Team};
 
-/// Rows that are worked on at a time; a multiple of [`TOGETHER`].
-const CHUNK: usize = 16;
+/// Rows whose values lie side by side, `[column][row][disparity]`, as one part of the work.
+const GROUP: usize = 4;
+/// Groups that are worked on at a time.
+const CHUNK: usize = 2;
+
+/// As many disparities as the code is made for.
+const RANGES: [usize; 7] = [16, 32, 64, 96, 128, 192, 256];
 
 /// Matches pairs of one size on the CPU.
 pub struct CpuExecutor {
@@ -36,42 +41,37 @@ pub struct CpuExecutor {
     penalties: Penalties,
     left: Census,
     right: Census,
-    /// Columns of the volumes: whole stripes.
-    columns: usize,
-    /// Of a chunk of rows, `[row][column][disparity]`.
+    /// Stripes of columns.
+    stripes: usize,
+    /// Of a chunk of groups.
     costs: Aligned<u8>,
-    /// Of all rows, laid out as the costs.
+    /// Of all groups.
     sums: Aligned<u8>,
-    /// States of the paths along columns, by the parity of the row: stripe by stripe.
-    states: [Aligned<u8>; 2],
-    least: Vec<u8>,
+    /// Of the paths along the columns of each stripe.
+    states: Vec<States>,
     members: Vec<Member>,
-    taken: [Vec<AtomicBool>; 4],
+    taken: [Vec<AtomicBool>; 3],
 }
 
 /// Memory of one thread.
 struct Member {
-    /// Differences of [`TOGETHER`] rows, and of one above and one below.
-    differences: Aligned<u8>,
-    states: Aligned<u8>,
+    states: States,
     best: [Vec<u16>; 2],
 }
 
 impl CpuExecutor {
-    /// For pairs of this size, and as many disparities, a multiple of 16 and at most 256.
+    /// For pairs of this size, and at least as many disparities, at most 256.
     pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
-        let columns = width.next_multiple_of(STRIPE);
-        let row = columns * disparities;
-        let stripes = columns / STRIPE;
+        let disparities = RANGES.into_iter().find(|&range| range >= disparities).unwrap_or(RANGES[RANGES.len() - 1]);
+        let stripes = width.div_ceil(STRIPE);
+        let groups = height.div_ceil(GROUP);
+        let group = stripes * STRIPE * GROUP * disparities;
         let member = || Member {
-            differences: Aligned::zeros((TOGETHER + 2) * row),
-            states: Aligned::zeros(path::row_states(disparities)),
-            best: [vec![0; width], vec![0; width + disparities]],
+            states: States::new(2 * GROUP, disparities),
+            best: [vec![0; GROUP * width], vec![0; GROUP * (width + disparities)]],
         };
-        let mut states = [(); 2].map(|()| Aligned::zeros(stripes * path::column_states(disparities)));
-        states.iter_mut().for_each(|states| states.fill(u8::MAX));
         let flags = || iter::repeat_with(AtomicBool::default);
-        let most = (height + 2 * CHUNK).max(CHUNK * stripes);
+        let most = (height + 2 * census::REACH).max(CHUNK * stripes);
         Self {
             width,
             height,
@@ -80,113 +80,111 @@ impl CpuExecutor {
             penalties: Penalties::new(),
             left: Census::new((width, height), false, 0),
             right: Census::new((width, height), true, disparities),
-            columns,
-            costs: Aligned::zeros(CHUNK * row),
-            sums: Aligned::zeros(height * row),
-            states,
-            least: vec![0; columns],
+            stripes,
+            costs: Aligned::zeros(CHUNK * group),
+            sums: Aligned::zeros(groups * group),
+            states: iter::repeat_with(|| States::new(STRIPE, disparities)).take(stripes).collect(),
             members: iter::repeat_with(member).take(threads).collect(),
-            taken: [(); 4].map(|()| flags().take(most).collect()),
+            taken: [(); 3].map(|()| flags().take(most).collect()),
         }
     }
 
-    fn with_lanes<const L: usize>(&mut self, left: &[u8], team: &mut Team, out: &mut [u16]) {
-        let chunks = self.height.div_ceil(CHUNK);
-        for chunk in 0..chunks {
-            self.along_rows::<L>(chunk, left, team, true);
-            self.along_columns::<L>(chunk, left, team, false);
+    fn match_range<const N: usize>(&mut self, left: &[u8], team: &mut Team, out: &mut [u16]) {
+        let groups = self.height.div_ceil(GROUP);
+        let chunks = groups.div_ceil(CHUNK);
+        let chunk = |chunk: usize| (chunk * CHUNK, CHUNK.min(groups - chunk * CHUNK));
+        for k in 0..chunks {
+            self.along_rows::<N>(chunk(k), left, team, true);
+            self.along_columns::<N>(chunk(k), left, team, false);
         }
-        for chunk in (0..chunks).rev() {
-            // What the last chunk left is still there.
-            if chunk + 1 < chunks {
-                self.along_rows::<L>(chunk, left, team, false);
+        for k in (0..chunks).rev() {
+            // The costs of the last chunk are still there.
+            if k + 1 < chunks {
+                self.along_rows::<N>(chunk(k), left, team, false);
             }
-            self.along_columns::<L>(chunk, left, team, true);
-            self.win::<L>(chunk, team, out);
+            self.along_columns::<N>(chunk(k), left, team, true);
+            self.win::<N>(chunk(k), team, out);
         }
     }
 
-    /// First row and number of rows of a chunk.
-    fn rows_of(&self, chunk: usize) -> (usize, usize) {
-        (chunk * CHUNK, CHUNK.min(self.height - chunk * CHUNK))
+    /// Bytes of a group of rows.
+    fn group(&self) -> usize {
+        self.stripes * STRIPE * GROUP * self.disparities
     }
 
-    /// The costs of a chunk, and, if `paths`, the sums of the paths along its rows.
-    fn along_rows<const L: usize>(&mut self, chunk: usize, left: &[u8], team: &mut Team, paths: bool) {
-        let (first, rows) = self.rows_of(chunk);
-        let Self { width, height, disparities, arch, penalties, columns, .. } = self;
-        let (width, height, disparities, arch) = (*width, *height, *disparities, *arch);
-        let stride = *columns * disparities;
+    /// The costs of the groups, and, if `paths`, the sums of the paths along their rows.
+    fn along_rows<const N: usize>(
+        &mut self,
+        (first, groups): (usize, usize),
+        left: &[u8],
+        team: &mut Team,
+        paths: bool,
+    ) {
+        let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
         let [cost_taken, sum_taken, ..] = &mut self.taken;
-        let costs = Shelf::new(&mut self.costs[..rows * stride], TOGETHER * stride, cost_taken);
-        let sums = Shelf::new(&mut self.sums[first * stride..(first + rows) * stride], TOGETHER * stride, sum_taken);
-        let (census, penalties) = ((&self.left, &self.right), &*penalties);
-        team.run_with(&mut self.members, rows.div_ceil(TOGETHER), &|member, part| {
-            let Member { differences, states, .. } = member;
+        let costs = Shelf::new(&mut self.costs[..groups * group], group, cost_taken);
+        let sums = Shelf::new(&mut self.sums[first * group..(first + groups) * group], group, sum_taken);
+        let (census, penalties) = ((&self.left, &self.right), &self.penalties);
+        team.run_with(&mut self.members, groups, &|member, part| {
+            let y = (first + part) * GROUP;
+            let mut codes = [[[&[][..]; census::PLANES]; 2]; cost::ROWS];
+            for (k, codes) in codes.iter_mut().enumerate() {
+                let y = (y + k).saturating_sub(1).min(height - 1);
+                *codes = [census.0.row(y), census.1.row(y)];
+            }
             let costs = costs.part(part);
-            let together = costs.len() / stride;
-            let y = first + part * TOGETHER;
-            let row_of = |k: usize| (y + k).saturating_sub(1).min(height - 1);
-            for (k, out) in differences.chunks_exact_mut(stride).take(together + 2).enumerate() {
-                let (left, right) = (census.0.row(row_of(k)), census.1.row(row_of(k)));
-                arch.dispatch(Differences::<L> { left, right, width, disparities, out });
-            }
-            for (k, out) in costs.chunks_exact_mut(stride).enumerate() {
-                let row = |k: usize| &differences[k * stride..(k + 1) * stride];
-                arch.dispatch(Costs::<L> { rows: [row(k), row(k + 1), row(k + 2)], width, disparities, out });
-            }
+            arch.dispatch(Costs::<N> { codes, width, out: costs });
             if paths {
-                let luma = &left[y * width..(y + together) * width];
-                let sums = sums.part(part);
-                arch.dispatch(Rows::<L> { costs, luma, width, stride, disparities, penalties, states, sums });
+                let luma = &left[y * width..(y + GROUP).min(height) * width];
+                let (states, sums) = (&mut member.states, sums.part(part));
+                arch.dispatch(Rows::<N> { costs, luma, width, penalties, states, sums });
             }
         });
     }
 
-    /// Adds the path down a chunk, or up.
-    fn along_columns<const L: usize>(&mut self, chunk: usize, left: &[u8], team: &mut Team, up: bool) {
-        let (first, rows) = self.rows_of(chunk);
-        let Self { width, disparities, arch, penalties, columns, .. } = self;
-        let (width, disparities, arch, penalties) = (*width, *disparities, *arch, &*penalties);
-        let (stride, stripes) = (*columns * disparities, *columns / STRIPE);
-        let [sum_taken, even_taken, odd_taken, least_taken] = &mut self.taken;
-        let (costs, luma) = (&*self.costs, (left, width));
-        let sums = Shelf::new(&mut self.sums[first * stride..(first + rows) * stride], STRIPE * disparities, sum_taken);
-        let [even, odd] = &mut self.states;
-        let even = Shelf::new(even, path::column_states(disparities), even_taken);
-        let odd = Shelf::new(odd, path::column_states(disparities), odd_taken);
-        let least = Shelf::new(&mut self.least, STRIPE, least_taken);
-        let order = if up { Order::Up(rows) } else { Order::Down(rows) };
+    /// Adds the path down the groups; or the path up, which leaves the sums of all where the costs were.
+    fn along_columns<const N: usize>(
+        &mut self,
+        (first, groups): (usize, usize),
+        left: &[u8],
+        team: &mut Team,
+        up: bool,
+    ) {
+        let (width, height, arch, group, stripes) = (self.width, self.height, self.arch, self.group(), self.stripes);
+        let stripe_len = group / stripes;
+        let [cost_taken, sum_taken, state_taken] = &mut self.taken;
+        let penalties = &self.penalties;
+        let costs = Shelf::new(&mut self.costs[..groups * group], stripe_len, cost_taken);
+        let sums = Shelf::new(&mut self.sums[first * group..(first + groups) * group], stripe_len, sum_taken);
+        let states = Shelf::new(&mut self.states, 1, state_taken);
         team.run(stripes, &|stripe| {
-            arch.dispatch(Columns::<L> {
-                costs,
-                first: stripe * STRIPE * disparities,
-                stride,
-                order,
-                y: first,
-                luma,
-                columns: (stripe * STRIPE, width.min((stripe + 1) * STRIPE)),
-                disparities,
-                penalties,
-                states: [even.part(stripe), odd.part(stripe)],
-                least: least.part(stripe),
-                sums: &sums,
-                part: (stripes, stripe),
-            });
+            let states = &mut states.part(stripe)[0];
+            for k in 0..groups {
+                let k = if up { groups - 1 - k } else { k };
+                let y = (first + k) * GROUP;
+                let (costs, sums) = (costs.part(k * stripes + stripe), sums.part(k * stripes + stripe));
+                arch.dispatch(Columns::<N> {
+                    volumes: if up { Volumes::Up { costs, sums } } else { Volumes::Down { costs, sums } },
+                    rows: (y, GROUP.min(height - y)),
+                    luma: (left, width),
+                    columns: (stripe * STRIPE, width.min((stripe + 1) * STRIPE)),
+                    penalties,
+                    states,
+                });
+            }
         });
     }
 
-    /// The winners of a chunk.
-    fn win<const L: usize>(&mut self, chunk: usize, team: &mut Team, out: &mut [u16]) {
-        let (first, rows) = self.rows_of(chunk);
-        let (width, disparities, arch) = (self.width, self.disparities, self.arch);
-        let stride = self.columns * disparities;
-        let sums = &self.sums[first * stride..];
-        let out = Shelf::new(&mut out[first * width..(first + rows) * width], width, &mut self.taken[0]);
-        team.run_with(&mut self.members, rows, &|member, row| {
-            let sums = &sums[row * stride..(row + 1) * stride];
+    /// The winners of the groups.
+    fn win<const N: usize>(&mut self, (first, groups): (usize, usize), team: &mut Team, out: &mut [u16]) {
+        let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
+        let rows = first * GROUP..((first + groups) * GROUP).min(height);
+        let sums = &self.costs;
+        let out = Shelf::new(&mut out[rows.start * width..rows.end * width], GROUP * width, &mut self.taken[0]);
+        team.run_with(&mut self.members, groups, &|member, part| {
+            let sums = &sums[part * group..(part + 1) * group];
             let [left, right] = &mut member.best;
-            arch.dispatch(Winners::<L> { sums, width, disparities, best: [left, right], out: out.part(row) });
+            arch.dispatch(Winners::<N> { sums, width, best: [left, right], out: out.part(part) });
         });
     }
 }
@@ -201,9 +199,13 @@ impl Executor for CpuExecutor {
         self.left.see(left, team, *arch, &mut taken[0]);
         self.right.see(right, team, *arch, &mut taken[0]);
         match self.disparities {
-            n if n % 64 == 0 => self.with_lanes::<64>(left, team, out),
-            n if n % 32 == 0 => self.with_lanes::<32>(left, team, out),
-            _ => self.with_lanes::<16>(left, team, out),
+            16 => self.match_range::<16>(left, team, out),
+            32 => self.match_range::<32>(left, team, out),
+            64 => self.match_range::<64>(left, team, out),
+            96 => self.match_range::<96>(left, team, out),
+            128 => self.match_range::<128>(left, team, out),
+            192 => self.match_range::<192>(left, team, out),
+            _ => self.match_range::<256>(left, team, out),
         }
         Ok(())
     }

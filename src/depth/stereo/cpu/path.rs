@@ -8,7 +8,8 @@
 
 use pulp::WithSimd;
 
-use crate::compute::team::Shelf;
+use super::GROUP;
+use crate::compute::aligned::Aligned;
 
 /// For a disparity that differs by one.
 const SLOPE: u8 = 8;
@@ -17,8 +18,8 @@ const JUMP: (f32, f32) = (20.0, 40.0);
 /// Difference of grey values that takes away all but 1/e of the additional penalty.
 const EDGE: f32 = 10.0;
 
-/// Bytes after the disparities of a pixel's state that are never the least: what lies beyond both ends of the range.
-pub const GUARD: usize = 64;
+/// What lies beyond both ends of the range.
+const GUARD: usize = 64;
 
 /// P2 by the difference of grey values from pixel to pixel.
 pub struct Penalties([u8; 256]);
@@ -39,119 +40,124 @@ impl Penalties {
     }
 }
 
-/// What one step of a path is made of; all slices but `before` have one byte for each disparity.
-struct Step<'a> {
-    /// The values of the pixel before, with a byte that is never the least on both sides; empty where the path begins.
-    before: &'a [u8],
-    /// The least of them.
-    least: u8,
-    p2: u8,
-    cost: &'a [u8],
-    out: &'a mut [u8],
-    /// Half of the values is added to what is kept of this.
-    sum: &'a mut [u8],
-    /// All bits, or none.
-    keep: u8,
+/// The `N` bytes from `at` on.
+#[inline(always)]
+fn bytes<const N: usize>(from: &[u8], at: usize) -> &[u8; N] {
+    &from[at..at + N].as_chunks::<N>().0[0]
 }
 
-impl Step<'_> {
-    /// Goes the step; returns the least value.
+/// The `N` bytes from `at` on.
+#[inline(always)]
+fn bytes_mut<const N: usize>(from: &mut [u8], at: usize) -> &mut [u8; N] {
+    &mut from[at..at + N].as_chunks_mut::<N>().0[0]
+}
+
+/// The states of paths: the values of each at the pixel where it is, with [`GUARD`] bytes on both sides that are never
+/// the least, and the least of them. Those of the pixel before are kept beside those that are being made.
+pub struct States {
+    values: [Aligned<u8>; 2],
+    least: Vec<u8>,
+    each: usize,
+}
+
+impl States {
+    /// Of `paths` paths.
+    pub fn new(paths: usize, disparities: usize) -> Self {
+        let each = disparities + GUARD;
+        let mut values = [(); 2].map(|()| Aligned::zeros(GUARD + paths * each));
+        values.iter_mut().for_each(|values| values.fill(u8::MAX));
+        Self { values, least: vec![0; paths], each }
+    }
+
+    /// Path `path` begins at a pixel of these costs.
     #[inline(always)]
-    fn go<const L: usize>(self) -> u8 {
-        let Self { before, least, p2, cost, out, sum, keep } = self;
-        let mut lowest = [u8::MAX; L];
-        let blocks = cost.as_chunks::<L>().0.iter().zip(out.as_chunks_mut::<L>().0).zip(sum.as_chunks_mut::<L>().0);
-        if before.is_empty() {
-            for ((cost, out), sum) in blocks {
-                for i in 0..L {
-                    out[i] = cost[i];
-                    sum[i] = (sum[i] & keep) + (cost[i] >> 1);
-                    lowest[i] = lowest[i].min(cost[i]);
-                }
-            }
-        } else {
-            let cap = least + p2;
-            let length = before.len() - 2;
-            let (lower, same, upper) = (&before[..length], &before[1..=length], &before[2..]);
-            let beside = lower.as_chunks::<L>().0.iter().zip(same.as_chunks::<L>().0).zip(upper.as_chunks::<L>().0);
-            for (((cost, out), sum), ((lower, same), upper)) in blocks.zip(beside) {
-                for i in 0..L {
-                    let near = lower[i].min(upper[i]).saturating_add(SLOPE);
-                    let value = same[i].min(near).min(cap).wrapping_sub(least).wrapping_add(cost[i]);
-                    out[i] = value;
-                    sum[i] = (sum[i] & keep).wrapping_add(value >> 1);
-                    lowest[i] = lowest[i].min(value);
-                }
-            }
-        }
+    fn begin<const N: usize>(&mut self, path: usize, cost: &[u8; N]) -> &[u8; N] {
+        let values = bytes_mut::<N>(&mut self.values[0], GUARD + path * self.each);
         let mut least = u8::MAX;
-        for value in lowest {
+        for d in 0..N {
+            values[d] = cost[d];
+            least = least.min(cost[d]);
+        }
+        self.least[path] = least;
+        values
+    }
+
+    /// Path `path` goes on to a pixel of these costs.
+    #[inline(always)]
+    fn go<const N: usize>(&mut self, path: usize, p2: u8, cost: &[u8; N]) -> &[u8; N] {
+        let [now, before] = &mut self.values;
+        let at = GUARD + path * self.each;
+        let values = bytes_mut::<N>(now, at);
+        let (lower, same, upper) = (bytes::<N>(before, at - 1), bytes::<N>(before, at), bytes::<N>(before, at + 1));
+        let last = self.least[path];
+        let cap = last + p2;
+        let mut least = u8::MAX;
+        for d in 0..N {
+            let near = lower[d].min(upper[d]).saturating_add(SLOPE);
+            let value = same[d].min(near).min(cap).wrapping_sub(last).wrapping_add(cost[d]);
+            values[d] = value;
             least = least.min(value);
         }
-        least
+        self.least[path] = least;
+        values
+    }
+
+    /// All paths have gone their step.
+    #[inline(always)]
+    fn turn(&mut self) {
+        let [now, before] = &mut self.values;
+        std::mem::swap(now, before);
     }
 }
 
-/// Rows that a [`Rows`] goes along together: while one waits for its own last step, the others go theirs.
-pub const TOGETHER: usize = 4;
-const WAYS: usize = 2;
-
-/// The paths from the left and from the right along some rows.
-pub struct Rows<'a, const L: usize> {
-    /// Costs, `[row][column][disparity]`.
+/// The paths from the left and from the right along a group of rows, together: while one waits for the end of its own
+/// last step, the others go theirs.
+pub struct Rows<'a, const N: usize> {
+    /// `[column][row][disparity]`.
     pub costs: &'a [u8],
-    /// Grey values of the left picture, `[row][column]`: one row for each row of costs, at most [`TOGETHER`].
+    /// Grey values of the left picture, `[row][column]`: of the rows of the group that there are.
     pub luma: &'a [u8],
     /// Columns.
     pub width: usize,
-    /// Bytes from row to row of `costs` and `sums`.
-    pub stride: usize,
-    /// Disparities, a multiple of `L`.
-    pub disparities: usize,
     /// P2.
     pub penalties: &'a Penalties,
-    /// Memory of [`row_states`] bytes.
-    pub states: &'a mut [u8],
+    /// Of `2 * GROUP` paths.
+    pub states: &'a mut States,
     /// Half of both paths' values, laid out as the costs.
     pub sums: &'a mut [u8],
 }
 
-/// Bytes of memory for the states of [`Rows`].
-pub fn row_states(disparities: usize) -> usize {
-    2 * (GUARD + TOGETHER * WAYS * (disparities + GUARD))
-}
-
-impl<const L: usize> WithSimd for Rows<'_, L> {
+impl<const N: usize> WithSimd for Rows<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { costs, luma, width, stride, disparities, penalties, states, sums } = self;
+        let Self { costs, luma, width, penalties, states, sums } = self;
         let rows = luma.len() / width;
-        states.fill(u8::MAX);
-        let (mut now, mut before) = states.split_at_mut(states.len() / 2);
-        let mut least = [[0u8; WAYS]; TOGETHER];
+        let (costs, sums) = (costs.as_chunks::<N>().0, sums.as_chunks_mut::<N>().0);
+        let last = width - 1;
         for k in 0..width {
-            let last = width - 1;
-            // The path that comes to a pixel first leaves its values there, and the other adds its own.
-            let ways = [(k, k.wrapping_sub(1), k > last - k), (last - k, width - k, k >= last - k)];
             for row in 0..rows {
                 let luma = &luma[row * width..(row + 1) * width];
+                // The path that comes to a pixel first leaves its values there, and the other adds its own.
+                let ways = [(k, k.wrapping_sub(1), k > last - k), (last - k, width - k, k >= last - k)];
                 for (way, (x, from, is_second)) in ways.into_iter().enumerate() {
-                    let cells = row * stride + x * disparities..row * stride + (x + 1) * disparities;
-                    let state = GUARD + (row * WAYS + way) * (disparities + GUARD);
-                    let step = Step {
-                        before: if k == 0 { &[] } else { &before[state - 1..state + disparities + 1] },
-                        least: least[row][way],
-                        p2: if k == 0 { 0 } else { penalties.between(luma[x], luma[from]) },
-                        cost: &costs[cells.clone()],
-                        out: &mut now[state..state + disparities],
-                        sum: &mut sums[cells],
-                        keep: if is_second { u8::MAX } else { 0 },
+                    let cells = x * GROUP + row;
+                    let (path, cost, sum) = (row * 2 + way, &costs[cells], &mut sums[cells]);
+                    let values = if k == 0 {
+                        states.begin(path, cost)
+                    } else {
+                        states.go(path, penalties.between(luma[x], luma[from]), cost)
                     };
-                    least[row][way] = step.go::<L>();
+                    if is_second {
+                        add_half(values, sum);
+                    } else {
+                        for d in 0..N {
+                            sum[d] = values[d] >> 1;
+                        }
+                    }
                 }
             }
-            std::mem::swap(&mut now, &mut before);
+            states.turn();
         }
     }
 }
@@ -159,86 +165,93 @@ impl<const L: usize> WithSimd for Rows<'_, L> {
 /// Columns that one thread goes down, or up.
 pub const STRIPE: usize = 32;
 
-/// The paths down or up the columns of a stripe, along some rows.
-pub struct Columns<'a, const L: usize> {
-    /// Costs, `[row][column][disparity]`, `STRIPE` columns from `x` on belonging to the stripe.
-    pub costs: &'a [u8],
-    /// Where the stripe begins in each row of `costs`, and bytes from row to row.
-    pub first: usize,
-    /// Bytes from row to row of `costs`.
-    pub stride: usize,
-    /// Rows of `costs`, in the order in which the path goes.
-    pub order: Order,
-    /// Number in the picture of the first row of `costs`.
-    pub y: usize,
+/// Adds half of the values.
+#[inline(always)]
+fn add_half<const N: usize>(values: &[u8; N], sum: &mut [u8; N]) {
+    for d in 0..N {
+        sum[d] = sum[d].wrapping_add(values[d] >> 1);
+    }
+}
+
+/// The paths down or up the columns of a stripe, along a group of rows.
+pub struct Columns<'a, const N: usize> {
+    /// Costs and sums of the stripe.
+    pub volumes: Volumes<'a>,
+    /// The first row of the group, and how many there are.
+    pub rows: (usize, usize),
     /// Grey values of the left picture, and its columns.
     pub luma: (&'a [u8], usize),
-    /// First column of the stripe and one past its last.
+    /// First column of the stripe, and one past its last.
     pub columns: (usize, usize),
-    /// Disparities, a multiple of `L`.
-    pub disparities: usize,
     /// P2.
     pub penalties: &'a Penalties,
-    /// Memory of [`column_states`] bytes for each parity of rows; kept from call to call.
-    pub states: [&'a mut [u8]; 2],
-    /// The least state of each column.
-    pub least: &'a mut [u8],
-    /// What the halves of the values are added to: part `row * parts + part` of it is the stripe's.
-    pub sums: &'a Shelf<'a, u8>,
-    /// Parts of a row of `sums`, and the number of this stripe.
-    pub part: (usize, usize),
+    /// Of [`STRIPE`] paths; kept from group to group.
+    pub states: &'a mut States,
 }
 
-/// Which way a path goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// From the first of so many rows to the last.
-    Down(usize),
-    /// From the last of so many rows to the first.
-    Up(usize),
+/// Costs and sums, both `[column][row][disparity]`, and the way the paths go.
+pub enum Volumes<'a> {
+    /// Down: half of the values is added to the sums.
+    Down {
+        /// What pixels cost.
+        costs: &'a [u8],
+        /// Of the paths so far.
+        sums: &'a mut [u8],
+    },
+    /// Up: the sums are done, and take the place of the costs.
+    Up {
+        /// What pixels cost; then the sums of all paths.
+        costs: &'a mut [u8],
+        /// Of the paths so far.
+        sums: &'a [u8],
+    },
 }
 
-/// Bytes of memory for the states of a stripe.
-pub fn column_states(disparities: usize) -> usize {
-    GUARD + STRIPE * (disparities + GUARD)
-}
-
-impl<const L: usize> WithSimd for Columns<'_, L> {
+impl<const N: usize> WithSimd for Columns<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { costs, first, stride, order, y, luma, columns, disparities, penalties, states, least, sums, part } =
-            self;
-        let [even, odd] = states;
-        let ((luma, width), (rows, up)) = (
-            luma,
-            match order {
-                Order::Down(rows) => (rows, false),
-                Order::Up(rows) => (rows, true),
-            },
-        );
-        let height = luma.len() / width;
-        for k in 0..rows {
-            let row = if up { rows - 1 - k } else { k };
-            let y = y + row;
-            let from = if up { y + 1 } else { y.wrapping_sub(1) };
-            let begins = from >= height;
-            let sums = sums.part(row * part.0 + part.1);
-            let (now, before) = if y.is_multiple_of(2) { (&mut *even, &*odd) } else { (&mut *odd, &*even) };
-            for (column, x) in (columns.0..columns.1).enumerate() {
-                let cells = column * disparities..(column + 1) * disparities;
-                let cost = &costs[row * stride + first..][cells.clone()];
-                let state = GUARD + column * (disparities + GUARD);
-                let step = Step {
-                    before: if begins { &[] } else { &before[state - 1..state + disparities + 1] },
-                    least: least[column],
-                    p2: if begins { 0 } else { penalties.between(luma[y * width + x], luma[from * width + x]) },
-                    cost,
-                    out: &mut now[state..state + disparities],
-                    sum: &mut sums[cells],
-                    keep: u8::MAX,
-                };
-                least[column] = step.go::<L>();
+        let Self { volumes, rows: (first, rows), luma: (luma, width), columns, penalties, states } = self;
+        let luma_at = |y: usize| &luma[y * width + columns.0..y * width + columns.1];
+        match volumes {
+            Volumes::Down { costs, sums } => {
+                let (costs, sums) = (costs.as_chunks::<N>().0, sums.as_chunks_mut::<N>().0);
+                for row in 0..rows {
+                    let y = first + row;
+                    let (here, there) = (luma_at(y), luma_at(y.saturating_sub(1)));
+                    for (column, (&here, &there)) in here.iter().zip(there).enumerate() {
+                        let cells = column * GROUP + row;
+                        let cost = &costs[cells];
+                        let values = if y == 0 {
+                            states.begin(column, cost)
+                        } else {
+                            states.go(column, penalties.between(here, there), cost)
+                        };
+                        add_half(values, &mut sums[cells]);
+                    }
+                    states.turn();
+                }
+            }
+            Volumes::Up { costs, sums } => {
+                let (costs, sums) = (costs.as_chunks_mut::<N>().0, sums.as_chunks::<N>().0);
+                let last = luma.len() / width - 1;
+                for row in (0..rows).rev() {
+                    let y = first + row;
+                    let (here, there) = (luma_at(y), luma_at((y + 1).min(last)));
+                    for (column, (&here, &there)) in here.iter().zip(there).enumerate() {
+                        let cells = column * GROUP + row;
+                        let (cost, sum) = (&mut costs[cells], &sums[cells]);
+                        let values = if y == last {
+                            states.begin(column, cost)
+                        } else {
+                            states.go(column, penalties.between(here, there), cost)
+                        };
+                        for d in 0..N {
+                            cost[d] = sum[d].wrapping_add(values[d] >> 1);
+                        }
+                    }
+                    states.turn();
+                }
             }
         }
     }
