@@ -1,8 +1,7 @@
 //! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per pair.
 //!
-//! Two sweeps over the rows, some at a time, so that what is made of them stays in the cache. Down: costs, the paths
-//! along the rows, and the path down. Up: the costs again, which is cheaper than to keep them, the path up, and the
-//! winners. Only the sums of the paths are kept for all pixels.
+//! One sweep over the rows, some at a time, so that what is made of them stays in the cache: costs, the paths along the
+//! rows, the path down, and the winners.
 
 mod census;
 mod cost;
@@ -14,9 +13,9 @@ use std::sync::atomic::AtomicBool;
 
 use census::Census;
 use cost::Costs;
-use path::{Columns, Penalties, Rows, STRIPE, States, Volumes};
+use path::{Columns, Penalties, Rows, STRIPE, States};
 use pulp::Arch;
-use winner::Winners;
+use winner::{Eyes, Winners};
 
 use super::Executor;
 use crate::compute::GpuError;
@@ -26,8 +25,6 @@ use crate::compute::team::{Shelf, Team};
 
 /// Rows whose values lie side by side, `[column][row][disparity]`, as one part of the work.
 const GROUP: usize = 4;
-/// Groups that are worked on at a time.
-const CHUNK: usize = 2;
 
 /// As many disparities as the code is made for.
 const RANGES: [usize; 7] = [16, 32, 64, 96, 128, 192, 256];
@@ -43,20 +40,22 @@ pub struct CpuExecutor {
     right: Census,
     /// Stripes of columns.
     stripes: usize,
-    /// Of a chunk of groups.
+    /// Groups that are worked on at a time: one for each thread.
+    chunk: usize,
+    /// Of a chunk.
     costs: Aligned<u8>,
-    /// Of all groups.
+    /// Of a chunk, laid out as the costs.
     sums: Aligned<u8>,
     /// Of the paths along the columns of each stripe.
     states: Vec<States>,
     members: Vec<Member>,
-    taken: [Vec<AtomicBool>; 3],
+    taken: [Vec<AtomicBool>; 2],
 }
 
 /// Memory of one thread.
 struct Member {
     states: States,
-    best: [Vec<u16>; 2],
+    eyes: Eyes,
 }
 
 impl CpuExecutor {
@@ -64,14 +63,14 @@ impl CpuExecutor {
     pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
         let disparities = RANGES.into_iter().find(|&range| range >= disparities).unwrap_or(RANGES[RANGES.len() - 1]);
         let stripes = width.div_ceil(STRIPE);
-        let groups = height.div_ceil(GROUP);
+        let chunk = threads.max(1);
         let group = stripes * STRIPE * GROUP * disparities;
         let member = || Member {
             states: States::new(2 * GROUP, disparities),
-            best: [vec![0; GROUP * width], vec![0; GROUP * (width + disparities)]],
+            eyes: Eyes::new(width, disparities),
         };
         let flags = || iter::repeat_with(AtomicBool::default);
-        let most = (height + 2 * census::REACH).max(CHUNK * stripes);
+        let most = (height + 2 * census::REACH).max(chunk * stripes);
         Self {
             width,
             height,
@@ -81,29 +80,22 @@ impl CpuExecutor {
             left: Census::new((width, height), false, 0),
             right: Census::new((width, height), true, disparities),
             stripes,
-            costs: Aligned::zeros(CHUNK * group),
-            sums: Aligned::zeros(groups * group),
+            chunk,
+            costs: Aligned::zeros(chunk * group),
+            sums: Aligned::zeros(chunk * group),
             states: iter::repeat_with(|| States::new(STRIPE, disparities)).take(stripes).collect(),
             members: iter::repeat_with(member).take(threads).collect(),
-            taken: [(); 3].map(|()| flags().take(most).collect()),
+            taken: [(); 2].map(|()| flags().take(most).collect()),
         }
     }
 
     fn match_range<const N: usize>(&mut self, left: &[u8], team: &mut Team, out: &mut [u16]) {
         let groups = self.height.div_ceil(GROUP);
-        let chunks = groups.div_ceil(CHUNK);
-        let chunk = |chunk: usize| (chunk * CHUNK, CHUNK.min(groups - chunk * CHUNK));
-        for k in 0..chunks {
-            self.along_rows::<N>(chunk(k), left, team, true);
-            self.along_columns::<N>(chunk(k), left, team, false);
-        }
-        for k in (0..chunks).rev() {
-            // The costs of the last chunk are still there.
-            if k + 1 < chunks {
-                self.along_rows::<N>(chunk(k), left, team, false);
-            }
-            self.along_columns::<N>(chunk(k), left, team, true);
-            self.win::<N>(chunk(k), team, out);
+        for first in (0..groups).step_by(self.chunk) {
+            let groups = (first, self.chunk.min(groups - first));
+            self.along_rows::<N>(groups, left, team);
+            self.along_columns::<N>(groups, left, team);
+            self.win::<N>(groups, team, out);
         }
     }
 
@@ -112,18 +104,12 @@ impl CpuExecutor {
         self.stripes * STRIPE * GROUP * self.disparities
     }
 
-    /// The costs of the groups, and, if `paths`, the sums of the paths along their rows.
-    fn along_rows<const N: usize>(
-        &mut self,
-        (first, groups): (usize, usize),
-        left: &[u8],
-        team: &mut Team,
-        paths: bool,
-    ) {
+    /// The costs of the groups, and the sums of the paths along their rows.
+    fn along_rows<const N: usize>(&mut self, (first, groups): (usize, usize), left: &[u8], team: &mut Team) {
         let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
-        let [cost_taken, sum_taken, ..] = &mut self.taken;
+        let [cost_taken, sum_taken] = &mut self.taken;
         let costs = Shelf::new(&mut self.costs[..groups * group], group, cost_taken);
-        let sums = Shelf::new(&mut self.sums[first * group..(first + groups) * group], group, sum_taken);
+        let sums = Shelf::new(&mut self.sums[..groups * group], group, sum_taken);
         let (census, penalties) = ((&self.left, &self.right), &self.penalties);
         team.run_with(&mut self.members, groups, &|member, part| {
             let y = (first + part) * GROUP;
@@ -134,37 +120,28 @@ impl CpuExecutor {
             }
             let costs = costs.part(part);
             arch.dispatch(Costs::<N> { codes, width, out: costs });
-            if paths {
-                let luma = &left[y * width..(y + GROUP).min(height) * width];
-                let (states, sums) = (&mut member.states, sums.part(part));
-                arch.dispatch(Rows::<N> { costs, luma, width, penalties, states, sums });
-            }
+            let luma = &left[y * width..(y + GROUP).min(height) * width];
+            let (states, sums) = (&mut member.states, sums.part(part));
+            arch.dispatch(Rows::<N> { costs, luma, width, penalties, states, sums });
         });
     }
 
-    /// Adds the path down the groups; or the path up, which leaves the sums of all where the costs were.
-    fn along_columns<const N: usize>(
-        &mut self,
-        (first, groups): (usize, usize),
-        left: &[u8],
-        team: &mut Team,
-        up: bool,
-    ) {
+    /// Adds the path down the groups, which leaves the sums of all where the costs were.
+    fn along_columns<const N: usize>(&mut self, (first, groups): (usize, usize), left: &[u8], team: &mut Team) {
         let (width, height, arch, group, stripes) = (self.width, self.height, self.arch, self.group(), self.stripes);
         let stripe_len = group / stripes;
-        let [cost_taken, sum_taken, state_taken] = &mut self.taken;
-        let penalties = &self.penalties;
+        let [cost_taken, state_taken] = &mut self.taken;
+        let (sums, penalties) = (&*self.sums, &self.penalties);
         let costs = Shelf::new(&mut self.costs[..groups * group], stripe_len, cost_taken);
-        let sums = Shelf::new(&mut self.sums[first * group..(first + groups) * group], stripe_len, sum_taken);
         let states = Shelf::new(&mut self.states, 1, state_taken);
         team.run(stripes, &|stripe| {
             let states = &mut states.part(stripe)[0];
             for k in 0..groups {
-                let k = if up { groups - 1 - k } else { k };
                 let y = (first + k) * GROUP;
-                let (costs, sums) = (costs.part(k * stripes + stripe), sums.part(k * stripes + stripe));
+                let part = k * stripes + stripe;
                 arch.dispatch(Columns::<N> {
-                    volumes: if up { Volumes::Up { costs, sums } } else { Volumes::Down { costs, sums } },
+                    costs: costs.part(part),
+                    sums: &sums[part * stripe_len..(part + 1) * stripe_len],
                     rows: (y, GROUP.min(height - y)),
                     luma: (left, width),
                     columns: (stripe * STRIPE, width.min((stripe + 1) * STRIPE)),
@@ -183,8 +160,7 @@ impl CpuExecutor {
         let out = Shelf::new(&mut out[rows.start * width..rows.end * width], GROUP * width, &mut self.taken[0]);
         team.run_with(&mut self.members, groups, &|member, part| {
             let sums = &sums[part * group..(part + 1) * group];
-            let [left, right] = &mut member.best;
-            arch.dispatch(Winners::<N> { sums, width, best: [left, right], out: out.part(part) });
+            arch.dispatch(Winners::<N> { sums, width, eyes: &mut member.eyes, out: out.part(part) });
         });
     }
 }

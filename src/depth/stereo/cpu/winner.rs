@@ -2,13 +2,11 @@
 
 use pulp::WithSimd;
 
-use super::GROUP;
 use super::super::fixed::{ONE, UNKNOWN};
+use super::GROUP;
 
 /// Left and right may differ by this much.
-const AGREE: u16 = 1;
-/// Disparities that are compared at once, where their number allows it.
-const LANES: usize = 32;
+const AGREE: u8 = 1;
 
 /// The winners of a group of rows.
 pub struct Winners<'a, const N: usize> {
@@ -16,63 +14,89 @@ pub struct Winners<'a, const N: usize> {
     pub sums: &'a [u8],
     /// Columns.
     pub width: usize,
-    /// Memory of `GROUP` times `width` values, and of `GROUP` times `width + N`.
-    pub best: [&'a mut [u16]; 2],
+    /// Memory.
+    pub eyes: &'a mut Eyes,
     /// Fixed-point disparities, `[row][column]`: of the rows of the group that there are.
     pub out: &'a mut [u16],
+}
+
+/// What each eye takes for the disparity of each pixel of a group.
+pub struct Eyes {
+    /// `[row][column]`.
+    left: Vec<u8>,
+    /// `[row][column]`, from the last column to the first, and beyond that what would lie outside.
+    right: Vec<u8>,
+    /// The sums of the right eye's.
+    right_sums: Vec<u8>,
+}
+
+impl Eyes {
+    /// Memory for rows of so many columns.
+    pub fn new(width: usize, disparities: usize) -> Self {
+        let beyond = GROUP * (width + disparities);
+        Self { left: vec![0; GROUP * width], right: vec![0; beyond], right_sums: vec![0; beyond] }
+    }
 }
 
 impl<const N: usize> WithSimd for Winners<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { sums, width, best: [left, right], out } = self;
-        let sums = sums.as_chunks::<N>().0;
-        let (rows, seen) = (out.len() / width, width + N);
-        right.fill(u16::MAX);
+        let Self { sums, width, eyes: Eyes { left, right, right_sums }, out } = self;
+        let sums = &sums.as_chunks::<N>().0[..width * GROUP];
+        let (rows, beyond) = (out.len() / width, width + N);
+        right_sums.fill(u8::MAX);
         for x in 0..width {
             // The rows take turns: what one has just written is not yet there to be read.
             for row in 0..rows {
                 let cells = &sums[x * GROUP + row];
+                left[row * width + x] = place_of_least(cells);
                 // Column x - d of the right eye, mirrored.
-                let seen = &mut right[row * seen + width - 1 - x..][..N];
-                left[row * width + x] = if N.is_multiple_of(LANES) {
-                    least::<LANES>(cells, seen)
-                } else {
-                    least::<16>(cells, seen)
-                };
+                let first = row * beyond + width - 1 - x;
+                let seen = first..first + N;
+                prefer(cells, &mut right_sums[seen.clone()], &mut right[seen]);
             }
         }
         for (row, out) in out.chunks_exact_mut(width).enumerate() {
-            let (left, right) = (&left[row * width..], &right[row * seen..]);
+            let (left, right) = (&left[row * width..], &right[row * beyond..]);
             for (x, out) in out.iter_mut().enumerate() {
-                let disparity = left[x] & 0xff;
-                let d = usize::from(disparity);
-                let agrees = d <= x && (right[width - 1 - x + d] & 0xff).abs_diff(disparity) <= AGREE;
+                let d = usize::from(left[x]);
+                let agrees = d <= x && right[width - 1 - x + d].abs_diff(left[x]) <= AGREE;
                 *out = if agrees { between(&sums[x * GROUP + row], d) } else { UNKNOWN };
             }
         }
     }
 }
 
-/// The least key of `cells`: a sum above its disparity, so that of the least sums the one at the lowest disparity is
-/// taken. `seen` takes the keys that are less than its own.
+/// The lowest place of the least of `cells`.
 #[inline(always)]
-fn least<const L: usize>(cells: &[u8], seen: &mut [u16]) -> u16 {
-    let mut lowest = [u16::MAX; L];
-    let blocks = cells.as_chunks::<L>().0.iter().zip(seen.as_chunks_mut::<L>().0);
-    for (block, (cells, seen)) in blocks.enumerate() {
-        for i in 0..L {
-            let key = (u16::from(cells[i]) << 8) | (block * L + i) as u16;
-            lowest[i] = lowest[i].min(key);
-            seen[i] = seen[i].min(key);
-        }
+fn place_of_least<const N: usize>(cells: &[u8; N]) -> u8 {
+    let mut least = u8::MAX;
+    for &cell in cells {
+        least = least.min(cell);
     }
-    let mut least = u16::MAX;
-    for key in lowest {
-        least = least.min(key);
+    let mut places = [0; N];
+    for d in 0..N {
+        places[d] = if cells[d] == least { d as u8 } else { u8::MAX };
     }
-    least
+    let mut place = u8::MAX;
+    for d in places {
+        place = place.min(d);
+    }
+    place
+}
+
+/// Where a cell is less than `sums`, it and its place are taken.
+#[inline(always)]
+fn prefer<const N: usize>(cells: &[u8; N], sums: &mut [u8], places: &mut [u8]) {
+    let mut taken = [0; N];
+    for d in 0..N {
+        taken[d] = if cells[d] < sums[d] { d as u8 } else { places[d] };
+    }
+    places.copy_from_slice(&taken);
+    for d in 0..N {
+        sums[d] = sums[d].min(cells[d]);
+    }
 }
 
 /// The place of the least cost between the disparities beside `d`, in fixed point: where two lines of one slope meet.
