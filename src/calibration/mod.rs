@@ -1,6 +1,8 @@
 //! Two cameras beside each other: how each images the world, how they stand, and what makes their pictures a pair with
 //! the same point in the same row.
 
+pub mod euroc;
+
 use glam::{DMat3, DVec2, DVec3};
 
 /// How a lens bends the rays of a pinhole camera.
@@ -34,4 +36,12 @@ pub struct StereoCalibration {
     pub rotation: DMat3,
     /// The left camera's place in the right one's axes; about `(-baseline, 0, 0)`.
     pub translation_m: DVec3,
+}
+
+/// Why a calibration cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationError {
+    /// Nothing reads it yet.
+    #[error("{0}: not read yet")]
+    Unread(String),
 }

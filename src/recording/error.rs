@@ -4,20 +4,21 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::MAX_SIDE_PX;
+use crate::calibration::CalibrationError;
 
 /// Why a recording or a picture could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// The folder holds no list that any known layout starts from.
     #[error(
-        "{}: not a recording: looked for {looked_for}, and found none; \
-         name the folder that holds one of them", dir.display()
+        "{}: not a recording: looked for {looked_for}, and found none of these; \
+         name the folder that holds them", dir.display()
     )]
     NotARecording {
         /// The folder.
         dir: PathBuf,
         /// The files that would have made it a recording.
-        looked_for: &'static str,
+        looked_for: String,
     },
     /// The layout is known, and a list that it needs is missing.
     #[error("{}: the list {missing} is missing beside {present}; restore it (lines of `time file`)", dir.display())]
@@ -35,6 +36,53 @@ pub enum RecordingError {
         /// The list.
         list: PathBuf,
     },
+    /// A folder that is a list of its own has no picture.
+    #[error("{}: no picture here has a number as its name, such as 000000.png; restore the pictures", folder.display())]
+    EmptyFolder {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// One eye is there alone.
+    #[error("{}: {missing} is missing beside {present}; restore the pictures of the other eye", dir.display())]
+    MissingEye {
+        /// The folder.
+        dir: PathBuf,
+        /// The folder that is needed.
+        missing: &'static str,
+        /// The folder that is there.
+        present: &'static str,
+    },
+    /// A picture of one eye has none of the other eye beside it.
+    #[error("{}: no picture of this name in {other}; restore it, remove this one, or keep going", path.display())]
+    NoPartner {
+        /// The picture.
+        path: PathBuf,
+        /// The folder of the other eye.
+        other: &'static str,
+    },
+    /// There are pictures beyond the end of the list of times.
+    #[error("{}: {times} times, and none for {picture}; complete the list, remove it, or keep going", list.display())]
+    TooFewTimes {
+        /// The list.
+        list: PathBuf,
+        /// How many times it has.
+        times: usize,
+        /// The first picture without one.
+        picture: String,
+    },
+    /// The calibration of a rectified pair cannot be used.
+    #[error("{}{}: {fault}", file.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Geometry {
+        /// The calibration.
+        file: PathBuf,
+        /// Line number, from 1, where one line is at fault.
+        line: Option<u32>,
+        /// What is wrong with it.
+        fault: GeometryFault,
+    },
+    /// The calibration of a raw pair cannot be used.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
     /// A line of a list is wrong.
     #[error("{}:{line}: {fault}", list.display())]
     Line {
@@ -65,6 +113,17 @@ pub enum RecordingError {
         /// Largest difference in time that makes a pair.
         tolerance_ns: u64,
     },
+    /// No picture of the right eye lies near any of the left one in time.
+    #[error(
+        "{}: no picture of the right camera lies within {} ms of one of the left; are the lists of one recording?",
+        dir.display(), *tolerance_ns as f64 / 1e6
+    )]
+    NoEyePairs {
+        /// The folder.
+        dir: PathBuf,
+        /// Largest difference in time that makes a pair.
+        tolerance_ns: u64,
+    },
     /// A picture that a list names is missing or wrong.
     #[error("{}:{line}: {}: {fault}", list.display(), file.display())]
     Listed {
@@ -88,6 +147,12 @@ pub enum RecordingError {
     /// The recording has no depth, and it was asked for.
     #[error("{}: the recording has no depth; use an effect that needs none, or another source of depth", dir.display())]
     NoDepth {
+        /// The folder.
+        dir: PathBuf,
+    },
+    /// The recording has one eye, and the right one was asked for.
+    #[error("{}: the recording has one eye, and stereo needs two; use another source of depth", dir.display())]
+    NoRight {
         /// The folder.
         dir: PathBuf,
     },
@@ -160,6 +225,9 @@ pub enum LineFault {
         /// How many the line has.
         found: usize,
     },
+    /// Not a time in nanoseconds.
+    #[error("{0:?} is not a time; write nanoseconds as a whole number, such as 1403715276262142976")]
+    Nanoseconds(String),
     /// Not a time.
     #[error("{0:?} is not a time; write seconds >= 0 as a decimal number, such as 1305031102.175304")]
     Time(String),
@@ -172,6 +240,47 @@ pub enum LineFault {
     /// The path cannot be one.
     #[error("the file name {0:?} has control characters; rename the file")]
     FileName(String),
+}
+
+/// What is wrong with the calibration of a rectified pair.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GeometryFault {
+    /// The file is of another kind.
+    #[error("neither a Middlebury calibration (`cam0=[f 0 cx; 0 f cy; 0 0 1]`) nor a KITTI one (`P0: 12 numbers`)")]
+    Unknown,
+    /// A key that is needed is not there.
+    #[error("the key {0} is missing; add its line")]
+    Missing(String),
+    /// A value is not what its key needs.
+    #[error("{key}: {found:?} is not {expected}; correct the line")]
+    Value {
+        /// The key.
+        key: String,
+        /// What a value of it is.
+        expected: &'static str,
+        /// What is there.
+        found: String,
+    },
+    /// Both eyes in one place see no depth.
+    #[error("the baseline is 0: both cameras stand in one place; give the calibration of the two eyes")]
+    NoBaseline,
+    /// The right eye stands on the left.
+    #[error("the right camera stands {0} m to the left of the left one; swap the eyes")]
+    Swapped(f64),
+    /// Rectified eyes have one focal length.
+    #[error("the left focal length is {0} px and the right one {1} px; give the calibration of rectified pictures")]
+    UnequalFocal(f64, f64),
+    /// The calibration belongs to pictures of another shape.
+    #[error(
+        "made for pictures of {}x{}, and these are {}x{}, of another aspect; give the calibration of these pictures",
+        of.0, of.1, pictures.0, pictures.1
+    )]
+    Size {
+        /// Columns and rows that the calibration belongs to.
+        of: (u32, u32),
+        /// Columns and rows of the pictures.
+        pictures: (u32, u32),
+    },
 }
 
 /// What is wrong with a picture file.
@@ -230,6 +339,17 @@ pub enum PictureFault {
         found: (u32, u32),
         /// Columns and rows of the first picture.
         expected: (u32, u32),
+    },
+    /// A right picture of another size than the left ones.
+    #[error(
+        "the right picture is {}x{}, and the left one {}x{}; both eyes need one size",
+        found.0, found.1, left.0, left.1
+    )]
+    EyeSize {
+        /// Columns and rows of this picture.
+        found: (u32, u32),
+        /// Columns and rows of the left pictures.
+        left: (u32, u32),
     },
     /// A depth map that cannot cover the view of its colour picture.
     #[error(
