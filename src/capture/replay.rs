@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::{Camera, CaptureError, Captured, SourceInfo};
-use crate::frame::{ColorImage, DepthMap, Stamp};
+use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use crate::frame::Stamp;
 use crate::recording::{Recording, Scratch};
 
 /// Which part of a recording to play.
@@ -95,11 +95,11 @@ impl Camera for Replay {
             period_ns: self.recording.period_ns(),
             frames: self.total(),
             live: false,
-            exact_depth: false,
+            brings: Brings::Color,
         }
     }
 
-    fn next(&mut self, color: &mut ColorImage, _depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
         let Some(stamp) = self.stamp() else { return Ok(Captured::End) };
         if stamp.index == self.lap.start {
             if self.position > 0 && self.good == 0 {
@@ -108,7 +108,7 @@ impl Camera for Replay {
             self.good = 0;
         }
         self.position += 1;
-        Ok(match self.recording.read_color(stamp.index, &mut self.scratch, color) {
+        Ok(match self.recording.read_color(stamp.index, &mut self.scratch, shot.color) {
             Ok(()) => {
                 self.good += 1;
                 Captured::Frame(stamp)

@@ -23,6 +23,7 @@ mod render;
 mod settings;
 mod sinks;
 mod source;
+mod stereo;
 mod stream;
 mod terminal;
 mod values;
@@ -59,7 +60,7 @@ struct Cli {
 enum Command {
     Stream(Box<stream::StreamCommand>),
     Render(Box<render::RenderCommand>),
-    Record(record::RecordCommand),
+    Record(Box<record::RecordCommand>),
     Aperture(aperture::ApertureCommand),
     Bench(Box<bench::BenchCommand>),
     Devices(devices::DevicesCommand),

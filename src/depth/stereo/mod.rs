@@ -1,5 +1,8 @@
 //! Depth from two eyes: the disparity of a rectified pair.
 
+pub mod source;
+pub mod stand_in;
+
 use crate::compute::GpuError;
 use crate::frame::{DisparityMap, GrayImage};
 
