@@ -2,7 +2,7 @@
 //! the pictures in `data`, and `sensor.yaml`. The pictures are as the cameras took them. Without `data.csv` the names of
 //! the pictures are their times.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::contents::{Contents, Folder, Layout, Listed, Source, numbered_pictures};
 use super::error::{LineFault, RecordingError};
@@ -74,7 +74,7 @@ impl Camera {
         Ok(names.into_iter().filter_map(entry).collect())
     }
 
-    fn picture(&self, file: &str) -> Result<std::path::PathBuf, LineFault> {
+    fn picture(&self, file: &str) -> Result<PathBuf, LineFault> {
         inside(file).map(|file| Path::new(self.pictures).join(file))
     }
 }
