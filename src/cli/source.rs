@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::config::Executor;
 use super::error::CliError;
-use super::stereo::{self, Pair};
+use super::stereo;
 use super::values::{DepthChoice, Effect};
 use super::{defaults, options};
 use crate::capture::replay::{Part, Replay};
@@ -22,7 +22,7 @@ use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::recorded::Recorded;
 use crate::optics::StereoRig;
-use crate::recording::{Options, Recording};
+use crate::recording::{Options, Pair, Recording};
 #[cfg(feature = "camera")]
 use crate::v4l2::{layout::Content, live::Wish};
 
@@ -192,7 +192,7 @@ impl Source {
             }
             stereo.refuse()?;
         } else if wanted.matches(source.depth.is_some()) {
-            let depth = stereo::open(&info, source.pair, source.disparities, stereo, wanted.executor)?;
+            let depth = stereo::open(&info, &source.pair, source.disparities, stereo, wanted.executor)?;
             let rig = *depth.rig();
             if let Some(blur) = wanted.blur {
                 stereo::check_focus(&rig, blur)?;
@@ -281,12 +281,17 @@ impl Opened {
                     looped: frames.repeat,
                     frames: frames.frames,
                 };
-                let camera = Replay::new(Arc::clone(&recording), &name, &part)?;
+                let mut camera = Replay::new(Arc::clone(&recording), &name, &part)?;
+                let pair = recording.pair().cloned();
+                if pair.is_some() && wanted.matches(recording.has_depth()) {
+                    camera = camera.with_right_eye();
+                }
+                let disparities = recording.disparities();
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
                 };
-                Ok(Self { depth, ..of(Box::new(camera)) })
+                Ok(Self { depth, pair: pair.unwrap_or(Pair::Unstated), disparities, ..of(Box::new(camera)) })
             }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {

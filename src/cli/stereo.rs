@@ -1,24 +1,26 @@
 //! From the options about two eyes to depth from them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::config::Executor;
 use super::error::CliError;
 use super::options;
 use super::values::Focus;
+use crate::calibration;
+use crate::calibration::rectification::Rectification;
+use crate::calibration::rectifier::Rectifier;
 use crate::capture::SourceInfo;
-use crate::depth::stereo::source::{Rectify, StereoDepth};
+use crate::depth::stereo::source::StereoDepth;
 use crate::depth::stereo::{Effort, Settings};
 use crate::optics::StereoRig;
+use crate::recording::Pair;
 
-/// What a source says of its two eyes by itself.
-pub enum Pair {
+/// What two eyes are.
+enum Stated {
     /// Their pictures are a rectified pair.
     Rectified(StereoRig),
     /// They are not; this makes them one.
-    Raw(Box<dyn Rectify>),
-    /// Nothing.
-    Unstated,
+    Raw(Box<Rectifier>),
 }
 
 impl options::Stereo {
@@ -54,10 +56,10 @@ impl options::Stereo {
     }
 
     /// What the two eyes are: what the options state, else what the source says. Nothing is guessed.
-    fn state(&self, pair: Pair, (width, height): (u32, u32)) -> Result<Pair, CliError> {
+    fn state(&self, pair: &Pair, size: (u32, u32)) -> Result<Stated, CliError> {
         if let Some(rig) = self.rig()? {
-            return match (self.rectified, &pair) {
-                (true, _) | (false, Pair::Rectified(_)) => Ok(Pair::Rectified(rig)),
+            return match (self.rectified, pair) {
+                (true, _) | (false, Pair::Rectified(_)) => Ok(Stated::Rectified(rig)),
                 _ => Err(CliError::Usage(
                     "--focal-px and --baseline-m are those of a rectified pair: add --rectified if this is one, or use \
                      --calib FILE"
@@ -65,15 +67,24 @@ impl options::Stereo {
                 )),
             };
         }
-        let stated = if self.calib.is_empty() { pair } else { load(&self.calib, (width, height))? };
-        match stated {
-            Pair::Raw(rectifier) if self.rectified => Ok(Pair::Rectified(rectifier.rig())),
-            Pair::Unstated if self.rectified => Ok(Pair::Rectified(StereoRig::assumed(width))),
+        let files: Vec<&Path> = self.calib.iter().map(PathBuf::as_path).collect();
+        let read = if files.is_empty() { None } else { Some(Pair::Raw(Box::new(calibration::load(&files)?))) };
+        match read.as_ref().unwrap_or(pair) {
+            Pair::Rectified(rig) => Ok(Stated::Rectified(*rig)),
+            Pair::Raw(calibration) => {
+                for note in calibration.notes(size) {
+                    tracing::warn!("{note}");
+                }
+                if self.rectified {
+                    return Ok(Stated::Rectified(Rectification::of(calibration, size)?.rig()));
+                }
+                Ok(Stated::Raw(Box::new(Rectifier::new(calibration, size)?)))
+            }
+            Pair::Unstated if self.rectified => Ok(Stated::Rectified(StereoRig::assumed(size.0))),
             Pair::Unstated => Err(CliError::Usage(
                 "depth from two eyes needs --calib FILE, or --rectified if their pictures are rectified already"
                     .to_string(),
             )),
-            stated => Ok(stated),
         }
     }
 }
@@ -84,7 +95,7 @@ impl options::Stereo {
 /// It is not stated what they are, a calibration cannot be used, or there is no such GPU.
 pub fn open(
     info: &SourceInfo,
-    pair: Pair,
+    pair: &Pair,
     disparities: Option<u32>,
     options: &options::Stereo,
     executor: &Executor,
@@ -93,9 +104,8 @@ pub fn open(
     let disparities = options.max_disparity.unwrap_or_else(|| settled(disparities, info.size.0));
     let matcher = executor.matcher(&Settings { disparities, effort: Effort::Full }, info.size)?;
     let (depth, how) = match stated {
-        Pair::Raw(rectifier) => (StereoDepth::of_raw(&info.name, rectifier, matcher), "to be rectified"),
-        Pair::Rectified(rig) => (StereoDepth::of_rectified(&info.name, rig, matcher), "rectified"),
-        Pair::Unstated => unreachable!("it is stated, or refused"),
+        Stated::Raw(rectifier) => (StereoDepth::of_raw(&info.name, *rectifier, matcher), "to be rectified"),
+        Stated::Rectified(rig) => (StereoDepth::of_rectified(&info.name, rig, matcher), "rectified"),
     };
     let StereoRig { focal_px, baseline_m, doffs_px, metric } = *depth.rig();
     let known = if metric { "" } else { ", assumed" };
@@ -128,12 +138,6 @@ pub fn check_focus(rig: &StereoRig, blur: &options::Blur) -> Result<(), CliError
 /// Disparities to try: as many as are known to occur, else those of a tenth of the picture's width.
 fn settled(known: Option<u32>, width_px: u32) -> u32 {
     known.unwrap_or(width_px.div_ceil(10)).next_multiple_of(16).clamp(16, Settings::MOST_DISPARITIES)
-}
-
-/// Reads calibrations.
-fn load(files: &[PathBuf], _size: (u32, u32)) -> Result<Pair, CliError> {
-    let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    Err(CliError::Usage(format!("--calib {}: calibrations cannot be read yet", files.join(","))))
 }
 
 #[cfg(test)]

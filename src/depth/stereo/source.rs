@@ -6,6 +6,7 @@
 //! ([`StereoRig::assumed`]) blurs as well as a measured one; only distances in metres mean nothing then.
 
 use super::{Effort, Matcher};
+use crate::calibration::rectifier::Rectifier;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
 use crate::optics::StereoRig;
@@ -16,21 +17,11 @@ const FARTHEST_PX: f32 = 1.0 / 16.0;
 /// What a map costs with little effort beside a full one: an eighth of the candidates, and what does not depend on them.
 const EFFORTS: [f64; 2] = [0.25, 1.0];
 
-/// Makes the pictures of two eyes a rectified pair.
-pub trait Rectify: Send {
-    /// The rig of the rectified pair.
-    fn rig(&self) -> StereoRig;
-    /// The left eye's picture, rectified, into `into` (resized).
-    fn left(&mut self, from: &ColorImage, into: &mut ColorImage);
-    /// The right eye's picture, rectified, into `into` (resized).
-    fn right(&mut self, from: &GrayImage, into: &mut GrayImage);
-}
-
 /// Depth from the frames of a camera that brings a right eye.
 pub struct StereoDepth {
     source_name: String,
     rig: StereoRig,
-    rectifier: Option<Box<dyn Rectify>>,
+    rectifier: Option<Rectifier>,
     matcher: Box<dyn Matcher>,
     left: GrayImage,
     /// Where pictures are rectified to.
@@ -56,7 +47,7 @@ impl StereoDepth {
     }
 
     /// Depth by `matcher` from pairs that `rectifier` rectifies. Their left pictures are rectified as well.
-    pub fn of_raw(source_name: &str, rectifier: Box<dyn Rectify>, matcher: Box<dyn Matcher>) -> Self {
+    pub fn of_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>) -> Self {
         let rig = rectifier.rig();
         Self { rectifier: Some(rectifier), ..Self::of_rectified(source_name, rig, matcher) }
     }
@@ -74,7 +65,7 @@ impl StereoDepth {
 
 impl DepthSource for StereoDepth {
     fn straighten(&mut self, color: &mut ColorImage) {
-        if let Some(rectifier) = &mut self.rectifier {
+        if let Some(rectifier) = &self.rectifier {
             rectifier.left(color, &mut self.color);
             std::mem::swap(color, &mut self.color);
         }
@@ -85,7 +76,7 @@ impl DepthSource for StereoDepth {
             return Err(DepthError::OneEye { source_name: self.source_name.clone() });
         };
         self.left.set_luma_of(seen.color);
-        let right = match &mut self.rectifier {
+        let right = match &self.rectifier {
             Some(rectifier) => {
                 rectifier.right(right, &mut self.right);
                 &self.right
@@ -120,7 +111,10 @@ fn metres(disparity: &DisparityMap, rig: &StereoRig, map: &mut DepthMap) {
 
 #[cfg(test)]
 mod tests {
+    use glam::{DMat3, DVec2, DVec3};
+
     use super::*;
+    use crate::calibration::{Distortion, Eye, StereoCalibration};
     use crate::depth::stereo::MatchError;
     use crate::frame::Stamp;
     use crate::optics::DepthCoc;
@@ -152,25 +146,6 @@ mod tests {
                 *px = (f32::from(left) - f32::from(right)) * share;
             }
             Ok(())
-        }
-    }
-
-    /// Turns the pictures upside down.
-    struct Flip;
-
-    impl Rectify for Flip {
-        fn rig(&self) -> StereoRig {
-            RIG
-        }
-        fn left(&mut self, from: &ColorImage, into: &mut ColorImage) {
-            into.resize(from.width, from.height);
-            into.rgb.copy_from_slice(&from.rgb);
-            into.rgb.reverse();
-        }
-        fn right(&mut self, from: &GrayImage, into: &mut GrayImage) {
-            into.resize(from.width, from.height);
-            into.luma.copy_from_slice(&from.luma);
-            into.luma.reverse();
         }
     }
 
@@ -229,15 +204,39 @@ mod tests {
 
     #[test]
     fn a_raw_pair_is_rectified_and_so_is_its_picture() {
-        let mut source = StereoDepth::of_raw("two eyes", Box::new(Flip), Box::new(Difference(Effort::Full)));
-        let (mut picture, mut map) = (color(&[25, 55]), DepthMap::default());
-        for turned in [[55, 25], [25, 55]] {
-            source.straighten(&mut picture);
-            assert_eq!(picture, color(&turned));
-        }
-        let right = gray(&[40, 20]);
-        source.read(Seen { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap();
-        assert_eq!(map.metres, [1.0, 0.5]);
+        let size = (64, 48);
+        let eye = |center_y_px| Eye {
+            size: Some(size),
+            focal_px: DVec2::splat(60.0),
+            center_px: DVec2::new(32.0, center_y_px),
+            distortion: Distortion::RadialTangential([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        };
+        // The right eye looks some rows lower.
+        let calibration = StereoCalibration {
+            eyes: [eye(24.0), eye(20.0)],
+            rotation: DMat3::IDENTITY,
+            translation_m: DVec3::new(-0.1, 0.0, 0.0),
+            given: None,
+            assumed_mm: false,
+        };
+        let rectifier = Rectifier::new(&calibration, size).unwrap();
+        let ramp: Vec<u8> = (0..64 * 48).map(|at| 40 + 3 * (at / 64) as u8).collect();
+        let raw = ColorImage { width: 64, height: 48, rgb: ramp.iter().flat_map(|&y| [y; 3]).collect() };
+        let raw_right = GrayImage { width: 64, height: 48, luma: ramp };
+        let (mut left, mut right) = (ColorImage::default(), GrayImage::default());
+        rectifier.left(&raw, &mut left);
+        rectifier.right(&raw_right, &mut right);
+        assert_ne!(left, raw);
+
+        let mut source = StereoDepth::of_raw("two eyes", rectifier, Box::new(Difference(Effort::Full)));
+        let (mut picture, mut map) = (raw.clone(), DepthMap::default());
+        source.straighten(&mut picture);
+        assert_eq!(picture, left);
+        source.read(Seen { stamp: STAMP, color: &picture, right: Some(&raw_right) }, &mut map).unwrap();
+        let middle = 24 * 64 + 32;
+        let difference_px = f32::from(left.rgb[3 * middle]) - f32::from(right.luma[middle]);
+        assert_eq!(map.metres[middle], if difference_px > 0.0 { source.rig().depth_m(difference_px) } else { 0.0 });
+        assert!(source.rig().metric && (source.rig().baseline_m - 0.1).abs() < 1e-6);
     }
 
     #[test]
