@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use super::error::{GeometryFault, RecordingError};
+use super::error::RecordingError;
+use super::fault::GeometryFault;
 use super::{kitti, middlebury};
 use crate::optics::StereoRig;
 

@@ -5,7 +5,8 @@
 use std::path::{Path, PathBuf};
 
 use super::contents::{Contents, Folder, Layout, Listed, Source, numbered_pictures};
-use super::error::{LineFault, RecordingError};
+use super::error::RecordingError;
+use super::fault::LineFault;
 use super::list::{self, Entry, give_up_disorder, inside, quoted, refuse_faults};
 use super::{Options, Pair, Unpaired, pair, timeline};
 use crate::calibration;
