@@ -6,7 +6,9 @@ use super::options;
 use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Refine, Tilt};
 use crate::bokeh::aperture::Aperture;
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
+use crate::depth::DepthError;
 use crate::depth::focus::FocusRule;
+use crate::depth::stereo::{self, Matcher};
 use crate::optics::{CocField, Lens, Ramp};
 use crate::pipeline::{CocAtInfinity, CocRule, QualityRule};
 
@@ -210,6 +212,14 @@ impl Executor {
     /// There is no such GPU.
     pub fn create(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, CliError> {
         Ok(bokeh::create(settings, size, self.backend, self.adapter.as_deref(), self.threads)?)
+    }
+
+    /// A matcher of pairs of `size` pixels.
+    ///
+    /// # Errors
+    /// There is no such GPU.
+    pub fn matcher(&self, settings: &stereo::Settings, _size: (u32, u32)) -> Result<Box<dyn Matcher>, CliError> {
+        Ok(stereo::stand_in::create(settings).map_err(DepthError::from)?)
     }
 
     /// The CPU executor, which can be looked into.

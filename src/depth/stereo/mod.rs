@@ -12,6 +12,9 @@ mod tidy;
 
 use tidy::Tidy;
 
+pub mod source;
+pub mod stand_in;
+
 use crate::compute::GpuError;
 use crate::compute::team::Team;
 use crate::frame::{DisparityMap, GrayImage};
