@@ -1,5 +1,7 @@
 //! Depth from two eyes: the disparity of a rectified pair.
 
+pub mod check;
+
 use crate::compute::GpuError;
 use crate::frame::{DisparityMap, GrayImage};
 
