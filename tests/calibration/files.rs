@@ -211,7 +211,7 @@ fn what_is_wrong_is_told_in_one_line_with_its_place() {
         (broken("[ 518.", "[ 518. : :"), "s.yml:"),
         (vec![("s.yml", "fx: 3\n".into())], "s.yml: not a stereo calibration"),
         (vec![("s.yml", String::new())], "s.yml: not a stereo calibration"),
-        (vec![("s.yml", "[".repeat(1000))], "s.yml:1: not readable as YAML: nested"),
+        (vec![("s.yml", "[".repeat(40))], "s.yml:1: not readable as YAML: nested"),
         (vec![("s.yml", left.clone())], "s.yml: this is the sensor.yaml of one camera"),
         (euroc("intrinsics: [458.654, ", "intrinsics: ["), "s.yml:15: intrinsics is 3x1, and must be 4 numbers"),
         (euroc("intrinsics:", "numbers:"), "s.yml: intrinsics is missing"),
@@ -233,6 +233,18 @@ fn what_is_wrong_is_told_in_one_line_with_its_place() {
     let refusal = calibration::load(&[Path::new("nowhere.yml")]).unwrap_err().to_string();
     assert!(refusal.starts_with("nowhere.yml: "), "{refusal}");
     assert!(calibration::load(&[]).unwrap_err().to_string().contains("one or two files"));
+}
+
+#[test]
+fn half_a_file_is_refused_in_one_line_too() {
+    let whole = format!("{INTRINSICS}{}", EXTRINSICS.replace("%YAML:1.0\n", ""));
+    for text in [whole.as_str(), CAMCHAIN, &sensor("0.1")] {
+        for end in (0..text.len()).step_by(3) {
+            // Whether it is whole enough or not, it is told in a line.
+            let outcome = load(&[("s.yml", &text[..end])]);
+            assert!(outcome.is_err_and(|refusal| refusal.contains("s.yml") && !refusal.contains('\n')) || end > 550);
+        }
+    }
 }
 
 /// A second change to what was broken once.
