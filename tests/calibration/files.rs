@@ -208,6 +208,8 @@ fn what_is_wrong_is_told_in_one_line_with_its_place() {
         ),
         (broken("M1: !!", "distortion_model: omni\nM1: !!"), "s.yml:3: distortion_model \"omni\" is not known"),
         (broken("M1: !!", "image_size: [0, 5]\nM1: !!"), "s.yml:3: image_size is no size"),
+        (broken("M1: !!", "image_width: 0\nimage_height: 5\nM1: !!"), "s.yml:3: image_width is no size"),
+        (broken("M1: !!", "image_width: 64.5\nimage_height: 5\nM1: !!"), "s.yml:3: image_width must be a whole number"),
         (broken("[ 518.", "[ 518. : :"), "s.yml:"),
         (vec![("s.yml", "fx: 3\n".into())], "s.yml: not a stereo calibration"),
         (vec![("s.yml", String::new())], "s.yml: not a stereo calibration"),

@@ -2,7 +2,7 @@
 //!
 //! Distinctive points (Shi and Tomasi, *Good features to track*, CVPR 1994) of the left picture are looked for in the
 //! right one by normalised correlation, in rows above and below and on both sides: first at half resolution, then to
-//! parts of a pixel at the full one. Only what is found in one place counts.
+//! parts of a pixel at the full one. Only what is found in one place, from there and back, counts.
 
 mod search;
 
@@ -15,11 +15,11 @@ use crate::frame::GrayImage;
 use search::{Coarse, Search, corners, halved, refined};
 
 /// Fewer matches tell nothing.
-const LEAST_MATCHES: u32 = 20;
+const LEAST_MATCHES: u32 = 12;
 /// Rows of a rectified pair agree this well in the median, in pixels.
 const MOST_OFF_PX: f32 = 0.75;
-/// And so do eight of ten points to the median.
-const MOST_SPREAD_PX: f32 = 1.25;
+/// And so do six of ten points to the median.
+const MOST_SPREAD_PX: f32 = 1.0;
 /// Disparities of what is far are around 0; those beyond this count as negative.
 const NEGATIVE_PX: f32 = -1.0;
 /// With more negative disparities than this share, the eyes are exchanged.
@@ -32,7 +32,7 @@ pub struct PairCheck {
     pub matches: u32,
     /// Row in the right picture less that in the left one, in pixels: the median.
     pub vertical_px: f32,
-    /// Distance from that median within which eight of ten points lie, in pixels.
+    /// Distance from that median within which six of ten points lie, in pixels.
     pub vertical_spread_px: f32,
     /// Share of points with a negative disparity: further to the right in the right picture.
     pub negative_share: f32,
@@ -102,13 +102,20 @@ pub fn check(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<Pa
         return Err(MatchError::Sizes { left: left.size(), right: right.size() });
     }
     let halves = [halved(left), halved(right)];
-    let coarse = Coarse::new(&halves[1], disparities.min(left.width) as i32 / 2);
+    let coarse = halves.each_ref().map(|half| Coarse::new(half, disparities.min(left.width) as i32 / 2));
     let arch = Arch::new();
     let mut scores = Vec::new();
+    let mut search = |from: usize, at| {
+        arch.dispatch(Search { from: &halves[from], into: &coarse[1 - from], at, scores: &mut scores })
+    };
     let mut moved_px: Vec<(f32, f32)> = Vec::new();
     for (x, y) in corners(&halves[0]) {
-        let found = arch.dispatch(Search { coarse: &coarse, left: &halves[0], at: (x, y), scores: &mut scores });
-        moved_px.extend(found.and_then(|(dx, dy)| refined(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy))));
+        let Some((dx, dy)) = search(0, (x, y)) else { continue };
+        let Some((back_dx, back_dy)) = search(1, (x + dx, y + dy)) else { continue };
+        // Whoever is the best match of its own best match.
+        if (dx + back_dx).abs() <= 1 && (dy + back_dy).abs() <= 1 {
+            moved_px.extend(refined(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy)));
+        }
     }
     Ok(summary(&moved_px))
 }
@@ -129,7 +136,7 @@ fn summary(moved_px: &[(f32, f32)]) -> PairCheck {
     PairCheck {
         matches: moved_px.len() as u32,
         vertical_px,
-        vertical_spread_px: quantile(&mut down_px, 0.8),
+        vertical_spread_px: quantile(&mut down_px, 0.6),
         negative_share: negative as f32 / moved_px.len() as f32,
     }
 }

@@ -78,7 +78,7 @@ pub(super) fn corners(image: &GrayImage) -> Vec<(i32, i32)> {
     found
 }
 
-/// The right picture at half resolution, prepared for correlation.
+/// A picture at half resolution, prepared to be searched.
 pub(super) struct Coarse {
     width: usize,
     height: usize,
@@ -113,10 +113,10 @@ impl Coarse {
     }
 }
 
-/// The place in the right picture of a point of the left one, at half resolution: how far across and down.
+/// The place in the picture `into` of the point `at` of the picture `from`, at half resolution: how far across and down.
 pub(super) struct Search<'a> {
-    pub coarse: &'a Coarse,
-    pub left: &'a GrayImage,
+    pub from: &'a GrayImage,
+    pub into: &'a Coarse,
     pub at: (i32, i32),
     /// Memory for the scores of all places.
     pub scores: &'a mut Vec<f32>,
@@ -126,12 +126,12 @@ impl WithSimd for Search<'_> {
     type Output = Option<(i32, i32)>;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Option<(i32, i32)> {
-        let &Coarse { width, height, reach, .. } = self.coarse;
+        let &Coarse { width, height, reach, .. } = self.into;
         // Windows are named by their upper left pixel.
         let (x, y) = (self.at.0 - COARSE as i32 / 2, self.at.1 - COARSE as i32 / 2);
         let mut patch = [0.0_f32; COARSE * COARSE];
         for (row, patch) in patch.chunks_exact_mut(COARSE).enumerate() {
-            let from = &self.left.luma[(y as usize + row) * width + x as usize..][..COARSE];
+            let from = &self.from.luma[(y as usize + row) * width + x as usize..][..COARSE];
             patch.iter_mut().zip(from).for_each(|(patch, &luma)| *patch = f32::from(luma));
         }
         let mean = patch.iter().sum::<f32>() / patch.len() as f32;
@@ -149,13 +149,13 @@ impl WithSimd for Search<'_> {
             for (row, weights) in patch.chunks_exact(COARSE).enumerate() {
                 let start = (top as usize + row) * width + first_x as usize;
                 for (column, &weight) in weights.iter().enumerate() {
-                    let values = &self.coarse.values[start + column..][..places];
+                    let values = &self.into.values[start + column..][..places];
                     for (score, &value) in scores.iter_mut().zip(values) {
                         *score += weight * value;
                     }
                 }
             }
-            let inverse_norms = &self.coarse.inverse_norm[top as usize * width + first_x as usize..][..places];
+            let inverse_norms = &self.into.inverse_norm[top as usize * width + first_x as usize..][..places];
             for (score, &inverse_norm) in scores.iter_mut().zip(inverse_norms) {
                 *score *= inverse_norm / norm;
             }
