@@ -125,6 +125,11 @@ fn opencv_in_one_file_or_two() {
     assert_eq!(one.eyes[1].center_px, DVec2::new(327.5, 261.5));
     let lens = Distortion::RadialTangential([-0.055, 0.078, 0.001, 0.002, -0.14, 0.0, 0.0, 0.0]);
     assert_eq!(one.eyes[0].distortion, lens);
+    // OpenCV writes 8, 12 or 14 coefficients where its models have as many.
+    let rational = whole.replace("rows: 5\n   cols: 1", "rows: 14\n   cols: 1");
+    let rational = rational.replace("-0.2 ]", "-0.2, 0., 0., -.1, 0., 0., 0., 0., 0., 0. ]");
+    let lens = Distortion::RadialTangential([-0.08, 0.2, 0.0, 0.0, -0.2, 0.0, 0.0, -0.1]);
+    assert_eq!(load(&[("stereo.yml", &rational)]).unwrap().eyes[1].distortion, lens);
     let notes = one.notes((640, 512));
     assert!(notes[0].contains("millimetres") && notes[0].contains("0.091 m"), "{notes:?}");
 }
