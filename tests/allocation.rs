@@ -12,11 +12,14 @@ use bokehcam::bokeh::Settings;
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::budget::{Governor, Quality, Sample};
+use bokehcam::calibration::rectifier::Rectifier;
+use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
 use bokehcam::depth::refine::Refiner;
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::link::live;
 use bokehcam::link::pool::{Pool, Pooled};
 use common::{EFFECTS, coc, noise, settings, three_depths};
+use glam::{DMat3, DVec2, DVec3};
 
 struct Counting;
 
@@ -45,7 +48,39 @@ fn a_frame_allocates_nothing() {
     blur();
     levels();
     refinement();
+    rectification();
     hand_over();
+}
+
+/// Both pictures of a pair that is not rectified yet.
+fn rectification() {
+    let eye = |shift_px: f64| Eye {
+        size: Some((160, 120)),
+        focal_px: DVec2::splat(140.0),
+        center_px: DVec2::new(80.0 + shift_px, 60.0),
+        distortion: Distortion::RadialTangential([-0.2, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    };
+    let calibration = StereoCalibration {
+        eyes: [eye(0.0), eye(3.0)],
+        rotation: DMat3::from_rotation_z(0.01),
+        translation_m: DVec3::new(-0.06, 0.0, 0.001),
+        given: None,
+        assumed_mm: false,
+    };
+    let rectifier = Rectifier::new(&calibration, (160, 120)).unwrap();
+    let left = noise(160, 120);
+    let mut right = GrayImage::default();
+    right.set_luma_of(&left);
+    let (mut into_left, mut into_right) = (ColorImage::default(), GrayImage::default());
+    let mut before = 0;
+    for frame in 0..4 {
+        if frame == 1 {
+            before = ALLOCATIONS.load(Ordering::Relaxed);
+        }
+        rectifier.left(&left, &mut into_left);
+        rectifier.right(&right, &mut into_right);
+    }
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
 }
 
 /// From thread to thread and home again, both ends sleeping now and then.

@@ -15,6 +15,8 @@ use tidy::Tidy;
 pub mod source;
 pub mod stand_in;
 
+pub mod check;
+
 use crate::compute::GpuError;
 use crate::compute::team::Team;
 use crate::frame::{DisparityMap, GrayImage};
