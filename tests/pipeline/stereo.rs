@@ -89,7 +89,7 @@ fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
     let stop = AtomicBool::new(false);
     let matcher = stand_in::create(&Settings { disparities: 16, effort: Effort::Full }).unwrap();
     let error = run(Run {
-        depth: Some(Box::new(StereoDepth::of_rectified("fake camera", StereoRig::assumed(SIZE.0), matcher))),
+        depth: Some(Box::new(StereoDepth::of_rectified("fake camera", StereoRig::assumed(SIZE.0), matcher, 16))),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         coc: dof(),
         ..simple(Box::new(fake_camera(5)), fake_sink(&Received::default()), &stop, Pace::Asap)
@@ -191,7 +191,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
             let (stop, received) = (AtomicBool::new(false), Received::default());
             let matcher = stand_in::create(&Settings { disparities: 16, effort: Effort::Full }).unwrap();
             run(Run {
-                depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher))),
+                depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher, 16))),
                 bokeh: Some(bokeh::create(&settings, (width, height), Backend::Cpu, None, Some(1)).unwrap()),
                 coc: CocRule::Depth {
                     focus: FocusRule::Point { x: focus.0, y: focus.1 },

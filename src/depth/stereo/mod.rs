@@ -1,5 +1,6 @@
 //! Depth from two eyes: the disparity of a rectified pair.
 
+pub mod check;
 pub mod source;
 pub mod stand_in;
 
