@@ -201,7 +201,7 @@ pub struct Computing {
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
     /// Threads of the CPU backend [default: one per core]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=1024).map(|threads| threads as usize))]
+    #[arg(long, value_name = "N", value_parser = threads())]
     pub threads: Option<usize>,
 }
 
@@ -288,6 +288,11 @@ fn disparities(text: &str) -> Result<u32, String> {
     const MOST: u32 = Settings::MOST_DISPARITIES;
     let good = |disparities: &u32| (16..=MOST).contains(disparities) && disparities.is_multiple_of(16);
     text.parse().ok().filter(good).ok_or_else(|| format!("use a multiple of 16 from 16 to {MOST}"))
+}
+
+/// A parser of numbers of threads.
+pub fn threads() -> impl TypedValueParser<Value = usize> {
+    value_parser!(u64).range(1..=1024).map(|threads| threads as usize)
 }
 
 fn rate(text: &str) -> Result<f64, String> {

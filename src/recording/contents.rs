@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::decode::DepthUnits;
-use super::error::{LineFault, PictureFault, RecordingError};
+use super::error::RecordingError;
+use super::fault::{LineFault, PictureFault};
 use super::{Options, Pair, Unpaired};
 use crate::optics::StereoRig;
 

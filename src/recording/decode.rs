@@ -10,7 +10,7 @@ use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
 use image::{ColorType, ImageDecoder, ImageError, ImageFormat, Limits};
 
-use super::error::PictureFault;
+use super::fault::PictureFault;
 use super::{MAX_SIDE_PX, depth_covers};
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 

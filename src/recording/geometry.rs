@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use super::error::{GeometryFault, RecordingError};
+use super::error::RecordingError;
+use super::fault::GeometryFault;
 use super::{kitti, middlebury};
 use crate::optics::StereoRig;
 
@@ -45,15 +46,16 @@ impl Geometry {
         parse(&text).map_err(|(line, fault)| RecordingError::Geometry { file: file.to_owned(), line, fault })
     }
 
-    /// The same for pictures of `size`, made larger or smaller.
+    /// The same, read from `file`, for pictures of `size`, which may be larger or smaller.
     ///
     /// # Errors
     /// They are of another aspect.
-    pub fn fitted(mut self, size: (u32, u32)) -> Result<Self, GeometryFault> {
+    pub fn fitted(mut self, file: &Path, size: (u32, u32)) -> Result<Self, RecordingError> {
         let Some(of) = self.size.filter(|&of| of != size) else { return Ok(self) };
         let [width, height, of_width, of_height] = [size.0, size.1, of.0, of.1].map(u64::from);
         if (width * of_height).abs_diff(height * of_width) > of_width.max(of_height).max(width).max(height) {
-            return Err(GeometryFault::Size { of, pictures: size });
+            let fault = GeometryFault::Size { of, pictures: size };
+            return Err(RecordingError::Geometry { file: file.to_owned(), line: None, fault });
         }
         let zoom = size.0 as f32 / of.0 as f32;
         self.rig.focal_px *= zoom;
@@ -95,13 +97,15 @@ mod tests {
     fn a_calibration_is_scaled_with_its_pictures_and_refused_for_others() {
         let rig = StereoRig { focal_px: 1000.0, baseline_m: 0.2, doffs_px: 30.0, metric: true };
         let full = Geometry { rig, size: Some((2000, 1001)), disparities: Some(96) };
-        let half = full.fitted((1000, 500)).unwrap();
+        let fitted = |geometry: Geometry, size| geometry.fitted(Path::new("calib.txt"), size);
+        let half = fitted(full, (1000, 500)).unwrap();
         assert_eq!((half.rig.focal_px, half.rig.doffs_px, half.disparities), (500.0, 15.0, Some(48)));
         // The same point: half the disparity, the same distance.
         assert_eq!(half.rig.depth_m(20.0), full.rig.depth_m(40.0));
-        assert_eq!(full.fitted((2000, 1001)), Ok(full));
-        assert_eq!(full.fitted((1000, 700)), Err(GeometryFault::Size { of: (2000, 1001), pictures: (1000, 700) }));
-        let unsized_one = Geometry { size: None, ..full };
-        assert_eq!(unsized_one.fitted((7, 9)), Ok(unsized_one));
+        assert_eq!(fitted(full, (2000, 1001)).unwrap(), full);
+        let refused = fitted(full, (1000, 700)).unwrap_err().to_string();
+        assert!(refused.starts_with("calib.txt: made for pictures of 2000x1001, and these are 1000x700"), "{refused}");
+        let for_any = Geometry { size: None, ..full };
+        assert_eq!(fitted(for_any, (7, 9)).unwrap(), for_any);
     }
 }

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use super::contents::{Place, Source};
-use super::error::{LineFault, RecordingError};
+use super::error::RecordingError;
+use super::fault::LineFault;
 
 /// Faulty text is quoted in messages up to this length.
 const QUOTED_CHARS: usize = 40;

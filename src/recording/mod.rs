@@ -12,6 +12,7 @@ mod decode;
 mod encode;
 mod error;
 mod euroc;
+mod fault;
 mod kitti;
 mod list;
 mod middlebury;
@@ -23,7 +24,8 @@ mod whole;
 use std::path::Path;
 
 pub use decode::Scratch;
-pub use error::{GeometryFault, LineFault, PictureFault, RecordingError};
+pub use error::RecordingError;
+pub use fault::{GeometryFault, LineFault, PictureFault};
 
 use crate::calibration::StereoCalibration;
 use crate::frame::{ColorImage, DepthMap, GrayImage};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::decode::{self, Scratch};
 use super::depth_covers;
-use super::error::PictureFault;
+use super::fault::PictureFault;
 use crate::frame::{DepthMap, DisparityMap};
 use crate::optics::StereoRig;
 

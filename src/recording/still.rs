@@ -7,7 +7,8 @@ use std::path::Path;
 use image::{DynamicImage, ImageError, RgbImage};
 
 use super::decode::{self, DepthUnits, Scratch};
-use super::error::{PictureFault, RecordingError};
+use super::error::RecordingError;
+use super::fault::PictureFault;
 use super::{check_depth_scale, encode, pfm, whole};
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 

@@ -2,10 +2,11 @@
 //! the pictures in `data`, and `sensor.yaml`. The pictures are as the cameras took them. Without `data.csv` the names of
 //! the pictures are their times.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::contents::{Contents, Folder, Layout, Listed, Source, numbered_pictures};
-use super::error::{LineFault, RecordingError};
+use super::error::RecordingError;
+use super::fault::LineFault;
 use super::list::{self, Entry, give_up_disorder, inside, quoted, refuse_faults};
 use super::{Options, Pair, Unpaired, pair, timeline};
 use crate::calibration;
@@ -74,7 +75,7 @@ impl Camera {
         Ok(names.into_iter().filter_map(entry).collect())
     }
 
-    fn picture(&self, file: &str) -> Result<std::path::PathBuf, LineFault> {
+    fn picture(&self, file: &str) -> Result<PathBuf, LineFault> {
         inside(file).map(|file| Path::new(self.pictures).join(file))
     }
 }

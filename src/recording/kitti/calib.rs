@@ -1,7 +1,7 @@
 //! `calib.txt`: rows of 12 numbers, each the 3x4 projection of a camera, `P0:` to `P3:` or `P_rect_00:` and so on. Rows
 //! without a key are P0 to P3 if there are four, else the left and the right camera.
 
-use crate::recording::error::GeometryFault;
+use crate::recording::fault::GeometryFault;
 use crate::recording::geometry::{Geometry, Wrong, numbers, rig};
 
 /// A camera's projection: `P[0]` is the focal length, `P[2]` the column of the principal point, both in pixels, and

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::recording::Options;
 use crate::recording::contents::Source;
-use crate::recording::error::{LineFault, RecordingError};
+use crate::recording::error::RecordingError;
+use crate::recording::fault::LineFault;
 use crate::recording::list::{self, Entry, quoted};
 
 const LIST: &str = "times.txt";

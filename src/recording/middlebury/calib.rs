@@ -2,7 +2,7 @@
 //! the right principal point less that of the left, `ndisp` a bound on the disparities.
 
 use crate::recording::MAX_SIDE_PX;
-use crate::recording::error::GeometryFault;
+use crate::recording::fault::GeometryFault;
 use crate::recording::geometry::{Geometry, Wrong, numbers, rig};
 
 const MM_PER_M: f64 = 1000.0;

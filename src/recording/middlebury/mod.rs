@@ -10,6 +10,7 @@ use super::decode::{self, Scratch};
 use super::error::RecordingError;
 use super::geometry::Geometry;
 use super::{Options, Pair, Unpaired};
+use crate::optics::StereoRig;
 
 /// Two pictures.
 pub(super) const LAYOUT: Layout =
@@ -48,16 +49,11 @@ fn open(folder: &Folder, _: &Options) -> Result<Contents, RecordingError> {
 }
 
 /// The eyes by the calibration `file`, and the bound on their disparities, at the size of the picture `color`.
-fn rig(
-    folder: &Folder,
-    color: &Source,
-    file: &Path,
-) -> Result<(crate::optics::StereoRig, Option<u32>), RecordingError> {
+fn rig(folder: &Folder, color: &Source, file: &Path) -> Result<(StereoRig, Option<u32>), RecordingError> {
     let stated = Geometry::read_as(file, calib::parse)?;
     let path = folder.locate(color)?;
     let (size, _) = decode::header(&path, &mut Scratch::default()).map_err(|fault| color.wrong(&folder.dir, fault))?;
-    let fitted = stated.fitted(size);
-    let fitted = fitted.map_err(|fault| RecordingError::Geometry { file: file.to_owned(), line: None, fault })?;
+    let fitted = stated.fitted(file, size)?;
     if fitted != stated {
         tracing::warn!("{}: made for pictures of another size, and scaled to {}x{}", file.display(), size.0, size.1);
     }

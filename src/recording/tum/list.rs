@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::time::parse_ns;
 use crate::recording::contents::Place;
-use crate::recording::error::{LineFault, RecordingError};
+use crate::recording::error::RecordingError;
+use crate::recording::fault::LineFault;
 use crate::recording::list::{self, Entry, inside, quoted};
 
 fn entry(place: Place, time: &str, file: &str) -> Entry {
