@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::recording::{Options, Recording, Scratch};
 
@@ -50,10 +50,14 @@ fn rectified_pair() -> tempfile::TempDir {
     folder
 }
 
-/// A recording whose pictures show both eyes beside each other; with `more` columns that belong to none.
+/// A recording whose pictures show both eyes of the scene beside each other; with `more` columns that belong to none.
 fn side_by_side(more: u32) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
     let (left, right) = planes::seen();
+    recording_of(&left, &right, more)
+}
+
+fn recording_of(left: &ColorImage, right: &GrayImage, more: u32) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
     let (width, height) = (planes::SIZE.0 as usize, planes::SIZE.1 as usize);
     let mut wide = ColorImage::new(2 * planes::SIZE.0 + more, planes::SIZE.1);
     let wide_px = wide.width as usize;
@@ -103,6 +107,30 @@ fn pictures_with_both_eyes_are_split() {
     let wide = side_by_side(0);
     let (near, far) = blurred(&wide.path().join("wide"), &["--side-by-side", "--rectified"]);
     assert!(near < 3.0 && far > 15.0, "{near} in focus, {far} behind");
+}
+
+#[test]
+fn a_pair_that_is_not_what_it_was_said_to_be_is_said_in_one_line() {
+    let said = |change: &dyn Fn(&mut ColorImage, &mut GrayImage)| {
+        let (mut left, mut right) = planes::seen();
+        change(&mut left, &mut right);
+        let folder = recording_of(&left, &right, 0);
+        let source = folder.path().join("wide");
+        let args = ["stream", path(&source), "--side-by-side", "--rectified", "--to", "null", "--backend", "cpu"];
+        let ran = bokehcam(&args);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        ran.stderr.lines().filter(|line| line.contains("WARN")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(said(&|_, _| {}), Vec::<String>::new());
+    // The right eye looks 5 rows lower.
+    let lower = said(&|_, right| right.luma.rotate_left(5 * planes::SIZE.0 as usize));
+    assert!(lower.len() == 1 && lower[0].contains("not rectified") && lower[0].contains("--calib"), "{lower:?}");
+    let exchanged = said(&|left, right| {
+        let (was_left, was_right) = (left.clone(), right.clone());
+        right.set_luma_of(&was_left);
+        left.rgb = was_right.luma.iter().flat_map(|&luma| [luma; 3]).collect();
+    });
+    assert!(exchanged.len() == 1 && exchanged[0].contains("exchanged"), "{exchanged:?}");
 }
 
 #[test]
