@@ -56,10 +56,24 @@ fn side_by_side(more: u32) -> tempfile::TempDir {
     recording_of(&left, &right, more)
 }
 
+/// A photograph as both eyes would see it 12 pixels from infinity: what a pair is can be told by many points only.
+fn photograph() -> (ColorImage, GrayImage) {
+    const DISPARITY_PX: usize = 12;
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let recording = Recording::open(&folder, &Options::default()).unwrap();
+    let (mut left, mut right) = (ColorImage::default(), GrayImage::default());
+    recording.read_color(0, &mut Scratch::default(), &mut left).unwrap();
+    right.set_luma_of(&left);
+    for row in right.luma.chunks_exact_mut(left.width as usize) {
+        row.rotate_left(DISPARITY_PX);
+    }
+    (left, right)
+}
+
 fn recording_of(left: &ColorImage, right: &GrayImage, more: u32) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let (width, height) = (planes::SIZE.0 as usize, planes::SIZE.1 as usize);
-    let mut wide = ColorImage::new(2 * planes::SIZE.0 + more, planes::SIZE.1);
+    let (width, height) = (left.width as usize, left.height as usize);
+    let mut wide = ColorImage::new(2 * left.width + more, left.height);
     let wide_px = wide.width as usize;
     for y in 0..height {
         wide.rgb[3 * y * wide_px..][..3 * width].copy_from_slice(&left.rgb[3 * y * width..][..3 * width]);
@@ -112,7 +126,7 @@ fn pictures_with_both_eyes_are_split() {
 #[test]
 fn a_pair_that_is_not_what_it_was_said_to_be_is_said_in_one_line() {
     let said = |change: &dyn Fn(&mut ColorImage, &mut GrayImage)| {
-        let (mut left, mut right) = planes::seen();
+        let (mut left, mut right) = photograph();
         change(&mut left, &mut right);
         let folder = recording_of(&left, &right, 0);
         let source = folder.path().join("wide");
@@ -123,7 +137,7 @@ fn a_pair_that_is_not_what_it_was_said_to_be_is_said_in_one_line() {
     };
     assert_eq!(said(&|_, _| {}), Vec::<String>::new());
     // The right eye looks 5 rows lower.
-    let lower = said(&|_, right| right.luma.rotate_left(5 * planes::SIZE.0 as usize));
+    let lower = said(&|_, right| right.luma.rotate_left(5 * right.width as usize));
     assert!(lower.len() == 1 && lower[0].contains("not rectified") && lower[0].contains("--calib"), "{lower:?}");
     let exchanged = said(&|left, right| {
         let (was_left, was_right) = (left.clone(), right.clone());
