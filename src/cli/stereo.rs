@@ -102,10 +102,12 @@ pub fn open(
 ) -> Result<StereoDepth, CliError> {
     let stated = options.state(pair, info.size)?;
     let disparities = options.max_disparity.unwrap_or_else(|| settled(disparities, info.size.0));
-    let matcher = executor.matcher(&Settings { disparities, effort: Effort::Full }, info.size)?;
+    let matcher = executor.matcher(disparities, Effort::Full, info.size)?;
     let (depth, how) = match stated {
-        Stated::Raw(rectifier) => (StereoDepth::of_raw(&info.name, *rectifier, matcher), "to be rectified"),
-        Stated::Rectified(rig) => (StereoDepth::of_rectified(&info.name, rig, matcher), "rectified"),
+        Stated::Raw(rectifier) => {
+            (StereoDepth::of_raw(&info.name, *rectifier, matcher, disparities), "to be rectified")
+        }
+        Stated::Rectified(rig) => (StereoDepth::of_rectified(&info.name, rig, matcher, disparities), "rectified"),
     };
     let StereoRig { focal_px, baseline_m, doffs_px, metric } = *depth.rig();
     let known = if metric { "" } else { ", assumed" };

@@ -90,13 +90,17 @@ impl Camera for FakeCamera {
         if index % self.corrupt_every == self.corrupt_every - 1 {
             return Ok(Captured::Corrupt(size_error()));
         }
-        let Shot { color, depth, .. } = shot;
+        let Shot { color, depth, right } = shot;
         color.resize(SIZE.0, SIZE.1);
         color.rgb.fill(index as u8);
         color.rgb.last_chunk_mut::<2>().unwrap().copy_from_slice(&(index as u16).to_le_bytes());
         if self.brings == Brings::Depth {
             depth.resize(SIZE.0, SIZE.1);
             depth.metres.fill(1.0 + index as f32);
+        }
+        if self.brings == Brings::RightEye {
+            right.resize(SIZE.0, SIZE.1);
+            right.luma.fill(index as u8);
         }
         Ok(Captured::Frame(Stamp { index, time_ns: index as u64 * PERIOD_NS, captured_ns: None }))
     }

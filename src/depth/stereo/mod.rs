@@ -3,19 +3,16 @@
 //! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on, in whole numbers, so that
 //! all executors find the same ([`fixed`]); what is made of them is common to all ([`tidy`]).
 
+pub mod check;
 pub mod cpu;
 pub mod fixed;
 mod gaps;
 mod half;
+pub mod source;
 mod speckle;
 mod tidy;
 
 use tidy::Tidy;
-
-pub mod source;
-pub mod stand_in;
-
-pub mod check;
 
 use crate::compute::GpuError;
 use crate::compute::team::Team;
@@ -54,10 +51,7 @@ pub trait Matcher: Send {
     fn describe(&self) -> String;
 
     /// Changes the effort from the next pair on.
-    ///
-    /// # Errors
-    /// The GPU has no room for another effort.
-    fn set_effort(&mut self, effort: Effort) -> Result<(), MatchError>;
+    fn set_effort(&mut self, effort: Effort);
 
     /// The disparity of the pair `left`, `right` into `into`, which becomes as large as they are; every pixel is
     /// answered.
@@ -99,14 +93,13 @@ pub enum MatchError {
 /// # Errors
 /// None so far.
 pub fn create(settings: &Settings) -> Result<Box<dyn Matcher>, MatchError> {
-    let mut matching = Matching {
+    let team = Team::new("match", settings.threads);
+    Ok(Box::new(Matching {
         settings: *settings,
-        team: Team::new("match", settings.threads.max(1)),
-        levels: [None, None],
+        levels: [Effort::Fast, Effort::Full].map(|effort| Level::new(settings, effort, team.threads())),
+        team,
         small: [GrayImage::default(), GrayImage::default()],
-    };
-    matching.set_effort(settings.effort)?;
-    Ok(Box::new(matching))
+    }))
 }
 
 /// Finds the disparities that both eyes agree on.
@@ -123,8 +116,8 @@ const SPECKLE: u32 = 100;
 struct Matching {
     settings: Settings,
     team: Team,
-    /// By effort; made when it is first asked for.
-    levels: [Option<Level>; 2],
+    /// By effort.
+    levels: [Level; 2],
     /// Left and right at half the size.
     small: [GrayImage; 2],
 }
@@ -157,14 +150,11 @@ impl Level {
 
 impl Matcher for Matching {
     fn describe(&self) -> String {
-        self.levels[self.settings.effort as usize].as_ref().map_or_else(String::new, |level| level.executor.describe())
+        self.levels[self.settings.effort as usize].executor.describe()
     }
 
-    fn set_effort(&mut self, effort: Effort) -> Result<(), MatchError> {
+    fn set_effort(&mut self, effort: Effort) {
         self.settings.effort = effort;
-        let threads = self.team.threads();
-        self.levels[effort as usize].get_or_insert_with(|| Level::new(&self.settings, effort, threads));
-        Ok(())
     }
 
     fn disparity(&mut self, left: &GrayImage, right: &GrayImage, into: &mut DisparityMap) -> Result<(), MatchError> {
@@ -176,7 +166,7 @@ impl Matcher for Matching {
         }
         into.resize(left.width, left.height);
         let Self { settings, team, levels, small } = self;
-        let Some(Level { executor, tidy, map, px }) = &mut levels[settings.effort as usize] else { return Ok(()) };
+        let Level { executor, tidy, map, px } = &mut levels[settings.effort as usize];
         match settings.effort {
             Effort::Full => {
                 executor.winners(&left.luma, &right.luma, team, map)?;

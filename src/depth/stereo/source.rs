@@ -5,7 +5,8 @@
 //! of diameter `A`. Focal length and baseline cancel out, so that a rig of which nothing is known
 //! ([`StereoRig::assumed`]) blurs as well as a measured one; only distances in metres mean nothing then.
 
-use super::{Effort, Matcher};
+use super::check::{Verdict, check};
+use super::{Effort, MatchError, Matcher};
 use crate::calibration::rectifier::Rectifier;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
@@ -13,6 +14,9 @@ use crate::optics::StereoRig;
 
 /// A disparity this little above that of infinity is as far as any: it is not measured any finer, and depth stays finite.
 const FARTHEST_PX: f32 = 1.0 / 16.0;
+
+/// Pairs that are looked at until one of them tells whether it is rectified; each look takes the time of a few frames.
+const FIRST_LOOKS: u32 = 5;
 
 /// What a map costs with little effort beside a full one: an eighth of the candidates, and what does not depend on them.
 const EFFORTS: [f64; 2] = [0.25, 1.0];
@@ -28,12 +32,15 @@ pub struct StereoDepth {
     color: ColorImage,
     right: GrayImage,
     disparity: DisparityMap,
+    disparities: u32,
+    /// Pairs that may still be looked at, for whether they are what they were said to be.
+    looks: u32,
 }
 
 impl StereoDepth {
-    /// Depth by `matcher` from pairs that `rig` took and that are rectified already. `source_name` stands for their
-    /// source in messages.
-    pub fn of_rectified(source_name: &str, rig: StereoRig, matcher: Box<dyn Matcher>) -> Self {
+    /// Depth by `matcher`, which tries so many `disparities`, from pairs that `rig` took and that are rectified already.
+    /// `source_name` stands for their source in messages.
+    pub fn of_rectified(source_name: &str, rig: StereoRig, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         Self {
             source_name: source_name.to_owned(),
             rig,
@@ -43,13 +50,15 @@ impl StereoDepth {
             color: ColorImage::default(),
             right: GrayImage::default(),
             disparity: DisparityMap::default(),
+            disparities,
+            looks: FIRST_LOOKS,
         }
     }
 
-    /// Depth by `matcher` from pairs that `rectifier` rectifies. Their left pictures are rectified as well.
-    pub fn of_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>) -> Self {
+    /// The same from pairs that `rectifier` rectifies. Their left pictures are rectified as well.
+    pub fn of_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         let rig = rectifier.rig();
-        Self { rectifier: Some(rectifier), ..Self::of_rectified(source_name, rig, matcher) }
+        Self { rectifier: Some(rectifier), ..Self::of_rectified(source_name, rig, matcher, disparities) }
     }
 
     /// What takes the pictures, once they are rectified.
@@ -61,6 +70,20 @@ impl StereoDepth {
     pub fn describe(&self) -> String {
         self.matcher.describe()
     }
+}
+
+/// Whether a pair is what it was said to be; said where it is not. Gives whether it could be told.
+fn first_look(source_name: &str, left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<bool, MatchError> {
+    let verdict = check(left, right, disparities)?.verdict();
+    match verdict {
+        Verdict::Rectified => tracing::info!("{source_name}: {verdict}"),
+        Verdict::RowsOff { .. } | Verdict::Swapped => tracing::warn!("{source_name}: {verdict}"),
+        Verdict::Unclear { .. } => {
+            tracing::debug!("{source_name}: {verdict}");
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 impl DepthSource for StereoDepth {
@@ -83,6 +106,10 @@ impl DepthSource for StereoDepth {
             }
             None => right,
         };
+        if self.looks > 0 {
+            let told = first_look(&self.source_name, &self.left, right, self.disparities)?;
+            self.looks = if told { 0 } else { self.looks - 1 };
+        }
         self.matcher.disparity(&self.left, right, &mut self.disparity)?;
         metres(&self.disparity, &self.rig, map);
         Ok(())
@@ -188,7 +215,7 @@ mod tests {
 
     #[test]
     fn a_rectified_pair_is_matched_as_it_is() {
-        let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)));
+        let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
         let (mut picture, mut map) = (color(&[25, 55, 10]), DepthMap::default());
         source.straighten(&mut picture);
         assert_eq!(picture, color(&[25, 55, 10]));
@@ -228,7 +255,7 @@ mod tests {
         rectifier.right(&raw_right, &mut right);
         assert_ne!(left, raw);
 
-        let mut source = StereoDepth::of_raw("two eyes", rectifier, Box::new(Difference(Effort::Full)));
+        let mut source = StereoDepth::of_raw("two eyes", rectifier, Box::new(Difference(Effort::Full)), 16);
         let (mut picture, mut map) = (raw.clone(), DepthMap::default());
         source.straighten(&mut picture);
         assert_eq!(picture, left);
@@ -241,7 +268,7 @@ mod tests {
 
     #[test]
     fn one_eye_and_unequal_eyes_are_named() {
-        let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)));
+        let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
         let (picture, mut map) = (color(&[25, 55]), DepthMap::default());
         let error = source.read(Seen { stamp: STAMP, color: &picture, right: None }, &mut map).unwrap_err();
         assert!(matches!(&error, DepthError::OneEye { .. }) && error.to_string().contains("two eyes"), "{error}");

@@ -65,10 +65,7 @@ impl CpuExecutor {
         let stripes = width.div_ceil(STRIPE);
         let chunk = threads.max(1);
         let group = stripes * STRIPE * GROUP * disparities;
-        let member = || Member {
-            states: States::new(2 * GROUP, disparities),
-            eyes: Eyes::new(width, disparities),
-        };
+        let member = || Member { states: States::new(2 * GROUP, disparities), eyes: Eyes::new(width, disparities) };
         let flags = || iter::repeat_with(AtomicBool::default);
         let most = (height + 2 * census::REACH).max(chunk * stripes);
         Self {
