@@ -263,7 +263,7 @@ def opencv_times(name, pair, disparities, calls):
 def our_times(options, files, disparities, threads, calls):
     """Times by effort, measured in the bench's process."""
     lines = subprocess.run(
-        [*options.stereo_bench, 'times', *files, '--disparities', str(disparities), '--threads', str(threads),
+        [*options.stereo_bench.split(), 'times', *files, '--disparities', str(disparities), '--threads', str(threads),
          '--rounds', str(calls), '--json'], check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True).stdout.splitlines()
     return {f'ours {r["effort"]}': r['times_ms'] for r in map(json.loads, lines)}
 
@@ -315,8 +315,8 @@ def main():
     parser.add_argument('--bin', default=os.path.join(ROOT, 'target', 'release', 'bokehcam'), help='this program')
     parser.add_argument('--data', default=os.environ.get('BOKEHCAM_DATA'), help='folder that holds stereo/scenes.csv')
     parser.add_argument('--times', action='store_true', help='measure times instead of accuracy')
-    parser.add_argument('--stereo-bench', nargs='+', default=['cargo', 'bench', '-q', '--bench', 'stereo', '--'],
-                        metavar='WORD', help='how the bench `stereo` is run')
+    parser.add_argument('--stereo-bench', default='cargo bench -q --bench stereo --', metavar='COMMAND',
+                        help='how the bench `stereo` is run')
     parser.add_argument('--rounds', type=int, default=5, help='turns of all methods')
     parser.add_argument('--calls', type=int, default=5, help='pairs matched by a method in its turn')
     parser.add_argument('--write-disparity', metavar='DIR', help="write OpenCV's disparity of the bundled recording")

@@ -20,7 +20,7 @@ const STILL_PX: f32 = 1.0 / 128.0;
 const STILL_CODES: u8 = 1;
 const STILL_REACH: i32 = 3;
 /// Without, when the mean over that square of the change of its grey is no more than this, in codes.
-const STILL_MEAN_CODES: f32 = 1.5;
+const STILL_MEAN_CODES: f32 = 3.0;
 /// A change of more than this, in pixels, is a jump.
 const JUMP_PX: f32 = 1.0;
 /// A moving edge is where the true disparity changes by more than this, in pixels, and so many columns and rows around.

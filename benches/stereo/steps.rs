@@ -21,7 +21,7 @@ use super::{Outcome, matcher};
 /// The frame that is shown: by then there is a memory of others.
 const FRAME: usize = 8;
 /// Columns of a picture.
-const WIDTH: u32 = 320;
+const WIDTH: u32 = 288;
 
 /// Writes the pictures.
 ///
