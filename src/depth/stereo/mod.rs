@@ -12,6 +12,8 @@ mod tidy;
 
 use tidy::Tidy;
 
+pub mod check;
+
 use crate::compute::GpuError;
 use crate::compute::team::Team;
 use crate::frame::{DisparityMap, GrayImage};
