@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::options::{Flicker, Options, name};
 use super::quality::picture::Plane;
-use super::sequence::{Frame, Sequence, bundled, kitti};
+use super::sequence::{Frame, Sequence, bundled, euroc, kitti};
 use super::{Outcome, matcher, print};
 
 /// The first frames of a sequence are not looked at: what remembers has little to remember there.
@@ -55,7 +55,7 @@ struct Record {
 pub fn run(flicker: &Flicker, options: &Options) -> Outcome {
     let mut sequences = vec![bundled()?];
     if let Some(data) = &flicker.data {
-        sequences.extend(kitti(data)?);
+        sequences.extend(kitti(data)?.into_iter().chain(euroc(data)?));
     }
     if !options.json {
         println!("sequence  effort step     memory  still %  change px  jumps %   moving bad1 %  error px");

@@ -1,14 +1,13 @@
 //! The matchers under test.
 
-#[path = "stand_in.rs"]
-mod stand_in;
+use std::thread;
 
-use bokehcam::depth::stereo::{Effort, Matcher};
+use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 
 use super::Outcome;
 use super::options::Options;
 
-/// A matcher of pictures of this size that remembers no frame.
+/// A matcher of pictures of this size that remembers no frame; `threads` of the CPU, all cores when `None`.
 ///
 /// # Errors
 /// It cannot be made.
@@ -16,11 +15,12 @@ pub fn create(
     options: &Options,
     effort: Effort,
     disparities: u32,
-    _size: (u32, u32),
-    _threads: Option<usize>,
+    size: (u32, u32),
+    threads: Option<usize>,
 ) -> Outcome<Box<dyn Matcher>> {
-    let mut matcher = stand_in::StandIn { disparities };
-    matcher.set_effort(effort);
-    let _ = &options.gpu;
-    Ok(Box::new(matcher))
+    if options.gpu.is_some() {
+        return Err("there is no matcher on the GPU".into());
+    }
+    let threads = threads.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
+    Ok(stereo::create(&Settings { size, disparities, effort, threads })?)
 }

@@ -12,6 +12,7 @@ use super::flicker::metres;
 use super::options::{Options, Picture, name};
 use super::quality::methods::{Blurrer, Method, Shot};
 use super::quality::metrics::{edge_band, psnr};
+use super::quality::picture::Plane;
 use super::quality::sheet;
 use super::sequence::{Sequence, bundled, pfm, recordings};
 use super::{Outcome, matcher, print};
@@ -31,6 +32,8 @@ struct Record {
     psnr_db: f64,
     /// The same within 12 px of depth edges.
     edge_db: f64,
+    /// PSNR without the leftmost columns, as many as the range, which the right eye may not see.
+    inner_db: f64,
     /// Frames with truth.
     frames: usize,
 }
@@ -61,14 +64,14 @@ pub fn run(picture: &Picture, options: &Options) -> Outcome {
         fs::create_dir_all(out)?;
     }
     if !options.json {
-        println!("depth         refined   PSNR dB   edge dB  frames");
+        println!("depth         refined   PSNR dB   edge dB  inner dB  frames");
     }
     for (depth, maps) in sources {
         for refined in [false, true] {
             let record = measure(&sequence, &depth, &maps, refined, picture.out.as_deref())?;
             let refined = if refined { "yes" } else { "no" };
-            let line =
-                format!("{depth:13} {refined:7} {:9.2} {:9.2} {:7}", record.psnr_db, record.edge_db, record.frames);
+            let Record { psnr_db, edge_db, inner_db, frames, .. } = record;
+            let line = format!("{depth:13} {refined:7} {psnr_db:9.2} {edge_db:9.2} {inner_db:9.2} {frames:7}");
             print(options, &line, &record)?;
         }
     }
@@ -76,7 +79,7 @@ pub fn run(picture: &Picture, options: &Options) -> Outcome {
 }
 
 fn truth(sequence: &Sequence) -> Vec<DepthMap> {
-    let map = |truth: &super::quality::picture::Plane<f32>| {
+    let map = |truth: &Plane<f32>| {
         let (width, height) = (truth.width as u32, truth.height as u32);
         metres(&DisparityMap { width, height, px: truth.data.clone() }, &sequence.rig)
     };
@@ -99,20 +102,23 @@ fn measure(sequence: &Sequence, depth: &str, maps: &[DepthMap], refined: bool, o
     let method = if refined { Method::Refined } else { Method::Layered(Quality::default()) };
     let mut blurrer = Blurrer::new(method, &shot(&sequence.frames[0].left, &maps[0]))?;
     let true_depth = truth(sequence);
-    let (mut psnr_db, mut edge_db, mut frames) = (0.0, 0.0, 0);
+    let (width, height) = (maps[0].width as usize, maps[0].height as usize);
+    let inner = Plane::from_fn(width, height, |x, _| x >= sequence.disparities as usize);
+    let (mut psnr_db, mut edge_db, mut inner_db, mut frames) = (0.0, 0.0, 0.0, 0);
     for (index, (frame, map)) in sequence.frames.iter().zip(maps).enumerate() {
         let blurred = blurrer.blur(&shot(&frame.left, map))?;
         let Some(lens) = seen_by_a_lens(index) else { continue };
         let edges = edge_band(&shot(&frame.left, &true_depth[index]).coc());
         psnr_db += psnr(&blurred, &lens, None);
         edge_db += psnr(&blurred, &lens, Some(&edges));
+        inner_db += psnr(&blurred, &lens, Some(&inner));
         frames += 1;
         if let Some(out) = out {
             let step = if refined { "refined" } else { "matched" };
             sheet::write(&out.join(format!("{}-{step}-{index:06}.png", depth.replace(' ', "-"))), &blurred)?;
         }
     }
-    let mean = |sum: f64| sum / f64::from(frames);
-    let (psnr_db, edge_db, frames) = (mean(psnr_db), mean(edge_db), frames as usize);
-    Ok(Record { depth: depth.to_owned(), refined, psnr_db, edge_db, frames })
+    let mean = |sum: f64| sum / frames as f64;
+    let (psnr_db, edge_db, inner_db) = (mean(psnr_db), mean(edge_db), mean(inner_db));
+    Ok(Record { depth: depth.to_owned(), refined, psnr_db, edge_db, inner_db, frames })
 }

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use bokehcam::calibration::{self, rectifier::Rectifier};
 use bokehcam::frame::{ColorImage, DisparityMap, GrayImage};
 use bokehcam::optics::StereoRig;
 
@@ -96,6 +97,34 @@ pub fn kitti(data: &Path) -> Outcome<Option<Sequence>> {
     });
     let rig = StereoRig { focal_px: 707.0912, baseline_m: 0.5372, doffs_px: 0.0, metric: true };
     Ok(Some(Sequence { name: "kitti", rig, disparities: 128, frames: frames.collect::<Outcome<_>>()? }))
+}
+
+/// 6 pairs of EuRoC's, at 20 Hz, almost still, rectified by their calibration, if they are there.
+///
+/// # Errors
+/// A picture or the calibration cannot be read.
+pub fn euroc(data: &Path) -> Outcome<Option<Sequence>> {
+    const PERIOD_NS: u64 = 50_000_000;
+    let folder = data.join("stereo_seq/MicroEurocDataset/mav0");
+    if !folder.is_dir() {
+        return Ok(None);
+    }
+    let sensors = ["cam0", "cam1"].map(|eye| folder.join(eye).join("sensor.yaml"));
+    let calibration = calibration::load(&[&sensors[0], &sensors[1]])?;
+    let names = numbered(&folder.join("cam0/data"))?;
+    let first = names.first().ok_or_else(|| format!("{}: no pictures", folder.display()))?;
+    let rectifier = Rectifier::new(&calibration, read(&folder.join("cam0/data").join(first))?.size())?;
+    let frames = names.iter().enumerate().map(|(index, name)| {
+        let [left, right] = [0, 1].map(|eye: usize| {
+            let mut rectified = ColorImage::default();
+            let taken = read(&folder.join(["cam0/data", "cam1/data"][eye]).join(name))?;
+            rectifier.maps()[eye].color(&taken, &mut rectified);
+            Outcome::Ok(rectified)
+        });
+        Ok(Frame { time_ns: index as u64 * PERIOD_NS, left: left?, right: right?, truth: None })
+    });
+    let frames = frames.collect::<Outcome<_>>()?;
+    Ok(Some(Sequence { name: "euroc", rig: rectifier.rig(), disparities: 96, frames }))
 }
 
 /// A disparity map in a PFM file: what is not finite is unknown, and becomes 0.
