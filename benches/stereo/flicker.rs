@@ -23,7 +23,8 @@ const STILL_REACH: i32 = 3;
 const STILL_MEAN_CODES: f32 = 3.0;
 /// A change of more than this, in pixels, is a jump.
 const JUMP_PX: f32 = 1.0;
-/// A moving edge is where the true disparity changes by more than this, in pixels, and so many columns and rows around.
+/// A moving edge is where the true disparity changes by more than this, in pixels, and so many columns and rows around;
+/// but not in the leftmost columns, as many as the range, which the right eye may not see.
 const EDGE_PX: f32 = 1.5;
 const EDGE_REACH: i32 = 5;
 
@@ -182,6 +183,7 @@ fn measure(sequence: &Sequence, regions: &[Regions], effort: Effort, maps: &[Pla
             }
             if let (Some(truth), Some(moving)) = (truth, moving)
                 && moving.data[at]
+                && at % now.width >= sequence.disparities as usize
             {
                 let error_px = (now.data[at] - truth.data[at]).abs();
                 bad.add(f32::from(error_px > 1.0));
