@@ -35,8 +35,11 @@ const HEXAGON_FRAMES: [u32; 1] = [0];
 
 type Outcome = Result<(), Box<dyn Error>>;
 
+/// Renders a recording into its folder.
+type Make = fn(&mut Folder) -> Outcome;
+
 /// The recordings, and what makes each.
-const RECORDINGS: [(&str, fn(&mut Folder) -> Outcome); 2] = [("portrait", make_portrait), ("stereo", make_stereo)];
+const RECORDINGS: [(&str, Make); 2] = [("portrait", make_portrait), ("stereo", make_stereo)];
 
 fn main() -> ExitCode {
     let (mut check, mut only) = (false, None);
