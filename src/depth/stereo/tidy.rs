@@ -75,14 +75,7 @@ impl WithSimd for Median<'_> {
         let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
         for (x, out) in out[1..=inner].iter_mut().enumerate() {
             *out = px(median([
-                above[0][x],
-                above[1][x],
-                above[2][x],
-                here[0][x],
-                here[1][x],
-                here[2][x],
-                below[0][x],
-                below[1][x],
+                above[0][x], above[1][x], above[2][x], here[0][x], here[1][x], here[2][x], below[0][x], below[1][x],
                 below[2][x],
             ]));
         }
@@ -105,25 +98,8 @@ fn px(fixed: u16) -> f32 {
 #[inline(always)]
 fn median(mut v: [u16; 9]) -> u16 {
     const EXCHANGES: [(usize, usize); 19] = [
-        (1, 2),
-        (4, 5),
-        (7, 8),
-        (0, 1),
-        (3, 4),
-        (6, 7),
-        (1, 2),
-        (4, 5),
-        (7, 8),
-        (0, 3),
-        (5, 8),
-        (4, 7),
-        (3, 6),
-        (1, 4),
-        (2, 5),
-        (4, 7),
-        (4, 2),
-        (6, 4),
-        (4, 2),
+        (1, 2), (4, 5), (7, 8), (0, 1), (3, 4), (6, 7), (1, 2), (4, 5), (7, 8), (0, 3), (5, 8), (4, 7), (3, 6), (1, 4),
+        (2, 5), (4, 7), (4, 2), (6, 4), (4, 2),
     ];
     for (a, b) in EXCHANGES {
         (v[a], v[b]) = (v[a].min(v[b]), v[a].max(v[b]));
