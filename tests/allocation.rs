@@ -16,7 +16,7 @@ use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::source::StereoDepth;
-use bokehcam::depth::stereo::{self, Effort, stand_in};
+use bokehcam::depth::stereo::{self, Effort};
 use bokehcam::depth::{DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::live;
@@ -158,7 +158,8 @@ fn two_eyes() {
         assumed_mm: false,
     };
     let rectifier = Rectifier::new(&calibration, size).expect("maps");
-    let matcher = stand_in::create(&stereo::Settings { disparities: 16, effort: Effort::Full }).expect("a matcher");
+    let matcher = stereo::create(&stereo::Settings { size, disparities: 16, effort: Effort::Full, threads: 2 })
+        .expect("a matcher");
     let mut depth = StereoDepth::of_raw("two eyes", rectifier, matcher, 16);
     let (raw, mut right, mut map) = (noise(size.0, size.1), GrayImage::default(), DepthMap::default());
     right.set_luma_of(&raw);

@@ -3,6 +3,8 @@
 
 use std::path::PathBuf;
 
+use bokehcam::calibration::rectifier::Rectifier;
+use bokehcam::calibration::{self, StereoCalibration};
 use bokehcam::depth::stereo::check::{PairCheck, Verdict, check};
 use bokehcam::frame::GrayImage;
 
@@ -115,9 +117,12 @@ fn two_sizes_are_refused() {
     assert!(check(&left, &other, 64).unwrap_err().to_string().contains("one size"));
 }
 
+fn data(path: &str) -> PathBuf {
+    PathBuf::from(std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data")).join(path)
+}
+
 fn gray(path: &str) -> GrayImage {
-    let data = std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data");
-    let image = image::open(PathBuf::from(data).join(path)).unwrap().to_luma8();
+    let image = image::open(data(path)).unwrap().to_luma8();
     GrayImage { width: image.width(), height: image.height(), luma: image.into_raw() }
 }
 
@@ -149,5 +154,36 @@ fn real_pairs() {
     for (left, right) in raw.into_iter().chain(boards) {
         let found = checked(&[gray(&left), gray(&right)]);
         assert!(!matches!(found.verdict(), Verdict::Rectified | Verdict::Swapped), "{left}: {found:?}");
+    }
+}
+
+/// The check of a pair after rectification.
+fn rectified(calibration: &StereoCalibration, pair: [GrayImage; 2]) -> PairCheck {
+    let rectifier = Rectifier::new(calibration, pair[0].size()).unwrap();
+    let mut into = [GrayImage::default(), GrayImage::default()];
+    for ((map, from), into) in rectifier.maps().iter().zip(&pair).zip(&mut into) {
+        map.gray(from, into);
+    }
+    check(&into[0], &into[1], 160).unwrap()
+}
+
+#[test]
+#[ignore = "needs BOKEHCAM_DATA, a folder with stereo_seq and calib"]
+fn rectifying_makes_real_pairs_rectified() {
+    let cameras = ["cam0", "cam1"].map(|eye| format!("stereo_seq/MicroEurocDataset/mav0/{eye}"));
+    let sensors = cameras.each_ref().map(|camera| data(&format!("{camera}/sensor.yaml")));
+    let euroc = calibration::load(&[&sensors[0], &sensors[1]]).unwrap();
+    let found = rectified(&euroc, cameras.map(|camera| gray(&format!("{camera}/data/1403715276262142976.png"))));
+    assert!(found.vertical_px.abs() < 0.3 && found.verdict() == Verdict::Rectified, "{found:?}");
+
+    // The author's left camera stands on the right.
+    let given = calibration::load(&[&data("calib/intrinsics.yml")]).unwrap().exchanged();
+    for rig in [given, StereoCalibration { given: None, ..given }] {
+        let boards = [6, 9, 12].map(|k| [format!("calib/right{k:02}.jpg"), format!("calib/left{k:02}.jpg")]);
+        for board in boards {
+            let found = rectified(&rig, board.each_ref().map(|path| gray(path)));
+            assert!(found.matches > 10 && found.vertical_px.abs() < 0.5, "{board:?}: {found:?}");
+            assert!(!matches!(found.verdict(), Verdict::RowsOff { .. } | Verdict::Swapped), "{board:?}: {found:?}");
+        }
     }
 }

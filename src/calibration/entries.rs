@@ -93,12 +93,15 @@ pub(super) fn pose(value: Value<'_>) -> Result<(DMat3, DVec3), CalibrationError>
 /// Columns and rows of pictures.
 pub(super) fn size(value: Value<'_>) -> Result<(u32, u32), CalibrationError> {
     let [width, height] = value.numbers::<2>(2, "a width and a height")?;
-    for side in [width, height] {
-        if side.fract() != 0.0 || !(1.0..65536.0).contains(&side) {
-            return Err(impossible(value, "is no size of pictures in whole pixels"));
-        }
+    Ok((side(value, width)?, side(value, height)?))
+}
+
+/// Columns or rows of pictures.
+pub(super) fn side(value: Value<'_>, number: f64) -> Result<u32, CalibrationError> {
+    if number.fract() != 0.0 || !(1.0..65536.0).contains(&number) {
+        return Err(impossible(value, "is no size of pictures in whole pixels"));
     }
-    Ok((width as u32, height as u32))
+    Ok(number as u32)
 }
 
 /// A translation between two eyes, if they are two.

@@ -110,7 +110,8 @@ pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, Calibratio
 
 fn size(files: &[File]) -> Result<Option<(u32, u32)>, CalibrationError> {
     if let (Some(width), Some(height)) = (find(files, WIDTH), find(files, HEIGHT)) {
-        return Ok(Some((width.count()?, height.count()?)));
+        let side = |value: Value<'_>| entries::side(value, value.count()?.into());
+        return Ok(Some((side(width)?, side(height)?)));
     }
     find(files, SIZE).map(entries::size).transpose()
 }

@@ -214,12 +214,18 @@ impl Executor {
         Ok(bokeh::create(settings, size, self.backend, self.adapter.as_deref(), self.threads)?)
     }
 
-    /// A matcher of pairs of `size` pixels.
+    /// A matcher of pairs of `size` pixels that tries so many `disparities`.
     ///
     /// # Errors
     /// There is no such GPU.
-    pub fn matcher(&self, settings: &stereo::Settings, _size: (u32, u32)) -> Result<Box<dyn Matcher>, CliError> {
-        Ok(stereo::stand_in::create(settings).map_err(DepthError::from)?)
+    pub fn matcher(
+        &self,
+        disparities: u32,
+        effort: stereo::Effort,
+        size: (u32, u32),
+    ) -> Result<Box<dyn Matcher>, CliError> {
+        let threads = self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+        Ok(stereo::create(&stereo::Settings { size, disparities, effort, threads }).map_err(DepthError::from)?)
     }
 
     /// The CPU executor, which can be looked into.

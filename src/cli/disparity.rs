@@ -111,7 +111,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         Effort::Full => stereo::Effort::Full,
     };
     let executor = Executor::new(command.backend, command.adapter.clone(), command.threads);
-    let mut matcher = executor.matcher(&Settings { disparities, effort }, size)?;
+    let mut matcher = executor.matcher(disparities, effort, size)?;
     let mut disparity = DisparityMap::default();
     let start = Instant::now();
     matcher.disparity(&left, &right, &mut disparity).map_err(DepthError::from)?;

@@ -104,7 +104,7 @@ pub fn open(
 ) -> Result<StereoDepth, CliError> {
     let stated = options.state(pair, info.size)?;
     let disparities = options.max_disparity.unwrap_or_else(|| settled(disparities, info.size.0));
-    let matcher = executor.matcher(&Settings { disparities, effort: Effort::Full }, info.size)?;
+    let matcher = executor.matcher(disparities, Effort::Full, info.size)?;
     let (depth, how) = match stated {
         Stated::Raw(rectifier) => {
             (StereoDepth::of_raw(&info.name, *rectifier, matcher, disparities), "to be rectified")

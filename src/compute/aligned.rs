@@ -7,31 +7,31 @@ const LINE: usize = 64;
 
 /// A fixed number of values that starts at a cache line.
 #[derive(Default)]
-pub struct Aligned {
-    memory: Vec<f32>,
+pub struct Aligned<T = f32> {
+    memory: Vec<T>,
     start: usize,
     length: usize,
 }
 
-impl Aligned {
+impl<T: Copy + Default> Aligned<T> {
     /// Zeros.
     pub fn zeros(length: usize) -> Self {
         // The allocation is longer than needed by a line, and never moves.
-        let memory = vec![0.0; length + LINE / size_of::<f32>()];
-        let start = memory.as_ptr().align_offset(LINE).min(LINE / size_of::<f32>());
+        let memory = vec![T::default(); length + LINE / size_of::<T>()];
+        let start = memory.as_ptr().align_offset(LINE).min(LINE / size_of::<T>());
         Self { memory, start, length }
     }
 }
 
-impl Deref for Aligned {
-    type Target = [f32];
-    fn deref(&self) -> &[f32] {
+impl<T> Deref for Aligned<T> {
+    type Target = [T];
+    fn deref(&self) -> &[T] {
         &self.memory[self.start..self.start + self.length]
     }
 }
 
-impl DerefMut for Aligned {
-    fn deref_mut(&mut self) -> &mut [f32] {
+impl<T> DerefMut for Aligned<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
         &mut self.memory[self.start..self.start + self.length]
     }
 }

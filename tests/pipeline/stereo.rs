@@ -10,7 +10,7 @@ use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::stereo::source::StereoDepth;
-use bokehcam::depth::stereo::{Effort, Settings, stand_in};
+use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::StereoRig;
@@ -62,6 +62,11 @@ fn two_eyes(frames: usize) -> FakeCamera {
     FakeCamera { brings: Brings::RightEye, ..fake_camera(frames) }
 }
 
+/// A matcher of small pictures.
+fn matcher(size: (u32, u32)) -> Box<dyn Matcher> {
+    stereo::create(&Settings { size, disparities: 16, effort: Effort::Full, threads: 1 }).unwrap()
+}
+
 #[test]
 fn the_right_eye_comes_with_its_picture_and_unpaired_frames_are_counted() {
     let stop = AtomicBool::new(false);
@@ -87,7 +92,7 @@ fn the_right_eye_comes_with_its_picture_and_unpaired_frames_are_counted() {
 #[test]
 fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
     let stop = AtomicBool::new(false);
-    let matcher = stand_in::create(&Settings { disparities: 16, effort: Effort::Full }).unwrap();
+    let matcher = matcher(SIZE);
     let error = run(Run {
         depth: Some(Box::new(StereoDepth::of_rectified("fake camera", StereoRig::assumed(SIZE.0), matcher, 16))),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
@@ -189,7 +194,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
     {
         for (focus, near_is_sharp) in [((0.5, 0.5), true), ((0.85, 0.1), false)] {
             let (stop, received) = (AtomicBool::new(false), Received::default());
-            let matcher = stand_in::create(&Settings { disparities: 16, effort: Effort::Full }).unwrap();
+            let matcher = matcher((width, height));
             run(Run {
                 depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher, 16))),
                 bokeh: Some(bokeh::create(&settings, (width, height), Backend::Cpu, None, Some(1)).unwrap()),

@@ -49,6 +49,14 @@ fn sequences_of_two_eyes() {
     let Some(Pair::Rectified(rig)) = kitti.pair() else { panic!("{:?}", kitti.pair()) };
     assert!((rig.focal_px - 707.091).abs() < 1e-3 && (rig.baseline_m - 0.537).abs() < 1e-3, "{rig:?}");
 
+    let euroc = open("stereo_seq/MicroEurocDataset");
+    assert_eq!((euroc.layout(), euroc.len(), euroc.size()), ("EuRoC/ASL", 6, (752, 480)));
+    // By the names of the pictures: there is no list.
+    assert_eq!((euroc.time_ns(1), euroc.time_ns(5)), (50_000_128, 250_000_128));
+    let Some(Pair::Raw(calibration)) = euroc.pair() else { panic!("{:?}", euroc.pair()) };
+    assert!((calibration.translation_m.length() - 0.110).abs() < 1e-3, "{calibration:?}");
+    assert_eq!(right_of(&euroc, 5).unwrap().size(), (752, 480));
+
     let scenes = open("stereo/kitti2012");
     assert_eq!((scenes.len(), scenes.pair()), (8, Some(&Pair::Unstated)));
 

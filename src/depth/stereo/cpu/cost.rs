@@ -1,0 +1,95 @@
+//! What it costs to say that a pixel has a disparity: the bits in which the census of both eyes differs, averaged over
+//! 3x3 pixels.
+
+use pulp::WithSimd;
+
+use super::GROUP;
+use super::census::PLANES;
+
+/// The cost of a partner beyond the border of the right picture: that of a poor one, so that the outermost columns may
+/// take the disparity of their neighbours.
+const OUTSIDE: u8 = 8;
+
+/// Rows whose differences the costs of a group are made of: one more above and one below.
+pub const ROWS: usize = GROUP + 2;
+
+/// Census of a left row, and of the right one from its last column to its first.
+pub type Codes<'a> = [[&'a [u8]; PLANES]; 2];
+
+/// The costs of a group of rows, 0 to 27: an eighth of the sum of the differences over three rows and columns.
+pub struct Costs<'a, const N: usize> {
+    /// From the row above the group to the one below it.
+    pub codes: [Codes<'a>; ROWS],
+    /// Columns.
+    pub width: usize,
+    /// `[column][row][disparity]`, at least `width * GROUP * N`.
+    pub out: &'a mut [u8],
+}
+
+impl<const N: usize> WithSimd for Costs<'_, N> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { codes, width, out } = self;
+        let out = out.as_chunks_mut::<N>().0;
+        // Sums over three rows, of the columns before, here, and after.
+        let mut before = [[0u8; N]; GROUP];
+        let mut here = [[0u8; N]; GROUP];
+        let mut after = [[0u8; N]; GROUP];
+        columns(&codes, width, 0, &mut here);
+        before.copy_from_slice(&here);
+        for x in 0..width {
+            if x + 1 < width {
+                columns(&codes, width, x + 1, &mut after);
+            }
+            for row in 0..GROUP {
+                let out = &mut out[x * GROUP + row];
+                let (before, here, after) = (&mut before[row], &mut here[row], &after[row]);
+                for d in 0..N {
+                    out[d] = (before[d] + here[d] + after[d] + 4) >> 3;
+                    before[d] = here[d];
+                    here[d] = after[d];
+                }
+            }
+        }
+    }
+}
+
+/// The differences of column `x`, summed over three rows, 0 to 72.
+#[inline(always)]
+fn columns<const N: usize>(codes: &[Codes; ROWS], width: usize, x: usize, sums: &mut [[u8; N]; GROUP]) {
+    let mut two = [[0u8; N]; 2];
+    for (k, codes) in codes.iter().enumerate() {
+        let one = differences::<N>(codes, width, x);
+        for d in 0..N {
+            if k >= 2 {
+                sums[k - 2][d] = two[0][d] + two[1][d] + one[d];
+            }
+            two[0][d] = two[1][d];
+            two[1][d] = one[d];
+        }
+    }
+}
+
+/// The bits that differ between pixel `x` and each partner, 0 to 24.
+#[inline(always)]
+fn differences<const N: usize>([left, right]: &Codes, width: usize, x: usize) -> [u8; N] {
+    // The partner at disparity d is in column x - d, which is this one plus d in the mirrored row.
+    let first = width - 1 - x;
+    let [a, b, c] = left.map(|plane| plane[x]);
+    let [of_a, of_b, of_c] = right;
+    let (of_a, of_b, of_c) = (&of_a[first..first + N], &of_b[first..first + N], &of_c[first..first + N]);
+    let mut out = [0u8; N];
+    for d in 0..N {
+        let (a, b, c) = (a ^ of_a[d], b ^ of_b[d], c ^ of_c[d]);
+        // Bits add up to ones and twos, so that two bytes are counted for three.
+        let (ones, twos) = (a ^ b ^ c, (a & b) | (c & (a ^ b)));
+        out[d] = ones.count_ones() as u8 + 2 * twos.count_ones() as u8;
+    }
+    if x + 1 < N {
+        for (d, out) in out.iter_mut().enumerate() {
+            *out = if d > x { OUTSIDE } else { *out };
+        }
+    }
+    out
+}

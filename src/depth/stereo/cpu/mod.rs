@@ -1,0 +1,185 @@
+//! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per pair.
+//!
+//! One sweep over the rows, some at a time, so that what is made of them stays in the cache: costs, the paths along the
+//! rows, the path down, and the winners.
+
+mod census;
+mod cost;
+mod path;
+mod winner;
+
+use std::iter;
+use std::sync::atomic::AtomicBool;
+
+use census::Census;
+use cost::Costs;
+use path::{Columns, Penalties, Rows, STRIPE, States};
+use pulp::Arch;
+use winner::{Eyes, Winners};
+
+use super::Executor;
+use crate::compute::GpuError;
+use crate::compute::aligned::Aligned;
+use crate::compute::simd;
+use crate::compute::team::{Shelf, Team};
+
+/// Rows whose values lie side by side, `[column][row][disparity]`, as one part of the work.
+const GROUP: usize = 4;
+
+/// As many disparities as the code is made for.
+const RANGES: [usize; 7] = [16, 32, 64, 96, 128, 192, 256];
+
+/// Matches pairs of one size on the CPU.
+pub struct CpuExecutor {
+    width: usize,
+    height: usize,
+    disparities: usize,
+    arch: Arch,
+    penalties: Penalties,
+    left: Census,
+    right: Census,
+    /// Stripes of columns.
+    stripes: usize,
+    /// Groups that are worked on at a time: one for each thread.
+    chunk: usize,
+    /// Of a chunk.
+    costs: Aligned<u8>,
+    /// Of a chunk, laid out as the costs.
+    sums: Aligned<u8>,
+    /// Of the paths along the columns of each stripe.
+    states: Vec<States>,
+    members: Vec<Member>,
+    taken: [Vec<AtomicBool>; 2],
+}
+
+/// Memory of one thread.
+struct Member {
+    states: States,
+    eyes: Eyes,
+}
+
+impl CpuExecutor {
+    /// For pairs of this size, and at least as many disparities, at most 256.
+    pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
+        let disparities = RANGES.into_iter().find(|&range| range >= disparities).unwrap_or(RANGES[RANGES.len() - 1]);
+        let stripes = width.div_ceil(STRIPE);
+        let chunk = threads.max(1);
+        let group = stripes * STRIPE * GROUP * disparities;
+        let member = || Member { states: States::new(2 * GROUP, disparities), eyes: Eyes::new(width, disparities) };
+        let flags = || iter::repeat_with(AtomicBool::default);
+        let most = (height + 2 * census::REACH).max(chunk * stripes);
+        Self {
+            width,
+            height,
+            disparities,
+            arch: Arch::new(),
+            penalties: Penalties::new(),
+            left: Census::new((width, height), false, 0),
+            right: Census::new((width, height), true, disparities),
+            stripes,
+            chunk,
+            costs: Aligned::zeros(chunk * group),
+            sums: Aligned::zeros(chunk * group),
+            states: iter::repeat_with(|| States::new(STRIPE, disparities)).take(stripes).collect(),
+            members: iter::repeat_with(member).take(threads).collect(),
+            taken: [(); 2].map(|()| flags().take(most).collect()),
+        }
+    }
+
+    fn match_range<const N: usize>(&mut self, left: &[u8], team: &mut Team, out: &mut [u16]) {
+        let groups = self.height.div_ceil(GROUP);
+        for first in (0..groups).step_by(self.chunk) {
+            let groups = (first, self.chunk.min(groups - first));
+            self.along_rows::<N>(groups, left, team);
+            self.along_columns::<N>(groups, left, team);
+            self.win::<N>(groups, team, out);
+        }
+    }
+
+    /// Bytes of a group of rows.
+    fn group(&self) -> usize {
+        self.stripes * STRIPE * GROUP * self.disparities
+    }
+
+    /// The costs of the groups, and the sums of the paths along their rows.
+    fn along_rows<const N: usize>(&mut self, (first, groups): (usize, usize), left: &[u8], team: &mut Team) {
+        let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
+        let [cost_taken, sum_taken] = &mut self.taken;
+        let costs = Shelf::new(&mut self.costs[..groups * group], group, cost_taken);
+        let sums = Shelf::new(&mut self.sums[..groups * group], group, sum_taken);
+        let (census, penalties) = ((&self.left, &self.right), &self.penalties);
+        team.run_with(&mut self.members, groups, &|member, part| {
+            let y = (first + part) * GROUP;
+            let mut codes = [[[&[][..]; census::PLANES]; 2]; cost::ROWS];
+            for (k, codes) in codes.iter_mut().enumerate() {
+                let y = (y + k).saturating_sub(1).min(height - 1);
+                *codes = [census.0.row(y), census.1.row(y)];
+            }
+            let costs = costs.part(part);
+            arch.dispatch(Costs::<N> { codes, width, out: costs });
+            let luma = &left[y * width..(y + GROUP).min(height) * width];
+            let (states, sums) = (&mut member.states, sums.part(part));
+            arch.dispatch(Rows::<N> { costs, luma, width, penalties, states, sums });
+        });
+    }
+
+    /// Adds the path down the groups, which leaves the sums of all where the costs were.
+    fn along_columns<const N: usize>(&mut self, (first, groups): (usize, usize), left: &[u8], team: &mut Team) {
+        let (width, height, arch, group, stripes) = (self.width, self.height, self.arch, self.group(), self.stripes);
+        let stripe_len = group / stripes;
+        let [cost_taken, state_taken] = &mut self.taken;
+        let (sums, penalties) = (&*self.sums, &self.penalties);
+        let costs = Shelf::new(&mut self.costs[..groups * group], stripe_len, cost_taken);
+        let states = Shelf::new(&mut self.states, 1, state_taken);
+        team.run(stripes, &|stripe| {
+            let states = &mut states.part(stripe)[0];
+            for k in 0..groups {
+                let y = (first + k) * GROUP;
+                let part = k * stripes + stripe;
+                arch.dispatch(Columns::<N> {
+                    costs: costs.part(part),
+                    sums: &sums[part * stripe_len..(part + 1) * stripe_len],
+                    rows: (y, GROUP.min(height - y)),
+                    luma: (left, width),
+                    columns: (stripe * STRIPE, width.min((stripe + 1) * STRIPE)),
+                    penalties,
+                    states,
+                });
+            }
+        });
+    }
+
+    /// The winners of the groups.
+    fn win<const N: usize>(&mut self, (first, groups): (usize, usize), team: &mut Team, out: &mut [u16]) {
+        let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
+        let rows = first * GROUP..((first + groups) * GROUP).min(height);
+        let sums = &self.costs;
+        let out = Shelf::new(&mut out[rows.start * width..rows.end * width], GROUP * width, &mut self.taken[0]);
+        team.run_with(&mut self.members, groups, &|member, part| {
+            let sums = &sums[part * group..(part + 1) * group];
+            arch.dispatch(Winners::<N> { sums, width, eyes: &mut member.eyes, out: out.part(part) });
+        });
+    }
+}
+
+impl Executor for CpuExecutor {
+    fn describe(&self) -> String {
+        format!("cpu, {} threads, {}", self.members.len(), simd::name(self.arch))
+    }
+
+    fn winners(&mut self, left: &[u8], right: &[u8], team: &mut Team, out: &mut [u16]) -> Result<(), GpuError> {
+        let Self { arch, taken, .. } = self;
+        self.left.see(left, team, *arch, &mut taken[0]);
+        self.right.see(right, team, *arch, &mut taken[0]);
+        match self.disparities {
+            16 => self.match_range::<16>(left, team, out),
+            32 => self.match_range::<32>(left, team, out),
+            64 => self.match_range::<64>(left, team, out),
+            96 => self.match_range::<96>(left, team, out),
+            128 => self.match_range::<128>(left, team, out),
+            192 => self.match_range::<192>(left, team, out),
+            _ => self.match_range::<256>(left, team, out),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,136 @@
+//! From the disparities that both eyes agree on to one for every pixel: islands go, gaps are filled from behind, and the
+//! median of 3x3 pixels takes what is left of chance.
+
+use std::sync::atomic::AtomicBool;
+
+use pulp::{Arch, WithSimd};
+
+use super::fixed::ONE;
+use super::gaps;
+use super::speckle::Speckles;
+use crate::compute::team::{Shelf, Team};
+
+/// Owns the memory for it.
+pub struct Tidy {
+    width: usize,
+    speckles: Speckles,
+    taken: Vec<AtomicBool>,
+    arch: Arch,
+}
+
+impl Tidy {
+    /// For maps of this size.
+    pub fn new((width, height): (usize, usize)) -> Self {
+        Self {
+            width,
+            speckles: Speckles::new(width * height),
+            taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
+            arch: Arch::new(),
+        }
+    }
+
+    /// Tidies `map` up, which is left with its gaps filled, and writes its median to `px`, in pixels, above 0. Islands
+    /// of at most `speckle` pixels go.
+    pub fn tidy(&mut self, map: &mut [u16], speckle: u32, team: &mut Team, px: &mut [f32]) {
+        let Self { width, speckles, taken, arch } = self;
+        let (width, arch) = (*width, *arch);
+        speckles.remove(map, width, speckle);
+        gaps::fill(map, width);
+        let map = &*map;
+        let height = map.len() / width;
+        let out = Shelf::new(px, width, taken);
+        team.run(height, &|y| {
+            let row = |y: usize| &map[y * width..(y + 1) * width];
+            let rows = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
+            arch.dispatch(Median { rows, out: out.part(y) });
+        });
+    }
+}
+
+/// The median of three rows and columns; beyond the border the outermost pixels repeat.
+struct Median<'a> {
+    rows: [&'a [u16]; 3],
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Median<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { rows: [above, here, below], out } = self;
+        let width = out.len();
+        let at = |x: usize| {
+            let (before, after) = (x.saturating_sub(1), (x + 1).min(width - 1));
+            let mut nine = [0; 9];
+            for (k, row) in [above, here, below].into_iter().enumerate() {
+                (nine[3 * k], nine[3 * k + 1], nine[3 * k + 2]) = (row[before], row[x], row[after]);
+            }
+            px(median(nine))
+        };
+        (out[0], out[width - 1]) = (at(0), at(width - 1));
+        if width < 3 {
+            return;
+        }
+        let inner = width - 2;
+        let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
+        for (x, out) in out[1..=inner].iter_mut().enumerate() {
+            *out = px(median([
+                above[0][x],
+                above[1][x],
+                above[2][x],
+                here[0][x],
+                here[1][x],
+                here[2][x],
+                below[0][x],
+                below[1][x],
+                below[2][x],
+            ]));
+        }
+    }
+}
+
+/// A row, and the same from the next two columns on.
+#[inline(always)]
+fn columns(row: &[u16], length: usize) -> [&[u16]; 3] {
+    [&row[..length], &row[1..=length], &row[2..length + 2]]
+}
+
+/// Pixels from fixed point. 0 would mean that nothing is known, and infinity is.
+#[inline(always)]
+fn px(fixed: u16) -> f32 {
+    f32::from(if fixed > 1 { fixed } else { 1 }) / f32::from(ONE)
+}
+
+/// The fifth of nine, by 19 exchanges (Paeth, *Median finding on a 3x3 grid*, Graphics Gems, 1990).
+#[inline(always)]
+fn median(nine: [u16; 9]) -> u16 {
+    let [mut a, mut b, mut c, mut d, mut e, mut f, mut g, mut h, mut i] = nine;
+    // Written out: a loop over places would not become vector code.
+    macro_rules! exchange {
+        ($($low:ident $high:ident),*) => {
+            $(($low, $high) = ($low.min($high), $low.max($high));)*
+        };
+    }
+    exchange!(b c, e f, h i, a b, d e, g h, b c, e f, h i, a d, f i, e h, d g, b e, c f, e h, e c, g e, e c);
+    let _ = (a, b, c, d, f, g, h, i);
+    e
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_the_fifth() {
+        let mut state = 1u32;
+        for _ in 0..2000 {
+            let nine: [u16; 9] = std::array::from_fn(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 24) as u16 % 12
+            });
+            let mut sorted = nine;
+            sorted.sort_unstable();
+            assert_eq!(median(nine), sorted[4], "{nine:?}");
+        }
+    }
+}
