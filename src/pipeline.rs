@@ -106,7 +106,7 @@ pub struct Run<'a> {
     /// Real time, or all frames.
     pub pace: Pace,
     /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss. In real time, depth may take half
-    /// of it before it is made for fewer frames.
+    /// of it before it is made with less effort, and then for fewer frames.
     pub budget_ns: u64,
     /// Count frames that cannot be read, and go on; otherwise the first one ends the run.
     pub keep_going: bool,

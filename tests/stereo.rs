@@ -212,6 +212,23 @@ fn a_calibration_that_cannot_be_read_is_named() {
     let wide = wide.path().join("wide");
     let ran = bokehcam(&["stream", path(&wide), "--to", "null", "--side-by-side", "--calib", "nowhere.yml"]);
     assert!(ran.code == 1 && ran.stderr.contains("nowhere.yml") && ran.stderr.lines().count() == 1, "{}", ran.stderr);
+    // Eyes that are exchanged, in millimetres of unknown pictures: one line all the same.
+    let calib = wide.with_file_name("calib.yml");
+    let camera =
+        "!!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [300., 0., 80., 0., 300., 60., 0., 0., 1.]\n";
+    let none = "!!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [0., 0., 0., 0., 0.]\n";
+    let rotation = "!!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [1., 0., 0., 0., 1., 0., 0., 0., 1.]\n";
+    let with = |x_mm: i32| {
+        let place = format!("!!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [{x_mm}., 0., 0.]\n");
+        let text = format!("%YAML:1.0\n---\nM1: {camera}D1: {none}M2: {camera}D2: {none}R: {rotation}T: {place}");
+        fs::write(&calib, text).unwrap();
+        bokehcam(&["stream", path(&wide), "--to", "null", "--side-by-side", "--calib", path(&calib), "--focus", "2"])
+    };
+    let exchanged = with(100);
+    assert!(exchanged.code == 1 && exchanged.stderr.contains("exchange"), "{}", exchanged.stderr);
+    assert_eq!(exchanged.stderr.lines().count(), 1, "{}", exchanged.stderr);
+    let good = with(-100);
+    assert!(good.code == 0 && good.stderr.contains("taken as millimetres"), "{}", good.stderr);
 }
 
 #[test]

@@ -72,13 +72,15 @@ impl options::Stereo {
         match read.as_ref().unwrap_or(pair) {
             Pair::Rectified(rig) => Ok(Stated::Rectified(*rig)),
             Pair::Raw(calibration) => {
+                let stated = if self.rectified {
+                    Stated::Rectified(Rectification::of(calibration, size)?.rig())
+                } else {
+                    Stated::Raw(Box::new(Rectifier::new(calibration, size)?))
+                };
                 for note in calibration.notes(size) {
                     tracing::warn!("{note}");
                 }
-                if self.rectified {
-                    return Ok(Stated::Rectified(Rectification::of(calibration, size)?.rig()));
-                }
-                Ok(Stated::Raw(Box::new(Rectifier::new(calibration, size)?)))
+                Ok(stated)
             }
             Pair::Unstated if self.rectified => Ok(Stated::Rectified(StereoRig::assumed(size.0))),
             Pair::Unstated => Err(CliError::Usage(
