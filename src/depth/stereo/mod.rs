@@ -3,6 +3,7 @@
 //! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on, in whole numbers, so that
 //! all executors find the same ([`fixed`]); what is made of them is common to all ([`tidy`]).
 
+mod border;
 pub mod check;
 pub mod cpu;
 pub mod fixed;
@@ -170,13 +171,13 @@ impl Matcher for Matching {
         match settings.effort {
             Effort::Full => {
                 executor.winners(&left.luma, &right.luma, team, map)?;
-                tidy.tidy(map, SPECKLE, team, &mut into.px);
+                tidy.tidy(map, &left.luma, SPECKLE, team, &mut into.px);
             }
             Effort::Fast => {
                 half::shrink(left, &mut small[0]);
                 half::shrink(right, &mut small[1]);
                 executor.winners(&small[0].luma, &small[1].luma, team, map)?;
-                tidy.tidy(map, SPECKLE / 4, team, px);
+                tidy.tidy(map, &small[0].luma, SPECKLE / 4, team, px);
                 half::grow(left, &small[0], px, &mut into.px);
             }
         }
