@@ -1,6 +1,7 @@
 //! How steady the disparity is where nothing moves, and how right where something does: with the memory of earlier
 //! frames, and without.
 
+use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::Effort;
 use bokehcam::frame::{DepthMap, DisparityMap};
@@ -88,6 +89,7 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
         matcher::create(options, effort, sequence.disparities, size, None)
     };
     let (mut matcher, mut refiner) = (create()?, Refiner::new());
+    let mut focus = Focus::new(FocusRule::Auto);
     let (mut matched, mut refined) = (Vec::new(), Vec::new());
     for frame in &sequence.frames {
         if !memory {
@@ -97,6 +99,7 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
         let [left, right] = frame.gray();
         matcher.disparity(&left, &right, &mut map)?;
         let mut depth = metres(&map, &sequence.rig);
+        refiner.focus_at(focus.focus_m(&depth, frame.time_ns));
         refiner.refine(&mut depth, &frame.left, frame.time_ns);
         let (width, height) = (map.width as usize, map.height as usize);
         let steady = depth.metres.iter().map(|&z_m| sequence.rig.disparity_px(z_m)).collect();

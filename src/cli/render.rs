@@ -121,7 +121,11 @@ pub fn prepared(
             // Focus looks at what was measured, so it comes before the holes are filled.
             let focus_m = Focus::new(focus).focus_m(&map, 0);
             match blur.refines(false) {
-                true => Refiner::new().refine(&mut map, color, 0),
+                true => {
+                    let mut refiner = Refiner::new();
+                    refiner.focus_at(focus_m);
+                    refiner.refine(&mut map, color, 0);
+                }
                 false => Filler::new().fill_by(&mut map, color),
             }
             Ok((lens.field(focus_m, color.width, max_coc_px), Some(map)))

@@ -78,7 +78,10 @@ impl DepthCoc {
         let focus_m = self.focus.focus_m(map, time_ns);
         match &mut self.maker {
             Maker::Fill(filler) => filler.fill_by(map, color),
-            Maker::Refine(refiner) => refiner.refine(map, color, time_ns),
+            Maker::Refine(refiner) => {
+                refiner.focus_at(focus_m);
+                refiner.refine(map, color, time_ns);
+            }
         }
         self.lens.field(focus_m, color.width, self.max_coc_px)
     }

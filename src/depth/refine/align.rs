@@ -56,7 +56,7 @@ impl Default for Aligner {
 }
 
 impl Aligner {
-    /// Aligns `inverse` (1/m) to the picture `rgb`. Steps of inverse depth above `jump` (1/m) are edges; depths that
+    /// Aligns `inverse` to the picture `rgb`. Steps of inverse depth above `jump` are edges; depths that
     /// are `unknown` were made up.
     pub fn align(&mut self, arch: Arch, inverse: &mut [f32], unknown: &[bool], rgb: &[u8], width: usize, jump: f32) {
         let height = inverse.len().checked_div(width).unwrap_or(0);

@@ -2,7 +2,7 @@
 //! the edges of the colours, and steady in time.
 //!
 //! What the blur shows of an error in depth is where an edge runs, and that it flickers; noise of a surface matters
-//! less. All is done in inverse depth (1/m), in which the circle of confusion is linear, a plane is a plane, and the
+//! less. All is done in inverse depth, the distance in focus over the depth, in which the circle of confusion is linear, a plane is a plane, and the
 //! noise of a stereo or structured-light sensor is the same at every distance (Khoshelham and Oude Elberink, *Accuracy
 //! and resolution of Kinect depth data*, 2012).
 
@@ -22,12 +22,12 @@ use self::upsample::Upsampler;
 use super::fill::Filler;
 use crate::frame::{ColorImage, DepthMap};
 
-/// A step of inverse depth from here on, in 1/m, is an edge: 0.6 px of CoC at a radius of 10 px at infinity and a
-/// focus at 1 m; less shows no edge in the blur.
+/// A step of inverse depth from here on is an edge: 0.6 px of CoC at a radius of 10 px at infinity; less shows no edge
+/// in the blur.
 const JUMP: f32 = 0.06;
 /// The same in standard deviations of the noise that smoothing has left.
 const JUMP_SIGMAS: f32 = 4.0;
-/// Changes in time up to this, in 1/m, or up to this many standard deviations of the measured noise, are averaged.
+/// Changes in time up to this, or up to this many standard deviations of the measured noise, are averaged.
 const LEAST_CHANGE: f32 = 0.01;
 const CHANGE_SIGMAS: f32 = 4.0;
 
@@ -42,12 +42,33 @@ pub struct Refiner {
     smoother: Smoother,
     aligner: Aligner,
     steadier: Steadier,
+    /// Distance in focus over a metre.
+    focus: Focus,
+}
+
+/// The unit of inverse depth: steps count by the blur they make, and that is by how they compare to what is in focus.
+#[derive(Clone, Copy, Debug)]
+struct Focus(f32);
+
+impl Default for Focus {
+    fn default() -> Self {
+        Self(1.0)
+    }
 }
 
 impl Refiner {
     /// No memory of earlier frames.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// What is in focus from the next frame on, in metres: for a street, a step of depth counts less than for a desk. A
+    /// metre before the first call.
+    pub fn focus_at(&mut self, focus_m: f32) {
+        if DepthMap::is_known(focus_m) && focus_m != self.focus.0 {
+            self.steadier.rescale(focus_m / self.focus.0);
+            self.focus = Focus(focus_m);
+        }
     }
 
     /// Refines the depth `map` of the picture `color` at `time_ns` of media time; the map takes the picture's size.
@@ -61,10 +82,11 @@ impl Refiner {
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
             return self.steadier.forget();
         }
-        let Self { arch, unknown, inverse, smoother, aligner, steadier, .. } = self;
+        let Self { arch, unknown, inverse, smoother, aligner, steadier, focus: Focus(focus_m), .. } = self;
+        let focus_m = *focus_m;
         let (arch, width) = (*arch, map.width as usize);
         inverse.clear();
-        inverse.extend(map.metres.iter().map(|&z_m| 1.0 / z_m));
+        inverse.extend(map.metres.iter().map(|&z_m| focus_m / z_m));
         let measured_noise = smoother.noise(inverse, unknown, width);
         smoother.smooth(arch, inverse, width, measured_noise);
         let noise = smoother.noise(inverse, unknown, width);
@@ -73,7 +95,7 @@ impl Refiner {
         let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
         steadier.steady(arch, inverse, &color.rgb, width, time_ns, limits);
         for (z_m, &v) in map.metres.iter_mut().zip(&*inverse) {
-            *z_m = 1.0 / v;
+            *z_m = focus_m / v;
         }
     }
 }

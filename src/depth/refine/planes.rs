@@ -65,7 +65,7 @@ impl Planes {
     }
 }
 
-/// Takes inverse depths (1/m), and how much each of them weighs.
+/// Takes inverse depths, and how much each of them weighs.
 pub struct SetDepths<'a> {
     /// Where to.
     pub planes: &'a mut Planes,

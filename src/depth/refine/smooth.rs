@@ -19,7 +19,7 @@ const LOOKS: usize = 96;
 /// there of a normal distribution in standard deviations.
 const SMOOTH_SHARE: f32 = 0.35;
 const SMOOTH_QUANTILE: f32 = 0.4538;
-/// Noise below this, in 1/m, is none: it is 1/20 px of CoC with a strong blur.
+/// Noise below this is none: it is 1/20 px of CoC with a strong blur.
 const NO_NOISE: f32 = 5e-4;
 
 /// Reduces the noise of maps of inverse depth; owns the memory for it.
@@ -30,7 +30,7 @@ pub struct Smoother {
 }
 
 impl Smoother {
-    /// The noise of a map, as a standard deviation in 1/m: a low quantile of second differences, which slanted planes
+    /// The noise of a map, as a standard deviation: a low quantile of second differences, which slanted planes
     /// do not raise, and edges only where they are everywhere. Unknown depths are left out.
     pub fn noise(&mut self, inverse: &[f32], unknown: &[bool], width: usize) -> f32 {
         self.differences.clear();
@@ -55,7 +55,7 @@ impl Smoother {
         quantile / SMOOTH_QUANTILE / 6.0_f32.sqrt()
     }
 
-    /// Averages `inverse` (in 1/m), whose noise has the standard deviation `noise`, within its surfaces.
+    /// Averages `inverse`, whose noise has the standard deviation `noise`, within its surfaces.
     pub fn smooth(&mut self, arch: Arch, inverse: &mut Vec<f32>, width: usize, noise: f32) {
         if noise < NO_NOISE || width == 0 {
             return;

@@ -20,7 +20,7 @@ const LONGEST_GAP_NS: u64 = 500_000_000;
 /// Rows and columns looked at for the median change, at most.
 const LOOKS: usize = 64;
 
-/// What a change of inverse depth means, 1/m.
+/// What a change of inverse depth means.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Below this it is noise, and averaged.
@@ -34,7 +34,7 @@ pub struct Limits {
 pub struct Steadier {
     width: usize,
     time_ns: u64,
-    /// Inverse depth as it was given out, 1/m; empty before the first frame.
+    /// Inverse depth as it was given out; empty before the first frame.
     mean: Vec<f32>,
     /// Frames in the mean.
     count: Vec<f32>,
@@ -48,12 +48,17 @@ pub struct Steadier {
 }
 
 impl Steadier {
+    /// The unit of inverse depth has become so many times smaller.
+    pub fn rescale(&mut self, times: f32) {
+        self.mean.iter_mut().for_each(|v| *v *= times);
+    }
+
     /// No frame came before the next one.
     pub fn forget(&mut self) {
         self.mean.clear();
     }
 
-    /// Steadies `inverse` (1/m) of the frame at `time_ns`, with the picture `rgb`.
+    /// Steadies `inverse` of the frame at `time_ns`, with the picture `rgb`.
     pub fn steady(&mut self, arch: Arch, inverse: &mut [f32], rgb: &[u8], width: usize, time_ns: u64, limits: Limits) {
         let follows = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
         let in_order = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);

@@ -38,7 +38,7 @@ pub fn weights_by_distance() -> Weights {
     std::array::from_fn(row)
 }
 
-/// The larger of what counts as a jump anywhere (1/m) and what does so near an inverse depth of `v`: a twentieth.
+/// The larger of what counts as a jump anywhere and what does so near an inverse depth of `v`: a twentieth.
 #[inline(always)]
 pub fn jump_at(jump: f32, v: f32) -> f32 {
     let relative = 0.05 * v;
@@ -48,7 +48,7 @@ pub fn jump_at(jump: f32, v: f32) -> f32 {
 /// The votes for one pixel.
 #[derive(Debug, Default)]
 pub struct Votes {
-    /// Inverse depth, 1/m.
+    /// Inverse depth.
     depth: Weights,
     weight: Weights,
     /// Least and largest inverse depth that has a vote.

@@ -9,10 +9,12 @@ pub mod cpu;
 pub mod fixed;
 mod gaps;
 mod half;
+mod prior;
 pub mod source;
 mod speckle;
 mod tidy;
 
+use prior::Prior;
 use tidy::Tidy;
 
 use crate::compute::GpuError;
@@ -107,8 +109,15 @@ pub fn create(settings: &Settings) -> Result<Box<dyn Matcher>, MatchError> {
 trait Executor: Send {
     fn describe(&self) -> String;
 
-    /// The disparities of the left picture, in fixed point, or unknown.
-    fn winners(&mut self, left: &[u8], right: &[u8], team: &mut Team, out: &mut [u16]) -> Result<(), GpuError>;
+    /// The disparities of the left picture, in fixed point, or unknown. The costs of those that are `likely`, whole ones
+    /// or unknown, are less by [`prior::BONUS`].
+    fn winners(
+        &mut self,
+        eyes: [&GrayImage; 2],
+        likely: Option<&[u16]>,
+        team: &mut Team,
+        out: &mut [u16],
+    ) -> Result<(), GpuError>;
 }
 
 /// Islands of so many pixels are chance, in whole pictures.
@@ -126,6 +135,7 @@ struct Matching {
 /// What one effort needs.
 struct Level {
     executor: Box<dyn Executor>,
+    prior: Prior,
     tidy: Tidy,
     map: Vec<u16>,
     px: Vec<f32>,
@@ -142,10 +152,31 @@ impl Level {
         let pixels = size.0 * size.1;
         Self {
             executor: Box::new(cpu::CpuExecutor::new(size, disparities, threads)),
+            prior: Prior::new(size.0),
             tidy: Tidy::new(size),
             map: vec![0; pixels],
             px: vec![0.0; if effort == Effort::Fast { pixels } else { 0 }],
         }
+    }
+}
+
+impl Level {
+    /// The disparities of a pair of this level's size, to `into`, else to the level's own; islands of up to `speckle`
+    /// pixels are left out.
+    fn find(
+        &mut self,
+        eyes: [&GrayImage; 2],
+        speckle: u32,
+        team: &mut Team,
+        into: Option<&mut [f32]>,
+    ) -> Result<(), GpuError> {
+        let Self { executor, prior, tidy, map, px } = self;
+        let luma = &eyes[0].luma;
+        executor.winners(eyes, prior.likely(luma), team, map)?;
+        tidy.drop_islands(map, speckle);
+        prior.keep(luma, map);
+        tidy.fill(map, luma, team, into.unwrap_or(px));
+        Ok(())
     }
 }
 
@@ -167,18 +198,15 @@ impl Matcher for Matching {
         }
         into.resize(left.width, left.height);
         let Self { settings, team, levels, small } = self;
-        let Level { executor, tidy, map, px } = &mut levels[settings.effort as usize];
+        let level = &mut levels[settings.effort as usize];
         match settings.effort {
-            Effort::Full => {
-                executor.winners(&left.luma, &right.luma, team, map)?;
-                tidy.tidy(map, &left.luma, SPECKLE, team, &mut into.px);
-            }
+            Effort::Full => level.find([left, right], SPECKLE, team, Some(&mut into.px))?,
             Effort::Fast => {
                 half::shrink(left, &mut small[0]);
                 half::shrink(right, &mut small[1]);
-                executor.winners(&small[0].luma, &small[1].luma, team, map)?;
-                tidy.tidy(map, &small[0].luma, SPECKLE / 4, team, px);
-                half::grow(left, &small[0], px, &mut into.px);
+                let [small_left, small_right] = &*small;
+                level.find([small_left, small_right], SPECKLE / 4, team, None)?;
+                half::grow(left, small_left, &level.px, &mut into.px);
             }
         }
         Ok(())

@@ -32,12 +32,15 @@ impl Tidy {
         }
     }
 
-    /// Tidies `map` up, which is left with its gaps filled, and writes its median to `px`, in pixels, above 0. Islands
-    /// of at most `speckle` pixels go.
-    pub fn tidy(&mut self, map: &mut [u16], luma: &[u8], speckle: u32, team: &mut Team, px: &mut [f32]) {
-        let Self { width, speckles, border, taken, arch } = self;
+    /// Makes islands of at most `most` pixels unknown.
+    pub fn drop_islands(&mut self, map: &mut [u16], most: u32) {
+        self.speckles.remove(map, self.width, most);
+    }
+
+    /// Fills the gaps of `map`, whose left picture is `luma`, and writes its median to `px`, in pixels, above 0.
+    pub fn fill(&mut self, map: &mut [u16], luma: &[u8], team: &mut Team, px: &mut [f32]) {
+        let Self { width, border, taken, arch, .. } = self;
         let (width, arch) = (*width, *arch);
-        speckles.remove(map, width, speckle);
         border.fill(map, luma, width);
         gaps::fill(map, width);
         let map = &*map;

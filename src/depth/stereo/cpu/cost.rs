@@ -3,6 +3,7 @@
 
 use pulp::WithSimd;
 
+use super::super::prior::BONUS;
 use super::GROUP;
 use super::census::PLANES;
 
@@ -49,6 +50,22 @@ impl<const N: usize> WithSimd for Costs<'_, N> {
                     out[d] = (before[d] + here[d] + after[d] + 4) >> 3;
                     before[d] = here[d];
                     here[d] = after[d];
+                }
+            }
+        }
+    }
+}
+
+/// Lowers the costs of the disparities that are `likely`, `[row][column]` of the group, and of those beside them.
+pub fn favour<const N: usize>(likely: &[u16], width: usize, costs: &mut [u8]) {
+    let costs = costs.as_chunks_mut::<N>().0;
+    for (row, likely) in likely.chunks_exact(width).enumerate() {
+        for (&d, costs) in likely.iter().zip(costs.iter_mut().skip(row).step_by(GROUP)) {
+            let d = usize::from(d);
+            // An unknown one lies beyond all.
+            if d < N {
+                for cost in &mut costs[d.saturating_sub(1)..(d + 2).min(N)] {
+                    *cost = cost.saturating_sub(BONUS);
                 }
             }
         }

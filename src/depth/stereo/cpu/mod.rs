@@ -22,6 +22,7 @@ use crate::compute::GpuError;
 use crate::compute::aligned::Aligned;
 use crate::compute::simd;
 use crate::compute::team::{Shelf, Team};
+use crate::frame::GrayImage;
 
 /// Rows whose values lie side by side, `[column][row][disparity]`, as one part of the work.
 const GROUP: usize = 4;
@@ -86,11 +87,11 @@ impl CpuExecutor {
         }
     }
 
-    fn match_range<const N: usize>(&mut self, left: &[u8], team: &mut Team, out: &mut [u16]) {
+    fn match_range<const N: usize>(&mut self, left: &[u8], likely: Option<&[u16]>, team: &mut Team, out: &mut [u16]) {
         let groups = self.height.div_ceil(GROUP);
         for first in (0..groups).step_by(self.chunk) {
             let groups = (first, self.chunk.min(groups - first));
-            self.along_rows::<N>(groups, left, team);
+            self.along_rows::<N>(groups, left, likely, team);
             self.along_columns::<N>(groups, left, team);
             self.win::<N>(groups, team, out);
         }
@@ -102,7 +103,13 @@ impl CpuExecutor {
     }
 
     /// The costs of the groups, and the sums of the paths along their rows.
-    fn along_rows<const N: usize>(&mut self, (first, groups): (usize, usize), left: &[u8], team: &mut Team) {
+    fn along_rows<const N: usize>(
+        &mut self,
+        (first, groups): (usize, usize),
+        left: &[u8],
+        likely: Option<&[u16]>,
+        team: &mut Team,
+    ) {
         let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
         let [cost_taken, sum_taken] = &mut self.taken;
         let costs = Shelf::new(&mut self.costs[..groups * group], group, cost_taken);
@@ -117,7 +124,11 @@ impl CpuExecutor {
             }
             let costs = costs.part(part);
             arch.dispatch(Costs::<N> { codes, width, out: costs });
-            let luma = &left[y * width..(y + GROUP).min(height) * width];
+            let pixels = y * width..(y + GROUP).min(height) * width;
+            if let Some(likely) = likely {
+                cost::favour::<N>(&likely[pixels.clone()], width, costs);
+            }
+            let luma = &left[pixels];
             let (states, sums) = (&mut member.states, sums.part(part));
             arch.dispatch(Rows::<N> { costs, luma, width, penalties, states, sums });
         });
@@ -167,18 +178,25 @@ impl Executor for CpuExecutor {
         format!("cpu, {} threads, {}", self.members.len(), simd::name(self.arch))
     }
 
-    fn winners(&mut self, left: &[u8], right: &[u8], team: &mut Team, out: &mut [u16]) -> Result<(), GpuError> {
+    fn winners(
+        &mut self,
+        [left, right]: [&GrayImage; 2],
+        likely: Option<&[u16]>,
+        team: &mut Team,
+        out: &mut [u16],
+    ) -> Result<(), GpuError> {
+        let (left, right) = (&*left.luma, &*right.luma);
         let Self { arch, taken, .. } = self;
         self.left.see(left, team, *arch, &mut taken[0]);
         self.right.see(right, team, *arch, &mut taken[0]);
         match self.disparities {
-            16 => self.match_range::<16>(left, team, out),
-            32 => self.match_range::<32>(left, team, out),
-            64 => self.match_range::<64>(left, team, out),
-            96 => self.match_range::<96>(left, team, out),
-            128 => self.match_range::<128>(left, team, out),
-            192 => self.match_range::<192>(left, team, out),
-            _ => self.match_range::<256>(left, team, out),
+            16 => self.match_range::<16>(left, likely, team, out),
+            32 => self.match_range::<32>(left, likely, team, out),
+            64 => self.match_range::<64>(left, likely, team, out),
+            96 => self.match_range::<96>(left, likely, team, out),
+            128 => self.match_range::<128>(left, likely, team, out),
+            192 => self.match_range::<192>(left, likely, team, out),
+            _ => self.match_range::<256>(left, likely, team, out),
         }
         Ok(())
     }
