@@ -4,16 +4,21 @@
 //! all executors find the same ([`fixed`]); what is made of them is common to all ([`tidy`]).
 
 pub mod cpu;
+pub mod executor;
 pub mod fixed;
 mod gaps;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod half;
+mod penalty;
 mod speckle;
 mod tidy;
 
+use executor::{Executor, Executors};
 use tidy::Tidy;
 
-use crate::compute::GpuError;
 use crate::compute::team::Team;
+use crate::compute::{Backend, GpuError};
 use crate::frame::{DisparityMap, GrayImage};
 
 /// How pairs are matched.
@@ -21,7 +26,7 @@ use crate::frame::{DisparityMap, GrayImage};
 pub struct Settings {
     /// Columns and rows of both pictures.
     pub size: (u32, u32),
-    /// Disparities that are tried, from 0 on: rounded up to a multiple of 16, and at most [`Settings::MOST_DISPARITIES`].
+    /// Disparities that are tried, from 0 on: rounded up ([`fixed::range`]), and at most [`Settings::MOST_DISPARITIES`].
     pub disparities: u32,
     /// How much is done for it.
     pub effort: Effort,
@@ -89,14 +94,16 @@ pub enum MatchError {
     Gpu(#[from] GpuError),
 }
 
-/// A matcher on the CPU.
+/// A matcher on the GPU or the CPU; `adapter` is part of a GPU adapter's name.
 ///
 /// # Errors
-/// None so far.
-pub fn create(settings: &Settings) -> Result<Box<dyn Matcher>, MatchError> {
+/// A GPU was asked for and there is none that fits, or it failed.
+pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> Result<Box<dyn Matcher>, MatchError> {
+    let threads = settings.threads.max(1);
     let mut matching = Matching {
         settings: *settings,
-        team: Team::new("match", settings.threads.max(1)),
+        executors: Executors::new(backend, adapter, threads)?,
+        team: Team::new("match", threads),
         levels: [None, None],
         small: [GrayImage::default(), GrayImage::default()],
     };
@@ -104,19 +111,12 @@ pub fn create(settings: &Settings) -> Result<Box<dyn Matcher>, MatchError> {
     Ok(Box::new(matching))
 }
 
-/// Finds the disparities that both eyes agree on.
-trait Executor: Send {
-    fn describe(&self) -> String;
-
-    /// The disparities of the left picture, in fixed point, or unknown.
-    fn winners(&mut self, left: &[u8], right: &[u8], team: &mut Team, out: &mut [u16]) -> Result<(), GpuError>;
-}
-
 /// Islands of so many pixels are chance, in whole pictures.
 const SPECKLE: u32 = 100;
 
 struct Matching {
     settings: Settings,
+    executors: Executors,
     team: Team,
     /// By effort; made when it is first asked for.
     levels: [Option<Level>; 2],
@@ -133,20 +133,19 @@ struct Level {
 }
 
 impl Level {
-    fn new(settings: &Settings, effort: Effort, threads: usize) -> Self {
+    fn new(settings: &Settings, effort: Effort, executors: &Executors) -> Result<Self, GpuError> {
         let whole = (settings.size.0 as usize, settings.size.1 as usize);
         let (size, disparities) = match effort {
             Effort::Fast => (half::size(whole), settings.disparities.div_ceil(2)),
             Effort::Full => (whole, settings.disparities),
         };
-        let disparities = disparities.next_multiple_of(16).clamp(16, Settings::MOST_DISPARITIES) as usize;
         let pixels = size.0 * size.1;
-        Self {
-            executor: Box::new(cpu::CpuExecutor::new(size, disparities, threads)),
+        Ok(Self {
+            executor: executors.executor(size, disparities as usize)?,
             tidy: Tidy::new(size),
             map: vec![0; pixels],
             px: vec![0.0; if effort == Effort::Fast { pixels } else { 0 }],
-        }
+        })
     }
 }
 
@@ -156,9 +155,11 @@ impl Matcher for Matching {
     }
 
     fn set_effort(&mut self, effort: Effort) -> Result<(), MatchError> {
+        let level = &mut self.levels[effort as usize];
+        if level.is_none() {
+            *level = Some(Level::new(&self.settings, effort, &self.executors)?);
+        }
         self.settings.effort = effort;
-        let threads = self.team.threads();
-        self.levels[effort as usize].get_or_insert_with(|| Level::new(&self.settings, effort, threads));
         Ok(())
     }
 
@@ -170,7 +171,7 @@ impl Matcher for Matching {
             return Err(MatchError::Size { made_for: self.settings.size, got: left.size() });
         }
         into.resize(left.width, left.height);
-        let Self { settings, team, levels, small } = self;
+        let Self { settings, team, levels, small, .. } = self;
         let Some(Level { executor, tidy, map, px }) = &mut levels[settings.effort as usize] else { return Ok(()) };
         match settings.effort {
             Effort::Full => {

@@ -3,12 +3,9 @@
 
 use pulp::WithSimd;
 
+use super::super::fixed::OUTSIDE;
 use super::GROUP;
 use super::census::PLANES;
-
-/// The cost of a partner beyond the border of the right picture: that of a poor one, so that the outermost columns may
-/// take the disparity of their neighbours.
-const OUTSIDE: u8 = 8;
 
 /// Rows whose differences the costs of a group are made of: one more above and one below.
 pub const ROWS: usize = GROUP + 2;
@@ -37,7 +34,9 @@ impl<const N: usize> WithSimd for Costs<'_, N> {
         let mut here = [[0u8; N]; GROUP];
         let mut after = [[0u8; N]; GROUP];
         columns(&codes, width, 0, &mut here);
+        // Beyond the borders the outermost columns repeat.
         before.copy_from_slice(&here);
+        after.copy_from_slice(&here);
         for x in 0..width {
             if x + 1 < width {
                 columns(&codes, width, x + 1, &mut after);
