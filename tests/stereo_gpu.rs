@@ -45,10 +45,10 @@ fn pair(width: usize, height: usize, most: usize) -> [Vec<u8>; 2] {
 }
 
 /// Both executors' winners of the pairs, one after the other, are the same; returns those of the last.
-fn same(size: (usize, usize), disparities: usize, pairs: &[[Vec<u8>; 2]], what: &str) -> Vec<u16> {
+fn same(device: &Arc<Device>, size: (usize, usize), disparities: usize, pairs: &[[Vec<u8>; 2]]) -> Vec<u16> {
     let mut team = Team::new("test", 2);
     let mut cpu = CpuExecutor::new(size, disparities, 2);
-    let mut gpu = GpuExecutor::new(&device(), size, disparities).expect("room for a small picture");
+    let mut gpu = GpuExecutor::new(device, size, disparities).expect("room for a small picture");
     let mut found = [vec![1; size.0 * size.1], vec![2; size.0 * size.1]];
     for (number, [left, right]) in pairs.iter().enumerate() {
         cpu.winners(left, right, &mut team, &mut found[0]).expect("the CPU matches");
@@ -57,7 +57,10 @@ fn same(size: (usize, usize), disparities: usize, pairs: &[[Vec<u8>; 2]], what: 
         if let Some(&first) = off.first() {
             let (x, y) = (first % size.0, first / size.0);
             let [cpu, gpu] = [found[0][first], found[1][first]];
-            panic!("{what}, pair {number}: {} differ, at first {x},{y}: {cpu} and {gpu}", off.len());
+            panic!(
+                "{size:?}, {disparities} disparities, pair {number}: {} differ, at first {x},{y}: {cpu} and {gpu}",
+                off.len()
+            );
         }
     }
     found[0].clone()
@@ -66,13 +69,14 @@ fn same(size: (usize, usize), disparities: usize, pairs: &[[Vec<u8>; 2]], what: 
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn winners_agree_whatever_the_size_and_range() {
+    let device = device();
     for (width, height) in [(17, 13), (1, 1), (1, 9), (2, 3), (4096, 2), (33, 200), (150, 41)] {
         for disparities in [1, 16, 64, 90, 128, 256] {
             let pairs = [pair(width, height, (disparities - 1).min(60)), pair(width, height, 3)];
-            same((width, height), disparities, &pairs, &format!("{width}x{height}, {disparities}"));
+            same(&device, (width, height), disparities, &pairs);
         }
     }
-    let found = same((150, 41), 64, &[pair(150, 41, 20)], "a texture");
+    let found = same(&device, (150, 41), 64, &[pair(150, 41, 20)]);
     let known = found.iter().filter(|&&winner| winner != UNKNOWN).count();
     assert!(known > found.len() / 2, "{known} of {} are known", found.len());
     assert!(found.iter().any(|&winner| winner != UNKNOWN && winner % 64 != 0), "some are between whole pixels");
@@ -81,6 +85,7 @@ fn winners_agree_whatever_the_size_and_range() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn winners_agree_on_extreme_pictures() {
+    let device = device();
     let (width, height) = (61, 37);
     let mut numbers = Numbers(5);
     let mut chance = || picture(width, height, |_, _| (numbers.next() * 256.0) as u8);
@@ -96,7 +101,7 @@ fn winners_agree_on_extreme_pictures() {
         ],
     ];
     for disparities in [16, 32, 96] {
-        same((width, height), disparities, &pairs, &format!("{disparities} disparities"));
+        same(&device, (width, height), disparities, &pairs);
     }
 }
 
@@ -135,11 +140,11 @@ fn what_the_device_cannot_hold_is_an_error() {
     assert!(error.to_string().contains("60000 x 60000"), "{error}");
 }
 
-/// Not a test but a measurement: `BOKEHCAM_PAIR=1280x720x128 cargo test --release --test stereo_gpu -- --ignored
-/// --nocapture time_of_a_pair`.
+/// Prints the times, of a pair of any size: `BOKEHCAM_PAIR=1280x720x128 cargo test --release --test stereo_gpu --
+/// --ignored --nocapture the_passes`.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
-fn time_of_a_pair_is_that_of_its_passes() {
+fn the_passes_of_a_pair_take_less_time_than_the_pair() {
     let wanted = std::env::var("BOKEHCAM_PAIR").unwrap_or_else(|_| "160x120x32".to_owned());
     let wanted: Vec<usize> =
         wanted.split('x').map(|number| number.parse().expect("COLUMNSxROWSxDISPARITIES")).collect();

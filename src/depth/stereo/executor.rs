@@ -25,7 +25,7 @@ pub trait Executor: Send {
 }
 
 /// Makes executors.
-pub struct Executors {
+pub(super) struct Executors {
     threads: usize,
     /// A GPU, and whether nothing else will do.
     #[cfg(feature = "gpu")]
@@ -33,7 +33,7 @@ pub struct Executors {
 }
 
 impl Executors {
-    /// Executors on the GPU, all on one, or on the CPU with as many threads as the team has that they are given.
+    /// Executors on one GPU or on the CPU, there for a team of `threads`.
     ///
     /// # Errors
     /// A GPU was asked for and there is none that fits.
@@ -53,7 +53,7 @@ impl Executors {
         }
     }
 
-    /// Executors on the CPU with as many threads as the team has that they are given.
+    /// Executors on the CPU, for a team of `threads`.
     ///
     /// # Errors
     /// A GPU was asked for.
