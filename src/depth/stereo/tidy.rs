@@ -75,14 +75,7 @@ impl WithSimd for Median<'_> {
         let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
         for (x, out) in out[1..=inner].iter_mut().enumerate() {
             *out = px(median([
-                above[0][x],
-                above[1][x],
-                above[2][x],
-                here[0][x],
-                here[1][x],
-                here[2][x],
-                below[0][x],
-                below[1][x],
+                above[0][x], above[1][x], above[2][x], here[0][x], here[1][x], here[2][x], below[0][x], below[1][x],
                 below[2][x],
             ]));
         }
