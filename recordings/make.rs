@@ -1,6 +1,7 @@
 //! Renders everything in `recordings/` again: `cargo run --release --example make_recordings`.
 //!
-//! With `--check` it writes nothing and compares what is there with what it renders.
+//! With the name of a recording it renders that one alone; with `--check` it writes nothing and compares what is there
+//! with what it renders.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -22,8 +23,10 @@ const SAMPLES_PER_PIXEL: u32 = 16;
 /// As in the TUM benchmark.
 const DEPTH_UNITS_PER_METRE: f32 = 5000.0;
 const BASELINE_M: f32 = 0.06;
-/// Every so many frames there is a right eye's picture.
-const RIGHT_EVERY: u32 = 6;
+/// As in the KITTI benchmarks.
+const DISPARITY_UNITS_PER_PX: f32 = 256.0;
+/// So many of the portrait's frames have a right eye's picture.
+const STEREO_FRAMES: u32 = 12;
 const COC_AT_INFINITY_PX: f32 = 14.0;
 /// Rays per pixel of the true blur: more than half the pixels of the widest disc.
 const LENS_RAYS: usize = 720;
@@ -32,37 +35,75 @@ const HEXAGON_FRAMES: [u32; 1] = [0];
 
 type Outcome = Result<(), Box<dyn Error>>;
 
+/// Renders a recording into its folder.
+type Make = fn(&mut Folder) -> Outcome;
+
+/// The recordings, and what makes each.
+const RECORDINGS: [(&str, Make); 2] = [("portrait", make_portrait), ("stereo", make_stereo)];
+
 fn main() -> ExitCode {
-    let check = match std::env::args().nth(1).as_deref() {
-        None => false,
-        Some("--check") => true,
-        Some(other) => {
-            eprintln!("no option '{other}': use --check, or none to write");
-            return ExitCode::from(2);
-        }
-    };
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
-    let mut folder = Folder { root, check, differing: 0 };
-    match make(&mut folder) {
-        Ok(()) if folder.differing == 0 => ExitCode::SUCCESS,
-        Ok(()) => {
-            eprintln!("{} files differ; render them again without --check", folder.differing);
-            ExitCode::FAILURE
-        }
-        Err(error) => {
-            eprintln!("{error}");
-            ExitCode::FAILURE
+    let (mut check, mut only) = (false, None);
+    for argument in std::env::args().skip(1) {
+        match RECORDINGS.iter().find(|(name, _)| *name == argument) {
+            _ if argument == "--check" => check = true,
+            Some((name, _)) => only = Some(*name),
+            None => {
+                eprintln!(
+                    "no option '{argument}': use --check, or none to write; and portrait or stereo for one alone"
+                );
+                return ExitCode::from(2);
+            }
         }
     }
+    let mut differing = 0;
+    for (name, make) in RECORDINGS {
+        if only.is_some_and(|only| only != name) {
+            continue;
+        }
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings").join(name);
+        let mut folder = Folder { root, check, differing: 0 };
+        if let Err(error) = make(&mut folder) {
+            eprintln!("{name}: {error}");
+            return ExitCode::FAILURE;
+        }
+        differing += folder.differing;
+    }
+    if differing > 0 {
+        eprintln!("{differing} files differ; render them again without --check");
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
 }
 
-fn make(folder: &mut Folder) -> Outcome {
+fn make_portrait(folder: &mut Folder) -> Outcome {
     let scene = Scene::portrait();
     let view = View::new(SIZE_PX.0, SIZE_PX.1);
     folder.text("camera.txt", &camera_text(&scene, &view))?;
     make_sequence(folder, &scene, &view)?;
-    make_right_eye(folder, &scene, &view)?;
     make_truth(folder, &scene, &view)
+}
+
+/// Both eyes and the true disparity of the portrait's first frames, in the layout of the KITTI odometry benchmark.
+fn make_stereo(folder: &mut Folder) -> Outcome {
+    let scene = Scene::portrait();
+    let left = View::new(SIZE_PX.0, SIZE_PX.1);
+    let right = left.right_eye(BASELINE_M);
+    folder.text("calib.txt", &calibration_text(&left))?;
+    let mut times = String::new();
+    let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
+    for frame in 0..STEREO_FRAMES {
+        let mut render = |view: &View, picture: &mut ColorImage| {
+            scene.render_pinhole(view, time_s(frame), SAMPLES_PER_PIXEL, threads(), picture, &mut map);
+        };
+        render(&right, &mut picture);
+        folder.color(&format!("image_3/{frame:06}.png"), &picture)?;
+        render(&left, &mut picture);
+        folder.color(&format!("image_2/{frame:06}.png"), &picture)?;
+        let units_at_1_m = left.focal_px * BASELINE_M * DISPARITY_UNITS_PER_PX;
+        folder.gray16(&format!("disp/{frame:06}.png"), &map, |z_m| units_at_1_m / z_m)?;
+        writeln!(times, "{:.6}", time_s(frame))?;
+    }
+    folder.text("times.txt", &times)
 }
 
 fn frames(scene: &Scene) -> u32 {
@@ -88,7 +129,7 @@ fn make_sequence(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
     for frame in 0..frames(scene) {
         scene.render_pinhole(view, time_s(frame), SAMPLES_PER_PIXEL, threads(), &mut picture, &mut map);
         folder.color(&format!("rgb/{frame:06}.png"), &picture)?;
-        folder.depth(&format!("depth/{frame:06}.png"), &map)?;
+        folder.gray16(&format!("depth/{frame:06}.png"), &map, |z_m| z_m * DEPTH_UNITS_PER_METRE)?;
         let time = format!("{:.6}", time_s(frame));
         writeln!(rgb, "{time} rgb/{frame:06}.png")?;
         writeln!(depth, "{time} depth/{frame:06}.png")?;
@@ -97,17 +138,6 @@ fn make_sequence(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
     folder.text("rgb.txt", &rgb)?;
     folder.text("depth.txt", &depth)?;
     folder.text("associations.txt", &pairs)
-}
-
-/// The right eye of a rectified pair for every few frames, with the pair's geometry.
-fn make_right_eye(folder: &mut Folder, scene: &Scene, view: &View) -> Outcome {
-    let right = view.right_eye(BASELINE_M);
-    let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
-    for frame in (0..frames(scene)).step_by(RIGHT_EVERY as usize) {
-        scene.render_pinhole(&right, time_s(frame), SAMPLES_PER_PIXEL, threads(), &mut picture, &mut map);
-        folder.color(&format!("right/{frame:06}.png"), &picture)?;
-    }
-    folder.text("right/calib.txt", &calibration_text(view))
 }
 
 /// Frames through a true thin lens.
@@ -134,9 +164,7 @@ fn camera_text(scene: &Scene, view: &View) -> String {
          # Units of the depth pictures; depth is along the optical axis.\n\
          depth_units_per_metre {DEPTH_UNITS_PER_METRE}\n\
          # Depth of the subject's face, in metres, and the lens of the pictures in truth/.\n\
-         focus_m {}\ncoc_at_infinity_px {COC_AT_INFINITY_PX}\nlens_rays {LENS_RAYS}\n\
-         # The right eye is this far to the right, in metres.\n\
-         baseline_m {BASELINE_M}\n",
+         focus_m {}\ncoc_at_infinity_px {COC_AT_INFINITY_PX}\nlens_rays {LENS_RAYS}\n",
         view.width,
         view.height,
         view.focal_px,
@@ -146,16 +174,14 @@ fn camera_text(scene: &Scene, view: &View) -> String {
     )
 }
 
-/// The pair's geometry as the Middlebury stereo benchmark writes it (baseline in millimetres).
+/// The pair's geometry as KITTI writes it: projections of the left and the right colour camera, row by row.
 fn calibration_text(view: &View) -> String {
     let centre = view.principal_point_px();
-    let matrix = format!("[{f} 0 {x}; 0 {f} {y}; 0 0 1]", f = view.focal_px, x = centre.x, y = centre.y);
-    format!(
-        "cam0={matrix}\ncam1={matrix}\ndoffs=0\nbaseline={}\nwidth={}\nheight={}\nndisp=96\n",
-        BASELINE_M * 1000.0,
-        view.width,
-        view.height,
-    )
+    let row = |eye_px: f32| {
+        let focal_px = view.focal_px;
+        format!("{focal_px:.5} 0 {:.5} {eye_px:.5} 0 {focal_px:.5} {:.5} 0 0 0 1 0", centre.x, centre.y)
+    };
+    format!("P2: {}\nP3: {}\n", row(0.0), row(-view.focal_px * BASELINE_M))
 }
 
 /// Where files are written, or compared.
@@ -165,7 +191,7 @@ struct Folder {
     differing: usize,
 }
 
-/// Bytes or depth units may differ by this much, and a thousandth of them by more: the mathematical functions of
+/// Bytes, depth or disparity units may differ by this much, and a thousandth of them by more: the mathematical functions of
 /// two machines round differently, and a ray at an edge may then fall on its other side.
 const TOLERANCE: i32 = 2;
 
@@ -180,8 +206,9 @@ impl Folder {
         self.encode(name, &image.rgb, image.size(), ExtendedColorType::Rgb8)
     }
 
-    fn depth(&mut self, name: &str, map: &DepthMap) -> Outcome {
-        let units: Vec<u16> = map.metres.iter().map(|z_m| (z_m * DEPTH_UNITS_PER_METRE).round() as u16).collect();
+    /// A depth map in units that are made of its metres.
+    fn gray16(&mut self, name: &str, map: &DepthMap, units: impl Fn(f32) -> f32) -> Outcome {
+        let units: Vec<u16> = map.metres.iter().map(|&z_m| units(z_m).round() as u16).collect();
         if self.check {
             let there = image::open(self.root.join(name))?.into_luma16();
             let same_size = there.dimensions() == map.size();

@@ -74,10 +74,15 @@ impl GrayImage {
     /// Becomes the luma of a colour picture (BT.601 weights, as usual for matching).
     pub fn set_luma_of(&mut self, color: &ColorImage) {
         self.resize(color.width, color.height);
-        for (luma, rgb) in self.luma.iter_mut().zip(color.rgb.as_chunks::<3>().0) {
-            let [r, g, b] = rgb.map(u32::from);
-            *luma = ((r * 9_798 + g * 19_235 + b * 3_735 + (1 << 14)) >> 15) as u8;
-        }
+        luma_of(&color.rgb, &mut self.luma);
+    }
+}
+
+/// The luma of `rgb` (R, G, B after each other), pixel by pixel, as in [`GrayImage::set_luma_of`].
+pub fn luma_of(rgb: &[u8], luma: &mut [u8]) {
+    for (luma, rgb) in luma.iter_mut().zip(rgb.as_chunks::<3>().0) {
+        let [r, g, b] = rgb.map(u32::from);
+        *luma = ((r * 9_798 + g * 19_235 + b * 3_735 + (1 << 14)) >> 15) as u8;
     }
 }
 

@@ -12,6 +12,7 @@ mod error;
 mod pacer;
 mod playout;
 mod quality;
+mod rate;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, Scope, ScopedJoinHandle};
@@ -20,11 +21,11 @@ pub use error::{Fault, PipelineError};
 
 use crate::bokeh::Bokeh;
 use crate::budget::Quality;
-use crate::capture::Camera;
+use crate::capture::{Brings, Camera};
 use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
-use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::demand::Demand;
 use crate::link::pool::Pool;
 use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
@@ -105,7 +106,7 @@ pub struct Run<'a> {
     /// Real time, or all frames.
     pub pace: Pace,
     /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss. In real time, depth may take half
-    /// of it before it is made for fewer frames.
+    /// of it before it is made with less effort, and then for fewer frames.
     pub budget_ns: u64,
     /// Count frames that cannot be read, and go on; otherwise the first one ends the run.
     pub keep_going: bool,
@@ -179,6 +180,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let places = Places { in_blur: executor.as_ref().map_or(0, |executor| executor.capacity()) };
     let colors = Pool::new(places.colors(), || ColorImage::new(info.size.0, info.size.1));
     let depths = Pool::new(places.depths(), DepthMap::default);
+    let rights = Pool::new(if info.brings == Brings::RightEye { places.rights() } else { 0 }, GrayImage::default);
     let outs = Pool::new(places.outs(), || ColorImage::new(info.size.0, info.size.1));
 
     let (to_depth, from_capture) = link(pace);
@@ -186,13 +188,14 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let (to_sink, from_blur) = link(pace);
     let capture = capture::Stage {
         pacer: pacer::Pacer::new(clock.clone(), pace == Pace::Realtime && !info.live, info.period_ns),
-        exact_depth: info.exact_depth,
+        brings: info.brings,
         camera,
         keep_going: run.keep_going,
         demand: run.demand,
         stop: [run.stop, &over],
         colors: &colors,
         depths: &depths,
+        rights: &rights,
         tally: &tally,
         clock: &clock,
         times: decode,
@@ -201,13 +204,13 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         // Without a blur nobody asks for depth.
         coc: if executor.is_some() { run.coc } else { UNUSED },
         refine: run.refine,
+        rate: live_ns.map(|_| rate::Rate::new(run.budget_ns / 2, source.as_ref().map_or(&[1.0], |s| s.efforts()))),
         source,
         source_name: &info.name,
         keep_going: run.keep_going,
         depths: &depths,
         tally: &tally,
         clock: &clock,
-        rate: live_ns.map(|_| depth::Rate::new(run.budget_ns / 2)),
         times: depth_times,
         held,
     };
@@ -292,6 +295,11 @@ impl Places {
 
     fn depths(&self) -> usize {
         self.colors()
+    }
+
+    /// The right eye's picture goes no further than its depth.
+    fn rights(&self) -> usize {
+        2 * Self::HAND + Self::LINK
     }
 
     fn outs(&self) -> usize {

@@ -12,11 +12,18 @@ use bokehcam::bokeh::Settings;
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::budget::{Governor, Quality, Sample};
+use bokehcam::calibration::rectifier::Rectifier;
+use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
+use bokehcam::compute::Backend;
 use bokehcam::depth::refine::Refiner;
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::depth::stereo::source::StereoDepth;
+use bokehcam::depth::stereo::{self, Effort};
+use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::live;
 use bokehcam::link::pool::{Pool, Pooled};
 use common::{EFFECTS, coc, noise, settings, three_depths};
+use glam::{DMat3, DVec2, DVec3};
 
 struct Counting;
 
@@ -45,7 +52,40 @@ fn a_frame_allocates_nothing() {
     blur();
     levels();
     refinement();
+    two_eyes();
+    rectification();
     hand_over();
+}
+
+/// Both pictures of a pair that is not rectified yet.
+fn rectification() {
+    let eye = |shift_px: f64| Eye {
+        size: Some((160, 120)),
+        focal_px: DVec2::splat(140.0),
+        center_px: DVec2::new(80.0 + shift_px, 60.0),
+        distortion: Distortion::RadialTangential([-0.2, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    };
+    let calibration = StereoCalibration {
+        eyes: [eye(0.0), eye(3.0)],
+        rotation: DMat3::from_rotation_z(0.01),
+        translation_m: DVec3::new(-0.06, 0.0, 0.001),
+        given: None,
+        assumed_mm: false,
+    };
+    let rectifier = Rectifier::new(&calibration, (160, 120)).unwrap();
+    let left = noise(160, 120);
+    let mut right = GrayImage::default();
+    right.set_luma_of(&left);
+    let (mut into_left, mut into_right) = (ColorImage::default(), GrayImage::default());
+    let mut before = 0;
+    for frame in 0..4 {
+        if frame == 1 {
+            before = ALLOCATIONS.load(Ordering::Relaxed);
+        }
+        rectifier.left(&left, &mut into_left);
+        rectifier.right(&right, &mut into_right);
+    }
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
 }
 
 /// From thread to thread and home again, both ends sleeping now and then.
@@ -100,6 +140,42 @@ fn refinement() {
         (2..7).for_each(&mut frame);
         assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "depth of 1/{share} of the size");
     }
+}
+
+/// A pair rectified, and matched by what needs no memory; after that it is the matcher's own affair.
+fn two_eyes() {
+    let size = (160, 120);
+    let eye = |center_y_px| Eye {
+        size: Some(size),
+        focal_px: DVec2::splat(150.0),
+        center_px: DVec2::new(80.0, center_y_px),
+        distortion: Distortion::RadialTangential([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    };
+    let calibration = StereoCalibration {
+        eyes: [eye(60.0), eye(57.0)],
+        rotation: DMat3::IDENTITY,
+        translation_m: DVec3::new(-0.1, 0.0, 0.0),
+        given: None,
+        assumed_mm: false,
+    };
+    let rectifier = Rectifier::new(&calibration, size).expect("maps");
+    let settings = stereo::Settings { size, disparities: 16, effort: Effort::Full, threads: 2 };
+    let matcher = stereo::create(&settings, Backend::Cpu, None).expect("a matcher");
+    let mut depth = StereoDepth::of_raw("two eyes", rectifier, matcher, 16);
+    let (raw, mut right, mut map) = (noise(size.0, size.1), GrayImage::default(), DepthMap::default());
+    right.set_luma_of(&raw);
+    let mut color = raw.clone();
+    let mut frame = |index: usize| {
+        depth.straighten(&mut color);
+        let stamp = Stamp { index, time_ns: index as u64, captured_ns: None };
+        depth.set_effort(index % 2);
+        depth.read(Seen { stamp, color: &color, right: Some(&right) }, &mut map).expect("depth");
+    };
+    // The first ones are looked at, for whether they are a rectified pair.
+    (0..6).for_each(&mut frame);
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    (6..11).for_each(&mut frame);
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "depth from two eyes");
 }
 
 fn blur() {

@@ -44,9 +44,10 @@ fn dumped(dump: &str, name: &str) -> (String, String) {
     (value.to_string(), origin.to_string())
 }
 
-const COMMANDS: [&[&str]; 10] = [
+const COMMANDS: [&[&str]; 11] = [
     &["stream"],
     &["render"],
+    &["depth"],
     &["record"],
     &["aperture"],
     &["bench"],

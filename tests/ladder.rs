@@ -8,10 +8,10 @@ use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Effect, Method, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::capture::synthetic::{Format, Synthetic};
-use bokehcam::capture::{Camera, Captured};
+use bokehcam::capture::{Camera, Captured, Shot};
 use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::depth::refine::Refiner;
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::optics::{CocField, DepthCoc};
 use bokehcam::recording::{Options, Recording, Scratch};
 use common::{EFFECTS, Numbers, coc, depth, noise, settings, three_depths};
@@ -116,7 +116,9 @@ fn scenes() -> [(&'static str, Frames); 2] {
     let mut camera = Synthetic::new(format).expect("a scene");
     let synthetic = (0..FRAMES).map(|_| {
         let (mut color, mut map) = (ColorImage::default(), DepthMap::default());
-        let captured = camera.next(&mut color, &mut map).expect("a frame");
+        let captured = camera
+            .next(Shot { color: &mut color, depth: &mut map, right: &mut GrayImage::default() })
+            .expect("a frame");
         let Captured::Frame(stamp) = captured else { panic!("{captured:?}") };
         (color, map, stamp.time_ns)
     });

@@ -1,9 +1,15 @@
 //! Recordings and single pictures: what is written is read again, what is wrong is told.
 
+#[path = "recording/euroc.rs"]
+mod euroc;
 #[path = "recording/faults.rs"]
 mod faults;
+#[path = "recording/kitti.rs"]
+mod kitti;
 #[path = "recording/layout.rs"]
 mod layout;
+#[path = "recording/middlebury.rs"]
+mod middlebury;
 #[path = "recording/real.rs"]
 mod real;
 #[path = "recording/still.rs"]
@@ -89,6 +95,11 @@ fn color_of(recording: &Recording, index: usize) -> Result<ColorImage, Recording
 fn depth_of(recording: &Recording, index: usize) -> Result<DepthMap, RecordingError> {
     let mut depth = DepthMap::default();
     recording.read_depth(index, &mut Scratch::default(), &mut depth).map(|()| depth)
+}
+
+fn right_of(recording: &Recording, index: usize) -> Result<bokehcam::frame::GrayImage, RecordingError> {
+    let mut luma = bokehcam::frame::GrayImage::default();
+    recording.read_right(index, &mut Scratch::default(), &mut luma).map(|()| luma)
 }
 
 fn times_ns(recording: &Recording) -> Vec<u64> {

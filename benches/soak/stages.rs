@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job};
-use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
+use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
-use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::recording::{Recording, Scratch};
 use bokehcam::sink::{Sink, SinkError};
 use bokehcam::stats::Cause;
@@ -61,11 +61,11 @@ impl Camera for Looped {
             period_ns: PERIOD_NS,
             frames: Some(self.frames),
             live: true,
-            exact_depth: false,
+            brings: Brings::Color,
         }
     }
 
-    fn next(&mut self, color: &mut ColorImage, _: &mut DepthMap) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
         if self.position >= self.frames {
             return Ok(Captured::End);
         }
@@ -83,7 +83,7 @@ impl Camera for Looped {
         let index = (self.position % self.recording.len() as u64) as usize;
         let time_ns = self.position * PERIOD_NS;
         self.position += 1;
-        Ok(match self.recording.read_color(index, &mut self.scratch, color) {
+        Ok(match self.recording.read_color(index, &mut self.scratch, shot.color) {
             Ok(()) => Captured::Frame(Stamp { index, time_ns, captured_ns: Some(due_ns) }),
             Err(error) => Captured::Corrupt(error.into()),
         })

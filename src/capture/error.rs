@@ -37,6 +37,37 @@ pub enum CaptureError {
         /// Frames per second.
         fps: f64,
     },
+    /// Side by side needs two halves.
+    #[error(
+        "--side-by-side: the pictures of {source_name} are {width}x{height}; two eyes beside each other need an even width"
+    )]
+    NoHalves {
+        /// The source.
+        source_name: String,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// Side by side needs one picture for both eyes.
+    #[error("--side-by-side is for a source that gives both eyes in one picture, and {source_name} does not")]
+    NotOnePicture {
+        /// The source.
+        source_name: String,
+    },
+    /// Two eyes need one size.
+    #[error(
+        "{} gives {}x{} and {} {}x{}: both eyes need one size; choose one that both have with --size",
+        names[0], left.0, left.1, names[1], right.0, right.1
+    )]
+    EyesDiffer {
+        /// Left camera, then right camera.
+        names: [String; 2],
+        /// Columns and rows of the left one's pictures.
+        left: (u32, u32),
+        /// Columns and rows of the right one's pictures.
+        right: (u32, u32),
+    },
     /// The camera cannot be opened.
     #[cfg(feature = "camera")]
     #[error(transparent)]

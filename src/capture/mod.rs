@@ -4,7 +4,9 @@ mod error;
 #[cfg(feature = "camera")]
 pub mod pixels;
 pub mod replay;
+pub mod side_by_side;
 pub mod synthetic;
+pub mod two_eyes;
 #[cfg(feature = "camera")]
 pub mod v4l2;
 
@@ -12,7 +14,7 @@ use std::time::Duration;
 
 pub use error::CaptureError;
 
-use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::stats::Cause;
 
 /// Produces frames, one after the other.
@@ -20,13 +22,13 @@ pub trait Camera: Send {
     /// What this camera is; stays the same during a run.
     fn info(&self) -> SourceInfo;
 
-    /// Reads the next frame into `color`, and its depth into `depth` if the camera [knows it](SourceInfo::exact_depth).
+    /// Reads the next frame into the buffers of `shot`, as far as the camera [brings it](SourceInfo::brings).
     /// A live camera waits for the frame, but not much longer than [`PATIENCE`]; the others leave it to the caller
     /// when the frame is due. On anything but [`Captured::Frame`] the buffers are unspecified.
     ///
     /// # Errors
     /// The camera failed, and there will be no more frames.
-    fn next(&mut self, color: &mut ColorImage, depth: &mut DepthMap) -> Result<Captured, CaptureError>;
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError>;
 
     /// Passes over the frames before media time `until_ns` without reading them; returns how many those were.
     /// Cameras that cannot (see [`SourceInfo::live`]) pass over none.
@@ -42,6 +44,28 @@ pub trait Camera: Send {
 
     /// Nobody watches: lets go of the device, if there is one, until [`Camera::next`] is called again.
     fn rest(&mut self) {}
+}
+
+/// Buffers for a frame. What the camera does not bring stays as it is.
+#[derive(Debug)]
+pub struct Shot<'a> {
+    /// The picture; of two eyes the left one's.
+    pub color: &'a mut ColorImage,
+    /// Its exact depth.
+    pub depth: &'a mut DepthMap,
+    /// What the right eye saw at the same time, as large as the picture.
+    pub right: &'a mut GrayImage,
+}
+
+/// What a camera brings of each frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Brings {
+    /// The picture alone.
+    Color,
+    /// The picture and its exact depth.
+    Depth,
+    /// The picture of the left eye, and the right eye's.
+    RightEye,
 }
 
 /// How long a live camera may wait in [`Camera::next`] before it says [`Captured::Waiting`].
@@ -61,8 +85,8 @@ pub struct SourceInfo {
     /// Whether frames come at their own pace. Otherwise they can be read and passed over at will, and a run that
     /// wants real time waits for their media time.
     pub live: bool,
-    /// Whether frames bring their own depth.
-    pub exact_depth: bool,
+    /// What frames consist of.
+    pub brings: Brings,
 }
 
 /// What came of reading a frame.

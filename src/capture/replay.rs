@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::{Camera, CaptureError, Captured, SourceInfo};
-use crate::frame::{ColorImage, DepthMap, Stamp};
+use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use crate::frame::Stamp;
 use crate::recording::{Recording, Scratch};
 
 /// Which part of a recording to play.
@@ -29,6 +29,8 @@ pub struct Replay {
     lap: Range<usize>,
     /// Media time of one lap.
     lap_ns: u64,
+    /// Whether the right eye's pictures are read as well.
+    right_eye: bool,
     looped: bool,
     limit: Option<u64>,
     /// Frames passed so far.
@@ -62,11 +64,18 @@ impl Replay {
             name: name.to_owned(),
             lap,
             lap_ns,
+            right_eye: false,
             looped: part.looped,
             limit: part.frames,
             position: 0,
             good: 0,
         })
+    }
+
+    /// Reads what the right eye saw as well. Frames of a recording with one eye are corrupt then.
+    #[must_use]
+    pub fn with_right_eye(self) -> Self {
+        Self { right_eye: true, ..self }
     }
 
     /// Frames to come in all, if there is an end.
@@ -95,11 +104,11 @@ impl Camera for Replay {
             period_ns: self.recording.period_ns(),
             frames: self.total(),
             live: false,
-            exact_depth: false,
+            brings: if self.right_eye { Brings::RightEye } else { Brings::Color },
         }
     }
 
-    fn next(&mut self, color: &mut ColorImage, _depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
         let Some(stamp) = self.stamp() else { return Ok(Captured::End) };
         if stamp.index == self.lap.start {
             if self.position > 0 && self.good == 0 {
@@ -108,7 +117,12 @@ impl Camera for Replay {
             self.good = 0;
         }
         self.position += 1;
-        Ok(match self.recording.read_color(stamp.index, &mut self.scratch, color) {
+        let Shot { color, right, .. } = shot;
+        let mut read = self.recording.read_color(stamp.index, &mut self.scratch, color);
+        if self.right_eye && read.is_ok() {
+            read = self.recording.read_right(stamp.index, &mut self.scratch, right);
+        }
+        Ok(match read {
             Ok(()) => {
                 self.good += 1;
                 Captured::Frame(stamp)

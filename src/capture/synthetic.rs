@@ -1,7 +1,7 @@
 //! The project's own scene as a camera, with exact depth.
 
-use super::{Camera, CaptureError, Captured, SourceInfo};
-use crate::frame::{ColorImage, DepthMap, Stamp};
+use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use crate::frame::Stamp;
 use crate::scene::{Scene, View};
 
 /// What the synthetic camera makes.
@@ -61,17 +61,17 @@ impl Camera for Synthetic {
             period_ns: self.time_ns(1),
             frames: self.format.frames,
             live: false,
-            exact_depth: true,
+            brings: Brings::Depth,
         }
     }
 
-    fn next(&mut self, color: &mut ColorImage, depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
         if self.at_end() {
             return Ok(Captured::End);
         }
         let time_s = self.position as f64 / self.format.fps;
         let threads = self.format.threads.max(1);
-        self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, color, depth);
+        self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, shot.color, shot.depth);
         let stamp = Stamp { index: self.position as usize, time_ns: self.time_ns(self.position), captured_ns: None };
         self.position += 1;
         Ok(Captured::Frame(stamp))

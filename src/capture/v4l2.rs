@@ -1,10 +1,13 @@
 //! A camera that is there: frames as they come, whatever happens to it.
 
+use std::time::Duration;
+
 use super::pixels::Decoder;
-use super::{Camera, CaptureError, Captured, PATIENCE, SourceInfo};
+use super::two_eyes::Eye;
+use super::{Brings, Camera, CaptureError, Captured, PATIENCE, Shot, SourceInfo};
 use crate::clock::Clock;
 use crate::frame::fit::Fit;
-use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::frame::{ColorImage, Stamp};
 use crate::stats::Cause;
 use crate::v4l2::live::{Live, Next, Setting, Wish};
 use crate::v4l2::queue::Losses;
@@ -46,7 +49,7 @@ impl V4l2Camera {
             period_ns: live.agreed().interval.period_ns(),
             frames,
             live: true,
-            exact_depth: false,
+            brings: Brings::Color,
         };
         Ok(Self {
             live,
@@ -60,6 +63,39 @@ impl V4l2Camera {
             given: 0,
             losses: Losses::default(),
             complained: false,
+        })
+    }
+
+    /// As [`Camera::next`], waiting no longer than `patience`.
+    pub fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured {
+        if let Some(lost) = self.told() {
+            return lost;
+        }
+        if self.info.frames.is_some_and(|frames| self.given >= frames) {
+            return Captured::End;
+        }
+        let began_ns = self.clock.now_ns();
+        let next = self.live.next(patience);
+        self.waited_ns = self.clock.now_ns() - began_ns;
+        let captured_ns = match next {
+            Next::Frame { captured_ns } => captured_ns,
+            Next::Lost(losses) => {
+                self.losses = losses;
+                return self.told().unwrap_or(Captured::Waiting);
+            }
+            Next::Waiting => return Captured::Waiting,
+        };
+        let good = self.decode(color);
+        self.live.release();
+        if !good {
+            return Captured::Lost(1, Cause::Corrupt);
+        }
+        let index = self.given as usize;
+        self.given += 1;
+        Captured::Frame(Stamp {
+            index,
+            time_ns: self.times.since_first_ns(captured_ns),
+            captured_ns: Some(captured_ns),
         })
     }
 
@@ -108,40 +144,26 @@ impl Camera for V4l2Camera {
         self.info.clone()
     }
 
-    fn next(&mut self, color: &mut ColorImage, _depth: &mut DepthMap) -> Result<Captured, CaptureError> {
-        if let Some(lost) = self.told() {
-            return Ok(lost);
-        }
-        if self.info.frames.is_some_and(|frames| self.given >= frames) {
-            return Ok(Captured::End);
-        }
-        let began_ns = self.clock.now_ns();
-        let next = self.live.next(PATIENCE);
-        self.waited_ns = self.clock.now_ns() - began_ns;
-        let captured_ns = match next {
-            Next::Frame { captured_ns } => captured_ns,
-            Next::Lost(losses) => {
-                self.losses = losses;
-                return Ok(self.told().unwrap_or(Captured::Waiting));
-            }
-            Next::Waiting => return Ok(Captured::Waiting),
-        };
-        let good = self.decode(color);
-        self.live.release();
-        if !good {
-            return Ok(Captured::Lost(1, Cause::Corrupt));
-        }
-        let index = self.given as usize;
-        self.given += 1;
-        Ok(Captured::Frame(Stamp {
-            index,
-            time_ns: self.times.since_first_ns(captured_ns),
-            captured_ns: Some(captured_ns),
-        }))
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+        Ok(self.next_within(PATIENCE, shot.color))
     }
 
     fn waited_ns(&self) -> u64 {
         self.waited_ns
+    }
+
+    fn rest(&mut self) {
+        self.live.rest();
+    }
+}
+
+impl Eye for V4l2Camera {
+    fn info(&self) -> SourceInfo {
+        self.info.clone()
+    }
+
+    fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured {
+        V4l2Camera::next_within(self, patience, color)
     }
 
     fn rest(&mut self) {

@@ -6,7 +6,9 @@ use super::options;
 use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Refine, Tilt};
 use crate::bokeh::aperture::Aperture;
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
+use crate::depth::DepthError;
 use crate::depth::focus::FocusRule;
+use crate::depth::stereo::{self, Matcher};
 use crate::optics::{CocField, Lens, Ramp};
 use crate::pipeline::{CocAtInfinity, CocRule, QualityRule};
 
@@ -210,6 +212,21 @@ impl Executor {
     /// There is no such GPU.
     pub fn create(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, CliError> {
         Ok(bokeh::create(settings, size, self.backend, self.adapter.as_deref(), self.threads)?)
+    }
+
+    /// A matcher of pairs of `size` pixels that tries so many `disparities`.
+    ///
+    /// # Errors
+    /// There is no such GPU.
+    pub fn matcher(
+        &self,
+        disparities: u32,
+        effort: stereo::Effort,
+        size: (u32, u32),
+    ) -> Result<Box<dyn Matcher>, CliError> {
+        let threads = self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+        let settings = stereo::Settings { size, disparities, effort, threads };
+        Ok(stereo::create(&settings, self.backend, self.adapter.as_deref()).map_err(DepthError::from)?)
     }
 
     /// The CPU executor, which can be looked into.

@@ -23,6 +23,8 @@ pub const DEPTH_SCALE: f32 = 5000.0;
 pub const LIVE_DEPTH_SCALE: f32 = 1000.0;
 /// Value of a depth picture that means unknown.
 pub const DEPTH_INVALID: &str = "0";
+/// Disparities that the command `depth` tries of a pair of which no more is known.
+pub const DISPARITIES: u32 = 64;
 /// Picture size of the synthetic scene.
 pub const SIZE: Size = Size { width: 640, height: 480 };
 /// Frame rate of the synthetic scene.

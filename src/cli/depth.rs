@@ -4,6 +4,7 @@ use super::error::CliError;
 use super::options;
 use super::source::Source;
 use super::values::{DepthChoice, Effect};
+use crate::capture::Brings;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::beside::Beside;
@@ -30,11 +31,11 @@ pub fn beside(
     if !matches!(blur.effect, None | Some(Effect::Dof)) {
         return usage("--depth names depth, and only --effect dof uses any: leave one of them out");
     }
-    if source.camera.info().exact_depth {
+    if source.camera.info().brings == Brings::Depth {
         return usage("the source knows its depth: leave --depth out");
     }
     let opened: Box<dyn DepthSource> = match &blur.depth {
-        DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::None => return Ok(source),
+        DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
             let options = Options {
                 depth_scale: depth.file_scale(),
@@ -61,7 +62,7 @@ fn device(name: &str, depth: &options::Depth, clock: &Clock) -> Result<Box<dyn D
         Ok(camera) => Ok(Box::new(camera)),
         // A slip of the pen, as like as not.
         Err(error @ OpenError::Name(_)) => Err(CliError::Usage(format!(
-            "--depth {name}: {error}; or use auto, recorded, none or a folder with a recording"
+            "--depth {name}: {error}; or use auto, recorded, stereo, none or a folder with a recording"
         ))),
         Err(error) => Err(error.into()),
     }

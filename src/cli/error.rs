@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::bokeh::BokehError;
+use crate::calibration::CalibrationError;
 use crate::capture::CaptureError;
 use crate::depth::DepthError;
 use crate::pipeline::Fault;
@@ -72,6 +73,9 @@ pub enum CliError {
     /// There is no depth.
     #[error(transparent)]
     Depth(#[from] DepthError),
+    /// The calibration of two eyes cannot be used.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
     /// The depth camera cannot be opened.
     #[cfg(feature = "camera")]
     #[error("--depth: {0}")]

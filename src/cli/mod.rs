@@ -12,6 +12,8 @@ mod debug_pictures;
 mod defaults;
 mod depth;
 mod devices;
+mod disparity;
+mod disparity_preview;
 mod doctor;
 mod dump;
 mod error;
@@ -23,6 +25,7 @@ mod render;
 mod settings;
 mod sinks;
 mod source;
+mod stereo;
 mod stream;
 mod terminal;
 mod values;
@@ -59,7 +62,8 @@ struct Cli {
 enum Command {
     Stream(Box<stream::StreamCommand>),
     Render(Box<render::RenderCommand>),
-    Record(record::RecordCommand),
+    Depth(Box<disparity::DepthCommand>),
+    Record(Box<record::RecordCommand>),
     Aperture(aperture::ApertureCommand),
     Bench(Box<bench::BenchCommand>),
     Devices(devices::DevicesCommand),
@@ -115,6 +119,7 @@ fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile) -> Result<(), Cl
     match cli.command {
         Command::Stream(command) => stream::run(&command, &cli.global),
         Command::Render(command) => render::run(&command, &cli.global),
+        Command::Depth(command) => disparity::run(&command, &cli.global),
         Command::Record(command) => record::run(&command, &cli.global),
         Command::Aperture(command) => aperture::run(&command, &cli.global),
         Command::Bench(command) => bench::run(&command),

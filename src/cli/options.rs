@@ -12,6 +12,7 @@ use super::values::{
     ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Refine, Size, Tilt, above_zero,
     between, not_negative, seconds,
 };
+use crate::depth::stereo::Settings;
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
 
@@ -90,6 +91,37 @@ impl Depth {
     }
 }
 
+/// Depth from two eyes.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Two eyes")]
+pub struct Stereo {
+    /// Each picture of the source shows both eyes beside each other: the left half is the left eye's
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub side_by_side: bool,
+    /// The pictures are a rectified pair already: the same point is in the same row
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub rectified: bool,
+    /// Calibration of the two eyes; may be given more than once, or as a list with commas, for one in two files
+    #[arg(long, value_name = "FILE", value_delimiter = ',')]
+    pub calib: Vec<PathBuf>,
+    /// Disparities that are tried, in pixels: a multiple of 16 up to 256 [default: the recording's, else a tenth of the
+    /// width]
+    #[arg(long, value_name = "PX", value_parser = disparities)]
+    pub max_disparity: Option<u32>,
+    /// Focal length of a rectified pair, in pixels, with --baseline-m
+    #[arg(long, value_name = "PX", value_parser = above_zero, conflicts_with = "calib")]
+    pub focal_px: Option<f32>,
+    /// Distance of its eyes, in metres
+    #[arg(long, value_name = "M", value_parser = above_zero, conflicts_with = "calib")]
+    pub baseline_m: Option<f32>,
+    /// Column of its right principal point less that of the left, in pixels [default: 0]
+    #[arg(long, value_name = "PX", value_parser = between(-10_000.0, 10_000.0), allow_negative_numbers = true,
+          conflicts_with = "calib")]
+    pub doffs_px: Option<f32>,
+}
+
 /// What the blur does.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Blur")]
@@ -100,8 +132,9 @@ pub struct Blur {
     /// How dof is composited
     #[arg(long, value_enum, value_name = "HOW", default_value = "layered")]
     pub method: Method,
-    /// Where depth comes from: auto (the source's, when the effect needs it), recorded (the source's), none, a folder
-    /// with a recording whose depth is played in a loop, or a depth camera (/dev/videoN, N, or part of its name)
+    /// Where depth comes from: auto (the source's, when the effect needs it: recorded, else from its two eyes), recorded
+    /// (the source's), stereo (from its two eyes), none, a folder with a recording whose depth is played in a loop, or a
+    /// depth camera (/dev/videoN, N, or part of its name)
     #[arg(long, value_name = "FROM", default_value = "auto")]
     pub depth: DepthChoice,
     /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker
@@ -168,7 +201,7 @@ pub struct Computing {
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
     /// Threads of the CPU backend [default: one per core]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=1024).map(|threads| threads as usize))]
+    #[arg(long, value_name = "N", value_parser = threads())]
     pub threads: Option<usize>,
 }
 
@@ -222,6 +255,9 @@ pub struct Every {
     /// Depth pictures.
     #[command(flatten)]
     pub depth: Depth,
+    /// Two eyes.
+    #[command(flatten)]
+    pub stereo: Stereo,
     /// The blur.
     #[command(flatten)]
     pub blur: Blur,
@@ -246,6 +282,17 @@ fn control(text: &str) -> Result<Setting, String> {
         .filter(|(name, _)| !name.is_empty())
         .ok_or_else(|| "use NAME=VALUE, such as exposure_dynamic_framerate=0".to_string())?;
     Ok((name.to_owned(), value.to_owned()))
+}
+
+fn disparities(text: &str) -> Result<u32, String> {
+    const MOST: u32 = Settings::MOST_DISPARITIES;
+    let good = |disparities: &u32| (16..=MOST).contains(disparities) && disparities.is_multiple_of(16);
+    text.parse().ok().filter(good).ok_or_else(|| format!("use a multiple of 16 from 16 to {MOST}"))
+}
+
+/// A parser of numbers of threads.
+pub fn threads() -> impl TypedValueParser<Value = usize> {
+    value_parser!(u64).range(1..=1024).map(|threads| threads as usize)
 }
 
 fn rate(text: &str) -> Result<f64, String> {

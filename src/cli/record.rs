@@ -5,16 +5,18 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 
+use super::config::Executor;
 use super::error::CliError;
-use super::source::{Source, SourceName};
-use super::{options, terminal};
-use crate::capture::Captured;
-use crate::frame::{ColorImage, DepthMap};
+use super::source::{Source, SourceName, Wanted};
+use super::{options, terminal, values};
+use crate::capture::{Brings, Captured, Shot};
+use crate::depth::Seen;
+use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::recording::tum::{Writer, WriterOptions};
 
 /// Record a source in the TUM RGB-D layout
 ///
-/// Writes rgb/, depth/ (16-bit PNG, 5000 units per metre, 0 unknown) and their lists. The lists appear when the
+/// Writes rgb/, depth/ (16-bit PNG, 5000 units per metre, 0 unknown; of two eyes, matched) and their lists. The lists appear when the
 /// recording is whole; Ctrl-C ends it whole.
 #[derive(Args, Debug)]
 #[command(after_help = "\
@@ -23,7 +25,7 @@ Examples:
   bokehcam record synthetic --frames 90 --size 320x240 --to recordings/mine
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
 pub struct RecordCommand {
-    /// A camera, a folder with a recording, or `synthetic`
+    /// A camera, two cameras LEFT,RIGHT, a folder with a recording, or `synthetic`
     source: SourceName,
     /// Folder for the recording
     #[arg(long, value_name = "DIR")]
@@ -33,6 +35,8 @@ pub struct RecordCommand {
     #[command(flatten)]
     depth: options::Depth,
     #[command(flatten)]
+    stereo: options::Stereo,
+    #[command(flatten)]
     output: options::Output,
 }
 
@@ -41,17 +45,27 @@ pub struct RecordCommand {
 /// # Errors
 /// The source cannot be read, or the recording exists (without `--force`) or cannot be written.
 pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliError> {
-    let Source { mut camera, depth: mut source } =
-        Source::open(&command.source, &command.frames, &command.depth, false)?;
+    let wanted = Wanted {
+        frames: &command.frames,
+        depth: &command.depth,
+        stereo: &command.stereo,
+        blur: None,
+        executor: &Executor::new(values::Backend::Auto, None, None),
+        keep_going: false,
+    };
+    let Source { mut camera, depth: mut source, rig } = Source::open(&command.source, &wanted)?;
+    if rig.is_some_and(|rig| !rig.metric) {
+        tracing::warn!("the distance of the two eyes is not known: the metres of this depth are those of assumed eyes");
+    }
     let info = camera.info();
     let options = WriterOptions { overwrite: command.output.force, ..WriterOptions::default() };
     let mut writer = Writer::create(&command.to, &options)?;
     let stop = terminal::stop_flag()?;
     let progress = terminal::Progress::new(info.frames, global);
-    let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let (mut recorded, mut lost) = (0, 0);
     while !stop.load(Ordering::Relaxed) {
-        let stamp = match camera.next(&mut color, &mut depth)? {
+        let stamp = match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right })? {
             Captured::Frame(stamp) => stamp,
             Captured::Corrupt(error) => return Err(error.into()),
             Captured::Lost(count, _) => {
@@ -62,9 +76,11 @@ pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliE
             Captured::End => break,
         };
         if let Some(source) = &mut source {
-            source.read(stamp, &mut depth)?;
+            source.straighten(&mut color);
+            let right = (info.brings == Brings::RightEye).then_some(&right);
+            source.read(Seen { stamp, color: &color, right }, &mut depth)?;
         }
-        let has_depth = source.is_some() || info.exact_depth;
+        let has_depth = source.is_some() || info.brings == Brings::Depth;
         writer.add(stamp.time_ns, &color, has_depth.then_some(&depth))?;
         recorded += 1;
         progress.delivered(recorded);

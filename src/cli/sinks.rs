@@ -6,18 +6,18 @@ use super::error::CliError;
 use super::options;
 use crate::sink::{Options, Sink, Target, Tee};
 
-/// Whether what was asked of the sinks fits together; `source` is the source's device, if it is one.
+/// Whether what was asked of the sinks fits together; `devices` are those that frames come from.
 ///
 /// # Errors
 /// Two sinks write to one place, one writes to the source, or an option needs a virtual camera where there is none.
-pub fn check(targets: &[Target], stream: &options::Stream, source: Option<&Path>) -> Result<(), CliError> {
+pub fn check(targets: &[Target], stream: &options::Stream, devices: &[&Path]) -> Result<(), CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
     for (at, target) in targets.iter().enumerate() {
         let name = || target.path().map_or("-".to_string(), |path| path.display().to_string());
         if targets[..at].iter().any(|other| other.collides_with(target)) {
             return usage(format!("--to {}: given twice; each sink needs a place of its own", name()));
         }
-        if source.is_some_and(|source| target.is_device(source)) {
+        if devices.iter().any(|device| target.is_device(device)) {
             return usage(format!("--to {}: this is the source itself; take a virtual camera of its own", name()));
         }
     }

@@ -4,18 +4,36 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
+use super::config::Executor;
 use super::error::CliError;
+use super::stereo;
+use super::values::{DepthChoice, Effect};
 use super::{defaults, options};
-use crate::capture::Camera;
 use crate::capture::replay::{Part, Replay};
+use crate::capture::side_by_side::SideBySide;
 use crate::capture::synthetic::{Format, Synthetic};
 #[cfg(feature = "camera")]
+use crate::capture::two_eyes::TwoEyes;
+#[cfg(feature = "camera")]
 use crate::capture::v4l2::V4l2Camera;
+use crate::capture::{Brings, Camera, CaptureError};
+#[cfg(feature = "camera")]
+use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::recorded::Recorded;
-use crate::recording::{Options, Recording};
+use crate::optics::StereoRig;
+use crate::recording::{Options, Pair, Recording};
 #[cfg(feature = "camera")]
 use crate::v4l2::{layout::Content, live::Wish};
+
+/// A camera: how it was called, and the node that this means now.
+#[cfg(feature = "camera")]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Named {
+    /// As it is written.
+    name: String,
+    node: PathBuf,
+}
 
 /// Where frames come from, as it is written.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,14 +42,12 @@ pub enum SourceName {
     Synthetic,
     /// A folder with a recording.
     Folder(PathBuf),
-    /// A camera's node, and how it was called.
+    /// A camera.
     #[cfg(feature = "camera")]
-    Camera {
-        /// As it is written.
-        name: String,
-        /// What that means now.
-        node: PathBuf,
-    },
+    Camera(Named),
+    /// Two cameras, the left one first.
+    #[cfg(feature = "camera")]
+    Cameras([Named; 2]),
 }
 
 impl FromStr for SourceName {
@@ -49,16 +65,37 @@ impl FromStr for SourceName {
 /// What can be a source.
 fn sources() -> &'static str {
     match cfg!(feature = "camera") {
-        true => "a camera, a folder with a recording, or synthetic",
+        true => "a camera, two cameras LEFT,RIGHT, a folder with a recording, or synthetic",
         false => "a folder with a recording, or synthetic",
     }
 }
 
 #[cfg(feature = "camera")]
 fn camera(text: &str) -> Result<SourceName, String> {
-    match crate::v4l2::node::resolve(text) {
-        Ok(node) => Ok(SourceName::Camera { name: text.to_owned(), node }),
-        Err(error) => Err(format!("{error}; use {}", sources())),
+    let named = |name: &str| {
+        let node = crate::v4l2::node::resolve(name)?;
+        Ok(Named { name: name.to_owned(), node })
+    };
+    let refuse = |error: crate::v4l2::node::NodeError| Err(format!("{error}; use {}", sources()));
+    // A camera's own name may have commas, too.
+    let alone = match named(text) {
+        Ok(camera) => return Ok(SourceName::Camera(camera)),
+        Err(error) => error,
+    };
+    let halves = |(at, _): (usize, &str)| (&text[..at], &text[at + 1..]);
+    let pairs = || text.match_indices(',').map(halves);
+    for (left, right) in pairs() {
+        if let (Ok(left), Ok(right)) = (named(left), named(right)) {
+            let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
+            if same(&left.node, &right.node) {
+                return Err(format!("the left and the right eye are one camera, {}", left.node.display()));
+            }
+            return Ok(SourceName::Cameras([left, right]));
+        }
+    }
+    match pairs().next() {
+        None => refuse(alone),
+        Some((left, right)) => refuse(named(left).and_then(|_| named(right)).err().unwrap_or(alone)),
     }
 }
 
@@ -79,7 +116,7 @@ impl SourceName {
             SourceName::Folder(_) => return Ok(()),
             SourceName::Synthetic => "synthetic",
             #[cfg(feature = "camera")]
-            SourceName::Camera { .. } => "a camera",
+            SourceName::Camera(_) | SourceName::Cameras(_) => "a camera",
         };
         if source.start.is_none() && source.end.is_none() && !source.repeat {
             return Ok(());
@@ -89,12 +126,14 @@ impl SourceName {
         )))
     }
 
-    /// The device that frames come from, if it is one.
-    pub fn device(&self) -> Option<&Path> {
+    /// The devices that frames come from.
+    pub fn devices(&self) -> Vec<&Path> {
         match self {
-            SourceName::Synthetic | SourceName::Folder(_) => None,
+            SourceName::Synthetic | SourceName::Folder(_) => Vec::new(),
             #[cfg(feature = "camera")]
-            SourceName::Camera { node, .. } => Some(node),
+            SourceName::Camera(camera) => vec![&camera.node],
+            #[cfg(feature = "camera")]
+            SourceName::Cameras(cameras) => cameras.iter().map(|camera| camera.node.as_path()).collect(),
         }
     }
 }
@@ -105,69 +144,176 @@ pub struct Source {
     pub camera: Box<dyn Camera>,
     /// Gives their depth, where the camera does not.
     pub depth: Option<Box<dyn DepthSource>>,
+    /// The eyes that depth comes from, where it comes from two.
+    pub rig: Option<StereoRig>,
 }
 
+/// How a source is wanted.
+pub struct Wanted<'a> {
+    /// Which frames.
+    pub frames: &'a options::Source,
+    /// How depth pictures are read.
+    pub depth: &'a options::Depth,
+    /// What is said of its two eyes.
+    pub stereo: &'a options::Stereo,
+    /// What its depth is for; `None` for itself.
+    pub blur: Option<&'a options::Blur>,
+    /// What matches its two eyes.
+    pub executor: &'a Executor,
+    /// Faulty lines of a recording's lists become frames that fail.
+    pub keep_going: bool,
+}
+
+/// Refinement of depth from two eyes, unless it is chosen: it knows nothing of how matching errs, but steadies it.
+const REFINES_STEREO: bool = true;
+
 impl Source {
-    /// Opens a source. With `keep_going`, faulty lines of a recording's lists become frames that fail.
+    /// Opens a source.
     ///
     /// # Errors
     /// It cannot be read, it has no frame between `--start` and `--end`, or an option does not apply to it.
-    pub fn open(
-        name: &SourceName,
-        source: &options::Source,
-        depth: &options::Depth,
-        keep_going: bool,
-    ) -> Result<Self, CliError> {
-        name.check(source)?;
+    pub fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, CliError> {
+        let Wanted { frames, stereo, .. } = wanted;
+        name.check(frames)?;
+        wanted.check_effect()?;
+        let mut source = Opened::open(name, wanted)?;
+        if stereo.side_by_side {
+            let usage = |error: CaptureError| CliError::Usage(error.to_string());
+            source.camera = Box::new(SideBySide::new(source.camera).map_err(usage)?);
+        }
+        let info = source.camera.info();
+        if info.brings != Brings::RightEye {
+            if wanted.choice() == &DepthChoice::Stereo {
+                return Err(CliError::Usage(format!(
+                    "--depth stereo: {} has one eye; use two cameras LEFT,RIGHT, a recording with both eyes, or \
+                     --side-by-side",
+                    info.name
+                )));
+            }
+            stereo.refuse()?;
+        } else if wanted.matches(source.depth.is_some()) {
+            let depth = stereo::open(&info, &source.pair, source.disparities, stereo, wanted.executor)?;
+            let rig = *depth.rig();
+            if let Some(blur) = wanted.blur {
+                stereo::check_focus(&rig, blur)?;
+            }
+            return Ok(Self { camera: source.camera, depth: Some(Box::new(depth)), rig: Some(rig) });
+        }
+        Ok(Self { camera: source.camera, depth: source.depth, rig: None })
+    }
+
+    /// Whether its frames have depth.
+    pub fn has_depth(&self) -> bool {
+        self.depth.is_some() || self.camera.info().brings == Brings::Depth
+    }
+
+    /// Whether its depth was measured, so that refining it makes it better.
+    pub fn is_measured(&self) -> bool {
+        self.depth.is_some() && (self.rig.is_none() || REFINES_STEREO)
+    }
+}
+
+impl Wanted<'_> {
+    fn choice(&self) -> &DepthChoice {
+        self.blur.map_or(&DepthChoice::Auto, |blur| &blur.depth)
+    }
+
+    /// Whether the effect is one that uses depth.
+    fn uses_depth(&self) -> bool {
+        self.blur.is_none_or(|blur| matches!(blur.effect, None | Some(Effect::Dof)))
+    }
+
+    fn check_effect(&self) -> Result<(), CliError> {
+        if self.choice() == &DepthChoice::Stereo && !self.uses_depth() {
+            let what = "--depth stereo: only --effect dof uses depth; leave one of them out";
+            return Err(CliError::Usage(what.to_string()));
+        }
+        Ok(())
+    }
+
+    /// Whether two eyes are matched, where there are two, and depth of another kind or not.
+    fn matches(&self, has_depth: bool) -> bool {
+        match self.choice() {
+            DepthChoice::Stereo => true,
+            DepthChoice::Auto => self.uses_depth() && !has_depth,
+            _ => false,
+        }
+    }
+}
+
+/// A source before its two eyes, if it has two, are looked at.
+struct Opened {
+    camera: Box<dyn Camera>,
+    depth: Option<Box<dyn DepthSource>>,
+    /// What it says of its two eyes.
+    pair: Pair,
+    /// The disparities that occur in it.
+    disparities: Option<u32>,
+}
+
+impl Opened {
+    fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, CliError> {
+        let Wanted { frames, depth, .. } = *wanted;
+        let of = |camera| Self { camera, depth: None, pair: Pair::Unstated, disparities: None };
         match name {
             SourceName::Synthetic => {
-                let size = source.size.unwrap_or(defaults::SIZE);
+                let size = frames.size.unwrap_or(defaults::SIZE);
                 let camera = Synthetic::new(Format {
                     size: (size.width, size.height),
-                    fps: source.fps.unwrap_or(defaults::FPS),
-                    frames: source.frames,
+                    fps: frames.fps.unwrap_or(defaults::FPS),
+                    frames: frames.frames,
                     threads: std::thread::available_parallelism().map_or(1, usize::from),
                 })?;
-                Ok(Self { camera: Box::new(camera), depth: None })
+                Ok(of(Box::new(camera)))
             }
             SourceName::Folder(folder) => {
                 let options = Options {
                     depth_scale: depth.file_scale(),
                     depth_invalid: Some(depth.depth_invalid),
-                    keep_going,
+                    keep_going: wanted.keep_going,
                     ..Options::default()
                 };
                 let recording = Arc::new(Recording::open(folder, &options)?);
                 let name = folder.display().to_string();
                 let part = Part {
-                    start_s: source.start.unwrap_or(0.0),
-                    end_s: source.end,
-                    looped: source.repeat,
-                    frames: source.frames,
+                    start_s: frames.start.unwrap_or(0.0),
+                    end_s: frames.end,
+                    looped: frames.repeat,
+                    frames: frames.frames,
                 };
-                let camera = Replay::new(Arc::clone(&recording), &name, &part)?;
+                let mut camera = Replay::new(Arc::clone(&recording), &name, &part)?;
+                let pair = recording.pair().cloned();
+                if pair.is_some() && wanted.matches(recording.has_depth()) {
+                    camera = camera.with_right_eye();
+                }
+                let disparities = recording.disparities();
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
                 };
-                Ok(Self { camera: Box::new(camera), depth })
+                Ok(Self { depth, pair: pair.unwrap_or(Pair::Unstated), disparities, ..of(Box::new(camera)) })
             }
             #[cfg(feature = "camera")]
-            SourceName::Camera { name, .. } => {
-                let wish = Wish {
-                    content: Content::Color,
-                    size_px: source.size.map(|size| (size.width, size.height)),
-                    fps: source.fps,
-                    fourcc: source.format,
-                };
-                let camera = V4l2Camera::open(name, wish, source.control.clone(), source.frames)?;
-                Ok(Self { camera: Box::new(camera), depth: None })
+            SourceName::Camera(camera) => {
+                let camera = V4l2Camera::open(&camera.name, wish(frames), frames.control.clone(), frames.frames)?;
+                Ok(of(Box::new(camera)))
+            }
+            #[cfg(feature = "camera")]
+            SourceName::Cameras([left, right]) => {
+                let open = |eye: &Named| V4l2Camera::open(&eye.name, wish(frames), frames.control.clone(), None);
+                let eyes = TwoEyes::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
+                Ok(of(Box::new(eyes)))
             }
         }
     }
+}
 
-    /// Whether its frames have depth.
-    pub fn has_depth(&self) -> bool {
-        self.depth.is_some() || self.camera.info().exact_depth
+#[cfg(feature = "camera")]
+fn wish(frames: &options::Source) -> Wish {
+    Wish {
+        content: Content::Color,
+        size_px: frames.size.map(|size| (size.width, size.height)),
+        fps: frames.fps,
+        fourcc: frames.format,
     }
 }

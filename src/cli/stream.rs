@@ -8,7 +8,7 @@ use super::config::{Blur, Executor};
 use super::depth;
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_whole};
-use super::source::{Source, SourceName};
+use super::source::{Source, SourceName, Wanted};
 use super::{options, sinks, terminal, values};
 use crate::clock::Clock;
 use crate::link::demand::Demand;
@@ -22,6 +22,8 @@ use crate::stats::Report;
 Examples:
   bokehcam stream /dev/video0 --to /dev/video10
   bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
+  bokehcam stream 0,2 --calib stereo.yml --to /dev/video10
+  bokehcam stream /dev/video4 --side-by-side --rectified --to /dev/video10
   bokehcam stream recordings/portrait --to out/
   bokehcam stream recordings/portrait --to out.mp4 --aperture polygon:6 --focus 1.2
   bokehcam stream recordings/portrait --to - --quiet --pace realtime | ffplay -
@@ -29,8 +31,8 @@ Examples:
   bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
-    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), a folder with a recording,
-    /// or `synthetic`
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
+    /// folder with a recording, or `synthetic`
     source: SourceName,
     /// /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm
     /// (ffmpeg), or null; may be given more than once
@@ -42,6 +44,8 @@ pub struct StreamCommand {
     blur: options::Blur,
     #[command(flatten)]
     depth: options::Depth,
+    #[command(flatten)]
+    stereo: options::Stereo,
     #[command(flatten)]
     aperture: options::Aperture,
     #[command(flatten)]
@@ -59,15 +63,24 @@ pub struct StreamCommand {
 pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliError> {
     let StreamCommand { stream, output, .. } = command;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
-    sinks::check(&command.to, stream, command.source.device())?;
-    if stream.pace == Some(values::Pace::Asap) && command.source.device().is_some() {
+    sinks::check(&command.to, stream, &command.source.devices())?;
+    if stream.pace == Some(values::Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
     }
-    let source = Source::open(&command.source, &command.frames, &command.depth, stream.keep_going)?;
+    let executor = Executor::of(&command.computing);
+    let wanted = Wanted {
+        frames: &command.frames,
+        depth: &command.depth,
+        stereo: &command.stereo,
+        blur: Some(&command.blur),
+        executor: &executor,
+        keep_going: stream.keep_going,
+    };
+    let source = Source::open(&command.source, &wanted)?;
     let source = depth::beside(source, &command.blur, &command.depth, stream.keep_going, &Clock::system())?;
     let info = source.camera.info();
-    let measured = source.depth.is_some();
+    let measured = source.is_measured();
     let pace = match stream.pace {
         Some(values::Pace::Realtime) => Pace::Realtime,
         Some(values::Pace::Asap) => Pace::Asap,
@@ -76,7 +89,6 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
     };
     let quality = command.computing.quality.rule(pace);
     let blur = Blur::resolve(&command.blur, &command.aperture, quality, source.has_depth())?;
-    let executor = Executor::of(&command.computing);
     let bokeh = blur.settings(info.size).map(|settings| executor.create(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
     let demand = stream.on_demand.then(Demand::new);

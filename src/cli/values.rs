@@ -40,6 +40,8 @@ pub enum DepthChoice {
     Auto,
     /// The source's.
     Recorded,
+    /// The source's two eyes.
+    Stereo,
     /// None: for the effects that need none.
     None,
     /// The depth of the recording in this folder.
@@ -61,8 +63,13 @@ impl FromStr for DepthChoice {
         Ok(match text {
             "auto" => Self::Auto,
             "recorded" => Self::Recorded,
+            "stereo" => Self::Stereo,
             "none" => Self::None,
-            "" => return Err("use auto, recorded, none, a folder with a recording, or a depth camera".to_string()),
+            "" => {
+                return Err(
+                    "use auto, recorded, stereo, none, a folder with a recording, or a depth camera".to_string()
+                );
+            }
             folder if Path::new(folder).is_dir() => Self::Folder(folder.into()),
             device => Self::Device(device.to_owned()),
         })

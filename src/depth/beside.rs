@@ -1,7 +1,7 @@
 //! Recorded depth beside colours from elsewhere: paired by media time, over and over.
 
-use super::{DepthError, DepthSource};
-use crate::frame::{DepthMap, Stamp};
+use super::{DepthError, DepthSource, Seen};
+use crate::frame::DepthMap;
 use crate::recording::{Recording, Scratch};
 
 /// The depth pictures of a recording, played in a loop by the frames' own time.
@@ -40,7 +40,7 @@ impl Beside {
 }
 
 impl DepthSource for Beside {
-    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         let index = self.index_at(stamp.time_ns);
         if self.last != Some(index) {
             self.last = None;

@@ -12,21 +12,49 @@ pub mod refine;
 pub mod registration;
 pub mod stereo;
 
-use crate::frame::{DepthMap, Stamp};
+use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::recording::RecordingError;
 
 /// Gives each frame its depth.
 ///
 /// Cameras that know the depth of their frames themselves hand it over with the picture and need no source.
 pub trait DepthSource: Send {
-    /// The depth of the frame `stamp`, into `map` (resized to fit).
+    /// Gives a picture the geometry of its depth, in place: called with every frame, before [`DepthSource::read`] where
+    /// that is called at all. Most depth is that of the picture as it is.
+    fn straighten(&mut self, color: &mut ColorImage) {
+        let _ = color;
+    }
+
+    /// The depth of the frame `seen`, into `map` (resized to fit).
     ///
     /// # Errors
     /// There is none, or it cannot be read; `map` is then unspecified.
-    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError>;
+    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError>;
+
+    /// What a map costs at each of its efforts, relative to the last and finest, which is 1; ascending. A source without
+    /// a choice has one.
+    fn efforts(&self) -> &'static [f64] {
+        &[1.0]
+    }
+
+    /// Changes the effort, as its place in [`DepthSource::efforts`], from the next map on. It begins with the finest.
+    fn set_effort(&mut self, effort: usize) {
+        let _ = effort;
+    }
 
     /// No frame came for a while: lets go of the device, if there is one, until [`DepthSource::read`] is called again.
     fn rest(&mut self) {}
+}
+
+/// A frame, as far as its depth may depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// Which frame, and when.
+    pub stamp: Stamp,
+    /// Its picture; of two eyes the left one's.
+    pub color: &'a ColorImage,
+    /// What the right eye saw, where there is one.
+    pub right: Option<&'a GrayImage>,
 }
 
 /// Why a frame has no depth.
@@ -39,6 +67,15 @@ pub enum DepthError {
     #[error("{source_name}: no depth yet")]
     Unpaired {
         /// The camera.
+        source_name: String,
+    },
+    /// The two eyes do not match.
+    #[error(transparent)]
+    Match(#[from] stereo::MatchError),
+    /// A frame came without what the right eye saw.
+    #[error("{source_name}: this frame has no right eye")]
+    OneEye {
+        /// Where the frames come from.
         source_name: String,
     },
     /// There is no depth at all.

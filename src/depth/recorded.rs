@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{DepthError, DepthSource};
-use crate::frame::{DepthMap, Stamp};
+use super::{DepthError, DepthSource, Seen};
+use crate::frame::DepthMap;
 use crate::recording::{Recording, Scratch};
 
 /// The depth pictures of a recording.
@@ -27,7 +27,7 @@ impl Recorded {
 }
 
 impl DepthSource for Recorded {
-    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         Ok(self.recording.read_depth(stamp.index, &mut self.scratch, map)?)
     }
 }

@@ -4,30 +4,34 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::pacer::Pacer;
 use super::{Ended, Frame, hand_on};
-use crate::capture::{Camera, Captured, PATIENCE};
+use crate::capture::{self, Brings, Camera, Captured, PATIENCE};
 use crate::clock::Clock;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::link::Sender;
 use crate::link::demand::Demand;
 use crate::link::pool::{Pool, Pooled};
 use crate::stats::{Cause, Histogram, Tally};
 
-/// A picture, and its depth where the camera knows it.
+/// A picture, and what the camera brought with it.
 pub(super) struct Shot {
     pub color: Pooled<ColorImage>,
+    /// Exact depth.
     pub depth: Option<Pooled<DepthMap>>,
+    /// The other eye's picture.
+    pub right: Option<Pooled<GrayImage>>,
 }
 
 pub(super) struct Stage<'a> {
     pub camera: Box<dyn Camera>,
     pub pacer: Pacer,
-    pub exact_depth: bool,
+    pub brings: Brings,
     pub keep_going: bool,
     /// `None` captures whether anybody watches or not.
     pub demand: Option<Demand>,
     pub stop: [&'a AtomicBool; 2],
     pub colors: &'a Pool<ColorImage>,
     pub depths: &'a Pool<DepthMap>,
+    pub rights: &'a Pool<GrayImage>,
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     pub times: &'a mut Histogram,
@@ -36,7 +40,7 @@ pub(super) struct Stage<'a> {
 impl Stage<'_> {
     pub(super) fn run(mut self, mut to: Sender<Frame<Shot>>) -> Ended {
         let stopped = || self.stop.iter().any(|stop| stop.load(Ordering::Relaxed));
-        let mut no_depth = DepthMap::default();
+        let (mut no_depth, mut no_right) = (DepthMap::default(), GrayImage::default());
         let mut complained = false;
         while !stopped() {
             if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
@@ -48,9 +52,15 @@ impl Stage<'_> {
             }
             self.tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
             let mut color = self.colors.take();
-            let mut depth = self.exact_depth.then(|| self.depths.take());
+            let mut depth = (self.brings == Brings::Depth).then(|| self.depths.take());
+            let mut right = (self.brings == Brings::RightEye).then(|| self.rights.take());
+            let shot = capture::Shot {
+                color: &mut color,
+                depth: depth.as_deref_mut().unwrap_or(&mut no_depth),
+                right: right.as_deref_mut().unwrap_or(&mut no_right),
+            };
             let began_ns = self.clock.now_ns();
-            match self.camera.next(&mut color, depth.as_deref_mut().unwrap_or(&mut no_depth))? {
+            match self.camera.next(shot)? {
                 Captured::Frame(stamp) => {
                     let read_ns = (self.clock.now_ns() - began_ns).saturating_sub(self.camera.waited_ns());
                     self.times.add(read_ns);
@@ -59,7 +69,7 @@ impl Stage<'_> {
                         None => self.pacer.wait(stamp.time_ns, read_ns, stopped),
                     };
                     let ticket = self.tally.captured(captured_ns);
-                    if !hand_on(&mut to, Frame { ticket, stamp, item: Shot { color, depth } }, self.tally) {
+                    if !hand_on(&mut to, Frame { ticket, stamp, item: Shot { color, depth, right } }, self.tally) {
                         break;
                     }
                 }

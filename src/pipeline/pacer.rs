@@ -58,8 +58,7 @@ impl Pacer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::{CaptureError, Captured, SourceInfo};
-    use crate::frame::{ColorImage, DepthMap};
+    use crate::capture::{CaptureError, Captured, Shot, SourceInfo};
 
     const PERIOD_NS: u64 = 100;
 
@@ -70,7 +69,7 @@ mod tests {
         fn info(&self) -> SourceInfo {
             unreachable!("the pacer asks for nothing but skips")
         }
-        fn next(&mut self, _: &mut ColorImage, _: &mut DepthMap) -> Result<Captured, CaptureError> {
+        fn next(&mut self, _: Shot) -> Result<Captured, CaptureError> {
             Ok(Captured::End)
         }
         fn skip(&mut self, until_ns: u64) -> u64 {

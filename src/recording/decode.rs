@@ -10,9 +10,9 @@ use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
 use image::{ColorType, ImageDecoder, ImageError, ImageFormat, Limits};
 
-use super::error::PictureFault;
+use super::fault::PictureFault;
 use super::{MAX_SIDE_PX, depth_covers};
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, GrayImage};
 
 /// More than the largest picture needs uncompressed: 8192 x 8192 pixels of 8 bytes.
 const MAX_FILE_BYTES: u64 = 1 << 30;
@@ -25,6 +25,7 @@ const MAX_METADATA_BYTES: u64 = 64 << 20;
 pub struct Scratch {
     file: Vec<u8>,
     pixels: Vec<u8>,
+    right: ColorImage,
 }
 
 impl Scratch {
@@ -105,6 +106,12 @@ pub(super) fn color(
         return decoder.read_image(&mut into.rgb).map_err(decode_fault);
     }
     read_pixels(decoder, &mut scratch.pixels)?;
+    if color_type == ColorType::L8 {
+        for (rgb, &grey) in into.rgb.as_chunks_mut::<3>().0.iter_mut().zip(&scratch.pixels) {
+            *rgb = [grey; 3];
+        }
+        return Ok(());
+    }
     let channels = if color_type.has_color() { [0, 1, 2] } else { [0, 0, 0] };
     for (rgb, pixel) in into.rgb.chunks_exact_mut(3).zip(pixels(&scratch.pixels, color_type)) {
         for (byte, channel) in rgb.iter_mut().zip(channels) {
@@ -112,6 +119,26 @@ pub(super) fn color(
         }
     }
     Ok(())
+}
+
+/// Decodes what a right eye saw to luma, just as that of a left one is made of its colour. A picture of another size
+/// than the `left` one is refused before it is decoded.
+pub(super) fn right_luma(
+    path: &Path,
+    left: (u32, u32),
+    scratch: &mut Scratch,
+    into: &mut GrayImage,
+) -> Result<(), PictureFault> {
+    let mut right = std::mem::take(&mut scratch.right);
+    let decoded = color(path, Some(left), scratch, &mut right);
+    if decoded.is_ok() {
+        into.set_luma_of(&right);
+    }
+    scratch.right = right;
+    decoded.map_err(|fault| match fault {
+        PictureFault::Size { found, expected: left } => PictureFault::EyeSize { found, left },
+        fault => fault,
+    })
 }
 
 /// Decodes 16-bit grey to metres. With `color_size`, a map that does not cover such a colour picture is refused.

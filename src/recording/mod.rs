@@ -1,25 +1,39 @@
 //! Recordings on disk, read and written frame by frame; and single pictures ([`still`]).
 //!
 //! A [`Recording`] is opened by its folder, and its layout is recognised by its content. [`tum`] is the layout that
-//! is read and written.
+//! is read and written; `kitti`, `euroc` and `middlebury` are read, and have two eyes.
 
+pub mod geometry;
 pub mod still;
 pub mod tum;
 
+mod contents;
 mod decode;
 mod encode;
 mod error;
+mod euroc;
+mod fault;
+mod kitti;
+mod list;
+mod middlebury;
+mod pair;
 mod pfm;
 mod timeline;
 mod whole;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub use decode::Scratch;
-pub use error::{LineFault, PictureFault, RecordingError};
+pub use error::RecordingError;
+pub use fault::{GeometryFault, LineFault, PictureFault};
 
-use crate::frame::{ColorImage, DepthMap};
-use decode::DepthUnits;
+use crate::calibration::StereoCalibration;
+use crate::frame::{ColorImage, DepthMap, GrayImage};
+use crate::optics::StereoRig;
+use contents::{DepthForm, Folder, Layout, Source};
+
+/// The layouts that are read, in the order in which they are looked for.
+const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT];
 
 /// Pictures with more columns or rows are refused from their header, before memory is taken for them.
 const MAX_SIDE_PX: u32 = 8192;
@@ -31,10 +45,10 @@ pub struct Options {
     pub depth_scale: f32,
     /// A depth value that means unknown; 0 always does.
     pub depth_invalid: Option<u16>,
-    /// Largest difference in time between a colour picture and its depth map, in nanoseconds.
+    /// Largest difference in time between a colour picture and its depth map or right picture, in nanoseconds.
     pub pair_tolerance_ns: u64,
-    /// Whether faulty lines of the lists become frames that fail to read. Otherwise the first one fails
-    /// [`Recording::open`].
+    /// Whether faulty lines of the lists become frames that fail to read, and so do right pictures that are missing.
+    /// Otherwise the first one fails [`Recording::open`].
     pub keep_going: bool,
 }
 
@@ -52,31 +66,37 @@ pub struct Unpaired {
     pub color: usize,
     /// Depth maps.
     pub depth: usize,
+    /// Pictures of the right eye.
+    pub right: usize,
+}
+
+/// How the two eyes of a recording stand.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pair {
+    /// The pictures are rectified, and this is their geometry.
+    Rectified(StereoRig),
+    /// The pictures are as the cameras took them; with this they can be rectified.
+    Raw(Box<StereoCalibration>),
+    /// The recording does not say.
+    Unstated,
 }
 
 /// An opened recording: its lists are in memory (some 300 bytes a frame), its pictures are read one by one when asked
 /// for, into memory that the caller keeps.
 ///
-/// Where there is depth, the frames are the pairs of a colour picture and a depth map; [`Recording::unpaired`] counts
-/// what is left over.
+/// Where there is depth, the frames are the pairs of a colour picture and a depth map, and where there are two eyes
+/// those of a left and a right picture; [`Recording::unpaired`] counts what is left over.
 #[derive(Debug)]
 pub struct Recording {
+    layout: &'static str,
     folder: Folder,
     frames: Vec<Frame>,
     size: (u32, u32),
     period_ns: u64,
-    units: DepthUnits,
-    has_depth: bool,
+    depth: Option<DepthForm>,
+    pair: Option<Pair>,
+    disparities: Option<u32>,
     unpaired: Unpaired,
-}
-
-/// The folder of a recording.
-#[derive(Debug)]
-struct Folder {
-    /// As it was named: for messages.
-    dir: PathBuf,
-    /// With every link resolved: no picture may lie outside it.
-    root: PathBuf,
 }
 
 /// A frame whose pictures are still on the disk.
@@ -84,50 +104,47 @@ struct Folder {
 struct Frame {
     time_ns: u64,
     color: Source,
+    right: Option<Source>,
     depth: Option<Source>,
-}
-
-/// A picture, and where it is named.
-#[derive(Debug)]
-struct Source {
-    list: &'static str,
-    line: u32,
-    /// Relative to the folder.
-    file: Result<PathBuf, LineFault>,
 }
 
 impl Recording {
     /// Opens the recording in the folder `dir`. Reads its lists, and of its pictures the headers it needs.
     ///
     /// # Errors
-    /// The folder is no recording, or a list is missing or empty; no depth map pairs with a colour picture; the depth
-    /// scale is not a number > 0; no colour picture can be read (the fault of the first is given). Without
-    /// `keep_going`, any faulty line of a list.
+    /// The folder is no recording, or a list is missing or empty; no depth map or right picture pairs with a colour
+    /// picture; the calibration is faulty; the depth scale is not a number > 0; no colour picture can be read (the
+    /// fault of the first is given). Without `keep_going`, any faulty line of a list, and a missing right picture.
     pub fn open(dir: &Path, options: &Options) -> Result<Self, RecordingError> {
         check_depth_scale(options.depth_scale)?;
         let root = dir.canonicalize().map_err(RecordingError::io("open the recording", dir))?;
         let folder = Folder { dir: dir.to_owned(), root };
-        let contents = tum::open(&folder, options)?;
+        let not_a_recording = || RecordingError::NotARecording { dir: dir.to_owned(), looked_for: looked_for() };
+        let layout = LAYOUTS.iter().find(|layout| (layout.is_in)(dir)).ok_or_else(not_a_recording)?;
+        let contents = (layout.open)(&folder, options)?;
 
         let size = first_size(&folder, contents.frames.iter().map(|frame| &frame.color))?;
         let times_ns: Vec<_> = contents.frames.iter().map(|frame| frame.time_ns).collect();
         let listed = contents.frames.into_iter().zip(timeline::fill(&times_ns));
-        let frames: Vec<_> =
-            listed.map(|(frame, time_ns)| Frame { time_ns, color: frame.color, depth: frame.depth }).collect();
+        let frames: Vec<_> = listed
+            .map(|(frame, time_ns)| Frame { time_ns, color: frame.color, right: frame.right, depth: frame.depth })
+            .collect();
         Ok(Self {
+            layout: layout.name,
             folder,
             size,
             period_ns: timeline::median_period_ns(frames.iter().map(|frame| frame.time_ns)),
             frames,
-            units: DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid },
-            has_depth: contents.has_depth,
+            depth: contents.depth,
+            pair: contents.pair,
+            disparities: contents.disparities,
             unpaired: contents.unpaired,
         })
     }
 
     /// The name of the layout, such as `TUM RGB-D`.
     pub fn layout(&self) -> &'static str {
-        tum::LAYOUT
+        self.layout
     }
 
     /// Number of frames, those that will fail to read included.
@@ -161,7 +178,17 @@ impl Recording {
 
     /// Whether the frames have depth.
     pub fn has_depth(&self) -> bool {
-        self.has_depth
+        self.depth.is_some()
+    }
+
+    /// Whether the frames have a right eye, and how it stands.
+    pub fn pair(&self) -> Option<&Pair> {
+        self.pair.as_ref()
+    }
+
+    /// How many disparities there may be, from 0, where the recording says so: a multiple of 16.
+    pub fn disparities(&self) -> Option<u32> {
+        self.disparities
     }
 
     /// What is listed and belongs to no frame.
@@ -186,15 +213,31 @@ impl Recording {
     /// # Errors
     /// As [`Recording::read_color`]; also where the recording has no depth.
     pub fn read_depth(&self, index: usize, scratch: &mut Scratch, into: &mut DepthMap) -> Result<(), RecordingError> {
-        if !self.has_depth {
-            return Err(RecordingError::NoDepth { dir: self.folder.dir.clone() });
-        }
+        let no_depth = || RecordingError::NoDepth { dir: self.folder.dir.clone() };
+        let form = self.depth.as_ref().ok_or_else(no_depth)?;
         let frame = self.frame(index)?;
         // Without a depth map, the line of the colour picture is at fault.
         let source = frame.depth.as_ref().unwrap_or(&frame.color);
         let path = self.folder.locate(source)?;
-        decode::depth(&path, self.units, Some(self.size), scratch, into)
-            .map_err(|fault| source.wrong(&self.folder.dir, fault))
+        let read = match form {
+            DepthForm::Units(units) => decode::depth(&path, *units, Some(self.size), scratch, into),
+            DepthForm::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, self.size, scratch, into),
+        };
+        read.map_err(|fault| source.wrong(&self.folder.dir, fault))
+    }
+
+    /// Reads what the right eye saw of frame `index`, of [`Recording::size`], as luma into `into`.
+    ///
+    /// # Errors
+    /// As [`Recording::read_color`]; also where the recording has one eye only.
+    pub fn read_right(&self, index: usize, scratch: &mut Scratch, into: &mut GrayImage) -> Result<(), RecordingError> {
+        let one_eye = || RecordingError::NoRight { dir: self.folder.dir.clone() };
+        let frame = self.frame(index)?;
+        self.pair.as_ref().ok_or_else(one_eye)?;
+        // Without a right picture, the line of the left one is at fault.
+        let source = frame.right.as_ref().unwrap_or(&frame.color);
+        let path = self.folder.locate(source)?;
+        decode::right_luma(&path, self.size, scratch, into).map_err(|fault| source.wrong(&self.folder.dir, fault))
     }
 
     fn frame(&self, index: usize) -> Result<&Frame, RecordingError> {
@@ -202,31 +245,9 @@ impl Recording {
     }
 }
 
-impl Folder {
-    /// The path of a picture, with every link resolved.
-    fn locate(&self, source: &Source) -> Result<PathBuf, RecordingError> {
-        let path = self.root.join(source.file(&self.dir)?);
-        // A path that cannot be resolved cannot be read either, and reading says why.
-        let path = path.canonicalize().unwrap_or(path);
-        if path.starts_with(&self.root) { Ok(path) } else { Err(source.wrong(&self.dir, PictureFault::Outside)) }
-    }
-}
-
-impl Source {
-    /// The file, or the fault of the line that should have named it.
-    fn file(&self, dir: &Path) -> Result<&Path, RecordingError> {
-        self.file.as_deref().map_err(|fault| RecordingError::Line {
-            list: dir.join(self.list),
-            line: self.line,
-            fault: fault.clone(),
-        })
-    }
-
-    /// The error that the picture has `fault`.
-    fn wrong(&self, dir: &Path, fault: PictureFault) -> RecordingError {
-        let file = self.file.clone().unwrap_or_default();
-        RecordingError::Listed { list: dir.join(self.list), line: self.line, file, fault }
-    }
+/// What makes a folder a recording, in all layouts.
+fn looked_for() -> String {
+    LAYOUTS.map(|layout| format!("{} ({})", layout.looked_for, layout.name)).join(", ")
 }
 
 /// The size of the first colour picture that has a readable header; if none has, what is wrong with the first.

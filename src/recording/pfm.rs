@@ -4,8 +4,10 @@ use std::io::Write;
 use std::path::Path;
 
 use super::decode::{self, Scratch};
-use super::error::PictureFault;
-use crate::frame::DepthMap;
+use super::depth_covers;
+use super::fault::PictureFault;
+use crate::frame::{DepthMap, DisparityMap};
+use crate::optics::StereoRig;
 
 /// Whether the name says that the file is a PFM.
 pub(super) fn is_named(path: &Path) -> bool {
@@ -14,11 +16,40 @@ pub(super) fn is_named(path: &Path) -> bool {
 
 /// Reads metres; what is not a depth becomes 0.
 pub(super) fn read(path: &Path) -> Result<DepthMap, PictureFault> {
-    let mut scratch = Scratch::default();
-    parse(scratch.read_file(path)?)
+    let mut map = DepthMap::default();
+    (map.width, map.height) = parse(Scratch::default().read_file(path)?, &mut map.metres)?;
+    Ok(map)
 }
 
-fn parse(bytes: &[u8]) -> Result<DepthMap, PictureFault> {
+/// Reads disparities in pixels; what is unknown becomes 0.
+pub(super) fn read_disparity(path: &Path) -> Result<DisparityMap, PictureFault> {
+    let mut map = DisparityMap::default();
+    (map.width, map.height) = parse(Scratch::default().read_file(path)?, &mut map.px)?;
+    Ok(map)
+}
+
+/// Reads disparities that `rig` turns into metres. They cover a colour picture of `color` pixels, for which `rig` is.
+pub(super) fn read_disparity_as_depth(
+    path: &Path,
+    rig: &StereoRig,
+    color: (u32, u32),
+    scratch: &mut Scratch,
+    into: &mut DepthMap,
+) -> Result<(), PictureFault> {
+    let found = parse(scratch.read_file(path)?, &mut into.metres)?;
+    if !depth_covers(found, color) {
+        return Err(PictureFault::DepthSize { found, color });
+    }
+    (into.width, into.height) = found;
+    let zoom = color.0 as f32 / found.0 as f32;
+    for value in &mut into.metres {
+        *value = if DepthMap::is_known(*value) { rig.depth_m(*value * zoom) } else { 0.0 };
+    }
+    Ok(())
+}
+
+/// Columns and rows, and the values, top row first; what is not a finite number above 0 becomes 0.
+fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<(u32, u32), PictureFault> {
     let mut rest = bytes;
     let magic = word(&mut rest)?;
     if magic != "Pf" {
@@ -38,9 +69,10 @@ fn parse(bytes: &[u8]) -> Result<DepthMap, PictureFault> {
 
     let from_bytes = if scale < 0.0 { f32::from_le_bytes } else { f32::from_be_bytes };
     let rows = data.chunks_exact(row_bytes).rev();
-    let metres = rows.flat_map(|row| row.as_chunks().0).map(|&bytes| from_bytes(bytes));
-    let metres = metres.map(|metres| if DepthMap::is_known(metres) { metres } else { 0.0 }).collect();
-    Ok(DepthMap { width, height, metres })
+    let read = rows.flat_map(|row| row.as_chunks().0).map(|&bytes| from_bytes(bytes));
+    values.clear();
+    values.extend(read.map(|value| if DepthMap::is_known(value) { value } else { 0.0 }));
+    Ok((width, height))
 }
 
 /// The next word of the header. Exactly one white space ends it, since pixels may follow.

@@ -1,4 +1,4 @@
-//! Single pictures: colour, depth and grey, to and from files.
+//! Single pictures: colour, depth, disparity and grey, to and from files.
 //!
 //! What is written appears whole or not at all, and replaces nothing unless `force` says so.
 
@@ -7,9 +7,10 @@ use std::path::Path;
 use image::{DynamicImage, ImageError, RgbImage};
 
 use super::decode::{self, DepthUnits, Scratch};
-use super::error::{PictureFault, RecordingError};
+use super::error::RecordingError;
+use super::fault::PictureFault;
 use super::{check_depth_scale, encode, pfm, whole};
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
 /// Reads a PNG or JPEG (told by the content) as 8-bit RGB, upright where it says how it was held. Grey is repeated,
 /// transparency ignored, 16 bits rounded to 8. At most 8192 x 8192 pixels.
@@ -45,6 +46,21 @@ pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result
     Ok(depth)
 }
 
+/// Reads a disparity map in pixels from a `.pfm`, where what is not finite or not above 0 is unknown, or from a 16-bit
+/// grey PNG of 256 units per pixel, where 0 is unknown (KITTI). At most 8192 x 8192 pixels.
+///
+/// # Errors
+/// As [`read_depth`].
+pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
+    if pfm::is_named(path) {
+        return pfm::read_disparity(path).map_err(RecordingError::picture(path));
+    }
+    let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
+    let units = DepthUnits { scale: encode::DISPARITY_SCALE, invalid: None };
+    decode::depth(path, units, None, &mut scratch, &mut map).map_err(RecordingError::picture(path))?;
+    Ok(DisparityMap { width: map.width, height: map.height, px: map.metres })
+}
+
 /// Reads a PNG or JPEG as columns, rows and grey values, row-major, 0 to 1 as stored (not linearised): the luma of a
 /// colour, and darker as it is more transparent. At most 8192 x 8192 pixels.
 ///
@@ -77,15 +93,56 @@ pub fn write_color(path: &Path, image: &ColorImage, force: bool) -> Result<(), R
 pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool) -> Result<(), RecordingError> {
     check_depth_scale(depth_scale)?;
     let mut file = Vec::new();
-    let encoded = if pfm::is_named(path) {
-        pfm::write(depth.width, depth.height, &depth.metres, &mut file);
-        Ok(())
-    } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
-        encode::depth_png(depth, depth_scale, &mut Vec::new(), &mut file)
-    } else {
-        return Err(RecordingError::picture(path)(PictureFault::Extension("`.png` or `.pfm`")));
+    let encoded = match map_format(path)? {
+        MapFormat::Pfm => {
+            pfm::write(depth.width, depth.height, &depth.metres, &mut file);
+            Ok(())
+        }
+        MapFormat::Png => encode::depth_png(depth, depth_scale, &mut Vec::new(), &mut file),
     };
     write(path, encoded, &file, force)
+}
+
+/// Writes a 16-bit grey `.png` of 256 units per pixel, where 0 is unknown and so is what lies beyond 65535 units
+/// (KITTI); or a `.pfm` of pixels, where infinity is unknown (Middlebury).
+///
+/// # Errors
+/// As [`write_color`].
+pub fn write_disparity(path: &Path, disparity: &DisparityMap, force: bool) -> Result<(), RecordingError> {
+    let mut file = Vec::new();
+    let encoded = match map_format(path)? {
+        MapFormat::Pfm => {
+            let or_infinity = |&px: &f32| if DepthMap::is_known(px) { px } else { f32::INFINITY };
+            let px: Vec<f32> = disparity.px.iter().map(or_infinity).collect();
+            pfm::write(disparity.width, disparity.height, &px, &mut file);
+            Ok(())
+        }
+        MapFormat::Png => encode::disparity_png(disparity, &mut file),
+    };
+    write(path, encoded, &file, force)
+}
+
+/// What depth and disparity maps are written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapFormat {
+    /// 16-bit grey.
+    Png,
+    /// Floats.
+    Pfm,
+}
+
+/// The format of a depth or disparity map of this name.
+///
+/// # Errors
+/// It ends with something else than `.png` or `.pfm`.
+pub fn map_format(path: &Path) -> Result<MapFormat, RecordingError> {
+    if pfm::is_named(path) {
+        Ok(MapFormat::Pfm)
+    } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        Ok(MapFormat::Png)
+    } else {
+        Err(RecordingError::picture(path)(PictureFault::Extension("`.png` or `.pfm`")))
+    }
 }
 
 fn write(path: &Path, encoded: Result<(), ImageError>, file: &[u8], force: bool) -> Result<(), RecordingError> {

@@ -7,8 +7,8 @@ use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use bokehcam::capture::v4l2::V4l2Camera;
-use bokehcam::capture::{Camera, Captured};
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::capture::{Captured, PATIENCE};
+use bokehcam::frame::ColorImage;
 use bokehcam::v4l2::layout::Content;
 use bokehcam::v4l2::live::Wish;
 use bokehcam::v4l2::node::nodes;
@@ -197,7 +197,7 @@ pub fn frame(camera: &mut V4l2Camera) -> (ColorImage, Lost) {
     let (mut color, mut lost) = (ColorImage::default(), Lost::default());
     let deadline = Instant::now() + Duration::from_secs(10);
     while Instant::now() < deadline {
-        match camera.next(&mut color, &mut DepthMap::default()).unwrap() {
+        match camera.next_within(PATIENCE, &mut color) {
             Captured::Frame(_) => return (color, lost),
             Captured::Lost(count, cause) => *lost.by(&format!("{cause:?}")) += count,
             Captured::Waiting => lost.waits += 1,
@@ -210,7 +210,7 @@ pub fn frame(camera: &mut V4l2Camera) -> (ColorImage, Lost) {
 /// The next frame, if there is one now.
 pub fn frame_now(camera: &mut V4l2Camera) -> Option<ColorImage> {
     let mut color = ColorImage::default();
-    match camera.next(&mut color, &mut DepthMap::default()).unwrap() {
+    match camera.next_within(PATIENCE, &mut color) {
         Captured::Frame(_) => Some(color),
         _ => None,
     }

@@ -12,4 +12,5 @@ mod devices;
 mod faults;
 mod formats;
 mod machine;
+mod two_eyes;
 mod virtual_camera;

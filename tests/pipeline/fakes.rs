@@ -10,11 +10,11 @@ use std::time::Duration;
 
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
 use bokehcam::budget::Quality;
-use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
+use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::compute::GpuError;
 use bokehcam::depth::focus::FocusRule;
-use bokehcam::depth::{DepthError, DepthSource};
+use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{CocAtInfinity, CocRule, Pace, PipelineError, Progress, QualityRule, Run, run};
@@ -58,7 +58,7 @@ pub struct FakeCamera {
     pub frames: usize,
     pub next: usize,
     pub corrupt_every: usize,
-    pub exact_depth: bool,
+    pub brings: Brings,
     pub trouble: Trouble,
 }
 
@@ -74,11 +74,11 @@ impl Camera for FakeCamera {
             period_ns: PERIOD_NS,
             frames: Some(self.frames as u64),
             live: false,
-            exact_depth: self.exact_depth,
+            brings: self.brings,
         }
     }
 
-    fn next(&mut self, color: &mut ColorImage, depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
         if self.next >= self.frames {
             return Ok(Captured::End);
         }
@@ -90,12 +90,17 @@ impl Camera for FakeCamera {
         if index % self.corrupt_every == self.corrupt_every - 1 {
             return Ok(Captured::Corrupt(size_error()));
         }
+        let Shot { color, depth, right } = shot;
         color.resize(SIZE.0, SIZE.1);
         color.rgb.fill(index as u8);
         color.rgb.last_chunk_mut::<2>().unwrap().copy_from_slice(&(index as u16).to_le_bytes());
-        if self.exact_depth {
+        if self.brings == Brings::Depth {
             depth.resize(SIZE.0, SIZE.1);
             depth.metres.fill(1.0 + index as f32);
+        }
+        if self.brings == Brings::RightEye {
+            right.resize(SIZE.0, SIZE.1);
+            right.luma.fill(index as u8);
         }
         Ok(Captured::Frame(Stamp { index, time_ns: index as u64 * PERIOD_NS, captured_ns: None }))
     }
@@ -111,7 +116,7 @@ impl Camera for FakeCamera {
 pub struct FakeDepth(Trouble);
 
 impl DepthSource for FakeDepth {
-    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         let index = stamp.index;
         if self.0.strikes(index) {
             return Err(DepthError::NoDepth { source_name: format!("frame {index}") });
@@ -234,7 +239,7 @@ impl Sink for FakeSink {
 pub struct Setup {
     pub frames: usize,
     pub corrupt_every: usize,
-    pub exact_depth: bool,
+    pub brings: Brings,
     pub camera: Trouble,
     pub depth: Option<Trouble>,
     pub bokeh: Option<FakeBokeh>,
@@ -260,7 +265,7 @@ impl Setup {
         Self {
             frames,
             corrupt_every: NEVER,
-            exact_depth: false,
+            brings: Brings::Color,
             camera: Trouble::default(),
             depth: Some(Trouble::default()),
             bokeh: Some(fake_bokeh(2, Trouble::default())),
@@ -284,7 +289,7 @@ impl Setup {
                 frames: self.frames,
                 next: 0,
                 corrupt_every: self.corrupt_every,
-                exact_depth: self.exact_depth,
+                brings: self.brings,
                 trouble: self.camera,
             }),
             depth: self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _),
@@ -353,9 +358,9 @@ impl Camera for LiveCamera {
         // So slow that no frame is ever late.
         SourceInfo { live: true, period_ns: 3_600_000_000_000, ..self.0.info() }
     }
-    fn next(&mut self, color: &mut ColorImage, depth: &mut DepthMap) -> Result<Captured, CaptureError> {
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
         self.1.fetch_add(1, Ordering::SeqCst);
-        self.0.next(color, depth)
+        self.0.next(shot)
     }
 }
 
@@ -380,5 +385,5 @@ pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a Atomic
 }
 
 pub fn fake_camera(frames: usize) -> FakeCamera {
-    FakeCamera { frames, next: 0, corrupt_every: NEVER, exact_depth: false, trouble: Trouble::default() }
+    FakeCamera { frames, next: 0, corrupt_every: NEVER, brings: Brings::Color, trouble: Trouble::default() }
 }

@@ -7,8 +7,8 @@ use std::time::Duration;
 use bokehcam::bokeh::rung::COSTS;
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
 use bokehcam::budget::Quality;
-use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
-use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::frame::Stamp;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{CocRule, Fault, Pace, QualityRule, Run, run};
 use bokehcam::sink::Null;
@@ -18,8 +18,8 @@ use crate::fakes::*;
 #[test]
 fn depth_comes_with_the_frame_it_belongs_to() {
     // Focus is eased over media time, and all of these frames come within 20 ms: the first one rules.
-    for (exact_depth, depth) in [(false, Some(Trouble::default())), (true, None)] {
-        let (result, received) = Setup { exact_depth, depth, ..Setup::new(20, Pace::Asap) }.run();
+    for (brings, depth) in [(Brings::Color, Some(Trouble::default())), (Brings::Depth, None)] {
+        let (result, received) = Setup { brings, depth, ..Setup::new(20, Pace::Asap) }.run();
         result.unwrap();
         assert!(received.pictures.lock().unwrap().iter().all(|rgb| rgb[0] == 1 && rgb[1] >= 100));
     }
@@ -131,7 +131,7 @@ impl Camera for Columns {
     fn info(&self) -> SourceInfo {
         fake_camera(1).info()
     }
-    fn next(&mut self, color: &mut ColorImage, _: &mut DepthMap) -> Result<Captured, CaptureError> {
+    fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
         if std::mem::replace(&mut self.0, true) {
             return Ok(Captured::End);
         }

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use bokehcam::budget::Quality;
-use bokehcam::capture::{Camera, CaptureError, Captured, SourceInfo};
+use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
-use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::pipeline::{Pace, QualityRule, Run, run};
 use bokehcam::sink::{Sink, SinkError};
@@ -25,10 +25,10 @@ struct Sleeper {
 impl Camera for Sleeper {
     fn info(&self) -> SourceInfo {
         let name = "sleeper".into();
-        SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, exact_depth: false }
+        SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, brings: Brings::Color }
     }
 
-    fn next(&mut self, color: &mut ColorImage, _: &mut DepthMap) -> Result<Captured, CaptureError> {
+    fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
         if !std::mem::replace(&mut self.open, true) {
             self.opened.fetch_add(1, Ordering::SeqCst);
             return Ok(Captured::Waiting);

@@ -5,4 +5,7 @@ mod fakes;
 mod faults;
 mod frames;
 mod live;
+#[path = "../common/planes.rs"]
+mod planes;
 mod replay;
+mod stereo;

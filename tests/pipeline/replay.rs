@@ -7,11 +7,11 @@ use std::sync::atomic::AtomicBool;
 
 use bokehcam::capture::replay::{Part, Replay};
 use bokehcam::capture::synthetic::{Format, Synthetic};
-use bokehcam::capture::{Camera, CaptureError, Captured};
+use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot};
 use bokehcam::depth::beside::Beside;
 use bokehcam::depth::recorded::Recorded;
-use bokehcam::depth::{DepthError, DepthSource};
-use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::pipeline::{Pace, Run, run};
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::recording::{Options, Recording};
@@ -45,10 +45,10 @@ fn replay(dir: &Path, part: Part) -> Result<Replay, CaptureError> {
 
 /// Index, media time in milliseconds and first byte of all frames; at most `limit`.
 fn play(camera: &mut dyn Camera, limit: usize) -> Vec<(usize, u64, u8)> {
-    let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let mut frames = Vec::new();
     while frames.len() < limit {
-        match camera.next(&mut color, &mut depth).unwrap() {
+        match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
             Captured::Frame(Stamp { index, time_ns, .. }) => frames.push((index, time_ns / 1_000_000, color.rgb[0])),
             Captured::Corrupt(error) => panic!("{error}"),
             Captured::End => break,
@@ -65,7 +65,7 @@ fn a_recording_plays_from_start_to_end() {
     let mut whole = replay(folder.path(), Part::default()).unwrap();
     let info = whole.info();
     assert_eq!((info.size, info.period_ns, info.frames), (SIZE, STEP_NS, Some(10)));
-    assert_eq!((info.name.as_str(), info.live, info.exact_depth), ("test recording", false, false));
+    assert_eq!((info.name.as_str(), info.live, info.brings), ("test recording", false, Brings::Color));
     assert!(play(&mut whole, 99).into_iter().eq((0..10).map(|i| (i, 40 * i as u64, i as u8))));
 
     // From 0.08 s, that frame included, to before 0.2 s.
@@ -135,13 +135,19 @@ fn sink_options() -> bokehcam::sink::Options {
     bokehcam::sink::Options::new(SIZE, STEP_NS)
 }
 
+/// A frame of which only the stamp counts.
+fn seen(stamp: Stamp) -> Seen<'static> {
+    static BLACK: ColorImage = ColorImage { width: 0, height: 0, rgb: Vec::new() };
+    Seen { stamp, color: &BLACK, right: None }
+}
+
 #[test]
 fn recorded_depth_is_that_of_the_frame() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), true);
     let mut depth = Recorded::new(open(folder.path()), "test recording").unwrap();
     let mut map = DepthMap::default();
-    depth.read(Stamp { index: 7, time_ns: 0, captured_ns: None }, &mut map).unwrap();
+    depth.read(seen(Stamp { index: 7, time_ns: 0, captured_ns: None }), &mut map).unwrap();
     assert_eq!(map.size(), SIZE);
     assert!(map.metres.iter().all(|&z_m| (z_m - 1.7).abs() < 1e-3));
 
@@ -160,7 +166,7 @@ fn depth_beside_other_colours_follows_their_time_in_a_loop() {
     let mut map = DepthMap::default();
     // A lap lasts 400 ms; the camera counts its frames as it likes.
     for (time_ms, frame) in [(0, 0), (39, 0), (40, 1), (41, 1), (399, 9), (400, 0), (850, 1), (40_000_120, 3), (0, 0)] {
-        depth.read(Stamp { index: 77, time_ns: time_ms * 1_000_000, captured_ns: Some(5) }, &mut map).unwrap();
+        depth.read(seen(Stamp { index: 77, time_ns: time_ms * 1_000_000, captured_ns: Some(5) }), &mut map).unwrap();
         assert_eq!(map.size(), SIZE);
         assert!(map.metres.iter().all(|&z_m| (z_m - 1.0 - 0.1 * frame as f32).abs() < 1e-3), "{time_ms} ms");
     }
@@ -174,7 +180,7 @@ fn depth_beside_other_colours_follows_their_time_in_a_loop() {
 struct Late(usize);
 
 impl DepthSource for Late {
-    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         if stamp.index < self.0 {
             return Err(DepthError::Unpaired { source_name: "a depth camera".to_owned() });
         }
@@ -238,16 +244,20 @@ fn the_synthetic_camera_knows_its_depth() {
     let mut camera = Synthetic::new(format).unwrap();
     let info = camera.info();
     assert_eq!((info.size, info.period_ns, info.frames), ((48, 27), 80_000_000, Some(3)));
-    assert!(info.exact_depth && !info.live);
-    let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
+    assert!(info.brings == Brings::Depth && !info.live);
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     for index in 0..3 {
-        let Captured::Frame(stamp) = camera.next(&mut color, &mut depth).unwrap() else { panic!("frame {index}") };
+        let Captured::Frame(stamp) =
+            camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap()
+        else {
+            panic!("frame {index}")
+        };
         assert_eq!(stamp, Stamp { index, time_ns: index as u64 * 80_000_000, captured_ns: None });
         assert_eq!((color.size(), depth.size()), ((48, 27), (48, 27)));
         assert!(color.rgb.iter().any(|&byte| byte != color.rgb[0]));
         assert!(depth.metres.iter().any(|&z_m| DepthMap::is_known(z_m)));
     }
-    assert!(matches!(camera.next(&mut color, &mut depth), Ok(Captured::End)));
+    assert!(matches!(camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }), Ok(Captured::End)));
 
     for (size, fps) in [((0, 9), 30.0), ((9, 9000), 30.0), ((9, 9), 0.0), ((9, 9), f64::NAN)] {
         assert!(matches!(Synthetic::new(Format { size, fps, ..format }), Err(CaptureError::Format { .. })));

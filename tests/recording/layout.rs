@@ -25,7 +25,7 @@ fn colour_and_depth_are_paired_by_nearest_time() {
     let recording = scene.open().unwrap();
     assert_eq!(recording.layout(), "TUM RGB-D");
     assert_eq!((recording.len(), recording.is_empty(), recording.has_depth()), (2, false, true));
-    assert_eq!(recording.unpaired(), Unpaired { color: 2, depth: 1 });
+    assert_eq!(recording.unpaired(), Unpaired { color: 2, depth: 1, right: 0 });
     assert_eq!(times_ns(&recording), [0, 67_907_000]);
     assert_eq!(color_of(&recording, 1).unwrap().rgb[0], 2);
     assert_eq!(depth_of(&recording, 1).unwrap().metres[0], 0.4);
@@ -42,7 +42,7 @@ fn a_depth_map_serves_one_picture_only() {
     scene.write("rgb.txt", "1.000 rgb/0.png\n1.004 rgb/1.png\n1.008 rgb/2.png\n");
     scene.write("depth.txt", "1.005 depth/1.png\n");
     let recording = scene.open().unwrap();
-    assert_eq!(recording.unpaired(), Unpaired { color: 2, depth: 0 });
+    assert_eq!(recording.unpaired(), Unpaired { color: 2, depth: 0, right: 0 });
     assert_eq!(recording.len(), 1);
     assert_eq!(color_of(&recording, 0).unwrap().rgb[0], 1);
 }

@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use bokehcam::frame::{ColorImage, DepthMap};
-use bokehcam::recording::still::{read_color, read_depth, read_grey, write_color, write_depth};
+use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
+use bokehcam::recording::still::{
+    read_color, read_depth, read_disparity, read_grey, write_color, write_depth, write_disparity,
+};
 use image::{DynamicImage, GrayAlphaImage, ImageBuffer, Luma, Rgb, RgbaImage};
 use tempfile::TempDir;
 
@@ -113,6 +115,29 @@ fn depth_survives_png_within_half_a_unit_and_pfm_exactly() {
     write_depth(&pfm, &depth, 1000.0, false).unwrap();
     assert_eq!(read_depth(&pfm, 1.0, None).unwrap(), depth);
     assert_says(read_depth(&png, f32::NAN, None), &["depth scale"]);
+}
+
+#[test]
+fn disparity_survives_png_within_half_a_unit_and_pfm_exactly() {
+    let dir = TempDir::new().unwrap();
+    let px: Vec<f32> = (0..35).map(|index| if index % 4 == 0 { 0.0 } else { 7.3217 * index as f32 }).collect();
+    let disparity = DisparityMap { width: 7, height: 5, px };
+    let [png, pfm] = ["d.png", "d.pfm"].map(|name| dir.path().join(name));
+    for path in [&png, &pfm] {
+        write_disparity(path, &disparity, false).unwrap();
+        assert_says(write_disparity(path, &disparity, false), &["already there"]);
+    }
+    assert_eq!(read_disparity(&pfm).unwrap(), disparity);
+    let read = read_disparity(&png).unwrap();
+    assert_eq!(read.size(), (7, 5));
+    assert!(disparity.px.iter().zip(&read.px).all(|(a, b)| (a - b).abs() <= 0.5 / 256.0));
+    // As others read the files: KITTI's 0 and Middlebury's infinity are unknown.
+    let raw = image::open(&png).unwrap().into_luma16();
+    assert_eq!((raw.get_pixel(0, 0)[0], raw.get_pixel(1, 0)[0]), (0, 1874));
+    // The first value is the bottom row's.
+    let first = "Pf\n7 5\n-1\n".len();
+    assert_eq!(fs::read(&pfm).unwrap()[first..first + 4], f32::INFINITY.to_le_bytes());
+    assert_says(write_disparity(&dir.path().join("d.jpg"), &disparity, false), &["`.png` or `.pfm`"]);
 }
 
 fn read_pfm(dir: &Path, content: &[u8]) -> Result<DepthMap, bokehcam::recording::RecordingError> {

@@ -13,9 +13,9 @@ use std::time::Duration;
 pub use units::Units;
 
 use super::registration::Registration;
-use super::{DepthError, DepthSource};
+use super::{DepthError, DepthSource, Seen};
 use crate::clock::Clock;
-use crate::frame::{DepthMap, Stamp};
+use crate::frame::DepthMap;
 use crate::v4l2::layout::Content;
 use crate::v4l2::live::{Live, Next, OpenError, Wish};
 use pairing::Pairing;
@@ -90,7 +90,7 @@ impl LiveDepth {
 }
 
 impl DepthSource for LiveDepth {
-    fn read(&mut self, stamp: Stamp, map: &mut DepthMap) -> Result<(), DepthError> {
+    fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         self.take_news(Duration::ZERO);
         let now_ns = self.clock.now_ns();
         let taken_ns = stamp.captured_ns.unwrap_or(now_ns);

@@ -39,7 +39,8 @@ pub fn grow(whole: &GrayImage, small: &GrayImage, px: &[f32], into: &mut [f32]) 
             let at = x / 2;
             let beside = if x % 2 == 0 { at.saturating_sub(1) } else { (at + 1).min(columns - 1) };
             let mut best = (u8::MAX, 0.0);
-            for place in [near * columns + at, near * columns + beside, other * columns + at, other * columns + beside] {
+            for place in [near * columns + at, near * columns + beside, other * columns + at, other * columns + beside]
+            {
                 let apart = small.luma[place].abs_diff(luma);
                 if apart < best.0 || place == near * columns + at {
                     best = (apart, px[place]);

@@ -3,6 +3,8 @@
 //! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on, in whole numbers, so that
 //! all executors find the same ([`fixed`]); what is made of them is common to all ([`tidy`]).
 
+mod border;
+pub mod check;
 pub mod cpu;
 pub mod executor;
 pub mod fixed;
@@ -11,6 +13,7 @@ mod gaps;
 pub mod gpu;
 mod half;
 mod penalty;
+pub mod source;
 mod speckle;
 mod tidy;
 
@@ -54,10 +57,7 @@ pub trait Matcher: Send {
     fn describe(&self) -> String;
 
     /// Changes the effort from the next pair on.
-    ///
-    /// # Errors
-    /// The GPU has no room for another effort.
-    fn set_effort(&mut self, effort: Effort) -> Result<(), MatchError>;
+    fn set_effort(&mut self, effort: Effort);
 
     /// The disparity of the pair `left`, `right` into `into`, which becomes as large as they are; every pixel is
     /// answered.
@@ -99,16 +99,15 @@ pub enum MatchError {
 /// # Errors
 /// A GPU was asked for and there is none that fits, or it failed.
 pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> Result<Box<dyn Matcher>, MatchError> {
-    let threads = settings.threads.max(1);
-    let mut matching = Matching {
+    let team = Team::new("match", settings.threads);
+    let executors = Executors::new(backend, adapter, team.threads())?;
+    let level = |effort| Level::new(settings, effort, &executors);
+    Ok(Box::new(Matching {
         settings: *settings,
-        executors: Executors::new(backend, adapter, threads)?,
-        team: Team::new("match", threads),
-        levels: [None, None],
+        levels: [level(Effort::Fast)?, level(Effort::Full)?],
+        team,
         small: [GrayImage::default(), GrayImage::default()],
-    };
-    matching.set_effort(settings.effort)?;
-    Ok(Box::new(matching))
+    }))
 }
 
 /// Islands of so many pixels are chance, in whole pictures.
@@ -116,10 +115,9 @@ const SPECKLE: u32 = 100;
 
 struct Matching {
     settings: Settings,
-    executors: Executors,
     team: Team,
-    /// By effort; made when it is first asked for.
-    levels: [Option<Level>; 2],
+    /// By effort.
+    levels: [Level; 2],
     /// Left and right at half the size.
     small: [GrayImage; 2],
 }
@@ -151,16 +149,11 @@ impl Level {
 
 impl Matcher for Matching {
     fn describe(&self) -> String {
-        self.levels[self.settings.effort as usize].as_ref().map_or_else(String::new, |level| level.executor.describe())
+        self.levels[self.settings.effort as usize].executor.describe()
     }
 
-    fn set_effort(&mut self, effort: Effort) -> Result<(), MatchError> {
-        let level = &mut self.levels[effort as usize];
-        if level.is_none() {
-            *level = Some(Level::new(&self.settings, effort, &self.executors)?);
-        }
+    fn set_effort(&mut self, effort: Effort) {
         self.settings.effort = effort;
-        Ok(())
     }
 
     fn disparity(&mut self, left: &GrayImage, right: &GrayImage, into: &mut DisparityMap) -> Result<(), MatchError> {
@@ -171,18 +164,18 @@ impl Matcher for Matching {
             return Err(MatchError::Size { made_for: self.settings.size, got: left.size() });
         }
         into.resize(left.width, left.height);
-        let Self { settings, team, levels, small, .. } = self;
-        let Some(Level { executor, tidy, map, px }) = &mut levels[settings.effort as usize] else { return Ok(()) };
+        let Self { settings, team, levels, small } = self;
+        let Level { executor, tidy, map, px } = &mut levels[settings.effort as usize];
         match settings.effort {
             Effort::Full => {
                 executor.winners(&left.luma, &right.luma, team, map)?;
-                tidy.tidy(map, SPECKLE, team, &mut into.px);
+                tidy.tidy(map, &left.luma, SPECKLE, team, &mut into.px);
             }
             Effort::Fast => {
                 half::shrink(left, &mut small[0]);
                 half::shrink(right, &mut small[1]);
                 executor.winners(&small[0].luma, &small[1].luma, team, map)?;
-                tidy.tidy(map, SPECKLE / 4, team, px);
+                tidy.tidy(map, &small[0].luma, SPECKLE / 4, team, px);
                 half::grow(left, &small[0], px, &mut into.px);
             }
         }

@@ -76,7 +76,8 @@ impl Speckles {
         for below in 0..self.runs.len() {
             let run = self.runs[below];
             // Runs are in the order of the rows, and of the columns in them.
-            while self.runs[above].y + 1 < run.y || (self.runs[above].y + 1 == run.y && self.runs[above].end <= run.start)
+            while self.runs[above].y + 1 < run.y
+                || (self.runs[above].y + 1 == run.y && self.runs[above].end <= run.start)
             {
                 above += 1;
             }

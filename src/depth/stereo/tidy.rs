@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, WithSimd};
 
+use super::border::Border;
 use super::fixed::ONE;
 use super::gaps;
 use super::speckle::Speckles;
@@ -14,6 +15,7 @@ use crate::compute::team::{Shelf, Team};
 pub struct Tidy {
     width: usize,
     speckles: Speckles,
+    border: Border,
     taken: Vec<AtomicBool>,
     arch: Arch,
 }
@@ -24,6 +26,7 @@ impl Tidy {
         Self {
             width,
             speckles: Speckles::new(width * height),
+            border: Border::default(),
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
             arch: Arch::new(),
         }
@@ -31,10 +34,11 @@ impl Tidy {
 
     /// Tidies `map` up, which is left with its gaps filled, and writes its median to `px`, in pixels, above 0. Islands
     /// of at most `speckle` pixels go.
-    pub fn tidy(&mut self, map: &mut [u16], speckle: u32, team: &mut Team, px: &mut [f32]) {
-        let Self { width, speckles, taken, arch } = self;
+    pub fn tidy(&mut self, map: &mut [u16], luma: &[u8], speckle: u32, team: &mut Team, px: &mut [f32]) {
+        let Self { width, speckles, border, taken, arch } = self;
         let (width, arch) = (*width, *arch);
         speckles.remove(map, width, speckle);
+        border.fill(map, luma, width);
         gaps::fill(map, width);
         let map = &*map;
         let height = map.len() / width;
@@ -75,7 +79,14 @@ impl WithSimd for Median<'_> {
         let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
         for (x, out) in out[1..=inner].iter_mut().enumerate() {
             *out = px(median([
-                above[0][x], above[1][x], above[2][x], here[0][x], here[1][x], here[2][x], below[0][x], below[1][x],
+                above[0][x],
+                above[1][x],
+                above[2][x],
+                here[0][x],
+                here[1][x],
+                here[2][x],
+                below[0][x],
+                below[1][x],
                 below[2][x],
             ]));
         }

@@ -1,167 +1,46 @@
 //! The lists: which picture was taken when.
 
-use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 use super::time::parse_ns;
-use crate::recording::Source;
-use crate::recording::error::{LineFault, RecordingError};
+use crate::recording::contents::Place;
+use crate::recording::error::RecordingError;
+use crate::recording::fault::LineFault;
+use crate::recording::list::{self, Entry, inside, quoted};
 
-/// Faulty text is quoted in messages up to this length.
-const QUOTED_CHARS: usize = 40;
-
-/// A time and a file.
-#[derive(Debug)]
-pub(super) struct Entry {
-    /// Nanoseconds; nothing where the line gives no time that can be used, and then `source` has the fault.
-    pub(super) time_ns: Option<u64>,
-    pub(super) source: Source,
+fn entry(place: Place, time: &str, file: &str) -> Entry {
+    Entry::new(place, parse_ns(time).ok_or_else(|| LineFault::Time(quoted(time))), inside(file))
 }
 
-impl Entry {
-    fn new(list: &'static str, line: u32, time: &str, file: &str) -> Self {
-        match parse_ns(time) {
-            Some(time_ns) => Self { time_ns: Some(time_ns), source: Source { list, line, file: inside(file) } },
-            None => Self::faulty(list, line, LineFault::Time(quoted(time))),
-        }
-    }
-
-    fn faulty(list: &'static str, line: u32, fault: LineFault) -> Self {
-        Self { time_ns: None, source: Source { list, line, file: Err(fault) } }
-    }
+fn faulty(place: Place, fault: LineFault) -> Entry {
+    Entry::new(place, Err(fault.clone()), Err(fault))
 }
 
 /// Reads lines of `time file`.
 pub(super) fn read(dir: &Path, list: &'static str) -> Result<Vec<Entry>, RecordingError> {
     let expected = "time file";
-    let bytes = read_bytes(dir, list)?;
-    let entries = lines(&bytes).map(|(line, text)| match text.map(columns) {
-        Ok((_, [Some(time), Some(file), None, ..])) => Entry::new(list, line, time, file),
-        Ok((found, _)) => Entry::faulty(list, line, LineFault::Columns { expected, found }),
-        Err(fault) => Entry::faulty(list, line, fault),
-    });
-    not_empty(dir, list, entries.collect())
+    list::read(dir, list, |place, text| match text.map(columns) {
+        Ok((_, [Some(time), Some(file), None, ..])) => entry(place, time, file),
+        Ok((found, _)) => faulty(place, LineFault::Columns { expected, found }),
+        Err(fault) => faulty(place, fault),
+    })
 }
 
 /// Reads lines of `time file time file`; as many entries on the left as on the right.
 pub(super) fn read_pairs(dir: &Path, list: &'static str) -> Result<Vec<[Entry; 2]>, RecordingError> {
     let expected = "time file time file";
-    let bytes = read_bytes(dir, list)?;
-    let faulty = |line, fault: LineFault| [fault.clone(), fault].map(|fault| Entry::faulty(list, line, fault));
-    let pairs = lines(&bytes).map(|(line, text)| match text.map(columns) {
+    let both_faulty = |place, fault: LineFault| [faulty(place, fault.clone()), faulty(place, fault)];
+    list::read(dir, list, |place, text| match text.map(columns) {
         Ok((_, [Some(time), Some(file), Some(other_time), Some(other_file), None])) => {
-            [Entry::new(list, line, time, file), Entry::new(list, line, other_time, other_file)]
+            [entry(place, time, file), entry(place, other_time, other_file)]
         }
-        Ok((found, _)) => faulty(line, LineFault::Columns { expected, found }),
-        Err(fault) => faulty(line, fault),
-    });
-    not_empty(dir, list, pairs.collect())
-}
-
-/// Takes the time from entries that break the order of times. As few as possible are given up: one wrong time far
-/// ahead does not cost all that follow it, and of equal times the first is kept.
-pub(super) fn give_up_disorder<'a>(entries: impl Iterator<Item = &'a mut Entry>) {
-    let entries: Vec<_> = entries.filter(|entry| entry.time_ns.is_some()).collect();
-    let times: Vec<_> = entries.iter().filter_map(|entry| entry.time_ns).collect();
-    for (entry, is_kept) in entries.into_iter().zip(longest_increase(&times)) {
-        if !is_kept {
-            entry.time_ns = None;
-            entry.source.file = Err(LineFault::OutOfOrder);
-        }
-    }
-}
-
-/// Marks a longest strictly increasing subsequence (patience sorting, from the end).
-fn longest_increase(times: &[u64]) -> Vec<bool> {
-    // heads[k] begins the run of k + 1 elements that leaves the most room before it.
-    let mut heads: Vec<usize> = Vec::new();
-    let mut next = vec![None; times.len()];
-    for (index, &time) in times.iter().enumerate().rev() {
-        let length = heads.partition_point(|&head| times[head] > time);
-        next[index] = length.checked_sub(1).map(|shorter| heads[shorter]);
-        match heads.get_mut(length) {
-            Some(head) => *head = index,
-            None => heads.push(index),
-        }
-    }
-    let mut is_kept = vec![false; times.len()];
-    let mut at = heads.last().copied();
-    while let Some(index) = at {
-        is_kept[index] = true;
-        at = next[index];
-    }
-    is_kept
-}
-
-fn read_bytes(dir: &Path, list: &str) -> Result<Vec<u8>, RecordingError> {
-    let path = dir.join(list);
-    fs::read(&path).map_err(RecordingError::io("read the list", &path))
-}
-
-fn not_empty<T>(dir: &Path, list: &str, entries: Vec<T>) -> Result<Vec<T>, RecordingError> {
-    if entries.is_empty() { Err(RecordingError::EmptyList { list: dir.join(list) }) } else { Ok(entries) }
-}
-
-/// Numbers, from 1, and texts of the lines that are neither blank nor comments.
-fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, LineFault>)> {
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let lines = (1..).zip(bytes.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii));
-    lines
-        .filter(|(_, text)| !text.is_empty() && !text.starts_with(b"#"))
-        .map(|(line, text)| (line, str::from_utf8(text).map_err(|_| LineFault::NotUtf8)))
+        Ok((found, _)) => both_faulty(place, LineFault::Columns { expected, found }),
+        Err(fault) => both_faulty(place, fault),
+    })
 }
 
 /// How many columns there are, and the first five.
 fn columns(text: &str) -> (usize, [Option<&str>; 5]) {
     let mut columns = text.split_ascii_whitespace();
     (columns.clone().count(), std::array::from_fn(|_| columns.next()))
-}
-
-/// A file name that stays in its folder, as far as its text tells.
-fn inside(file: &str) -> Result<PathBuf, LineFault> {
-    if file.contains(char::is_control) {
-        return Err(LineFault::FileName(quoted(file)));
-    }
-    let path = PathBuf::from(file);
-    let is_inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if is_inside { Ok(path) } else { Err(LineFault::Outside(path)) }
-}
-
-fn quoted(text: &str) -> String {
-    text.chars().take(QUOTED_CHARS).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn kept(times: &[u64]) -> Vec<u64> {
-        times.iter().zip(longest_increase(times)).filter(|(_, is_kept)| *is_kept).map(|(&time, _)| time).collect()
-    }
-
-    #[test]
-    fn as_few_times_as_possible_are_given_up() {
-        assert!(kept(&[]).is_empty());
-        assert_eq!(kept(&[1, 2, 3]), [1, 2, 3]);
-        assert_eq!(kept(&[1, 99, 2, 3, 4]), [1, 2, 3, 4]);
-        assert_eq!(kept(&[5, 6, 0, 7, 8]), [5, 6, 7, 8]);
-        assert_eq!(kept(&[3, 2, 1]), [3]);
-    }
-
-    #[test]
-    fn the_first_of_equal_times_is_kept() {
-        assert_eq!(longest_increase(&[1, 2, 2, 3]), [true, true, false, true]);
-        assert_eq!(longest_increase(&[4, 4, 4]), [true, false, false]);
-    }
-
-    #[test]
-    fn names_stay_inside() {
-        for name in ["rgb/1.png", "1.png", "./rgb/1.png", "rgb/..1.png"] {
-            assert_eq!(inside(name), Ok(PathBuf::from(name)));
-        }
-        for name in ["../1.png", "rgb/../../1.png", "/etc/passwd", "rgb/..", ".."] {
-            assert_eq!(inside(name), Err(LineFault::Outside(PathBuf::from(name))));
-        }
-        assert!(matches!(inside("rgb/\u{1b}[2J.png"), Err(LineFault::FileName(_))));
-    }
 }

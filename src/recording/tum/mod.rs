@@ -7,15 +7,15 @@
 
 mod list;
 mod open;
-mod pair;
 mod time;
 mod writer;
 
-pub(super) use open::open;
+use super::contents::Layout;
 pub use writer::{Writer, WriterOptions};
 
-/// The name of the layout.
-pub(super) const LAYOUT: &str = "TUM RGB-D";
+/// Lists of colour pictures and depth maps.
+pub(super) const LAYOUT: Layout =
+    Layout { name: "TUM RGB-D", looked_for: "associations.txt or rgb.txt", is_in: open::is_in, open: open::open };
 
 /// Units per metre of the benchmark's depth pictures.
 pub(super) const DEPTH_SCALE: f32 = 5000.0;

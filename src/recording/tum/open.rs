@@ -3,47 +3,35 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use super::list::{self, Entry};
-use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, pair};
-use crate::recording::decode::{self, Kind, Scratch};
+use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
+use crate::recording::contents::{Contents, DepthForm, Folder, Listed, Source};
+use crate::recording::decode::{self, DepthUnits, Kind, Scratch};
 use crate::recording::error::RecordingError;
-use crate::recording::{Folder, Options, Source, Unpaired};
+use crate::recording::list::{Entry, give_up_disorder, refuse_faults};
+use crate::recording::{Options, Unpaired, pair};
 
-/// What a folder in this layout holds.
-pub(in crate::recording) struct Contents {
-    pub(in crate::recording) frames: Vec<Listed>,
-    pub(in crate::recording) has_depth: bool,
-    pub(in crate::recording) unpaired: Unpaired,
-}
-
-/// A frame as listed. The times that there are increase strictly; a colour without one is faulty.
-pub(in crate::recording) struct Listed {
-    pub(in crate::recording) time_ns: Option<u64>,
-    pub(in crate::recording) color: Source,
-    pub(in crate::recording) depth: Option<Source>,
+/// Whether `dir` has a list of this layout.
+pub(super) fn is_in(dir: &Path) -> bool {
+    [ASSOCIATIONS, COLOR_LIST, DEPTH_LIST].iter().any(|list| dir.join(list).exists())
 }
 
 /// Reads the lists in `folder`.
-pub(in crate::recording) fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
+pub(super) fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     let has = |list: &str| dir.join(list).exists();
     match (has(ASSOCIATIONS), has(COLOR_LIST), has(DEPTH_LIST)) {
         (true, ..) => from_associations(folder, options),
         (false, true, has_depth) => from_lists(dir, has_depth, options),
-        (false, false, true) => {
+        (false, false, _) => {
             Err(RecordingError::MissingList { dir: dir.clone(), missing: COLOR_LIST, present: DEPTH_LIST })
         }
-        (false, false, false) => Err(RecordingError::NotARecording {
-            dir: dir.clone(),
-            looked_for: "associations.txt and rgb.txt (TUM RGB-D)",
-        }),
     }
 }
 
 fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents, RecordingError> {
     let read = |list| {
         let mut entries = list::read(dir, list)?;
-        list::give_up_disorder(entries.iter_mut());
+        give_up_disorder(entries.iter_mut());
         if !options.keep_going {
             refuse_faults(dir, entries.iter())?;
         }
@@ -51,37 +39,26 @@ fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents
     };
     let colors = read(COLOR_LIST)?;
     if !has_depth {
-        let frame = |Entry { time_ns, source }| Listed { time_ns, color: source, depth: None };
-        let frames = colors.into_iter().map(frame).collect();
-        return Ok(Contents { frames, has_depth, unpaired: Unpaired::default() });
+        let frame = |color: Entry| frame(color, None);
+        return Ok(contents(colors.into_iter().map(frame).collect(), None, Unpaired::default()));
     }
-
-    let times = |entries: &[Entry]| entries.iter().filter_map(|entry| entry.time_ns).collect::<Vec<_>>();
-    let depths = read(DEPTH_LIST)?;
-    let mut partners = pair::nearest(&times(&colors), &times(&depths), options.pair_tolerance_ns).into_iter();
-
-    let mut unpaired = Unpaired { color: 0, depth: depths.len() };
-    let mut timed_depths: Vec<_> =
-        depths.into_iter().filter(|depth| depth.time_ns.is_some()).map(|depth| Some(depth.source)).collect();
-    let mut frames = Vec::new();
-    for Entry { time_ns, source: color } in colors {
-        let depth = match time_ns {
-            Some(_) => partners.next().flatten().and_then(|partner| timed_depths[partner].take()),
-            None => None,
-        };
-        // A faulty line stays, to be counted where it is read.
-        match (time_ns, &depth) {
-            (Some(_), None) => unpaired.color += 1,
-            _ => {
-                unpaired.depth -= usize::from(depth.is_some());
-                frames.push(Listed { time_ns, color, depth });
-            }
-        }
-    }
-    if frames.iter().all(|frame| frame.depth.is_none()) {
+    let paired = pair::join(colors, read(DEPTH_LIST)?, options.pair_tolerance_ns);
+    if paired.frames.iter().all(|(_, depth)| depth.is_none()) {
         return Err(RecordingError::NoPairs { dir: dir.to_owned(), tolerance_ns: options.pair_tolerance_ns });
     }
-    Ok(Contents { frames, has_depth, unpaired })
+    let unpaired = Unpaired { color: paired.left_over, depth: paired.others_left_over, ..Unpaired::default() };
+    let frames = paired.frames.into_iter().map(|(color, depth)| frame(color, depth)).collect();
+    Ok(contents(frames, Some(options), unpaired))
+}
+
+fn frame(color: Entry, depth: Option<Source>) -> Listed {
+    Listed { time_ns: color.time_ns, color: color.source, right: None, depth }
+}
+
+fn contents(frames: Vec<Listed>, depth: Option<&Options>, unpaired: Unpaired) -> Contents {
+    let units = |options: &Options| DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid };
+    let depth = depth.map(|options| DepthForm::Units(units(options)));
+    Contents { frames, depth, pair: None, disparities: None, unpaired }
 }
 
 fn from_associations(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
@@ -89,14 +66,12 @@ fn from_associations(folder: &Folder, options: &Options) -> Result<Contents, Rec
     if !is_color_first(folder, &pairs)? {
         pairs.iter_mut().for_each(|pair| pair.reverse());
     }
-    list::give_up_disorder(pairs.iter_mut().map(|[color, _]| color));
+    give_up_disorder(pairs.iter_mut().map(|[color, _]| color));
     if !options.keep_going {
         refuse_faults(&folder.dir, pairs.iter().flatten())?;
     }
-    let frame =
-        |[color, depth]: [Entry; 2]| Listed { time_ns: color.time_ns, color: color.source, depth: Some(depth.source) };
-    let frames = pairs.into_iter().map(frame).collect();
-    Ok(Contents { frames, has_depth: true, unpaired: Unpaired::default() })
+    let frames = pairs.into_iter().map(|[color, depth]| frame(color, Some(depth.source))).collect();
+    Ok(contents(frames, Some(options), Unpaired::default()))
 }
 
 /// Whether the colour is in the first columns: told by the other lists, else by the pictures.
@@ -133,8 +108,4 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
 fn kind(folder: &Folder, source: &Source, scratch: &mut Scratch) -> Option<Kind> {
     let path = folder.locate(source).ok()?;
     decode::header(&path, scratch).ok().map(|(_, kind)| kind)
-}
-
-fn refuse_faults<'a>(dir: &Path, mut entries: impl Iterator<Item = &'a Entry>) -> Result<(), RecordingError> {
-    entries.try_for_each(|entry| entry.source.file(dir).map(|_| ()))
 }

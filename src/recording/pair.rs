@@ -3,10 +3,46 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use super::contents::Source;
+use super::list::Entry;
+
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Stream {
     Color(usize),
     Depth(usize),
+}
+
+/// Entries with their partners.
+pub(super) struct Paired {
+    /// Those that have a partner, and faulty ones, to be counted where they are read.
+    pub(super) frames: Vec<(Entry, Option<Source>)>,
+    /// How many of the first list were left over.
+    pub(super) left_over: usize,
+    /// How many of the second one were.
+    pub(super) others_left_over: usize,
+}
+
+/// Pairs two lists by [`nearest`] time.
+pub(super) fn join(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns: u64) -> Paired {
+    let times = |entries: &[Entry]| entries.iter().filter_map(|entry| entry.time_ns).collect::<Vec<_>>();
+    let mut partners = nearest(&times(&entries), &times(&others), tolerance_ns).into_iter();
+
+    let mut paired = Paired { frames: Vec::new(), left_over: 0, others_left_over: others.len() };
+    let mut timed: Vec<_> =
+        others.into_iter().filter(|other| other.time_ns.is_some()).map(|other| Some(other.source)).collect();
+    for entry in entries {
+        let partner = match entry.time_ns {
+            Some(_) => partners.next().flatten().and_then(|partner| timed[partner].take()),
+            None => None,
+        };
+        if entry.time_ns.is_some() && partner.is_none() {
+            paired.left_over += 1;
+        } else {
+            paired.others_left_over -= usize::from(partner.is_some());
+            paired.frames.push((entry, partner));
+        }
+    }
+    paired
 }
 
 /// Pairs of indices into two strictly increasing lists of times: the closest pair first, then the closest of what
@@ -14,7 +50,7 @@ enum Stream {
 ///
 /// In the merged order the closest two of different streams are always neighbours, so that only neighbours are
 /// looked at: `n log n` for any tolerance.
-pub(super) fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
+fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<usize>> {
     let colors = color_ns.iter().enumerate().map(|(index, &time)| (time, Stream::Color(index)));
     let depths = depth_ns.iter().enumerate().map(|(index, &time)| (time, Stream::Depth(index)));
     let mut merged: Vec<_> = colors.chain(depths).collect();

@@ -1,0 +1,240 @@
+//! How steady the disparity is where nothing moves, and how right where something does: with the memory of earlier
+//! frames, and without.
+
+use bokehcam::depth::refine::Refiner;
+use bokehcam::depth::stereo::Effort;
+use bokehcam::frame::{DepthMap, DisparityMap};
+use bokehcam::optics::StereoRig;
+use serde::Serialize;
+
+use super::options::{Flicker, Options, name};
+use super::quality::picture::Plane;
+use super::sequence::{Frame, Sequence, bundled, euroc, kitti};
+use super::{Outcome, matcher, print};
+
+/// The first frames of a sequence are not looked at: what remembers has little to remember there.
+const WARM_UP: usize = 2;
+/// With truth, a pixel is still when its true disparity changes by no more than this, in pixels, and each colour by no
+/// more than so many codes (before noise is put on), within so many columns and rows.
+const STILL_PX: f32 = 1.0 / 128.0;
+const STILL_CODES: u8 = 1;
+const STILL_REACH: i32 = 3;
+/// Without, when the mean over that square of the change of its grey is no more than this, in codes.
+const STILL_MEAN_CODES: f32 = 3.0;
+/// A change of more than this, in pixels, is a jump.
+const JUMP_PX: f32 = 1.0;
+/// A moving edge is where the true disparity changes by more than this, in pixels, and so many columns and rows around;
+/// but not in the leftmost columns, as many as the range, which the right eye may not see.
+const EDGE_PX: f32 = 1.5;
+const EDGE_REACH: i32 = 5;
+
+/// One way to make the disparity of one sequence.
+#[derive(Serialize)]
+struct Record {
+    sequence: &'static str,
+    effort: &'static str,
+    /// After which step.
+    step: &'static str,
+    /// Whether earlier frames were remembered.
+    memory: bool,
+    /// Share of pixels that are still.
+    still_percent: f64,
+    /// Mean absolute change from frame to frame of still pixels, in pixels of disparity.
+    still_change_px: f64,
+    /// Share of still pixels that jump from one frame to the next.
+    still_jumps_percent: f64,
+    /// Share of pixels around moving edges that are off by more than 1 px.
+    moving_bad1_percent: Option<f64>,
+    /// Their mean error.
+    moving_error_px: Option<f64>,
+}
+
+/// Measures and prints.
+///
+/// # Errors
+/// A recording cannot be read; a matcher cannot be made or fails.
+pub fn run(flicker: &Flicker, options: &Options) -> Outcome {
+    let mut sequences = vec![bundled()?];
+    if let Some(data) = &flicker.data {
+        sequences.extend(kitti(data)?.into_iter().chain(euroc(data)?));
+    }
+    if !options.json {
+        println!("sequence  effort step     memory  still %  change px  jumps %   moving bad1 %  error px");
+    }
+    for mut sequence in sequences {
+        let regions = regions(&sequence);
+        if sequence.frames[0].truth.is_some() {
+            (1..).zip(&mut sequence.frames).for_each(|(seed, frame)| frame.add_noise(flicker.noise, seed));
+        }
+        for &effort in &options.efforts {
+            let [without, with] = [false, true].map(|memory| maps(&sequence, options, effort, memory));
+            let (without, with) = (without?, with?);
+            for (step, name) in ["matched", "refined"].into_iter().enumerate() {
+                for (memory, maps) in [(false, &without[step]), (true, &with[step])] {
+                    let record = measure(&sequence, &regions, effort, maps);
+                    let record = Record { step: name, memory, ..record };
+                    print(options, &record.line(), &record)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Disparities of all frames, as matched and as refined. Without memory, every frame is the first one.
+fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) -> Outcome<[Vec<Plane<f32>>; 2]> {
+    let create = || {
+        let size = sequence.frames[0].left.size();
+        matcher::create(options, effort, sequence.disparities, size, None)
+    };
+    let (mut matcher, mut refiner) = (create()?, Refiner::new());
+    let (mut matched, mut refined) = (Vec::new(), Vec::new());
+    for frame in &sequence.frames {
+        if !memory {
+            (matcher, refiner) = (create()?, Refiner::new());
+        }
+        let mut map = DisparityMap::default();
+        let [left, right] = frame.gray();
+        matcher.disparity(&left, &right, &mut map)?;
+        let mut depth = metres(&map, &sequence.rig);
+        refiner.refine(&mut depth, &frame.left, frame.time_ns);
+        let (width, height) = (map.width as usize, map.height as usize);
+        let steady = depth.metres.iter().map(|&z_m| sequence.rig.disparity_px(z_m)).collect();
+        refined.push(Plane { width, height, data: steady });
+        matched.push(Plane { width, height, data: map.px });
+    }
+    Ok([matched, refined])
+}
+
+/// The depth of a disparity map: what is unknown or at infinity is 0.
+pub fn metres(map: &DisparityMap, rig: &StereoRig) -> DepthMap {
+    let metres = map.px.iter().map(|&px| {
+        let z_m = if px > 0.0 { rig.depth_m(px) } else { 0.0 };
+        if DepthMap::is_known(z_m) { z_m } else { 0.0 }
+    });
+    DepthMap { width: map.width, height: map.height, metres: metres.collect() }
+}
+
+/// Of a frame and the one before: pixels that are still, and those around moving edges.
+struct Regions {
+    still: Plane<bool>,
+    moving: Option<Plane<bool>>,
+}
+
+/// For every frame but the first.
+fn regions(sequence: &Sequence) -> Vec<Regions> {
+    sequence.frames.windows(2).map(|pair| Regions { still: still(&pair[0], &pair[1]), moving: moving(pair) }).collect()
+}
+
+fn still(before: &Frame, now: &Frame) -> Plane<bool> {
+    let (width, height) = (now.left.width as usize, now.left.height as usize);
+    if let (Some(a), Some(b)) = (&before.truth, &now.truth) {
+        let differs = Plane::from_fn(width, height, |x, y| {
+            let at = y * width + x;
+            let codes = before.left.rgb[3 * at..3 * at + 3].iter().zip(&now.left.rgb[3 * at..3 * at + 3]);
+            (a.data[at] - b.data[at]).abs() > STILL_PX || codes.into_iter().any(|(a, b)| a.abs_diff(*b) > STILL_CODES)
+        });
+        return grown(&differs, STILL_REACH).map(|differs| !differs);
+    }
+    let ([a, _], [b, _]) = (before.gray(), now.gray());
+    let change =
+        Plane::from_fn(width, height, |x, y| f32::from(b.luma[y * width + x]) - f32::from(a.luma[y * width + x]));
+    let mean = |of: &Plane<f32>, dx: i32, dy: i32| {
+        Plane::from_fn(width, height, |x, y| {
+            let sum: f32 = reach(STILL_REACH).map(|d| of.at(x as i32 + d * dx, y as i32 + d * dy)).sum();
+            sum / reach(STILL_REACH).count() as f32
+        })
+    };
+    // The mean of the change's size, not of the change: texture that moves has none of the latter.
+    mean(&mean(&change.map(f32::abs), 1, 0), 0, 1).map(|codes| codes <= STILL_MEAN_CODES)
+}
+
+fn moving(pair: &[Frame]) -> Option<Plane<bool>> {
+    let (a, b) = (pair[0].truth.as_ref()?, pair[1].truth.as_ref()?);
+    let jumps = a.data.iter().zip(&b.data).map(|(a, b)| (a - b).abs() > EDGE_PX).collect();
+    Some(grown(&Plane { width: b.width, height: b.height, data: jumps }, EDGE_REACH))
+}
+
+fn reach(px: i32) -> std::ops::RangeInclusive<i32> {
+    -px..=px
+}
+
+/// Pixels within a square of `px` to each side of those that are set.
+fn grown(of: &Plane<bool>, px: i32) -> Plane<bool> {
+    let along = |of: &Plane<bool>, dx: i32, dy: i32| {
+        Plane::from_fn(of.width, of.height, |x, y| reach(px).any(|d| of.at(x as i32 + d * dx, y as i32 + d * dy)))
+    };
+    along(&along(of, 1, 0), 0, 1)
+}
+
+/// Everything but the step and the memory.
+fn measure(sequence: &Sequence, regions: &[Regions], effort: Effort, maps: &[Plane<f32>]) -> Record {
+    let (mut share, mut change, mut jumps) = <(Mean, Mean, Mean)>::default();
+    let (mut bad, mut error) = <(Mean, Mean)>::default();
+    for index in 1 + WARM_UP..maps.len() {
+        let (Regions { still, moving }, now, before) = (&regions[index - 1], &maps[index], &maps[index - 1]);
+        let truth = sequence.frames[index].truth.as_ref();
+        for at in 0..now.data.len() {
+            let change_px = (now.data[at] - before.data[at]).abs();
+            share.add(f32::from(still.data[at]));
+            if still.data[at] && change_px.is_finite() {
+                change.add(change_px);
+                jumps.add(f32::from(change_px > JUMP_PX));
+            }
+            if let (Some(truth), Some(moving)) = (truth, moving)
+                && moving.data[at]
+                && at % now.width >= sequence.disparities as usize
+            {
+                let error_px = (now.data[at] - truth.data[at]).abs();
+                bad.add(f32::from(error_px > 1.0));
+                error.add(error_px);
+            }
+        }
+    }
+    Record {
+        sequence: sequence.name,
+        effort: name(effort),
+        step: "",
+        memory: false,
+        still_percent: 100.0 * share.value().unwrap_or(f64::NAN),
+        still_change_px: change.value().unwrap_or(f64::NAN),
+        still_jumps_percent: 100.0 * jumps.value().unwrap_or(f64::NAN),
+        moving_bad1_percent: bad.value().map(|share| 100.0 * share),
+        moving_error_px: error.value(),
+    }
+}
+
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    count: u64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f32) {
+        self.sum += f64::from(value);
+        self.count += 1;
+    }
+
+    fn value(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / self.count as f64)
+    }
+}
+
+impl Record {
+    fn line(&self) -> String {
+        let cell = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
+        format!(
+            "{:9} {:6} {:8} {:6} {:8.1} {:10.4} {:8.3} {:>15} {:>9}",
+            self.sequence,
+            self.effort,
+            self.step,
+            if self.memory { "on" } else { "off" },
+            self.still_percent,
+            self.still_change_px,
+            self.still_jumps_percent,
+            cell(self.moving_bad1_percent),
+            cell(self.moving_error_px)
+        )
+    }
+}

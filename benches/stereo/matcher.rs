@@ -1,0 +1,27 @@
+//! The matchers under test.
+
+use std::thread;
+
+use bokehcam::compute::Backend;
+use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
+
+use super::Outcome;
+use super::options::Options;
+
+/// A matcher of pictures of this size that remembers no frame; `threads` of the CPU, all cores when `None`.
+///
+/// # Errors
+/// It cannot be made.
+pub fn create(
+    options: &Options,
+    effort: Effort,
+    disparities: u32,
+    size: (u32, u32),
+    threads: Option<usize>,
+) -> Outcome<Box<dyn Matcher>> {
+    if options.gpu.is_some() {
+        return Err("there is no matcher on the GPU".into());
+    }
+    let threads = threads.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
+    Ok(stereo::create(&Settings { size, disparities, effort, threads }, Backend::Cpu, None)?)
+}

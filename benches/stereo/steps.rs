@@ -1,0 +1,87 @@
+//! Pictures of every step, from the bundled recording, for `docs/stereo.md`.
+
+use std::fs;
+use std::path::Path;
+
+use bokehcam::budget::Quality;
+use bokehcam::depth::refine::Refiner;
+use bokehcam::depth::stereo::Effort;
+use bokehcam::frame::{ColorImage, DisparityMap};
+use image::RgbImage;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::imageops::{self, resize};
+
+use super::flicker::metres;
+use super::options::{Options, name};
+use super::picture::shot;
+use super::quality::methods::{Blurrer, Method};
+use super::sequence::bundled;
+use super::{Outcome, matcher};
+
+/// The frame that is shown: by then there is a memory of others.
+const FRAME: usize = 8;
+/// Columns of a picture.
+const WIDTH: u32 = 288;
+
+/// Writes the pictures.
+///
+/// # Errors
+/// The recording cannot be read; the matcher or the blur fails; the folder cannot be written.
+pub fn run(out: &Path, options: &Options) -> Outcome {
+    let sequence = bundled()?;
+    let frame = &sequence.frames[FRAME];
+    let (width, height) = frame.left.size();
+    fs::create_dir_all(out)?;
+    keep(out, "left", &frame.left)?;
+    keep(out, "right", &frame.right)?;
+    let most_px = sequence.disparities as f32;
+    if let Some(truth) = &frame.truth {
+        keep(out, "true", &painted(&truth.data, (width, height), most_px))?;
+    }
+    for effort in [Effort::Fast, Effort::Full] {
+        let mut matcher = matcher::create(options, effort, sequence.disparities, (width, height), None)?;
+        let (mut refiner, mut map) = (Refiner::new(), DisparityMap::default());
+        for (index, frame) in sequence.frames.iter().enumerate().take(FRAME + 1) {
+            let [left, right] = frame.gray();
+            matcher.disparity(&left, &right, &mut map)?;
+            let mut depth = metres(&map, &sequence.rig);
+            refiner.refine(&mut depth, &frame.left, frame.time_ns);
+            if index < FRAME {
+                continue;
+            }
+            let refined: Vec<f32> = depth.metres.iter().map(|&z_m| sequence.rig.disparity_px(z_m)).collect();
+            keep(out, &format!("matched-{}", name(effort)), &painted(&map.px, (width, height), most_px))?;
+            if effort == Effort::Full {
+                keep(out, "refined", &painted(&refined, (width, height), most_px))?;
+                let shot = shot(&frame.left, &depth);
+                keep(out, "blurred", &Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur(&shot)?)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn keep(out: &Path, name: &str, image: &ColorImage) -> Outcome {
+    let whole = RgbImage::from_raw(image.width, image.height, image.rgb.clone()).unwrap_or_default();
+    let small = resize(&whole, WIDTH, WIDTH * image.height / image.width, imageops::FilterType::Triangle);
+    let path = out.join(format!("{name}.png"));
+    let file = std::io::BufWriter::new(fs::File::create(&path)?);
+    small.write_with_encoder(PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive))?;
+    println!("{}: {} kB", path.display(), fs::metadata(&path)?.len() / 1000);
+    Ok(())
+}
+
+/// A picture of disparities: from blue, far, over green to red, near; black is unknown. By square root, as most of a
+/// room lies far away.
+fn painted(px: &[f32], (width, height): (u32, u32), most_px: f32) -> ColorImage {
+    let color = |&px: &f32| {
+        if !(px > 0.0 && px.is_finite()) {
+            return [0; 3];
+        }
+        let nearness = (px / most_px).min(1.0).sqrt();
+        // Three ramps: red rises last, green is highest in the middle, blue falls first.
+        [nearness * 2.0 - 0.7, 1.0 - (nearness - 0.5).abs() * 2.2, 1.3 - nearness * 2.0]
+            .map(|light| (255.0 * light.clamp(0.05, 1.0)) as u8)
+    };
+    ColorImage { width, height, rgb: px.iter().flat_map(color).collect() }
+}

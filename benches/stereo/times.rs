@@ -1,0 +1,123 @@
+//! Time of the matcher.
+
+use std::path::Path;
+use std::time::Instant;
+
+use bokehcam::depth::stereo::{Effort, Matcher};
+use bokehcam::frame::{ColorImage, DisparityMap, GrayImage};
+use image::imageops::{FilterType, resize};
+use image::{DynamicImage, RgbImage};
+use serde::Serialize;
+
+use super::options::{Options, Times, name};
+use super::sequence::bundled;
+use super::{Outcome, matcher, print};
+
+/// A matcher on a pair.
+#[derive(Serialize)]
+struct Record {
+    size: (u32, u32),
+    disparities: u32,
+    effort: &'static str,
+    threads: usize,
+    matcher: String,
+    median_ms: f64,
+    best_ms: f64,
+    /// In the order measured.
+    times_ms: Vec<f64>,
+}
+
+/// Measures and prints.
+///
+/// # Errors
+/// A picture cannot be read; a matcher cannot be made or fails.
+pub fn run(times: &Times, options: &Options) -> Outcome {
+    if !options.json {
+        println!("size       disparities effort threads  median ms    best ms  matcher");
+    }
+    for pair in pairs(times)? {
+        for &disparities in &times.disparities {
+            for record in measure(&pair, disparities, times, options)? {
+                let line = format!(
+                    "{:10} {:11} {:6} {:7} {:10.2} {:10.2}  {}",
+                    format!("{}x{}", record.size.0, record.size.1),
+                    record.disparities,
+                    record.effort,
+                    record.threads,
+                    record.median_ms,
+                    record.best_ms,
+                    record.matcher
+                );
+                print(options, &line, &record)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// All efforts and threads in turn.
+fn measure(pair: &[GrayImage; 2], disparities: u32, times: &Times, options: &Options) -> Outcome<Vec<Record>> {
+    let size = pair[0].size();
+    let mut cases: Vec<(Box<dyn Matcher>, Record)> = Vec::new();
+    for &effort in &options.efforts {
+        for &threads in &times.threads {
+            let matcher = matcher::create(options, effort, disparities, size, Some(threads))?;
+            cases.push((matcher, Record::new(size, disparities, effort, threads)));
+        }
+    }
+    let mut map = DisparityMap::default();
+    let mut turn = |matcher: &mut dyn Matcher| -> Outcome<f64> {
+        let began = Instant::now();
+        matcher.disparity(&pair[0], &pair[1], &mut map)?;
+        Ok(1e3 * began.elapsed().as_secs_f64())
+    };
+    for round in 0..=times.rounds {
+        for (matcher, record) in &mut cases {
+            let time_ms = turn(matcher.as_mut())?;
+            // The first one takes its memory.
+            if round > 0 {
+                record.times_ms.push(time_ms);
+            }
+        }
+    }
+    let finished = cases.into_iter().map(|(matcher, mut record)| {
+        let mut sorted = record.times_ms.clone();
+        sorted.sort_by(f64::total_cmp);
+        record.median_ms = sorted[sorted.len() / 2];
+        record.best_ms = sorted[0];
+        record.matcher = matcher.describe();
+        record
+    });
+    Ok(finished.collect())
+}
+
+impl Record {
+    fn new(size: (u32, u32), disparities: u32, effort: Effort, threads: usize) -> Self {
+        let effort = name(effort);
+        let (matcher, times_ms) = (String::new(), Vec::new());
+        Self { size, disparities, effort, threads, matcher, median_ms: 0.0, best_ms: 0.0, times_ms }
+    }
+}
+
+fn pairs(times: &Times) -> Outcome<Vec<[GrayImage; 2]>> {
+    if let [left, right] = &times.pair[..] {
+        let read = |path: &Path| -> Outcome<GrayImage> {
+            let image = image::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
+            Ok(gray(&image))
+        };
+        return Ok(vec![[read(left)?, read(right)?]]);
+    }
+    let first = bundled()?.frames.swap_remove(0);
+    let scaled = |picture: &ColorImage, (width, height)| {
+        let whole = RgbImage::from_raw(picture.width, picture.height, picture.rgb.clone()).unwrap_or_default();
+        gray(&DynamicImage::from(resize(&whole, width, height, FilterType::CatmullRom)))
+    };
+    Ok(times.size.iter().map(|&size| [scaled(&first.left, size), scaled(&first.right, size)]).collect())
+}
+
+fn gray(image: &DynamicImage) -> GrayImage {
+    let picture = image.to_rgb8();
+    let mut gray = GrayImage::default();
+    gray.set_luma_of(&ColorImage { width: picture.width(), height: picture.height(), rgb: picture.into_raw() });
+    gray
+}

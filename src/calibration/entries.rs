@@ -1,0 +1,113 @@
+//! The entries that files of all kinds have: cameras, lenses, rotations.
+
+use glam::{DMat3, DQuat, DVec2, DVec3};
+
+use super::Distortion;
+use super::error::{CalibrationError, Fault};
+use super::yaml::Value;
+
+/// How far a matrix may be from a rotation: calibrations are written with few digits.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+/// Focal lengths of cameras in pixels.
+const FOCALS_PX: std::ops::Range<f64> = 1.0..1e6;
+
+fn impossible(value: Value<'_>, what: &'static str) -> CalibrationError {
+    value.refuse(Fault::Impossible { key: value.key(), what })
+}
+
+/// Focal lengths and principal point, if they can be such.
+pub(super) fn pinhole(value: Value<'_>, [fu, fv, cu, cv]: [f64; 4]) -> Result<(DVec2, DVec2), CalibrationError> {
+    if ![fu, fv].iter().all(|focal_px| FOCALS_PX.contains(focal_px)) {
+        return Err(impossible(value, "has a focal length that is not between 1 and a million pixels"));
+    }
+    if ![cu, cv].iter().all(|center_px| center_px.abs() < 1e5) {
+        return Err(impossible(value, "has a principal point that is nowhere near a picture"));
+    }
+    Ok((DVec2::new(fu, fv), DVec2::new(cu, cv)))
+}
+
+/// The same from a 3x3 camera matrix.
+pub(super) fn camera_matrix(value: Value<'_>) -> Result<(DVec2, DVec2), CalibrationError> {
+    let [fu, skew, cu, zero, fv, cv, below @ ..] = value.numbers::<9>(3, "3x3")?;
+    if skew != 0.0 || zero != 0.0 || below != [0.0, 0.0, 1.0] {
+        return Err(impossible(value, "is not of the form [fx 0 cx; 0 fy cy; 0 0 1]"));
+    }
+    pinhole(value, [fu, fv, cu, cv])
+}
+
+/// The lens of a model (radial-tangential where none is named) with the coefficients `value`.
+pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<Distortion, CalibrationError> {
+    let name = model.map(|model| model.text()).transpose()?.unwrap_or("radial-tangential");
+    let matrix = value.matrix()?;
+    let dimensions = |expected| {
+        let found = (matrix.rows, matrix.cols);
+        value.refuse(Fault::Dimensions { key: value.key(), found, expected })
+    };
+    let is_vector = matrix.rows == 1 || matrix.cols == 1;
+    match name.to_ascii_lowercase().replace('_', "-").as_str() {
+        "radial-tangential" | "radtan" | "plumb-bob" | "rational-polynomial" | "opencv" | "pinhole" => {
+            if !is_vector || ![4, 5, 8, 12, 14].contains(&matrix.data.len()) {
+                return Err(dimensions("a vector of 4, 5, 8, 12 or 14 (k1 k2 p1 p2 k3 ...)"));
+            }
+            let (known, unknown) = matrix.data.split_at(matrix.data.len().min(8));
+            if unknown.iter().any(|&coefficient| coefficient != 0.0) {
+                return Err(value.refuse(Fault::Prism { key: value.key() }));
+            }
+            let mut all = [0.0; 8];
+            all[..known.len()].copy_from_slice(known);
+            Ok(Distortion::RadialTangential(all))
+        }
+        "equidistant" | "fisheye" | "kannala-brandt" | "opencv-fisheye" => {
+            let all = matrix.data.as_slice().try_into().ok().filter(|_| is_vector);
+            all.map(Distortion::Equidistant).ok_or_else(|| dimensions("a vector of 4 (k1 k2 k3 k4)"))
+        }
+        "none" => Ok(Distortion::RadialTangential([0.0; 8])),
+        _ => {
+            let model = model.unwrap_or(value);
+            let known = "radial-tangential, equidistant and none";
+            Err(model.refuse(Fault::Model { key: model.key(), found: name.into(), known }))
+        }
+    }
+}
+
+/// A rotation from its nine numbers, row by row; small errors are taken out.
+pub(super) fn rotation(value: Value<'_>, rows: &[f64; 9]) -> Result<DMat3, CalibrationError> {
+    let matrix = DMat3::from_cols_array(rows).transpose();
+    let off = matrix * matrix.transpose() - DMat3::IDENTITY;
+    if off.to_cols_array().iter().any(|part| part.abs() > ROTATION_TOLERANCE) || matrix.determinant() < 0.0 {
+        return Err(impossible(value, "is not a rotation (rows of length 1, at right angles, right-handed)"));
+    }
+    Ok(DMat3::from_quat(DQuat::from_mat3(&matrix).normalize()))
+}
+
+/// A pose `x -> rotation x + translation` from a 4x4 matrix.
+pub(super) fn pose(value: Value<'_>) -> Result<(DMat3, DVec3), CalibrationError> {
+    let m = value.numbers::<16>(4, "4x4")?;
+    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+        return Err(impossible(value, "does not end with the row 0 0 0 1"));
+    }
+    let turned = rotation(value, &[m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]])?;
+    Ok((turned, DVec3::new(m[3], m[7], m[11])))
+}
+
+/// Columns and rows of pictures.
+pub(super) fn size(value: Value<'_>) -> Result<(u32, u32), CalibrationError> {
+    let [width, height] = value.numbers::<2>(2, "a width and a height")?;
+    Ok((side(value, width)?, side(value, height)?))
+}
+
+/// Columns or rows of pictures.
+pub(super) fn side(value: Value<'_>, number: f64) -> Result<u32, CalibrationError> {
+    if number.fract() != 0.0 || !(1.0..65536.0).contains(&number) {
+        return Err(impossible(value, "is no size of pictures in whole pixels"));
+    }
+    Ok(number as u32)
+}
+
+/// A translation between two eyes, if they are two.
+pub(super) fn apart(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
+    if translation.length() < 1e-9 {
+        return Err(impossible(value, "puts both cameras in one place (a baseline of 0)"));
+    }
+    Ok(translation)
+}

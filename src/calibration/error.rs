@@ -1,0 +1,170 @@
+//! What can be wrong with a calibration: what, where, and what to do about it, in one line.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a calibration cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationError {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file is none of those that are known.
+    #[error(
+        "{}: not a stereo calibration: looked for M1 D1 M2 D2 R T (OpenCV), cam0 and cam1 (Kalibr) and T_BS (EuRoC); \
+         name a file with one of them", .0.display()
+    )]
+    Unknown(PathBuf),
+    /// Files that do not make one calibration.
+    #[error("a calibration is one or two files, and {0} were named")]
+    Files(usize),
+    /// EuRoC keeps each eye in a file of its own.
+    #[error("{}: this is the sensor.yaml of one camera; name those of both, the left one first", .0.display())]
+    OneSensor(PathBuf),
+    /// Something in the file is wrong.
+    #[error("{}: {fault}", Place(path, *line))]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1; 0 where it is about the whole file.
+        line: usize,
+        /// What is wrong.
+        fault: Fault,
+    },
+    /// Numbers that did not come from a file are wrong.
+    #[error("calibration: {0}")]
+    Numbers(#[from] Fault),
+    /// The calibration is for pictures of another shape.
+    #[error(
+        "the calibration is for pictures of {}x{}, and these are {}x{}: neither the same size nor the same aspect; \
+         calibrate at this size, or record at that one", calibrated.0, calibrated.1, found.0, found.1
+    )]
+    Shape {
+        /// Columns and rows that it is for.
+        calibrated: (u32, u32),
+        /// Columns and rows of the pictures.
+        found: (u32, u32),
+    },
+    /// The calibration does not say for which size it is, and it cannot be that of the pictures.
+    #[error(
+        "the calibration names no picture size, and its principal point ({:.0}, {:.0}) is not near the middle of \
+         {}x{}; add `image_size: [WIDTH, HEIGHT]` to it", center_px.0, center_px.1, found.0, found.1
+    )]
+    NoSize {
+        /// Column and row of the principal point.
+        center_px: (f64, f64),
+        /// Columns and rows of the pictures.
+        found: (u32, u32),
+    },
+    /// The pictures are too small to have four neighbours anywhere, or larger than any map.
+    #[error("pictures of {}x{} cannot be rectified: each side needs 2 to 16384 pixels", .0.0, .0.1)]
+    Size((u32, u32)),
+    /// The eyes are not beside each other.
+    #[error(
+        "the cameras stand {0} each other: only cameras beside each other are matched; turn the rig, or its pictures \
+         and the calibration"
+    )]
+    NotBeside(&'static str),
+    /// Left and right are exchanged.
+    #[error("the calibration's left camera stands on the right; exchange the two pictures and the two cameras")]
+    Swapped,
+    /// There is too little that both eyes see.
+    #[error("the cameras look in directions that are too different: they share too little of their pictures")]
+    Apart,
+}
+
+/// What can be wrong with an entry.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// The file is no YAML.
+    #[error("not readable as YAML: {0}")]
+    Yaml(String),
+    /// A key is missing.
+    #[error("{key} is missing; {hint}")]
+    Missing {
+        /// The key.
+        key: String,
+        /// What to do.
+        hint: &'static str,
+    },
+    /// Something else stands where an entry of a certain kind belongs.
+    #[error("{key} must be {expected}")]
+    Kind {
+        /// The key.
+        key: String,
+        /// What belongs there.
+        expected: &'static str,
+    },
+    /// What should be a number is none, or infinite.
+    #[error("{key} holds {text:?} where a finite number belongs; calibrate again")]
+    NotFinite {
+        /// The key.
+        key: String,
+        /// What stands there.
+        text: String,
+    },
+    /// A matrix of the wrong size.
+    #[error("{key} is {}x{}, and must be {expected}", found.0, found.1)]
+    Dimensions {
+        /// The key.
+        key: String,
+        /// Rows and columns.
+        found: (usize, usize),
+        /// Rows and columns that it must have.
+        expected: &'static str,
+    },
+    /// A matrix whose data does not fill its rows and columns.
+    #[error("{key} says {}x{}, and holds {found} numbers", said.0, said.1)]
+    Data {
+        /// The key.
+        key: String,
+        /// Rows and columns that it says it has.
+        said: (usize, usize),
+        /// How many numbers there are.
+        found: usize,
+    },
+    /// Numbers that cannot be what they should be.
+    #[error("{key} {what}; calibrate again")]
+    Impossible {
+        /// The key.
+        key: String,
+        /// What is wrong with them.
+        what: &'static str,
+    },
+    /// A model of camera or lens that is not known here.
+    #[error("{key} {found:?} is not known here; known are {known}")]
+    Model {
+        /// The key.
+        key: String,
+        /// The model.
+        found: String,
+        /// The models that are known.
+        known: &'static str,
+    },
+    /// Coefficients of terms that are not known here.
+    #[error(
+        "{key} has coefficients beyond k6 (thin prism, tilt) that are not 0, which are not known here; \
+         calibrate without CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL"
+    )]
+    Prism {
+        /// The key.
+        key: String,
+    },
+}
+
+/// A file and, where one is to blame, a line.
+struct Place<'a>(&'a Path, usize);
+
+impl fmt::Display for Place<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let &Self(path, line) = self;
+        write!(f, "{}", path.display())?;
+        if line > 0 { write!(f, ":{line}") } else { Ok(()) }
+    }
+}

@@ -1,0 +1,64 @@
+//! The `sensor.yaml` of the EuRoC/ASL layout: one file for each camera, with its pose on the body.
+//!
+//! M. Burri et al., *The EuRoC micro aerial vehicle datasets*, IJRR 35 (2016).
+
+use std::path::Path;
+
+use glam::{DMat3, DVec3};
+
+use super::error::{CalibrationError, Fault};
+use super::yaml::{File, Value};
+use super::{Eye, StereoCalibration, entries};
+
+/// What to do where a key is missing.
+const HINT: &str = "copy sensor.yaml anew from the recording";
+
+/// Reads the `sensor.yaml` of the left and of the right camera.
+///
+/// # Errors
+/// One cannot be read, has a key missing, or numbers that cannot be.
+pub fn read(left: &Path, right: &Path) -> Result<StereoCalibration, CalibrationError> {
+    from_files(&File::open(left)?, &File::open(right)?)
+}
+
+pub(super) fn from_files(left: &File, right: &File) -> Result<StereoCalibration, CalibrationError> {
+    let poses = [body_from_camera(left.root())?, body_from_camera(right.root())?];
+    let [(left_rotation, left_place), (right_rotation, right_place)] = poses;
+    let to_right = right_rotation.transpose();
+    let place = right.root().need("T_BS", HINT)?;
+    Ok(StereoCalibration {
+        eyes: [eye(left.root())?, eye(right.root())?],
+        rotation: to_right * left_rotation,
+        translation_m: entries::apart(place, to_right * (left_place - right_place))?,
+        given: None,
+        assumed_mm: false,
+    })
+}
+
+fn body_from_camera(file: Value<'_>) -> Result<(DMat3, DVec3), CalibrationError> {
+    entries::pose(file.need("T_BS", HINT)?)
+}
+
+fn eye(file: Value<'_>) -> Result<Eye, CalibrationError> {
+    pinhole_only(file)?;
+    let intrinsics = file.need("intrinsics", HINT)?;
+    let numbers = intrinsics.numbers::<4>(4, "4 numbers (fu fv cu cv)")?;
+    let (focal_px, center_px) = entries::pinhole(intrinsics, numbers)?;
+    let coefficients = file.need("distortion_coefficients", HINT)?;
+    Ok(Eye {
+        size: file.get("resolution").map(entries::size).transpose()?,
+        focal_px,
+        center_px,
+        distortion: entries::distortion(file.get("distortion_model"), coefficients)?,
+    })
+}
+
+/// Refuses cameras that are not seen through a pinhole (and a lens).
+pub(super) fn pinhole_only(camera: Value<'_>) -> Result<(), CalibrationError> {
+    match camera.get("camera_model") {
+        Some(model) if model.text()? != "pinhole" => {
+            Err(model.refuse(Fault::Model { key: model.key(), found: model.text()?.into(), known: "pinhole" }))
+        }
+        _ => Ok(()),
+    }
+}

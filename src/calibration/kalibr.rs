@@ -1,0 +1,39 @@
+//! Kalibr's camchain: `cam0` and `cam1` with the pose between them.
+//!
+//! P. Furgale et al., *Unified temporal and spatial calibration for multi-sensor systems*, IROS 2013;
+//! the keys are those of Kalibr's page "YAML formats".
+
+use super::error::CalibrationError;
+use super::euroc::pinhole_only;
+use super::yaml::{File, Value};
+use super::{Eye, StereoCalibration, entries};
+
+/// What to do where a key is missing.
+const HINT: &str = "name the camchain that kalibr_calibrate_cameras wrote for both cameras";
+
+pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationError> {
+    let cameras = [file.root().need("cam0", HINT)?, file.root().need("cam1", HINT)?];
+    let pose = cameras[1].need("T_cn_cnm1", HINT)?;
+    let (rotation, translation_m) = entries::pose(pose)?;
+    Ok(StereoCalibration {
+        eyes: [eye(cameras[0])?, eye(cameras[1])?],
+        rotation,
+        translation_m: entries::apart(pose, translation_m)?,
+        given: None,
+        assumed_mm: false,
+    })
+}
+
+fn eye(camera: Value<'_>) -> Result<Eye, CalibrationError> {
+    pinhole_only(camera)?;
+    let intrinsics = camera.need("intrinsics", HINT)?;
+    let numbers = intrinsics.numbers::<4>(4, "4 numbers (fu fv pu pv)")?;
+    let (focal_px, center_px) = entries::pinhole(intrinsics, numbers)?;
+    let coefficients = camera.need("distortion_coeffs", HINT)?;
+    Ok(Eye {
+        size: camera.get("resolution").map(entries::size).transpose()?,
+        focal_px,
+        center_px,
+        distortion: entries::distortion(camera.get("distortion_model"), coefficients)?,
+    })
+}

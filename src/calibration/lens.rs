@@ -1,0 +1,139 @@
+//! Cameras as rays: from a point in space to a pixel and back.
+//!
+//! Radial-tangential: D. C. Brown, *Decentering distortion of lenses*, 1966, with OpenCV's rational terms.
+//! Equidistant: J. Kannala, S. Brandt, *A generic camera model and calibration method*, PAMI 28 (2006), eq. 6.
+
+use glam::{DMat2, DVec2, DVec3};
+
+use super::{Distortion, Eye};
+
+/// Rays further than this from the axis are left out: a flat picture of them would have no end.
+const WIDEST_DEG: f64 = 80.0;
+/// Angle between the rays at which a lens is asked whether it still spreads them.
+const STEP_DEG: f64 = 0.1;
+
+impl Distortion {
+    /// Distance from the axis that the lens gives to a ray at the distance `radius`, on the plane at distance 1.
+    fn radial(&self, radius: f64) -> f64 {
+        match *self {
+            Self::RadialTangential([k1, k2, _, _, k3, k4, k5, k6]) => {
+                let r2 = radius * radius;
+                radius * (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+            }
+            Self::Equidistant([k1, k2, k3, k4]) => {
+                let angle = radius.atan();
+                let a2 = angle * angle;
+                angle * (1.0 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
+            }
+        }
+    }
+
+    /// Where a lens images what a pinhole images at `point`, both on the plane at distance 1.
+    pub fn distort(&self, point: DVec2) -> DVec2 {
+        let r2 = point.length_squared();
+        let radius = r2.sqrt();
+        let bent = if radius > 0.0 { point * (self.radial(radius) / radius) } else { point };
+        let Self::RadialTangential([_, _, p1, p2, ..]) = *self else { return bent };
+        let cross = 2.0 * point.x * point.y;
+        let across = p1 * cross + p2 * (r2 + 2.0 * point.x * point.x);
+        let down = p1 * (r2 + 2.0 * point.y * point.y) + p2 * cross;
+        bent + DVec2::new(across, down)
+    }
+
+    /// Greatest distance from the axis up to which the model is one-to-one, on the plane at distance 1: polynomials
+    /// turn back somewhere beyond the rays that they were fitted to. At most that of 80 degrees.
+    pub fn reach(&self) -> f64 {
+        let radius = |step: u32| (f64::from(step) * STEP_DEG).to_radians().tan();
+        let last = (WIDEST_DEG / STEP_DEG) as u32;
+        let spreads = |step: &u32| self.radial(radius(step + 1)) > self.radial(radius(*step));
+        radius((0..last).find(|step| !spreads(step)).unwrap_or(last))
+    }
+
+    /// The point that is imaged at `point`: [`Distortion::distort`] backwards. What lies beyond `reach` is taken to be
+    /// there.
+    pub fn undistort(&self, point: DVec2, reach: f64) -> DVec2 {
+        let length = point.length();
+        if length == 0.0 && self.distort(point) == point {
+            return point;
+        }
+        if length >= self.radial(reach) {
+            return point * (reach / length);
+        }
+        // The radial part by halving, which always converges; the little that the tangential part adds by Newton.
+        let (mut near, mut far) = (0.0, reach);
+        for _ in 0..30 {
+            let middle = (near + far) / 2.0;
+            if self.radial(middle) < length { near = middle } else { far = middle }
+        }
+        let mut guess = if length > 0.0 { point * (near / length) } else { point };
+        const DELTA: f64 = 1e-6;
+        for _ in 0..8 {
+            let slope = |step: DVec2| (self.distort(guess + step) - self.distort(guess - step)) / (2.0 * DELTA);
+            let slopes = DMat2::from_cols(slope(DVec2::X * DELTA), slope(DVec2::Y * DELTA));
+            let next = guess + slopes.inverse() * (point - self.distort(guess));
+            if !next.is_finite() || (next - guess).length() > 0.1 {
+                break;
+            }
+            guess = next;
+        }
+        guess
+    }
+}
+
+impl Eye {
+    /// The pixel that sees what lies at `point` in the camera's axes (x right, y down, z forward), also outside the
+    /// picture; `None` behind the camera and beyond the lens's `reach`.
+    pub fn project(&self, point: DVec3, reach: f64) -> Option<DVec2> {
+        let flat = point.truncate() / point.z;
+        let is_seen = point.z > 0.0 && flat.length_squared() <= reach * reach;
+        is_seen.then(|| self.distortion.distort(flat) * self.focal_px + self.center_px)
+    }
+
+    /// The ray of a pixel, on the plane at distance 1; at `reach` where it lies beyond.
+    pub fn ray(&self, pixel_px: DVec2, reach: f64) -> DVec2 {
+        self.distortion.undistort((pixel_px - self.center_px) / self.focal_px, reach)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LENSES: [Distortion; 4] = [
+        Distortion::RadialTangential([-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0, 0.0, 0.0, 0.0]),
+        Distortion::RadialTangential([-0.055, 0.078, 0.001, -0.002, -0.14, 0.0, 0.0, -0.141]),
+        Distortion::RadialTangential([0.0; 8]),
+        Distortion::Equidistant([0.0034, 0.0007, -0.0020, 0.0002]),
+    ];
+
+    #[test]
+    fn undistorting_is_distorting_backwards() {
+        for lens in LENSES {
+            let reach = lens.reach();
+            for k in 0..200 {
+                let (radius, angle) = (f64::from(k) / 200.0 * reach.min(1.0) * 0.95, f64::from(k) * 0.7);
+                let point = DVec2::from_angle(angle) * radius;
+                let back = lens.undistort(lens.distort(point), reach);
+                assert!((back - point).length() < 1e-9, "{lens:?}: {point} became {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_reach_is_where_a_polynomial_turns_back() {
+        // r - 0.3 r^3 grows up to 1 / sqrt(0.9).
+        let barrel = Distortion::RadialTangential([-0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!((barrel.reach() - 0.9_f64.powf(-0.5)).abs() < 0.01);
+        assert!((Distortion::Equidistant([0.0; 4]).reach() - 80.0_f64.to_radians().tan()).abs() < 1e-9);
+        let beyond = barrel.undistort(DVec2::new(3.0, 0.0), barrel.reach());
+        assert_eq!(beyond, DVec2::new(barrel.reach(), 0.0));
+    }
+
+    #[test]
+    fn nobody_sees_what_is_behind() {
+        let eye =
+            Eye { size: None, focal_px: DVec2::splat(100.0), center_px: DVec2::splat(50.0), distortion: LENSES[3] };
+        assert_eq!(eye.project(DVec3::new(0.1, 0.0, -1.0), eye.distortion.reach()), None);
+        assert_eq!(eye.project(DVec3::Z, eye.distortion.reach()), Some(eye.center_px));
+    }
+}

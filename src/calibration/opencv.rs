@@ -1,0 +1,168 @@
+//! OpenCV's FileStorage YAML, as its sample `stereo_calib` writes it: cameras, lenses and pose (M1 D1 M2 D2 R T), what
+//! `stereoRectify` makes of them (R1 R2 P1 P2), or both, in one file or two.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::error::{CalibrationError, Fault};
+use super::rectification::Rectification;
+use super::yaml::{File, Value};
+use super::{Eye, StereoCalibration, entries};
+
+/// A baseline longer than this is in millimetres: no rig of metres is that wide.
+const WIDEST_M: f64 = 2.0;
+/// How far the rectification may be from the pose that it belongs to.
+const SAME_POSE: f64 = 0.02;
+/// What to do where a camera is missing.
+const CAMERA_HINT: &str = "name the file with M1 D1 M2 D2 (intrinsics.yml) as well";
+/// What to do where a lens is missing.
+const LENS_HINT: &str = "write the lens's coefficients, zeros where the pictures have no distortion";
+/// What to do where the pose is missing.
+const POSE_HINT: &str = "name the file with R and T, or R1 R2 P1 P2 (extrinsics.yml), as well";
+
+/// The names of an entry, in small letters and without underscores.
+type Names = &'static [&'static str];
+
+const CAMERAS: [Names; 2] = [
+    &["m1", "k1", "cameramatrix1", "cameramatrixleft", "leftcameramatrix", "kleft", "mleft"],
+    &["m2", "k2", "cameramatrix2", "cameramatrixright", "rightcameramatrix", "kright", "mright"],
+];
+const LENSES: [Names; 2] = [
+    &["d1", "distcoeffs1", "distcoeffsleft", "leftdistcoeffs", "distortioncoefficientsleft", "distortionleft", "dleft"],
+    &[
+        "d2",
+        "distcoeffs2",
+        "distcoeffsright",
+        "rightdistcoeffs",
+        "distortioncoefficientsright",
+        "distortionright",
+        "dright",
+    ],
+];
+const ROTATION: Names = &["r", "rotation", "rotationmatrix"];
+const TRANSLATION: Names = &["t", "translation", "translationvector"];
+const TURNS: [Names; 2] = [&["r1", "rectificationleft", "rleft"], &["r2", "rectificationright", "rright"]];
+const PROJECTIONS: [Names; 2] = [&["p1", "projectionleft", "pleft"], &["p2", "projectionright", "pright"]];
+const MODEL: Names = &["distortionmodel"];
+const SIZE: Names = &["imagesize", "size"];
+const WIDTH: Names = &["imagewidth", "width"];
+const HEIGHT: Names = &["imageheight", "height"];
+
+fn find<'a>(files: &'a [File], names: Names) -> Option<Value<'a>> {
+    let is_it = |key: &str| names.contains(&key.to_ascii_lowercase().replace(['_', '-'], "").as_str());
+    files.iter().find_map(|file| file.root().find(is_it))
+}
+
+fn need<'a>(files: &'a [File], names: Names, key: &str, hint: &'static str) -> Result<Value<'a>, CalibrationError> {
+    let missing = || files[0].root().refuse(Fault::Missing { key: key.into(), hint });
+    find(files, names).ok_or_else(missing)
+}
+
+/// Whether the files are such ones at all.
+pub(super) fn is_known(files: &[File]) -> bool {
+    CAMERAS.into_iter().chain(TURNS).any(|names| find(files, names).is_some())
+        || (find(files, ROTATION).is_some() && find(files, TRANSLATION).is_some())
+}
+
+/// Whether cameras or pose are missing, which a second file may have.
+pub(super) fn is_half(files: &[File]) -> bool {
+    find(files, CAMERAS[0]).is_none() || (find(files, ROTATION).is_none() && find(files, TURNS[0]).is_none())
+}
+
+/// The calibration in `files`, at least one.
+pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, CalibrationError> {
+    let size = size(files)?;
+    let eyes = [eye(files, 0, size)?, eye(files, 1, size)?];
+    let mut given = given(files)?;
+    let (rotation, translation) = match given {
+        Some((ref given, shift)) if find(files, ROTATION).is_none() => {
+            let to_right = given.rotations[1].transpose();
+            (to_right * given.rotations[0], to_right * DVec3::new(shift, 0.0, 0.0))
+        }
+        _ => {
+            let (rotation, place) = (need(files, ROTATION, "R", POSE_HINT)?, need(files, TRANSLATION, "T", POSE_HINT)?);
+            let translation = DVec3::from_array(place.numbers::<3>(3, "3x1")?);
+            (entries::rotation(rotation, &rotation.numbers::<9>(3, "3x3")?)?, entries::apart(place, translation)?)
+        }
+    };
+    if let Some((given, shift)) = &given {
+        let turn = given.rotations[1] * rotation - given.rotations[0];
+        let place = given.rotations[1] * translation - DVec3::new(*shift, 0.0, 0.0);
+        let is_same = turn.to_cols_array().iter().all(|part| part.abs() < SAME_POSE);
+        if !is_same || place.length() > SAME_POSE * translation.length() {
+            let value = need(files, TURNS[1], "R2", POSE_HINT)?;
+            let what = "does not belong to R and T: R2 R must be R1, and R2 T along the columns by P2";
+            return Err(value.refuse(Fault::Impossible { key: value.key(), what }));
+        }
+    }
+    let assumed_mm = translation.length() > WIDEST_M;
+    let unit_m = if assumed_mm { 1e-3 } else { 1.0 };
+    if let Some((given, _)) = &mut given {
+        given.baseline_m *= unit_m;
+    }
+    Ok(StereoCalibration {
+        eyes,
+        rotation,
+        translation_m: translation * unit_m,
+        given: given.map(|(given, _)| given),
+        assumed_mm,
+    })
+}
+
+fn size(files: &[File]) -> Result<Option<(u32, u32)>, CalibrationError> {
+    if let (Some(width), Some(height)) = (find(files, WIDTH), find(files, HEIGHT)) {
+        let side = |value: Value<'_>| entries::side(value, value.count()?.into());
+        return Ok(Some((side(width)?, side(height)?)));
+    }
+    find(files, SIZE).map(entries::size).transpose()
+}
+
+fn eye(files: &[File], side: usize, size: Option<(u32, u32)>) -> Result<Eye, CalibrationError> {
+    let camera = need(files, CAMERAS[side], ["M1", "M2"][side], CAMERA_HINT)?;
+    let (focal_px, center_px) = entries::camera_matrix(camera)?;
+    let lens = need(files, LENSES[side], ["D1", "D2"][side], LENS_HINT)?;
+    Ok(Eye { size, focal_px, center_px, distortion: entries::distortion(find(files, MODEL), lens)? })
+}
+
+/// P1 or P2, taken apart.
+struct Projection<'a> {
+    value: Value<'a>,
+    focal_px: DVec2,
+    center_px: DVec2,
+    /// The fourth column: the focal length times the place of the left eye.
+    shift: DVec2,
+}
+
+fn projection(files: &[File], side: usize) -> Result<Projection<'_>, CalibrationError> {
+    let value = need(files, PROJECTIONS[side], ["P1", "P2"][side], POSE_HINT)?;
+    let [fx, _, cx, across, _, fy, cy, down, ..] = value.numbers::<12>(3, "3x4")?;
+    let (focal_px, center_px) = entries::pinhole(value, [fx, fy, cx, cy])?;
+    Ok(Projection { value, focal_px, center_px, shift: DVec2::new(across, down) })
+}
+
+/// R1 R2 P1 P2, where there are any of them, and the right eye's shift along the columns, in the file's unit.
+fn given(files: &[File]) -> Result<Option<(Rectification, f64)>, CalibrationError> {
+    if TURNS.into_iter().chain(PROJECTIONS).all(|names| find(files, names).is_none()) {
+        return Ok(None);
+    }
+    let turn = |side: usize| {
+        let value = need(files, TURNS[side], ["R1", "R2"][side], POSE_HINT)?;
+        entries::rotation(value, &value.numbers::<9>(3, "3x3")?)
+    };
+    let rotations: [DMat3; 2] = [turn(0)?, turn(1)?];
+    let [left, right] = [projection(files, 0)?, projection(files, 1)?];
+    let (focal_px, left_px, right_px) = (left.focal_px, left.center_px, right.center_px);
+    let value = right.value;
+    let impossible = |what| value.refuse(Fault::Impossible { key: value.key(), what });
+    if right.shift.y.abs() > right.shift.x.abs() {
+        return Err(CalibrationError::NotBeside("above"));
+    }
+    let shift = right.shift.x / focal_px.x;
+    if shift.abs() < 1e-9 {
+        return Err(impossible("puts both cameras in one place (a baseline of 0)"));
+    }
+    if (focal_px - right.focal_px).abs().max_element() > 1e-3 * focal_px.x || (left_px.y - right_px.y).abs() > 0.01 {
+        return Err(impossible("is not of one rectified pair with P1: focal lengths and rows must be the same"));
+    }
+    let centers_px = [left_px, right_px];
+    Ok(Some((Rectification { rotations, focal_px, centers_px, baseline_m: shift.abs() }, shift)))
+}

@@ -1,0 +1,125 @@
+//! The cameras that a rectified pair seems to come from: both turned to look the same way, with rows along the line
+//! between them, one focal length and one principal point.
+//!
+//! Bouguet's method: each eye turns by half of what they differ in, so that each picture is bent as little as the other
+//! one, then both turn together until the baseline lies along the rows.
+
+use glam::{DMat3, DQuat, DVec2, DVec3};
+
+use super::{CalibrationError, Eye, Fault, StereoCalibration};
+use crate::optics::StereoRig;
+
+/// The rectified focal length is at least this part of the cameras' own: a fisheye's rim is given up before its middle
+/// loses more detail.
+const LEAST_FOCAL: f64 = 0.7;
+/// The rectified focal length is at most this many times the cameras' own: beyond, both see too little in common.
+const MOST_FOCAL: f64 = 3.0;
+/// Points along each border of a picture that are followed into the rectified one.
+const BORDER_POINTS: u32 = 256;
+/// Rays flatter than this against the rectified plane are taken to be here.
+const FLATTEST: f64 = 0.1;
+
+/// How both eyes are turned, and what a pinhole then sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rectification {
+    /// From each eye's own axes (left, right) to the rectified ones.
+    pub rotations: [DMat3; 2],
+    /// Focal lengths along columns and rows of both rectified pictures, in pixels.
+    pub focal_px: DVec2,
+    /// Principal points of the left and of the right rectified picture; in the same row.
+    pub centers_px: [DVec2; 2],
+    /// Distance of the eyes in metres, > 0.
+    pub baseline_m: f64,
+}
+
+impl Rectification {
+    /// The rectification of a calibration for pictures of `size`: the file's own, else Bouguet's. Of the latter both
+    /// pictures show the same directions, so that the disparity of infinity is 0: the largest window of the pictures'
+    /// aspect within what both eyes see, so that no corner is black; but with a focal length of at least 0.7 times the
+    /// cameras' own.
+    ///
+    /// # Errors
+    /// The pictures have another shape; the eyes are exchanged, not beside each other, or look in directions that are
+    /// too different; numbers that cannot be.
+    pub fn of(calibration: &StereoCalibration, size: (u32, u32)) -> Result<Self, CalibrationError> {
+        let calibration = calibration.at(size)?;
+        let halfway_m = calibration.halfway_m();
+        let impossible = |key: &str, what| Fault::Impossible { key: key.into(), what };
+        if !halfway_m.is_finite() || halfway_m.length() < 1e-9 {
+            return Err(impossible("the translation", "puts both cameras in one place").into());
+        }
+        if calibration.eyes.iter().any(|eye| !(eye.focal_px.is_finite() && eye.focal_px.min_element() > 0.0)) {
+            return Err(impossible("the focal length", "is not above 0").into());
+        }
+        if halfway_m.y.abs() > halfway_m.x.abs() {
+            return Err(CalibrationError::NotBeside("above"));
+        }
+        if halfway_m.z.abs() > halfway_m.x.abs() {
+            return Err(CalibrationError::NotBeside("behind"));
+        }
+        if calibration.is_swapped() {
+            return Err(CalibrationError::Swapped);
+        }
+        if let Some(given) = calibration.given {
+            return Ok(given);
+        }
+        let half_turn = calibration.half_turn();
+        let onto_rows = DMat3::from_quat(DQuat::from_rotation_arc(halfway_m.normalize(), DVec3::NEG_X));
+        let rotations = [onto_rows * half_turn.transpose(), onto_rows * half_turn];
+        let (focal_px, center_px) = window(&calibration.eyes, &rotations, size)?;
+        let focal_px = DVec2::splat(focal_px);
+        Ok(Self { rotations, focal_px, centers_px: [center_px; 2], baseline_m: calibration.baseline_m() })
+    }
+
+    /// The same with left and right exchanged.
+    #[must_use]
+    pub fn exchanged(&self) -> Self {
+        let ([left, right], [left_px, right_px]) = (self.rotations, self.centers_px);
+        Self { rotations: [right, left], centers_px: [right_px, left_px], ..*self }
+    }
+
+    /// From disparities of the rectified pair to depth.
+    pub fn rig(&self) -> StereoRig {
+        let [left_px, right_px] = self.centers_px;
+        StereoRig {
+            focal_px: self.focal_px.x as f32,
+            baseline_m: self.baseline_m as f32,
+            doffs_px: (right_px.x - left_px.x) as f32,
+            metric: true,
+        }
+    }
+
+    /// The direction that a pixel of the rectified picture of an eye (0 left, 1 right) shows, in that eye's own axes.
+    pub fn direction(&self, side: usize, pixel_px: DVec2) -> DVec3 {
+        let flat = (pixel_px - self.centers_px[side]) / self.focal_px;
+        self.rotations[side].transpose() * flat.extend(1.0)
+    }
+}
+
+/// Focal length and principal point of the largest window within what both eyes see.
+fn window(eyes: &[Eye; 2], rotations: &[DMat3; 2], size: (u32, u32)) -> Result<(f64, DVec2), CalibrationError> {
+    let last_px = DVec2::new(f64::from(size.0) - 1.0, f64::from(size.1) - 1.0);
+    let (mut least, mut most) = (DVec2::NEG_INFINITY, DVec2::INFINITY);
+    for (eye, rotation) in eyes.iter().zip(rotations) {
+        let reach = eye.distortion.reach();
+        let seen = |pixel_px: DVec2| {
+            let direction = *rotation * eye.ray(pixel_px, reach).extend(1.0);
+            direction.truncate() / direction.z.max(FLATTEST)
+        };
+        for k in 0..=BORDER_POINTS {
+            let along_px = last_px * f64::from(k) / f64::from(BORDER_POINTS);
+            least.x = least.x.max(seen(DVec2::new(0.0, along_px.y)).x);
+            most.x = most.x.min(seen(DVec2::new(last_px.x, along_px.y)).x);
+            least.y = least.y.max(seen(DVec2::new(along_px.x, 0.0)).y);
+            most.y = most.y.min(seen(DVec2::new(along_px.x, last_px.y)).y);
+        }
+    }
+    let extent = most - least;
+    let own_px = eyes.iter().map(|eye| eye.focal_px.element_sum()).sum::<f64>() / 4.0;
+    let needed_px = (last_px / extent).max_element();
+    if extent.min_element() <= 0.0 || needed_px > own_px * MOST_FOCAL {
+        return Err(CalibrationError::Apart);
+    }
+    let focal_px = needed_px.max(own_px * LEAST_FOCAL);
+    Ok((focal_px, last_px / 2.0 - focal_px * (least + most) / 2.0))
+}

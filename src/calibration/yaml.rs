@@ -1,0 +1,228 @@
+//! YAML as calibrations are written in, with the line of every entry for what is wrong there.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use saphyr_parser::{Event, Parser, ScanError};
+
+use super::error::{CalibrationError, Fault};
+
+/// Calibrations have a few kilobytes.
+const MOST_BYTES: u64 = 1 << 20;
+/// Calibrations are nested three deep.
+const MOST_NESTED: usize = 32;
+
+/// A file, read.
+pub(super) struct File {
+    path: PathBuf,
+    root: Node,
+}
+
+/// An entry and its line, from 1.
+struct Node {
+    line: usize,
+    kind: Kind,
+}
+
+enum Kind {
+    Scalar(String),
+    List(Vec<Node>),
+    Map(Vec<(String, Node)>),
+}
+
+/// A matrix of any size, row by row.
+pub(super) struct Matrix {
+    pub rows: usize,
+    pub cols: usize,
+    pub data: Vec<f64>,
+}
+
+impl File {
+    /// Reads the file `path`.
+    pub fn open(path: &Path) -> Result<Self, CalibrationError> {
+        let fail = |source| CalibrationError::Io { path: path.to_owned(), source };
+        if std::fs::metadata(path).map_err(fail)?.len() > MOST_BYTES {
+            return Err(fail(io::Error::other("too large for a calibration; name the calibration's file")));
+        }
+        Self::parse(path, &String::from_utf8_lossy(&std::fs::read(path).map_err(fail)?))
+    }
+
+    /// Reads `text`, the content of `path`.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, CalibrationError> {
+        // OpenCV's first line `%YAML:1.0` is no directive of YAML: as a comment it disturbs nobody.
+        let commented = text.trim_start_matches('\u{feff}').strip_prefix('%').map(|rest| format!("#{rest}"));
+        let text = commented.as_deref().unwrap_or(text);
+        let root = tree(text).map_err(|(line, what)| CalibrationError::File {
+            path: path.to_owned(),
+            line,
+            fault: Fault::Yaml(what),
+        })?;
+        Ok(Self { path: path.to_owned(), root })
+    }
+
+    /// The file's name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// All of it.
+    pub fn root(&self) -> Value<'_> {
+        Value { path: &self.path, key: "the file", line: 0, kind: &self.root.kind }
+    }
+}
+
+/// The first document of `text`; else the line and what is wrong with it.
+fn tree(text: &str) -> Result<Node, (usize, String)> {
+    let fault = |error: ScanError| (error.marker().line(), error.info().replace('\n', " "));
+    let mut open: Vec<Node> = Vec::new();
+    for event in Parser::new_from_str(text) {
+        let (event, span) = event.map_err(fault)?;
+        let line = span.start.line();
+        let done = match event {
+            Event::Scalar(text, ..) => Node { line, kind: Kind::Scalar(text.into_owned()) },
+            Event::SequenceStart(..) | Event::MappingStart(..) if open.len() == MOST_NESTED => {
+                return Err((line, "nested too deep".into()));
+            }
+            Event::SequenceStart(..) => {
+                open.push(Node { line, kind: Kind::List(Vec::new()) });
+                continue;
+            }
+            Event::MappingStart(..) => {
+                open.push(Node { line, kind: Kind::Map(Vec::new()) });
+                continue;
+            }
+            Event::SequenceEnd | Event::MappingEnd => match open.pop() {
+                Some(node) => node,
+                None => continue,
+            },
+            Event::Alias(_) => return Err((line, "aliases are not known here; write the value out".into())),
+            Event::DocumentEnd => break,
+            _ => continue,
+        };
+        match open.last_mut().map(|node| &mut node.kind) {
+            None => return Ok(done),
+            Some(Kind::List(list)) => list.push(done),
+            Some(Kind::Map(map)) => match map.last_mut() {
+                // A key waits for its value as an entry without one: a list that never ends up there.
+                Some((_, value)) if value.line == 0 => *value = done,
+                _ => match done.kind {
+                    Kind::Scalar(key) => map.push((key, Node { line: 0, kind: Kind::List(Vec::new()) })),
+                    _ => return Err((line, "a key must be a word".into())),
+                },
+            },
+            Some(Kind::Scalar(_)) => {}
+        }
+    }
+    Ok(Node { line: 1, kind: Kind::Map(Vec::new()) })
+}
+
+/// An entry of a file, and what it is called.
+#[derive(Clone, Copy)]
+pub(super) struct Value<'a> {
+    path: &'a Path,
+    key: &'a str,
+    line: usize,
+    kind: &'a Kind,
+}
+
+impl<'a> Value<'a> {
+    /// The error that `fault` is here.
+    pub fn refuse(&self, fault: Fault) -> CalibrationError {
+        CalibrationError::File { path: self.path.to_owned(), line: self.line, fault }
+    }
+
+    /// What it is called.
+    pub fn key(&self) -> String {
+        self.key.to_owned()
+    }
+
+    /// The entry whose key `is_it`.
+    pub fn find(&self, is_it: impl Fn(&str) -> bool) -> Option<Value<'a>> {
+        let Kind::Map(map) = self.kind else { return None };
+        let (key, node) = map.iter().find(|(key, _)| is_it(key))?;
+        Some(Value { path: self.path, key, line: node.line, kind: &node.kind })
+    }
+
+    /// The entry `key`, if there is one.
+    pub fn get(&self, key: &str) -> Option<Value<'a>> {
+        self.find(|name| name == key)
+    }
+
+    /// The entry `key`; `hint` says what to do where it is missing.
+    pub fn need(&self, key: &str, hint: &'static str) -> Result<Value<'a>, CalibrationError> {
+        self.get(key).ok_or_else(|| self.refuse(Fault::Missing { key: key.into(), hint }))
+    }
+
+    fn expect(&self, expected: &'static str) -> CalibrationError {
+        self.refuse(Fault::Kind { key: self.key(), expected })
+    }
+
+    /// A single word.
+    pub fn text(&self) -> Result<&'a str, CalibrationError> {
+        match self.kind {
+            Kind::Scalar(text) => Ok(text),
+            _ => Err(self.expect("one word")),
+        }
+    }
+
+    fn number(&self) -> Result<f64, CalibrationError> {
+        let Kind::Scalar(text) = self.kind else { return Err(self.expect("a list of numbers")) };
+        let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| {
+            let short = text.chars().take(20).collect();
+            self.refuse(Fault::NotFinite { key: self.key(), text: short })
+        })
+    }
+
+    /// A whole number, >= 0.
+    pub fn count(&self) -> Result<u32, CalibrationError> {
+        self.text()?.trim_end_matches(".0").parse().map_err(|_| self.expect("a whole number"))
+    }
+
+    fn items(&self) -> Option<impl Iterator<Item = Value<'a>>> {
+        let Value { path, key, .. } = *self;
+        let Kind::List(list) = self.kind else { return None };
+        Some(list.iter().map(move |node| Value { path, key, line: node.line, kind: &node.kind }))
+    }
+
+    /// A matrix: `rows`, `cols` and `data`; a list of rows; or a list of numbers, which is one column.
+    pub fn matrix(&self) -> Result<Matrix, CalibrationError> {
+        if let Kind::Map(_) = self.kind {
+            let side = |key| self.need(key, "a matrix has rows, cols and data")?.count();
+            let (rows, cols) = (side("rows")? as usize, side("cols")? as usize);
+            let data = self.need("data", "a matrix has rows, cols and data")?;
+            let data = Value { key: self.key, ..data }.matrix()?.data;
+            if rows.checked_mul(cols) != Some(data.len()) {
+                return Err(self.refuse(Fault::Data { key: self.key(), said: (rows, cols), found: data.len() }));
+            }
+            return Ok(Matrix { rows, cols, data });
+        }
+        let mut matrix = Matrix { rows: 0, cols: 1, data: Vec::new() };
+        for item in self.items().ok_or_else(|| self.expect("a matrix or a list of numbers"))? {
+            let before = matrix.data.len();
+            match item.items() {
+                Some(row) => {
+                    for number in row {
+                        matrix.data.push(number.number()?);
+                    }
+                }
+                None => matrix.data.push(item.number()?),
+            }
+            let cols = matrix.data.len() - before;
+            if matrix.rows > 0 && cols != matrix.cols {
+                return Err(self.expect("a matrix with rows of one length"));
+            }
+            (matrix.rows, matrix.cols) = (matrix.rows + 1, cols);
+        }
+        Ok(matrix)
+    }
+
+    /// Exactly `N` numbers of a matrix with `rows` rows.
+    pub fn numbers<const N: usize>(&self, rows: usize, expected: &'static str) -> Result<[f64; N], CalibrationError> {
+        let Matrix { rows: found, cols, data } = self.matrix()?;
+        let wrong = || self.refuse(Fault::Dimensions { key: self.key(), found: (found, cols), expected });
+        // A vector may lie or stand.
+        let fits = found == rows || (rows == N && found == 1);
+        data.try_into().ok().filter(|_| fits).ok_or_else(wrong)
+    }
+}

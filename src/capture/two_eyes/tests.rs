@@ -1,0 +1,129 @@
+use super::*;
+use crate::frame::{DepthMap, GrayImage, Stamp};
+
+const MS: u64 = 1_000_000;
+const PERIOD_NS: u64 = 33 * MS;
+
+/// A camera whose frames are there at these times; every byte of one is its number. Frames that are not read before the
+/// next one are lost, as with a driver.
+struct FakeEye {
+    clock: Clock,
+    taken_ns: Vec<u64>,
+    next: usize,
+    size: (u32, u32),
+}
+
+impl Eye for FakeEye {
+    fn info(&self) -> SourceInfo {
+        let (name, brings) = ("fake".to_owned(), Brings::Color);
+        SourceInfo { name, size: self.size, period_ns: PERIOD_NS, frames: None, live: true, brings }
+    }
+
+    fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured {
+        let now_ns = self.clock.now_ns();
+        let overwritten = self.taken_ns[self.next..].windows(2).take_while(|pair| pair[1] <= now_ns).count();
+        if overwritten > 0 {
+            self.next += overwritten;
+            return Captured::Lost(overwritten as u64, Cause::Evicted);
+        }
+        let until_ns = now_ns + patience.as_nanos() as u64;
+        match self.taken_ns.get(self.next) {
+            Some(&taken_ns) if taken_ns <= until_ns => {
+                self.clock.sleep_until_ns(taken_ns);
+                color.resize(self.size.0, self.size.1);
+                color.rgb.fill(self.next as u8);
+                self.next += 1;
+                Captured::Frame(Stamp { index: self.next - 1, time_ns: taken_ns, captured_ns: Some(taken_ns) })
+            }
+            Some(_) => {
+                self.clock.sleep_until_ns(until_ns);
+                Captured::Waiting
+            }
+            None => Captured::End,
+        }
+    }
+
+    fn rest(&mut self) {}
+}
+
+fn eyes(left_ns: Vec<u64>, right_ns: Vec<u64>) -> (TwoEyes<FakeEye>, Clock) {
+    let clock = Clock::manual();
+    let eye = |taken_ns| FakeEye { clock: clock.clone(), taken_ns, next: 0, size: (4, 2) };
+    (TwoEyes::new(eye(left_ns), eye(right_ns), clock.clone(), None).unwrap(), clock)
+}
+
+fn times(frames: impl Iterator<Item = u64>, skew_ns: u64) -> Vec<u64> {
+    frames.map(|k| (k + 1) * PERIOD_NS + skew_ns).collect()
+}
+
+/// The numbers of the pairs, and how many frames were lost without a partner and otherwise; whoever reads takes so long.
+fn play(camera: &mut TwoEyes<FakeEye>, clock: &Clock, takes_ns: u64) -> (Vec<(u8, u8)>, u64, u64) {
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+    let (mut pairs, mut unpaired, mut lost) = (Vec::new(), 0, 0);
+    loop {
+        match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
+            Captured::Frame(stamp) => {
+                assert_eq!((color.size(), right.size(), stamp.index as u8), ((4, 2), (4, 2), color.rgb[0]));
+                pairs.push((color.rgb[0], right.luma[0]));
+                clock.advance_ns(takes_ns);
+            }
+            Captured::Lost(count, Cause::Unpaired) => unpaired += count,
+            Captured::Lost(count, _) => lost += count,
+            Captured::Waiting => {}
+            Captured::Corrupt(error) => panic!("{error}"),
+            Captured::End => return (pairs, unpaired, lost),
+        }
+    }
+}
+
+#[test]
+fn frames_of_one_time_come_together_whichever_camera_leads() {
+    for (left_skew, right_skew) in [(0, 0), (0, 15 * MS), (15 * MS, 0)] {
+        let (mut camera, clock) = eyes(times(0..50, left_skew), times(0..50, right_skew));
+        assert_eq!(camera.info().brings, Brings::RightEye);
+        let (pairs, unpaired, lost) = play(&mut camera, &clock, 3 * MS);
+        assert!(pairs.into_iter().eq((0..50).map(|k| (k, k))), "{left_skew} {right_skew}");
+        assert_eq!((unpaired, lost), (0, 0));
+        assert!(camera.apart.max_ns() == left_skew.abs_diff(right_skew));
+    }
+}
+
+#[test]
+fn a_frame_without_a_partner_is_counted_and_the_next_ones_are_pairs_again() {
+    // The right camera loses frames 5 and 6, the left one frame 20.
+    let left = times((0..40).filter(|&k| k != 20), 2 * MS);
+    let right = times((0..40).filter(|&k| k != 5 && k != 6), 9 * MS);
+    let (mut camera, clock) = eyes(left, right);
+    let (pairs, unpaired, lost) = play(&mut camera, &clock, MS);
+    assert_eq!((pairs.len(), unpaired, lost), (37, 2, 0));
+    // Numbers count what each camera gave.
+    assert_eq!((pairs[4], pairs[5], pairs[36]), ((4, 4), (7, 5), (38, 37)));
+}
+
+#[test]
+fn one_camera_gone_costs_the_frames_of_that_time_and_half_a_period_each() {
+    let (mut camera, clock) = eyes(times(0..40, 0), times((0..10).chain(30..40), 5 * MS));
+    let (pairs, unpaired, lost) = play(&mut camera, &clock, MS);
+    assert_eq!((pairs.len() as u64, unpaired, lost), (20, 20, 0));
+    assert_eq!(pairs[10], (30, 10));
+    let (mut camera, clock) = eyes(times((0..10).chain(30..40), 0), times(0..40, 5 * MS));
+    let (pairs, unpaired, lost) = play(&mut camera, &clock, MS);
+    assert_eq!((pairs.len(), unpaired, lost), (20, 0, 0));
+    assert_eq!(pairs[19], (19, 39));
+}
+
+#[test]
+fn who_reads_slowly_gets_fewer_pairs_and_every_left_frame_is_accounted_for() {
+    let (mut camera, clock) = eyes(times(0..90, 0), times(0..90, 7 * MS));
+    let (pairs, unpaired, lost) = play(&mut camera, &clock, 50 * MS);
+    assert_eq!(pairs.len() as u64 + unpaired + lost, 90);
+    assert!(pairs.len() >= 30 && pairs.iter().all(|(left, right)| left == right), "{pairs:?}");
+}
+
+#[test]
+fn eyes_of_two_sizes_are_refused() {
+    let clock = Clock::manual();
+    let eye = |size| FakeEye { clock: clock.clone(), taken_ns: Vec::new(), next: 0, size };
+    let error = TwoEyes::new(eye((640, 480)), eye((1280, 720)), clock.clone(), None).err().unwrap().to_string();
+    assert!(error.contains("640x480") && error.contains("1280x720") && error.contains("--size"), "{error}");
+}

@@ -1,0 +1,226 @@
+//! Distinctive points, and where they are in another picture.
+
+use pulp::{Simd, WithSimd};
+
+use crate::frame::GrayImage;
+
+/// Rows above and below that are searched, in pixels of half resolution.
+const ROWS: i32 = 12;
+/// One point is taken from each square of this side, in pixels of half resolution.
+const CELL: usize = 16;
+/// Side of the compared windows at half resolution.
+const COARSE: usize = 8;
+/// Side of the compared windows at full resolution.
+const FINE: usize = 13;
+/// How far the place found at half resolution may be wrong at full resolution, in pixels.
+const STEP: i32 = 2;
+/// Half the side of the window in which a point's gradients are summed.
+const CORNER_REACH: usize = 2;
+/// Least squared gradient per pixel, across the direction in which it is least, of a distinctive point.
+const LEAST_CORNER: f32 = 16.0;
+/// Least correlation of a match.
+const LEAST_SCORE: f32 = 0.8;
+/// A match lacks less than this part of what the second best place lacks to a correlation of 1.
+const UNIQUE: f32 = 0.6;
+/// Places this near to the best one belong to it, in pixels of half resolution.
+const SAME_PEAK: i32 = 3;
+
+/// A picture of half as many columns and rows.
+pub(super) fn halved(image: &GrayImage) -> GrayImage {
+    let (width, height) = (image.width / 2, image.height / 2);
+    let mut half = GrayImage { width, height, luma: Vec::with_capacity(width as usize * height as usize) };
+    let stride = image.width as usize;
+    for rows in image.luma.chunks_exact(2 * stride.max(1)) {
+        let (upper, lower) = rows.split_at(stride);
+        for (a, b) in upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0) {
+            let sum: u16 = [a[0], a[1], b[0], b[1]].map(u16::from).iter().sum();
+            half.luma.push(((sum + 2) / 4) as u8);
+        }
+    }
+    half
+}
+
+/// The most distinctive point of each cell, if it is distinctive at all, away from the border.
+pub(super) fn corners(image: &GrayImage) -> Vec<(i32, i32)> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let value = |x: usize, y: usize| f32::from(image.luma[y * width + x]);
+    let least = |x: usize, y: usize| {
+        let (mut across, mut down, mut both) = (0.0, 0.0, 0.0);
+        for y in y - CORNER_REACH..=y + CORNER_REACH {
+            for x in x - CORNER_REACH..=x + CORNER_REACH {
+                let (gx, gy) = (value(x + 1, y) - value(x - 1, y), value(x, y + 1) - value(x, y - 1));
+                (across, down, both) = (across + gx * gx, down + gy * gy, both + gx * gy);
+            }
+        }
+        // The smaller eigenvalue of the sums' matrix; differences span two pixels.
+        let half: f32 = (across - down) / 2.0;
+        let pixels = ((2 * CORNER_REACH + 1) * (2 * CORNER_REACH + 1) * 4) as f32;
+        ((across + down) / 2.0 - half.hypot(both)) / pixels
+    };
+    let border = COARSE;
+    let mut found = Vec::new();
+    for top in (border..height.saturating_sub(border)).step_by(CELL) {
+        for first in (border..width.saturating_sub(border)).step_by(CELL) {
+            let mut best = (LEAST_CORNER, 0, 0);
+            for y in top..(top + CELL).min(height - border) {
+                for x in (first..(first + CELL).min(width - border)).step_by(2) {
+                    let strength = least(x, y);
+                    if strength > best.0 {
+                        best = (strength, x, y);
+                    }
+                }
+            }
+            if best.0 > LEAST_CORNER {
+                found.push((best.1 as i32, best.2 as i32));
+            }
+        }
+    }
+    found
+}
+
+/// A picture at half resolution, prepared to be searched.
+pub(super) struct Coarse {
+    width: usize,
+    height: usize,
+    values: Vec<f32>,
+    /// For the window that begins at each pixel, 1 over the root of its squared deviations.
+    inverse_norm: Vec<f32>,
+    /// Greatest disparity, either way.
+    reach: i32,
+}
+
+impl Coarse {
+    /// Of a picture at half resolution; `reach` is the greatest disparity there.
+    pub fn new(image: &GrayImage, reach: i32) -> Self {
+        let (width, height) = (image.width as usize, image.height as usize);
+        let values: Vec<f32> = image.luma.iter().map(|&luma| f32::from(luma)).collect();
+        let mut inverse_norm = vec![0.0; values.len()];
+        for y in 0..(height + 1).saturating_sub(COARSE) {
+            for x in 0..(width + 1).saturating_sub(COARSE) {
+                let (mut sum, mut squares) = (0.0, 0.0);
+                for row in 0..COARSE {
+                    for value in &values[(y + row) * width + x..][..COARSE] {
+                        (sum, squares) = (sum + value, squares + value * value);
+                    }
+                }
+                let variance = squares - sum * sum / (COARSE * COARSE) as f32;
+                // Below one level per pixel there is but noise.
+                let is_textured = variance > (COARSE * COARSE) as f32;
+                inverse_norm[y * width + x] = if is_textured { variance.sqrt().recip() } else { 0.0 };
+            }
+        }
+        Self { width, height, values, inverse_norm, reach }
+    }
+}
+
+/// The place in the picture `into` of the point `at` of the picture `from`, at half resolution: how far across and down.
+pub(super) struct Search<'a> {
+    pub from: &'a GrayImage,
+    pub into: &'a Coarse,
+    pub at: (i32, i32),
+    /// Memory for the scores of all places.
+    pub scores: &'a mut Vec<f32>,
+}
+
+impl WithSimd for Search<'_> {
+    type Output = Option<(i32, i32)>;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Option<(i32, i32)> {
+        let &Coarse { width, height, reach, .. } = self.into;
+        // Windows are named by their upper left pixel.
+        let (x, y) = (self.at.0 - COARSE as i32 / 2, self.at.1 - COARSE as i32 / 2);
+        let mut patch = [0.0_f32; COARSE * COARSE];
+        for (row, patch) in patch.chunks_exact_mut(COARSE).enumerate() {
+            let from = &self.from.luma[(y as usize + row) * width + x as usize..][..COARSE];
+            patch.iter_mut().zip(from).for_each(|(patch, &luma)| *patch = f32::from(luma));
+        }
+        let mean = patch.iter().sum::<f32>() / patch.len() as f32;
+        patch.iter_mut().for_each(|value| *value -= mean);
+        let norm = patch.iter().map(|value| value * value).sum::<f32>().sqrt();
+        if norm == 0.0 {
+            return None;
+        }
+        let first_x = (x - reach).max(0);
+        let places = ((x + reach).min((width - COARSE) as i32) - first_x + 1) as usize;
+        let rows = (y - ROWS).max(0)..(y + ROWS).min((height - COARSE) as i32) + 1;
+        self.scores.clear();
+        self.scores.resize(places * rows.len(), 0.0);
+        for (scores, top) in self.scores.chunks_exact_mut(places).zip(rows.clone()) {
+            for (row, weights) in patch.chunks_exact(COARSE).enumerate() {
+                let start = (top as usize + row) * width + first_x as usize;
+                for (column, &weight) in weights.iter().enumerate() {
+                    let values = &self.into.values[start + column..][..places];
+                    for (score, &value) in scores.iter_mut().zip(values) {
+                        *score += weight * value;
+                    }
+                }
+            }
+            let inverse_norms = &self.into.inverse_norm[top as usize * width + first_x as usize..][..places];
+            for (score, &inverse_norm) in scores.iter_mut().zip(inverse_norms) {
+                *score *= inverse_norm / norm;
+            }
+        }
+        let place = |k: usize| (first_x + (k % places) as i32 - x, rows.start + (k / places) as i32 - y);
+        let (mut best, mut score) = (0, 0.0);
+        for (k, &other) in self.scores.iter().enumerate() {
+            if other > score {
+                (best, score) = (k, other);
+            }
+        }
+        let (dx, dy) = place(best);
+        let rival = |k: usize| {
+            let (other_dx, other_dy) = place(k);
+            (other_dx - dx).abs() > SAME_PEAK || (other_dy - dy).abs() > SAME_PEAK
+        };
+        // Anything that comes near enough to the best place elsewhere.
+        let enough = 1.0 - (1.0 - score) / UNIQUE;
+        let is_unique = !self.scores.iter().enumerate().any(|(k, &other)| other > enough && rival(k));
+        (score > LEAST_SCORE && is_unique).then_some((dx, dy))
+    }
+}
+
+/// The move (across, down) of the point `at`, about `moved`, at full resolution and to parts of a pixel.
+pub(super) fn refined(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved: (i32, i32)) -> Option<(f32, f32)> {
+    const SIDE: usize = (2 * STEP + 1) as usize;
+    let patch = window(left, at)?;
+    let mut scores = [[0.0; SIDE]; SIDE];
+    let (mut score, mut peak) = (LEAST_SCORE, None);
+    for (dy, scores) in (-STEP..).zip(&mut scores) {
+        for (dx, place) in (-STEP..).zip(scores) {
+            let other = window(right, (at.0 + moved.0 + dx, at.1 + moved.1 + dy))?;
+            *place = patch.iter().zip(&other).map(|(a, b)| a * b).sum::<f32>();
+            if *place > score {
+                (score, peak) = (*place, Some((dx, dy)));
+            }
+        }
+    }
+    let (dx, dy) = peak.filter(|(dx, dy)| dx.abs() < STEP && dy.abs() < STEP)?;
+    let (column, row) = ((dx + STEP) as usize, (dy + STEP) as usize);
+    // The top of the parabola through three scores.
+    let top = |before: f32, after: f32| {
+        let bend = before - 2.0 * score + after;
+        if bend < 0.0 { (before - after) / (2.0 * bend) } else { 0.0 }
+    };
+    let across = top(scores[row][column - 1], scores[row][column + 1]);
+    let down = top(scores[row - 1][column], scores[row + 1][column]);
+    Some(((moved.0 + dx) as f32 + across, (moved.1 + dy) as f32 + down))
+}
+
+/// The window around a pixel, of mean 0 and norm 1; `None` where it leaves the picture or nothing is in it.
+fn window(image: &GrayImage, (x, y): (i32, i32)) -> Option<[f32; FINE * FINE]> {
+    let (x, y) = (x - FINE as i32 / 2, y - FINE as i32 / 2);
+    let is_inside = x >= 0 && y >= 0 && x + FINE as i32 <= image.width as i32 && y + FINE as i32 <= image.height as i32;
+    let mut values = [0.0; FINE * FINE];
+    if !is_inside {
+        return None;
+    }
+    for (row, values) in values.chunks_exact_mut(FINE).enumerate() {
+        let from = &image.luma[(y as usize + row) * image.width as usize + x as usize..][..FINE];
+        values.iter_mut().zip(from).for_each(|(value, &luma)| *value = f32::from(luma));
+    }
+    let mean = values.iter().sum::<f32>() / values.len() as f32;
+    values.iter_mut().for_each(|value| *value -= mean);
+    let norm = values.iter().map(|value| value * value).sum::<f32>().sqrt();
+    values.iter_mut().for_each(|value| *value /= norm);
+    (norm > 0.0).then_some(values)
+}

@@ -1,0 +1,279 @@
+//! Two eyes as a source of depth: rectified if they are not yet, matched, and turned into metres.
+//!
+//! The blur needs no more than the disparity: with `z = f B / (d + doffs)`, the thin lens `c = c_inf (1 - z_f / z)` is
+//! `c = (c_inf / d_f) (d_f - d)`, counted from the disparity of infinity, which is `(A / 2B) (d_f - d)` for an aperture
+//! of diameter `A`. Focal length and baseline cancel out, so that a rig of which nothing is known
+//! ([`StereoRig::assumed`]) blurs as well as a measured one; only distances in metres mean nothing then.
+
+use super::check::{Verdict, check};
+use super::{Effort, MatchError, Matcher};
+use crate::calibration::rectifier::Rectifier;
+use crate::depth::{DepthError, DepthSource, Seen};
+use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
+use crate::optics::StereoRig;
+
+/// A disparity this little above that of infinity is as far as any: it is not measured any finer, and depth stays finite.
+const FARTHEST_PX: f32 = 1.0 / 16.0;
+
+/// Pairs that are looked at until one of them tells whether it is rectified; each look takes the time of a few frames.
+const FIRST_LOOKS: u32 = 5;
+
+/// What a map costs with little effort beside a full one: an eighth of the candidates, and what does not depend on them.
+const EFFORTS: [f64; 2] = [0.25, 1.0];
+
+/// Depth from the frames of a camera that brings a right eye.
+pub struct StereoDepth {
+    source_name: String,
+    rig: StereoRig,
+    rectifier: Option<Rectifier>,
+    matcher: Box<dyn Matcher>,
+    left: GrayImage,
+    /// Where pictures are rectified to.
+    color: ColorImage,
+    right: GrayImage,
+    disparity: DisparityMap,
+    disparities: u32,
+    /// Pairs that may still be looked at, for whether they are what they were said to be.
+    looks: u32,
+}
+
+impl StereoDepth {
+    /// Depth by `matcher`, which tries so many `disparities`, from pairs that `rig` took and that are rectified already.
+    /// `source_name` stands for their source in messages.
+    pub fn of_rectified(source_name: &str, rig: StereoRig, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
+        Self {
+            source_name: source_name.to_owned(),
+            rig,
+            rectifier: None,
+            matcher,
+            left: GrayImage::default(),
+            color: ColorImage::default(),
+            right: GrayImage::default(),
+            disparity: DisparityMap::default(),
+            disparities,
+            looks: FIRST_LOOKS,
+        }
+    }
+
+    /// The same from pairs that `rectifier` rectifies. Their left pictures are rectified as well.
+    pub fn of_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
+        let rig = rectifier.rig();
+        Self { rectifier: Some(rectifier), ..Self::of_rectified(source_name, rig, matcher, disparities) }
+    }
+
+    /// What takes the pictures, once they are rectified.
+    pub fn rig(&self) -> &StereoRig {
+        &self.rig
+    }
+
+    /// What runs the matching.
+    pub fn describe(&self) -> String {
+        self.matcher.describe()
+    }
+}
+
+/// Whether a pair is what it was said to be; said where it is not. Gives whether it could be told.
+fn first_look(source_name: &str, left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<bool, MatchError> {
+    let verdict = check(left, right, disparities)?.verdict();
+    match verdict {
+        Verdict::Rectified => tracing::info!("{source_name}: {verdict}"),
+        Verdict::RowsOff { .. } | Verdict::Swapped => tracing::warn!("{source_name}: {verdict}"),
+        Verdict::Unclear { .. } => {
+            tracing::debug!("{source_name}: {verdict}");
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+impl DepthSource for StereoDepth {
+    fn straighten(&mut self, color: &mut ColorImage) {
+        if let Some(rectifier) = &self.rectifier {
+            rectifier.left(color, &mut self.color);
+            std::mem::swap(color, &mut self.color);
+        }
+    }
+
+    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        let Some(right) = seen.right else {
+            return Err(DepthError::OneEye { source_name: self.source_name.clone() });
+        };
+        self.left.set_luma_of(seen.color);
+        let right = match &self.rectifier {
+            Some(rectifier) => {
+                rectifier.right(right, &mut self.right);
+                &self.right
+            }
+            None => right,
+        };
+        if self.looks > 0 {
+            let told = first_look(&self.source_name, &self.left, right, self.disparities)?;
+            self.looks = if told { 0 } else { self.looks - 1 };
+        }
+        self.matcher.disparity(&self.left, right, &mut self.disparity)?;
+        metres(&self.disparity, &self.rig, map);
+        Ok(())
+    }
+
+    fn efforts(&self) -> &'static [f64] {
+        &EFFORTS
+    }
+
+    fn set_effort(&mut self, effort: usize) {
+        self.matcher.set_effort(if effort == 0 { Effort::Fast } else { Effort::Full });
+    }
+}
+
+/// Disparity as depth. What is unknown stays so; what is at infinity, or beyond it by an error of measurement, is as far
+/// as anything can be told to be.
+fn metres(disparity: &DisparityMap, rig: &StereoRig, map: &mut DepthMap) {
+    map.resize(disparity.width, disparity.height);
+    let (focal_baseline, doffs_px) = (rig.focal_px * rig.baseline_m, rig.doffs_px);
+    for (z_m, &d_px) in map.metres.iter_mut().zip(&disparity.px) {
+        let known = (d_px > 0.0) & (d_px < f32::INFINITY);
+        let far_m = focal_baseline / (d_px + doffs_px).max(FARTHEST_PX);
+        *z_m = if known { far_m } else { 0.0 };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec2, DVec3};
+
+    use super::*;
+    use crate::calibration::{Distortion, Eye, StereoCalibration};
+    use crate::depth::stereo::MatchError;
+    use crate::frame::Stamp;
+    use crate::optics::DepthCoc;
+
+    const STAMP: Stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
+
+    /// Takes the difference of the eyes for their disparity.
+    struct Difference(Effort);
+
+    impl Matcher for Difference {
+        fn describe(&self) -> String {
+            "difference".to_owned()
+        }
+        fn set_effort(&mut self, effort: Effort) {
+            self.0 = effort;
+        }
+        fn disparity(
+            &mut self,
+            left: &GrayImage,
+            right: &GrayImage,
+            into: &mut DisparityMap,
+        ) -> Result<(), MatchError> {
+            if left.size() != right.size() {
+                return Err(MatchError::Sizes { left: left.size(), right: right.size() });
+            }
+            into.resize(left.width, left.height);
+            let share = if self.0 == Effort::Full { 1.0 } else { 0.5 };
+            for (px, (&left, &right)) in into.px.iter_mut().zip(left.luma.iter().zip(&right.luma)) {
+                *px = (f32::from(left) - f32::from(right)) * share;
+            }
+            Ok(())
+        }
+    }
+
+    const RIG: StereoRig = StereoRig { focal_px: 100.0, baseline_m: 0.1, doffs_px: 5.0, metric: true };
+
+    fn gray(luma: &[u8]) -> GrayImage {
+        GrayImage { width: luma.len() as u32, height: 1, luma: luma.to_vec() }
+    }
+
+    fn color(luma: &[u8]) -> ColorImage {
+        ColorImage { width: luma.len() as u32, height: 1, rgb: luma.iter().flat_map(|&y| [y; 3]).collect() }
+    }
+
+    #[test]
+    fn disparity_becomes_metres_and_what_is_unknown_stays_so() {
+        let disparity = DisparityMap { width: 6, height: 1, px: vec![5.0, 15.0, 0.0, f32::NAN, f32::INFINITY, 0.01] };
+        let mut map = DepthMap::default();
+        metres(&disparity, &RIG, &mut map);
+        assert_eq!(map.metres[..5], [1.0, 0.5, 0.0, 0.0, 0.0]);
+        assert!((map.metres[5] - 10.0 / 5.01).abs() < 1e-5);
+        // Infinity lies at 5 px: what is there or beyond is far, and known.
+        metres(&disparity, &StereoRig { doffs_px: -5.0, ..RIG }, &mut map);
+        assert_eq!(map.metres, [160.0, 1.0, 0.0, 0.0, 0.0, 160.0]);
+    }
+
+    #[test]
+    fn the_blur_is_affine_in_the_disparity_whatever_the_rig() {
+        let disparity = DisparityMap { width: 5, height: 1, px: vec![4.0, 8.0, 16.0, 24.0, 32.0] };
+        for rig in [RIG, StereoRig::assumed(640), StereoRig { focal_px: 721.5, baseline_m: 0.54, ..RIG }] {
+            let mut map = DepthMap::default();
+            metres(&disparity, &rig, &mut map);
+            let coc = DepthCoc { coc_at_infinity_px: 12.0, focus_m: map.metres[2], max_coc_px: 100.0 };
+            let in_focus_px = 16.0 + rig.doffs_px;
+            for (&d_px, &z_m) in disparity.px.iter().zip(&map.metres) {
+                let expected_px = 12.0 / in_focus_px * (16.0 - d_px);
+                assert!((coc.coc_px(z_m) - expected_px).abs() < 1e-4, "{rig:?} {d_px}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rectified_pair_is_matched_as_it_is() {
+        let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
+        let (mut picture, mut map) = (color(&[25, 55, 10]), DepthMap::default());
+        source.straighten(&mut picture);
+        assert_eq!(picture, color(&[25, 55, 10]));
+        let right = gray(&[20, 40, 10]);
+        source.read(Seen { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap();
+        assert_eq!(map.metres, [1.0, 0.5, 0.0]);
+        let efforts = source.efforts();
+        assert!(efforts.is_sorted() && efforts.last() == Some(&1.0));
+        source.set_effort(0);
+        source.read(Seen { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap();
+        assert_eq!(map.metres[1], 10.0 / 12.5);
+    }
+
+    #[test]
+    fn a_raw_pair_is_rectified_and_so_is_its_picture() {
+        let size = (64, 48);
+        let eye = |center_y_px| Eye {
+            size: Some(size),
+            focal_px: DVec2::splat(60.0),
+            center_px: DVec2::new(32.0, center_y_px),
+            distortion: Distortion::RadialTangential([0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        };
+        // The right eye looks some rows lower.
+        let calibration = StereoCalibration {
+            eyes: [eye(24.0), eye(20.0)],
+            rotation: DMat3::IDENTITY,
+            translation_m: DVec3::new(-0.1, 0.0, 0.0),
+            given: None,
+            assumed_mm: false,
+        };
+        let rectifier = Rectifier::new(&calibration, size).unwrap();
+        let ramp: Vec<u8> = (0..64 * 48).map(|at| 40 + 3 * (at / 64) as u8).collect();
+        let raw = ColorImage { width: 64, height: 48, rgb: ramp.iter().flat_map(|&y| [y; 3]).collect() };
+        let raw_right = GrayImage { width: 64, height: 48, luma: ramp };
+        let (mut left, mut right) = (ColorImage::default(), GrayImage::default());
+        rectifier.left(&raw, &mut left);
+        rectifier.right(&raw_right, &mut right);
+        assert_ne!(left, raw);
+
+        let mut source = StereoDepth::of_raw("two eyes", rectifier, Box::new(Difference(Effort::Full)), 16);
+        let (mut picture, mut map) = (raw.clone(), DepthMap::default());
+        source.straighten(&mut picture);
+        assert_eq!(picture, left);
+        source.read(Seen { stamp: STAMP, color: &picture, right: Some(&raw_right) }, &mut map).unwrap();
+        let middle = 24 * 64 + 32;
+        let difference_px = f32::from(left.rgb[3 * middle]) - f32::from(right.luma[middle]);
+        assert_eq!(map.metres[middle], if difference_px > 0.0 { source.rig().depth_m(difference_px) } else { 0.0 });
+        assert!(source.rig().metric && (source.rig().baseline_m - 0.1).abs() < 1e-6);
+    }
+
+    #[test]
+    fn one_eye_and_unequal_eyes_are_named() {
+        let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
+        let (picture, mut map) = (color(&[25, 55]), DepthMap::default());
+        let error = source.read(Seen { stamp: STAMP, color: &picture, right: None }, &mut map).unwrap_err();
+        assert!(matches!(&error, DepthError::OneEye { .. }) && error.to_string().contains("two eyes"), "{error}");
+        let right = gray(&[1, 2, 3]);
+        let error = source.read(Seen { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap_err();
+        assert!(error.to_string().contains("2x1") && error.to_string().contains("3x1"), "{error}");
+    }
+}

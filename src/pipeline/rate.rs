@@ -1,0 +1,123 @@
+//! How well, and for how many frames, depth is made: the ladder of the depth stage.
+
+use crate::budget::{Governor, Sample};
+use crate::frame::DepthMap;
+use crate::optics::CocField;
+
+/// What there is time for: first depth is made with less effort, where its source has a choice, then for every second
+/// or third frame, and the others take it over.
+pub(super) struct Rate {
+    /// The cheapest first.
+    rungs: Vec<Rung>,
+    governor: Governor,
+    budget_ns: u64,
+    /// Frames since depth was made, that one included.
+    age: usize,
+    /// What was made last, where the next frame may be given it, too.
+    last: Option<CocField>,
+    map: DepthMap,
+}
+
+#[derive(Clone, Copy)]
+struct Rung {
+    /// Frames that share a depth.
+    frames: usize,
+    effort: usize,
+}
+
+impl Rate {
+    /// Depth may take `budget_ns` of a frame's time, on average. `efforts` are the costs of its source's efforts, the
+    /// finest, 1, at the end.
+    pub(super) fn new(budget_ns: u64, efforts: &[f64]) -> Self {
+        let cheapest = efforts.first().copied().unwrap_or(1.0);
+        let shared = [3, 2].map(|frames| (Rung { frames, effort: 0 }, cheapest / frames as f64));
+        let own = efforts.iter().enumerate().map(|(effort, &cost)| (Rung { frames: 1, effort }, cost));
+        let (rungs, costs): (Vec<Rung>, Vec<f64>) = shared.into_iter().chain(own).unzip();
+        let governor = Governor::new(&costs, costs.len() - 1);
+        Self { rungs, governor, budget_ns, age: 0, last: None, map: DepthMap::default() }
+    }
+
+    /// The effort for the next depth.
+    pub(super) fn effort(&self) -> usize {
+        self.rung().effort
+    }
+
+    fn rung(&self) -> Rung {
+        self.rungs[self.governor.rung()]
+    }
+
+    /// The CoC of the last depth where the next frame is given both; counts the frame.
+    pub(super) fn holds(&mut self) -> Option<CocField> {
+        if self.age >= self.rung().frames {
+            self.last = None;
+        }
+        self.age += 1;
+        self.last
+    }
+
+    /// The depth that is held.
+    pub(super) fn copy_held(&self, into: &mut DepthMap) {
+        copy(&self.map, into);
+    }
+
+    /// Depth was made, and took so long.
+    pub(super) fn made(&mut self, (map, field): (&DepthMap, CocField), took_ns: u64, at_ns: u64) {
+        self.age = 1;
+        let took_ns = took_ns / self.rung().frames as u64;
+        self.governor.note(Sample { rung: self.governor.rung(), took_ns, at_ns }, self.budget_ns);
+        // The first one, too: no later frame shall be the one that takes the memory.
+        if self.rung().frames > 1 || self.map.metres.is_empty() {
+            copy(map, &mut self.map);
+            self.last = Some(field);
+        }
+    }
+}
+
+fn copy(from: &DepthMap, to: &mut DepthMap) {
+    to.resize(from.width, from.height);
+    to.metres.copy_from_slice(&from.metres);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FAST: f64 = 0.25;
+
+    /// Which frames of 200 are given the depth of the one before, where making it takes so long, and the last effort.
+    fn run(took_ns: u64, efforts: &[f64]) -> (Vec<bool>, usize) {
+        let mut rate = Rate::new(16_000_000, efforts);
+        let map = DepthMap::new(2, 2);
+        let frame = |now_ns| {
+            if rate.holds().is_some() {
+                return true;
+            }
+            let took_ns = (took_ns as f64 * efforts[rate.effort()]) as u64;
+            rate.made((&map, CocField::Uniform { radius_px: 1.0 }), took_ns, now_ns);
+            false
+        };
+        let held = (1..=200).map(|frame| frame * 33_000_000).map(frame).collect();
+        (held, rate.effort())
+    }
+
+    #[test]
+    fn depth_is_made_as_often_as_there_is_time() {
+        for (took_ms, every) in [(10, 1), (20, 2), (40, 3), (400, 3)] {
+            let (held, effort) = run(took_ms * 1_000_000, &[1.0]);
+            assert!(!held[0], "the first frame has no other to take it from");
+            let made: Vec<usize> = (20..200).filter(|&frame| !held[frame]).collect();
+            assert!(made.windows(2).all(|pair| pair[1] - pair[0] == every), "{took_ms} ms: {made:?}");
+            assert_eq!(effort, 0);
+        }
+    }
+
+    #[test]
+    fn less_effort_comes_before_fewer_maps() {
+        for (took_ms, every, effort) in [(10, 1, 1), (20, 1, 0), (50, 1, 0), (100, 2, 0), (160, 3, 0)] {
+            let (held, last) = run(took_ms * 1_000_000, &[FAST, 1.0]);
+            let made: Vec<usize> = (20..200).filter(|&frame| !held[frame]).collect();
+            assert!(made.windows(2).all(|pair| pair[1] - pair[0] == every), "{took_ms} ms: {made:?}");
+            assert_eq!(last, effort, "{took_ms} ms");
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! What every layout is read into: frames whose pictures are still on the disk.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::decode::DepthUnits;
+use super::error::RecordingError;
+use super::fault::{LineFault, PictureFault};
+use super::{Options, Pair, Unpaired};
+use crate::optics::StereoRig;
+
+/// A layout: how it is recognised, and how it is read.
+pub(super) struct Layout {
+    /// As it is called.
+    pub(super) name: &'static str,
+    /// What makes a folder one, for messages.
+    pub(super) looked_for: &'static str,
+    /// Whether the folder is one.
+    pub(super) is_in: fn(&Path) -> bool,
+    /// Reads what lists and calibrations there are.
+    pub(super) open: fn(&Folder, &Options) -> Result<Contents, RecordingError>,
+}
+
+/// What a folder holds.
+#[derive(Debug)]
+pub(super) struct Contents {
+    pub(super) frames: Vec<Listed>,
+    pub(super) depth: Option<DepthForm>,
+    pub(super) pair: Option<Pair>,
+    pub(super) disparities: Option<u32>,
+    pub(super) unpaired: Unpaired,
+}
+
+/// A frame as listed. The times that there are increase strictly.
+#[derive(Debug)]
+pub(super) struct Listed {
+    pub(super) time_ns: Option<u64>,
+    pub(super) color: Source,
+    pub(super) right: Option<Source>,
+    pub(super) depth: Option<Source>,
+}
+
+/// How depth is stored.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum DepthForm {
+    /// 16-bit pictures.
+    Units(DepthUnits),
+    /// Disparities in a PFM, as these eyes see them at the size of the colour pictures.
+    Disparity(StereoRig),
+}
+
+/// The folder of a recording.
+#[derive(Debug)]
+pub(super) struct Folder {
+    /// As it was named: for messages.
+    pub(super) dir: PathBuf,
+    /// With every link resolved: no picture may lie outside it.
+    pub(super) root: PathBuf,
+}
+
+/// A line of a list.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) list: &'static str,
+    /// From 1.
+    pub(super) line: u32,
+}
+
+/// A picture, and where it is named.
+#[derive(Clone, Debug)]
+pub(super) struct Source {
+    /// Nothing where the folder itself is the list.
+    pub(super) place: Option<Place>,
+    /// Relative to the folder.
+    pub(super) file: Result<PathBuf, LineFault>,
+}
+
+impl Folder {
+    /// The path of a picture, with every link resolved.
+    pub(super) fn locate(&self, source: &Source) -> Result<PathBuf, RecordingError> {
+        let path = self.root.join(source.file(&self.dir)?);
+        // A path that cannot be resolved cannot be read either, and reading says why.
+        let path = path.canonicalize().unwrap_or(path);
+        if path.starts_with(&self.root) { Ok(path) } else { Err(source.wrong(&self.dir, PictureFault::Outside)) }
+    }
+}
+
+impl Source {
+    /// A picture that no list names.
+    pub(super) fn found(file: PathBuf) -> Self {
+        Self { place: None, file: Ok(file) }
+    }
+
+    /// The file, or the fault of the line that should have named it.
+    pub(super) fn file(&self, dir: &Path) -> Result<&Path, RecordingError> {
+        self.file.as_deref().map_err(|fault| {
+            let (list, line) = self.place.map_or((dir.to_owned(), 0), |place| (dir.join(place.list), place.line));
+            RecordingError::Line { list, line, fault: fault.clone() }
+        })
+    }
+
+    /// The error that the picture has `fault`.
+    pub(super) fn wrong(&self, dir: &Path, fault: PictureFault) -> RecordingError {
+        let file = self.file.clone().unwrap_or_default();
+        match self.place {
+            Some(Place { list, line }) => RecordingError::Listed { list: dir.join(list), line, file, fault },
+            None => RecordingError::Picture { path: dir.join(file), fault },
+        }
+    }
+}
+
+/// Names of the PNG and JPEG files in `folder` whose stems are made of digits and `_`, in the order of their numbers.
+///
+/// # Errors
+/// The folder cannot be listed, or has no such file.
+pub(super) fn numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingError> {
+    let is_picture = |name: &String| {
+        let (stem, extension) = name.rsplit_once('.').unwrap_or_default();
+        !stem.is_empty()
+            && stem.bytes().all(|byte| byte.is_ascii_digit() || byte == b'_')
+            && ["png", "jpg", "jpeg"].iter().any(|known| extension.eq_ignore_ascii_case(known))
+    };
+    let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
+    let entries: Vec<_> = entries.map_err(RecordingError::io("list", folder))?;
+    let mut names: Vec<_> = entries.into_iter().filter_map(|name| name.into_string().ok()).filter(is_picture).collect();
+    // Numbers without leading zeros, too, come in their order.
+    names.sort_unstable_by(|a, b| (a.len(), a).cmp(&(b.len(), b)));
+    if names.is_empty() { Err(RecordingError::EmptyFolder { folder: folder.to_owned() }) } else { Ok(names) }
+}

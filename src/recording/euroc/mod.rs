@@ -1,0 +1,118 @@
+//! The layout of the EuRoC and ASL sets: `mav0/cam0` and `mav0/cam1`, each with `data.csv` (lines of `nanoseconds,file`),
+//! the pictures in `data`, and `sensor.yaml`. The pictures are as the cameras took them. Without `data.csv` the names of
+//! the pictures are their times.
+
+use std::path::{Path, PathBuf};
+
+use super::contents::{Contents, Folder, Layout, Listed, Source, numbered_pictures};
+use super::error::RecordingError;
+use super::fault::LineFault;
+use super::list::{self, Entry, give_up_disorder, inside, quoted, refuse_faults};
+use super::{Options, Pair, Unpaired, pair, timeline};
+use crate::calibration;
+
+/// A folder for each camera, with its list.
+pub(super) const LAYOUT: Layout = Layout {
+    name: "EuRoC/ASL",
+    looked_for: "mav0/cam0 with data.csv or data",
+    is_in: |dir| CAMERAS.iter().any(|[left, _]| left.is_in(dir)),
+    open,
+};
+
+/// What a camera has, below the folder of the recording.
+struct Camera {
+    list: &'static str,
+    pictures: &'static str,
+    sensor: &'static str,
+}
+
+/// Left and right, where the folder is the parent of `mav0`, and where it is `mav0`.
+const CAMERAS: [[Camera; 2]; 2] = [
+    [
+        Camera { list: "mav0/cam0/data.csv", pictures: "mav0/cam0/data", sensor: "mav0/cam0/sensor.yaml" },
+        Camera { list: "mav0/cam1/data.csv", pictures: "mav0/cam1/data", sensor: "mav0/cam1/sensor.yaml" },
+    ],
+    [
+        Camera { list: "cam0/data.csv", pictures: "cam0/data", sensor: "cam0/sensor.yaml" },
+        Camera { list: "cam1/data.csv", pictures: "cam1/data", sensor: "cam1/sensor.yaml" },
+    ],
+];
+
+impl Camera {
+    fn is_in(&self, dir: &Path) -> bool {
+        dir.join(self.list).exists() || dir.join(self.pictures).is_dir()
+    }
+
+    fn read(&self, dir: &Path, options: &Options) -> Result<Vec<Entry>, RecordingError> {
+        let mut entries = match dir.join(self.list).exists() {
+            true => list::read(dir, self.list, |place, text| {
+                let columns = text.map(|text| text.split(',').map(str::trim).collect::<Vec<_>>());
+                match columns.as_deref() {
+                    Ok(&[time, file]) => Entry::new(place, parse_ns(time), self.picture(file)),
+                    Ok(columns) => {
+                        let fault = LineFault::Columns { expected: "nanoseconds,file", found: columns.len() };
+                        Entry::new(place, Err(fault.clone()), Err(fault))
+                    }
+                    Err(fault) => Entry::new(place, Err(fault.clone()), Err(fault.clone())),
+                }
+            })?,
+            false => self.by_name(dir)?,
+        };
+        give_up_disorder(entries.iter_mut());
+        if !options.keep_going {
+            refuse_faults(dir, entries.iter())?;
+        }
+        Ok(entries)
+    }
+
+    /// Entries of the pictures whose name is a time.
+    fn by_name(&self, dir: &Path) -> Result<Vec<Entry>, RecordingError> {
+        let names = numbered_pictures(&dir.join(self.pictures))?;
+        let entry = |name: String| {
+            let time_ns = parse_ns(name.split('.').next()?).ok()?;
+            Some(Entry { time_ns: Some(time_ns), source: Source::found(Path::new(self.pictures).join(name)) })
+        };
+        Ok(names.into_iter().filter_map(entry).collect())
+    }
+
+    fn picture(&self, file: &str) -> Result<PathBuf, LineFault> {
+        inside(file).map(|file| Path::new(self.pictures).join(file))
+    }
+}
+
+fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
+    let dir = &folder.dir;
+    let [left, right] = CAMERAS.iter().find(|[left, _]| left.is_in(dir)).unwrap_or(&CAMERAS[0]);
+    let frame = |left: Entry, right| Listed { time_ns: left.time_ns, color: left.source, right, depth: None };
+    let entries = left.read(dir, options)?;
+    if !right.is_in(dir) {
+        let frames = entries.into_iter().map(|left| frame(left, None)).collect();
+        return Ok(Contents { frames, depth: None, pair: None, disparities: None, unpaired: Unpaired::default() });
+    }
+    // What is half a period away belongs as well to the next picture.
+    let half_period_ns = timeline::median_period_ns(entries.iter().filter_map(|entry| entry.time_ns)) / 2;
+    let tolerance_ns = options.pair_tolerance_ns.min(half_period_ns);
+    let paired = pair::join(entries, right.read(dir, options)?, tolerance_ns);
+    if paired.frames.iter().all(|(_, right)| right.is_none()) {
+        return Err(RecordingError::NoEyePairs { dir: dir.clone(), tolerance_ns });
+    }
+    let sensors = [left, right].map(|camera| dir.join(camera.sensor));
+    let pair = match sensors.iter().any(|sensor| sensor.exists()) {
+        true => Pair::Raw(Box::new(calibration::euroc::read(&sensors[0], &sensors[1])?)),
+        false => Pair::Unstated,
+    };
+    Ok(Contents {
+        frames: paired.frames.into_iter().map(|(left, right)| frame(left, right)).collect(),
+        depth: None,
+        pair: Some(pair),
+        disparities: None,
+        unpaired: Unpaired { color: paired.left_over, right: paired.others_left_over, ..Unpaired::default() },
+    })
+}
+
+/// The times have 61 bits, and `f64` 53: they stay whole numbers.
+fn parse_ns(text: &str) -> Result<u64, LineFault> {
+    // `parse` alone would also take a sign.
+    let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
+    text.parse().ok().filter(|_| is_number).ok_or_else(|| LineFault::Nanoseconds(quoted(text)))
+}

@@ -1,0 +1,111 @@
+//! What the `calib.txt` of a rectified pair says: in the form of Middlebury and ETH3D, or in that of KITTI.
+
+use std::fs;
+use std::path::Path;
+
+use super::error::RecordingError;
+use super::fault::GeometryFault;
+use super::{kitti, middlebury};
+use crate::optics::StereoRig;
+
+/// A difference of the two focal lengths, as a share of one, that rounding explains.
+const FOCAL_TOLERANCE: f64 = 1e-3;
+
+/// The geometry of a rectified pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Geometry {
+    /// The eyes.
+    pub rig: StereoRig,
+    /// Columns and rows of the pictures that the numbers belong to, where that is said.
+    pub size: Option<(u32, u32)>,
+    /// How many disparities there may be, from 0, where that is said: a multiple of 16.
+    pub disparities: Option<u32>,
+}
+
+/// What is wrong, and in which line, from 1, if it is in one.
+pub(super) type Wrong = (Option<u32>, GeometryFault);
+
+impl Geometry {
+    /// Reads a calibration; its form is told by its content. Of KITTI's four cameras those are taken in whose folder
+    /// the picture `left` is; where that tells nothing, the colour cameras 2 and 3, else 0 and 1.
+    ///
+    /// # Errors
+    /// It cannot be read, is of another kind, lacks a key, or has numbers that cannot be.
+    pub fn read(file: &Path, left: &Path) -> Result<Self, RecordingError> {
+        Self::read_as(file, |text| {
+            if middlebury::calib::is_one(text) {
+                middlebury::calib::parse(text)
+            } else {
+                kitti::calib::parse(text, kitti::camera_of(left))
+            }
+        })
+    }
+
+    pub(super) fn read_as(file: &Path, parse: impl Fn(&str) -> Result<Self, Wrong>) -> Result<Self, RecordingError> {
+        let text = fs::read_to_string(file).map_err(RecordingError::io("read the calibration", file))?;
+        parse(&text).map_err(|(line, fault)| RecordingError::Geometry { file: file.to_owned(), line, fault })
+    }
+
+    /// The same, read from `file`, for pictures of `size`, which may be larger or smaller.
+    ///
+    /// # Errors
+    /// They are of another aspect.
+    pub fn fitted(mut self, file: &Path, size: (u32, u32)) -> Result<Self, RecordingError> {
+        let Some(of) = self.size.filter(|&of| of != size) else { return Ok(self) };
+        let [width, height, of_width, of_height] = [size.0, size.1, of.0, of.1].map(u64::from);
+        if (width * of_height).abs_diff(height * of_width) > of_width.max(of_height).max(width).max(height) {
+            let fault = GeometryFault::Size { of, pictures: size };
+            return Err(RecordingError::Geometry { file: file.to_owned(), line: None, fault });
+        }
+        let zoom = size.0 as f32 / of.0 as f32;
+        self.rig.focal_px *= zoom;
+        self.rig.doffs_px *= zoom;
+        self.disparities = self.disparities.map(|most| ((most as f32 * zoom).ceil() as u32).next_multiple_of(16));
+        self.size = Some(size);
+        Ok(self)
+    }
+}
+
+/// Eyes of these focal lengths (left, right), the columns of whose principal points differ by `doffs_px`.
+pub(super) fn rig(focal_px: [f64; 2], doffs_px: f64, baseline_m: f64) -> Result<StereoRig, GeometryFault> {
+    let [left_px, right_px] = focal_px;
+    if (left_px - right_px).abs() > FOCAL_TOLERANCE * left_px {
+        return Err(GeometryFault::UnequalFocal(left_px, right_px));
+    }
+    if baseline_m < 0.0 {
+        return Err(GeometryFault::Swapped(-baseline_m));
+    }
+    let rig =
+        StereoRig { focal_px: left_px as f32, baseline_m: baseline_m as f32, doffs_px: doffs_px as f32, metric: true };
+    if rig.baseline_m > 0.0 { Ok(rig) } else { Err(GeometryFault::NoBaseline) }
+}
+
+/// The numbers in `text`, between white space, brackets, commas and semicolons; nothing where a word is no number.
+pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let is_between = |c: char| c.is_whitespace() || matches!(c, '[' | ']' | ';' | ',');
+    let words = text.split(is_between).filter(|word| !word.is_empty());
+    let numbers: Option<Vec<f64>> =
+        words.map(|word| word.parse().ok().filter(|number: &f64| number.is_finite())).collect();
+    numbers?.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_calibration_is_scaled_with_its_pictures_and_refused_for_others() {
+        let rig = StereoRig { focal_px: 1000.0, baseline_m: 0.2, doffs_px: 30.0, metric: true };
+        let full = Geometry { rig, size: Some((2000, 1001)), disparities: Some(96) };
+        let fitted = |geometry: Geometry, size| geometry.fitted(Path::new("calib.txt"), size);
+        let half = fitted(full, (1000, 500)).unwrap();
+        assert_eq!((half.rig.focal_px, half.rig.doffs_px, half.disparities), (500.0, 15.0, Some(48)));
+        // The same point: half the disparity, the same distance.
+        assert_eq!(half.rig.depth_m(20.0), full.rig.depth_m(40.0));
+        assert_eq!(fitted(full, (2000, 1001)).unwrap(), full);
+        let refused = fitted(full, (1000, 700)).unwrap_err().to_string();
+        assert!(refused.starts_with("calib.txt: made for pictures of 2000x1001, and these are 1000x700"), "{refused}");
+        let for_any = Geometry { size: None, ..full };
+        assert_eq!(fitted(for_any, (7, 9)).unwrap(), for_any);
+    }
+}

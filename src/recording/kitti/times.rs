@@ -1,0 +1,70 @@
+//! When the pictures were taken: `times.txt`, one time in seconds a line, that of picture 0 first.
+
+use std::path::{Path, PathBuf};
+
+use crate::recording::Options;
+use crate::recording::contents::Source;
+use crate::recording::error::RecordingError;
+use crate::recording::fault::LineFault;
+use crate::recording::list::{self, Entry, quoted};
+
+const LIST: &str = "times.txt";
+
+/// Without times: 10 frames per second, as KITTI's cameras were triggered.
+const PERIOD_NS: u64 = 100_000_000;
+
+/// Seconds up to which a time is taken: beyond any date.
+const LAST_S: f64 = 1e10;
+
+/// Entries for pictures by name and file. A picture whose name is a number has the time in that line, so that an
+/// excerpt may keep the list of the whole; others have it by their place.
+///
+/// # Errors
+/// Without `keep_going`, a picture has no time.
+pub(super) fn of(dir: &Path, pictures: Vec<(&str, PathBuf)>, options: &Options) -> Result<Vec<Entry>, RecordingError> {
+    if !dir.join(LIST).exists() {
+        let entry = |(index, (_, file)): (u64, (&str, PathBuf))| Entry {
+            time_ns: Some(index * PERIOD_NS),
+            source: Source::found(file),
+        };
+        return Ok((0..).zip(pictures).map(entry).collect());
+    }
+    let times = list::read(dir, LIST, |place, text| (place, text.and_then(parse_ns)))?;
+    let entries = pictures.into_iter().enumerate().map(|(index, (name, file))| {
+        let number = name.split('.').next().and_then(|stem| stem.parse().ok()).unwrap_or(index);
+        match times.get(number) {
+            Some((place, time_ns)) => Ok(Entry::new(*place, time_ns.clone(), Ok(file))),
+            None if options.keep_going => Ok(Entry { time_ns: None, source: Source::found(file) }),
+            None => Err(RecordingError::TooFewTimes {
+                list: dir.join(LIST),
+                times: times.len(),
+                picture: file.display().to_string(),
+            }),
+        }
+    });
+    entries.collect()
+}
+
+/// Nanoseconds of seconds >= 0, written in any way (KITTI writes `1.037359e-01`). They count from the first picture,
+/// and `f64` holds these to the nanosecond.
+fn parse_ns(text: &str) -> Result<u64, LineFault> {
+    let seconds = text.parse().ok().filter(|seconds| (0.0..LAST_S).contains(seconds));
+    seconds.map(|seconds: f64| (seconds * 1e9).round() as u64).ok_or_else(|| LineFault::Time(quoted(text)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_seconds_in_any_writing() {
+        for (text, ns) in
+            [("0.000000e+00", 0), ("1.037359e-01", 103_735_900), ("2.5", 2_500_000_000), ("7", 7_000_000_000)]
+        {
+            assert_eq!(parse_ns(text), Ok(ns));
+        }
+        for text in ["", "-1.0", "nan", "inf", "1e99", "1,5", "soon", "1.0 2.0"] {
+            assert_eq!(parse_ns(text), Err(LineFault::Time(text.into())));
+        }
+    }
+}

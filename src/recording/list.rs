@@ -1,0 +1,145 @@
+//! Lists of pictures: which was taken when.
+
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use super::contents::{Place, Source};
+use super::error::RecordingError;
+use super::fault::LineFault;
+
+/// Faulty text is quoted in messages up to this length.
+const QUOTED_CHARS: usize = 40;
+
+/// A time and a file.
+#[derive(Debug)]
+pub(super) struct Entry {
+    /// Nanoseconds; nothing where there is no time that can be used, and then `source` has the fault.
+    pub(super) time_ns: Option<u64>,
+    pub(super) source: Source,
+}
+
+impl Entry {
+    /// What a line says; without a time, it is faulty.
+    pub(super) fn new(place: Place, time_ns: Result<u64, LineFault>, file: Result<PathBuf, LineFault>) -> Self {
+        match time_ns {
+            Ok(time_ns) => Self { time_ns: Some(time_ns), source: Source { place: Some(place), file } },
+            Err(fault) => Self { time_ns: None, source: Source { place: Some(place), file: Err(fault) } },
+        }
+    }
+}
+
+/// Reads the list `list` in `dir`, each line of which `parse` understands.
+///
+/// # Errors
+/// It cannot be read, or has no line.
+pub(super) fn read<T>(
+    dir: &Path,
+    list: &'static str,
+    parse: impl Fn(Place, Result<&str, LineFault>) -> T,
+) -> Result<Vec<T>, RecordingError> {
+    let path = dir.join(list);
+    let bytes = fs::read(&path).map_err(RecordingError::io("read the list", &path))?;
+    let entries: Vec<T> = lines(&bytes).map(|(line, text)| parse(Place { list, line }, text)).collect();
+    if entries.is_empty() { Err(RecordingError::EmptyList { list: path }) } else { Ok(entries) }
+}
+
+/// Refuses the first faulty entry.
+pub(super) fn refuse_faults<'a>(
+    dir: &Path,
+    mut entries: impl Iterator<Item = &'a Entry>,
+) -> Result<(), RecordingError> {
+    entries.try_for_each(|entry| entry.source.file(dir).map(|_| ()))
+}
+
+/// Takes the time from entries that break the order of times. As few as possible are given up: one wrong time far
+/// ahead does not cost all that follow it, and of equal times the first is kept.
+pub(super) fn give_up_disorder<'a>(entries: impl Iterator<Item = &'a mut Entry>) {
+    let entries: Vec<_> = entries.filter(|entry| entry.time_ns.is_some()).collect();
+    let times: Vec<_> = entries.iter().filter_map(|entry| entry.time_ns).collect();
+    for (entry, is_kept) in entries.into_iter().zip(longest_increase(&times)) {
+        if !is_kept {
+            entry.time_ns = None;
+            entry.source.file = Err(LineFault::OutOfOrder);
+        }
+    }
+}
+
+/// Marks a longest strictly increasing subsequence (patience sorting, from the end).
+fn longest_increase(times: &[u64]) -> Vec<bool> {
+    // heads[k] begins the run of k + 1 elements that leaves the most room before it.
+    let mut heads: Vec<usize> = Vec::new();
+    let mut next = vec![None; times.len()];
+    for (index, &time) in times.iter().enumerate().rev() {
+        let length = heads.partition_point(|&head| times[head] > time);
+        next[index] = length.checked_sub(1).map(|shorter| heads[shorter]);
+        match heads.get_mut(length) {
+            Some(head) => *head = index,
+            None => heads.push(index),
+        }
+    }
+    let mut is_kept = vec![false; times.len()];
+    let mut at = heads.last().copied();
+    while let Some(index) = at {
+        is_kept[index] = true;
+        at = next[index];
+    }
+    is_kept
+}
+
+/// Numbers, from 1, and texts of the lines that are neither blank nor comments.
+pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, LineFault>)> {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let lines = (1..).zip(bytes.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii));
+    lines
+        .filter(|(_, text)| !text.is_empty() && !text.starts_with(b"#"))
+        .map(|(line, text)| (line, str::from_utf8(text).map_err(|_| LineFault::NotUtf8)))
+}
+
+/// A file name that stays in its folder, as far as its text tells.
+pub(super) fn inside(file: &str) -> Result<PathBuf, LineFault> {
+    if file.contains(char::is_control) {
+        return Err(LineFault::FileName(quoted(file)));
+    }
+    let path = PathBuf::from(file);
+    let is_inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if is_inside { Ok(path) } else { Err(LineFault::Outside(path)) }
+}
+
+pub(super) fn quoted(text: &str) -> String {
+    text.chars().take(QUOTED_CHARS).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(times: &[u64]) -> Vec<u64> {
+        times.iter().zip(longest_increase(times)).filter(|(_, is_kept)| *is_kept).map(|(&time, _)| time).collect()
+    }
+
+    #[test]
+    fn as_few_times_as_possible_are_given_up() {
+        assert!(kept(&[]).is_empty());
+        assert_eq!(kept(&[1, 2, 3]), [1, 2, 3]);
+        assert_eq!(kept(&[1, 99, 2, 3, 4]), [1, 2, 3, 4]);
+        assert_eq!(kept(&[5, 6, 0, 7, 8]), [5, 6, 7, 8]);
+        assert_eq!(kept(&[3, 2, 1]), [3]);
+    }
+
+    #[test]
+    fn the_first_of_equal_times_is_kept() {
+        assert_eq!(longest_increase(&[1, 2, 2, 3]), [true, true, false, true]);
+        assert_eq!(longest_increase(&[4, 4, 4]), [true, false, false]);
+    }
+
+    #[test]
+    fn names_stay_inside() {
+        for name in ["rgb/1.png", "1.png", "./rgb/1.png", "rgb/..1.png"] {
+            assert_eq!(inside(name), Ok(PathBuf::from(name)));
+        }
+        for name in ["../1.png", "rgb/../../1.png", "/etc/passwd", "rgb/..", ".."] {
+            assert_eq!(inside(name), Err(LineFault::Outside(PathBuf::from(name))));
+        }
+        assert!(matches!(inside("rgb/\u{1b}[2J.png"), Err(LineFault::FileName(_))));
+    }
+}

@@ -1,0 +1,61 @@
+//! The layout of the Middlebury and ETH3D two-view stereo sets: one pair, `im0.png` and `im1.png`, a recording of one
+//! frame. `calib.txt` beside it has the geometry, and with it `disp0.pfm` is depth.
+
+pub(super) mod calib;
+
+use std::path::Path;
+
+use super::contents::{Contents, DepthForm, Folder, Layout, Listed, Source};
+use super::decode::{self, Scratch};
+use super::error::RecordingError;
+use super::geometry::Geometry;
+use super::{Options, Pair, Unpaired};
+use crate::optics::StereoRig;
+
+/// Two pictures.
+pub(super) const LAYOUT: Layout =
+    Layout { name: "Middlebury stereo", looked_for: "im0.png and im1.png", is_in: |dir| eyes(dir).is_some(), open };
+
+/// The pictures of the left and the right eye; the second is that of the sets of 2001 and 2003.
+const EYES: [[&str; 2]; 2] = [["im0.png", "im1.png"], ["im2.png", "im6.png"]];
+
+const CALIBRATION: &str = "calib.txt";
+
+/// Disparities of the left picture.
+const DISPARITIES: [&str; 2] = ["disp0.pfm", "disp0GT.pfm"];
+
+fn eyes(dir: &Path) -> Option<[Source; 2]> {
+    let eyes = EYES.iter().find(|eyes| eyes.iter().all(|eye| dir.join(eye).exists()))?;
+    Some(eyes.map(|eye| Source::found(eye.into())))
+}
+
+fn open(folder: &Folder, _: &Options) -> Result<Contents, RecordingError> {
+    let dir = &folder.dir;
+    let [color, right] = eyes(dir).unwrap_or(EYES[0].map(|eye| Source::found(eye.into())));
+    let file = dir.join(CALIBRATION);
+    let rig = match file.exists() {
+        true => Some(rig(folder, &color, &file)?),
+        false => None,
+    };
+    let depth = DISPARITIES.iter().find(|name| dir.join(name).exists()).zip(rig.map(|(rig, _)| rig));
+    let (depth, form) = depth.map(|(name, rig)| (Source::found(name.into()), DepthForm::Disparity(rig))).unzip();
+    Ok(Contents {
+        frames: vec![Listed { time_ns: Some(0), color, right: Some(right), depth }],
+        depth: form,
+        pair: Some(rig.map_or(Pair::Unstated, |(rig, _)| Pair::Rectified(rig))),
+        disparities: rig.and_then(|(_, disparities)| disparities),
+        unpaired: Unpaired::default(),
+    })
+}
+
+/// The eyes by the calibration `file`, and the bound on their disparities, at the size of the picture `color`.
+fn rig(folder: &Folder, color: &Source, file: &Path) -> Result<(StereoRig, Option<u32>), RecordingError> {
+    let stated = Geometry::read_as(file, calib::parse)?;
+    let path = folder.locate(color)?;
+    let (size, _) = decode::header(&path, &mut Scratch::default()).map_err(|fault| color.wrong(&folder.dir, fault))?;
+    let fitted = stated.fitted(file, size)?;
+    if fitted != stated {
+        tracing::warn!("{}: made for pictures of another size, and scaled to {}x{}", file.display(), size.0, size.1);
+    }
+    Ok((fitted.rig, fitted.disparities))
+}

@@ -1,0 +1,72 @@
+//! Two cameras as two eyes.
+
+use std::time::Duration;
+
+use bokehcam::v4l2::{Device, controls};
+
+use super::machine::{Machine, Stream, VERSIONS, bokehcam, sh};
+
+const RIGHT: &str = "/dev/video1";
+/// Two cameras, each with an HDMI input that has 30 frames per second at any size.
+const TWO: &str = "n_devs=2 node_types=0x1,0x1 num_inputs=2,2 input_types=0xc,0xc vid_cap_nr=0,1";
+
+/// Two cameras of 30 frames per second.
+fn machine() -> Machine {
+    let machine = Machine::with(TWO, VERSIONS[0]);
+    machine.at_30_fps();
+    sh(&format!("v4l2-ctl -d {RIGHT} -i 1 && v4l2-ctl -d {RIGHT} --set-dv-bt-timings index=5"));
+    controls::set(&Device::open(RIGHT.as_ref()).unwrap(), "osd_text_mode", "None").unwrap();
+    machine
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn two_cameras_give_pairs_and_every_frame_is_accounted_for() {
+    let _machine = machine();
+    let stream = Stream::start("0,1 --rectified --size 320x180 --fps 30 --effect none --frames 60 --to null");
+    let report = stream.report(false);
+    let frames = &report["frames"];
+    println!("{frames}");
+    // The last ones may come while the pictures before them are still under way.
+    assert!((50..=60).contains(&frames["delivered"].as_u64().unwrap()), "{frames}");
+    // The machine is emulated: a frame that it had no time for leaves its partner alone.
+    assert!(frames["dropped"]["unpaired"].as_u64().unwrap() < 20, "{frames}");
+    let source = report["source"].as_str().unwrap();
+    assert!(source.contains("/dev/video0") && source.contains(RIGHT), "{source}");
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn their_depth_is_matched() {
+    let _machine = machine();
+    let stream = Stream::start("0,1 --rectified --max-disparity 16 --size 160x90 --fps 30 --frames 4 --to null");
+    let report = stream.report(false);
+    assert!(report["frames"]["delivered"].as_u64().unwrap() > 0, "{report}");
+    assert!(report["stages_ms"]["depth"]["p50"].as_f64().unwrap() > 0.0, "{report}");
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn while_one_camera_is_away_its_partner_s_frames_are_unpaired_and_then_it_goes_on() {
+    let _machine = machine();
+    let stream = Stream::start("0,1 --rectified --size 320x180 --fps 30 --effect none --to null");
+    std::thread::sleep(Duration::from_secs(3));
+    controls::set(&Device::open(RIGHT.as_ref()).unwrap(), "disconnect", "1").unwrap();
+    std::thread::sleep(Duration::from_secs(6));
+    let report = stream.report(true);
+    let frames = &report["frames"];
+    println!("{frames}");
+    assert!(frames["dropped"]["unpaired"].as_u64().unwrap() > 0, "{frames}");
+    assert!(frames["delivered"].as_u64().unwrap() > 60, "{frames}");
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn cameras_without_a_size_in_common_are_refused() {
+    let _machine = machine();
+    // A webcam's sizes beside one that gives what its cable carries.
+    sh("v4l2-ctl -d /dev/video0 -i 0 && v4l2-ctl -d /dev/video0 --set-fmt-video width=640,height=360");
+    let ran = bokehcam("stream 0,1 --rectified --effect none --size 333x177 --frames 3 --to null").output().unwrap();
+    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+    assert!(!ran.status.success() && said.contains("both eyes need one size"), "{said}");
+}

@@ -1,0 +1,217 @@
+//! Two eyes through the pipeline: what the right one saw comes with its picture, and the blur follows the disparity.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use bokehcam::bokeh::aperture::Aperture;
+use bokehcam::bokeh::{self, Backend, Effect, Method};
+use bokehcam::budget::Quality;
+use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::depth::stereo::source::StereoDepth;
+use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
+use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::optics::StereoRig;
+use bokehcam::pipeline::{CocAtInfinity, CocRule, Fault, Pace, Run, run};
+use bokehcam::stats::Cause;
+
+use crate::fakes::*;
+use crate::planes;
+
+fn fake_sink(received: &Received) -> Box<FakeSink> {
+    let (received, trouble) = (received.clone(), Trouble::default());
+    Box::new(FakeSink { received, trouble, closes_at: NEVER, finish_fails: false })
+}
+
+/// Depth that is what the right eye saw, which must be of the same frame as the picture.
+struct OfTheRight;
+
+impl DepthSource for OfTheRight {
+    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        let right = seen.right.expect("a right eye");
+        assert_eq!((right.luma[0], right.size()), (seen.stamp.index as u8, SIZE));
+        assert_eq!(seen.color.rgb[0], right.luma[0], "picture and right eye are of one frame");
+        map.resize(SIZE.0, SIZE.1);
+        map.metres.fill(1.0 + f32::from(right.luma[0]));
+        Ok(())
+    }
+}
+
+/// A camera with two eyes, of whose frames every third has no partner.
+struct LosesPartners(FakeCamera);
+
+impl Camera for LosesPartners {
+    fn info(&self) -> SourceInfo {
+        self.0.info()
+    }
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+        if self.0.next % 3 == 2 {
+            self.0.next += 1;
+            return Ok(Captured::Lost(1, Cause::Unpaired));
+        }
+        self.0.next(shot)
+    }
+    fn skip(&mut self, until_ns: u64) -> u64 {
+        self.0.skip(until_ns)
+    }
+}
+
+fn two_eyes(frames: usize) -> FakeCamera {
+    FakeCamera { brings: Brings::RightEye, ..fake_camera(frames) }
+}
+
+/// A matcher of small pictures.
+fn matcher(size: (u32, u32)) -> Box<dyn Matcher> {
+    stereo::create(&Settings { size, disparities: 16, effort: Effort::Full, threads: 1 }, Backend::Cpu, None).unwrap()
+}
+
+#[test]
+fn the_right_eye_comes_with_its_picture_and_unpaired_frames_are_counted() {
+    let stop = AtomicBool::new(false);
+    for pace in [Pace::Asap, Pace::Realtime] {
+        let received = Received::default();
+        let frames = run(Run {
+            depth: Some(Box::new(OfTheRight)),
+            bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
+            coc: dof(),
+            ..simple(Box::new(LosesPartners(two_eyes(60))), fake_sink(&received), &stop, pace)
+        })
+        .unwrap()
+        .frames;
+        assert!(frames.balance(), "{frames:?}");
+        assert_eq!((frames.captured, frames.in_flight, frames.delivered), (60, 0, received.count()), "{pace:?}");
+        if pace == Pace::Asap {
+            assert_eq!((frames.delivered, frames.dropped.unpaired), (40, 20));
+            assert!(received.numbers().iter().all(|number| number % 3 != 2));
+        }
+    }
+}
+
+#[test]
+fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
+    let stop = AtomicBool::new(false);
+    let matcher = matcher(SIZE);
+    let error = run(Run {
+        depth: Some(Box::new(StereoDepth::of_rectified("fake camera", StereoRig::assumed(SIZE.0), matcher, 16))),
+        bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
+        coc: dof(),
+        ..simple(Box::new(fake_camera(5)), fake_sink(&Received::default()), &stop, Pace::Asap)
+    })
+    .unwrap_err();
+    assert!(matches!(error.fault, Fault::Depth(DepthError::OneEye { .. })), "{error}");
+}
+
+/// Depth that takes long, less with less effort; it marks the pictures that it straightens.
+struct Slow {
+    effort: Arc<AtomicUsize>,
+    most: usize,
+}
+
+const MARK: u8 = 77;
+
+impl DepthSource for Slow {
+    fn straighten(&mut self, color: &mut ColorImage) {
+        color.rgb[BLURRED] = MARK;
+    }
+    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        assert_eq!(seen.color.rgb[BLURRED], MARK, "straightened before it is matched");
+        std::thread::sleep(Duration::from_millis(1 + self.most as u64));
+        map.resize(SIZE.0, SIZE.1);
+        map.metres.fill(1.0);
+        Ok(())
+    }
+    fn efforts(&self) -> &'static [f64] {
+        &[0.3, 1.0]
+    }
+    fn set_effort(&mut self, effort: usize) {
+        self.most = effort;
+        self.effort.store(effort, Ordering::SeqCst);
+    }
+}
+
+#[test]
+fn without_time_depth_is_made_with_less_effort_and_every_picture_is_straightened() {
+    let stop = AtomicBool::new(false);
+    for (pace, held, effort) in [(Pace::Asap, false, 9), (Pace::Realtime, true, 0)] {
+        let received = Received::default();
+        let last = Arc::new(AtomicUsize::new(9));
+        let report = run(Run {
+            depth: Some(Box::new(Slow { effort: last.clone(), most: 1 })),
+            bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
+            coc: dof(),
+            ..simple(Box::new(two_eyes(150)), fake_sink(&received), &stop, pace)
+        })
+        .unwrap();
+        assert_eq!((report.depth_held > 0, last.load(Ordering::SeqCst)), (held, effort), "{pace:?}");
+        assert!(received.count() > 0);
+        assert!(received.pictures.lock().unwrap().iter().all(|rgb| rgb[BLURRED] == MARK), "{pace:?}");
+    }
+}
+
+/// The square before the wall, so many times.
+struct TwoPlanes(usize);
+
+impl Camera for TwoPlanes {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: "two planes".into(),
+            size: planes::SIZE,
+            period_ns: 33_000_000,
+            frames: Some(self.0 as u64),
+            live: false,
+            brings: Brings::RightEye,
+        }
+    }
+
+    fn next(&mut self, Shot { color, right, .. }: Shot) -> Result<Captured, CaptureError> {
+        let Some(left) = self.0.checked_sub(1) else { return Ok(Captured::End) };
+        self.0 = left;
+        (*color, *right) = planes::seen();
+        Ok(Captured::Frame(Stamp { index: left, time_ns: 0, captured_ns: None }))
+    }
+}
+
+#[test]
+fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
+    let (width, height) = planes::SIZE;
+    let (sharp, _) = planes::seen();
+    let settings = bokeh::Settings {
+        effect: Effect::Dof,
+        method: Method::Layered,
+        aperture: Aperture::default(),
+        rim: 0.2,
+        rank: None,
+        highlights: 0.0,
+        quality: Quality::High,
+        adaptive: false,
+        far_max_px: 8.0,
+        near_max_px: 16.0,
+    };
+    // Whatever the rig: it says nothing of the blur.
+    for rig in [StereoRig::assumed(width), StereoRig { focal_px: 300.0, baseline_m: 0.5, doffs_px: 0.0, metric: true }]
+    {
+        for (focus, near_is_sharp) in [((0.5, 0.5), true), ((0.85, 0.1), false)] {
+            let (stop, received) = (AtomicBool::new(false), Received::default());
+            let matcher = matcher((width, height));
+            run(Run {
+                depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher, 16))),
+                bokeh: Some(bokeh::create(&settings, (width, height), Backend::Cpu, None, Some(1)).unwrap()),
+                coc: CocRule::Depth {
+                    focus: FocusRule::Point { x: focus.0, y: focus.1 },
+                    lens: CocAtInfinity::Px(8.0),
+                    max_coc_px: 16.0,
+                },
+                ..simple(Box::new(TwoPlanes(1)), fake_sink(&received), &stop, Pace::Asap)
+            })
+            .unwrap();
+            let pictures = received.pictures.lock().unwrap();
+            let near = planes::difference(&pictures[0], &sharp.rgb, planes::is_well_inside);
+            let far = planes::difference(&pictures[0], &sharp.rgb, planes::is_well_outside);
+            let (in_focus, blurred) = if near_is_sharp { (near, far) } else { (far, near) };
+            println!("{rig:?}, near is sharp: {near_is_sharp}: {in_focus:.2} in focus, {blurred:.2} elsewhere");
+            assert!(in_focus < 2.0 && blurred > 20.0, "{rig:?}: {in_focus} in focus, {blurred} elsewhere");
+        }
+    }
+}
