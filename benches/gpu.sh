@@ -15,7 +15,7 @@ sizes=${SIZES:-1920x1080,3840x2160}
 frames=${FRAMES:-30}
 if [[ -z "${BOKEHCAM:-}" ]]; then
     cargo build --release --locked
-    cargo test --release --locked --test parity -- --include-ignored
+    cargo test --release --locked --test parity --test stereo_gpu -- --include-ignored
     BOKEHCAM=${CARGO_TARGET_DIR:-target}/release/bokehcam
 fi
 options=(bench --scene portrait --backend gpu --passes --frames "$frames")

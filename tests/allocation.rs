@@ -14,6 +14,7 @@ use bokehcam::bokeh::plan::Plan;
 use bokehcam::budget::{Governor, Quality, Sample};
 use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
+use bokehcam::compute::Backend;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort};
@@ -158,8 +159,8 @@ fn two_eyes() {
         assumed_mm: false,
     };
     let rectifier = Rectifier::new(&calibration, size).expect("maps");
-    let matcher = stereo::create(&stereo::Settings { size, disparities: 16, effort: Effort::Full, threads: 2 })
-        .expect("a matcher");
+    let settings = stereo::Settings { size, disparities: 16, effort: Effort::Full, threads: 2 };
+    let matcher = stereo::create(&settings, Backend::Cpu, None).expect("a matcher");
     let mut depth = StereoDepth::of_raw("two eyes", rectifier, matcher, 16);
     let (raw, mut right, mut map) = (noise(size.0, size.1), GrayImage::default(), DepthMap::default());
     right.set_luma_of(&raw);

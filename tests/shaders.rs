@@ -6,6 +6,7 @@ use std::mem::offset_of;
 
 use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Level, Work};
 use bokehcam::bokeh::plan::MAX_BINS;
+use bokehcam::depth::stereo::gpu::shaders as stereo;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 fn parse(source: &str) -> naga::Module {
@@ -14,7 +15,10 @@ fn parse(source: &str) -> naga::Module {
 
 #[test]
 fn every_shader_validates_and_is_named_like_its_file() {
-    for shader in ALL {
+    let blur = ALL.map(|shader| (shader, CONSTANTS.map(|(name, _)| name).to_vec()));
+    let constants = stereo::constants((1, 1), 16, false).map(|(name, _)| name);
+    let stereo = stereo::ALL.map(|shader| (shader, constants.to_vec()));
+    for (shader, constants) in blur.into_iter().chain(stereo) {
         let module = parse(shader.source);
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
         if let Err(error) = validator.validate(&module) {
@@ -23,7 +27,7 @@ fn every_shader_validates_and_is_named_like_its_file() {
         let entries: Vec<_> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
         assert_eq!(entries, [shader.name]);
         let overrides: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
-        assert_eq!(overrides, CONSTANTS.map(|(name, _)| name));
+        assert_eq!(overrides, constants);
     }
 }
 
@@ -33,8 +37,9 @@ fn every_file_is_a_pass_or_shared_and_short() {
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let known = ["common", "work", "filter", "level", "range"].contains(&name.as_str())
-            || ALL.iter().any(|shader| shader.name == name);
+        let known = ["common", "work", "filter", "level", "range", "stereo_common", "stereo_path"]
+            .contains(&name.as_str())
+            || ALL.iter().chain(&stereo::ALL).any(|shader| shader.name == name);
         assert!(known, "{} belongs to no pass", path.display());
         let lines = std::fs::read_to_string(&path).expect("a text").lines().count();
         assert!(lines <= 150, "{} has {lines} lines", path.display());

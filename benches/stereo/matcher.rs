@@ -2,6 +2,7 @@
 
 use std::thread;
 
+use bokehcam::compute::Backend;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 
 use super::Outcome;
@@ -22,5 +23,5 @@ pub fn create(
         return Err("there is no matcher on the GPU".into());
     }
     let threads = threads.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
-    Ok(stereo::create(&Settings { size, disparities, effort, threads })?)
+    Ok(stereo::create(&Settings { size, disparities, effort, threads }, Backend::Cpu, None)?)
 }

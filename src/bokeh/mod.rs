@@ -18,6 +18,7 @@ pub mod split;
 use std::time::Duration;
 
 use crate::budget::Quality;
+pub use crate::compute::Backend;
 use crate::compute::GpuError;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -170,18 +171,6 @@ pub enum Probe {
     Blur(usize),
 }
 
-/// Where the blur runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Backend {
-    /// A hardware GPU where there is one, else the CPU: a software Vulkan driver is far slower than plain code.
-    #[default]
-    Auto,
-    /// Any Vulkan adapter, a software one included.
-    Gpu,
-    /// The CPU.
-    Cpu,
-}
-
 /// The executor for pictures of `size` (width, height).
 ///
 /// `adapter` is part of a GPU adapter's name; `threads` is for the CPU executor, all cores when `None`.
@@ -206,8 +195,7 @@ pub fn create(
     }
     #[cfg(not(feature = "gpu"))]
     if backend == Backend::Gpu || adapter.is_some() {
-        let wanted = "at all: this build leaves the GPU out (feature `gpu`)".to_owned();
-        return Err(GpuError::NoAdapter { wanted, found: "none".to_owned() }.into());
+        return Err(GpuError::left_out().into());
     }
     Ok(Box::new(cpu::CpuBokeh::new(plan, threads)))
 }

@@ -225,7 +225,8 @@ impl Executor {
         size: (u32, u32),
     ) -> Result<Box<dyn Matcher>, CliError> {
         let threads = self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-        Ok(stereo::create(&stereo::Settings { size, disparities, effort, threads }).map_err(DepthError::from)?)
+        let settings = stereo::Settings { size, disparities, effort, threads };
+        Ok(stereo::create(&settings, self.backend, self.adapter.as_deref()).map_err(DepthError::from)?)
     }
 
     /// The CPU executor, which can be looked into.

@@ -4,6 +4,15 @@ use std::sync::{Arc, Mutex};
 
 use super::GpuError;
 
+/// A pass: the name of its entry point and file, and its source.
+#[derive(Clone, Copy, Debug)]
+pub struct Shader {
+    /// Entry point.
+    pub name: &'static str,
+    /// Whole source, shared parts included.
+    pub source: &'static str,
+}
+
 /// A device and its queue.
 pub struct Device {
     /// The device.
@@ -79,6 +88,49 @@ impl Device {
         Ok(Self { device, queue, name, timestamps, fault })
     }
 
+    /// A pass with its `override` constants.
+    pub fn pipeline(&self, Shader { name, source }: Shader, constants: &[(&str, f64)]) -> wgpu::ComputePipeline {
+        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(name),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(name),
+            layout: None,
+            module: &module,
+            entry_point: Some(name),
+            compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
+            cache: None,
+        })
+    }
+
+    /// The buffers of a pass, in the order of its bindings.
+    pub fn bindings<'a>(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        buffers: impl Iterator<Item = wgpu::BufferBinding<'a>>,
+    ) -> wgpu::BindGroup {
+        let entry =
+            |(k, buffer)| wgpu::BindGroupEntry { binding: k as u32, resource: wgpu::BindingResource::Buffer(buffer) };
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &buffers.enumerate().map(entry).collect::<Vec<_>>(),
+        })
+    }
+
+    /// Copies bytes to a buffer whatever their number, from the byte `at` on, which begins a word: the device takes
+    /// whole words only.
+    pub fn upload(&self, buffer: &wgpu::Buffer, at: u64, bytes: &[u8]) {
+        let (words, rest) = bytes.split_at(bytes.len() & !3);
+        self.queue.write_buffer(buffer, at, words);
+        if !rest.is_empty() {
+            let mut word = [0; 4];
+            word[..rest.len()].copy_from_slice(rest);
+            self.queue.write_buffer(buffer, at + words.len() as u64, &word);
+        }
+    }
+
     /// The first thing that went wrong on the device, if anything did.
     ///
     /// # Errors
@@ -89,6 +141,12 @@ impl Device {
             None => Ok(()),
         }
     }
+}
+
+/// So many workgroups in rows and columns, as a device limits both; a few more are left over.
+pub fn in_two(workgroups: u32) -> [u32; 2] {
+    let down = workgroups.div_ceil(32_768).max(1);
+    [workgroups.div_ceil(down), down]
 }
 
 /// Whether the kernel offers any GPU at all. Asking Vulkan instead takes time, and some drivers write to stderr.

@@ -6,6 +6,18 @@ pub mod device;
 pub mod simd;
 pub mod team;
 
+/// Where the executors run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Backend {
+    /// A hardware GPU where there is one, else the CPU: a software Vulkan driver is far slower than plain code.
+    #[default]
+    Auto,
+    /// Any Vulkan adapter, a software one included.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
 /// Why there is no GPU to compute on.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum GpuError {
@@ -20,4 +32,13 @@ pub enum GpuError {
     /// The GPU refused or was lost.
     #[error("GPU: {0}")]
     Failed(String),
+}
+
+#[cfg(not(feature = "gpu"))]
+impl GpuError {
+    /// A GPU was asked for, and this build cannot use any.
+    pub fn left_out() -> Self {
+        let wanted = "at all: this build leaves the GPU out (feature `gpu`)".to_owned();
+        Self::NoAdapter { wanted, found: "none".to_owned() }
+    }
 }

@@ -64,7 +64,7 @@ fn two_eyes(frames: usize) -> FakeCamera {
 
 /// A matcher of small pictures.
 fn matcher(size: (u32, u32)) -> Box<dyn Matcher> {
-    stereo::create(&Settings { size, disparities: 16, effort: Effort::Full, threads: 1 }).unwrap()
+    stereo::create(&Settings { size, disparities: 16, effort: Effort::Full, threads: 1 }, Backend::Cpu, None).unwrap()
 }
 
 #[test]

@@ -111,17 +111,6 @@ impl GpuBokeh {
             unused: 0.0,
         }
     }
-
-    /// Copies bytes to a buffer whatever their number; the device takes whole words only.
-    fn upload(&self, buffer: &wgpu::Buffer, bytes: &[u8]) {
-        let (words, rest) = bytes.split_at(bytes.len() & !3);
-        self.device.queue.write_buffer(buffer, 0, words);
-        if !rest.is_empty() {
-            let mut word = [0; 4];
-            word[..rest.len()].copy_from_slice(rest);
-            self.device.queue.write_buffer(buffer, words.len() as u64, &word);
-        }
-    }
 }
 
 impl Bokeh for GpuBokeh {
@@ -145,9 +134,9 @@ impl Bokeh for GpuBokeh {
                 self.depth = Buffers::depth(&self.device, map.metres.len());
                 self.passes.set_depth(&self.device, &self.buffers, &self.depth);
             }
-            self.upload(&self.depth, bytes);
+            self.device.upload(&self.depth, 0, bytes);
         }
-        self.upload(&self.buffers.color, &job.color.rgb);
+        self.device.upload(&self.buffers.color, 0, &job.color.rgb);
         self.plan.set_quality(job.quality);
         self.plan.split(job.depth.as_deref(), &job.coc);
         self.layout.lay_out(&self.plan, &self.capacity);

@@ -5,9 +5,9 @@ use std::ops::Range;
 use super::buffers::{Buffers, Filters, WORK_STRIDE, works};
 use super::layout::{Layout, RESULT_TILE, ROWS_TILE, tiles};
 use super::readback::MAX_QUERIES;
-use super::shaders::{self, Bin, Shader, Work};
+use super::shaders::{self, Bin, Work};
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
-use crate::compute::device::Device;
+use crate::compute::device::{Device, Shader, in_two};
 
 /// Invocations of a workgroup in x and y, as the shaders declare them.
 const TILE: u32 = 16;
@@ -52,7 +52,7 @@ pub struct Passes {
 
 /// Makes the steps.
 struct Maker<'a> {
-    device: &'a wgpu::Device,
+    device: &'a Device,
     buffers: &'a Buffers,
     made: Vec<(&'static str, wgpu::ComputePipeline)>,
 }
@@ -62,39 +62,9 @@ impl Maker<'_> {
         if let Some((_, pipeline)) = self.made.iter().find(|(name, _)| *name == shader.name) {
             return pipeline.clone();
         }
-        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(shader.name),
-            source: wgpu::ShaderSource::Wgsl(shader.source.into()),
-        });
-        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(shader.name),
-            layout: None,
-            module: &module,
-            entry_point: Some(shader.name),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &shaders::CONSTANTS,
-                ..Default::default()
-            },
-            cache: None,
-        });
+        let pipeline = self.device.pipeline(shader, &shaders::CONSTANTS);
         self.made.push((shader.name, pipeline.clone()));
         pipeline
-    }
-
-    fn bindings<'a>(
-        &self,
-        pipeline: &wgpu::ComputePipeline,
-        resources: impl Iterator<Item = wgpu::BufferBinding<'a>>,
-    ) -> wgpu::BindGroup {
-        let entry = |(k, resource)| wgpu::BindGroupEntry {
-            binding: k as u32,
-            resource: wgpu::BindingResource::Buffer(resource),
-        };
-        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &resources.enumerate().map(entry).collect::<Vec<_>>(),
-        })
     }
 
     /// A pass in the name of `name`, over `size` invocations in workgroups of `tile`.
@@ -107,7 +77,7 @@ impl Maker<'_> {
         buffers: &[&wgpu::Buffer],
     ) -> Fixed {
         let pipeline = self.pipeline(shader);
-        let bindings = self.bindings(&pipeline, buffers.iter().map(|buffer| buffer.as_entire_buffer_binding()));
+        let bindings = self.device.bindings(&pipeline, buffers.iter().map(|buffer| buffer.as_entire_buffer_binding()));
         Fixed { step: Step { name, pipeline, bindings }, workgroups: size.map(|size| size.div_ceil(tile)) }
     }
 
@@ -122,7 +92,7 @@ impl Maker<'_> {
         };
         let uniforms = [work, b.bins.as_entire_buffer_binding()];
         let buffers = buffers.iter().map(|buffer| buffer.as_entire_buffer_binding());
-        let bindings = self.bindings(&pipeline, uniforms.into_iter().chain(buffers));
+        let bindings = self.device.bindings(&pipeline, uniforms.into_iter().chain(buffers));
         Step { name, pipeline, bindings }
     }
 }
@@ -130,7 +100,7 @@ impl Maker<'_> {
 impl Passes {
     /// The passes of a plan over its buffers.
     pub fn new(device: &Device, plan: &Plan, b: &Buffers, depth: &wgpu::Buffer) -> Self {
-        let mut maker = Maker { device: &device.device, buffers: b, made: Vec::new() };
+        let mut maker = Maker { device, buffers: b, made: Vec::new() };
         let picture = [plan.width as u32, plan.height as u32];
         let half = picture.map(|v| v.div_ceil(2));
 
@@ -193,9 +163,8 @@ impl Passes {
 
     /// Binds another depth buffer.
     pub fn set_depth(&mut self, device: &Device, b: &Buffers, depth: &wgpu::Buffer) {
-        let maker = Maker { device: &device.device, buffers: b, made: Vec::new() };
         let buffers = [&b.frame, &b.color, depth, &b.scene, &b.ranges].map(|buffer| buffer.as_entire_buffer_binding());
-        self.unpack.step.bindings = maker.bindings(&self.unpack.step.pipeline, buffers.into_iter());
+        self.unpack.step.bindings = device.bindings(&self.unpack.step.pipeline, buffers.into_iter());
     }
 
     /// Uploads which bins each pass of this frame does, with the terms of a bank.
@@ -280,10 +249,4 @@ impl Passes {
         }
         run(&self.composite.step, self.composite.workgroups);
     }
-}
-
-/// So many workgroups in rows and columns, as a device limits both; a few more are left over.
-fn in_two(workgroups: u32) -> [u32; 2] {
-    let down = workgroups.div_ceil(32_768).max(1);
-    [workgroups.div_ceil(down), down]
 }

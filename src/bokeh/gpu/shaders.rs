@@ -3,15 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::bokeh::plan::{ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HINDMOST_COVERAGE, SEGMENT};
-
-/// A pass: the name of its entry point and file, and its source.
-#[derive(Clone, Copy, Debug)]
-pub struct Shader {
-    /// Entry point.
-    pub name: &'static str,
-    /// Whole source, shared parts included.
-    pub source: &'static str,
-}
+use crate::compute::device::Shader;
 
 macro_rules! shader {
     ($name:literal $(, $shared:literal)*) => {

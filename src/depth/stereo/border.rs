@@ -22,6 +22,11 @@ pub struct Border {
 }
 
 impl Border {
+    /// For maps of this size: no memory is taken later.
+    pub fn new((width, height): (usize, usize)) -> Self {
+        Self { length: Vec::with_capacity(width * height), first: Vec::with_capacity(height) }
+    }
+
     /// Gives the pixels of `map` left of the first known one of their row the disparity of a pixel that looks alike.
     /// `luma` is the left picture; rows without any disparity stay as they are.
     pub fn fill(&mut self, map: &mut [u16], luma: &[u8], width: usize) {

@@ -6,19 +6,24 @@
 mod border;
 pub mod check;
 pub mod cpu;
+pub mod executor;
 pub mod fixed;
 mod gaps;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod half;
+mod penalty;
 mod prior;
 pub mod source;
 mod speckle;
 mod tidy;
 
+use executor::{Executor, Executors};
 use prior::Prior;
 use tidy::Tidy;
 
-use crate::compute::GpuError;
 use crate::compute::team::Team;
+use crate::compute::{Backend, GpuError};
 use crate::frame::{DisparityMap, GrayImage};
 
 /// How pairs are matched.
@@ -26,7 +31,7 @@ use crate::frame::{DisparityMap, GrayImage};
 pub struct Settings {
     /// Columns and rows of both pictures.
     pub size: (u32, u32),
-    /// Disparities that are tried, from 0 on: rounded up to a multiple of 16, and at most [`Settings::MOST_DISPARITIES`].
+    /// Disparities that are tried, from 0 on: rounded up ([`fixed::range`]), and at most [`Settings::MOST_DISPARITIES`].
     pub disparities: u32,
     /// How much is done for it.
     pub effort: Effort,
@@ -91,33 +96,20 @@ pub enum MatchError {
     Gpu(#[from] GpuError),
 }
 
-/// A matcher on the CPU.
+/// A matcher on the GPU or the CPU; `adapter` is part of a GPU adapter's name.
 ///
 /// # Errors
-/// None so far.
-pub fn create(settings: &Settings) -> Result<Box<dyn Matcher>, MatchError> {
+/// A GPU was asked for and there is none that fits, or it failed.
+pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> Result<Box<dyn Matcher>, MatchError> {
     let team = Team::new("match", settings.threads);
+    let executors = Executors::new(backend, adapter, team.threads())?;
+    let level = |effort| Level::new(settings, effort, &executors);
     Ok(Box::new(Matching {
         settings: *settings,
-        levels: [Effort::Fast, Effort::Full].map(|effort| Level::new(settings, effort, team.threads())),
+        levels: [level(Effort::Fast)?, level(Effort::Full)?],
         team,
         small: [GrayImage::default(), GrayImage::default()],
     }))
-}
-
-/// Finds the disparities that both eyes agree on.
-trait Executor: Send {
-    fn describe(&self) -> String;
-
-    /// The disparities of the left picture, in fixed point, or unknown. The costs of those that are `likely`, whole ones
-    /// or unknown, are less by [`prior::BONUS`].
-    fn winners(
-        &mut self,
-        eyes: [&GrayImage; 2],
-        likely: Option<&[u16]>,
-        team: &mut Team,
-        out: &mut [u16],
-    ) -> Result<(), GpuError>;
 }
 
 /// Islands of so many pixels are chance, in whole pictures.
@@ -142,21 +134,20 @@ struct Level {
 }
 
 impl Level {
-    fn new(settings: &Settings, effort: Effort, threads: usize) -> Self {
+    fn new(settings: &Settings, effort: Effort, executors: &Executors) -> Result<Self, GpuError> {
         let whole = (settings.size.0 as usize, settings.size.1 as usize);
         let (size, disparities) = match effort {
             Effort::Fast => (half::size(whole), settings.disparities.div_ceil(2)),
             Effort::Full => (whole, settings.disparities),
         };
-        let disparities = disparities.next_multiple_of(16).clamp(16, Settings::MOST_DISPARITIES) as usize;
         let pixels = size.0 * size.1;
-        Self {
-            executor: Box::new(cpu::CpuExecutor::new(size, disparities, threads)),
+        Ok(Self {
+            executor: executors.executor(size, disparities as usize)?,
             prior: Prior::new(size.0),
             tidy: Tidy::new(size),
             map: vec![0; pixels],
             px: vec![0.0; if effort == Effort::Fast { pixels } else { 0 }],
-        }
+        })
     }
 }
 
@@ -171,8 +162,8 @@ impl Level {
         into: Option<&mut [f32]>,
     ) -> Result<(), GpuError> {
         let Self { executor, prior, tidy, map, px } = self;
-        let luma = &eyes[0].luma;
-        executor.winners(eyes, prior.likely(luma), team, map)?;
+        let [luma, right] = eyes.map(|eye| &*eye.luma);
+        executor.winners([luma, right], prior.likely(luma), team, map)?;
         tidy.drop_islands(map, speckle);
         prior.keep(luma, map);
         tidy.fill(map, luma, team, into.unwrap_or(px));

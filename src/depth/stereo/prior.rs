@@ -6,9 +6,6 @@
 
 use super::fixed::{ONE, UNKNOWN};
 
-/// What a cost is less at the last disparity, and at those beside it.
-pub const BONUS: u8 = 2;
-
 /// Sum of the changes of 3x3 pixels, in 8-bit codes, up to which they are taken for noise: 4 a pixel.
 const NOISE: u16 = 36;
 
@@ -22,7 +19,7 @@ pub struct Prior {
     map: Vec<u16>,
     /// Sums of changes of three neighbours in a row.
     changes: Vec<u16>,
-    /// Whole disparities that are likely, or [`UNKNOWN`].
+    /// One more than the whole disparity that is likely, or 0.
     likely: Vec<u16>,
 }
 
@@ -32,8 +29,8 @@ impl Prior {
         Self { width, ..Self::default() }
     }
 
-    /// The whole disparity that is likely for each pixel of the left picture `luma`, or [`UNKNOWN`]; nothing before the
-    /// first pair.
+    /// One more than the whole disparity that is likely for each pixel of the left picture `luma`, or 0; nothing before
+    /// the first pair.
     pub fn likely(&mut self, luma: &[u8]) -> Option<&[u16]> {
         if self.luma.len() != luma.len() {
             return None;
@@ -56,7 +53,7 @@ impl Prior {
             let three = row(y.saturating_sub(1)).iter().zip(row(y)).zip(row((y + 1).min(height - 1)));
             likely.extend(map.iter().zip(three).map(|(&d, ((above, here), below))| {
                 let still = above + here + below <= NOISE;
-                if still && d != UNKNOWN { (d + ONE / 2) / ONE } else { UNKNOWN }
+                if still && d != UNKNOWN { (d + ONE / 2) / ONE + 1 } else { 0 }
             }));
         }
         Some(likely)
@@ -90,7 +87,7 @@ mod tests {
         let likely = prior.likely(&next).unwrap();
         for (i, &d) in likely.iter().enumerate() {
             let moved = (i % width).abs_diff(10) <= 1 && (i / width).abs_diff(5) <= 1;
-            assert_eq!(d, if i == 3 || moved { UNKNOWN } else { 6 }, "{i}");
+            assert_eq!(d, if i == 3 || moved { 0 } else { 7 }, "{i}");
         }
     }
 }

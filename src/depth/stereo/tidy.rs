@@ -26,7 +26,7 @@ impl Tidy {
         Self {
             width,
             speckles: Speckles::new(width * height),
-            border: Border::default(),
+            border: Border::new((width, height)),
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
             arch: Arch::new(),
         }

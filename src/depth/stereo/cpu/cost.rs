@@ -3,13 +3,9 @@
 
 use pulp::WithSimd;
 
-use super::super::prior::BONUS;
+use super::super::fixed::{BONUS, OUTSIDE};
 use super::GROUP;
 use super::census::PLANES;
-
-/// The cost of a partner beyond the border of the right picture: that of a poor one, so that the outermost columns may
-/// take the disparity of their neighbours.
-const OUTSIDE: u8 = 8;
 
 /// Rows whose differences the costs of a group are made of: one more above and one below.
 pub const ROWS: usize = GROUP + 2;
@@ -38,7 +34,9 @@ impl<const N: usize> WithSimd for Costs<'_, N> {
         let mut here = [[0u8; N]; GROUP];
         let mut after = [[0u8; N]; GROUP];
         columns(&codes, width, 0, &mut here);
+        // Beyond the borders the outermost columns repeat.
         before.copy_from_slice(&here);
+        after.copy_from_slice(&here);
         for x in 0..width {
             if x + 1 < width {
                 columns(&codes, width, x + 1, &mut after);
@@ -56,15 +54,15 @@ impl<const N: usize> WithSimd for Costs<'_, N> {
     }
 }
 
-/// Lowers the costs of the disparities that are `likely`, `[row][column]` of the group, and of those beside them.
+/// Lowers the costs of the disparities that are `likely` (one more than each, or 0), `[row][column]` of the group, and of
+/// those beside them.
 pub fn favour<const N: usize>(likely: &[u16], width: usize, costs: &mut [u8]) {
     let costs = costs.as_chunks_mut::<N>().0;
     for (row, likely) in likely.chunks_exact(width).enumerate() {
-        for (&d, costs) in likely.iter().zip(costs.iter_mut().skip(row).step_by(GROUP)) {
-            let d = usize::from(d);
-            // An unknown one lies beyond all.
-            if d < N {
-                for cost in &mut costs[d.saturating_sub(1)..(d + 2).min(N)] {
+        for (&likely, costs) in likely.iter().zip(costs.iter_mut().skip(row).step_by(GROUP)) {
+            let likely = usize::from(likely);
+            if likely > 0 {
+                for cost in &mut costs[likely.saturating_sub(2)..(likely + 1).min(N)] {
                     *cost = cost.saturating_sub(BONUS);
                 }
             }

@@ -13,22 +13,20 @@ use std::sync::atomic::AtomicBool;
 
 use census::Census;
 use cost::Costs;
-use path::{Columns, Penalties, Rows, STRIPE, States};
+use path::{Columns, Rows, STRIPE, States};
 use pulp::Arch;
 use winner::{Eyes, Winners};
 
-use super::Executor;
+use super::executor::Executor;
+use super::fixed;
+use super::penalty::Penalties;
 use crate::compute::GpuError;
 use crate::compute::aligned::Aligned;
 use crate::compute::simd;
 use crate::compute::team::{Shelf, Team};
-use crate::frame::GrayImage;
 
 /// Rows whose values lie side by side, `[column][row][disparity]`, as one part of the work.
 const GROUP: usize = 4;
-
-/// As many disparities as the code is made for.
-const RANGES: [usize; 7] = [16, 32, 64, 96, 128, 192, 256];
 
 /// Matches pairs of one size on the CPU.
 pub struct CpuExecutor {
@@ -62,7 +60,7 @@ struct Member {
 impl CpuExecutor {
     /// For pairs of this size, and at least as many disparities, at most 256.
     pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
-        let disparities = RANGES.into_iter().find(|&range| range >= disparities).unwrap_or(RANGES[RANGES.len() - 1]);
+        let disparities = fixed::range(disparities);
         let stripes = width.div_ceil(STRIPE);
         let chunk = threads.max(1);
         let group = stripes * STRIPE * GROUP * disparities;
@@ -180,12 +178,11 @@ impl Executor for CpuExecutor {
 
     fn winners(
         &mut self,
-        [left, right]: [&GrayImage; 2],
+        [left, right]: [&[u8]; 2],
         likely: Option<&[u16]>,
         team: &mut Team,
         out: &mut [u16],
     ) -> Result<(), GpuError> {
-        let (left, right) = (&*left.luma, &*right.luma);
         let Self { arch, taken, .. } = self;
         self.left.see(left, team, *arch, &mut taken[0]);
         self.right.see(right, team, *arch, &mut taken[0]);

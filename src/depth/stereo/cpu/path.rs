@@ -9,37 +9,13 @@
 
 use pulp::WithSimd;
 
+use super::super::fixed::SLOPE;
+use super::super::penalty::Penalties;
 use super::GROUP;
 use crate::compute::aligned::Aligned;
 
-/// For a disparity that differs by one.
-const SLOPE: u8 = 8;
-/// For any other: this much across an edge of the picture, where a jump is likely, and up to so much more without one.
-const JUMP: (f32, f32) = (20.0, 40.0);
-/// Difference of grey values that takes away all but 1/e of the additional penalty.
-const EDGE: f32 = 10.0;
-
 /// What lies beyond both ends of the range.
 const GUARD: usize = 64;
-
-/// P2 by the difference of grey values from pixel to pixel.
-pub struct Penalties([u8; 256]);
-
-impl Penalties {
-    /// Computes them.
-    pub fn new() -> Self {
-        let mut table = [0; 256];
-        for (step, p2) in table.iter_mut().enumerate() {
-            *p2 = (JUMP.0 + JUMP.1 * (-(step as f32) / EDGE).exp()) as u8;
-        }
-        Self(table)
-    }
-
-    #[inline(always)]
-    fn between(&self, a: u8, b: u8) -> u8 {
-        self.0[usize::from(a.abs_diff(b))]
-    }
-}
 
 /// The states of paths: the values of each at the pixel where it is, with [`GUARD`] bytes on both sides that are never
 /// the least, and the least of them. Those of the pixel before are kept beside those that are being made.

@@ -2,11 +2,8 @@
 
 use pulp::WithSimd;
 
-use super::super::fixed::{ONE, UNKNOWN};
+use super::super::fixed::{AGREE, ONE, UNKNOWN};
 use super::GROUP;
-
-/// Left and right may differ by this much.
-const AGREE: u8 = 1;
 
 /// The winners of a group of rows.
 pub struct Winners<'a, const N: usize> {

@@ -1,0 +1,48 @@
+// Pass stereo_cost: what it costs to say that a pixel has a disparity: an eighth of the sum of the bits in which the
+// census of both eyes differs, over 3x3 pixels, and less for what is likely. A workgroup goes along a strip of a row.
+
+@group(0) @binding(0) var<storage, read> census: array<u32>;        // left, then right
+@group(0) @binding(1) var<storage, read> likely: array<u32>;        // one more than a disparity or 0, two a word
+@group(0) @binding(2) var<storage, read_write> costs: array<u32>;   // four a word, `[row][column][word]`
+
+const STRIP = 16u;
+
+// The bits that differ at four disparities of a column, summed over three rows. The outermost columns and rows repeat.
+fn column_at(x: i32, y: u32, word: u32) -> vec4<u32> {
+    let column = u32(clamp(x, 0, i32(WIDTH) - 1));
+    let disparities = 4u * word + vec4(0u, 1u, 2u, 3u);
+    let outside = disparities > vec4(column);
+    let partners = max(vec4(column), disparities) - disparities;
+    var sum = vec4(0u);
+    for (var k = 0u; k < 3u; k++) {
+        let row = (clamp(y + k, 1u, HEIGHT) - 1u) * WIDTH;
+        let right = row + WIDTH * HEIGHT + partners;
+        let codes = vec4(census[right.x], census[right.y], census[right.z], census[right.w]);
+        sum += select(countOneBits(vec4(census[row + column]) ^ codes), vec4(OUTSIDE), outside);
+    }
+    return sum;
+}
+
+// The costs at a pixel, where that disparity and those beside it are favoured which is likely.
+fn favour(pixel: u32, word: u32, cost: vec4<u32>) -> vec4<u32> {
+    let one_more = vec4((likely[pixel / 2u] >> (16u * (pixel % 2u))) & 0xffffu);
+    let here = 4u * word + vec4(1u, 2u, 3u, 4u);
+    let near = (max(here, one_more) - min(here, one_more) <= vec4(1u)) & (one_more > vec4(0u));
+    return cost - select(vec4(0u), min(cost, vec4(BONUS)), near);
+}
+
+@compute @workgroup_size(WORDS)
+fn stereo_cost(@builtin(workgroup_id) strip: vec3<u32>, @builtin(local_invocation_index) word: u32) {
+    let y = strip.y;
+    let first = strip.x * STRIP;
+    var before = column_at(i32(first) - 1, y, word);
+    var here = column_at(i32(first), y, word);
+    for (var x = first; x < min(first + STRIP, WIDTH); x++) {
+        let after = column_at(i32(x) + 1, y, word);
+        let pixel = y * WIDTH + x;
+        let cost = (before + here + after + 4u) >> vec4(3u);
+        costs[pixel * WORDS + word] = pack4xU8(favour(pixel, word, cost));
+        before = here;
+        here = after;
+    }
+}

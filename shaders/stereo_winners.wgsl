@@ -1,0 +1,67 @@
+// Pass stereo_winners: of each pixel, the disparity that costs least, in fixed point, if the right eye agrees.
+
+@group(0) @binding(0) var<storage, read> totals: array<u32>;
+@group(0) @binding(1) var<storage, read_write> winners: array<u32>;     // two pixels a word
+
+const INVOCATIONS = 64u;
+
+var<workgroup> found: array<u32, INVOCATIONS>;
+
+fn total(x: u32, y: u32, disparity: u32) -> u32 {
+    return (totals[total_at(x, y, disparity / 4u)] >> (8u * (disparity % 4u))) & 255u;
+}
+
+// The disparity that the left eye takes. With the disparity as its low byte, the lowest of equal sums is the least.
+fn left_at(x: u32, y: u32) -> u32 {
+    var best = vec4(0xffffffffu);
+    for (var word = 0u; word < WORDS; word++) {
+        let disparities = 4u * word + vec4(0u, 1u, 2u, 3u);
+        best = min(best, (unpack4xU8(totals[total_at(x, y, word)]) << vec4(8u)) | disparities);
+    }
+    return least_of(best) & 255u;
+}
+
+// The disparity that the right eye takes: of all left pixels that may see the same.
+fn right_at(x: u32, y: u32) -> u32 {
+    var best = 0xffffffffu;
+    for (var disparity = 0u; disparity < min(4u * WORDS, WIDTH - x); disparity++) {
+        best = min(best, (total(x + disparity, y, disparity) << 8u) | disparity);
+    }
+    return best & 255u;
+}
+
+// Where two lines of one slope meet, between the disparities beside `disparity`.
+fn between(x: u32, y: u32, disparity: u32) -> u32 {
+    let whole = disparity * ONE;
+    if disparity == 0u || disparity + 1u >= 4u * WORDS {
+        return whole;
+    }
+    let below = i32(total(x, y, disparity - 1u));
+    let above = i32(total(x, y, disparity + 1u));
+    let slope = max(below, above) - i32(total(x, y, disparity));
+    if slope == 0 {
+        return whole;
+    }
+    return u32(i32(whole) + (below - above) * i32(ONE / 2u) / slope);
+}
+
+fn winner_at(x: u32, y: u32) -> u32 {
+    let disparity = left_at(x, y);
+    if disparity > x || difference(right_at(x - disparity, y), disparity) > AGREE {
+        return UNKNOWN;
+    }
+    return between(x, y, disparity);
+}
+
+@compute @workgroup_size(INVOCATIONS)
+fn stereo_winners(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+                  @builtin(local_invocation_index) thread: u32) {
+    let pixel = (workgroup.y * workgroups.x + workgroup.x) * INVOCATIONS + thread;
+    if pixel < WIDTH * HEIGHT {
+        found[thread] = winner_at(pixel % WIDTH, pixel / WIDTH);
+    }
+    workgroupBarrier();
+    if pixel < WIDTH * HEIGHT && thread % 2u == 0u {
+        winners[pixel / 2u] = found[thread] | (found[thread + 1u] << 16u);
+    }
+}

@@ -1,0 +1,87 @@
+//! What finds the disparities that both eyes agree on, and which one does.
+
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
+
+use super::cpu::CpuExecutor;
+#[cfg(feature = "gpu")]
+use super::gpu::GpuExecutor;
+#[cfg(feature = "gpu")]
+use crate::compute::device::Device;
+use crate::compute::team::Team;
+use crate::compute::{Backend, GpuError};
+
+/// Finds the disparities that both eyes agree on. All executors find the same, to the bit.
+pub trait Executor: Send {
+    /// One line for the report.
+    fn describe(&self) -> String;
+
+    /// The disparities of the left picture into `out`, in fixed point ([`super::fixed`]), or unknown. `eyes` are the grey
+    /// values of the left and the right picture, row by row. `likely` has one more than the whole disparity that is
+    /// likely for a pixel, or 0: that one and those beside it cost less by [`super::fixed::BONUS`].
+    ///
+    /// # Errors
+    /// The GPU failed.
+    fn winners(
+        &mut self,
+        eyes: [&[u8]; 2],
+        likely: Option<&[u16]>,
+        team: &mut Team,
+        out: &mut [u16],
+    ) -> Result<(), GpuError>;
+}
+
+/// Makes executors.
+pub(super) struct Executors {
+    threads: usize,
+    /// A GPU, and whether nothing else will do.
+    #[cfg(feature = "gpu")]
+    gpu: Option<(Arc<Device>, bool)>,
+}
+
+impl Executors {
+    /// Executors on one GPU or on the CPU, there for a team of `threads`.
+    ///
+    /// # Errors
+    /// A GPU was asked for and there is none that fits.
+    #[cfg(feature = "gpu")]
+    pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
+        if backend == Backend::Cpu {
+            return Ok(Self { threads, gpu: None });
+        }
+        let must = backend == Backend::Gpu || adapter.is_some();
+        match Device::open(backend == Backend::Auto, adapter) {
+            Ok(device) => Ok(Self { threads, gpu: Some((Arc::new(device), must)) }),
+            Err(error) if must => Err(error),
+            Err(error) => {
+                tracing::info!("matching on the CPU: {error}");
+                Ok(Self { threads, gpu: None })
+            }
+        }
+    }
+
+    /// Executors on the CPU, for a team of `threads`.
+    ///
+    /// # Errors
+    /// A GPU was asked for.
+    #[cfg(not(feature = "gpu"))]
+    pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
+        if backend == Backend::Gpu || adapter.is_some() { Err(GpuError::left_out()) } else { Ok(Self { threads }) }
+    }
+
+    /// An executor for pictures of `size` (columns, rows) and at least so many disparities, at most 256.
+    ///
+    /// # Errors
+    /// The GPU that was asked for has no room, or failed.
+    pub fn executor(&self, size: (usize, usize), disparities: usize) -> Result<Box<dyn Executor>, GpuError> {
+        #[cfg(feature = "gpu")]
+        if let Some((device, must)) = &self.gpu {
+            match GpuExecutor::new(device, size, disparities) {
+                Ok(executor) => return Ok(Box::new(executor)),
+                Err(error) if *must => return Err(error),
+                Err(error) => tracing::info!("matching on the CPU: {error}"),
+            }
+        }
+        Ok(Box::new(CpuExecutor::new(size, disparities, self.threads)))
+    }
+}
