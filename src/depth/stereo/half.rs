@@ -25,28 +25,31 @@ pub fn shrink(from: &GrayImage, into: &mut GrayImage) {
     }
 }
 
-/// Disparities of a whole picture from those of its half: of the four that are near, a pixel takes that of the one which
-/// is as bright as itself, so that the edges follow the picture. `small` is the half of `whole`, and `px` its
-/// disparities.
-pub fn grow(whole: &GrayImage, small: &GrayImage, px: &[f32], into: &mut [f32]) {
-    let (width, height) = (whole.width as usize, whole.height as usize);
+/// Row `y` of the disparities of a whole picture, from those of its half: of the four that are near, a pixel takes that of
+/// the one which is as bright as itself, so that the edges follow the picture. `small` is the half of `whole`, and `px`
+/// its disparities.
+pub fn grow_row(whole: &GrayImage, small: &GrayImage, px: &[f32], y: usize, out: &mut [f32]) {
     let (columns, rows) = (small.width as usize, small.height as usize);
-    for (y, (out, luma)) in into.chunks_exact_mut(width).zip(whole.luma.chunks_exact(width)).enumerate().take(height) {
-        // Even rows and columns lie nearer to the one before, odd ones nearer to the one after.
-        let near = y / 2;
-        let other = if y % 2 == 0 { near.saturating_sub(1) } else { (near + 1).min(rows - 1) };
-        for (x, (out, &luma)) in out.iter_mut().zip(luma).enumerate() {
-            let at = x / 2;
-            let beside = if x % 2 == 0 { at.saturating_sub(1) } else { (at + 1).min(columns - 1) };
-            let mut best = (u8::MAX, 0.0);
-            for place in [near * columns + at, near * columns + beside, other * columns + at, other * columns + beside]
-            {
-                let apart = small.luma[place].abs_diff(luma);
-                if apart < best.0 || place == near * columns + at {
-                    best = (apart, px[place]);
-                }
-            }
-            *out = 2.0 * best.1;
+    // Even rows and columns lie nearer to the one before, odd ones nearer to the one after.
+    let near = y / 2;
+    let other = if y.is_multiple_of(2) { near.saturating_sub(1) } else { (near + 1).min(rows - 1) };
+    let row = |y: usize| (&small.luma[y * columns..(y + 1) * columns], &px[y * columns..(y + 1) * columns]);
+    let ((near_luma, near_px), (other_luma, other_px)) = (row(near), row(other));
+    let luma = &whole.luma[y * out.len()..(y + 1) * out.len()];
+    for (x, (out, &luma)) in out.iter_mut().zip(luma).enumerate() {
+        let at = x / 2;
+        let beside = if x.is_multiple_of(2) { at.saturating_sub(1) } else { (at + 1).min(columns - 1) };
+        let mut apart = near_luma[at].abs_diff(luma);
+        let mut best_px = near_px[at];
+        for (place_luma, place_px) in [
+            (near_luma[beside], near_px[beside]),
+            (other_luma[at], other_px[at]),
+            (other_luma[beside], other_px[beside]),
+        ] {
+            let here = place_luma.abs_diff(luma);
+            best_px = if here < apart { place_px } else { best_px };
+            apart = apart.min(here);
         }
+        *out = 2.0 * best_px;
     }
 }

@@ -18,11 +18,14 @@ pub mod source;
 mod speckle;
 mod tidy;
 
+use std::iter;
+use std::sync::atomic::AtomicBool;
+
 use executor::{Executor, Executors};
 use prior::Prior;
 use tidy::Tidy;
 
-use crate::compute::team::Team;
+use crate::compute::team::{Shelf, Team};
 use crate::compute::{Backend, GpuError};
 use crate::frame::{DisparityMap, GrayImage};
 
@@ -109,6 +112,7 @@ pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> R
         levels: [level(Effort::Fast)?, level(Effort::Full)?],
         team,
         small: [GrayImage::default(), GrayImage::default()],
+        taken: iter::repeat_with(AtomicBool::default).take(settings.size.1 as usize).collect(),
     }))
 }
 
@@ -122,6 +126,8 @@ struct Matching {
     levels: [Level; 2],
     /// Left and right at half the size.
     small: [GrayImage; 2],
+    /// For each row.
+    taken: Vec<AtomicBool>,
 }
 
 /// What one effort needs.
@@ -188,7 +194,7 @@ impl Matcher for Matching {
             return Err(MatchError::Size { made_for: self.settings.size, got: left.size() });
         }
         into.resize(left.width, left.height);
-        let Self { settings, team, levels, small } = self;
+        let Self { settings, team, levels, small, taken } = self;
         let level = &mut levels[settings.effort as usize];
         match settings.effort {
             Effort::Full => level.find([left, right], SPECKLE, team, Some(&mut into.px))?,
@@ -197,7 +203,8 @@ impl Matcher for Matching {
                 half::shrink(right, &mut small[1]);
                 let [small_left, small_right] = &*small;
                 level.find([small_left, small_right], SPECKLE / 4, team, None)?;
-                half::grow(left, small_left, &level.px, &mut into.px);
+                let (px, rows) = (&level.px, Shelf::new(&mut into.px, left.width as usize, taken));
+                team.run(left.height as usize, &|y| half::grow_row(left, small_left, px, y, rows.part(y)));
             }
         }
         Ok(())
