@@ -2,7 +2,7 @@
 //! frames, and without.
 
 use bokehcam::depth::refine::Refiner;
-use bokehcam::depth::stereo::Effort;
+use bokehcam::depth::stereo::{Effort, Pair};
 use bokehcam::frame::{DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
 use serde::Serialize;
@@ -95,7 +95,7 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
         }
         let mut map = DisparityMap::default();
         let [left, right] = frame.gray();
-        matcher.disparity(&left, &right, &mut map)?;
+        matcher.disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
         let mut depth = metres(&map, &sequence.rig);
         refiner.refine(&mut depth, &frame.left, frame.time_ns);
         let (width, height) = (map.width as usize, map.height as usize);

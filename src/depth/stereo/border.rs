@@ -22,6 +22,11 @@ pub struct Border {
 }
 
 impl Border {
+    /// The first known column of each row of the map that was filled last, 0 in rows without any disparity.
+    pub fn first(&self) -> &[usize] {
+        &self.first
+    }
+
     /// Gives the pixels of `map` left of the first known one of their row the disparity of a pixel that looks alike.
     /// `luma` is the left picture; rows without any disparity stay as they are.
     pub fn fill(&mut self, map: &mut [u16], luma: &[u8], width: usize) {

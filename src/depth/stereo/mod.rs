@@ -3,6 +3,7 @@
 //! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on, in whole numbers, so that
 //! all executors find the same ([`fixed`]); what is made of them is common to all ([`tidy`]).
 
+mod alike;
 mod border;
 pub mod check;
 pub mod cpu;
@@ -13,11 +14,12 @@ pub mod source;
 mod speckle;
 mod tidy;
 
+use alike::Colors;
 use tidy::Tidy;
 
 use crate::compute::GpuError;
 use crate::compute::team::Team;
-use crate::frame::{DisparityMap, GrayImage};
+use crate::frame::{ColorImage, DisparityMap, GrayImage};
 
 /// How pairs are matched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +48,17 @@ pub enum Effort {
     Full,
 }
 
+/// A rectified pair.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair<'a> {
+    /// What the left eye saw.
+    pub left: &'a GrayImage,
+    /// The same in colour, if it is known: tells more of what the right eye does not see.
+    pub color: Option<&'a ColorImage>,
+    /// What the right eye saw.
+    pub right: &'a GrayImage,
+}
+
 /// Finds the disparity of rectified pairs.
 pub trait Matcher: Send {
     /// What runs it, for the report.
@@ -54,12 +67,11 @@ pub trait Matcher: Send {
     /// Changes the effort from the next pair on.
     fn set_effort(&mut self, effort: Effort);
 
-    /// The disparity of the pair `left`, `right` into `into`, which becomes as large as they are; every pixel is
-    /// answered.
+    /// The disparity of `pair` into `into`, which becomes as large as its pictures; every pixel is answered.
     ///
     /// # Errors
     /// The pictures are not of the size that was set; the GPU failed.
-    fn disparity(&mut self, left: &GrayImage, right: &GrayImage, into: &mut DisparityMap) -> Result<(), MatchError>;
+    fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError>;
 }
 
 /// Why a pair has no disparity.
@@ -158,26 +170,30 @@ impl Matcher for Matching {
         self.settings.effort = effort;
     }
 
-    fn disparity(&mut self, left: &GrayImage, right: &GrayImage, into: &mut DisparityMap) -> Result<(), MatchError> {
+    fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError> {
+        let Pair { left, color, right } = pair;
         if left.size() != right.size() {
             return Err(MatchError::Sizes { left: left.size(), right: right.size() });
         }
-        if left.size() != self.settings.size {
-            return Err(MatchError::Size { made_for: self.settings.size, got: left.size() });
+        for got in [Some(left.size()), color.map(ColorImage::size)].into_iter().flatten() {
+            if got != self.settings.size {
+                return Err(MatchError::Size { made_for: self.settings.size, got });
+            }
         }
+        let colors = |every| color.map(|image| Colors { image, every });
         into.resize(left.width, left.height);
         let Self { settings, team, levels, small } = self;
         let Level { executor, tidy, map, px } = &mut levels[settings.effort as usize];
         match settings.effort {
             Effort::Full => {
                 executor.winners(&left.luma, &right.luma, team, map)?;
-                tidy.tidy(map, &left.luma, SPECKLE, team, &mut into.px);
+                tidy.tidy(map, &left.luma, colors(1), SPECKLE, team, &mut into.px);
             }
             Effort::Fast => {
                 half::shrink(left, &mut small[0]);
                 half::shrink(right, &mut small[1]);
                 executor.winners(&small[0].luma, &small[1].luma, team, map)?;
-                tidy.tidy(map, &small[0].luma, SPECKLE / 4, team, px);
+                tidy.tidy(map, &small[0].luma, colors(2), SPECKLE / 4, team, px);
                 half::grow(left, &small[0], px, &mut into.px);
             }
         }

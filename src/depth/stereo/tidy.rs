@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, WithSimd};
 
+use super::alike::{Alike, Colors};
 use super::border::Border;
 use super::fixed::ONE;
 use super::gaps;
@@ -16,6 +17,7 @@ pub struct Tidy {
     width: usize,
     speckles: Speckles,
     border: Border,
+    alike: Alike,
     taken: Vec<AtomicBool>,
     arch: Arch,
 }
@@ -27,6 +29,7 @@ impl Tidy {
             width,
             speckles: Speckles::new(width * height),
             border: Border::default(),
+            alike: Alike::default(),
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
             arch: Arch::new(),
         }
@@ -34,11 +37,22 @@ impl Tidy {
 
     /// Tidies `map` up, which is left with its gaps filled, and writes its median to `px`, in pixels, above 0. Islands
     /// of at most `speckle` pixels go.
-    pub fn tidy(&mut self, map: &mut [u16], luma: &[u8], speckle: u32, team: &mut Team, px: &mut [f32]) {
-        let Self { width, speckles, border, taken, arch } = self;
+    pub fn tidy(
+        &mut self,
+        map: &mut [u16],
+        luma: &[u8],
+        colors: Option<Colors>,
+        speckle: u32,
+        team: &mut Team,
+        px: &mut [f32],
+    ) {
+        let Self { width, speckles, border, alike, taken, arch } = self;
         let (width, arch) = (*width, *arch);
         speckles.remove(map, width, speckle);
         border.fill(map, luma, width);
+        if let Some(colors) = colors {
+            alike.correct(map, width, border.first(), colors);
+        }
         gaps::fill(map, width);
         let map = &*map;
         let height = map.len() / width;
