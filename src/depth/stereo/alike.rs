@@ -126,7 +126,7 @@ impl Alike {
             }
             // A surface may lie in two classes.
             let mut most = Tally::default();
-            for pair in tallies.array_windows::<2>() {
+            for pair in tallies.windows(2) {
                 let mut both = pair[0];
                 both += pair[1];
                 if both.count > most.count {
