@@ -44,6 +44,12 @@ impl Colors<'_> {
     }
 }
 
+/// Whether one of the [`COLORS`] is none: all channels are about the same. Greys are everywhere, in grey pictures above
+/// all, and say nothing.
+fn is_grey(color: usize) -> bool {
+    [color >> 7, color >> 2 & 31].iter().all(|difference| [15, 16].contains(difference))
+}
+
 /// How many pixels, and the sum of their disparities in 1/8 px, which fits for pictures of 8 million pixels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
@@ -120,8 +126,8 @@ impl Alike {
             }
         }
         self.surfaces.clear();
-        self.surfaces.extend(self.counts.iter().zip(&self.tallies).map(|(&count, tallies)| {
-            if count < LEAST {
+        self.surfaces.extend(self.counts.iter().zip(&self.tallies).enumerate().map(|(color, (&count, tallies))| {
+            if count < LEAST || is_grey(color) {
                 return UNKNOWN;
             }
             // A surface may lie in two classes.
@@ -206,18 +212,24 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_colour_and_one_of_many_surfaces_say_nothing() {
+    fn an_unknown_colour_and_one_of_many_surfaces_and_grey_say_nothing() {
         for row in corrected(RED, 1).chunks_exact(SIZE.0) {
             assert_eq!(row[..UNSEEN], [FAR; UNSEEN]);
         }
         let (width, height) = SIZE;
         let mut image = ColorImage::new(width as u32, height as u32);
-        image.rgb.fill(100);
+        image.rgb = GREEN.repeat(width * height);
         let half: Vec<u16> = (0..width * height).map(|k| if k % width < 40 { FAR } else { NEAR }).collect();
         let mut map = half.clone();
         let colors = Colors { image: &image, every: 1 };
         Alike::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
         assert_eq!(map, half);
+        image.rgb.fill(100);
+        let mut map: Vec<u16> = (0..width * height).map(|k| if k % width < UNSEEN { FAR } else { NEAR }).collect();
+        let before = map.clone();
+        let colors = Colors { image: &image, every: 1 };
+        Alike::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
+        assert_eq!(map, before);
     }
 
     #[test]
