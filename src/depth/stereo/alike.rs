@@ -88,12 +88,12 @@ pub struct Alike {
 impl Alike {
     /// Corrects the pixels of `map` that were filled, those left of column `first` of their row.
     pub fn correct(&mut self, map: &mut [u16], width: usize, first: &[usize], colors: Colors) {
+        self.take_memory(map.len());
         let columns = first.iter().max().map_or(0, |&most| (most + 1).min(width));
         if columns < 2 {
             return;
         }
         self.learn(map, width, first, (REACH * columns).min(width), colors);
-        self.seen.clear();
         for y in 0..first.len() {
             self.seen.extend((0..columns).map(|x| self.surfaces[colors.at(x, y)]));
         }
@@ -107,11 +107,19 @@ impl Alike {
         }
     }
 
+    /// All that a map of so many pixels may ever need, so that no wider border of a later one takes more.
+    fn take_memory(&mut self, pixels: usize) {
+        self.tallies.resize(COLORS, [Tally::default(); CLASSES]);
+        self.counts.resize(COLORS, 0);
+        self.surfaces.clear();
+        self.surfaces.reserve(COLORS);
+        self.seen.clear();
+        self.seen.reserve(pixels);
+    }
+
     /// Learns the surfaces from every other of the known pixels of the first `reach` columns, and of the rows.
     fn learn(&mut self, map: &[u16], width: usize, first: &[usize], reach: usize, colors: Colors) {
-        self.tallies.resize(COLORS, [Tally::default(); CLASSES]);
-        self.counts.clear();
-        self.counts.resize(COLORS, 0);
+        self.counts.fill(0);
         for (y, (row, &first)) in map.chunks_exact(width).zip(first).enumerate().step_by(2) {
             for (x, &d) in row[..reach].iter().enumerate().skip(first).step_by(2) {
                 if d != UNKNOWN {
@@ -125,7 +133,6 @@ impl Alike {
                 }
             }
         }
-        self.surfaces.clear();
         self.surfaces.extend(self.counts.iter().zip(&self.tallies).enumerate().map(|(color, (&count, tallies))| {
             if count < LEAST || is_grey(color) {
                 return UNKNOWN;
