@@ -13,7 +13,7 @@ use bokehcam::depth::stereo::cpu::CpuExecutor;
 use bokehcam::depth::stereo::executor::Executor;
 use bokehcam::depth::stereo::fixed::UNKNOWN;
 use bokehcam::depth::stereo::gpu::GpuExecutor;
-use bokehcam::depth::stereo::{self, Effort, Settings};
+use bokehcam::depth::stereo::{self, Effort, Pair, Settings};
 use bokehcam::frame::{DisparityMap, GrayImage};
 use common::Numbers;
 
@@ -128,7 +128,7 @@ fn maps_agree_at_every_effort() {
             for effort in [Effort::Fast, Effort::Full, Effort::Fast] {
                 for (matcher, map) in matchers.iter_mut().zip(&mut maps) {
                     matcher.set_effort(effort);
-                    matcher.disparity(&left, &right, map).expect("a map");
+                    matcher.disparity(Pair { left: &left, color: None, right: &right }, map).expect("a map");
                 }
                 assert!(maps[0].px == maps[1].px, "{width}x{height}, {disparities} disparities, {effort:?}");
             }

@@ -3,7 +3,7 @@
 
 use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::depth::refine::Refiner;
-use bokehcam::depth::stereo::Effort;
+use bokehcam::depth::stereo::{Effort, Pair};
 use bokehcam::frame::{DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
 use serde::Serialize;
@@ -97,7 +97,7 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
         }
         let mut map = DisparityMap::default();
         let [left, right] = frame.gray();
-        matcher.disparity(&left, &right, &mut map)?;
+        matcher.disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
         let mut depth = metres(&map, &sequence.rig);
         refiner.focus_at(focus.focus_m(&depth, frame.time_ns));
         refiner.refine(&mut depth, &frame.left, frame.time_ns);

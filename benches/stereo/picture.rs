@@ -5,6 +5,7 @@ use std::path::Path;
 
 use bokehcam::bokeh::aperture::{Aperture, Shape};
 use bokehcam::budget::Quality;
+use bokehcam::depth::stereo::Pair;
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
 use serde::Serialize;
 
@@ -51,7 +52,7 @@ pub fn run(picture: &Picture, options: &Options) -> Outcome {
         let mut maps = Vec::new();
         for frame in &sequence.frames {
             let ([left, right], mut map) = (frame.gray(), DisparityMap::default());
-            matcher.disparity(&left, &right, &mut map)?;
+            matcher.disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
             maps.push(metres(&map, &sequence.rig));
         }
         sources.push((format!("ours {}", name(effort)), maps));

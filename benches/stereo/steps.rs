@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bokehcam::budget::Quality;
 use bokehcam::depth::refine::Refiner;
-use bokehcam::depth::stereo::Effort;
+use bokehcam::depth::stereo::{Effort, Pair};
 use bokehcam::frame::{ColorImage, DisparityMap};
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -43,7 +43,7 @@ pub fn run(out: &Path, options: &Options) -> Outcome {
         let (mut refiner, mut map) = (Refiner::new(), DisparityMap::default());
         for (index, frame) in sequence.frames.iter().enumerate().take(FRAME + 1) {
             let [left, right] = frame.gray();
-            matcher.disparity(&left, &right, &mut map)?;
+            matcher.disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
             let mut depth = metres(&map, &sequence.rig);
             refiner.refine(&mut depth, &frame.left, frame.time_ns);
             if index < FRAME {

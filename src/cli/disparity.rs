@@ -12,8 +12,8 @@ use super::files::refuse_overwrite;
 use super::values::{Backend, above_zero, between};
 use super::{defaults, options, terminal};
 use crate::depth::DepthError;
-use crate::depth::stereo::{self, MatchError, Settings};
-use crate::frame::{DepthMap, DisparityMap, GrayImage};
+use crate::depth::stereo::{self, MatchError, Pair, Settings};
+use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
 use crate::optics::StereoRig;
 use crate::recording::geometry::Geometry;
 use crate::recording::still::{self, MapFormat};
@@ -98,8 +98,8 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
             terminal::say(&format!("note: {text}"));
         }
     };
-    let [left, right] = [&command.left, &command.right].map(|file| read_luma(file));
-    let (left, right) = (left?, right?);
+    let color = still::read_color(&command.left)?;
+    let (left, right) = (luma_of(&color), luma_of(&still::read_color(&command.right)?));
     let size = left.size();
     if right.size() != size {
         return Err(DepthError::from(MatchError::Sizes { left: size, right: right.size() }).into());
@@ -114,7 +114,8 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     let mut matcher = executor.matcher(disparities, effort, size)?;
     let mut disparity = DisparityMap::default();
     let start = Instant::now();
-    matcher.disparity(&left, &right, &mut disparity).map_err(DepthError::from)?;
+    let pair = Pair { left: &left, color: Some(&color), right: &right };
+    matcher.disparity(pair, &mut disparity).map_err(DepthError::from)?;
     let took_ms = start.elapsed().as_secs_f64() * 1e3;
 
     let force = command.output.force;
@@ -210,10 +211,10 @@ impl DepthCommand {
     }
 }
 
-fn read_luma(file: &Path) -> Result<GrayImage, CliError> {
+fn luma_of(color: &ColorImage) -> GrayImage {
     let mut luma = GrayImage::default();
-    luma.set_luma_of(&still::read_color(file)?);
-    Ok(luma)
+    luma.set_luma_of(color);
+    luma
 }
 
 /// Metres; 0 where the disparity is unknown.

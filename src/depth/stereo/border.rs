@@ -27,6 +27,11 @@ impl Border {
         Self { length: Vec::with_capacity(width * height), first: Vec::with_capacity(height) }
     }
 
+    /// The first known column of each row of the map that was filled last, 0 in rows without any disparity.
+    pub fn first(&self) -> &[usize] {
+        &self.first
+    }
+
     /// Gives the pixels of `map` left of the first known one of their row the disparity of a pixel that looks alike.
     /// `luma` is the left picture; rows without any disparity stay as they are.
     pub fn fill(&mut self, map: &mut [u16], luma: &[u8], width: usize) {

@@ -3,6 +3,7 @@
 //! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on, in whole numbers, so that
 //! all executors find the same ([`fixed`]); what is made of them is common to all ([`tidy`]).
 
+mod alike;
 mod border;
 pub mod check;
 pub mod cpu;
@@ -21,13 +22,14 @@ mod tidy;
 use std::iter;
 use std::sync::atomic::AtomicBool;
 
+use alike::Colors;
 use executor::{Executor, Executors};
 use prior::Prior;
 use tidy::Tidy;
 
 use crate::compute::team::{Shelf, Team};
 use crate::compute::{Backend, GpuError};
-use crate::frame::{DisparityMap, GrayImage};
+use crate::frame::{ColorImage, DisparityMap, GrayImage};
 
 /// How pairs are matched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +58,17 @@ pub enum Effort {
     Full,
 }
 
+/// A rectified pair.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair<'a> {
+    /// What the left eye saw.
+    pub left: &'a GrayImage,
+    /// The same in colour, if it is known: tells more of what the right eye does not see.
+    pub color: Option<&'a ColorImage>,
+    /// What the right eye saw.
+    pub right: &'a GrayImage,
+}
+
 /// Finds the disparity of rectified pairs.
 pub trait Matcher: Send {
     /// What runs it, for the report.
@@ -64,12 +77,11 @@ pub trait Matcher: Send {
     /// Changes the effort from the next pair on.
     fn set_effort(&mut self, effort: Effort);
 
-    /// The disparity of the pair `left`, `right` into `into`, which becomes as large as they are; every pixel is
-    /// answered.
+    /// The disparity of `pair` into `into`, which becomes as large as its pictures; every pixel is answered.
     ///
     /// # Errors
     /// The pictures are not of the size that was set; the GPU failed.
-    fn disparity(&mut self, left: &GrayImage, right: &GrayImage, into: &mut DisparityMap) -> Result<(), MatchError>;
+    fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError>;
 }
 
 /// Why a pair has no disparity.
@@ -163,6 +175,7 @@ impl Level {
     fn find(
         &mut self,
         eyes: [&GrayImage; 2],
+        colors: Option<Colors>,
         speckle: u32,
         team: &mut Team,
         into: Option<&mut [f32]>,
@@ -172,7 +185,7 @@ impl Level {
         executor.winners([luma, right], prior.likely(luma), team, map)?;
         tidy.drop_islands(map, speckle);
         prior.keep(luma, map);
-        tidy.fill(map, luma, team, into.unwrap_or(px));
+        tidy.fill(map, luma, colors, team, into.unwrap_or(px));
         Ok(())
     }
 }
@@ -186,23 +199,27 @@ impl Matcher for Matching {
         self.settings.effort = effort;
     }
 
-    fn disparity(&mut self, left: &GrayImage, right: &GrayImage, into: &mut DisparityMap) -> Result<(), MatchError> {
+    fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError> {
+        let Pair { left, color, right } = pair;
         if left.size() != right.size() {
             return Err(MatchError::Sizes { left: left.size(), right: right.size() });
         }
-        if left.size() != self.settings.size {
-            return Err(MatchError::Size { made_for: self.settings.size, got: left.size() });
+        for got in [Some(left.size()), color.map(ColorImage::size)].into_iter().flatten() {
+            if got != self.settings.size {
+                return Err(MatchError::Size { made_for: self.settings.size, got });
+            }
         }
+        let colors = |every| color.map(|image| Colors { image, every });
         into.resize(left.width, left.height);
         let Self { settings, team, levels, small, taken } = self;
         let level = &mut levels[settings.effort as usize];
         match settings.effort {
-            Effort::Full => level.find([left, right], SPECKLE, team, Some(&mut into.px))?,
+            Effort::Full => level.find([left, right], colors(1), SPECKLE, team, Some(&mut into.px))?,
             Effort::Fast => {
                 half::shrink(left, &mut small[0]);
                 half::shrink(right, &mut small[1]);
                 let [small_left, small_right] = &*small;
-                level.find([small_left, small_right], SPECKLE / 4, team, None)?;
+                level.find([small_left, small_right], colors(2), SPECKLE / 4, team, None)?;
                 let (px, rows) = (&level.px, Shelf::new(&mut into.px, left.width as usize, taken));
                 team.run(left.height as usize, &|y| half::grow_row(left, small_left, px, y, rows.part(y)));
             }

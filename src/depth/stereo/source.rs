@@ -6,7 +6,7 @@
 //! ([`StereoRig::assumed`]) blurs as well as a measured one; only distances in metres mean nothing then.
 
 use super::check::{Verdict, check};
-use super::{Effort, MatchError, Matcher};
+use super::{Effort, MatchError, Matcher, Pair};
 use crate::calibration::rectifier::Rectifier;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
@@ -110,7 +110,8 @@ impl DepthSource for StereoDepth {
             let told = first_look(&self.source_name, &self.left, right, self.disparities)?;
             self.looks = if told { 0 } else { self.looks - 1 };
         }
-        self.matcher.disparity(&self.left, right, &mut self.disparity)?;
+        let pair = Pair { left: &self.left, color: Some(seen.color), right };
+        self.matcher.disparity(pair, &mut self.disparity)?;
         metres(&self.disparity, &self.rig, map);
         Ok(())
     }
@@ -158,12 +159,8 @@ mod tests {
         fn set_effort(&mut self, effort: Effort) {
             self.0 = effort;
         }
-        fn disparity(
-            &mut self,
-            left: &GrayImage,
-            right: &GrayImage,
-            into: &mut DisparityMap,
-        ) -> Result<(), MatchError> {
+        fn disparity(&mut self, pair: Pair, into: &mut DisparityMap) -> Result<(), MatchError> {
+            let Pair { left, right, .. } = pair;
             if left.size() != right.size() {
                 return Err(MatchError::Sizes { left: left.size(), right: right.size() });
             }

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, WithSimd};
 
+use super::alike::{Alike, Colors};
 use super::border::Border;
 use super::fixed::ONE;
 use super::gaps;
@@ -16,6 +17,7 @@ pub struct Tidy {
     width: usize,
     speckles: Speckles,
     border: Border,
+    alike: Alike,
     taken: Vec<AtomicBool>,
     arch: Arch,
 }
@@ -27,6 +29,7 @@ impl Tidy {
             width,
             speckles: Speckles::new(width * height),
             border: Border::new((width, height)),
+            alike: Alike::default(),
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
             arch: Arch::new(),
         }
@@ -38,10 +41,13 @@ impl Tidy {
     }
 
     /// Fills the gaps of `map`, whose left picture is `luma`, and writes its median to `px`, in pixels, above 0.
-    pub fn fill(&mut self, map: &mut [u16], luma: &[u8], team: &mut Team, px: &mut [f32]) {
-        let Self { width, border, taken, arch, .. } = self;
+    pub fn fill(&mut self, map: &mut [u16], luma: &[u8], colors: Option<Colors>, team: &mut Team, px: &mut [f32]) {
+        let Self { width, border, alike, taken, arch, .. } = self;
         let (width, arch) = (*width, *arch);
         border.fill(map, luma, width);
+        if let Some(colors) = colors {
+            alike.correct(map, width, border.first(), colors);
+        }
         gaps::fill(map, width);
         let map = &*map;
         let height = map.len() / width;

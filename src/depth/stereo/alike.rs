@@ -1,0 +1,255 @@
+//! What has the colour of a surface that both eyes see belongs to it.
+//!
+//! The left border is filled along the picture ([`super::border`]), which misses what stands before it and touches
+//! nothing that the right eye sees: leaves before a wall become wall. Where the known pixels of a colour nearly all lie
+//! on one surface, so do the border's, and where their disparity says otherwise, they take the surface's.
+
+use std::ops::AddAssign;
+
+use super::Settings;
+use super::fixed::{ONE, UNKNOWN};
+use crate::frame::ColorImage;
+
+/// Disparities this far apart are not of one surface.
+const APART: u16 = 8 * ONE;
+/// Classes of disparities, each so wide.
+const CLASSES: usize = Settings::MOST_DISPARITIES as usize * ONE as usize / APART as usize + 1;
+/// Colours that are told apart.
+const COLORS: usize = 1 << 12;
+/// Colours are learned from so many widths of the border.
+const REACH: usize = 4;
+/// Known pixels of a colour that tell something.
+const LEAST: u32 = 16;
+/// A colour stands for a surface that has so many of eight of its pixels.
+const MOST_OF_8: u32 = 7;
+/// Of the nine pixels that lie so far around one, more than half must be of the same surface.
+const AROUND_PX: usize = 2;
+
+/// Colours of the pixels of a map.
+#[derive(Clone, Copy)]
+pub struct Colors<'a> {
+    /// The picture, as large as the map times `every`.
+    pub image: &'a ColorImage,
+    /// The map's pixels stand for the first of so many columns and rows.
+    pub every: usize,
+}
+
+impl Colors<'_> {
+    /// Which of the [`COLORS`] a pixel has: 5 bits for each difference of two channels, which shading changes little,
+    /// and 2 for the brightness.
+    fn at(&self, x: usize, y: usize) -> usize {
+        let at = 3 * self.every * (y * self.image.width as usize + x);
+        let [red, green, blue] = [0, 1, 2].map(|channel| usize::from(self.image.rgb[at + channel]));
+        (red + 256 - green) >> 4 << 7 | (blue + 256 - green) >> 4 << 2 | (red + 2 * green + blue) >> 8
+    }
+}
+
+/// Whether one of the [`COLORS`] is none: all channels are about the same. Greys are everywhere, in grey pictures above
+/// all, and say nothing.
+fn is_grey(color: usize) -> bool {
+    [color >> 7, color >> 2 & 31].iter().all(|difference| [15, 16].contains(difference))
+}
+
+/// How many pixels, and the sum of their disparities in 1/8 px, which fits for pictures of 8 million pixels.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    count: u32,
+    sum: u32,
+}
+
+impl Tally {
+    const UNIT: u16 = ONE / 8;
+
+    fn mean(self) -> u16 {
+        (self.sum / self.count) as u16 * Self::UNIT
+    }
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.count += other.count;
+        self.sum += other.sum;
+    }
+}
+
+/// Fills by colour; owns the memory for it.
+#[derive(Debug, Default)]
+pub struct Alike {
+    /// Known pixels by colour and class of disparity.
+    tallies: Vec<[Tally; CLASSES]>,
+    /// Known pixels by colour.
+    counts: Vec<u32>,
+    /// The disparity of the surface that has a colour, or unknown.
+    surfaces: Vec<u16>,
+    /// The same by the colour of each pixel of the border, `[row][column]`.
+    seen: Vec<u16>,
+}
+
+impl Alike {
+    /// Corrects the pixels of `map` that were filled, those left of column `first` of their row.
+    pub fn correct(&mut self, map: &mut [u16], width: usize, first: &[usize], colors: Colors) {
+        self.take_memory(map.len());
+        let columns = first.iter().max().map_or(0, |&most| (most + 1).min(width));
+        if columns < 2 {
+            return;
+        }
+        self.learn(map, width, first, (REACH * columns).min(width), colors);
+        for y in 0..first.len() {
+            self.seen.extend((0..columns).map(|x| self.surfaces[colors.at(x, y)]));
+        }
+        for (y, (row, &first)) in map.chunks_exact_mut(width).zip(first).enumerate() {
+            for (x, d) in row[..first].iter_mut().enumerate() {
+                let surface = self.seen[y * columns + x];
+                if surface != UNKNOWN && surface.abs_diff(*d) >= APART && self.is_amid(surface, x, y, columns) {
+                    *d = surface;
+                }
+            }
+        }
+    }
+
+    /// All that a map of so many pixels may ever need, so that no wider border of a later one takes more.
+    fn take_memory(&mut self, pixels: usize) {
+        self.tallies.resize(COLORS, [Tally::default(); CLASSES]);
+        self.counts.resize(COLORS, 0);
+        self.surfaces.clear();
+        self.surfaces.reserve(COLORS);
+        self.seen.clear();
+        self.seen.reserve(pixels);
+    }
+
+    /// Learns the surfaces from every other of the known pixels of the first `reach` columns, and of the rows.
+    fn learn(&mut self, map: &[u16], width: usize, first: &[usize], reach: usize, colors: Colors) {
+        self.counts.fill(0);
+        for (y, (row, &first)) in map.chunks_exact(width).zip(first).enumerate().step_by(2) {
+            for (x, &d) in row[..reach].iter().enumerate().skip(first).step_by(2) {
+                if d != UNKNOWN {
+                    let color = colors.at(x, y);
+                    if self.counts[color] == 0 {
+                        self.tallies[color] = [Tally::default(); CLASSES];
+                    }
+                    self.counts[color] += 1;
+                    let class = usize::from(d / APART).min(CLASSES - 1);
+                    self.tallies[color][class] += Tally { count: 1, sum: u32::from(d / Tally::UNIT) };
+                }
+            }
+        }
+        self.surfaces.extend(self.counts.iter().zip(&self.tallies).enumerate().map(|(color, (&count, tallies))| {
+            if count < LEAST || is_grey(color) {
+                return UNKNOWN;
+            }
+            // A surface may lie in two classes.
+            let mut most = Tally::default();
+            for pair in tallies.windows(2) {
+                let mut both = pair[0];
+                both += pair[1];
+                if both.count > most.count {
+                    most = both;
+                }
+            }
+            if 8 * most.count >= MOST_OF_8 * count { most.mean() } else { UNKNOWN }
+        }));
+    }
+
+    /// Whether the colours around a pixel are of this surface, too.
+    fn is_amid(&self, surface: u16, x: usize, y: usize, columns: usize) -> bool {
+        let rows = self.seen.len() / columns;
+        let mut same = 0;
+        for y in [y.saturating_sub(AROUND_PX), y, (y + AROUND_PX).min(rows - 1)] {
+            for x in [x.saturating_sub(AROUND_PX), x, (x + AROUND_PX).min(columns - 1)] {
+                let other = self.seen[y * columns + x];
+                same += u32::from(other != UNKNOWN && other.abs_diff(surface) < APART);
+            }
+        }
+        same > 4
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GREEN: [u8; 3] = [60, 140, 50];
+    const WALL: [u8; 3] = [170, 150, 120];
+    const RED: [u8; 3] = [190, 30, 40];
+    const SIZE: (usize, usize) = (80, 40);
+    /// The border's width.
+    const UNSEEN: usize = 16;
+    const NEAR: u16 = 60 * ONE;
+    const FAR: u16 = 10 * ONE;
+
+    fn is_patch(x: usize, y: usize) -> bool {
+        (4..12).contains(&x) && (10..20).contains(&y)
+    }
+
+    fn is_near(x: usize) -> bool {
+        (50..70).contains(&x)
+    }
+
+    /// A near green surface before a far wall, and in the border, which was taken for wall, a patch of this colour.
+    fn corrected(patch: [u8; 3], every: usize) -> Vec<u16> {
+        let (width, height) = SIZE;
+        let mut image = ColorImage::new((width * every) as u32, (height * every) as u32);
+        for (k, rgb) in image.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let (x, y) = (k % (width * every) / every, k / (width * every) / every);
+            *rgb = if is_patch(x, y) {
+                patch
+            } else if is_near(x) {
+                GREEN
+            } else {
+                WALL
+            };
+        }
+        let mut map: Vec<u16> = (0..width * height).map(|k| if is_near(k % width) { NEAR } else { FAR }).collect();
+        Alike::default().correct(&mut map, width, &vec![UNSEEN; height], Colors { image: &image, every });
+        map
+    }
+
+    #[test]
+    fn a_patch_of_the_near_surfaces_colour_is_near() {
+        for every in [1, 2] {
+            for (k, d) in corrected(GREEN, every).into_iter().enumerate() {
+                let (x, y) = (k % SIZE.0, k / SIZE.0);
+                // Its corners have too little of their colour around them.
+                let corner = [4, 5, 10, 11].contains(&x) && [10, 11, 18, 19].contains(&y);
+                if !corner {
+                    assert_eq!(d, if is_near(x) || is_patch(x, y) { NEAR } else { FAR }, "{x}, {y}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_unknown_colour_and_one_of_many_surfaces_and_grey_say_nothing() {
+        for row in corrected(RED, 1).chunks_exact(SIZE.0) {
+            assert_eq!(row[..UNSEEN], [FAR; UNSEEN]);
+        }
+        let (width, height) = SIZE;
+        let mut image = ColorImage::new(width as u32, height as u32);
+        image.rgb = GREEN.repeat(width * height);
+        let half: Vec<u16> = (0..width * height).map(|k| if k % width < 40 { FAR } else { NEAR }).collect();
+        let mut map = half.clone();
+        let colors = Colors { image: &image, every: 1 };
+        Alike::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
+        assert_eq!(map, half);
+        image.rgb.fill(100);
+        let mut map: Vec<u16> = (0..width * height).map(|k| if k % width < UNSEEN { FAR } else { NEAR }).collect();
+        let before = map.clone();
+        let colors = Colors { image: &image, every: 1 };
+        Alike::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
+        assert_eq!(map, before);
+    }
+
+    #[test]
+    fn what_was_learned_before_is_forgotten() {
+        let (width, height) = SIZE;
+        let image = ColorImage { width: 80, height: 40, rgb: GREEN.repeat(width * height) };
+        let first = vec![UNSEEN; height];
+        let mut alike = Alike::default();
+        for surface in [NEAR, FAR] {
+            let mut map: Vec<u16> =
+                (0..width * height).map(|k| if k % width < UNSEEN { 30 * ONE } else { surface }).collect();
+            alike.correct(&mut map, width, &first, Colors { image: &image, every: 1 });
+            assert_eq!(map, vec![surface; width * height]);
+        }
+    }
+}
