@@ -39,7 +39,7 @@ pub struct CpuExecutor {
     right: Census,
     /// Stripes of columns.
     stripes: usize,
-    /// Groups that are worked on at a time: one for each thread.
+    /// Groups that are worked on at a time.
     chunk: usize,
     /// Of a chunk.
     costs: Aligned<u8>,
@@ -62,7 +62,8 @@ impl CpuExecutor {
     pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
         let disparities = fixed::range(disparities);
         let stripes = width.div_ceil(STRIPE);
-        let chunk = threads.max(1);
+        // Two for each of a few threads: they wait less for each other.
+        let chunk = threads + threads.min(4);
         let group = stripes * STRIPE * GROUP * disparities;
         let member = || Member { states: States::new(2 * GROUP, disparities), eyes: Eyes::new(width, disparities) };
         let flags = || iter::repeat_with(AtomicBool::default);

@@ -20,10 +20,16 @@ const GUARD: usize = 64;
 /// The states of paths: the values of each at the pixel where it is, with [`GUARD`] bytes on both sides that are never
 /// the least, and the least of them. Those of the pixel before are kept beside those that are being made.
 pub struct States {
-    now: Aligned<u8>,
-    before: Aligned<u8>,
+    values: Aligned<u8>,
+    /// Where the second half of the values begins.
+    half: usize,
+    /// Whether those that are being made are in the second half.
+    second: bool,
     least: Vec<u8>,
 }
+
+/// Bytes after which addresses look alike to a processor that compares what it reads with what it is still to write.
+const ALIKE: usize = 4096;
 
 /// One path on its way to its next pixel.
 struct Path<'a> {
@@ -38,26 +44,29 @@ struct Path<'a> {
 impl States {
     /// Of `paths` paths.
     pub fn new(paths: usize, disparities: usize) -> Self {
-        let values = || {
-            let mut values = Aligned::zeros(GUARD + paths * (disparities + GUARD));
-            values.fill(u8::MAX);
-            values
-        };
-        Self { now: values(), before: values(), least: vec![0; paths] }
+        let length = GUARD + paths * (disparities + GUARD);
+        // As far from looking alike as can be, and in whole cache lines.
+        let half = (length + ALIKE / 2).next_multiple_of(ALIKE) - ALIKE / 2;
+        let half = if half < length { half + ALIKE } else { half };
+        let mut values = Aligned::zeros(half + length);
+        values.fill(u8::MAX);
+        Self { values, half, second: false, least: vec![0; paths] }
     }
 
     /// The paths, for one step; [`States::turn`] ends it.
     #[inline(always)]
     fn paths<const N: usize>(&mut self) -> impl Iterator<Item = Path<'_>> {
-        let now = self.now[GUARD..].chunks_exact_mut(N + GUARD);
-        let before = self.before[GUARD - 1..].chunks_exact(N + GUARD);
+        let (first, second) = self.values.split_at_mut(self.half);
+        let (now, before) = if self.second { (second, first) } else { (first, second) };
+        let now = now[GUARD..].chunks_exact_mut(N + GUARD);
+        let before = before[GUARD - 1..].chunks_exact(N + GUARD);
         now.zip(before).zip(&mut self.least).map(|((now, before), least)| Path { before, now, least })
     }
 
     /// All paths have gone their step.
     #[inline(always)]
     fn turn(&mut self) {
-        std::mem::swap(&mut self.now, &mut self.before);
+        self.second = !self.second;
     }
 }
 
