@@ -18,8 +18,9 @@ const FARTHEST_PX: f32 = 1.0 / 16.0;
 /// Pairs that are looked at until one of them tells whether it is rectified; each look takes the time of a few frames.
 const FIRST_LOOKS: u32 = 5;
 
-/// What a map costs with little effort beside a full one: an eighth of the candidates, and what does not depend on them.
-const EFFORTS: [f64; 2] = [0.25, 1.0];
+/// What a map costs with little effort beside a full one, as measured: an eighth of the candidates, and what does not
+/// depend on them.
+const EFFORTS: [f64; 2] = [0.33, 1.0];
 
 /// Depth from the frames of a camera that brings a right eye.
 pub struct StereoDepth {
