@@ -1,7 +1,7 @@
 //! Depth from two eyes: the disparity of a rectified pair.
 //!
 //! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on, in whole numbers, so that
-//! all executors find the same ([`fixed`]); what is made of them is common to all ([`tidy`]).
+//! all executors find the same ([`fixed`]); what is made of them is common to all (`tidy`).
 
 mod alike;
 mod border;
