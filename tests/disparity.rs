@@ -211,3 +211,32 @@ fn what_does_not_fit_is_refused_in_one_line() {
     desk.assert_refused(&["--out", "d.pfm"], 1, "right.png: there is no such file");
     assert!(!desk.path("d.pfm").exists());
 }
+
+#[test]
+fn a_pair_that_is_none_is_said() {
+    let desk = Desk::new();
+    let bundled =
+        |eye: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/stereo").join(eye).join("000000.png");
+    let save = |left: &str, right: &str, rows: i64| {
+        fs::copy(bundled(left), desk.path("left.png")).unwrap();
+        let eye = image::open(bundled(right)).unwrap().into_luma8();
+        let mut moved = GrayImage::new(eye.width(), eye.height());
+        image::imageops::replace(&mut moved, &eye, 0, rows);
+        moved.save(desk.path("right.png")).unwrap();
+    };
+    for (left, right, rows, said) in [
+        ("image_2", "image_3", 0, None),
+        ("image_2", "image_3", 4, Some("rows are off by")),
+        ("image_3", "image_2", 0, Some("left and right are exchanged")),
+    ] {
+        save(left, right, rows);
+        let ran = desk.run(&["--out", "out.pfm", "--max-disparity", "96", "--force"]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        match said {
+            Some(said) => assert!(ran.stderr.contains(said), "{said}: {}", ran.stderr),
+            None => {
+                assert!(!ran.stderr.contains("note: the pair") && !ran.stderr.contains("exchanged"), "{}", ran.stderr)
+            }
+        }
+    }
+}

@@ -12,6 +12,7 @@ use super::files::refuse_overwrite;
 use super::values::{Backend, above_zero, between};
 use super::{defaults, options, terminal};
 use crate::depth::DepthError;
+use crate::depth::stereo::check::{Verdict, check};
 use crate::depth::stereo::{self, MatchError, Pair, Settings};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
 use crate::optics::StereoRig;
@@ -117,6 +118,14 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     let pair = Pair { left: &left, color: Some(&color), right: &right };
     matcher.disparity(pair, &mut disparity).map_err(DepthError::from)?;
     let took_ms = start.elapsed().as_secs_f64() * 1e3;
+
+    match check(&left, &right, disparities).map_err(DepthError::from)?.verdict() {
+        Verdict::RowsOff { px } => note(format!(
+            "the pair is not rectified: rows are off by up to {px:.1} px, and the disparity is wrong; rectify it first"
+        )),
+        verdict @ Verdict::Swapped => note(verdict.to_string()),
+        Verdict::Rectified | Verdict::Unclear { .. } => {}
+    }
 
     let force = command.output.force;
     match geometry.filter(|_| command.metres) {
