@@ -16,6 +16,11 @@ frames=${FRAMES:-30}
 if [[ -z "${BOKEHCAM:-}" ]]; then
     cargo build --release --locked
     cargo test --release --locked --test parity --test stereo_gpu -- --include-ignored
+    # Depth from two eyes: each pass by the device's own timestamps, then whole pairs.
+    for pair in 640x480x64 1280x720x128; do
+        BOKEHCAM_PAIR=$pair cargo test --release --locked --test stereo_gpu -- --ignored --nocapture the_passes
+    done
+    cargo bench --locked --bench stereo -- times --gpu "${ADAPTER:-}" --size 640x480,1280x720 --disparities 64,128
     BOKEHCAM=${CARGO_TARGET_DIR:-target}/release/bokehcam
 fi
 options=(bench --scene portrait --backend gpu --passes --frames "$frames")

@@ -19,9 +19,11 @@ pub fn create(
     size: (u32, u32),
     threads: Option<usize>,
 ) -> Outcome<Box<dyn Matcher>> {
-    if options.gpu.is_some() {
-        return Err("there is no matcher on the GPU".into());
-    }
+    let (backend, adapter) = match options.gpu.as_deref() {
+        None => (Backend::Cpu, None),
+        Some("") => (Backend::Gpu, None),
+        Some(name) => (Backend::Gpu, Some(name)),
+    };
     let threads = threads.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
-    Ok(stereo::create(&Settings { size, disparities, effort, threads }, Backend::Cpu, None)?)
+    Ok(stereo::create(&Settings { size, disparities, effort, threads }, backend, adapter)?)
 }
