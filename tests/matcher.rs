@@ -136,7 +136,7 @@ fn what_rests_is_steady_and_what_moves_is_new() {
         let mut pair = pair((width, height), |x, _| if (100..160).contains(&x) { near } else { 6 });
         let mut noise = Noise(seed);
         for (k, luma) in pair.iter_mut().flat_map(|eye| eye.luma.iter_mut()).enumerate() {
-            let strength = if k % width as usize >= 180 { 60 } else { 1 };
+            let strength = if k % width as usize >= 180 { 60 } else { 2 };
             *luma = 100 + *luma / strength + noise.next() / 100;
         }
         pair
