@@ -102,8 +102,10 @@ fn what_goes_in_at_30_frames_per_second_comes_out_for_other_programs() {
             frames_passed as f64 <= 1.3 * steps.len() as f64 * captured / delivered + 5.0,
             "{report}: steps {steps:?}"
         );
-        let rate = captured / report["elapsed_s"].as_f64().unwrap();
-        assert!((27.0..32.0).contains(&rate), "{rate} frames per second: {frames}");
+        // Until the camera streams, and after its last frame, this emulated machine may take a second of it.
+        let elapsed_s = report["elapsed_s"].as_f64().unwrap();
+        let (least, most) = (captured / elapsed_s, captured / (elapsed_s - 1.0));
+        assert!(least < 32.0 && most > 27.0, "{least} to {most} frames per second: {frames}");
         assert_eq!(frames["dropped"]["corrupt"], 0, "{frames}");
     }
 }
