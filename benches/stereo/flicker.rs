@@ -3,7 +3,7 @@
 
 use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::depth::refine::Refiner;
-use bokehcam::depth::stereo::{Effort, Pair};
+use bokehcam::depth::stereo::{Effort, Pair, source};
 use bokehcam::frame::{DepthMap, DisparityMap};
 use bokehcam::optics::StereoRig;
 use serde::Serialize;
@@ -109,13 +109,11 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
     Ok([matched, refined])
 }
 
-/// The depth of a disparity map: what is unknown or at infinity is 0.
+/// The depth of a disparity map, as a stream has it.
 pub fn metres(map: &DisparityMap, rig: &StereoRig) -> DepthMap {
-    let metres = map.px.iter().map(|&px| {
-        let z_m = if px > 0.0 { rig.depth_m(px) } else { 0.0 };
-        if DepthMap::is_known(z_m) { z_m } else { 0.0 }
-    });
-    DepthMap { width: map.width, height: map.height, metres: metres.collect() }
+    let mut depth = DepthMap::default();
+    source::metres(map, rig, &mut depth);
+    depth
 }
 
 /// Of a frame and the one before: pixels that are still, and those around moving edges.

@@ -1,8 +1,7 @@
 //! The matchers under test.
 
-use std::thread;
-
 use bokehcam::compute::Backend;
+use bokehcam::compute::team::cores;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 
 use super::Outcome;
@@ -24,6 +23,6 @@ pub fn create(
         Some("") => (Backend::Gpu, None),
         Some(name) => (Backend::Gpu, Some(name)),
     };
-    let threads = threads.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
+    let threads = threads.unwrap_or_else(cores);
     Ok(stereo::create(&Settings { size, disparities, effort, threads }, backend, adapter)?)
 }

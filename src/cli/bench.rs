@@ -12,6 +12,7 @@ use super::values::{self, Size, above_zero};
 use super::{defaults, options, print, render};
 use crate::bokeh::{Bokeh, Job, PassTimes};
 use crate::budget::Quality;
+use crate::compute::team::cores;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
 use crate::optics::CocField;
@@ -212,7 +213,7 @@ impl Buffers {
 }
 
 fn synthetic_frame(scene: BenchScene, size: (u32, u32)) -> (ColorImage, DepthMap) {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = cores();
     let scene = match scene {
         BenchScene::Sitter => Scene::sitter(),
         BenchScene::Portrait => Scene::portrait(),

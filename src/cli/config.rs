@@ -6,6 +6,7 @@ use super::options;
 use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Refine, Tilt};
 use crate::bokeh::aperture::Aperture;
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
+use crate::compute::team::cores;
 use crate::depth::DepthError;
 use crate::depth::focus::FocusRule;
 use crate::depth::stereo::{self, Matcher};
@@ -224,7 +225,7 @@ impl Executor {
         effort: stereo::Effort,
         size: (u32, u32),
     ) -> Result<Box<dyn Matcher>, CliError> {
-        let threads = self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+        let threads = self.threads.unwrap_or_else(cores);
         let settings = stereo::Settings { size, disparities, effort, threads };
         Ok(stereo::create(&settings, self.backend, self.adapter.as_deref()).map_err(DepthError::from)?)
     }

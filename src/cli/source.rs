@@ -19,6 +19,7 @@ use crate::capture::v4l2::V4l2Camera;
 use crate::capture::{Brings, Camera, CaptureError};
 #[cfg(feature = "camera")]
 use crate::clock::Clock;
+use crate::compute::team::cores;
 use crate::depth::DepthSource;
 use crate::depth::recorded::Recorded;
 use crate::optics::StereoRig;
@@ -262,7 +263,7 @@ impl Opened {
                     size: (size.width, size.height),
                     fps: frames.fps.unwrap_or(defaults::FPS),
                     frames: frames.frames,
-                    threads: std::thread::available_parallelism().map_or(1, usize::from),
+                    threads: cores(),
                 })?;
                 Ok(of(Box::new(camera)))
             }

@@ -60,6 +60,11 @@ const SPINS: u32 = 4_000;
 // order the two.
 unsafe impl Sync for Shared {}
 
+/// Threads that run at once on this machine, at least 1.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, usize::from)
+}
+
 impl Team {
     /// A team of `threads` (at least 1), the caller included; `name` is what the others are called, with a number.
     pub fn new(name: &str, threads: usize) -> Self {

@@ -33,7 +33,7 @@ use super::rung::SCALES;
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::budget::Quality;
 use crate::compute::simd;
-use crate::compute::team::{Shelf, Team};
+use crate::compute::team::{Shelf, Team, cores};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
@@ -66,7 +66,7 @@ struct Member {
 impl CpuBokeh {
     /// An executor of `plan` on `threads` threads (all cores when `None`).
     pub fn new(plan: Plan, threads: Option<usize>) -> Self {
-        let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+        let threads = threads.unwrap_or_else(cores);
         let (width, height) = (plan.width, plan.height);
         let team = Team::new("blur", threads);
         let slots: Vec<Slot> = (0..plan.slots()).map(|slot| Slot::new(&plan, slot)).collect();

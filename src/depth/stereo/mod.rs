@@ -167,9 +167,7 @@ impl Level {
             px: vec![0.0; if effort == Effort::Fast { pixels } else { 0 }],
         })
     }
-}
 
-impl Level {
     /// The disparities of a pair of this level's size, to `into`, else to the level's own; islands of up to `speckle`
     /// pixels are left out.
     fn find(

@@ -128,7 +128,7 @@ impl DepthSource for StereoDepth {
 
 /// Disparity as depth. What is unknown stays so; what is at infinity, or beyond it by an error of measurement, is as far
 /// as anything can be told to be.
-fn metres(disparity: &DisparityMap, rig: &StereoRig, map: &mut DepthMap) {
+pub fn metres(disparity: &DisparityMap, rig: &StereoRig, map: &mut DepthMap) {
     map.resize(disparity.width, disparity.height);
     let (focal_baseline, doffs_px) = (rig.focal_px * rig.baseline_m, rig.doffs_px);
     for (z_m, &d_px) in map.metres.iter_mut().zip(&disparity.px) {
