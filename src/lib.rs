@@ -11,7 +11,8 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 5 | [`cli`]: arguments to one resolved configuration, one function per command |
+//! | 6 | [`cli`]: arguments to one resolved configuration, one function per command |
+//! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`pipeline`]: the one place that knows all stages |
 //! | 3 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
 //! | 2 | [`link`], [`budget`], [`stats`], [`recording`], [`scene`], `v4l2` |
@@ -35,6 +36,7 @@ pub mod compute;
 pub mod depth;
 pub mod frame;
 pub mod link;
+pub mod look;
 pub mod optics;
 pub mod pipeline;
 pub mod recording;

@@ -6,6 +6,7 @@
 
 mod blur;
 mod capture;
+mod change;
 mod deliver;
 mod depth;
 mod error;
@@ -15,11 +16,13 @@ mod quality;
 mod rate;
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
 use std::thread::{self, Scope, ScopedJoinHandle};
 
+pub use change::{Change, Executor};
 pub use error::{Fault, PipelineError};
 
-use crate::bokeh::Bokeh;
+use crate::bokeh::{Bokeh, PassTimes};
 use crate::budget::Quality;
 use crate::capture::{Brings, Camera};
 use crate::clock::Clock;
@@ -27,11 +30,11 @@ use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::demand::Demand;
-use crate::link::pool::Pool;
+use crate::link::pool::{Pool, Pooled};
 use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
 use crate::optics::{CocField, DepthCoc, Lens};
 use crate::sink::Sink;
-use crate::stats::{About, Cause, Report, Tally, Ticket, Timings};
+use crate::stats::{About, Cause, Frames, Report, Tally, Ticket, Timings};
 
 /// Whether frames wait for the program, or the program for frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +104,8 @@ pub struct Run<'a> {
     pub coc: CocRule,
     /// Fit depth to the pictures and steady it before it is used; otherwise only its holes are filled.
     pub refine: bool,
+    /// Where a change of all that comes from; `None` keeps everything as it is.
+    pub changes: Option<mpsc::Receiver<Change>>,
     /// Where they go.
     pub sink: Box<dyn Sink>,
     /// Real time, or all frames.
@@ -114,6 +119,9 @@ pub struct Run<'a> {
     pub demand: Option<Demand>,
     /// Flip the pictures left to right on their way out.
     pub mirror: bool,
+    /// Who is shown each frame that the sink took, with what it was made of; the newest wins. Where the sink
+    /// [keeps](Sink::keeps) nothing, a frame is delivered once it was taken from here.
+    pub view: Option<Sender<View>>,
     /// What measures time.
     pub clock: Clock,
     /// Once set, no more frames are captured.
@@ -135,10 +143,46 @@ pub struct Progress {
     pub total: Option<u64>,
 }
 
-/// A frame on its way: what identifies it, and what there is of it at this point.
+/// A frame, for who looks at more than the picture.
+pub struct View {
+    /// The picture as the sink was given it.
+    pub picture: Pooled<ColorImage>,
+    /// The picture before the blur; `None` where nothing was blurred.
+    pub color: Option<Pooled<ColorImage>>,
+    /// The depth that it was blurred by, holes filled.
+    pub depth: Option<Pooled<DepthMap>>,
+    /// The radius of every pixel.
+    pub coc: CocField,
+    /// Which frame it is.
+    pub stamp: Stamp,
+    /// When it was captured, on the run's clock.
+    pub captured_ns: u64,
+    /// What it took.
+    pub trace: Trace,
+    /// The counts of the run up to this frame.
+    pub frames: Frames,
+}
+
+/// What a frame took on its way, in nanoseconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Trace {
+    /// Reading and decoding, waits excluded.
+    pub decode_ns: u64,
+    /// Depth and CoC; next to nothing where they were taken over from the frame before.
+    pub depth_ns: u64,
+    /// The blur; 0 where there was none.
+    pub blur_ns: u64,
+    /// Its passes.
+    pub passes: PassTimes,
+    /// The rung it was blurred at.
+    pub quality: Option<Quality>,
+}
+
+/// A frame on its way: what identifies it, what it took, and what there is of it at this point.
 struct Frame<T> {
     ticket: Ticket,
     stamp: Stamp,
+    trace: Trace,
     item: T,
 }
 
@@ -177,7 +221,12 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let live_ns = (pace == Pace::Realtime).then_some(info.period_ns);
     let began_ns = clock.now_ns();
     let over = AtomicBool::new(false);
-    let places = Places { in_blur: executor.as_ref().map_or(0, |executor| executor.capacity()) };
+    let in_blur = match (&executor, &run.changes) {
+        (_, Some(_)) => MOST_IN_FLIGHT,
+        (Some(executor), None) => executor.capacity(),
+        (None, None) => 0,
+    };
+    let places = Places { in_blur, viewed: run.view.is_some() };
     let colors = Pool::new(places.colors(), || ColorImage::new(info.size.0, info.size.1));
     let depths = Pool::new(places.depths(), DepthMap::default);
     let rights = Pool::new(if info.brings == Brings::RightEye { places.rights() } else { 0 }, GrayImage::default);
@@ -204,6 +253,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         // Without a blur nobody asks for depth.
         coc: if executor.is_some() { run.coc } else { UNUSED },
         refine: run.refine,
+        changes: run.changes,
         rate: live_ns.map(|_| rate::Rate::new(run.budget_ns / 2, source.as_ref().map_or(&[1.0], |s| s.efforts()))),
         source,
         source_name: &info.name,
@@ -219,6 +269,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         late: live_ns.map(quality::LateRule::new),
         picker: quality::Picker::new(run.quality, most, run.budget_ns, live_ns),
         outs: &outs,
+        viewed: places.viewed,
         tally: &tally,
         clock: &clock,
         budget_ns: run.budget_ns,
@@ -226,6 +277,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     };
     let deliver = deliver::Stage {
         sink: &mut *sink,
+        view: run.view,
         mirror: run.mirror,
         total: info.frames,
         progress: run.progress,
@@ -281,7 +333,12 @@ fn hand_on<T>(to: &mut Sender<Frame<T>>, frame: Frame<T>, tally: &Tally) -> bool
 /// Room for buffers along the way, so that no stage waits for one that another has no need to give back.
 struct Places {
     in_blur: usize,
+    /// Whether a viewer is given what the sink was, and what it was made of.
+    viewed: bool,
 }
+
+/// Most frames that any executor has in hand.
+const MOST_IN_FLIGHT: usize = 4;
 
 impl Places {
     /// A link's items, and the one that it displaces or that waits for room.
@@ -290,7 +347,12 @@ impl Places {
 
     fn colors(&self) -> usize {
         // Where nothing blurs, the captured pictures themselves go on to the sink.
-        3 * (Self::HAND + Self::LINK) + Self::HAND + self.in_blur
+        3 * (Self::HAND + Self::LINK) + Self::HAND + self.in_blur + self.views()
+    }
+
+    /// Those that a viewer has: one that it shows, one that it takes, and one that it keeps for long.
+    fn views(&self) -> usize {
+        if self.viewed { 3 * Self::HAND + Self::LINK } else { 0 }
     }
 
     fn depths(&self) -> usize {
@@ -303,7 +365,7 @@ impl Places {
     }
 
     fn outs(&self) -> usize {
-        if self.in_blur == 0 { 0 } else { self.in_blur + 2 * Self::HAND + Self::LINK }
+        if self.in_blur == 0 { 0 } else { self.in_blur + 2 * Self::HAND + Self::LINK + self.views() }
     }
 }
 

@@ -100,6 +100,10 @@ pub struct Finished {
     pub ticket: u64,
     /// The result.
     pub out: Pooled<ColorImage>,
+    /// The job's picture.
+    pub color: Pooled<ColorImage>,
+    /// The job's depth.
+    pub depth: Option<Pooled<DepthMap>>,
     /// Time per pass.
     pub times: PassTimes,
 }

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 use clap::{Args, value_parser};
 use serde::Serialize;
 
-use super::config::{Blur, Executor};
+use super::config::{self, Executor};
 use super::error::CliError;
+use super::quality::QualityChoice;
 use super::values::{self, Size, above_zero};
 use super::{defaults, options, print, render};
 use crate::bokeh::{Bokeh, Job, PassTimes};
@@ -15,8 +16,8 @@ use crate::budget::Quality;
 use crate::compute::team::cores;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
+use crate::look::COC_AT_INFINITY_PER_HEIGHT;
 use crate::optics::CocField;
-use crate::pipeline::QualityRule;
 use crate::scene::{Scene, View};
 
 /// Frames before those that are measured: caches and clocks settle.
@@ -110,7 +111,7 @@ pub fn run(command: &BenchCommand) -> Result<(), CliError> {
     };
     for size in &command.sizes {
         let (color, depth) = synthetic_frame(command.scene, (size.width, size.height));
-        let default_coc_px = [size.height as f32 * defaults::COC_AT_INFINITY_PER_HEIGHT];
+        let default_coc_px = [size.height as f32 * COC_AT_INFINITY_PER_HEIGHT];
         let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
         for &coc_px in radii_px {
             for &quality in &command.quality {
@@ -136,14 +137,14 @@ fn measure(
         return Err(CliError::Usage("--depth FOLDER or a depth camera are for `stream`".to_string()));
     }
     let options = options::Blur { coc_at_infinity: Some(coc_px), ..command.blur.clone() };
-    let blur = Blur::resolve(&options, &command.aperture, QualityRule::Fixed(quality), true)?;
+    let look = config::look(&options, &command.aperture, QualityChoice::Level(quality), true)?;
     let size = color.size();
-    let Some(settings) = blur.settings(size) else {
+    let Some(settings) = look.settings(size, false) else {
         return Err(CliError::Usage(
             "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
         ));
     };
-    let (coc, depth) = render::prepared(&blur, color, Some(depth.clone()))?;
+    let (coc, depth) = render::prepared(&look, color, Some(depth.clone()))?;
     let mut bokeh = executor.create(&settings, size)?;
     let buffers = Buffers {
         colors: Pool::new(bokeh.capacity(), || color.clone()),

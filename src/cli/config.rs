@@ -1,186 +1,90 @@
 //! Resolved, validated configuration: what the raw options mean. Nothing below the command line sees an option.
 
-use super::defaults;
 use super::error::CliError;
 use super::options;
-use super::values::{self, DepthChoice, Effect, Focus, Method, Rank, Refine, Tilt};
-use crate::bokeh::aperture::Aperture;
+use super::quality::QualityChoice;
+use super::values::{self, ApertureName, DepthChoice, Effect, Focus, Method, Rank};
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
 use crate::compute::team::cores;
 use crate::depth::DepthError;
 use crate::depth::focus::FocusRule;
 use crate::depth::stereo::{self, Matcher};
-use crate::optics::{CocField, Lens, Ramp};
-use crate::pipeline::{CocAtInfinity, CocRule, QualityRule};
+use crate::look::{Look, Refine, Strength};
+use crate::optics::Lens;
 
-/// How strong the blur is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Strength {
-    /// A fraction of the picture's height.
-    Default,
-    /// CoC radius at infinity, in pixels.
-    AtInfinity(f32),
-    /// What this lens does at the distance of focus.
-    Lens(Lens),
-}
-
-/// Everything about the blur, for pictures of any size.
-#[derive(Clone, Debug)]
-pub struct Blur {
-    effect: Option<bokeh::Effect>,
-    focus: Focus,
-    method: bokeh::Method,
-    strength: Strength,
-    max_coc_px: Option<f32>,
-    refine: Refine,
-    tilt: Tilt,
-    aperture: Aperture,
-    rim: f32,
-    rank: Option<bokeh::Rank>,
-    highlights: f32,
-    quality: QualityRule,
-}
-
-impl Blur {
-    /// Resolves options for a source that has depth or not.
-    ///
-    /// # Errors
-    /// The options do not fit each other or the source, or the aperture's picture cannot be read.
-    pub fn resolve(
-        blur: &options::Blur,
-        aperture: &options::Aperture,
-        quality: QualityRule,
-        has_depth: bool,
-    ) -> Result<Self, CliError> {
-        let usage = |text: &str| Err(CliError::Usage(text.to_string()));
-        let uses_depth = has_depth && blur.depth != DepthChoice::None;
-        let effect = match blur.effect {
-            Some(Effect::None) => None,
-            Some(Effect::Blur) => Some(bokeh::Effect::Blur),
-            Some(Effect::TiltShift) => Some(bokeh::Effect::TiltShift),
-            Some(Effect::Dof) if uses_depth => Some(bokeh::Effect::Dof),
-            Some(Effect::Dof) if has_depth => {
-                return usage("--effect dof needs depth: leave --depth none out, or use --effect blur or tilt-shift");
-            }
-            Some(Effect::Dof) => {
-                return usage("--effect dof needs depth, and the source has none: use --effect blur or tilt-shift");
-            }
-            None if uses_depth => Some(bokeh::Effect::Dof),
-            None => Some(bokeh::Effect::Blur),
-        };
-        if blur.depth == DepthChoice::Recorded && !has_depth {
-            return usage("--depth recorded: the source has no depth");
+/// Resolves options for a source that has depth or not.
+///
+/// # Errors
+/// The options do not fit each other or the source, or the aperture's picture cannot be read.
+pub fn look(
+    blur: &options::Blur,
+    aperture: &options::Aperture,
+    quality: QualityChoice,
+    has_depth: bool,
+) -> Result<Look, CliError> {
+    let usage = |text: &str| Err(CliError::Usage(text.to_string()));
+    let uses_depth = has_depth && blur.depth != DepthChoice::None;
+    let effect = match blur.effect {
+        Some(Effect::None) => None,
+        Some(Effect::Blur) => Some(bokeh::Effect::Blur),
+        Some(Effect::TiltShift) => Some(bokeh::Effect::TiltShift),
+        Some(Effect::Dof) if uses_depth => Some(bokeh::Effect::Dof),
+        Some(Effect::Dof) if has_depth => {
+            return usage("--effect dof needs depth: leave --depth none out, or use --effect blur or tilt-shift");
         }
-        let strength = match (blur.coc_at_infinity, blur.f_number, blur.focal_length, blur.sensor_width) {
-            (Some(radius_px), ..) => Strength::AtInfinity(radius_px),
-            (None, None, None, None) => Strength::Default,
-            (None, Some(f_number), Some(focal_length_mm), Some(sensor_width_mm)) => {
-                Strength::Lens(Lens { focal_length_mm, f_number, sensor_width_mm })
-            }
-            _ => return usage("a lens needs all of --f-number, --focal-length and --sensor-width"),
-        };
-        let focuses_by_depth = effect == Some(bokeh::Effect::Dof);
-        if matches!(strength, Strength::Lens(_)) && !focuses_by_depth && !matches!(blur.focus, Focus::Metres(_)) {
-            return usage("a lens without depth needs --focus METRES: its blur depends on the distance of focus");
+        Some(Effect::Dof) => {
+            return usage("--effect dof needs depth, and the source has none: use --effect blur or tilt-shift");
         }
-        Ok(Self {
-            effect,
-            focus: blur.focus,
-            method: match blur.method {
-                Method::Layered => bokeh::Method::Layered,
-                Method::Gather => bokeh::Method::Gather,
-            },
-            strength,
-            max_coc_px: blur.max_coc,
-            refine: blur.refine,
-            tilt: blur.tilt,
-            aperture: aperture.aperture.load(aperture.intensity)?,
-            rim: aperture.rim,
-            rank: aperture.rank.map(|rank| match rank {
-                Rank::Terms(terms) => bokeh::Rank::Terms(terms),
-                Rank::Full => bokeh::Rank::Full,
-            }),
-            highlights: aperture.highlights,
-            quality,
-        })
+        None if uses_depth => Some(bokeh::Effect::Dof),
+        None => Some(bokeh::Effect::Blur),
+    };
+    if blur.depth == DepthChoice::Recorded && !has_depth {
+        return usage("--depth recorded: the source has no depth");
     }
-
-    /// The executor's settings for pictures of `size` pixels; none when frames pass through.
-    pub fn settings(&self, size: (u32, u32)) -> Option<bokeh::Settings> {
-        let effect = self.effect?;
-        let (quality, adaptive) = match self.quality {
-            QualityRule::Fixed(quality) => (quality, false),
-            QualityRule::Auto(quality) => (quality, true),
-        };
-        let max_px = self.max_coc_px(size);
-        let far_max_px = self.even_px(size).min(max_px);
-        let near_max_px = if effect == bokeh::Effect::Dof { max_px } else { 0.0 };
-        Some(bokeh::Settings {
-            effect,
-            method: self.method,
-            aperture: self.aperture.clone(),
-            rim: self.rim,
-            rank: self.rank,
-            highlights: self.highlights,
-            quality,
-            adaptive,
-            far_max_px,
-            near_max_px,
-        })
-    }
-
-    /// By how much a picture of `size` pixels is blurred.
-    pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
-        let max_coc_px = self.max_coc_px(size);
-        let even_px = self.even_px(size).min(max_coc_px);
-        match self.effect {
-            None => CocRule::Fixed(CocField::Uniform { radius_px: 0.0 }),
-            Some(bokeh::Effect::Blur) => CocRule::Fixed(CocField::Uniform { radius_px: even_px }),
-            Some(bokeh::Effect::TiltShift) => CocRule::Fixed(CocField::Ramp(self.tilt.ramp(size, even_px))),
-            Some(bokeh::Effect::Dof) => CocRule::Depth {
-                focus: match self.focus {
-                    Focus::Auto => FocusRule::Auto,
-                    Focus::Metres(metres) => FocusRule::Metres(metres),
-                    Focus::Point(x, y) => FocusRule::Point { x, y },
-                },
-                lens: match self.strength {
-                    Strength::Lens(lens) => CocAtInfinity::Lens(lens),
-                    Strength::Default | Strength::AtInfinity(_) => CocAtInfinity::Px(self.even_px(size)),
-                },
-                max_coc_px,
-            },
+    let strength = match (blur.coc_at_infinity, blur.f_number, blur.focal_length, blur.sensor_width) {
+        (Some(radius_px), ..) => Strength::AtInfinity(radius_px),
+        (None, None, None, None) => Strength::Default,
+        (None, Some(f_number), Some(focal_length_mm), Some(sensor_width_mm)) => {
+            Strength::Lens(Lens { focal_length_mm, f_number, sensor_width_mm })
         }
+        _ => return usage("a lens needs all of --f-number, --focal-length and --sensor-width"),
+    };
+    let focuses_by_depth = effect == Some(bokeh::Effect::Dof);
+    if matches!(strength, Strength::Lens(_)) && !focuses_by_depth && !matches!(blur.focus, Focus::Metres(_)) {
+        return usage("a lens without depth needs --focus METRES: its blur depends on the distance of focus");
     }
-
-    /// Whether depth is refined before the blur; `measured` is the depth of a recorded stream.
-    pub fn refines(&self, measured: bool) -> bool {
-        match self.refine {
-            Refine::Auto => measured,
-            Refine::On => true,
-            Refine::Off => false,
-        }
-    }
-
-    /// CoC radius at infinity in pixels, where it does not depend on a focus that is yet to be found.
-    fn even_px(&self, (width, height): (u32, u32)) -> f32 {
-        match (self.strength, self.focus) {
-            (Strength::Default, _) => height as f32 * defaults::COC_AT_INFINITY_PER_HEIGHT,
-            (Strength::AtInfinity(radius_px), _) => radius_px,
-            (Strength::Lens(lens), Focus::Metres(focus_m)) => lens.coc_at_infinity_px(focus_m, width),
-            // Whatever the lens may give: the largest CoC is the bound.
-            (Strength::Lens(_), _) => f32::INFINITY,
-        }
-    }
-
-    /// Largest CoC radius, in pixels. Without depth no point is nearer than the focal plane, and the strength that
-    /// was asked for holds unless `--max-coc` is given, too.
-    fn max_coc_px(&self, size: (u32, u32)) -> f32 {
-        let by_height_px = size.1 as f32 * defaults::MAX_COC_PER_HEIGHT;
-        self.max_coc_px.unwrap_or(match self.strength {
-            Strength::AtInfinity(radius_px) => by_height_px.max(radius_px),
-            Strength::Default | Strength::Lens(_) => by_height_px,
-        })
-    }
+    Ok(Look {
+        effect,
+        focus: match blur.focus {
+            Focus::Auto => FocusRule::Auto,
+            Focus::Metres(metres) => FocusRule::Metres(metres),
+            Focus::Point(x, y) => FocusRule::Point { x, y },
+        },
+        method: match blur.method {
+            Method::Layered => bokeh::Method::Layered,
+            Method::Gather => bokeh::Method::Gather,
+        },
+        strength,
+        max_coc_px: blur.max_coc,
+        refine: match blur.refine {
+            values::Refine::Auto => Refine::Auto,
+            values::Refine::On => Refine::On,
+            values::Refine::Off => Refine::Off,
+        },
+        tilt: blur.tilt,
+        aperture: aperture.aperture.load(aperture.intensity)?,
+        aperture_file: match &aperture.aperture {
+            ApertureName::Image(file) => Some(file.clone()),
+            _ => None,
+        },
+        rim: aperture.rim,
+        rank: aperture.rank.map(|rank| match rank {
+            Rank::Terms(terms) => bokeh::Rank::Terms(terms),
+            Rank::Full => bokeh::Rank::Full,
+        }),
+        highlights: aperture.highlights,
+        quality: quality.level(),
+    })
 }
 
 /// What runs the blur.
@@ -243,36 +147,21 @@ impl Executor {
     }
 }
 
-impl Tilt {
-    /// The ramp for a picture of `size` pixels that reaches `max_px` in the corner farthest from the band.
-    fn ramp(&self, (width, height): (u32, u32), max_px: f32) -> Ramp {
-        let (width, height) = (width as f32, height as f32);
-        let (sin, cos) = self.angle_deg.to_radians().sin_cos();
-        let normal = glam::Vec2::new(-sin, cos);
-        let offset_px = normal.dot(glam::Vec2::new(width / 2.0, height * self.center_y));
-        let half_band_px = height * self.band / 2.0;
-        let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
-        let reach_px = corners
-            .map(|corner| (normal.dot(corner.into()) - offset_px).abs() - half_band_px)
-            .into_iter()
-            .fold(0.0, f32::max);
-        Ramp { normal, offset_px, half_band_px, slope: if reach_px > 0.0 { max_px / reach_px } else { 0.0 }, max_px }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use clap::{Args, Command, FromArgMatches};
 
     use super::*;
+    use crate::optics::CocField;
+    use crate::pipeline::CocRule;
 
     const SIZE: (u32, u32) = (640, 450);
 
-    fn resolve(flags: &[&str], has_depth: bool) -> Result<Blur, CliError> {
+    fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, CliError> {
         let command = options::Every::augment_args(Command::new("test").no_binary_name(true));
         let matches = command.try_get_matches_from(flags).unwrap();
         let every = options::Every::from_arg_matches(&matches).unwrap();
-        Blur::resolve(&every.blur, &every.aperture, every.computing.quality.still(), has_depth)
+        look(&every.blur, &every.aperture, every.computing.quality, has_depth)
     }
 
     fn refusal(flags: &[&str], has_depth: bool) -> String {
@@ -284,7 +173,7 @@ mod tests {
         assert_eq!(resolve(&[], true).unwrap().effect, Some(bokeh::Effect::Dof));
         assert_eq!(resolve(&[], false).unwrap().effect, Some(bokeh::Effect::Blur));
         assert_eq!(resolve(&["--depth=none"], true).unwrap().effect, Some(bokeh::Effect::Blur));
-        assert!(resolve(&["--effect=none"], true).unwrap().settings(SIZE).is_none());
+        assert!(resolve(&["--effect=none"], true).unwrap().settings(SIZE, false).is_none());
         assert!(refusal(&["--effect=dof"], false).contains("the source has none"));
         assert!(refusal(&["--effect=dof", "--depth=none"], true).contains("--depth none"));
     }
@@ -313,9 +202,9 @@ mod tests {
     #[test]
     fn the_executor_is_made_for_every_radius_that_can_come() {
         let dof = resolve(&["--f-number=2", "--focal-length=50", "--sensor-width=36"], true).unwrap();
-        let settings = dof.settings(SIZE).unwrap();
+        let settings = dof.settings(SIZE, false).unwrap();
         assert_eq!((settings.far_max_px, settings.near_max_px), (27.0, 27.0));
-        let blur = resolve(&["--coc-at-infinity=7"], false).unwrap().settings(SIZE).unwrap();
+        let blur = resolve(&["--coc-at-infinity=7"], false).unwrap().settings(SIZE, false).unwrap();
         assert_eq!((blur.far_max_px, blur.near_max_px), (7.0, 0.0));
     }
 

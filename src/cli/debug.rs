@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::config::{Blur, Executor};
+use super::config::Executor;
 use super::debug_pictures::{coc, grey, light};
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_whole};
@@ -15,6 +15,7 @@ use crate::bokeh::cpu::CpuBokeh;
 use crate::bokeh::plan::{Bin, Compositing};
 use crate::bokeh::{Bokeh, Probe};
 use crate::frame::{ColorImage, DepthMap};
+use crate::look::Look;
 use crate::optics::CocField;
 use crate::recording::still;
 
@@ -92,18 +93,18 @@ impl Range {
 pub fn blurred(
     color: ColorImage,
     depth: Option<DepthMap>,
-    blur: &Blur,
+    look: &Look,
     executor: &Executor,
     (dir, force): (&Path, bool),
 ) -> Result<(ColorImage, String), CliError> {
     let size = color.size();
     let mut inside = Inside { pictures: Vec::new(), plan: PlanFile::of(size) };
     let mut result = ColorImage::default();
-    match blur.settings(size) {
+    match look.settings(size, false) {
         None => result = color,
         Some(settings) => {
             let mut bokeh = executor.create_open(&settings, size)?;
-            let (coc, depth) = prepared(blur, &color, depth)?;
+            let (coc, depth) = prepared(look, &color, depth)?;
             bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
             inside.look(&bokeh, &color, depth.as_ref(), &coc);
         }

@@ -2,10 +2,6 @@
 
 use super::values::Size;
 
-/// CoC radius at infinity, as a fraction of the picture's height: a portrait lens wide open.
-pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
-/// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
-pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
 /// Soft rim of the aperture, as a fraction of its radius: rank 3 is then as good as rank 7 of a hard disc.
 pub const RIM: f32 = 0.2;
 /// Highlight recovery; off, because it invents light.

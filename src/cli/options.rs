@@ -9,10 +9,11 @@ use clap::{Args, value_parser};
 use super::defaults;
 use super::quality::{QualityChoice, level_or_auto};
 use super::values::{
-    ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Refine, Size, Tilt, above_zero,
+    ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Refine, Size, above_zero,
     between, not_negative, seconds,
 };
 use crate::depth::stereo::Settings;
+use crate::look::Tilt;
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
 

@@ -3,7 +3,6 @@
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::budget::Quality;
-use crate::pipeline::{Pace, QualityRule};
 
 /// How finely to blur, as it is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,19 +14,11 @@ pub enum QualityChoice {
 }
 
 impl QualityChoice {
-    /// For a stream at this pace.
-    pub fn rule(self, pace: Pace) -> QualityRule {
+    /// The level, where one is chosen.
+    pub fn level(self) -> Option<Quality> {
         match self {
-            Self::Auto if pace == Pace::Realtime => QualityRule::Auto(Quality::default()),
-            _ => self.still(),
-        }
-    }
-
-    /// Where nothing has to be ready at any time: the same picture every time.
-    pub fn still(self) -> QualityRule {
-        match self {
-            Self::Auto => QualityRule::Fixed(Quality::default()),
-            Self::Level(quality) => QualityRule::Fixed(quality),
+            Self::Auto => None,
+            Self::Level(quality) => Some(quality),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::config::{Blur, Executor};
+use super::config::{self, Executor};
 use super::error::CliError;
 use super::files::refuse_overwrite;
 use super::{debug, options, terminal};
@@ -12,6 +12,7 @@ use crate::bokeh::{BokehError, Job};
 use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
+use crate::look::Look;
 use crate::optics::CocField;
 use crate::pipeline::CocRule;
 use crate::recording::still;
@@ -65,12 +66,11 @@ pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliE
     let read_depth =
         |file: &PathBuf| still::read_depth(file, command.depth.file_scale(), Some(command.depth.depth_invalid));
     let depth = command.depth_map.as_ref().map(read_depth).transpose()?;
-    let quality = command.computing.quality.still();
-    let blur = Blur::resolve(&command.blur, &command.aperture, quality, depth.is_some())?;
+    let look = config::look(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
     let executor = Executor::of(&command.computing);
     let (result, by) = match &command.debug_dir {
-        Some(dir) => debug::blurred(color, depth, &blur, &executor, (dir, command.output.force))?,
-        None => blurred(color, depth, &blur, &executor)?,
+        Some(dir) => debug::blurred(color, depth, &look, &executor, (dir, command.output.force))?,
+        None => blurred(color, depth, &look, &executor)?,
     };
     still::write_color(&command.out, &result, command.output.force)?;
     if !global.quiet {
@@ -83,12 +83,12 @@ pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliE
 fn blurred(
     color: ColorImage,
     depth: Option<DepthMap>,
-    blur: &Blur,
+    look: &Look,
     executor: &Executor,
 ) -> Result<(ColorImage, String), CliError> {
     let size = color.size();
-    let Some(settings) = blur.settings(size) else { return Ok((color, "not blurred".to_string())) };
-    let (coc, depth) = prepared(blur, &color, depth)?;
+    let Some(settings) = look.settings(size, false) else { return Ok((color, "not blurred".to_string())) };
+    let (coc, depth) = prepared(look, &color, depth)?;
     let mut bokeh = executor.create(&settings, size)?;
     bokeh.submit(Job {
         ticket: 0,
@@ -110,17 +110,17 @@ fn blurred(
 /// # Errors
 /// [`BokehError::NoDepth`] when the blur follows depth and there is none.
 pub fn prepared(
-    blur: &Blur,
+    look: &Look,
     color: &ColorImage,
     depth: Option<DepthMap>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
-    match (blur.coc_rule(color.size()), depth) {
+    match (look.coc_rule(color.size()), depth) {
         (CocRule::Fixed(field), _) => Ok((field, None)),
         (CocRule::Depth { .. }, None) => Err(BokehError::NoDepth),
         (CocRule::Depth { focus, lens, max_coc_px }, Some(mut map)) => {
             // Focus looks at what was measured, so it comes before the holes are filled.
             let focus_m = Focus::new(focus).focus_m(&map, 0);
-            match blur.refines(false) {
+            match look.refines(false) {
                 true => {
                     let mut refiner = Refiner::new();
                     refiner.focus_at(focus_m);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 
-use super::config::{Blur, Executor};
+use super::config::{self, Executor};
 use super::depth;
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_whole};
@@ -87,9 +87,9 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         None if info.live || command.to.iter().any(Target::is_live) => Pace::Realtime,
         None => Pace::Asap,
     };
-    let quality = command.computing.quality.rule(pace);
-    let blur = Blur::resolve(&command.blur, &command.aperture, quality, source.has_depth())?;
-    let bokeh = blur.settings(info.size).map(|settings| executor.create(&settings, info.size)).transpose()?;
+    let look = config::look(&command.blur, &command.aperture, command.computing.quality, source.has_depth())?;
+    let adaptive = pace == Pace::Realtime;
+    let bokeh = look.settings(info.size, adaptive).map(|settings| executor.create(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
     let demand = stream.on_demand.then(Demand::new);
     let sink_options = sink::Options {
@@ -115,15 +115,17 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         camera: source.camera,
         depth: source.depth,
         bokeh,
-        quality,
-        coc: blur.coc_rule(info.size),
-        refine: blur.refines(measured),
+        quality: look.quality_rule(adaptive),
+        coc: look.coc_rule(info.size),
+        refine: look.refines(measured),
+        changes: None,
         sink,
         pace,
         budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
         keep_going: stream.keep_going,
         demand,
         mirror: stream.mirror,
+        view: None,
         clock: Clock::system(),
         stop: &stop,
         progress: &|progress| bar.delivered(progress.delivered),

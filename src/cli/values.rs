@@ -163,37 +163,6 @@ impl FromStr for Size {
     }
 }
 
-/// The sharp band of `tilt-shift`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tilt {
-    /// Middle of the band in the middle column, as a fraction of the height.
-    pub center_y: f32,
-    /// Width of the band across its direction, as a fraction of the height.
-    pub band: f32,
-    /// Turn of the band, clockwise, in degrees; 0 is level.
-    pub angle_deg: f32,
-}
-
-impl FromStr for Tilt {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut parts = text.split(':');
-        let mut next = |low, high, default| match parts.next() {
-            None => Some(default),
-            Some(part) => number_in(part, low, high),
-        };
-        let tilt = (|| {
-            Some(Tilt {
-                center_y: next(0.0, 1.0, 0.5)?,
-                band: next(0.0, 1.0, 0.15)?,
-                angle_deg: next(-360.0, 360.0, 0.0)?,
-            })
-        })();
-        tilt.filter(|_| parts.next().is_none())
-            .ok_or_else(|| "use CENTER_Y[:BAND[:ANGLE_DEG]], the first two from 0 to 1, such as 0.6:0.1:15".to_string())
-    }
-}
-
 /// How many separable terms approximate the aperture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rank {

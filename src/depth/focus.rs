@@ -50,11 +50,19 @@ impl Focus {
         Self { rule, subject: Subject::default(), window_m: Vec::new(), lens: None }
     }
 
+    /// Focuses on something else: the lens moves there from where it is.
+    pub fn follow(&mut self, rule: FocusRule) {
+        if self.rule != rule {
+            self.rule = rule;
+            self.lens.iter_mut().for_each(|lens| lens.moving = true);
+        }
+    }
+
     /// The focus distance in metres for a frame at `time_ns` of media time, from its depth as measured (not filled).
     /// Where the map knows nothing of the subject, the lens stays where it is.
     pub fn focus_m(&mut self, map: &DepthMap, time_ns: u64) -> f32 {
         let target_m = match self.rule {
-            FocusRule::Metres(focus_m) => return focus_m,
+            FocusRule::Metres(focus_m) => Some(focus_m),
             FocusRule::Auto => self.subject.distance_m(map),
             FocusRule::Point { x, y } => point_m(map, x, y, &mut self.window_m),
         };
@@ -64,7 +72,8 @@ impl Focus {
         let target = 1.0 / target_m;
         let lens = self.lens.get_or_insert(EasedLens { dioptres: target, time_ns, moving: false });
         lens.ease(target, time_ns);
-        1.0 / lens.dioptres
+        // A distance that was asked for is kept to the last bit.
+        if lens.dioptres == target { target_m } else { 1.0 / lens.dioptres }
     }
 }
 

@@ -1,19 +1,27 @@
-//! Third stage: drops what is too late, and blurs the rest.
+//! Third stage: drops what is too late, and blurs the rest; takes another executor when one comes.
 
 use std::collections::VecDeque;
 
 use super::depth::Ready;
 use super::quality::{LateRule, Picker};
-use super::{Ended, Fault, Frame, hand_on};
-use crate::bokeh::{Bokeh, Job, PassTimes};
+use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, Trace, hand_on};
+use crate::bokeh::{Bokeh, Finished, Job, PassTimes};
 use crate::budget::Quality;
 use crate::clock::Clock;
-use crate::frame::{ColorImage, Stamp};
+use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Receiver, Sender};
+use crate::optics::CocField;
 use crate::stats::{Cause, Histogram, PassHistograms, RungCounts, Tally, Ticket};
 
-type Picture = Pooled<ColorImage>;
+/// A blurred picture, and what it was made of.
+pub(super) struct Blurred {
+    pub picture: Pooled<ColorImage>,
+    /// The picture before; `None` where nothing was blurred, or nobody looks at it.
+    pub color: Option<Pooled<ColorImage>>,
+    pub depth: Option<Pooled<DepthMap>>,
+    pub coc: CocField,
+}
 
 pub(super) struct Stage<'a> {
     /// `None` passes frames through.
@@ -24,6 +32,8 @@ pub(super) struct Stage<'a> {
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     pub picker: Picker,
+    /// Whether somebody looks at what the pictures were made of.
+    pub viewed: bool,
     pub budget_ns: u64,
     pub times: Times<'a>,
 }
@@ -39,16 +49,19 @@ pub(super) struct Times<'a> {
 struct Pending {
     ticket: Ticket,
     stamp: Stamp,
+    trace: Trace,
+    coc: CocField,
     began_ns: u64,
     quality: Quality,
 }
 
 impl Stage<'_> {
-    pub(super) fn run(mut self, mut from: Receiver<Frame<Ready>>, mut to: Sender<Frame<Picture>>) -> Ended {
-        let Some(mut executor) = self.executor.take() else { return self.pass_through(from, to) };
-        let capacity = executor.capacity().max(1);
-        let mut pending = VecDeque::with_capacity(capacity);
+    pub(super) fn run(mut self, mut from: Receiver<Frame<Ready>>, mut to: Sender<Frame<Blurred>>) -> Ended {
+        let mut executor = self.executor.take();
+        let mut pending = VecDeque::with_capacity(MOST_IN_FLIGHT);
+        let mut swapped = 0;
         loop {
+            let capacity = executor.as_ref().map_or(1, |executor| executor.capacity().max(1));
             let next = match pending.len() {
                 0 => match from.recv() {
                     None => return Ok(()),
@@ -59,64 +72,118 @@ impl Stage<'_> {
             };
             // With nothing to submit, there is time to wait for what was.
             let mut wait = next.is_none();
-            if let Some(Frame { ticket, stamp, item }) = next {
-                let began_ns = self.clock.now_ns();
-                // Behind those that are under way.
-                let expected_ns = self.picker.expected_ns() * (pending.len() as u64 + 1);
-                if self.is_late(&ticket, began_ns, expected_ns) {
-                    self.tally.dropped(ticket, Cause::Late);
+            if let Some(mut frame) = next {
+                if let Some(swap) = frame.item.swap.take().filter(|swap| swap.number != swapped) {
+                    swapped = swap.number;
+                    while let Some(old) = executor.as_mut().filter(|_| !pending.is_empty()) {
+                        if !self.collect(&mut **old, &mut pending, true, &mut to)? {
+                            return Ok(());
+                        }
+                    }
+                    if let Some((new, quality)) = swap.take() {
+                        executor = new;
+                        self.picker = self.picker.with(quality);
+                    }
+                }
+                let Some(executor) = &mut executor else {
+                    if !self.pass(frame, &mut to) {
+                        return Ok(());
+                    }
+                    continue;
+                };
+                if !self.submit(&mut **executor, frame, &mut pending)? {
                     continue;
                 }
-                self.picker.begin(began_ns.saturating_sub(ticket.captured_ns));
-                let quality = self.picker.quality();
-                let Ready { color, depth, coc } = item;
-                let job = Job { ticket: ticket.id.0, color, depth, coc, quality, out: self.outs.take() };
-                pending.push_back(Pending { ticket, stamp, began_ns, quality });
-                if let Err(error) = executor.submit(job) {
-                    return self.fail(pending.pop_back(), error.into());
-                }
-                wait = pending.len() == capacity;
+                wait = pending.len() >= executor.capacity().max(1);
             }
-            let finished = match executor.collect(wait) {
-                Ok(Some(finished)) => finished,
-                Ok(None) if wait => return Err(Fault::LostFrame),
-                Ok(None) => continue,
-                Err(error) => return self.fail(pending.pop_front(), error.into()),
-            };
-            let Some(done) = pending.pop_front().filter(|oldest| oldest.ticket.id.0 == finished.ticket) else {
-                return Err(Fault::LostFrame);
-            };
-            self.measure(&done, &finished.times, capacity);
-            let frame = Frame { ticket: done.ticket, stamp: done.stamp, item: finished.out };
-            if !hand_on(&mut to, frame, self.tally) {
+            if let Some(executor) = &mut executor
+                && !self.collect(&mut **executor, &mut pending, wait, &mut to)?
+            {
                 return Ok(());
             }
         }
     }
 
-    fn pass_through(mut self, mut from: Receiver<Frame<Ready>>, mut to: Sender<Frame<Picture>>) -> Ended {
-        while let Some(Frame { ticket, stamp, item }) = from.recv() {
-            if self.is_late(&ticket, self.clock.now_ns(), 0) {
-                self.tally.dropped(ticket, Cause::Late);
-            } else if !hand_on(&mut to, Frame { ticket, stamp, item: item.color }, self.tally) {
-                break;
-            }
+    /// Hands a frame on as it is; gives back whether there is anybody to take more.
+    fn pass(&mut self, frame: Frame<Ready>, to: &mut Sender<Frame<Blurred>>) -> bool {
+        let Frame { ticket, stamp, trace, item: Ready { color, depth, coc, .. } } = frame;
+        if self.is_late(&ticket, self.clock.now_ns(), 0) {
+            self.tally.dropped(ticket, Cause::Late);
+            return true;
         }
-        Ok(())
+        let item = Blurred { picture: color, color: None, depth: depth.filter(|_| self.viewed), coc };
+        hand_on(to, Frame { ticket, stamp, trace, item }, self.tally)
+    }
+
+    /// Begins a frame, unless it is too late for that.
+    fn submit(
+        &mut self,
+        executor: &mut dyn Bokeh,
+        frame: Frame<Ready>,
+        pending: &mut VecDeque<Pending>,
+    ) -> Result<bool, Fault> {
+        let Frame { ticket, stamp, trace, item: Ready { color, depth, coc, .. } } = frame;
+        let began_ns = self.clock.now_ns();
+        // Behind those that are under way.
+        let expected_ns = self.picker.expected_ns() * (pending.len() as u64 + 1);
+        if self.is_late(&ticket, began_ns, expected_ns) {
+            self.tally.dropped(ticket, Cause::Late);
+            return Ok(false);
+        }
+        self.picker.begin(began_ns.saturating_sub(ticket.captured_ns));
+        let quality = self.picker.quality();
+        let job = Job { ticket: ticket.id.0, color, depth, coc, quality, out: self.outs.take() };
+        pending.push_back(Pending { ticket, stamp, trace, coc, began_ns, quality });
+        match executor.submit(job) {
+            Ok(()) => Ok(true),
+            Err(error) => Err(self.failed(pending.pop_back(), error.into())),
+        }
+    }
+
+    /// Hands on the oldest frame that is done, if there is one; with `wait`, there is. Gives back whether there is
+    /// anybody to take more.
+    fn collect(
+        &mut self,
+        executor: &mut dyn Bokeh,
+        pending: &mut VecDeque<Pending>,
+        wait: bool,
+        to: &mut Sender<Frame<Blurred>>,
+    ) -> Result<bool, Fault> {
+        let finished = match executor.collect(wait) {
+            Ok(Some(finished)) => finished,
+            Ok(None) if wait => return Err(Fault::LostFrame),
+            Ok(None) => return Ok(true),
+            Err(error) => return Err(self.failed(pending.pop_front(), error.into())),
+        };
+        let Some(done) = pending.pop_front().filter(|oldest| oldest.ticket.id.0 == finished.ticket) else {
+            return Err(Fault::LostFrame);
+        };
+        let Finished { out, color, depth, times, .. } = finished;
+        let blur_ns = self.measure(&done, &times, executor.capacity());
+        let Pending { ticket, stamp, trace, coc, quality, .. } = done;
+        let item = Blurred {
+            picture: out,
+            color: Some(color).filter(|_| self.viewed),
+            depth: depth.filter(|_| self.viewed),
+            coc,
+        };
+        let trace = Trace { blur_ns, passes: times, quality: Some(quality), ..trace };
+        Ok(hand_on(to, Frame { ticket, stamp, trace, item }, self.tally))
     }
 
     fn is_late(&mut self, ticket: &Ticket, now_ns: u64, expected_ns: u64) -> bool {
         self.late.as_mut().is_some_and(|late| late.is_late(ticket.captured_ns, now_ns, expected_ns))
     }
 
-    fn fail(&self, frame: Option<Pending>, fault: Fault) -> Ended {
+    fn failed(&self, frame: Option<Pending>, fault: Fault) -> Fault {
         if let Some(frame) = frame {
             self.tally.dropped(frame.ticket, Cause::Failed);
         }
-        Err(fault)
+        fault
     }
 
-    fn measure(&mut self, done: &Pending, passes: &PassTimes, capacity: usize) {
+    /// Counts what a frame took; gives back how long its blur did.
+    fn measure(&mut self, done: &Pending, passes: &PassTimes, capacity: usize) -> u64 {
         let now_ns = self.clock.now_ns();
         let mut in_passes_ns = 0;
         for (name, time) in passes.iter() {
@@ -131,5 +198,6 @@ impl Stage<'_> {
         // Where frames overlap, wall time says nothing of a single one.
         let took_ns = if capacity > 1 { in_passes_ns } else { blur_ns };
         self.picker.note(done.quality, took_ns, now_ns);
+        blur_ns
     }
 }

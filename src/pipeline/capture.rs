@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::pacer::Pacer;
-use super::{Ended, Frame, hand_on};
+use super::{Ended, Frame, Trace, hand_on};
 use crate::capture::{self, Brings, Camera, Captured, PATIENCE};
 use crate::clock::Clock;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
@@ -69,7 +69,9 @@ impl Stage<'_> {
                         None => self.pacer.wait(stamp.time_ns, read_ns, stopped),
                     };
                     let ticket = self.tally.captured(captured_ns);
-                    if !hand_on(&mut to, Frame { ticket, stamp, item: Shot { color, depth, right } }, self.tally) {
+                    let trace = Trace { decode_ns: read_ns, ..Trace::default() };
+                    let frame = Frame { ticket, stamp, trace, item: Shot { color, depth, right } };
+                    if !hand_on(&mut to, frame, self.tally) {
                         break;
                     }
                 }

@@ -1,16 +1,18 @@
 //! Last stage, on the caller's thread: hands pictures to the sink.
 
+use super::blur::Blurred;
 use super::playout::Playout;
-use super::{Ended, Frame, Progress};
+use super::{Ended, Frame, Progress, View};
 use crate::clock::Clock;
 use crate::frame::ColorImage;
-use crate::link::pool::Pooled;
-use crate::link::{Received, Receiver};
+use crate::link::{self, Received, Receiver, Sender};
 use crate::sink::Sink;
-use crate::stats::{Cause, Histogram, Tally};
+use crate::stats::{Cause, Histogram, Tally, Ticket};
 
 pub(super) struct Stage<'a> {
     pub sink: &'a mut dyn Sink,
+    /// Who looks at the frames besides.
+    pub view: Option<Sender<View>>,
     pub mirror: bool,
     pub total: Option<u64>,
     pub progress: &'a dyn Fn(Progress),
@@ -29,10 +31,11 @@ pub(super) struct Times<'a> {
 }
 
 impl Stage<'_> {
-    pub(super) fn run(mut self, mut from: Receiver<Frame<Pooled<ColorImage>>>) -> Ended {
+    pub(super) fn run(mut self, mut from: Receiver<Frame<Blurred>>) -> Ended {
         let mut last_ns = None;
+        let mut viewed = None;
         loop {
-            let Frame { ticket, item: mut picture, .. } = match self.next(&mut from) {
+            let Frame { ticket, stamp, trace, item: mut frame } = match self.next(&mut from) {
                 Received::Item(frame) => frame,
                 Received::Nothing => {
                     if self.sink.repeat()?.is_break() {
@@ -44,13 +47,13 @@ impl Stage<'_> {
                 Received::Ended => break,
             };
             if self.mirror {
-                mirror(&mut picture);
+                mirror(&mut frame.picture);
             }
             if let Some(playout) = &mut self.playout {
                 self.clock.sleep_until_ns(playout.due_ns(ticket.captured_ns, self.clock.now_ns()));
             }
             let began_ns = self.clock.now_ns();
-            match self.sink.put(&picture) {
+            match self.sink.put(&frame.picture) {
                 Ok(flow) if flow.is_break() => break,
                 Ok(_) => {}
                 Err(error) => {
@@ -64,7 +67,22 @@ impl Stage<'_> {
             if let Some(last_ns) = last_ns.replace(now_ns) {
                 self.times.frame.add(now_ns - last_ns);
             }
-            self.tally.delivered(ticket);
+            let captured_ns = ticket.captured_ns;
+            // Where the viewer alone takes frames, one is delivered once it did.
+            let (sunk, kept) =
+                if self.view.is_none() || self.sink.keeps() { (Some(ticket), None) } else { (None, Some(ticket)) };
+            sunk.into_iter().for_each(|ticket| self.tally.delivered(ticket));
+            if let Some(view) = &mut self.view {
+                let Blurred { picture, color, depth, coc } = frame;
+                let frames = self.tally.frames();
+                match view.send(View { picture, color, depth, coc, stamp, captured_ns, trace, frames }) {
+                    Ok(displaced) => self.looked_at(displaced.is_none(), std::mem::replace(&mut viewed, kept)),
+                    Err(link::Abandoned) => {
+                        viewed = kept;
+                        break;
+                    }
+                }
+            }
             let frames = self.tally.frames();
             (self.progress)(Progress {
                 captured: frames.captured,
@@ -73,7 +91,18 @@ impl Stage<'_> {
                 total: self.total,
             });
         }
+        // What lies there at the end is still looked at.
+        self.looked_at(true, viewed);
         Ok(())
+    }
+
+    /// What became of the frame before.
+    fn looked_at(&self, taken: bool, ticket: Option<Ticket>) {
+        match ticket {
+            Some(ticket) if taken => self.tally.delivered(ticket),
+            Some(ticket) => self.tally.dropped(ticket, Cause::Evicted),
+            None => {}
+        }
     }
 
     fn next<T>(&self, from: &mut Receiver<T>) -> Received<T> {

@@ -1,8 +1,10 @@
-//! Second stage: gives each frame its depth and its CoC.
+//! Second stage: gives each frame its depth and its CoC; here a change of the blur begins.
 
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use super::capture::Shot;
+use super::change::{Change, Executor, Swap};
 use super::rate::Rate;
 use super::{CocAtInfinity, CocRule, Ended, Fault, Frame, hand_on};
 use crate::clock::Clock;
@@ -24,11 +26,14 @@ pub(super) struct Ready {
     pub color: Pooled<ColorImage>,
     pub depth: Option<Pooled<DepthMap>>,
     pub coc: CocField,
+    /// The last change of what blurs, if there was one: every frame since then brings it.
+    pub swap: Option<Arc<Swap>>,
 }
 
 pub(super) struct Stage<'a> {
     pub coc: CocRule,
     pub refine: bool,
+    pub changes: Option<mpsc::Receiver<Change>>,
     pub source: Option<Box<dyn DepthSource>>,
     pub source_name: &'a str,
     pub keep_going: bool,
@@ -64,11 +69,33 @@ impl Coc {
     fn new(rule: CocRule, refine: bool) -> Self {
         match rule {
             CocRule::Fixed(field) => Self::Fixed(field),
-            CocRule::Depth { focus, lens, max_coc_px } => {
-                let maker = if refine { Maker::Refine(Box::new(Refiner::new())) } else { Maker::Fill(Filler::new()) };
-                Self::Depth(Box::new(DepthCoc { focus: Focus::new(focus), maker, lens, max_coc_px }))
-            }
+            CocRule::Depth { focus, lens, max_coc_px } => Self::Depth(Box::new(DepthCoc {
+                focus: Focus::new(focus),
+                maker: Maker::new(refine),
+                lens,
+                max_coc_px,
+            })),
         }
+    }
+
+    /// Follows another rule, from where the lens stands now.
+    fn follow(&mut self, rule: CocRule, refine: bool) {
+        match (self, rule) {
+            (Self::Depth(coc), CocRule::Depth { focus, lens, max_coc_px }) => {
+                coc.focus.follow(focus);
+                (coc.lens, coc.max_coc_px) = (lens, max_coc_px);
+                if refine != matches!(coc.maker, Maker::Refine(_)) {
+                    coc.maker = Maker::new(refine);
+                }
+            }
+            (coc, rule) => *coc = Self::new(rule, refine),
+        }
+    }
+}
+
+impl Maker {
+    fn new(refine: bool) -> Self {
+        if refine { Self::Refine(Box::new(Refiner::new())) } else { Self::Fill(Filler::new()) }
     }
 }
 
@@ -91,17 +118,28 @@ impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
         let mut coc = Coc::new(self.coc, self.refine);
         let mut complained = false;
+        let mut swap: Option<Arc<Swap>> = None;
         loop {
-            let Frame { ticket, stamp, item: Shot { mut color, depth, right } } = match from.recv_timeout(IDLE) {
-                Received::Item(frame) => frame,
-                Received::Ended => break,
-                Received::Nothing => {
-                    if let Some(source) = &mut self.source {
-                        source.rest();
+            let Frame { ticket, stamp, mut trace, item: Shot { mut color, depth, right } } =
+                match from.recv_timeout(IDLE) {
+                    Received::Item(frame) => frame,
+                    Received::Ended => break,
+                    Received::Nothing => {
+                        if let Some(source) = &mut self.source {
+                            source.rest();
+                        }
+                        continue;
                     }
-                    continue;
+                };
+            for Change { coc: rule, refine, quality, bokeh } in self.changes.iter().flat_map(mpsc::Receiver::try_iter) {
+                coc.follow(rule, refine);
+                self.rate.iter_mut().for_each(Rate::forget);
+                if let Executor::To(executor) = bokeh {
+                    let number = swap.map_or(1, |last| last.number + 1);
+                    swap = Some(Arc::new(Swap::new(number, executor, quality)));
                 }
-            };
+            }
+            let began_ns = self.clock.now_ns();
             let made = match &mut coc {
                 Coc::Fixed(field) => Ok((None, *field)),
                 Coc::Depth(coc) => {
@@ -127,7 +165,9 @@ impl Stage<'_> {
                     continue;
                 }
             };
-            if !hand_on(&mut to, Frame { ticket, stamp, item: Ready { color, depth, coc } }, self.tally) {
+            trace.depth_ns = self.clock.now_ns() - began_ns;
+            let frame = Frame { ticket, stamp, trace, item: Ready { color, depth, coc, swap: swap.clone() } };
+            if !hand_on(&mut to, frame, self.tally) {
                 break;
             }
         }

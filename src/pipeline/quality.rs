@@ -20,21 +20,33 @@ pub(super) struct Picker {
     deadline_ns: Option<u64>,
     /// Ages of the last frames when their blur began.
     ages: Window<AGES>,
+    most: Quality,
 }
 
 impl Picker {
     /// Frames may take `budget_ns`; where they come every `period_ns` in real time, there is a deadline, too. None is
     /// blurred more finely than `most` unless that was asked for.
     pub(super) fn new(rule: QualityRule, most: Quality, budget_ns: u64, period_ns: Option<u64>) -> Self {
+        let (rungs, governor) = Self::of(rule, most);
+        let deadline_ns = period_ns.map(|period_ns| DEADLINE_PERIODS * period_ns * DEADLINE_TENTHS / 10);
+        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default(), most }
+    }
+
+    /// The same under another rule. What was learnt of the time that rungs take holds no more.
+    pub(super) fn with(&self, rule: QualityRule) -> Self {
+        let (rungs, governor) = Self::of(rule, self.most);
+        let &Self { budget_ns, deadline_ns, most, .. } = self;
+        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default(), most }
+    }
+
+    fn of(rule: QualityRule, most: Quality) -> (&'static [Quality], Governor) {
         let at = |quality: Quality| quality as usize;
-        let (rungs, governor) = match rule {
+        match rule {
             QualityRule::Fixed(quality) => (&Quality::ALL[at(quality)..=at(quality)], Governor::new(&[1.0], 0)),
             QualityRule::Auto(start) => {
                 (&Quality::ALL[..=at(most)], Governor::new(&COSTS[..=at(most)], at(start.min(most))))
             }
-        };
-        let deadline_ns = period_ns.map(|period_ns| DEADLINE_PERIODS * period_ns * DEADLINE_TENTHS / 10);
-        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default() }
+        }
     }
 
     /// The quality of the next frame.

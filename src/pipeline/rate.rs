@@ -55,6 +55,11 @@ impl Rate {
         self.last
     }
 
+    /// Nothing is held any more: the next frame's depth is made anew.
+    pub(super) fn forget(&mut self) {
+        self.last = None;
+    }
+
     /// The depth that is held.
     pub(super) fn copy_held(&self, into: &mut DepthMap) {
         copy(&self.map, into);

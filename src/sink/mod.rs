@@ -58,6 +58,11 @@ pub trait Sink {
         Ok(ControlFlow::Continue(()))
     }
 
+    /// Whether anything becomes of the frames it is given now; otherwise, where there is a viewer, only that counts.
+    fn keeps(&self) -> bool {
+        true
+    }
+
     /// Completes the output after the last frame.
     ///
     /// # Errors

@@ -169,7 +169,7 @@ impl Bokeh for FakeBokeh {
             let mut times = PassTimes::new();
             times.add("rows", Duration::from_micros(400));
             times.add("columns", Duration::from_micros(300));
-            Finished { ticket: job.ticket, out: job.out, times }
+            Finished { ticket: job.ticket, out: job.out, color: job.color, depth: job.depth, times }
         }))
     }
 
@@ -297,6 +297,7 @@ impl Setup {
             quality: QualityRule::Fixed(Quality::Fast),
             coc: self.coc,
             refine: false,
+            changes: None,
             sink: Box::new(FakeSink {
                 received: received.clone(),
                 trouble: self.sink,
@@ -308,6 +309,7 @@ impl Setup {
             keep_going: self.keep_going,
             demand: None,
             mirror: false,
+            view: None,
             clock: Clock::system(),
             stop: &stop,
             progress: &|progress| {
@@ -372,12 +374,14 @@ pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a Atomic
         quality: QualityRule::Fixed(Quality::Fast),
         coc: CocRule::Fixed(CocField::Uniform { radius_px: 3.0 }),
         refine: false,
+        changes: None,
         sink,
         pace,
         budget_ns: PERIOD_NS,
         keep_going: false,
         demand: None,
         mirror: false,
+        view: None,
         clock: Clock::system(),
         stop,
         progress: &|_| {},

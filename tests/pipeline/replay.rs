@@ -202,6 +202,7 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         coc: dof(),
         refine: false,
+        changes: None,
         keep_going: false,
         ..simple(Box::new(camera), sink, &stop, Pace::Asap)
     })
@@ -221,6 +222,7 @@ fn rendered(dir: &Path, file: &Path) -> Vec<u8> {
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
         coc: dof(),
         refine: false,
+        changes: None,
         ..simple(Box::new(camera), sink, &stop, Pace::Asap)
     })
     .unwrap();

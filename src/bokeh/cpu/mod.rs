@@ -290,7 +290,8 @@ impl Bokeh for CpuBokeh {
     fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
         self.plan.set_quality(job.quality);
         let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
-        self.done = Some(Finished { ticket: job.ticket, out: job.out, times });
+        let Job { ticket, color, depth, out, .. } = job;
+        self.done = Some(Finished { ticket, out, color, depth, times });
         Ok(())
     }
 

@@ -143,6 +143,7 @@ impl Ring {
         self.last = Some(Instant::now());
         oldest.slot.passes.clear();
         self.free.push(oldest.slot);
-        Ok(Some(Finished { ticket: oldest.job.ticket, out: oldest.job.out, times }))
+        let Job { ticket, color, depth, out, .. } = oldest.job;
+        Ok(Some(Finished { ticket, out, color, depth, times }))
     }
 }

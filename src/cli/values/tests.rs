@@ -1,4 +1,5 @@
 use super::*;
+use crate::look::Tilt;
 
 #[test]
 fn apertures_read_back_what_they_print() {

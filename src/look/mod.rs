@@ -1,0 +1,154 @@
+//! How the picture shall look: everything about the blur, for pictures of any size.
+//!
+//! The command line and the preview window make looks; what runs them, [`crate::bokeh`] and [`crate::pipeline`], is
+//! told of one picture size.
+
+mod tilt;
+
+use std::path::PathBuf;
+
+pub use tilt::Tilt;
+
+use crate::bokeh::{self, aperture::Aperture};
+use crate::budget::Quality;
+use crate::depth::focus::FocusRule;
+use crate::optics::{CocField, Lens};
+use crate::pipeline::{CocAtInfinity, CocRule, QualityRule};
+
+/// CoC radius at infinity, as a fraction of the picture's height: a portrait lens wide open.
+pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
+/// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
+pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
+
+/// How strong the blur is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Strength {
+    /// A fraction of the picture's height.
+    Default,
+    /// CoC radius at infinity, in pixels.
+    AtInfinity(f32),
+    /// What this lens does at the distance of focus.
+    Lens(Lens),
+}
+
+/// Whether depth is refined before the blur.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refine {
+    /// Where it was measured.
+    Auto,
+    /// Always.
+    On,
+    /// Never: only holes are filled.
+    Off,
+}
+
+/// Everything about the blur, for pictures of any size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// What the radius follows; `None` passes pictures through.
+    pub effect: Option<bokeh::Effect>,
+    /// Compositing of the effect `dof`.
+    pub method: bokeh::Method,
+    /// Where the focal plane is.
+    pub focus: FocusRule,
+    /// How strong the blur is.
+    pub strength: Strength,
+    /// Largest CoC radius in pixels; `None` is a share of the height.
+    pub max_coc_px: Option<f32>,
+    /// Whether depth is refined.
+    pub refine: Refine,
+    /// The band of the effect `tilt-shift`.
+    pub tilt: Tilt,
+    /// The lens opening.
+    pub aperture: Aperture,
+    /// The file that its shape comes from, where that is a picture.
+    pub aperture_file: Option<PathBuf>,
+    /// Width of its soft rim, as a fraction of the radius.
+    pub rim: f32,
+    /// Separable terms; `None` takes the quality level's.
+    pub rank: Option<bokeh::Rank>,
+    /// Highlight recovery; 0 is off.
+    pub highlights: f32,
+    /// How finely it is blurred; `None` as the time allows.
+    pub quality: Option<Quality>,
+}
+
+impl Look {
+    /// The executor's settings for pictures of `size` pixels; none when frames pass through.
+    /// `adaptive` says whether the quality may follow the time there is.
+    pub fn settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
+        let effect = self.effect?;
+        let max_px = self.max_coc_px(size);
+        let far_max_px = self.even_px(size).min(max_px);
+        let near_max_px = if effect == bokeh::Effect::Dof { max_px } else { 0.0 };
+        Some(bokeh::Settings {
+            effect,
+            method: self.method,
+            aperture: self.aperture.clone(),
+            rim: self.rim,
+            rank: self.rank,
+            highlights: self.highlights,
+            quality: self.quality.unwrap_or_default(),
+            adaptive: adaptive && self.quality.is_none(),
+            far_max_px,
+            near_max_px,
+        })
+    }
+
+    /// By how much a picture of `size` pixels is blurred.
+    pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
+        let max_coc_px = self.max_coc_px(size);
+        let even_px = self.even_px(size).min(max_coc_px);
+        match self.effect {
+            None => CocRule::Fixed(CocField::Uniform { radius_px: 0.0 }),
+            Some(bokeh::Effect::Blur) => CocRule::Fixed(CocField::Uniform { radius_px: even_px }),
+            Some(bokeh::Effect::TiltShift) => CocRule::Fixed(CocField::Ramp(self.tilt.ramp(size, even_px))),
+            Some(bokeh::Effect::Dof) => CocRule::Depth {
+                focus: self.focus,
+                lens: match self.strength {
+                    Strength::Lens(lens) => CocAtInfinity::Lens(lens),
+                    Strength::Default | Strength::AtInfinity(_) => CocAtInfinity::Px(self.even_px(size)),
+                },
+                max_coc_px,
+            },
+        }
+    }
+
+    /// At which rung an executor of [`Look::settings`] blurs.
+    pub fn quality_rule(&self, adaptive: bool) -> QualityRule {
+        match self.quality {
+            None if adaptive => QualityRule::Auto(Quality::default()),
+            quality => QualityRule::Fixed(quality.unwrap_or_default()),
+        }
+    }
+
+    /// Whether depth is refined before the blur; `measured` is the depth of a recorded stream.
+    pub fn refines(&self, measured: bool) -> bool {
+        match self.refine {
+            Refine::Auto => measured,
+            Refine::On => true,
+            Refine::Off => false,
+        }
+    }
+
+    /// CoC radius at infinity in pixels, where it does not depend on a focus that is yet to be found.
+    fn even_px(&self, (width, height): (u32, u32)) -> f32 {
+        match (self.strength, self.focus) {
+            (Strength::Default, _) => height as f32 * COC_AT_INFINITY_PER_HEIGHT,
+            (Strength::AtInfinity(radius_px), _) => radius_px,
+            (Strength::Lens(lens), FocusRule::Metres(focus_m)) => lens.coc_at_infinity_px(focus_m, width),
+            // Whatever the lens may give: the largest CoC is the bound.
+            (Strength::Lens(_), _) => f32::INFINITY,
+        }
+    }
+
+    /// Largest CoC radius, in pixels. Without depth no point is nearer than the focal plane, and the strength that
+    /// was asked for holds unless `--max-coc` is given, too.
+    fn max_coc_px(&self, size: (u32, u32)) -> f32 {
+        let by_height_px = size.1 as f32 * MAX_COC_PER_HEIGHT;
+        self.max_coc_px.unwrap_or(match self.strength {
+            Strength::AtInfinity(radius_px) => by_height_px.max(radius_px),
+            Strength::Default | Strength::Lens(_) => by_height_px,
+        })
+    }
+}

@@ -1,0 +1,53 @@
+//! The sharp band of tilt-shift.
+
+use std::str::FromStr;
+
+use crate::optics::Ramp;
+
+/// The sharp band of `tilt-shift`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tilt {
+    /// Middle of the band in the middle column, as a fraction of the height.
+    pub center_y: f32,
+    /// Width of the band across its direction, as a fraction of the height.
+    pub band: f32,
+    /// Turn of the band, clockwise, in degrees; 0 is level.
+    pub angle_deg: f32,
+}
+
+impl FromStr for Tilt {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut parts = text.split(':');
+        let mut next = |low, high, default| match parts.next() {
+            None => Some(default),
+            Some(part) => part.trim().parse().ok().filter(|number| (low..=high).contains(number)),
+        };
+        let tilt = (|| {
+            Some(Tilt {
+                center_y: next(0.0, 1.0, 0.5)?,
+                band: next(0.0, 1.0, 0.15)?,
+                angle_deg: next(-360.0, 360.0, 0.0)?,
+            })
+        })();
+        tilt.filter(|_| parts.next().is_none())
+            .ok_or_else(|| "use CENTER_Y[:BAND[:ANGLE_DEG]], the first two from 0 to 1, such as 0.6:0.1:15".to_string())
+    }
+}
+
+impl Tilt {
+    /// The ramp for a picture of `size` pixels that reaches `max_px` in the corner farthest from the band.
+    pub fn ramp(&self, (width, height): (u32, u32), max_px: f32) -> Ramp {
+        let (width, height) = (width as f32, height as f32);
+        let (sin, cos) = self.angle_deg.to_radians().sin_cos();
+        let normal = glam::Vec2::new(-sin, cos);
+        let offset_px = normal.dot(glam::Vec2::new(width / 2.0, height * self.center_y));
+        let half_band_px = height * self.band / 2.0;
+        let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
+        let reach_px = corners
+            .map(|corner| (normal.dot(corner.into()) - offset_px).abs() - half_band_px)
+            .into_iter()
+            .fold(0.0, f32::max);
+        Ramp { normal, offset_px, half_band_px, slope: if reach_px > 0.0 { max_px / reach_px } else { 0.0 }, max_px }
+    }
+}

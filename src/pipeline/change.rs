@@ -1,0 +1,47 @@
+//! What may change while a run goes on: how the frames are blurred.
+
+use std::sync::Mutex;
+
+use super::{CocRule, QualityRule};
+use crate::bokeh::Bokeh;
+
+/// Another blur, from the next frame on. Every frame has the CoC and the executor of one and the same change.
+pub struct Change {
+    /// By how much frames are blurred.
+    pub coc: CocRule,
+    /// Whether depth is fitted to the pictures and steadied.
+    pub refine: bool,
+    /// At which rung a new executor blurs.
+    pub quality: QualityRule,
+    /// What blurs them.
+    pub bokeh: Executor,
+}
+
+/// What blurs from a change on.
+pub enum Executor {
+    /// What did before.
+    Keep,
+    /// This one; `None` passes frames through.
+    To(Option<Box<dyn Bokeh>>),
+}
+
+/// An executor on its way to the blur stage. Each frame of the change brings it, so that it comes whichever frame does.
+pub(super) struct Swap {
+    /// Counts from 1.
+    pub number: u64,
+    /// Locked once when it is made and once when it is taken.
+    executor: Mutex<Option<New>>,
+}
+
+type New = (Option<Box<dyn Bokeh>>, QualityRule);
+
+impl Swap {
+    pub(super) fn new(number: u64, executor: Option<Box<dyn Bokeh>>, quality: QualityRule) -> Self {
+        Self { number, executor: Mutex::new(Some((executor, quality))) }
+    }
+
+    /// The executor, for who comes first.
+    pub(super) fn take(&self) -> Option<New> {
+        self.executor.lock().ok()?.take()
+    }
+}
