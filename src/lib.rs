@@ -11,7 +11,8 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 6 | [`cli`]: arguments to one resolved configuration, one function per command |
+//! | 7 | [`cli`]: arguments to one resolved configuration, one function per command |
+//! | 6 | `preview`: the window |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`pipeline`]: the one place that knows all stages |
 //! | 3 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
@@ -39,6 +40,8 @@ pub mod link;
 pub mod look;
 pub mod optics;
 pub mod pipeline;
+#[cfg(feature = "window")]
+pub mod preview;
 pub mod recording;
 pub mod scene;
 pub mod sink;

@@ -4,31 +4,38 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the crate by layer, the lowest first.
-const LAYERS: [&[&str]; 8] = [
+const LAYERS: [&[&str]; 9] = [
     &["frame", "optics", "clock"],
     &["compute", "calibration"],
     &["link", "budget", "stats", "recording", "scene", "v4l2"],
     &["capture", "depth", "bokeh", "sink"],
     &["pipeline"],
     &["look"],
+    &["preview"],
     &["cli"],
     &["main"],
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 13] = [
+const DOORS: [(&str, &[&str]); 19] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
     ("ctrlc", &["cli"]),
+    ("dream_soft_render", &["preview/present"]),
+    ("egui", &["preview"]),
+    ("egui_wgpu", &["preview/present"]),
+    ("egui_winit", &["preview/window"]),
     ("image", &["recording", "sink"]),
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
     ("rustix", &["clock", "link/bell", "v4l2"]),
     ("saphyr_parser", &["calibration"]),
+    ("softbuffer", &["preview/present"]),
     ("strsim", &["v4l2"]),
     ("v4l", &["v4l2"]),
-    ("wgpu", &["bokeh/gpu", "compute/device", "depth/stereo/gpu"]),
+    ("wgpu", &["bokeh/gpu", "compute/device", "depth/stereo/gpu", "preview/present"]),
+    ("winit", &["preview/present", "preview/window"]),
     ("zune_jpeg", &["capture"]),
 ];
 

@@ -37,7 +37,7 @@ use crate::link::demand::Demand;
 /// Takes finished frames, in order.
 ///
 /// Dropping a sink without [`Sink::finish`] gives up its output: a file that is not whole never appears.
-pub trait Sink {
+pub trait Sink: Send {
     /// Takes one frame. `Break` says that the reader at the other end has gone and wants no more, not even this one.
     ///
     /// # Errors

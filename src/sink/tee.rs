@@ -61,16 +61,15 @@ impl Sink for Tee {
 
 #[cfg(test)]
 mod tests {
-    use std::cell::RefCell;
     use std::io;
-    use std::rc::Rc;
+    use std::sync::{Arc, Mutex};
 
     use super::*;
 
     /// Writes down what is asked of it.
     struct Witness {
         name: &'static str,
-        log: Rc<RefCell<Vec<String>>>,
+        log: Arc<Mutex<Vec<String>>>,
         hold_ms: Option<u64>,
         /// Frames until its reader goes.
         wants: usize,
@@ -79,7 +78,7 @@ mod tests {
 
     impl Witness {
         fn note(&self, what: &str) {
-            self.log.borrow_mut().push(format!("{} {what}", self.name));
+            self.log.lock().unwrap().push(format!("{} {what}", self.name));
         }
 
         fn end(&self) -> Result<(), SinkError> {
@@ -113,16 +112,16 @@ mod tests {
         }
     }
 
-    fn tee(log: &Rc<RefCell<Vec<String>>>, sinks: [(&'static str, Option<u64>, usize, bool); 2]) -> Box<Tee> {
+    fn tee(log: &Arc<Mutex<Vec<String>>>, sinks: [(&'static str, Option<u64>, usize, bool); 2]) -> Box<Tee> {
         let sinks = sinks.map(|(name, hold_ms, wants, breaks_down)| {
-            Box::new(Witness { name, log: Rc::clone(log), hold_ms, wants, breaks_down }) as Box<dyn Sink>
+            Box::new(Witness { name, log: Arc::clone(log), hold_ms, wants, breaks_down }) as Box<dyn Sink>
         });
         Box::new(Tee::new(sinks.into()))
     }
 
     #[test]
     fn a_sink_whose_reader_goes_is_left_out_and_the_last_ends_it() {
-        let log = Rc::default();
+        let log = Arc::default();
         let mut tee = tee(&log, [("a", None, 1, false), ("b", Some(50), 2, false)]);
         assert_eq!((tee.describe().as_str(), tee.hold()), ("a, b", Some(Duration::from_millis(50))));
         let frame = ColorImage::new(2, 2);
@@ -131,15 +130,15 @@ mod tests {
         assert!(tee.put(&frame).unwrap().is_break());
         assert_eq!(tee.hold(), None);
         tee.finish().unwrap();
-        assert_eq!(*log.borrow(), ["a put", "a finish", "b put", "b repeat", "b put", "b finish"]);
+        assert_eq!(*log.lock().unwrap(), ["a put", "a finish", "b put", "b repeat", "b put", "b finish"]);
     }
 
     #[test]
     fn all_are_completed_and_the_first_error_is_told() {
-        let log = Rc::default();
+        let log = Arc::default();
         let broken = tee(&log, [("a", Some(200), 9, true), ("b", Some(100), 9, true)]);
         assert_eq!(broken.hold(), Some(Duration::from_millis(100)));
         assert_eq!(broken.finish().unwrap_err().to_string(), "cannot write a: full");
-        assert_eq!(*log.borrow(), ["a finish", "b finish"]);
+        assert_eq!(*log.lock().unwrap(), ["a finish", "b finish"]);
     }
 }

@@ -68,7 +68,7 @@ impl Y4m<File> {
 }
 
 /// A stream whose reader may go at any time, which ends the run but is no fault.
-impl<W: Write> Sink for Y4m<W> {
+impl<W: Write + Send> Sink for Y4m<W> {
     fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
         match self.write(frame) {
             Err(SinkError::Write { cause, .. }) if cause.kind() == ErrorKind::BrokenPipe => Ok(ControlFlow::Break(())),

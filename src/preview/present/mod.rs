@@ -1,0 +1,69 @@
+//! How the window's content gets onto the screen: two ways that show the same.
+//!
+//! `gpu` draws with the device that blurs, so that a picture blurred there is shown without a way back; `soft` draws
+//! on the CPU into memory shared with the display server, where there is no GPU.
+
+use crate::frame::ColorImage;
+
+/// Where something lies in the window, in its pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Area {
+    /// Columns from the left; the area lies within the window.
+    pub x: u32,
+    /// Rows from the top.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// What is drawn under the controls.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawing<'a> {
+    /// Where the picture goes, scaled to fill it; the rest of the window is the background.
+    pub area: Area,
+    /// The picture.
+    pub picture: &'a ColorImage,
+    /// Another one of the same size, shown instead left of this fraction of the area's width.
+    pub before: Option<(&'a ColorImage, f32)>,
+    /// Whether pictures are flipped left to right; the split is not.
+    pub mirror: bool,
+    /// Whether they are shown grey and dim: there are no new ones.
+    pub stale: bool,
+    /// Colour of the rest, sRGB.
+    pub background: [u8; 3],
+}
+
+/// Controls that changed, as egui gives them.
+pub struct Controls {
+    /// What to paint.
+    pub primitives: Vec<egui::ClippedPrimitive>,
+    /// Textures to set before and to free after.
+    pub textures: egui::TexturesDelta,
+    /// Pixels of the window per point of the controls.
+    pub pixels_per_point: f32,
+}
+
+/// Shows pictures and controls in a window.
+pub trait Presenter {
+    /// The window has another size, in pixels; one without pixels shows nothing.
+    fn resize(&mut self, size: (u32, u32));
+
+    /// Controls to paint from now on.
+    fn set_controls(&mut self, controls: Controls);
+
+    /// Shows the drawing with the controls on it.
+    ///
+    /// # Errors
+    /// The window cannot be drawn to any more.
+    fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError>;
+
+    /// One line: what draws.
+    fn describe(&self) -> String;
+}
+
+/// The window cannot be drawn to.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot draw to the window: {0}")]
+pub struct PresentError(pub String);
