@@ -7,7 +7,7 @@ mod report;
 mod tally;
 
 pub use histogram::{Histogram, PassHistograms};
-pub use report::{About, QualityUse, Report, RungCounts, Spread, StageMs, StagesMs, Versions};
+pub use report::{About, QualityUse, Report, RungCounts, Spread, StageMs, StagesMs, Versions, WindowUse};
 pub use tally::{Cause, Dropped, Frames, Tally, Ticket};
 
 /// What the stages measure while they run; each stage fills its own fields.

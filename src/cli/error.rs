@@ -39,6 +39,14 @@ pub enum CliError {
         /// Why.
         source: io::Error,
     },
+    /// There is no window, or it failed.
+    #[error(transparent)]
+    #[cfg(feature = "window")]
+    Window(#[from] crate::preview::window::WindowError),
+    /// A preview ended without ever having shown a frame.
+    #[error("{0}")]
+    #[cfg(feature = "window")]
+    NoFrames(String),
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),

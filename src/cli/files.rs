@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::error::CliError;
+use crate::stats::Report;
 
 /// # Errors
 /// [`CliError::Exists`] when one of `paths` exists and `force` is not given.
@@ -27,4 +28,14 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
         let _ = fs::remove_file(part);
         CliError::io(path)(error)
     })
+}
+
+/// Writes the report of a run as JSON.
+///
+/// # Errors
+/// As for [`write_whole`].
+pub fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
+    let mut json = Vec::new();
+    report.write_json(&mut json).map_err(CliError::io(path))?;
+    write_whole(path, &json)
 }

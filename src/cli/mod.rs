@@ -19,6 +19,8 @@ mod dump;
 mod error;
 mod files;
 mod options;
+#[cfg(feature = "window")]
+mod preview;
 mod quality;
 mod record;
 mod render;
@@ -60,6 +62,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    #[cfg(feature = "window")]
+    Preview(Box<preview::PreviewCommand>),
     Stream(Box<stream::StreamCommand>),
     Render(Box<render::RenderCommand>),
     Depth(Box<disparity::DepthCommand>),
@@ -117,6 +121,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile) -> Result<(), CliError> {
     match cli.command {
+        #[cfg(feature = "window")]
+        Command::Preview(command) => preview::run(&command, &cli.global),
         Command::Stream(command) => stream::run(&command, &cli.global),
         Command::Render(command) => render::run(&command, &cli.global),
         Command::Depth(command) => disparity::run(&command, &cli.global),

@@ -7,6 +7,8 @@ use clap::builder::TypedValueParser;
 use clap::{Args, value_parser};
 
 use super::defaults;
+#[cfg(feature = "window")]
+use super::preview::Show;
 use super::quality::{QualityChoice, level_or_auto};
 use super::values::{
     ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Refine, Size, above_zero,
@@ -36,7 +38,7 @@ pub struct Global {
 }
 
 /// Which frames of which source.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Source")]
 pub struct Source {
     /// Start this many seconds after the first frame
@@ -69,7 +71,7 @@ pub struct Source {
 }
 
 /// How depth pictures are read.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Depth")]
 pub struct Depth {
     /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000; 1000 from a camera]
@@ -93,7 +95,7 @@ impl Depth {
 }
 
 /// Depth from two eyes.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Two eyes")]
 pub struct Stereo {
     /// Each picture of the source shows both eyes beside each other: the left half is the left eye's
@@ -166,7 +168,7 @@ pub struct Blur {
 }
 
 /// The lens opening.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Aperture")]
 pub struct Aperture {
     /// disc, ring:INNER, polygon:N[:ROTATION_DEG[:CURVATURE]], heart, star:N or image:FILE
@@ -188,7 +190,7 @@ pub struct Aperture {
 }
 
 /// How finely and on what the blur is computed.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Computing")]
 pub struct Computing {
     /// Quality level: changes fidelity, never the amount of blur. auto follows the time there is (--budget-ms) where
@@ -207,7 +209,7 @@ pub struct Computing {
 }
 
 /// How a stream runs.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Stream")]
 pub struct Stream {
     /// Time that the blur of one frame may take, in milliseconds [default: the frame period]
@@ -237,14 +239,74 @@ pub struct Stream {
     pub report: Option<PathBuf>,
 }
 
+/// What a window shows first; all of it can be changed there.
+#[cfg(feature = "window")]
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Window")]
+pub struct Window {
+    /// What of each frame is shown
+    #[arg(long, value_enum, value_name = "WHAT", default_value = "picture")]
+    pub show: Show,
+    /// Show the picture as it was before the blur, left of this fraction of its width
+    #[arg(long, value_name = "FRACTION", value_parser = between(0.0, 1.0))]
+    pub split: Option<f32>,
+    /// Fill the screen
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub full_screen: bool,
+    /// Show frame times, latency and drops
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub instruments: bool,
+    /// Show the controls; --panel=false begins without
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = true,
+          default_missing_value = "true", action = clap::ArgAction::Set, hide_possible_values = true)]
+    pub panel: bool,
+    /// Size of text and controls, 1 as usual
+    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = between(0.75, 3.0))]
+    pub text_scale: f32,
+    /// Where snapshots and recordings go [default: the pictures folder]
+    #[arg(long, value_name = "DIR")]
+    pub save_to: Option<PathBuf>,
+}
+
 /// What may be overwritten.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Output")]
 pub struct Output {
     /// Overwrite what exists
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
     pub force: bool,
+}
+
+/// What is needed to blur a stream, wherever it goes.
+#[derive(Args, Clone, Debug)]
+pub struct Streaming {
+    /// Which frames.
+    #[command(flatten)]
+    pub frames: Source,
+    /// The blur.
+    #[command(flatten)]
+    pub blur: Blur,
+    /// Depth pictures.
+    #[command(flatten)]
+    pub depth: Depth,
+    /// Two eyes.
+    #[command(flatten)]
+    pub stereo: Stereo,
+    /// The lens opening.
+    #[command(flatten)]
+    pub aperture: Aperture,
+    /// The executor.
+    #[command(flatten)]
+    pub computing: Computing,
+    /// The stream.
+    #[command(flatten)]
+    pub stream: Stream,
+    /// Overwriting.
+    #[command(flatten)]
+    pub output: Output,
 }
 
 /// Every setting: the keys of the settings file and of the environment.
@@ -271,6 +333,10 @@ pub struct Every {
     /// The stream.
     #[command(flatten)]
     pub stream: Stream,
+    /// The window.
+    #[cfg(feature = "window")]
+    #[command(flatten)]
+    pub window: Window,
     /// Overwriting.
     #[command(flatten)]
     pub output: Output,

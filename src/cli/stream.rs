@@ -1,20 +1,17 @@
 //! `stream`: a source, blurred, into a sink.
 
-use std::path::Path;
-
 use clap::Args;
 
 use super::config::{self, Executor};
 use super::depth;
 use super::error::CliError;
-use super::files::{refuse_overwrite, write_whole};
+use super::files::{refuse_overwrite, write_report};
 use super::source::{Source, SourceName, Wanted};
 use super::{options, sinks, terminal, values};
 use crate::clock::Clock;
 use crate::link::demand::Demand;
 use crate::pipeline::{self, Pace, Run};
 use crate::sink::{self, Target};
-use crate::stats::Report;
 
 /// Blur a camera, a recording or the synthetic scene, frame by frame
 #[derive(Args, Debug)]
@@ -39,21 +36,7 @@ pub struct StreamCommand {
     #[arg(long, value_name = "SINK", required = true)]
     to: Vec<Target>,
     #[command(flatten)]
-    frames: options::Source,
-    #[command(flatten)]
-    blur: options::Blur,
-    #[command(flatten)]
-    depth: options::Depth,
-    #[command(flatten)]
-    stereo: options::Stereo,
-    #[command(flatten)]
-    aperture: options::Aperture,
-    #[command(flatten)]
-    computing: options::Computing,
-    #[command(flatten)]
-    stream: options::Stream,
-    #[command(flatten)]
-    output: options::Output,
+    parts: options::Streaming,
 }
 
 /// Runs the command. The report is written whenever the pipeline ran, however it ended.
@@ -61,24 +44,25 @@ pub struct StreamCommand {
 /// # Errors
 /// The options do not fit the source, something would be overwritten, or a stage of the pipeline failed.
 pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliError> {
-    let StreamCommand { stream, output, .. } = command;
+    let StreamCommand { parts, .. } = command;
+    let options::Streaming { stream, output, .. } = parts;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
     sinks::check(&command.to, stream, &command.source.devices())?;
     if stream.pace == Some(values::Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
     }
-    let executor = Executor::of(&command.computing);
+    let executor = Executor::of(&parts.computing);
     let wanted = Wanted {
-        frames: &command.frames,
-        depth: &command.depth,
-        stereo: &command.stereo,
-        blur: Some(&command.blur),
+        frames: &parts.frames,
+        depth: &parts.depth,
+        stereo: &parts.stereo,
+        blur: Some(&parts.blur),
         executor: &executor,
         keep_going: stream.keep_going,
     };
     let source = Source::open(&command.source, &wanted)?;
-    let source = depth::beside(source, &command.blur, &command.depth, stream.keep_going, &Clock::system())?;
+    let source = depth::beside(source, &parts.blur, &parts.depth, stream.keep_going, &Clock::system())?;
     let info = source.camera.info();
     let measured = source.is_measured();
     let pace = match stream.pace {
@@ -87,7 +71,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         None if info.live || command.to.iter().any(Target::is_live) => Pace::Realtime,
         None => Pace::Asap,
     };
-    let look = config::look(&command.blur, &command.aperture, command.computing.quality, source.has_depth())?;
+    let look = config::look(&parts.blur, &parts.aperture, parts.computing.quality, source.has_depth())?;
     let adaptive = pace == Pace::Realtime;
     let bokeh = look.settings(info.size, adaptive).map(|settings| executor.create(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
@@ -102,7 +86,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
 
     if info.live && !global.quiet {
         terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
-        if command.blur.effect.is_none() && !source.has_depth() {
+        if parts.blur.effect.is_none() && !source.has_depth() {
             terminal::say(
                 "there is no depth, so the whole picture is blurred: --depth NAME takes a depth camera's, --effect \
                  tilt-shift keeps a band sharp",
@@ -142,10 +126,4 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         terminal::say(&report.to_string());
     }
     ended
-}
-
-fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
-    let mut json = Vec::new();
-    report.write_json(&mut json).map_err(CliError::io(path))?;
-    write_whole(path, &json)
 }

@@ -94,7 +94,7 @@ pub trait Backstage: Send {
     fn output(&mut self, name: &str, size: (u32, u32), period_ns: u64) -> Result<Box<dyn Sink>, String>;
 
     /// The command that shows `source` in this look: `bokehcam preview ...`, or `bokehcam stream ...` into `outputs`.
-    fn command(&self, look: &Look, source: &str, mirror: bool, outputs: &[String]) -> String;
+    fn command(&self, look: &Look, source: &str, outputs: &[String]) -> String;
 
     /// The presets, the person's own last, each upon `look`.
     fn presets(&mut self, look: &Look) -> Vec<Preset>;

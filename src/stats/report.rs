@@ -55,8 +55,32 @@ pub struct Report {
     pub sink: String,
     /// Wall time of the run, in seconds.
     pub elapsed_s: f64,
+    /// What was on the screen, where there was a window.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<WindowUse>,
     /// What made this report.
     pub versions: Versions,
+}
+
+/// What a window showed, and how quickly.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct WindowUse {
+    /// Frames that were on the screen.
+    pub presented: u64,
+    /// From the start of the preview to its first frame.
+    pub first_frame_ms: Option<f64>,
+    /// From capture to the screen.
+    pub latency_ms: Option<Spread>,
+    /// From an input to the picture that shows what it did.
+    pub reaction_ms: Option<Spread>,
+}
+
+impl WindowUse {
+    /// Sums up what was measured.
+    pub fn new(presented: u64, first_frame_ns: Option<u64>, latency: &Histogram, reaction: &Histogram) -> Self {
+        let first_frame_ms = first_frame_ns.map(ms);
+        Self { presented, first_frame_ms, latency_ms: Spread::of(latency), reaction_ms: Spread::of(reaction) }
+    }
 }
 
 /// Percentiles of a time.
@@ -137,6 +161,7 @@ impl Report {
             source: about.source,
             sink: about.sink,
             elapsed_s: ms(about.elapsed_ns) / 1000.0,
+            window: None,
             versions: Versions {
                 bokehcam: env!("CARGO_PKG_VERSION"),
                 platform: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),

@@ -1,0 +1,156 @@
+//! `preview`: a window that shows a source in portrait mode, live.
+
+mod wings;
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+
+use super::config::{self, Executor};
+use super::error::CliError;
+use super::files::{refuse_overwrite, write_report};
+use super::source::SourceName;
+use super::{options, settings, sinks, terminal, values};
+use crate::look::Look;
+use crate::preview::session::Start;
+use crate::preview::state::{Output, Shown, State};
+use crate::preview::window::{self, Preview};
+use crate::sink::Target;
+
+use wings::Wings;
+
+/// Show a camera, a recording or the synthetic scene in portrait mode, live, and find a look
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam preview                          the first camera there is
+  bokehcam preview 0 --mirror --to /dev/video10
+  bokehcam preview 0,2 --calib stereo.yml
+  bokehcam preview recordings/portrait --preset cinematic
+  bokehcam preview recordings/portrait --split 0.5 --highlights 12
+  bokehcam preview synthetic --full-screen
+
+In the window, F1 shows all keys. Click to focus there, double-click to follow the subject. What the window sets can be
+copied as a command (K). A recording is played in a loop.")]
+pub struct PreviewCommand {
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
+    /// folder with a recording, or `synthetic` [default: the first camera there is]
+    source: Option<String>,
+    /// Also write to /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or .webm from the start;
+    /// may be given more than once
+    #[arg(long, value_name = "SINK")]
+    to: Vec<Target>,
+    #[command(flatten)]
+    window: options::Window,
+    #[command(flatten)]
+    parts: options::Streaming,
+}
+
+/// What of a frame is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Show {
+    /// The picture
+    Picture,
+    /// Its depth, in colours
+    Depth,
+    /// Its circle of confusion
+    Coc,
+    /// The bins that it is split into
+    Bins,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// The options do not fit each other, there is no display, or there never was a frame.
+pub fn run(command: &PreviewCommand, global: &options::Global) -> Result<(), CliError> {
+    show(command.source.as_deref().unwrap_or_default(), &command.to, &command.window, &command.parts, global)
+}
+
+/// Shows a source in a window, and writes it to `to`.
+///
+/// # Errors
+/// As for [`run`].
+pub fn show(
+    source: &str,
+    to: &[Target],
+    window: &options::Window,
+    parts: &options::Streaming,
+    global: &options::Global,
+) -> Result<(), CliError> {
+    let options::Streaming { frames, stream, output, computing, .. } = parts;
+    refuse_overwrite(stream.report.as_deref(), output.force)?;
+    let refuse = |what: &str| Err(CliError::Usage(what.to_string()));
+    if stream.pace == Some(values::Pace::Asap) {
+        return refuse("--pace asap: a window shows frames in their own time; leave --pace out");
+    }
+    if stream.on_demand {
+        return refuse("--on-demand: the window watches all the time; leave it out, or use `bokehcam stream`");
+    }
+    if !source.is_empty() {
+        let name = SourceName::from_str(source).map_err(|error| CliError::Usage(format!("{source}: {error}")))?;
+        sinks::check(to, stream, &name.devices())?;
+    }
+    let outputs = to.iter().map(|target| match target.path() {
+        Some(path) => Ok(Output { name: path.display().to_string(), is_camera: target.is_live() }),
+        None => refuse("--to: beside a window, use a virtual camera, a folder or a file"),
+    });
+    let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
+    // As if there were depth: what the source lacks is seen when it is open.
+    let look = config::look(&parts.blur, &parts.aperture, computing.quality, true)?;
+    let executor = Executor::of(computing);
+    let state = first_state(look.clone(), source, window, stream.mirror);
+    let stop = terminal::stop_flag()?;
+    let ended = window::show(Preview {
+        state,
+        session: Start {
+            backstage: Box::new(Wings::new(parts, executor)),
+            look,
+            source: source.to_owned(),
+            outputs,
+            keep_going: stream.keep_going,
+            budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
+            folder: window.save_to.clone().unwrap_or_else(pictures_folder),
+        },
+        device: None,
+        close_at_end: frames.frames.is_some(),
+        memory: settings::state_folder().map(|folder| folder.join("window.toml")),
+        stop,
+    })?;
+    if let (Some(path), Some(report)) = (&stream.report, &ended.report) {
+        write_report(path, report)?;
+    }
+    if let Some(report) = ended.report.as_ref().filter(|_| !global.quiet) {
+        terminal::say(&report.to_string());
+    }
+    match ended.lost {
+        Some(why) if ended.report.is_none() => Err(CliError::NoFrames(why)),
+        _ => Ok(()),
+    }
+}
+
+fn first_state(look: Look, source: &str, window: &options::Window, mirror: bool) -> State {
+    let mut state = State::new(look, source.to_owned());
+    state.shown = match window.show {
+        Show::Picture => Shown::Picture,
+        Show::Depth => Shown::Depth,
+        Show::Coc => Shown::Coc,
+        Show::Bins => Shown::Bins,
+    };
+    state.split = window.split;
+    state.mirror = mirror;
+    state.full_screen = window.full_screen;
+    state.instruments = window.instruments;
+    state.panel = window.panel;
+    state.text_scale = window.text_scale;
+    state
+}
+
+/// Where people keep pictures, else here.
+fn pictures_folder() -> PathBuf {
+    let home = std::env::var_os("HOME").map(PathBuf::from);
+    let named = std::env::var_os("XDG_PICTURES_DIR").map(PathBuf::from);
+    let usual = home.map(|home| home.join("Pictures"));
+    named.into_iter().chain(usual).find(|folder| folder.is_dir()).unwrap_or_default()
+}

@@ -1,0 +1,206 @@
+//! What the window asks for by name, got as the other commands get it.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use super::super::config::Executor;
+use super::super::options::{self, Streaming};
+use super::super::settings;
+use super::super::source::{Source, SourceName, Wanted};
+use super::super::{command_line, depth};
+use crate::bokeh::{self, Bokeh};
+use crate::clock::Clock;
+use crate::look::Look;
+use crate::preview::backstage::{Backstage, Choice, Control, Opened, Preset};
+use crate::sink::{self, Sink, Target};
+
+/// What is said when there is nothing to look at but our own scene.
+const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
+                         `bokehcam doctor` says what is missing.";
+/// What is called so needs no camera.
+const SYNTHETIC: &str = "synthetic";
+
+pub(super) struct Wings {
+    parts: Streaming,
+    executor: Executor,
+    settings_file: Option<PathBuf>,
+    /// The camera that was opened last, where its controls can be set.
+    camera: Option<String>,
+}
+
+impl Wings {
+    /// Opens what is asked for as `parts` say.
+    pub fn new(parts: &Streaming, executor: Executor) -> Self {
+        let mut parts = parts.clone();
+        // Of which effect the window makes use, and when a recording is over, the person says later.
+        parts.blur.effect = None;
+        parts.frames.repeat = true;
+        Self { parts, executor, settings_file: settings::user_file(), camera: None }
+    }
+
+    fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
+        let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
+        let Streaming { frames, blur, depth, stereo, stream, .. } = &self.parts;
+        let frames = options::Source { repeat: matches!(source_name, SourceName::Folder(_)), ..frames.clone() };
+        let wanted = Wanted {
+            frames: &frames,
+            depth,
+            stereo,
+            blur: Some(blur),
+            executor: &self.executor,
+            keep_going: stream.keep_going,
+            cycle: true,
+        };
+        let source = Source::open(&source_name, &wanted).map_err(|error| error.to_string())?;
+        let source = depth::beside(source, blur, depth, stream.keep_going, &Clock::system());
+        Ok((source.map_err(|error| error.to_string())?, source_name))
+    }
+}
+
+impl Backstage for Wings {
+    fn sources(&mut self) -> Vec<Choice> {
+        let mut sources = devices::cameras();
+        sources.push(Choice { name: SYNTHETIC.into(), label: "Synthetic scene".into() });
+        sources
+    }
+
+    fn virtual_cameras(&mut self) -> Vec<Choice> {
+        devices::virtual_cameras()
+    }
+
+    fn open(&mut self, name: &str) -> Result<Opened, String> {
+        let mut notes = Vec::new();
+        let first = devices::cameras().into_iter().next();
+        let name = match name {
+            "" => first.map_or_else(
+                || {
+                    notes.push(NO_CAMERA.to_owned());
+                    SYNTHETIC.to_owned()
+                },
+                |camera| camera.name,
+            ),
+            name => name.to_owned(),
+        };
+        let (source, source_name) = self.open_source(&name)?;
+        self.camera = devices::camera_of(&source_name);
+        let controls = self.camera.as_deref().map(devices::controls).unwrap_or_default();
+        let (has_depth, measured) = (source.has_depth(), source.is_measured());
+        Ok(Opened { name, camera: source.camera, depth: source.depth, has_depth, measured, notes, controls })
+    }
+
+    fn set_control(&mut self, name: &str, value: i64) -> Result<Vec<Control>, String> {
+        match &self.camera {
+            Some(camera) => devices::set_control(camera, name, value),
+            None => Err("this source has no controls".to_owned()),
+        }
+    }
+
+    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+        self.executor.create(settings, size).map_err(|error| error.to_string())
+    }
+
+    fn output(&mut self, name: &str, size: (u32, u32), period_ns: u64) -> Result<Box<dyn Sink>, String> {
+        let out_size = self.parts.stream.out_size.map(|size| (size.width, size.height));
+        let force = self.parts.output.force;
+        let options = sink::Options { force, out_size, ..sink::Options::new(size, period_ns) };
+        let target = Target::from_str(name).map_err(|error| error.to_string())?;
+        target.open(&options).map_err(|error| error.to_string())
+    }
+
+    fn command(&self, look: &Look, source: &str, outputs: &[String]) -> String {
+        command_line::of(look, source, outputs)
+    }
+
+    fn presets(&mut self, look: &Look) -> Vec<Preset> {
+        let presets = settings::presets(self.settings_file.as_deref(), look).unwrap_or_else(|error| {
+            tracing::warn!("{error}");
+            Vec::new()
+        });
+        presets.into_iter().map(|(name, look, own)| Preset { name, look, own }).collect()
+    }
+
+    fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
+        let Some(file) = &self.settings_file else {
+            return Err("there is no place for settings: set HOME or XDG_CONFIG_HOME".to_owned());
+        };
+        settings::save_preset(file, name, &look.flags()).map_err(|error| error.to_string())
+    }
+}
+
+#[cfg(feature = "camera")]
+mod devices {
+    use super::super::super::source::SourceName;
+    use super::{Choice, Control};
+    use crate::v4l2::live::knobs::{self, Knob};
+    use crate::v4l2::node::{self, Kind, Node};
+
+    fn choices(kind: Kind) -> Vec<Choice> {
+        let of_kind = |node: &Node| node.kind == kind && (kind == Kind::Virtual || node.captures);
+        let choice = |node: Node| {
+            let name = node.path.display().to_string();
+            let label = if node.card.is_empty() { name.clone() } else { format!("{} ({name})", node.card) };
+            Choice { name, label }
+        };
+        node::nodes().into_iter().filter(of_kind).map(choice).collect()
+    }
+
+    pub fn cameras() -> Vec<Choice> {
+        choices(Kind::Capture)
+    }
+
+    pub fn virtual_cameras() -> Vec<Choice> {
+        choices(Kind::Virtual)
+    }
+
+    /// One camera has controls of its own; two have to see alike.
+    pub fn camera_of(source: &SourceName) -> Option<String> {
+        match source {
+            SourceName::Camera(camera) => Some(camera.node().display().to_string()),
+            _ => None,
+        }
+    }
+
+    pub fn controls(camera: &str) -> Vec<Control> {
+        let listed = knobs::list(camera).unwrap_or_else(|error| {
+            tracing::info!("{error}");
+            Vec::new()
+        });
+        listed.into_iter().map(control).collect()
+    }
+
+    pub fn set_control(camera: &str, name: &str, value: i64) -> Result<Vec<Control>, String> {
+        let turned = knobs::turn(camera, name, value).map_err(|error| error.to_string())?;
+        Ok(turned.into_iter().map(control).collect())
+    }
+
+    fn control(knob: Knob) -> Control {
+        let Knob { name, value, range, menu, switch, active } = knob;
+        Control { name, value, range, menu, switch, active }
+    }
+}
+
+#[cfg(not(feature = "camera"))]
+mod devices {
+    use super::super::super::source::SourceName;
+    use super::{Choice, Control};
+
+    pub fn cameras() -> Vec<Choice> {
+        Vec::new()
+    }
+
+    pub fn virtual_cameras() -> Vec<Choice> {
+        Vec::new()
+    }
+
+    pub fn camera_of(_: &SourceName) -> Option<String> {
+        None
+    }
+
+    pub fn controls(_: &str) -> Vec<Control> {
+        Vec::new()
+    }
+
+    pub fn set_control(camera: &str, _: &str, _: i64) -> Result<Vec<Control>, String> {
+        Err(format!("{camera}: this build leaves cameras out (feature `camera`)"))
+    }
+}

@@ -1,0 +1,190 @@
+//! One run of the pipeline behind the window.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::thread::{self, JoinHandle};
+
+use super::super::backstage::{Backstage, Opened};
+use super::super::state::{Output, Running, Source};
+use super::{Heard, News};
+use crate::bokeh;
+use crate::clock::Clock;
+use crate::link;
+use crate::look::Look;
+use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run};
+use crate::sink::switch::Told as Written;
+use crate::sink::Sink;
+use crate::sink::{Switch, Switchboard};
+use crate::stats::Report;
+
+/// What a run begins with besides its source.
+pub(super) struct Settings<'a> {
+    pub look: &'a Look,
+    pub keep_going: bool,
+    pub budget_ns: Option<u64>,
+}
+
+/// A run, and the ways into it.
+pub(super) struct Live {
+    pub size: (u32, u32),
+    pub period_ns: u64,
+    has_depth: bool,
+    measured: bool,
+    /// What the executor was made for.
+    made_for: Option<bokeh::Settings>,
+    changes: mpsc::Sender<Change>,
+    board: Switchboard,
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<Option<Report>>,
+}
+
+/// The window's pictures come in real time.
+const ADAPTIVE: bool = true;
+
+impl Live {
+    /// Begins a run; `wrote` is told what becomes of its outputs, and `ended` how it ended.
+    ///
+    /// # Errors
+    /// The executor cannot be made, or the system gives no thread: one line.
+    pub(super) fn begin(
+        opened: Opened,
+        settings: &Settings,
+        backstage: &mut dyn Backstage,
+        news: &News,
+        wrote: impl Fn(Written) + Send + Sync + 'static,
+        ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
+    ) -> Result<(Self, Source), String> {
+        let Opened { camera, depth, has_depth, measured, .. } = opened;
+        let info = camera.info();
+        let look = fitting(settings.look, has_depth);
+        let made_for = look.settings(info.size, ADAPTIVE);
+        let bokeh = made_for.as_ref().map(|made_for| backstage.executor(made_for, info.size)).transpose()?;
+        let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
+        let budget_ns = settings.budget_ns.unwrap_or(info.period_ns);
+        let (sink, board) = Switch::new("window", wrote);
+        let (changes, to_come) = mpsc::channel();
+        let (view, views) = link::live();
+        let stop = Arc::new(AtomicBool::new(false));
+        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), settings.keep_going);
+        let (coc, refine, quality) = (look.coc_rule(info.size), look.refines(measured), look.quality_rule(ADAPTIVE));
+        news.send(Heard::Views(views));
+        let run = move || {
+            pipeline::run(Run {
+                camera,
+                depth,
+                bokeh,
+                quality,
+                coc,
+                refine,
+                changes: Some(to_come),
+                sink: Box::new(sink),
+                pace: Pace::Realtime,
+                budget_ns,
+                keep_going,
+                demand: None,
+                mirror: false,
+                view: Some(view),
+                clock: Clock::system(),
+                stop: &stopped,
+                progress: &|_| wake(),
+            })
+        };
+        let thread = thread::Builder::new().name("pipeline".into()).spawn(move || {
+            let result = run();
+            let report = match &result {
+                Ok(report) => report.clone(),
+                Err(failed) => (*failed.report).clone(),
+            };
+            ended(result);
+            Some(report)
+        });
+        let thread = thread.map_err(|error| format!("cannot start the pipeline's thread: {error}"))?;
+        let source = Source::Running(Running {
+            label: info.name,
+            size: info.size,
+            period_ns: info.period_ns,
+            has_depth,
+            executor,
+            budget_ns,
+        });
+        let live = Self {
+            size: info.size,
+            period_ns: info.period_ns,
+            has_depth,
+            measured,
+            made_for,
+            changes,
+            board,
+            stop,
+            thread,
+        };
+        Ok((live, source))
+    }
+
+    /// The look as far as the source allows it.
+    pub(super) fn effective(&self, look: &Look) -> Look {
+        fitting(look, self.has_depth)
+    }
+
+    /// Frames have this look from now on.
+    ///
+    /// # Errors
+    /// Its executor cannot be made: one line. The one before goes on.
+    pub(super) fn adopt(&mut self, look: &Look, backstage: &mut dyn Backstage) -> Result<(), String> {
+        let look = self.effective(look);
+        let made_for = look.settings(self.size, ADAPTIVE);
+        let change = |bokeh| Change {
+            coc: look.coc_rule(self.size),
+            refine: look.refines(self.measured),
+            quality: look.quality_rule(ADAPTIVE),
+            bokeh,
+        };
+        // A run that has ended hears nothing.
+        if self.effect() == look.effect {
+            // At once what can be at once: the executor at hand cuts what it was not made for.
+            let _ = self.changes.send(change(Executor::Keep));
+        }
+        if made_for != self.made_for {
+            let bokeh = made_for.as_ref().map(|made_for| backstage.executor(made_for, self.size)).transpose()?;
+            let _ = self.changes.send(change(Executor::To(bokeh)));
+            self.made_for = made_for;
+        }
+        Ok(())
+    }
+
+    fn effect(&self) -> Option<bokeh::Effect> {
+        self.made_for.as_ref().map(|settings| settings.effect)
+    }
+
+    /// Frames go to this sink, too.
+    pub(super) fn write_to(&self, output: &Output, sink: Box<dyn Sink>) {
+        // A run that has ended drops it, which is told.
+        let _ = self.board.add(&output.name, sink);
+    }
+
+    /// Completes a sink.
+    pub(super) fn end(&self, output: &Output) {
+        let _ = self.board.remove(&output.name);
+    }
+
+    /// Ends the run and waits for it; gives back its report.
+    pub(super) fn stop(self) -> Option<Report> {
+        self.stop.store(true, Ordering::Relaxed);
+        self.join()
+    }
+
+    /// Waits for a run that has ended or will.
+    pub(super) fn join(self) -> Option<Report> {
+        self.thread.join().ok().flatten()
+    }
+}
+
+/// The look as far as a source with depth or without allows it: without, the depth of field is that of a toy world.
+pub(in crate::preview) fn fitting(look: &Look, has_depth: bool) -> Look {
+    let mut look = look.clone();
+    if look.effect == Some(bokeh::Effect::Dof) && !has_depth {
+        look.effect = Some(bokeh::Effect::TiltShift);
+    }
+    look
+}

@@ -1,0 +1,355 @@
+//! The window's events.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use winit::application::ApplicationHandler;
+use winit::event::WindowEvent;
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
+use winit::window::{Fullscreen, WindowId};
+
+use super::gfx::Gfx;
+use super::memory::Memory;
+use super::{Ended, Preview, WindowError};
+use crate::bokeh;
+use crate::clock::Clock;
+use crate::compute::device::Device;
+use crate::frame::ColorImage;
+use crate::link::Receiver;
+use crate::optics::CocField;
+use crate::pipeline::View;
+use crate::preview::panel::{self, Canvas, Panel};
+use crate::preview::present::{Area, Controls, Drawing};
+use crate::preview::session::{Heard, Session, Still, Wake, fitting};
+use crate::preview::state::{Action, Effect, Shown, Source, State};
+use crate::preview::views::Views;
+
+/// Instruments are laid out anew this often.
+const INSTRUMENTS: Duration = Duration::from_millis(100);
+/// A stop from outside is seen after this time at the latest.
+const LOOK_UP: Duration = Duration::from_millis(250);
+
+pub(super) struct App {
+    state: State,
+    panel: Panel,
+    ctx: egui::Context,
+    gfx: Option<Gfx>,
+    device: Option<Arc<Device>>,
+    session: Session,
+    /// Whether a wake is under way, so that a busy session rings once.
+    rung: Arc<AtomicBool>,
+    views: Option<Receiver<View>>,
+    view: Option<View>,
+    /// Whether `view` was not on the screen yet.
+    is_new: bool,
+    made: Views,
+    /// What the frames that come are blurred with.
+    settings: Option<bokeh::Settings>,
+    nothing: ColorImage,
+    clock: Clock,
+    /// When controls are to be laid out next.
+    layout_at: Option<Instant>,
+    laid_out: Instant,
+    /// The oldest input whose effect is not on the screen yet.
+    input_at: Option<Instant>,
+    hidden: bool,
+    memory: Option<PathBuf>,
+    remembered: Option<Memory>,
+    close_at_end: bool,
+    stop: Arc<AtomicBool>,
+    failed: Option<WindowError>,
+}
+
+impl App {
+    /// Begins the session at once, so that the source opens while the window does.
+    pub fn new(preview: Preview, proxy: EventLoopProxy<()>) -> Result<Self, WindowError> {
+        let Preview { mut state, session, device, close_at_end, memory, stop } = preview;
+        let rung = Arc::new(AtomicBool::new(false));
+        let ringing = Arc::clone(&rung);
+        // An event loop that is gone needs no waking.
+        let wake: Wake = Arc::new(move || {
+            if !ringing.swap(true, Ordering::AcqRel) {
+                let _ = proxy.send_event(());
+            }
+        });
+        let clock = Clock::system();
+        state.meters.begin(clock.now_ns());
+        let ctx = egui::Context::default();
+        panel::dress(&ctx);
+        let remembered = memory.as_deref().and_then(Memory::read);
+        Ok(Self {
+            state,
+            panel: Panel::default(),
+            ctx,
+            gfx: None,
+            device,
+            session: Session::begin(session, wake)?,
+            rung,
+            views: None,
+            view: None,
+            is_new: false,
+            made: Views::default(),
+            settings: None,
+            nothing: ColorImage::new(16, 9),
+            clock,
+            layout_at: Some(Instant::now()),
+            laid_out: Instant::now(),
+            input_at: None,
+            hidden: false,
+            memory,
+            remembered,
+            close_at_end,
+            stop,
+            failed: None,
+        })
+    }
+
+    /// Closes the session after the window. What was shown last goes into the report.
+    pub fn end(self) -> Result<Ended, WindowError> {
+        let Self { gfx, view, views, session, state, failed, .. } = self;
+        // The window goes at once; outputs may take a while to be completed.
+        drop((gfx, view, views));
+        let mut report = session.close();
+        if let Some(report) = &mut report {
+            report.window = state.meters.report();
+        }
+        let lost = match state.source {
+            Source::Lost(why) => Some(why),
+            _ => None,
+        };
+        failed.map_or(Ok(Ended { report, lost }), Err)
+    }
+
+    /// Hears what the session has to say, and takes the newest frame.
+    fn hear(&mut self, events: &ActiveEventLoop) {
+        // Before the look: what comes after it rings again.
+        self.rung.store(false, Ordering::Release);
+        let mut changed = false;
+        while let Some(heard) = self.session.hear() {
+            match heard {
+                Heard::Views(views) => {
+                    self.views = Some(views);
+                    self.state.meters.restart();
+                }
+                Heard::Copy(text) => {
+                    if let Some(gfx) = &mut self.gfx {
+                        gfx.input.set_clipboard_text(text);
+                    }
+                }
+                Heard::Told(told) => {
+                    self.state.hear(told);
+                    changed = true;
+                }
+            }
+        }
+        if changed {
+            self.look_changed();
+            self.layout_at = Some(Instant::now());
+            self.set_title();
+            if self.close_at_end && self.state.source == Source::Ended {
+                events.exit();
+            }
+        }
+        let newest = self.views.as_mut().and_then(Receiver::try_recv);
+        if let Some(view) = newest.filter(|_| !self.state.frozen) {
+            self.state.focus_m = match view.coc {
+                CocField::Depth(coc) => Some(coc.focus_m),
+                _ => None,
+            };
+            self.view = Some(view);
+            self.is_new = true;
+            changed = true;
+        }
+        if changed {
+            self.ask_for_redraw();
+        }
+    }
+
+    fn set_title(&self) {
+        if let (Some(gfx), Source::Running(running)) = (&self.gfx, &self.state.source) {
+            gfx.window.set_title(&format!("{} - bokehcam", running.label));
+        }
+    }
+
+    fn look_changed(&mut self) {
+        self.settings = match &self.state.source {
+            Source::Running(running) => fitting(&self.state.look, running.has_depth).settings(running.size, true),
+            _ => None,
+        };
+    }
+
+    fn ask_for_redraw(&self) {
+        if let Some(gfx) = self.gfx.as_ref().filter(|_| !self.hidden) {
+            gfx.window.request_redraw();
+        }
+    }
+
+    fn touched(&mut self) {
+        let now = Instant::now();
+        self.input_at.get_or_insert(now);
+        self.layout_at = Some(now);
+        self.ask_for_redraw();
+    }
+
+    fn picture_size(&self) -> (u32, u32) {
+        self.view.as_ref().map_or(self.nothing.size(), |view| view.picture.size())
+    }
+
+    /// Lays the controls out and does what the person did to them.
+    fn lay_out(&mut self, events: &ActiveEventLoop) {
+        let size = self.picture_size();
+        let Some(gfx) = &mut self.gfx else { return };
+        let canvas = Canvas { area: gfx.area(size), size };
+        let input = gfx.input.take_egui_input(&gfx.window);
+        let mut actions = Vec::new();
+        let (panel, state) = (&mut self.panel, &self.state);
+        let output = self.ctx.run_ui(input, |ui| panel.show(ui, state, canvas, &mut actions));
+        gfx.input.handle_platform_output(&gfx.window, output.platform_output);
+        let primitives = self.ctx.tessellate(output.shapes, output.pixels_per_point);
+        let pixels_per_point = output.pixels_per_point;
+        gfx.presenter.set_controls(Controls { primitives, textures: output.textures_delta, pixels_per_point });
+        self.laid_out = Instant::now();
+        let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
+        self.layout_at = self.laid_out.checked_add(wait);
+        if !actions.is_empty() {
+            // They are shown with the next layout, which also answers what is asked of the state then.
+            self.layout_at = Some(self.laid_out);
+            actions.into_iter().for_each(|action| self.perform(action, events));
+            self.ask_for_redraw();
+        }
+    }
+
+    fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
+        for effect in self.state.apply(action) {
+            match effect {
+                Effect::Snapshot => self.snapshot(),
+                Effect::FullScreen(on) => {
+                    if let Some(gfx) = &self.gfx {
+                        gfx.window.set_fullscreen(on.then_some(Fullscreen::Borderless(None)));
+                    }
+                }
+                Effect::Close => events.exit(),
+                Effect::Look(look) => {
+                    self.session.order(Effect::Look(look));
+                    self.look_changed();
+                }
+                other => self.session.order(other),
+            }
+        }
+    }
+
+    fn snapshot(&mut self) {
+        let Some(view) = &self.view else { return };
+        self.session.save(Still {
+            picture: view.picture.clone(),
+            color: view.color.as_ref().unwrap_or(&view.picture).clone(),
+            depth: view.depth.as_ref().map(|depth| (**depth).clone()),
+            focus_m: self.state.focus_m,
+            quality: view.trace.quality,
+        });
+    }
+
+    /// Shows the frame with the controls as they are.
+    fn draw(&mut self, events: &ActiveEventLoop) {
+        let size = self.picture_size();
+        let Some(gfx) = self.gfx.as_mut().filter(|_| !self.hidden) else { return };
+        let State { shown, mirror, split, source, .. } = &self.state;
+        let made = match (&self.view, shown) {
+            (Some(view), shown) if *shown != Shown::Picture => self.made.draw(*shown, view, self.settings.as_ref()),
+            _ => None,
+        };
+        self.state.legend = made.and(self.made.legend());
+        let picture = self.view.as_ref().map_or(&self.nothing, |view| &*view.picture);
+        let before = self.view.as_ref().map(|view| view.color.as_ref().map_or(picture, |color| color));
+        let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
+        let drawing = Drawing {
+            area: if self.view.is_some() { gfx.area(size) } else { Area::default() },
+            picture: made.unwrap_or(picture),
+            before: before.zip(*split),
+            mirror: *mirror,
+            stale: !matches!(source, Source::Running(_) | Source::Opening),
+            background,
+        };
+        let began_ns = self.clock.now_ns();
+        gfx.window.pre_present_notify();
+        if let Err(error) = gfx.presenter.present(&drawing) {
+            self.failed = Some(error.into());
+            return events.exit();
+        }
+        let now_ns = self.clock.now_ns();
+        if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.is_new)) {
+            self.state.meters.presented(view, now_ns, now_ns - began_ns);
+        }
+        if let Some(input_at) = self.input_at.take() {
+            self.state.meters.reacted(input_at.elapsed().as_nanos() as u64);
+        }
+    }
+}
+
+impl ApplicationHandler<()> for App {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.gfx.is_some() {
+            return;
+        }
+        match Gfx::open(events, &self.ctx, self.remembered, self.state.full_screen, self.device.clone()) {
+            Ok(gfx) => self.gfx = Some(gfx),
+            Err(error) => {
+                self.failed = Some(error);
+                return events.exit();
+            }
+        }
+        self.hear(events);
+        self.ask_for_redraw();
+    }
+
+    fn user_event(&mut self, events: &ActiveEventLoop, (): ()) {
+        self.hear(events);
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(gfx) = &mut self.gfx else { return };
+        match &event {
+            WindowEvent::RedrawRequested => {
+                let instruments = self.state.instruments && self.is_new && self.laid_out.elapsed() >= INSTRUMENTS;
+                if instruments || self.layout_at.is_some_and(|at| at <= Instant::now()) {
+                    self.lay_out(events);
+                }
+                return self.draw(events);
+            }
+            WindowEvent::CloseRequested => return events.exit(),
+            WindowEvent::Occluded(hidden) => {
+                self.hidden = *hidden;
+                return self.ask_for_redraw();
+            }
+            WindowEvent::Resized(size) => {
+                gfx.presenter.resize((size.width, size.height));
+                self.hidden = size.width == 0 || size.height == 0;
+                self.remembered = gfx.memory().or(self.remembered);
+            }
+            _ => {}
+        }
+        if gfx.input.on_window_event(&gfx.window, &event).repaint {
+            self.touched();
+        }
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        if self.stop.load(Ordering::Relaxed) {
+            return events.exit();
+        }
+        let now = Instant::now();
+        if self.layout_at.is_some_and(|at| at <= now) {
+            self.ask_for_redraw();
+        }
+        let layout_at = self.layout_at.filter(|_| !self.hidden).map_or(now + LOOK_UP, |at| at.min(now + LOOK_UP));
+        events.set_control_flow(ControlFlow::WaitUntil(layout_at));
+    }
+
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        if let (Some(path), Some(memory)) = (&self.memory, self.gfx.as_ref().and_then(Gfx::memory).or(self.remembered)) {
+            memory.write(path);
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! The window: winit's events in, pictures and controls out.
+//!
+//! Its thread does nothing that can take long. A frame that comes is shown at once with the controls as they are;
+//! controls are laid out anew when something happened to them, and ten times a second while instruments are shown.
+
+mod app;
+mod gfx;
+mod memory;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use winit::event_loop::EventLoop;
+
+use app::App;
+
+use super::session;
+use super::state::State;
+use crate::compute::device::Device;
+use crate::stats::Report;
+
+/// What a preview begins with.
+pub struct Preview {
+    /// What the window shows first.
+    pub state: State,
+    /// What goes on behind it.
+    pub session: session::Start,
+    /// What draws, where that is a GPU.
+    pub device: Option<Arc<Device>>,
+    /// Close the window when the source ends.
+    pub close_at_end: bool,
+    /// Where the size of the window is remembered.
+    pub memory: Option<PathBuf>,
+    /// Once set, the window closes.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// How a preview ended.
+#[derive(Clone, Debug, Default)]
+pub struct Ended {
+    /// The report of the last run.
+    pub report: Option<Report>,
+    /// Why there were no frames (any more), where that was so when the window closed.
+    pub lost: Option<String>,
+}
+
+/// Why there is no window.
+#[derive(Debug, thiserror::Error)]
+pub enum WindowError {
+    /// No display server, or one that refuses.
+    #[error("there can be no window: {0}; without one, `bokehcam stream SOURCE --to SINK` does the same")]
+    NoWindow(String),
+    /// It cannot be drawn to.
+    #[error(transparent)]
+    Present(#[from] super::present::PresentError),
+    /// The system gives no thread.
+    #[error("cannot start the session's thread: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// Shows the window until it is closed.
+///
+/// # Errors
+/// There is no display, or the window cannot be drawn to.
+pub fn show(preview: Preview) -> Result<Ended, WindowError> {
+    let mut events = event_loop()?;
+    let proxy = events.create_proxy();
+    let mut app = App::new(preview, proxy)?;
+    let ran = {
+        use winit::platform::run_on_demand::EventLoopExtRunOnDemand;
+        events.run_app_on_demand(&mut app)
+    };
+    let ended = app.end();
+    ran.map_err(|error| WindowError::NoWindow(error.to_string()))?;
+    ended
+}
+
+/// The event loop. Where a library that the display needs is missing, winit panics.
+fn event_loop() -> Result<EventLoop<()>, WindowError> {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| {}));
+    let made = std::panic::catch_unwind(|| EventLoop::with_user_event().build());
+    std::panic::set_hook(hook);
+    match made {
+        Ok(Ok(events)) => Ok(events),
+        Ok(Err(error)) => Err(WindowError::NoWindow(error.to_string())),
+        Err(panic) => {
+            let why = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+            Err(WindowError::NoWindow(why.unwrap_or("a library is missing").to_owned()))
+        }
+    }
+}
