@@ -33,6 +33,7 @@ const STOP: f32 = 0.005;
 pub struct Focus {
     rule: FocusRule,
     subject: Subject,
+    loyalty: Loyalty,
     window_m: Vec<f32>,
     lens: Option<EasedLens>,
 }
@@ -47,13 +48,14 @@ struct EasedLens {
 impl Focus {
     /// A lens that was not focused yet: the first frame sets it at once.
     pub fn new(rule: FocusRule) -> Self {
-        Self { rule, subject: Subject::default(), window_m: Vec::new(), lens: None }
+        Self { rule, subject: Subject::default(), loyalty: Loyalty::default(), window_m: Vec::new(), lens: None }
     }
 
     /// Focuses on something else: the lens moves there from where it is.
     pub fn follow(&mut self, rule: FocusRule) {
         if self.rule != rule {
             self.rule = rule;
+            self.loyalty = Loyalty::default();
             self.lens.iter_mut().for_each(|lens| lens.moving = true);
         }
     }
@@ -63,7 +65,7 @@ impl Focus {
     pub fn focus_m(&mut self, map: &DepthMap, time_ns: u64) -> f32 {
         let target_m = match self.rule {
             FocusRule::Metres(focus_m) => Some(focus_m),
-            FocusRule::Auto => self.subject.distance_m(map),
+            FocusRule::Auto => self.subject.distance_m(map).map(|found_m| self.loyalty.choose_m(found_m, time_ns)),
             FocusRule::Point { x, y } => point_m(map, x, y, &mut self.window_m),
         };
         let Some(target_m) = target_m else {
@@ -87,6 +89,53 @@ impl EasedLens {
             let share = 1.0 - (-elapsed_s / TIME_CONSTANT_S).exp();
             self.dioptres += (target - self.dioptres) * share as f32;
         }
+    }
+}
+
+/// Two distances this close together, in dioptres, are of one subject; and how fast it may move, in dioptres a second.
+const SAME: f32 = 0.12;
+const SPEED: f32 = 2.0;
+/// Another subject is turned to once it was there for so long: whoever passes by is not meant.
+const PATIENCE_NS: u64 = 400_000_000;
+
+/// Stays with a subject while others come and go, so that the lens does not hunt between two of them.
+#[derive(Debug, Default)]
+struct Loyalty {
+    subject: Option<Seen>,
+    /// Another one, and since when it is there.
+    rival: Option<(Seen, u64)>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    dioptres: f32,
+    time_ns: u64,
+}
+
+impl Seen {
+    fn is_same(self, found: Seen) -> bool {
+        let elapsed_s = found.time_ns.saturating_sub(self.time_ns) as f32 / 1e9;
+        (found.dioptres - self.dioptres).abs() <= SAME + SPEED * elapsed_s
+    }
+}
+
+impl Loyalty {
+    /// The distance to focus on where the nearest large subject is found at `found_m`.
+    fn choose_m(&mut self, found_m: f32, time_ns: u64) -> f32 {
+        let found = Seen { dioptres: 1.0 / found_m, time_ns };
+        let Some(subject) = self.subject.filter(|subject| !subject.is_same(found)) else {
+            (self.subject, self.rival) = (Some(found), None);
+            return found_m;
+        };
+        // Time in which it was not seen is none in which it could move unseen.
+        self.subject = Some(Seen { time_ns, ..subject });
+        let since_ns = self.rival.filter(|(rival, _)| rival.is_same(found)).map_or(time_ns, |(_, since_ns)| since_ns);
+        if time_ns.saturating_sub(since_ns) >= PATIENCE_NS {
+            (self.subject, self.rival) = (Some(found), None);
+            return found_m;
+        }
+        self.rival = Some((found, since_ns));
+        1.0 / subject.dioptres
     }
 }
 
@@ -188,4 +237,57 @@ impl Subject {
 fn centre_weight(at_px: usize, size_px: usize) -> f32 {
     let off = (at_px as f32 + 0.5) / size_px as f32 * 2.0 - 1.0;
     1.0 - 0.9 * off * off
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRAME_NS: u64 = 33_000_000;
+
+    fn flat(metres: f32) -> DepthMap {
+        DepthMap { width: 8, height: 8, metres: vec![metres; 64] }
+    }
+
+    #[test]
+    fn the_lens_does_not_hunt_between_two_subjects() {
+        let mut focus = Focus::new(FocusRule::Auto);
+        for frame in 0..300u64 {
+            // Every few frames the other one is found.
+            let at_m = if frame % 7 < 3 { 3.0 } else { 1.0 };
+            let focus_m = focus.focus_m(&flat(if frame == 0 { 1.0 } else { at_m }), frame * FRAME_NS);
+            assert!((focus_m - 1.0).abs() < 0.02, "{frame}: {focus_m}");
+        }
+    }
+
+    #[test]
+    fn it_turns_to_a_subject_that_stays_and_follows_one_that_moves() {
+        let mut focus = Focus::new(FocusRule::Auto);
+        focus.focus_m(&flat(1.0), 0);
+        let turned = (1..200u64).find(|&k| focus.focus_m(&flat(3.0), k * FRAME_NS) > 1.05).unwrap() * FRAME_NS;
+        assert!((PATIENCE_NS..PATIENCE_NS + 200_000_000).contains(&turned), "{turned}");
+        let settled_m = (200..300u64).map(|k| focus.focus_m(&flat(3.0), k * FRAME_NS)).last().unwrap();
+        assert!((settled_m - 3.0).abs() < 0.03, "{settled_m}");
+        // From 3 m to 1 m in a second: never more than what the lens' own inertia makes of it.
+        for k in 0..30u64 {
+            let at_m = 3.0 / (1.0 + 2.0 * k as f32 / 30.0);
+            let focus_m = focus.focus_m(&flat(at_m), (300 + k) * FRAME_NS);
+            assert!((1.0 / focus_m - 1.0 / at_m).abs() < 0.25, "{k}: {focus_m} for {at_m}");
+        }
+    }
+
+    #[test]
+    fn another_rule_moves_the_lens_from_where_it_is() {
+        let mut focus = Focus::new(FocusRule::Metres(1.5));
+        assert_eq!(focus.focus_m(&flat(4.0), 0), 1.5);
+        focus.follow(FocusRule::Metres(3.0));
+        let mut last_m = 1.5;
+        for frame in 1..120u64 {
+            let focus_m = focus.focus_m(&flat(4.0), frame * FRAME_NS);
+            assert!(focus_m >= last_m && focus_m <= 3.0, "{frame}: {last_m} to {focus_m}");
+            assert!(focus_m - last_m < 0.5, "it does not jump");
+            last_m = focus_m;
+        }
+        assert!((last_m - 3.0).abs() < 0.02, "{last_m}");
+    }
 }

@@ -77,10 +77,8 @@ impl Stage<'_> {
                 let frames = self.tally.frames();
                 match view.send(View { picture, color, depth, coc, stamp, captured_ns, trace, frames }) {
                     Ok(displaced) => self.looked_at(displaced.is_none(), std::mem::replace(&mut viewed, kept)),
-                    Err(link::Abandoned) => {
-                        viewed = kept;
-                        break;
-                    }
+                    // Nobody knows this frame's fate: it stays in flight.
+                    Err(link::Abandoned) => break,
                 }
             }
             let frames = self.tally.frames();

@@ -1,6 +1,7 @@
 //! The pipeline with stages that are slow, fail or panic: every frame is accounted for, and the cause is the error.
 
 mod accounting;
+mod changes;
 mod fakes;
 mod faults;
 mod frames;
