@@ -1,6 +1,7 @@
 //! Pictures and depth maps: what travels between the stages.
 
 pub mod fit;
+pub mod scale;
 
 /// Number of a captured frame: counts from 0 in capture order, dropped frames included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

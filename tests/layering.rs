@@ -17,12 +17,11 @@ const LAYERS: [&[&str]; 9] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 19] = [
+const DOORS: [(&str, &[&str]); 18] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
     ("ctrlc", &["cli"]),
-    ("dream_soft_render", &["preview/present"]),
     ("egui", &["preview"]),
     ("egui_wgpu", &["preview/present"]),
     ("egui_winit", &["preview/window"]),

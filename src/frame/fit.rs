@@ -1,18 +1,12 @@
 //! A picture scaled into another size, whole and undistorted: what is left over on two sides becomes black bars.
 
 use super::ColorImage;
-
-/// Fractional bits of the weights of a row's or column's taps.
-const WEIGHT_BITS: u32 = 14;
-/// Fractional bits of a value that is filtered down the columns but not yet along the row; fits 16 bits.
-const VALUE_BITS: u32 = 8;
+use super::scale::Scale;
 
 /// Scales pictures; keeps its memory and weights from one to the next.
 #[derive(Debug, Default)]
 pub struct Fit {
-    across: Axis,
-    down: Axis,
-    /// One row of the source's width, filtered down the columns.
+    scale: Scale,
     row: Vec<u16>,
 }
 
@@ -40,9 +34,7 @@ impl Fit {
             into.rgb.fill(0);
             return;
         };
-        self.across.adapt(from_width, place.width);
-        self.down.adapt(from_height, place.height);
-        self.row.resize(3 * from_width, 0);
+        self.scale.adapt((from_width, from_height), (place.width, place.height));
 
         let (above, rest) = into.rgb.split_at_mut(3 * width * place.top);
         let (rows, below) = rest.split_at_mut(3 * width * place.height);
@@ -53,9 +45,7 @@ impl Fit {
             let (scaled, right) = rest.split_at_mut(3 * place.width);
             left.fill(0);
             right.fill(0);
-            let (first, weights) = self.down.taps(y);
-            filter_down(&from.rgb[3 * from_width * first..], 3 * from_width, weights, &mut self.row);
-            self.across.filter(&self.row, scaled);
+            self.scale.row(&from.rgb, y, 0..place.width, &mut self.row, scaled);
         }
     }
 }
@@ -74,95 +64,6 @@ fn place(from: (usize, usize), into: (usize, usize)) -> Option<Place> {
     };
     // Even, so that pixels that share their colour in the output are of one kind.
     Some(Place { left: ((into.0 - width) / 2) & !1, top: ((into.1 - height) / 2) & !1, width, height })
-}
-
-/// The weighted sum of `weights.len()` rows of `stride` values each.
-fn filter_down(rows: &[u8], stride: usize, weights: &[u16], row: &mut [u16]) {
-    const SHIFT: u32 = WEIGHT_BITS - VALUE_BITS;
-    match *weights {
-        [weight] if weight == 1 << WEIGHT_BITS => {
-            for (sum, &value) in row.iter_mut().zip(rows) {
-                *sum = u16::from(value) << VALUE_BITS;
-            }
-        }
-        [a, b] => {
-            let (a, b) = (u32::from(a), u32::from(b));
-            for ((sum, &upper), &lower) in row.iter_mut().zip(rows).zip(&rows[stride..]) {
-                *sum = ((a * u32::from(upper) + b * u32::from(lower)) >> SHIFT) as u16;
-            }
-        }
-        _ => {
-            row.fill(0);
-            for (values, &weight) in rows.chunks_exact(stride).zip(weights) {
-                for (sum, &value) in row.iter_mut().zip(values) {
-                    // Each term cut to 8 bits of fraction: below a tenth of a code in all, for every usual size.
-                    *sum += ((u32::from(weight) * u32::from(value)) >> SHIFT) as u16;
-                }
-            }
-        }
-    }
-}
-
-/// The taps of every pixel along one axis of the scaled picture: equally many each, within the source.
-#[derive(Debug, Default)]
-struct Axis {
-    from: usize,
-    firsts: Vec<usize>,
-    taps: usize,
-    /// `taps` of each pixel; they sum to 1.
-    weights: Vec<u16>,
-}
-
-impl Axis {
-    fn adapt(&mut self, from: usize, to: usize) {
-        if (self.from, self.firsts.len()) == (from, to) {
-            return;
-        }
-        let ratio = from as f64 / to as f64;
-        let reach = ratio.max(1.0);
-        self.from = from;
-        self.taps = ((2.0 * reach).ceil() as usize).min(from);
-        self.firsts.clear();
-        self.weights.clear();
-        for pixel in 0..to {
-            let center = (pixel as f64 + 0.5) * ratio - 0.5;
-            let first = ((center - reach).floor() + 1.0).clamp(0.0, (from - self.taps) as f64) as usize;
-            let start = self.weights.len();
-            let tent = |tap: usize| (1.0 - ((first + tap) as f64 - center).abs() / reach).max(0.0);
-            let sum: f64 = (0..self.taps).map(tent).sum();
-            let one = f64::from(1 << WEIGHT_BITS);
-            self.weights.extend((0..self.taps).map(|tap| (tent(tap) / sum * one).round() as u16));
-            // What rounding left over goes where it is least: a constant picture stays as it is.
-            let weights = &mut self.weights[start..];
-            let left_over = (1 << WEIGHT_BITS) - weights.iter().map(|&weight| i32::from(weight)).sum::<i32>();
-            if let Some(largest) = weights.iter_mut().max() {
-                *largest = (i32::from(*largest) + left_over) as u16;
-            }
-            self.firsts.push(first);
-        }
-    }
-
-    fn taps(&self, pixel: usize) -> (usize, &[u16]) {
-        (self.firsts[pixel], &self.weights[pixel * self.taps..][..self.taps])
-    }
-
-    /// Filters a row of 3-channel pixels.
-    fn filter(&self, row: &[u16], scaled: &mut [u8]) {
-        const SHIFT: u32 = WEIGHT_BITS + VALUE_BITS;
-        let pixels = row.as_chunks::<3>().0;
-        let weights = self.weights.chunks_exact(self.taps);
-        for ((pixel, &first), weights) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(&self.firsts).zip(weights) {
-            let mut sums = [1_u32 << (SHIFT - 1); 3];
-            for (values, &weight) in pixels[first..].iter().zip(weights) {
-                for channel in 0..3 {
-                    sums[channel] += u32::from(weight) * u32::from(values[channel]);
-                }
-            }
-            for channel in 0..3 {
-                pixel[channel] = (sums[channel] >> SHIFT) as u8;
-            }
-        }
-    }
 }
 
 #[cfg(test)]

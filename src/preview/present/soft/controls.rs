@@ -1,0 +1,187 @@
+//! The controls as a picture of their own: painted when they change, laid over every frame.
+
+use std::ops::Range;
+
+use egui::epaint::{ClippedPrimitive, Mesh, Primitive, Vertex};
+use pulp::{Arch, Simd, WithSimd};
+
+use super::blend::over;
+use super::texture::{Texture, Textures};
+use super::triangle::{self, Clip, Corner};
+use crate::preview::present::Controls;
+
+/// Cells that a row is divided into: one bit each.
+const CELLS: usize = u64::BITS as usize;
+/// Columns of a cell at least.
+const LEAST_CELL_PX: usize = 16;
+
+/// The controls over a window.
+#[derive(Debug, Default)]
+pub struct Overlay {
+    size: (usize, usize),
+    /// Premultiplied, `0xAARRGGBB`.
+    pixels: Vec<u32>,
+    cell_px: usize,
+    /// For each row, the cells where there may be anything.
+    cells: Vec<u64>,
+    textures: Textures,
+    primitives: Vec<ClippedPrimitive>,
+    pixels_per_point: f32,
+    /// Whether `pixels` shows something else.
+    outdated: bool,
+}
+
+impl Overlay {
+    /// Another size, in pixels.
+    pub fn resize(&mut self, size: (usize, usize)) {
+        if self.size == size {
+            return;
+        }
+        self.size = size;
+        self.cell_px = size.0.div_ceil(CELLS).max(LEAST_CELL_PX);
+        self.pixels.clear();
+        self.pixels.resize(size.0 * size.1, 0);
+        self.cells.clear();
+        self.cells.resize(size.1, 0);
+        self.outdated = true;
+    }
+
+    /// Other controls, from the next [`Overlay::paint`] on.
+    pub fn set(&mut self, controls: Controls) {
+        let Controls { primitives, textures, pixels_per_point } = controls;
+        self.textures.set(&textures);
+        // Those that are freed are still needed for what is painted now, so painting does not wait.
+        (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
+        if !textures.free.is_empty() {
+            self.paint();
+            self.textures.free(&textures);
+        }
+    }
+
+    /// Paints what changed; gives back whether anything did.
+    pub fn paint(&mut self) -> bool {
+        if !std::mem::take(&mut self.outdated) {
+            return false;
+        }
+        let width = self.size.0;
+        for (row, cells) in self.pixels.chunks_exact_mut(width.max(1)).zip(&mut self.cells) {
+            for columns in runs(std::mem::take(cells), self.cell_px, 0..width) {
+                row[columns].fill(0);
+            }
+        }
+        let primitives = std::mem::take(&mut self.primitives);
+        for ClippedPrimitive { clip_rect, primitive } in &primitives {
+            // Callbacks draw with a GPU; no control of ours has one.
+            if let Primitive::Mesh(mesh) = primitive {
+                let clip = self.clip(*clip_rect);
+                self.mesh(mesh, clip);
+            }
+        }
+        self.primitives = primitives;
+        true
+    }
+
+    fn clip(&self, rect: egui::Rect) -> Clip {
+        let at = |points: f32, most: usize| (points * self.pixels_per_point).round().clamp(0.0, most as f32) as usize;
+        let (width, height) = self.size;
+        let (left, top) = (at(rect.min.x, width), at(rect.min.y, height));
+        Clip { left, top, right: at(rect.max.x, width).max(left), bottom: at(rect.max.y, height).max(top) }
+    }
+
+    fn mesh(&mut self, mesh: &Mesh, clip: Clip) {
+        let Self { textures, pixels, cells, cell_px, size, .. } = self;
+        let Some(texture) = textures.get(mesh.texture_id) else { return };
+        let (width, cell_px) = (size.0, *cell_px);
+        for corners in mesh.indices.as_chunks::<3>().0 {
+            let Some(corners) = corners_of(mesh, *corners, self.pixels_per_point) else { continue };
+            fill(corners, clip, texture, width, cell_px, pixels, cells);
+        }
+    }
+
+    /// Lays the controls over some columns of the row `y`; `row` holds these.
+    pub fn blend(&self, arch: Arch, y: usize, columns: Range<usize>, row: &mut [u32]) {
+        let Some(&cells) = self.cells.get(y) else { return };
+        let start = columns.start;
+        let from = &self.pixels[y * self.size.0..][..self.size.0];
+        for run in runs(cells, self.cell_px, columns) {
+            let to = &mut row[run.start - start..run.end - start];
+            arch.dispatch(Blend { from: &from[run], to });
+        }
+    }
+}
+
+fn corners_of(mesh: &Mesh, corners: [u32; 3], pixels_per_point: f32) -> Option<[Corner; 3]> {
+    let corner = |index: u32| {
+        let &Vertex { pos, uv, color } = mesh.vertices.get(index as usize)?;
+        let at = [pos.x * pixels_per_point, pos.y * pixels_per_point];
+        Some(Corner { at, uv: [uv.x, uv.y], color: color.to_array() })
+    };
+    let [a, b, c] = corners.map(corner);
+    Some([a?, b?, c?])
+}
+
+fn fill(
+    corners: [Corner; 3],
+    clip: Clip,
+    texture: &Texture,
+    width: usize,
+    cell_px: usize,
+    pixels: &mut [u32],
+    cells: &mut [u64],
+) {
+    triangle::fill(corners, clip, texture, |y, columns, paint| {
+        let (first, last) = (columns.start / cell_px, (columns.end - 1) / cell_px);
+        cells[y] |= (u64::MAX >> (CELLS - 1 - (last - first))) << first;
+        paint(&mut pixels[y * width..][columns]);
+    });
+}
+
+/// Runs of cells that are set, as columns, cut to `within`.
+fn runs(mut cells: u64, cell_px: usize, within: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let mut passed = 0;
+    std::iter::from_fn(move || {
+        if cells == 0 {
+            return None;
+        }
+        let skipped = cells.trailing_zeros() as usize;
+        cells >>= skipped;
+        let count = cells.trailing_ones() as usize;
+        // Shifted twice, as all bits at once is one too many.
+        cells = cells >> (count - 1) >> 1;
+        let first = passed + skipped;
+        passed = first + count;
+        Some((first * cell_px).max(within.start)..(passed * cell_px).min(within.end))
+    })
+    .filter(|run| run.start < run.end)
+}
+
+/// One run over the picture.
+struct Blend<'a> {
+    from: &'a [u32],
+    to: &'a mut [u32],
+}
+
+impl WithSimd for Blend<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (to, &from) in self.to.iter_mut().zip(self.from) {
+            // The window's pixels have no alpha.
+            *to = over(from, *to) & 0x00ff_ffff;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_the_cells_that_are_set() {
+        let all = |cells, within| runs(cells, 10, within).collect::<Vec<_>>();
+        assert!(all(0, 0..100).is_empty());
+        assert_eq!(all(u64::MAX, 0..640), [0..640]);
+        assert_eq!(all(1 << 63 | 0b1011, 5..635), [5..20, 30..40, 630..635]);
+        assert_eq!(all(0b1011, 20..35), [30..35]);
+    }
+}

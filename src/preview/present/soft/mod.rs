@@ -1,0 +1,69 @@
+//! On the CPU, into memory that is shared with the display server.
+
+mod blend;
+mod controls;
+mod painter;
+mod picture;
+mod texture;
+mod triangle;
+
+use std::num::NonZeroU32;
+use std::sync::Arc;
+
+pub use painter::Painter;
+use softbuffer::{Context, SoftBufferError, Surface};
+use winit::window::Window;
+
+use super::{Controls, Drawing, PresentError, Presenter};
+
+/// Presents without a GPU.
+pub struct Soft {
+    window: Arc<Window>,
+    surface: Surface<Arc<Window>, Arc<Window>>,
+    size: Option<(NonZeroU32, NonZeroU32)>,
+    painter: Painter,
+}
+
+impl Soft {
+    /// For this window.
+    ///
+    /// # Errors
+    /// The display server takes no pictures from memory.
+    pub fn new(window: Arc<Window>) -> Result<Self, PresentError> {
+        let context = Context::new(Arc::clone(&window)).map_err(fault)?;
+        let surface = Surface::new(&context, Arc::clone(&window)).map_err(fault)?;
+        let size = window.inner_size();
+        let mut soft = Self { window, surface, size: None, painter: Painter::new() };
+        soft.resize((size.width, size.height));
+        Ok(soft)
+    }
+}
+
+fn fault(error: SoftBufferError) -> PresentError {
+    PresentError(error.to_string())
+}
+
+impl Presenter for Soft {
+    fn resize(&mut self, size: (u32, u32)) {
+        self.size = NonZeroU32::new(size.0).zip(NonZeroU32::new(size.1));
+        self.painter.resize(size);
+    }
+
+    fn set_controls(&mut self, controls: Controls) {
+        self.painter.set_controls(controls);
+    }
+
+    fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
+        let Some((width, height)) = self.size else { return Ok(()) };
+        self.surface.resize(width, height).map_err(fault)?;
+        let mut buffer = self.surface.buffer_mut().map_err(fault)?;
+        let age = buffer.age();
+        self.painter.paint(&mut buffer, age, drawing);
+        self.window.pre_present_notify();
+        buffer.present().map_err(fault)
+    }
+
+    fn describe(&self) -> String {
+        "the CPU, into shared memory".to_owned()
+    }
+}

@@ -1,0 +1,106 @@
+//! The picture as pixels of the window, row by row.
+
+use std::ops::Range;
+
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::frame::ColorImage;
+use crate::frame::scale::Scale;
+use crate::preview::present::{Drawing, Tone};
+
+/// Scales pictures into an area; keeps its weights from one to the next.
+#[derive(Debug, Default)]
+pub struct Scaler {
+    scale: Scale,
+}
+
+/// Memory for one thread.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    row: Vec<u16>,
+    line: Vec<u8>,
+}
+
+impl Scaler {
+    /// For pictures of this drawing.
+    pub fn adapt(&mut self, drawing: &Drawing) {
+        let [from, to] = [drawing.picture.size(), (drawing.area.width, drawing.area.height)]
+            .map(|(width, height)| (width as usize, height as usize));
+        if from != to {
+            self.scale.adapt(from, to);
+        }
+    }
+
+    /// The row `y` of the area, whose first columns `row` holds.
+    pub fn row(&self, arch: Arch, drawing: &Drawing, y: usize, scratch: &mut Scratch, row: &mut [u32]) {
+        let mut whole = |picture: &ColorImage, columns: Range<usize>, row: &mut [u32]| {
+            let columns = columns.start..columns.end.min(row.len());
+            let Some(row) = row.get_mut(columns.clone()).filter(|row| !row.is_empty()) else { return };
+            let width = drawing.area.width as usize;
+            let from = if drawing.mirror { width - columns.end..width - columns.start } else { columns };
+            let rgb = if picture.size() == (drawing.area.width, drawing.area.height) {
+                &picture.rgb[3 * (y * width + from.start)..3 * (y * width + from.end)]
+            } else {
+                scratch.line.resize(3 * from.len(), 0);
+                self.scale.row(&picture.rgb, y, from, &mut scratch.row, &mut scratch.line);
+                &scratch.line[..]
+            };
+            arch.dispatch(Expand { rgb, row });
+            if drawing.mirror {
+                row.reverse();
+            }
+        };
+        let width = drawing.area.width as usize;
+        let Some((before, split)) = drawing.split() else {
+            whole(drawing.picture, 0..width, row);
+            return self.tone(arch, drawing, row);
+        };
+        whole(before, 0..split.at, row);
+        whole(drawing.picture, split.at..width, row);
+        self.tone(arch, drawing, row);
+        for (columns, [r, g, b]) in split.divider() {
+            let columns = columns.start.min(row.len())..columns.end.min(row.len());
+            row[columns].fill(u32::from_be_bytes([0, r, g, b]));
+        }
+    }
+
+    fn tone(&self, arch: Arch, drawing: &Drawing, row: &mut [u32]) {
+        if drawing.stale {
+            arch.dispatch(Stale { row });
+        }
+    }
+}
+
+/// Packed bytes to words, `0x00RRGGBB`.
+struct Expand<'a> {
+    rgb: &'a [u8],
+    row: &'a mut [u32],
+}
+
+impl WithSimd for Expand<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (pixel, &[r, g, b]) in self.row.iter_mut().zip(self.rgb.as_chunks::<3>().0) {
+            *pixel = u32::from_be_bytes([0, r, g, b]);
+        }
+    }
+}
+
+/// Grey and dim.
+struct Stale<'a> {
+    row: &'a mut [u32],
+}
+
+impl WithSimd for Stale<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for pixel in self.row {
+            let [r, g, b] = [*pixel >> 16 & 0xff, *pixel >> 8 & 0xff, *pixel & 0xff];
+            let [red, green, blue] = Tone::STALE_WEIGHTS;
+            *pixel =
+                ((red * r + green * g + blue * b + (1 << (Tone::STALE_BITS - 1))) >> Tone::STALE_BITS) * 0x0001_0101;
+        }
+    }
+}

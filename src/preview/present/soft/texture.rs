@@ -1,0 +1,190 @@
+//! The textures of controls: the glyphs of text, and pictures.
+
+use std::collections::HashMap;
+
+use egui::epaint::ImageDelta;
+use egui::{Color32, ImageData, TextureFilter, TextureId, TextureWrapMode, TexturesDelta};
+
+/// Parts of a texel that places are rounded to.
+const PARTS: f32 = 256.0;
+
+/// Premultiplied texels.
+#[derive(Debug)]
+pub struct Texture {
+    size: [usize; 2],
+    texels: Vec<u32>,
+    smooth: bool,
+    wrap: TextureWrapMode,
+}
+
+/// The textures by egui's names.
+#[derive(Debug, Default)]
+pub struct Textures(HashMap<TextureId, Texture>);
+
+impl Textures {
+    /// The texture, if egui has set it.
+    pub fn get(&self, id: TextureId) -> Option<&Texture> {
+        self.0.get(&id)
+    }
+
+    /// Sets what is new or changed.
+    pub fn set(&mut self, delta: &TexturesDelta) {
+        for (&id, changes) in &delta.set {
+            for change in changes {
+                self.change(id, change);
+            }
+        }
+    }
+
+    /// Drops what is needed no more.
+    pub fn free(&mut self, delta: &TexturesDelta) {
+        for id in &delta.free {
+            self.0.remove(id);
+        }
+    }
+
+    fn change(&mut self, id: TextureId, change: &ImageDelta) {
+        let ImageData::Color(image) = &change.image;
+        let texels = image.pixels.iter().map(|&color| packed(color));
+        let [width, height] = image.size;
+        let Some([left, top]) = change.pos else {
+            let texture = Texture {
+                size: image.size,
+                texels: texels.collect(),
+                smooth: change.options.magnification == TextureFilter::Linear,
+                wrap: change.options.wrap_mode,
+            };
+            self.0.insert(id, texture);
+            return;
+        };
+        let Some(texture) = self.0.get_mut(&id) else { return };
+        let [across, down] = texture.size;
+        if left + width > across || top + height > down || width == 0 {
+            return;
+        }
+        let texels: Vec<u32> = texels.collect();
+        for (row, part) in texture.texels.chunks_exact_mut(across).skip(top).zip(texels.chunks_exact(width)) {
+            row[left..left + width].copy_from_slice(part);
+        }
+    }
+}
+
+/// As one word, `0xAARRGGBB`.
+fn packed(color: Color32) -> u32 {
+    let [r, g, b, a] = color.to_array();
+    u32::from_be_bytes([a, r, g, b])
+}
+
+impl Texture {
+    /// Where `uv` is, in texels.
+    pub fn place(&self, uv: [f32; 2]) -> [f32; 2] {
+        [uv[0] * self.size[0] as f32, uv[1] * self.size[1] as f32]
+    }
+
+    /// The colour at a place in texels.
+    #[inline]
+    pub fn at(&self, [x, y]: [f32; 2]) -> u32 {
+        if !self.smooth {
+            return self.texel(x.floor() as i64, y.floor() as i64);
+        }
+        let (x, y) = (((x - 0.5) * PARTS).round() as i64, ((y - 0.5) * PARTS).round() as i64);
+        let (parts, part_x, part_y) = (PARTS as i64, x & 255, y & 255);
+        let (x, y) = (x.div_euclid(parts), y.div_euclid(parts));
+        if part_x == 0 && part_y == 0 {
+            // Where texels and pixels coincide, as in text.
+            return self.texel(x, y);
+        }
+        let upper = mix(self.texel(x, y), self.texel(x + 1, y), part_x as u32);
+        let lower = mix(self.texel(x, y + 1), self.texel(x + 1, y + 1), part_x as u32);
+        mix_finely(upper, lower, part_y as u32)
+    }
+
+    #[inline]
+    fn texel(&self, x: i64, y: i64) -> u32 {
+        let [width, height] = self.size;
+        let wrapped = |at: i64, side: usize| {
+            let side = side as i64;
+            match self.wrap {
+                TextureWrapMode::ClampToEdge => at.clamp(0, side - 1),
+                TextureWrapMode::Repeat => at.rem_euclid(side),
+                TextureWrapMode::MirroredRepeat => {
+                    let at = at.rem_euclid(2 * side);
+                    at.min(2 * side - 1 - at)
+                }
+            }
+        };
+        if self.texels.is_empty() {
+            return 0;
+        }
+        self.texels[wrapped(y, height) as usize * width + wrapped(x, width) as usize]
+    }
+}
+
+/// Between two colours, with 8 more bits for each channel, in pairs: blue and red, green and alpha.
+fn mix(a: u32, b: u32, part: u32) -> [u64; 2] {
+    let pair = |color: u32| u64::from(color & 0xff) | u64::from(color >> 16 & 0xff) << 32;
+    let (rest, part) = (u64::from(256 - part), u64::from(part));
+    [pair(a) * rest + pair(b) * part, pair(a >> 8) * rest + pair(b >> 8) * part]
+}
+
+/// Between two of those, rounded.
+fn mix_finely(upper: [u64; 2], lower: [u64; 2], part: u32) -> u32 {
+    let (rest, part) = (u64::from(256 - part), u64::from(part));
+    let [low, high] = std::array::from_fn(|k| {
+        let sum = upper[k] * rest + lower[k] * part + 0x0000_8000_0000_8000;
+        (sum >> 16 & 0xff) as u32 | ((sum >> 48 & 0xff) as u32) << 16
+    });
+    low | high << 8
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{ColorImage, TextureOptions};
+
+    use super::*;
+
+    fn texture(options: TextureOptions) -> Textures {
+        let colors = [[0, 0, 0, 0], [255, 255, 255, 255], [200, 100, 50, 255], [10, 20, 30, 40]];
+        let colors = colors.map(|[r, g, b, a]| Color32::from_rgba_premultiplied(r, g, b, a));
+        let image = ColorImage::new([2, 2], colors.to_vec());
+        let mut delta = TexturesDelta::default();
+        delta.push(TextureId::default(), ImageDelta::full(image, options));
+        let mut textures = Textures::default();
+        textures.set(&delta);
+        textures
+    }
+
+    #[test]
+    fn texels_are_met_at_their_centres_and_mixed_between() {
+        let textures = texture(TextureOptions::LINEAR);
+        let texture = textures.get(TextureId::default()).unwrap();
+        assert_eq!(texture.at([0.5, 0.5]), 0);
+        assert_eq!(texture.at([1.5, 1.5]), 0x280a_141e);
+        assert_eq!(texture.at([1.0, 0.5]), 0x8080_8080, "half way");
+        assert_eq!(texture.at([1.0, 1.0]), 0x8a74_5e54, "the mean of four");
+        assert_eq!(texture.at([-9.0, 40.0]), 0xffc8_6432, "beyond the edge");
+    }
+
+    #[test]
+    fn the_nearest_texel_is_whole() {
+        let textures = texture(TextureOptions::NEAREST);
+        let texture = textures.get(TextureId::default()).unwrap();
+        assert_eq!(texture.at([1.01, 0.99]), 0xffff_ffff);
+        assert_eq!(texture.at([0.99, 1.01]), 0xffc8_6432);
+    }
+
+    #[test]
+    fn a_part_may_change_and_a_texture_go() {
+        let mut textures = texture(TextureOptions::NEAREST);
+        let mut delta = TexturesDelta::default();
+        let dot = ColorImage::new([1, 1], vec![Color32::RED]);
+        delta.push(TextureId::default(), ImageDelta::partial([1, 0], dot.clone(), TextureOptions::NEAREST));
+        delta.push(TextureId::default(), ImageDelta::partial([2, 0], dot, TextureOptions::NEAREST));
+        textures.set(&delta);
+        let texture = textures.get(TextureId::default()).unwrap();
+        assert_eq!((texture.at([1.5, 0.5]), texture.at([0.5, 1.5])), (0xffff_0000, 0xffc8_6432));
+        delta.free(TextureId::default());
+        textures.free(&delta);
+        assert!(textures.get(TextureId::default()).is_none());
+    }
+}

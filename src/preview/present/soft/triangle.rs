@@ -1,0 +1,282 @@
+//! Fills triangles as a GPU does: the pixels whose centres they cover, colours and texture interpolated between the
+//! corners.
+
+use std::ops::Range;
+
+use super::blend::{over, scaled_by};
+use super::texture::Texture;
+
+/// Parts of a pixel that corners are rounded to; shared edges then neither overlap nor leave gaps.
+const SUBPIXELS: f32 = 256.0;
+const PIXEL: i64 = SUBPIXELS as i64;
+/// No corner is further away, in pixels, so that nothing overflows.
+const FURTHEST: f32 = 1e6;
+
+/// A corner.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    /// Where it is, in pixels.
+    pub at: [f32; 2],
+    /// Where it is in the texture, from 0 to 1.
+    pub uv: [f32; 2],
+    /// Red, green, blue and alpha, premultiplied.
+    pub color: [u8; 4],
+}
+
+/// Rows and columns that may be drawn to, the ends excluded.
+#[derive(Clone, Copy, Debug)]
+pub struct Clip {
+    pub left: usize,
+    pub top: usize,
+    pub right: usize,
+    pub bottom: usize,
+}
+
+/// Fills a triangle. `row` is called with each row and the columns that are covered there; it hands these pixels to the
+/// function it is given.
+pub fn fill(
+    corners: [Corner; 3],
+    clip: Clip,
+    texture: &Texture,
+    mut row: impl FnMut(usize, Range<usize>, &dyn Fn(&mut [u32])),
+) {
+    let Some(shape) = Shape::new(corners.map(|corner| corner.at)) else { return };
+    let paint = Paint::new(corners, texture);
+    if paint.is_nothing() {
+        return;
+    }
+    for y in shape.rows(clip) {
+        let columns = shape.columns(y, clip);
+        if !columns.is_empty() {
+            let x = columns.start;
+            row(y, columns, &|pixels| paint.fill(x, y, pixels, texture));
+        }
+    }
+}
+
+/// The three edges.
+struct Shape {
+    edges: [Edge; 3],
+    top: i64,
+    bottom: i64,
+}
+
+/// Pixels on the inner side of an edge have `start + x * across + y * down >= 0`.
+#[derive(Clone, Copy)]
+struct Edge {
+    start: i64,
+    across: i64,
+    down: i64,
+}
+
+impl Shape {
+    /// `None` where nothing is covered.
+    fn new(corners: [[f32; 2]; 3]) -> Option<Self> {
+        if corners.as_flattened().iter().any(|value| !value.is_finite()) {
+            return None;
+        }
+        let mut corners =
+            corners.map(|corner| corner.map(|v| (v.clamp(-FURTHEST, FURTHEST) * SUBPIXELS).round() as i64));
+        let [a, b, c] = corners;
+        match (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) {
+            0 => return None,
+            area if area < 0 => corners.swap(1, 2),
+            _ => {}
+        }
+        let edge = |from: [i64; 2], to: [i64; 2]| {
+            let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+            // A centre on a shared edge belongs to the triangle below it or right of it.
+            let mine = dy < 0 || (dy == 0 && dx > 0);
+            let at = |x: i64, y: i64| dx * (y - from[1]) - dy * (x - from[0]);
+            Edge { start: at(PIXEL / 2, PIXEL / 2) - i64::from(!mine), across: -dy * PIXEL, down: dx * PIXEL }
+        };
+        let [a, b, c] = corners;
+        let rows = corners.map(|corner| corner[1]);
+        let (top, bottom) = (rows.into_iter().min()?, rows.into_iter().max()?);
+        Some(Self { edges: [edge(a, b), edge(b, c), edge(c, a)], top, bottom })
+    }
+
+    fn rows(&self, clip: Clip) -> Range<usize> {
+        let within = |row: i64| row.clamp(clip.top as i64, clip.bottom as i64) as usize;
+        within(self.top.div_euclid(PIXEL))..within(self.bottom.div_euclid(PIXEL) + 1)
+    }
+
+    fn columns(&self, y: usize, clip: Clip) -> Range<usize> {
+        let (mut left, mut right) = (clip.left as i64, clip.right as i64);
+        for edge in &self.edges {
+            let start = edge.start + y as i64 * edge.down;
+            match edge.across {
+                0 if start < 0 => return 0..0,
+                0 => {}
+                // The first column from which on the value is not negative: the quotient rounded up.
+                across if across > 0 => left = left.max(-start.div_euclid(across)),
+                across => right = right.min(start.div_euclid(-across) + 1),
+            }
+        }
+        if left < right { left as usize..right as usize } else { 0..0 }
+    }
+}
+
+/// A value that changes evenly over the picture.
+#[derive(Clone, Copy, Default)]
+struct Plane {
+    start: f32,
+    across: f32,
+    down: f32,
+}
+
+impl Plane {
+    /// Through three corners.
+    fn through(at: [[f32; 2]; 3], values: [f32; 3]) -> Self {
+        let (ab, ac) = ([at[1][0] - at[0][0], at[1][1] - at[0][1]], [at[2][0] - at[0][0], at[2][1] - at[0][1]]);
+        let area = ab[0] * ac[1] - ab[1] * ac[0];
+        let (b, c) = (values[1] - values[0], values[2] - values[0]);
+        let (across, down) = ((b * ac[1] - c * ab[1]) / area, (c * ab[0] - b * ac[0]) / area);
+        if !across.is_finite() || !down.is_finite() {
+            return Self { start: values[0], ..Self::default() };
+        }
+        Self { start: values[0] - at[0][0] * across - at[0][1] * down, across, down }
+    }
+
+    /// At the centre of a pixel.
+    fn at(&self, x: usize, y: usize) -> f32 {
+        self.start + self.across * (x as f32 + 0.5) + self.down * (y as f32 + 0.5)
+    }
+}
+
+/// What a triangle is filled with.
+struct Paint {
+    /// The colour, where it is one.
+    plain: Option<[u8; 4]>,
+    colors: [Plane; 4],
+    /// The texel, where it is one, as in [`over`].
+    texel: Option<u32>,
+    /// Where in the texture, in texels.
+    texels: [Plane; 2],
+}
+
+impl Paint {
+    fn new(corners: [Corner; 3], texture: &Texture) -> Self {
+        let [a, b, c] = corners;
+        let at = corners.map(|corner| corner.at);
+        let mut paint = Self {
+            plain: (a.color == b.color && b.color == c.color).then_some(a.color),
+            colors: [Plane::default(); 4],
+            texel: None,
+            texels: [Plane::default(); 2],
+        };
+        if paint.plain.is_none() {
+            paint.colors =
+                std::array::from_fn(|k| Plane::through(at, corners.map(|corner| f32::from(corner.color[k]))));
+        }
+        let uv = corners.map(|corner| texture.place(corner.uv));
+        if a.uv == b.uv && b.uv == c.uv {
+            paint.texel = Some(texture.at(uv[0]));
+        } else {
+            paint.texels = std::array::from_fn(|k| Plane::through(at, uv.map(|uv| uv[k])));
+        }
+        paint
+    }
+
+    fn is_nothing(&self) -> bool {
+        self.plain == Some([0; 4]) || self.texel == Some(0)
+    }
+
+    fn fill(&self, x: usize, y: usize, pixels: &mut [u32], texture: &Texture) {
+        match (self.plain, self.texel) {
+            (Some(color), Some(texel)) => {
+                let color = scaled_by(texel, color);
+                if color >> 24 == 255 {
+                    pixels.fill(color);
+                } else {
+                    pixels.iter_mut().for_each(|pixel| *pixel = over(color, *pixel));
+                }
+            }
+            (None, Some(u32::MAX)) => {
+                let (mut color, step) = self.color_from(x, y);
+                for pixel in pixels {
+                    *pixel = over(packed(color), *pixel);
+                    color = std::array::from_fn(|k| color[k] + step[k]);
+                }
+            }
+            (plain, texel) => {
+                let (mut color, step) = self.color_from(x, y);
+                let mut at = self.texels.map(|plane| plane.at(x, y));
+                for pixel in pixels {
+                    let texel = texel.unwrap_or_else(|| texture.at(at));
+                    if texel != 0 {
+                        let color = plain.unwrap_or_else(|| rounded(color));
+                        *pixel = over(scaled_by(texel, color), *pixel);
+                    }
+                    color = std::array::from_fn(|k| color[k] + step[k]);
+                    at = std::array::from_fn(|k| at[k] + self.texels[k].across);
+                }
+            }
+        }
+    }
+
+    /// The colour at a pixel, and how it changes to the next.
+    fn color_from(&self, x: usize, y: usize) -> ([f32; 4], [f32; 4]) {
+        (self.colors.map(|plane| plane.at(x, y)), self.colors.map(|plane| plane.across))
+    }
+}
+
+/// To whole codes; the conversion keeps to their range.
+fn rounded(color: [f32; 4]) -> [u8; 4] {
+    color.map(|value| (value + 0.5) as u8)
+}
+
+fn packed(color: [f32; 4]) -> u32 {
+    let [r, g, b, a] = rounded(color);
+    u32::from_be_bytes([a, r, g, b])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: usize = 40;
+
+    fn covered(corners: [[f32; 2]; 3], counts: &mut [u32]) {
+        let Some(shape) = Shape::new(corners) else { return };
+        let clip = Clip { left: 0, top: 0, right: SIZE, bottom: SIZE };
+        for y in shape.rows(clip) {
+            shape.columns(y, clip).for_each(|x| counts[y * SIZE + x] += 1);
+        }
+    }
+
+    #[test]
+    fn triangles_that_share_edges_cover_each_pixel_once() {
+        // A fan around a point, closed by the canvas's own corners.
+        for middle in [[20.0, 20.0], [20.5, 20.5], [3.13, 37.77], [39.996, 0.004], [20.0, 0.5]] {
+            let n = SIZE as f32;
+            let rim = [[0.0, 0.0], [13.5, 0.0], [n, 0.0], [n, 20.25], [n, n], [0.5, n], [0.0, n], [0.0, 11.1]];
+            let mut counts = vec![0; SIZE * SIZE];
+            for k in 0..rim.len() {
+                covered([rim[k], middle, rim[(k + 1) % rim.len()]], &mut counts);
+            }
+            assert!(counts.iter().all(|&count| count == 1), "{middle:?}");
+        }
+    }
+
+    #[test]
+    fn the_pixels_whose_centres_lie_inside_are_covered() {
+        let mut counts = vec![0; SIZE * SIZE];
+        covered([[2.5, 3.5], [10.5, 3.5], [2.5, 11.5]], &mut counts);
+        for (x, y) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y))) {
+            // The edges at the left and on top are the triangle's own, the slanted one is not.
+            let inside = x >= 2 && y >= 3 && (x - 2) + (y - 3) < 8;
+            assert_eq!(counts[y * SIZE + x], u32::from(inside), "{x}, {y}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_triangle_covers_nothing() {
+        let mut counts = vec![0; SIZE * SIZE];
+        covered([[1.0, 1.0], [5.0, 5.0], [9.0, 9.0]], &mut counts);
+        covered([[f32::NAN, 1.0], [5.0, 5.0], [9.0, 1.0]], &mut counts);
+        assert!(counts.iter().all(|&count| count == 0));
+        covered([[-1e30, -1e30], [1e30, -1e30], [0.0, 1e30]], &mut counts);
+        assert!(counts.iter().all(|&count| count <= 1));
+    }
+}
