@@ -64,6 +64,7 @@ pub fn look(
             Method::Layered => bokeh::Method::Layered,
             Method::Gather => bokeh::Method::Gather,
         },
+        focus_range_m: 0.0,
         strength,
         max_coc_px: blur.max_coc,
         refine: match blur.refine {

@@ -51,6 +51,8 @@ pub struct Look {
     pub method: bokeh::Method,
     /// Where the focal plane is.
     pub focus: FocusRule,
+    /// Depth range around the focal plane that stays sharp, in metres, 0 or more.
+    pub focus_range_m: f32,
     /// How strong the blur is.
     pub strength: Strength,
     /// Largest CoC radius in pixels; `None` is a share of the height.

@@ -1,14 +1,262 @@
-//! What the instruments show: the last frames, and how long they took.
+//! What the instruments show: the last frames, how long they took, and what became of the others.
 
-use crate::pipeline::View;
+use crate::budget::{Quality, Window};
+use crate::pipeline::{Trace, View};
+use crate::stats::{Frames, Histogram};
 
-/// The last frames.
+/// Frames that the instruments look back on.
+pub const FRAMES: usize = 240;
+const MS: f64 = 1e-6;
+/// A change of a stage's mean counts for this much of it: single frames jump.
+const EASE: f64 = 0.08;
+/// Passes of a blur that are told apart.
+const PASSES: usize = 16;
+
+/// One frame, for the graph.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bar {
+    /// Its blur, in milliseconds.
+    pub blur_ms: f32,
+    /// From the presented frame before to this one, in milliseconds.
+    pub interval_ms: f32,
+    /// The rung it was blurred at; `None` where it was not.
+    pub quality: Option<Quality>,
+}
+
+/// The last frames, and totals of all.
+#[derive(Clone, Debug)]
+pub struct Meters {
+    bars: [Bar; FRAMES],
+    held: usize,
+    next: usize,
+    latency_ms: Window<FRAMES>,
+    reaction_ms: Window<FRAMES>,
+    stages: Stages,
+    frames: Frames,
+    last_ns: Option<u64>,
+    begun_ns: Option<u64>,
+    totals: Totals,
+}
+
+/// Mean times of the last frames, in milliseconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Stages {
+    /// Reading and decoding.
+    pub decode_ms: f64,
+    /// Depth and CoC.
+    pub depth_ms: f64,
+    /// The blur.
+    pub blur_ms: f64,
+    /// Drawing the window.
+    pub present_ms: f64,
+    passes: [(&'static str, f64); PASSES],
+    seen: usize,
+}
+
+impl Stages {
+    /// The blur's passes, by name.
+    pub fn passes(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+        self.passes[..self.seen].iter().copied()
+    }
+}
+
+/// What was presented in all.
 #[derive(Clone, Debug, Default)]
-pub struct Meters {}
+pub struct Totals {
+    /// Frames presented.
+    pub presented: u64,
+    /// From the start of the preview to the first frame, in nanoseconds.
+    pub first_frame_ns: Option<u64>,
+    /// From capture to the end of presenting.
+    pub latency: Histogram,
+    /// From an input to the picture that shows what it did.
+    pub reaction: Histogram,
+}
+
+/// The instruments' numbers: over the last [`FRAMES`] frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Frames presented a second.
+    pub fps: f64,
+    /// Median and 99th percentile from capture to presented, in milliseconds.
+    pub latency_ms: [f64; 2],
+    /// Median and 99th percentile from input to picture, in milliseconds.
+    pub reaction_ms: [f64; 2],
+}
+
+impl Default for Meters {
+    fn default() -> Self {
+        Self {
+            bars: [Bar::default(); FRAMES],
+            held: 0,
+            next: 0,
+            latency_ms: Window::default(),
+            reaction_ms: Window::default(),
+            stages: Stages::default(),
+            frames: Frames::default(),
+            last_ns: None,
+            begun_ns: None,
+            totals: Totals::default(),
+        }
+    }
+}
 
 impl Meters {
-    /// A frame was presented at `now_ns` of the run's clock.
-    pub fn presented(&mut self, view: &View, now_ns: u64) {
-        let _ = (view, now_ns);
+    /// The preview began at `now_ns`: the first frame is measured from here.
+    pub fn begin(&mut self, now_ns: u64) {
+        self.begun_ns.get_or_insert(now_ns);
+    }
+
+    /// Another source: what was measured of the last frames is no more. Totals stay.
+    pub fn restart(&mut self) {
+        let (begun_ns, totals) = (self.begun_ns, std::mem::take(&mut self.totals));
+        *self = Self { begun_ns, totals, ..Self::default() };
+    }
+
+    /// A frame is on the screen since `now_ns` of the run's clock; drawing it took `present_ns`. Allocates nothing.
+    pub fn presented(&mut self, view: &View, now_ns: u64, present_ns: u64) {
+        let latency_ns = now_ns.saturating_sub(view.captured_ns);
+        self.count(&view.trace, now_ns, latency_ns, present_ns);
+        self.frames = view.frames;
+    }
+
+    fn count(&mut self, trace: &Trace, now_ns: u64, latency_ns: u64, present_ns: u64) {
+        self.totals.presented += 1;
+        self.totals.latency.add(latency_ns);
+        if let (None, Some(begun_ns)) = (self.totals.first_frame_ns, self.begun_ns) {
+            self.totals.first_frame_ns = Some(now_ns.saturating_sub(begun_ns));
+        }
+        let interval_ms = self.last_ns.replace(now_ns).map(|last_ns| now_ns.saturating_sub(last_ns) as f64 * MS);
+        self.latency_ms.push(latency_ns as f64 * MS);
+        self.bars[self.next] = Bar {
+            blur_ms: (trace.blur_ns as f64 * MS) as f32,
+            interval_ms: interval_ms.unwrap_or_default() as f32,
+            quality: trace.quality,
+        };
+        self.next = (self.next + 1) % FRAMES;
+        self.held = (self.held + 1).min(FRAMES);
+        self.stages.add(trace, present_ns, self.held == 1);
+    }
+
+    /// The person did something, and the picture showed it this much later.
+    pub fn reacted(&mut self, after_ns: u64) {
+        self.totals.reaction.add(after_ns);
+        self.reaction_ms.push(after_ns as f64 * MS);
+    }
+
+    /// The last frames, the oldest first.
+    pub fn bars(&self) -> impl ExactSizeIterator<Item = &Bar> {
+        let first = self.next + FRAMES - self.held;
+        (0..self.held).map(move |k| &self.bars[(first + k) % FRAMES])
+    }
+
+    /// Mean times of the last frames.
+    pub fn stages(&self) -> &Stages {
+        &self.stages
+    }
+
+    /// What became of the source's frames.
+    pub fn frames(&self) -> &Frames {
+        &self.frames
+    }
+
+    /// What was presented in all.
+    pub fn totals(&self) -> &Totals {
+        &self.totals
+    }
+
+    /// The numbers of the last frames. This sorts: a few times a second is enough.
+    pub fn summary(&self) -> Summary {
+        let spread = |window: &Window<FRAMES>| [0.5, 0.99].map(|p| window.percentile(FRAMES, p));
+        let intervals = self.bars().map(|bar| f64::from(bar.interval_ms)).filter(|&ms| ms > 0.0);
+        let (count, sum_ms) = intervals.fold((0.0, 0.0), |(count, sum), ms| (count + 1.0, sum + ms));
+        Summary {
+            fps: if sum_ms > 0.0 { 1000.0 * count / sum_ms } else { 0.0 },
+            latency_ms: spread(&self.latency_ms),
+            reaction_ms: spread(&self.reaction_ms),
+        }
+    }
+}
+
+impl Stages {
+    fn add(&mut self, trace: &Trace, present_ns: u64, first: bool) {
+        let share = if first { 1.0 } else { EASE };
+        let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS - *mean_ms) * share;
+        ease(&mut self.decode_ms, trace.decode_ns);
+        ease(&mut self.depth_ms, trace.depth_ns);
+        ease(&mut self.blur_ms, trace.blur_ns);
+        ease(&mut self.present_ms, present_ns);
+        for (name, time) in trace.passes.iter() {
+            let ms = time.as_secs_f64() * 1e3;
+            match self.passes[..self.seen].iter_mut().find(|pass| pass.0 == name) {
+                Some(pass) => pass.1 += (ms - pass.1) * share,
+                None if self.seen < PASSES => {
+                    self.passes[self.seen] = (name, ms);
+                    self.seen += 1;
+                }
+                None => {}
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_NS: u64 = 40_000_000;
+
+    fn ran(frames: u64) -> Meters {
+        let mut meters = Meters::default();
+        meters.begin(1_000);
+        for k in 0..frames {
+            let trace = Trace { blur_ns: 1_000_000 * k, quality: Some(Quality::Fast), ..Trace::default() };
+            meters.count(&trace, 1_000 + (k + 1) * PERIOD_NS, 5_000_000 + k * 1_000, 2_000_000);
+        }
+        meters
+    }
+
+    #[test]
+    fn the_last_frames_are_held_oldest_first() {
+        for frames in [0, 1, 7, FRAMES as u64, 3 * FRAMES as u64 + 5] {
+            let meters = ran(frames);
+            let held = frames.min(FRAMES as u64);
+            let blurs: Vec<f32> = meters.bars().map(|bar| bar.blur_ms).collect();
+            assert_eq!(blurs.len() as u64, held);
+            assert!(blurs.iter().zip(frames - held..).all(|(&ms, k)| (ms - k as f32).abs() < 1e-3), "{blurs:?}");
+        }
+    }
+
+    #[test]
+    fn rates_and_percentiles_are_those_of_the_frames() {
+        let meters = ran(100);
+        let summary = meters.summary();
+        assert!((summary.fps - 25.0).abs() < 1e-3, "{summary:?}");
+        assert!((summary.latency_ms[0] - 5.049).abs() < 2e-3 && (summary.latency_ms[1] - 5.098).abs() < 2e-3);
+        assert_eq!(summary.reaction_ms, [0.0; 2]);
+        let totals = meters.totals();
+        assert_eq!((totals.presented, totals.first_frame_ns), (100, Some(PERIOD_NS)));
+        assert_eq!(Meters::default().summary(), Summary::default());
+    }
+
+    #[test]
+    fn another_source_begins_anew_but_totals_go_on() {
+        let mut meters = ran(10);
+        meters.reacted(9_000_000);
+        meters.restart();
+        assert_eq!((meters.bars().len(), meters.summary()), (0, Summary::default()));
+        assert_eq!((meters.totals().presented, meters.totals().reaction.samples()), (10, 1));
+        meters.count(&Trace::default(), 10 * PERIOD_NS, 1, 1);
+        assert_eq!(meters.totals().first_frame_ns, Some(PERIOD_NS), "the first frame is the first of all");
+    }
+
+    #[test]
+    fn stages_follow_the_frames() {
+        let mut meters = ran(400);
+        assert!((meters.stages().present_ms - 2.0).abs() < 1e-9);
+        let mut passes = crate::bokeh::PassTimes::new();
+        passes.add("blur", std::time::Duration::from_millis(7));
+        meters.count(&Trace { passes, ..Trace::default() }, 1, 1, 1);
+        assert_eq!(meters.stages().passes().collect::<Vec<_>>(), [("blur", 7.0)]);
     }
 }

@@ -6,7 +6,9 @@
 //! [`state::Effect`]s that only others can bring about.
 
 pub mod backstage;
+pub mod keys;
 pub mod meters;
 pub mod panel;
 pub mod present;
 pub mod state;
+pub mod views;

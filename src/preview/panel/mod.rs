@@ -1,11 +1,46 @@
 //! The controls, as egui draws them.
 
+mod canvas;
+mod help;
+mod icons;
+mod instruments;
+mod legend;
+mod marks;
+mod notes;
+mod parts;
+mod sections;
+mod sheet;
+#[cfg(test)]
+mod tests;
+mod theme;
+
+use std::time::Duration;
+
+use egui::{Event, Ui};
+
 use super::present::Area;
 use super::state::{Action, State};
+use super::{keys, meters, state, views};
+use canvas::{Gestures, Place};
+
+/// After so many seconds without pointer or keyboard the panel hides.
+const HIDES_AFTER_S: f64 = 4.0;
+/// A key or the wheel that rests for so many seconds was let go.
+const LET_GO_AFTER_S: f64 = 0.8;
 
 /// What the controls remember from frame to frame besides egui's own memory.
-#[derive(Debug, Default)]
-pub struct Panel {}
+#[derive(Default)]
+pub struct Panel {
+    ready: bool,
+    /// When there was pointer or keyboard last, in egui's seconds.
+    active_s: f64,
+    /// When a control in hand changed the look last.
+    stroke_s: Option<f64>,
+    gestures: Gestures,
+    sheet: sheet::Memory,
+    instruments: instruments::Cache,
+    notes: notes::Ages,
+}
 
 /// Where the picture is, for the gestures on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -18,7 +53,80 @@ pub struct Canvas {
 
 impl Panel {
     /// Draws the controls, reads keys and gestures, and says what the person did.
-    pub fn show(&mut self, ui: &mut egui::Ui, state: &State, canvas: Canvas, actions: &mut Vec<Action>) {
-        let _ = (ui, state, canvas, actions);
+    pub fn show(&mut self, ui: &mut Ui, state: &State, canvas: Canvas, actions: &mut Vec<Action>) {
+        let ctx = ui.ctx().clone();
+        if !std::mem::replace(&mut self.ready, true) {
+            theme::install(&ctx);
+            self.active_s = ctx.input(|input| input.time);
+        }
+        // A new scale holds from the next pass on.
+        if (ctx.zoom_factor() - state.text_scale).abs() > 1e-3 {
+            ctx.set_zoom_factor(state.text_scale);
+        }
+        let first = actions.len();
+        let height_px = if canvas.size.1 > 0 { canvas.size.1 } else { 720 };
+        self.keys(ui, state, height_px, actions);
+        let awake = self.is_awake(ui);
+        if let Some(place) = Place::new(canvas, ctx.pixels_per_point(), state.mirror) {
+            self.gestures.show(ui, state, place, actions);
+        }
+        if !state.bare {
+            legend::show(ui, state);
+            let shown = state.panel && (awake || self.sheet.is_in_use(&ctx));
+            self.sheet.show(&ctx, state, shown, height_px, actions);
+            if state.instruments {
+                self.instruments.show(&ctx, state);
+            }
+        }
+        self.notes.show(&ctx, state, actions);
+        if state.help {
+            help::show(&ctx, actions);
+        }
+        self.settle(ui, &actions[first..]).into_iter().for_each(|settle| actions.push(settle));
+    }
+
+    fn keys(&mut self, ui: &Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
+        let ctx = ui.ctx();
+        if ctx.text_edit_focused() {
+            return;
+        }
+        let focused = ctx.memory(|memory| memory.focused().is_some());
+        ui.input(|input| {
+            actions.extend(input.events.iter().filter_map(|event| keys::action(event, state, height_px, focused)));
+        });
+    }
+
+    /// Whether there was pointer or keyboard a short while ago.
+    fn is_awake(&mut self, ui: &Ui) -> bool {
+        let (now_s, active) = ui.input(|input| {
+            let is_sign = |event: &Event| {
+                let away = matches!(event, Event::PointerGone | Event::WindowFocused(_) | Event::MouseMoved(_));
+                !away && !matches!(event, Event::Key { pressed: false, .. })
+            };
+            (input.time, input.events.iter().any(is_sign) || input.pointer.any_down())
+        });
+        if active {
+            self.active_s = now_s;
+        }
+        let left_s = self.active_s + HIDES_AFTER_S - now_s;
+        if left_s > 0.0 {
+            ui.ctx().request_repaint_after(Duration::from_secs_f64(left_s + 0.01));
+        }
+        left_s > 0.0
+    }
+
+    /// Says when a control was let go, so that its changes are undone together and the next ones are not.
+    fn settle(&mut self, ui: &Ui, done: &[Action]) -> Option<Action> {
+        let (now_s, down, released) =
+            ui.input(|input| (input.time, input.pointer.any_down(), input.pointer.any_released()));
+        if done.iter().any(|action| matches!(action, Action::Look { stroke: Some(_), .. })) {
+            self.stroke_s = Some(now_s);
+        }
+        let since_s = self.stroke_s?;
+        if released || !down && now_s - since_s > LET_GO_AFTER_S {
+            self.stroke_s = None;
+            return Some(Action::Settle);
+        }
+        None
     }
 }

@@ -1,0 +1,269 @@
+//! The keys: one table of what each does. The help shows it, and the panel acts by it.
+
+use egui::{Event, Key, Modifiers};
+
+use super::state::{Action, Shown, Source, State, tweak};
+use crate::depth::focus::FocusRule;
+use crate::look::Look;
+
+/// Keys to press together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chord {
+    /// The key.
+    pub key: Key,
+    /// Whether Ctrl is held.
+    pub ctrl: bool,
+    /// Whether Shift is held; signs that need it on some keyboards are the same with and without.
+    pub shift: bool,
+}
+
+/// What a key does.
+pub struct Binding {
+    /// Any of these.
+    pub chords: &'static [Chord],
+    /// What the help calls them.
+    pub keys: &'static str,
+    /// What they do.
+    pub does: &'static str,
+    /// Whether it goes on while the key is held.
+    pub repeats: bool,
+    make: fn(&State, Context) -> Option<Action>,
+}
+
+/// Bindings of one kind.
+pub struct Group {
+    /// What they are about.
+    pub name: &'static str,
+    /// The bindings.
+    pub bindings: &'static [Binding],
+}
+
+/// What is known when a key is pressed, besides the state.
+#[derive(Clone, Copy, Debug)]
+pub struct Context {
+    /// Rows of the picture; some blur is a share of them.
+    pub height_px: u32,
+    /// Which of its chords it was.
+    pub chord: usize,
+}
+
+const fn key(key: Key) -> Chord {
+    Chord { key, ctrl: false, shift: false }
+}
+
+const fn ctrl(key: Key) -> Chord {
+    Chord { key, ctrl: true, shift: false }
+}
+
+const fn ctrl_shift(key: Key) -> Chord {
+    Chord { key, ctrl: true, shift: true }
+}
+
+type Make = fn(&State, Context) -> Option<Action>;
+
+const fn once(chords: &'static [Chord], keys: &'static str, does: &'static str, make: Make) -> Binding {
+    Binding { chords, keys, does, repeats: false, make }
+}
+
+const fn held(chords: &'static [Chord], keys: &'static str, does: &'static str, make: Make) -> Binding {
+    Binding { chords, keys, does, repeats: true, make }
+}
+
+/// Another look.
+fn look(state: &State, stroke: &'static str, change: impl FnOnce(&mut Look)) -> Option<Action> {
+    let mut look = state.look.clone();
+    change(&mut look);
+    (look != state.look).then(|| Action::Look { look: Box::new(look), stroke: Some(stroke) })
+}
+
+/// One thing is shown, or else the picture.
+fn show(state: &State, shown: Shown) -> Option<Action> {
+    Some(Action::Show(if state.shown == shown { Shown::Picture } else { shown }))
+}
+
+/// Which way the second of two keys goes, against the first.
+fn way(context: Context) -> f32 {
+    if context.chord.is_multiple_of(2) { -1.0 } else { 1.0 }
+}
+
+/// What Esc closes, one thing at a time.
+fn step_back(state: &State) -> Option<Action> {
+    if state.help {
+        Some(Action::Help(false))
+    } else if state.bare {
+        Some(Action::Bare(false))
+    } else if state.full_screen {
+        Some(Action::FullScreen(false))
+    } else if state.panel {
+        Some(Action::Panel(false))
+    } else {
+        None
+    }
+}
+
+/// A step of focus by the arrow keys, as a fraction of the picture.
+const STEP: f32 = 0.02;
+/// A step of the amount of blur, or of the f-number: a third of a stop.
+const THIRD_STOP: f32 = 1.122;
+/// A step of the focal range, in metres.
+const RANGE_STEP_M: f32 = 0.05;
+/// A step of the size of text.
+const TEXT_STEP: f32 = 1.1;
+
+/// All keys.
+pub const GROUPS: [Group; 5] = [
+    Group {
+        name: "Look",
+        bindings: &[
+            once(
+                &[
+                    key(Key::Num1),
+                    key(Key::Num2),
+                    key(Key::Num3),
+                    key(Key::Num4),
+                    key(Key::Num5),
+                    key(Key::Num6),
+                    key(Key::Num7),
+                    key(Key::Num8),
+                    key(Key::Num9),
+                ],
+                "1 – 9",
+                "the preset of that number",
+                |state, context| state.presets.get(context.chord).map(|preset| Action::Preset(preset.name.clone())),
+            ),
+            held(&[key(Key::OpenBracket), key(Key::CloseBracket)], "[  ]", "less blur, more blur", |state, context| {
+                let factor = THIRD_STOP.powf(way(context));
+                look(state, "key blur", |look| tweak::blur_by(look, factor, context.height_px))
+            }),
+            held(
+                &[key(Key::Semicolon), key(Key::Quote)],
+                ";  '",
+                "smaller f-number, larger f-number",
+                |state, context| {
+                    let factor = THIRD_STOP.powf(way(context));
+                    look(state, "key f-number", |look| tweak::f_number_by(look, factor))
+                },
+            ),
+            held(&[key(Key::Comma), key(Key::Period)], ",  .", "less in focus, more in focus", |state, context| {
+                look(state, "key focal range", |look| tweak::focus_range_by(look, RANGE_STEP_M * way(context)))
+            }),
+            held(&[ctrl(Key::Z)], "Ctrl+Z", "undo", |_, _| Some(Action::Undo)),
+            held(&[ctrl_shift(Key::Z), ctrl(Key::Y)], "Ctrl+Shift+Z", "redo", |_, _| Some(Action::Redo)),
+            once(&[key(Key::R)], "R", "back to the look at the start", |_, _| Some(Action::Reset)),
+        ],
+    },
+    Group {
+        name: "Focus",
+        bindings: &[
+            once(&[key(Key::A)], "A", "follow the subject", |state, _| {
+                look(state, "key auto", |look| look.focus = FocusRule::Auto)
+            }),
+            held(
+                &[key(Key::ArrowLeft), key(Key::ArrowRight)],
+                "Left, Right",
+                "move the point of focus, turn the sharp band",
+                |state, context| look(state, "key arrows", |look| tweak::move_focus(look, STEP * way(context), 0.0)),
+            ),
+            held(
+                &[key(Key::ArrowUp), key(Key::ArrowDown)],
+                "Up, Down",
+                "move the point of focus, move the sharp band",
+                |state, context| look(state, "key arrows", |look| tweak::move_focus(look, 0.0, STEP * way(context))),
+            ),
+        ],
+    },
+    Group {
+        name: "View",
+        bindings: &[
+            once(&[key(Key::B)], "B", "before and after, side by side", |state, _| {
+                Some(Action::Split(if state.split.is_some() { None } else { Some(0.5) }))
+            }),
+            once(&[key(Key::Z)], "Z", "freeze the picture", |state, _| Some(Action::Freeze(!state.frozen))),
+            once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
+            once(&[key(Key::D)], "D", "show depth", |state, _| show(state, Shown::Depth)),
+            once(&[key(Key::C)], "C", "show the circle of confusion", |state, _| show(state, Shown::Coc)),
+            once(&[key(Key::N)], "N", "show the bins", |state, _| show(state, Shown::Bins)),
+        ],
+    },
+    Group {
+        name: "Keep",
+        bindings: &[
+            once(&[key(Key::S)], "S", "save a snapshot", |_, _| Some(Action::Snapshot)),
+            once(&[key(Key::V)], "V", "start or stop a recording", |state, _| {
+                Some(Action::Record(state.recording().is_none()))
+            }),
+            once(&[key(Key::O)], "O", "start or stop the virtual camera", |state, _| {
+                let first = || state.virtual_cameras.first().map(|choice| choice.name.clone());
+                Some(Action::VirtualCamera(if state.virtual_camera().is_some() { None } else { first() }))
+            }),
+            once(&[key(Key::K)], "K", "copy as a command", |_, _| Some(Action::CopyCommand)),
+            once(&[key(Key::F5)], "F5", "open the source again, look for new ones", |state, _| {
+                let lost = matches!(state.source, Source::Lost(_) | Source::Ended);
+                Some(if lost { Action::Retry } else { Action::Refresh })
+            }),
+        ],
+    },
+    Group {
+        name: "Window",
+        bindings: &[
+            once(&[key(Key::P), key(Key::Space)], "P, Space", "the panel", |state, _| {
+                Some(Action::Panel(!state.panel))
+            }),
+            once(&[key(Key::I)], "I", "the instruments", |state, _| Some(Action::Instruments(!state.instruments))),
+            once(&[key(Key::H)], "H", "nothing but the picture", |state, _| Some(Action::Bare(!state.bare))),
+            once(&[key(Key::F), key(Key::F11)], "F, F11", "full screen", |state, _| {
+                Some(Action::FullScreen(!state.full_screen))
+            }),
+            held(
+                &[ctrl(Key::Minus), ctrl(Key::Plus), ctrl(Key::Minus), ctrl(Key::Equals)],
+                "Ctrl+−  Ctrl++",
+                "smaller text, larger text",
+                |state, context| Some(Action::TextScale(state.text_scale * TEXT_STEP.powf(way(context)))),
+            ),
+            once(&[ctrl(Key::Num0)], "Ctrl+0", "text as usual", |_, _| Some(Action::TextScale(1.0))),
+            once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
+                Some(Action::Help(!state.help))
+            }),
+            once(&[key(Key::Escape)], "Esc", "close what is open, leave full screen", |state, _| step_back(state)),
+            once(&[key(Key::Q), ctrl(Key::Q), ctrl(Key::W)], "Q, Ctrl+Q", "close the window", |_, _| {
+                Some(Action::Close)
+            }),
+        ],
+    },
+];
+
+/// Keys that belong to the control in focus, where one is.
+fn is_for_controls(chord: Chord) -> bool {
+    let keys = [Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Space, Key::Escape];
+    !chord.ctrl && keys.contains(&chord.key)
+}
+
+/// Letters, whose capitals are others; other signs are themselves wherever they are on a keyboard.
+fn is_letter(key: Key) -> bool {
+    key.name().len() == 1 && key.name().chars().all(|c| c.is_ascii_alphabetic())
+}
+
+impl Chord {
+    fn is(self, pressed: Key, modifiers: Modifiers) -> bool {
+        let shift = !is_letter(self.key) || self.shift == modifiers.shift;
+        self.key == pressed && self.ctrl == modifiers.ctrl && shift && (!modifiers.alt || !is_letter(self.key))
+    }
+}
+
+/// What the key in `event` does, if it is one of these. While a control is `focused`, some keys are its own.
+pub fn action(event: &Event, state: &State, height_px: u32, focused: bool) -> Option<Action> {
+    let Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { return None };
+    let bindings = GROUPS.iter().flat_map(|group| group.bindings);
+    let found = bindings.filter(|binding| binding.repeats || !repeat).find_map(|binding| {
+        let chord = binding.chords.iter().position(|chord| chord.is(*key, *modifiers))?;
+        Some((binding, chord))
+    });
+    let (binding, chord) = found?;
+    if focused && is_for_controls(binding.chords[chord]) {
+        return None;
+    }
+    (binding.make)(state, Context { height_px, chord })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! What one does to the picture itself: click, double-click, turn the wheel, drag.
+
+use egui::{Id, Pos2, Rect, Response, Sense, Ui, Vec2, pos2};
+
+use super::Canvas;
+use super::marks::{self, Tilting};
+use super::state::{Action, Shown, State, tweak};
+use crate::bokeh::Effect;
+use crate::depth::focus::FocusRule;
+use crate::look::Look;
+
+/// How long a ring shows where one clicked, in seconds.
+pub const RING_S: f64 = 0.9;
+/// Points of the wheel that double the blur.
+const WHEEL_TO_DOUBLE: f32 = 300.0;
+/// The split line can be taken hold of this near to it, in points.
+const HOLD: f32 = 12.0;
+
+/// What the gestures remember.
+#[derive(Debug, Default)]
+pub struct Gestures {
+    /// Where a click focused last, as fractions of the picture as it is, and when.
+    ring: Option<([f32; 2], f64)>,
+    /// Which of the marks of tilt-shift is being dragged.
+    tilting: Option<Tilting>,
+}
+
+/// The picture on the screen, in points.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Where it is.
+    pub rect: Rect,
+    /// Its own columns and rows.
+    pub size: Vec2,
+    /// Whether it is shown as a mirror does.
+    pub mirror: bool,
+}
+
+impl Place {
+    /// Of this canvas; `None` where there is no picture.
+    pub fn new(canvas: Canvas, pixels_per_point: f32, mirror: bool) -> Option<Self> {
+        let area = canvas.area;
+        if area.width == 0 || area.height == 0 || canvas.size.0 == 0 || canvas.size.1 == 0 {
+            return None;
+        }
+        let points = |pixels: u32| pixels as f32 / pixels_per_point;
+        let rect = Rect::from_min_size(
+            pos2(points(area.x), points(area.y)),
+            Vec2::new(points(area.width), points(area.height)),
+        );
+        Some(Self { rect, size: Vec2::new(canvas.size.0 as f32, canvas.size.1 as f32), mirror })
+    }
+
+    /// Where a point of the picture is on the screen; both of `at` are fractions.
+    pub fn point(&self, [x, y]: [f32; 2]) -> Pos2 {
+        let x = if self.mirror { 1.0 - x } else { x };
+        self.rect.min + Vec2::new(x, y) * self.rect.size()
+    }
+
+    /// What of the picture is there on the screen: fractions from 0 to 1.
+    pub fn fractions(&self, at: Pos2) -> [f32; 2] {
+        let at = (at - self.rect.min) / self.rect.size();
+        let x = if self.mirror { 1.0 - at.x } else { at.x };
+        [x, at.y].map(|fraction| fraction.clamp(0.0, 1.0))
+    }
+}
+
+impl Gestures {
+    /// Reads what is done to the picture, and draws the marks on it.
+    pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, actions: &mut Vec<Action>) {
+        let response = ui.interact(place.rect, Id::unique("picture"), Sense::click_and_drag());
+        let line = split_line(ui, state, &place);
+        let is_tilt = state.look.effect == Some(Effect::TiltShift) && state.shown == Shown::Picture && !state.bare;
+        let own = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
+        if !own {
+            self.click(&response, state, &place, actions);
+        }
+        if is_tilt {
+            self.tilt(ui, &response, state, &place, actions);
+        }
+        if response.hovered() {
+            wheel(ui, state, &place, actions);
+        }
+        self.draw(ui, state, &place, is_tilt, own);
+        if let Some(at) = line.filter(Response::dragged).and_then(|line| line.interact_pointer_pos()) {
+            let fraction = (at.x - place.rect.left()) / place.rect.width();
+            actions.push(Action::Split(Some(fraction.clamp(0.0, 1.0))));
+        }
+    }
+
+    fn click(&mut self, response: &Response, state: &State, place: &Place, actions: &mut Vec<Action>) {
+        let Some(at) = response.interact_pointer_pos().filter(|_| response.clicked()) else { return };
+        let mut look = state.look.clone();
+        let [x, y] = place.fractions(at);
+        if look.effect == Some(Effect::TiltShift) {
+            look.tilt.center_y = marks::center_through(&look.tilt, place.size, [x, y]);
+        } else if response.double_clicked() {
+            look.focus = FocusRule::Auto;
+            self.ring = None;
+        } else {
+            look.focus = FocusRule::Point { x, y };
+            self.ring = Some(([x, y], response.ctx.input(|input| input.time)));
+        }
+        push_look(actions, state, look, "picture click");
+    }
+
+    fn tilt(&mut self, ui: &Ui, response: &Response, state: &State, place: &Place, actions: &mut Vec<Action>) {
+        if response.drag_started() {
+            let origin = ui.input(|input| input.pointer.press_origin());
+            self.tilting = origin.and_then(|at| marks::grip(&state.look.tilt, place, at));
+        }
+        if !response.dragged() {
+            self.tilting = None;
+        }
+        if let (Some(tilting), Some(at)) = (self.tilting, response.interact_pointer_pos()) {
+            let mut look = state.look.clone();
+            marks::drag(&mut look.tilt, tilting, place, at);
+            push_look(actions, state, look, tilting.stroke());
+        }
+    }
+
+    fn draw(&mut self, ui: &Ui, state: &State, place: &Place, is_tilt: bool, line_held: bool) {
+        let painter = ui.painter().with_clip_rect(place.rect);
+        let now = ui.input(|input| input.time);
+        if state.bare {
+            return;
+        }
+        if let Some(at) = state.split {
+            marks::split(&painter, place, at, line_held);
+        }
+        if is_tilt {
+            let pointer = ui.input(|input| input.pointer.hover_pos());
+            let near = self.tilting.or_else(|| pointer.and_then(|at| marks::grip(&state.look.tilt, place, at)));
+            marks::tilt(&painter, &state.look.tilt, place, near);
+        }
+        if let (FocusRule::Point { x, y }, Some(Effect::Dof)) = (state.look.focus, state.look.effect) {
+            marks::point(&painter, place.point([x, y]));
+        }
+        if let Some((at, since)) = self.ring {
+            let age = (now - since) / RING_S;
+            if age < 1.0 {
+                marks::ring(&painter, place.point(at), age.max(0.0) as f32);
+                ui.ctx().request_repaint_after_secs(1.0 / 30.0);
+            } else {
+                self.ring = None;
+            }
+        }
+    }
+}
+
+/// The line between before and after, to take hold of.
+fn split_line(ui: &mut Ui, state: &State, place: &Place) -> Option<Response> {
+    let at = state.split?;
+    let x = place.rect.left() + at * place.rect.width();
+    let rect = Rect::from_x_y_ranges(x - HOLD..=x + HOLD, place.rect.y_range());
+    let line = ui.interact(rect, Id::unique("split line"), Sense::drag());
+    Some(line.on_hover_and_drag_cursor(egui::CursorIcon::ResizeHorizontal))
+}
+
+fn wheel(ui: &Ui, state: &State, place: &Place, actions: &mut Vec<Action>) {
+    let turned = ui.input(|input| if input.modifiers.any() { 0.0 } else { input.smooth_scroll_delta().y });
+    if turned != 0.0 {
+        let mut look = state.look.clone();
+        tweak::blur_by(&mut look, (turned / WHEEL_TO_DOUBLE).exp2(), place.size.y as u32);
+        push_look(actions, state, look, "wheel");
+    }
+}
+
+fn push_look(actions: &mut Vec<Action>, state: &State, look: Look, stroke: &'static str) {
+    if look != state.look {
+        actions.push(Action::Look { look: Box::new(look), stroke: Some(stroke) });
+    }
+}

@@ -1,0 +1,113 @@
+//! Icons, drawn with a few lines.
+
+use std::f32::consts::TAU;
+
+use egui::{
+    Color32, CornerRadius, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo,
+};
+use egui::{Role, pos2, vec2};
+
+use super::parts::focus_ring;
+use super::theme::Colors;
+
+/// What an icon shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Icon {
+    /// An arrow that turns back.
+    Undo,
+    /// An arrow that turns forth.
+    Redo,
+    /// A circle that begins anew.
+    Reset,
+    /// A question mark.
+    Help,
+    /// A cross.
+    Close,
+}
+
+/// A button that is an icon. Whether it was clicked.
+pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
+    let colors = Colors::here(ui);
+    let sense = if enabled { Sense::click() } else { Sense::hover() };
+    let (rect, response) = ui.allocate_exact_size(Vec2::splat(26.0), sense);
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, hint));
+    if enabled && response.hovered() {
+        ui.painter().rect_filled(rect, CornerRadius::same(7), colors.hover);
+    }
+    let color = if enabled { colors.text } else { colors.weak.gamma_multiply(0.45) };
+    draw(ui.painter(), icon, rect.center(), color);
+    focus_ring(ui, &response, rect.shrink(2.0));
+    response.on_hover_text(hint).clicked()
+}
+
+fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
+    let stroke = Stroke::new(1.6, color);
+    match icon {
+        Icon::Undo => turn(painter, at, -1.0, stroke),
+        Icon::Redo => turn(painter, at, 1.0, stroke),
+        Icon::Reset => {
+            arc(painter, at, 6.0, [0.12, 0.92], stroke);
+            let tip = at + Vec2::angled(0.12 * TAU) * 6.0;
+            painter.add(Shape::line(vec![tip + vec2(-4.6, -0.6), tip, tip + vec2(0.8, 4.6)], stroke));
+        }
+        Icon::Help => {
+            arc(painter, at + vec2(0.0, -3.0), 3.2, [0.5, 1.12], stroke);
+            let foot = at + vec2(0.0, 2.0);
+            painter.add(Shape::line(vec![at + vec2(2.3, -0.8), at + vec2(0.2, 0.7), foot], stroke));
+            painter.circle_filled(at + vec2(0.0, 5.6), 1.2, color);
+        }
+        Icon::Close => {
+            for down in [-1.0, 1.0] {
+                painter.line_segment([at + vec2(-4.5, -4.5 * down), at + vec2(4.5, 4.5 * down)], stroke);
+            }
+        }
+    }
+}
+
+/// An arrow that turns left (-1) or right (1).
+fn turn(painter: &Painter, at: Pos2, side: f32, stroke: Stroke) {
+    let curve: Vec<Pos2> = (0..=12)
+        .map(|k| {
+            let angle = (-0.25 + 0.5 * k as f32 / 12.0) * TAU;
+            at + vec2(side * -(angle.cos() * 4.0 - 1.0), angle.sin() * 4.0 + 1.0)
+        })
+        .map(|p| pos2(2.0 * at.x - p.x, p.y))
+        .collect();
+    painter.add(Shape::line(curve, stroke));
+    let tip = at + vec2(side * 6.0, -3.0);
+    painter.line_segment([at + vec2(-side, -3.0), tip], stroke);
+    painter.line_segment([at + vec2(-side, 5.0), at + vec2(side * 3.0, 5.0)], stroke);
+    painter.add(Shape::line(vec![tip + vec2(side * -3.4, -3.4), tip, tip + vec2(side * -3.4, 3.4)], stroke));
+}
+
+fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: Stroke) {
+    let points = (0..=20).map(|k| {
+        let turn = turns[0] + (turns[1] - turns[0]) * k as f32 / 20.0;
+        center + Vec2::angled(turn * TAU) * radius
+    });
+    painter.add(Shape::line(points.collect(), stroke));
+}
+
+/// The mark of a section: it points down where it is open.
+pub fn chevron(ui: &mut Ui, openness: f32, response: &Response) {
+    let colors = Colors::here(ui);
+    let center = response.rect.center();
+    let turned = egui::emath::Rot2::from_angle(openness * TAU / 4.0);
+    let points = [vec2(-2.0, -4.0), vec2(2.5, 0.0), vec2(-2.0, 4.0)].map(|point| center + turned * point);
+    ui.painter().add(Shape::line(points.to_vec(), Stroke::new(1.6, colors.weak)));
+}
+
+/// A dot, as on a recorder; a square while it records.
+pub fn record(painter: &Painter, center: Pos2, on: bool, color: Color32) {
+    if on {
+        painter.rect_filled(Rect::from_center_size(center, Vec2::splat(9.0)), CornerRadius::same(2), color);
+    } else {
+        painter.circle_filled(center, 5.0, color);
+        painter.rect_stroke(
+            Rect::from_center_size(center, Vec2::splat(14.0)),
+            CornerRadius::same(7),
+            Stroke::new(1.0, color),
+            StrokeKind::Inside,
+        );
+    }
+}

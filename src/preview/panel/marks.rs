@@ -1,0 +1,196 @@
+//! Marks drawn on the picture: where the focus is, the line of the split, the band of tilt-shift.
+//!
+//! They are light with a dark border, so that they are seen on any picture.
+
+use egui::{Align2, CornerRadius, FontFamily, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
+
+use super::canvas::Place;
+use super::state::tweak::turned;
+use super::theme::{ON_PICTURE, SHADE, medium};
+use crate::look::Tilt;
+
+/// A mark can be taken hold of this near to it, in points.
+const HOLD: f32 = 16.0;
+
+/// A mark of tilt-shift in hand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tilting {
+    /// The middle: the band moves.
+    Middle,
+    /// An edge: it becomes wider.
+    Edge,
+    /// The far grip: it turns.
+    Turn,
+}
+
+impl Tilting {
+    /// Changes by this mark are undone together.
+    pub fn stroke(self) -> &'static str {
+        match self {
+            Self::Middle => "tilt middle",
+            Self::Edge => "tilt edge",
+            Self::Turn => "tilt turn",
+        }
+    }
+}
+
+fn line(painter: &Painter, ends: [Pos2; 2], width: f32) {
+    painter.line_segment(ends, Stroke::new(width + 2.0, SHADE));
+    painter.line_segment(ends, Stroke::new(width, ON_PICTURE));
+}
+
+fn dot(painter: &Painter, at: Pos2, radius: f32) {
+    painter.circle_filled(at, radius + 1.5, SHADE);
+    painter.circle_filled(at, radius, ON_PICTURE);
+}
+
+/// The ring where one clicked: it draws together and fades; `age` from 0 to 1.
+pub fn ring(painter: &Painter, at: Pos2, age: f32) {
+    let settle = (age / 0.3).min(1.0);
+    let radius = 40.0 - 18.0 * (1.0 - (1.0 - settle) * (1.0 - settle));
+    let opacity = ((1.0 - age) / 0.5).min(1.0);
+    painter.circle_stroke(at, radius, Stroke::new(4.0, SHADE.gamma_multiply(opacity)));
+    painter.circle_stroke(at, radius, Stroke::new(2.0, ON_PICTURE.gamma_multiply(opacity)));
+}
+
+/// The point of focus: four corners of a square.
+pub fn point(painter: &Painter, at: Pos2) {
+    for (width, color) in [(3.5, SHADE), (1.5, ON_PICTURE)] {
+        for corner in [vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0)] {
+            let tip = at + corner * 13.0;
+            let points = vec![tip - vec2(corner.x * 6.0, 0.0), tip, tip - vec2(0.0, corner.y * 6.0)];
+            painter.add(Shape::line(points, Stroke::new(width, color)));
+        }
+    }
+}
+
+/// The line between before (left) and after.
+pub fn split(painter: &Painter, place: &Place, at: f32, held: bool) {
+    let rect = place.rect;
+    let x = rect.left() + at * rect.width();
+    line(painter, [pos2(x, rect.top()), pos2(x, rect.bottom())], if held { 3.0 } else { 2.0 });
+    let grip = pos2(x, rect.center().y);
+    dot(painter, grip, if held { 15.0 } else { 13.0 });
+    for side in [-1.0, 1.0] {
+        let tip = grip + vec2(side * 7.5, 0.0);
+        let points = vec![tip + vec2(side * -3.5, -4.0), tip, tip + vec2(side * -3.5, 4.0)];
+        painter.add(Shape::line(points, Stroke::new(1.8, egui::Color32::from_gray(40))));
+    }
+    label(painter, pos2(x - 12.0, rect.top() + 14.0), Align2::RIGHT_TOP, "Before");
+    label(painter, pos2(x + 12.0, rect.top() + 14.0), Align2::LEFT_TOP, "After");
+}
+
+/// A word on the picture.
+pub fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) {
+    let galley = painter.layout_no_wrap(text.to_owned(), FontId::new(12.5, medium()), ON_PICTURE);
+    let rect = align.anchor_size(at, galley.size() + vec2(14.0, 6.0));
+    painter.rect_filled(rect, CornerRadius::same(9), egui::Color32::from_black_alpha(190));
+    painter.galley(rect.min + vec2(7.0, 3.0), galley, ON_PICTURE);
+}
+
+/// The band on the screen: its middle, the direction along it, and that across it (both one picture height long), in
+/// points.
+struct Band {
+    middle: Pos2,
+    along: Vec2,
+    across: Vec2,
+}
+
+impl Band {
+    fn new(tilt: &Tilt, place: &Place) -> Self {
+        let (sin, cos) = tilt.angle_deg.to_radians().sin_cos();
+        let side = if place.mirror { -1.0 } else { 1.0 };
+        let height = place.rect.height();
+        Self {
+            middle: place.point([0.5, tilt.center_y]),
+            along: vec2(side * cos, sin) * height,
+            across: vec2(side * -sin, cos) * height,
+        }
+    }
+
+    fn edge(&self, tilt: &Tilt, side: f32) -> Pos2 {
+        self.middle + self.across * (side * tilt.band / 2.0)
+    }
+
+    /// The grip that turns it, within the picture.
+    fn turn(&self, place: &Place) -> Pos2 {
+        let most = place.rect.width().min(place.rect.height()) / place.rect.height();
+        self.middle + self.along * (0.32 * most)
+    }
+}
+
+/// The mark of tilt-shift that a press at `at` takes hold of.
+pub fn grip(tilt: &Tilt, place: &Place, at: Pos2) -> Option<Tilting> {
+    let band = Band::new(tilt, place);
+    let near = |mark: Pos2| mark.distance(at) <= HOLD;
+    if near(band.turn(place)) {
+        Some(Tilting::Turn)
+    } else if near(band.middle) {
+        Some(Tilting::Middle)
+    } else if [-1.0, 1.0].into_iter().any(|side| near(band.edge(tilt, side))) {
+        Some(Tilting::Edge)
+    } else {
+        let across = (at - band.middle).dot(band.across) / band.across.length_sq();
+        (across.abs() <= tilt.band / 2.0).then_some(Tilting::Middle)
+    }
+}
+
+/// Moves a mark to `at`.
+pub fn drag(tilt: &mut Tilt, tilting: Tilting, place: &Place, at: Pos2) {
+    let band = Band::new(tilt, place);
+    let from_middle = at - band.middle;
+    match tilting {
+        Tilting::Middle => tilt.center_y = ((at.y - place.rect.top()) / place.rect.height()).clamp(0.0, 1.0),
+        Tilting::Edge => {
+            let across = from_middle.dot(band.across) / band.across.length_sq();
+            tilt.band = (2.0 * across.abs()).clamp(0.0, 1.0);
+        }
+        Tilting::Turn if from_middle.length() > 4.0 => {
+            let side = if place.mirror { -1.0 } else { 1.0 };
+            let angle = from_middle.y.atan2(side * from_middle.x).to_degrees();
+            // Level, upright and half between are easy to find.
+            let nearest = (angle / 45.0).round() * 45.0;
+            tilt.angle_deg = turned(if (angle - nearest).abs() < 2.0 { nearest } else { angle }, 0.0);
+        }
+        Tilting::Turn => {}
+    }
+}
+
+/// The middle of a band, as a fraction of the height, that runs through a point given as fractions; `size` is the
+/// picture's own, in pixels.
+pub fn center_through(tilt: &Tilt, size: Vec2, [x, y]: [f32; 2]) -> f32 {
+    let (sin, cos) = tilt.angle_deg.to_radians().sin_cos();
+    if cos.abs() < 0.2 {
+        // Nearly upright: no middle within reach would do.
+        return y;
+    }
+    (y - sin / cos * (x - 0.5) * size.x / size.y).clamp(0.0, 1.0)
+}
+
+/// The band of tilt-shift and its grips; the one that is `near` the pointer is larger.
+pub fn tilt(painter: &Painter, tilt: &Tilt, place: &Place, near: Option<Tilting>) {
+    let band = Band::new(tilt, place);
+    let reach = band.along * (place.rect.size().length() / place.rect.height());
+    for side in [-1.0, 1.0] {
+        let at = band.edge(tilt, side);
+        for (width, color) in [(3.5, SHADE), (1.5, ON_PICTURE)] {
+            painter.extend(Shape::dashed_line(&[at - reach, at + reach], Stroke::new(width, color), 10.0, 7.0));
+        }
+    }
+    let turn = band.turn(place);
+    line(painter, [band.middle, turn], 1.5);
+    let size = |tilting: Tilting, usual: f32| if near == Some(tilting) { usual + 2.5 } else { usual };
+    for side in [-1.0, 1.0] {
+        dot(painter, band.edge(tilt, side), size(Tilting::Edge, 5.5));
+    }
+    dot(painter, turn, size(Tilting::Turn, 6.5));
+    painter.circle_filled(turn, 3.0, egui::Color32::from_gray(40));
+    dot(painter, band.middle, size(Tilting::Middle, 9.0));
+    let text = format!("{:.0}°", tilt.angle_deg);
+    if near == Some(Tilting::Turn) {
+        let font = FontId::new(12.5, FontFamily::Proportional);
+        let at = Rect::from_center_size(turn + vec2(0.0, -24.0), vec2(44.0, 20.0));
+        painter.rect_filled(at, CornerRadius::same(9), egui::Color32::from_black_alpha(190));
+        painter.text(at.center(), Align2::CENTER_CENTER, text, font, ON_PICTURE);
+    }
+}

@@ -1,0 +1,150 @@
+//! The controls that the sections are made of.
+
+use std::ops::RangeInclusive;
+
+use egui::{
+    Align, Align2, CornerRadius, DragValue, FontId, Layout, Rect, Response, RichText, Role, Sense, Slider, Stroke,
+    StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+};
+
+use super::theme::{Colors, ROW, medium};
+
+/// How a number is chosen.
+pub struct Number<'a> {
+    /// What it is called.
+    pub label: &'a str,
+    /// What it does, shown while the pointer rests on it.
+    pub hint: &'a str,
+    /// Least and largest value.
+    pub range: RangeInclusive<f32>,
+    /// Whether the slider goes by ratios.
+    pub ratios: bool,
+    /// Digits after the point.
+    pub digits: usize,
+    /// What is written before and after it.
+    pub around: [&'a str; 2],
+}
+
+/// A name, a number to drag or type, and a slider under them. Whether the number changed.
+pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
+    let Number { label, hint, range, ratios, digits, around: [before, after] } = how;
+    let mut changed = false;
+    ui.scope(|ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        let name = ui.horizontal(|ui| {
+            let name = ui.label(label).on_hover_text(hint);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
+                ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
+                let decades = (range.end() - range.start()) / 300.0;
+                let drag = DragValue::new(value).range(range.clone()).speed(decades).max_decimals(digits);
+                let drag = drag.min_decimals(digits).prefix(before).suffix(after);
+                changed |= ui.add(drag).labelled_by(name.id).on_hover_text(hint).changed();
+            });
+            name
+        });
+        ui.spacing_mut().slider_width = ui.available_width();
+        ui.spacing_mut().interact_size.y = 20.0;
+        let least = if ratios { f64::from(*range.start()).max(1e-3) } else { 0.0 };
+        let slider = Slider::new(value, range).show_value(false).logarithmic(ratios).smallest_positive(least);
+        changed |= ui.add(slider).labelled_by(name.inner.id).on_hover_text(hint).changed();
+    });
+    changed
+}
+
+/// One of several, side by side: name and hint of each, and which of them can be chosen. The one that was clicked.
+pub fn choose(
+    ui: &mut Ui,
+    what: &str,
+    options: &[(&str, &str)],
+    chosen: usize,
+    can: impl Fn(usize) -> bool,
+) -> Option<usize> {
+    let colors = Colors::here(ui);
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW), Sense::hover());
+    ui.painter().rect_filled(rect, CornerRadius::same(7), colors.field);
+    let cell_width = rect.width() / options.len().max(1) as f32;
+    let mut clicked = None;
+    for (index, (name, hint)) in options.iter().enumerate() {
+        let left = rect.left() + cell_width * index as f32;
+        let cell = Rect::from_min_size(pos2(left, rect.top()), Vec2::new(cell_width, ROW));
+        let (is_chosen, is_possible) = (index == chosen, can(index));
+        let sense = if is_possible { Sense::click() } else { Sense::hover() };
+        let response = ui.interact(cell, ui.scope_id().with((what, index)), sense);
+        response
+            .widget_info(|| WidgetInfo::selected(Role::RadioButton, is_possible, is_chosen, format!("{what}: {name}")));
+        let inner = cell.shrink(2.0);
+        let text = if is_chosen {
+            ui.painter().rect_filled(inner, CornerRadius::same(6), colors.accent);
+            colors.on_accent
+        } else if !is_possible {
+            colors.weak.gamma_multiply(0.6)
+        } else {
+            if response.hovered() {
+                ui.painter().rect_filled(inner, CornerRadius::same(6), colors.hover);
+            }
+            colors.text
+        };
+        focus_ring(ui, &response, inner);
+        let family = if is_chosen { medium() } else { egui::FontFamily::Proportional };
+        let font = FontId::new(12.5, family);
+        ui.painter().with_clip_rect(cell).text(inner.center(), Align2::CENTER_CENTER, name, font, text);
+        if response.on_hover_text(*hint).clicked() {
+            clicked = Some(index);
+        }
+    }
+    clicked
+}
+
+/// A ring around what has the keyboard's focus.
+pub fn focus_ring(ui: &Ui, response: &Response, rect: Rect) {
+    if response.has_focus() {
+        let colors = Colors::here(ui);
+        let outside = StrokeKind::Outside;
+        ui.painter().rect_stroke(rect.expand(1.0), CornerRadius::same(7), Stroke::new(2.0, colors.text), outside);
+    }
+}
+
+/// A name and a switch. Whether it was turned.
+pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
+    let colors = Colors::here(ui);
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::Switch, ui.is_enabled(), on, label));
+    let track = Rect::from_center_size(pos2(rect.right() - 17.0, rect.center().y), Vec2::new(32.0, 18.0));
+    let fill = match (on, response.hovered()) {
+        (true, _) => colors.accent,
+        (false, true) => colors.hover,
+        (false, false) => colors.field,
+    };
+    let painter = ui.painter();
+    painter.rect_filled(track, CornerRadius::same(9), fill);
+    painter.rect_stroke(track, CornerRadius::same(9), Stroke::new(1.0, colors.line), StrokeKind::Inside);
+    let x = if on { track.right() - 9.0 } else { track.left() + 9.0 };
+    painter.circle_filled(pos2(x, track.center().y), 6.5, if on { colors.on_accent } else { colors.weak });
+    let font = TextStyle::Body.resolve(ui.style());
+    painter.text(rect.left_center(), Align2::LEFT_CENTER, label, font, ui.visuals().text_color());
+    focus_ring(ui, &response, track);
+    response.on_hover_text(hint).clicked()
+}
+
+/// A line of explanation.
+pub fn remark(ui: &mut Ui, text: &str) {
+    let colors = Colors::here(ui);
+    ui.label(RichText::new(text).text_style(TextStyle::Small).color(colors.weak));
+}
+
+/// A part of the panel that can be folded.
+pub fn section<R>(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui) -> R) -> Option<R> {
+    let colors = Colors::here(ui);
+    ui.add_space(4.0);
+    let title = RichText::new(name).family(medium()).size(13.5).color(colors.text);
+    let folded = egui::CollapsingHeader::new(title)
+        .id_salt(name)
+        .default_open(open)
+        .icon(super::icons::chevron)
+        .show_unindented(ui, |ui| {
+            ui.add_space(2.0);
+            body(ui)
+        });
+    folded.body_returned
+}

@@ -1,0 +1,185 @@
+//! The shape of the lens opening, chosen from pictures of what it makes of a light.
+
+use egui::{
+    Color32, ColorImage, CornerRadius, Rect, Sense, Stroke, StrokeKind, TextureHandle, TextureOptions, Ui, Vec2,
+};
+use egui::{Role, WidgetInfo, pos2};
+
+use super::Sheet;
+use crate::bokeh::aperture::{Aperture, Shape};
+use crate::preview::panel::parts::{Number, focus_ring, number};
+use crate::preview::panel::theme::Colors;
+
+/// Cells of a mask, and pixels of the picture of it: the window may be drawn without smoothing.
+const CELLS: usize = 28;
+const SIDE_PX: usize = 84;
+/// Side of a thumbnail, in points.
+const SIDE: f32 = 40.0;
+
+const SHAPES: [&str; 6] = ["Disc", "Ring", "Blades", "Heart", "Star", "Picture"];
+
+/// Pictures of apertures, and what they were made of.
+#[derive(Default)]
+pub struct Thumbs {
+    made: [Option<(Aperture, f32, TextureHandle)>; SHAPES.len()],
+}
+
+/// The shape, its numbers, and the highlights that show it.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
+    shapes(ui, sheet, thumbs);
+    let before = sheet.look.aperture.clone();
+    let part = |label, hint, range, digits, around| Number { label, hint, range, ratios: false, digits, around };
+    match &mut sheet.look.aperture.shape {
+        Shape::Disc | Shape::Heart | Shape::Picture(_) => {}
+        Shape::Ring { inner } => {
+            number(ui, part("Hole", "Its radius", 0.0..=0.95, 2, ["", ""]), inner);
+        }
+        Shape::Polygon { blades, rotation_deg, curvature } => {
+            whole(ui, part("Blades", "How many", 3.0..=16.0, 0, ["", ""]), blades);
+            number(ui, part("Rotation", "Clockwise", -180.0..=180.0, 0, ["", "°"]), rotation_deg);
+            number(ui, part("Curvature", "Straight blades to a circle", 0.0..=1.0, 2, ["", ""]), curvature);
+        }
+        Shape::Star { points } => whole(ui, part("Points", "How many", 3.0..=16.0, 0, ["", ""]), points),
+    }
+    let light = part("Light", "-1: soap bubbles; 1: bright in the middle, soft at the rim", -1.0..=1.0, 2, ["", ""]);
+    number(ui, light, &mut sheet.look.aperture.intensity);
+    let shaped = before != sheet.look.aperture;
+    sheet.changed(shaped, "aperture");
+    let soft = number(ui, part("Soft rim", "As a share of the radius", 0.0..=1.0, 2, ["", ""]), &mut sheet.look.rim);
+    sheet.changed(soft, "rim");
+    let how = part("Highlights", "How much brighter lights are than white; 0 is off", 0.0..=50.0, 1, ["", "×"]);
+    let bright = number(ui, how, &mut sheet.look.highlights);
+    sheet.changed(bright, "highlights");
+}
+
+/// A number without a fraction.
+fn whole(ui: &mut Ui, how: Number, value: &mut u32) {
+    let mut real = *value as f32;
+    if number(ui, how, &mut real) {
+        *value = real.round() as u32;
+    }
+}
+
+fn shapes(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
+    let chosen = index_of(&sheet.look.aperture.shape);
+    let settled = !ui.input(|input| input.pointer.any_down());
+    let mut picked = None;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        for (index, name) in SHAPES.iter().enumerate() {
+            let Some(shape) = of_index(index, &sheet.look) else { continue };
+            let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::click());
+            let is_chosen = index == chosen;
+            response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, *name));
+            let aperture = Aperture { shape, intensity: sheet.look.aperture.intensity };
+            // One picture a pass, and while something is dragged only that of what is changed.
+            let texture = thumbs.of(ui, index, &aperture, sheet.look.rim, settled || is_chosen);
+            thumbnail(ui, rect, texture, is_chosen, response.hovered());
+            focus_ring(ui, &response, rect);
+            if response.on_hover_text(*name).clicked() && !is_chosen {
+                picked = Some(aperture);
+            }
+        }
+    });
+    if let Some(aperture) = picked {
+        sheet.look.aperture = aperture;
+        sheet.changed(true, "shape");
+    }
+}
+
+fn thumbnail(ui: &Ui, rect: Rect, texture: Option<egui::TextureId>, chosen: bool, hovered: bool) {
+    let colors = Colors::here(ui);
+    let painter = ui.painter();
+    painter.rect_filled(rect, CornerRadius::same(8), if hovered { colors.hover } else { colors.field });
+    let light = if chosen { colors.accent } else { colors.text };
+    if let Some(texture) = texture {
+        let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        painter.image(texture, rect.shrink(6.0), whole, light);
+    }
+    if chosen {
+        painter.rect_stroke(rect, CornerRadius::same(8), Stroke::new(2.0, colors.accent), StrokeKind::Inside);
+    }
+}
+
+fn index_of(shape: &Shape) -> usize {
+    match shape {
+        Shape::Disc => 0,
+        Shape::Ring { .. } => 1,
+        Shape::Polygon { .. } => 2,
+        Shape::Heart => 3,
+        Shape::Star { .. } => 4,
+        Shape::Picture(_) => 5,
+    }
+}
+
+/// A shape to choose: the chosen one as it is, and others as they begin. A picture is only there where one was given.
+fn of_index(index: usize, look: &crate::look::Look) -> Option<Shape> {
+    if index == index_of(&look.aperture.shape) {
+        return Some(look.aperture.shape.clone());
+    }
+    Some(match index {
+        0 => Shape::Disc,
+        1 => Shape::Ring { inner: 0.5 },
+        2 => Shape::Polygon { blades: 6, rotation_deg: 0.0, curvature: 0.15 },
+        3 => Shape::Heart,
+        4 => Shape::Star { points: 5 },
+        _ => return None,
+    })
+}
+
+impl Thumbs {
+    fn of(&mut self, ui: &Ui, index: usize, aperture: &Aperture, rim: f32, may: bool) -> Option<egui::TextureId> {
+        let made = &mut self.made[index];
+        let current = made.as_ref().is_some_and(|(of, at, _)| of == aperture && *at == rim);
+        if !current && (may || made.is_none()) {
+            let image = picture(aperture, rim);
+            match made {
+                Some((of, at, texture)) => {
+                    texture.set(image, TextureOptions::LINEAR);
+                    (*of, *at) = (aperture.clone(), rim);
+                }
+                None => {
+                    let texture = ui.ctx().load_texture(SHAPES[index], image, TextureOptions::LINEAR);
+                    *made = Some((aperture.clone(), rim, texture));
+                }
+            }
+        }
+        made.as_ref().map(|(.., texture)| texture.id())
+    }
+}
+
+/// White, as opaque as the aperture lets light through, the light as eyes see it.
+fn picture(aperture: &Aperture, rim: f32) -> ColorImage {
+    let mask = aperture.mask(CELLS, rim);
+    let brightest = mask.values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let at = |x: usize, y: usize| mask.values[y * CELLS + x] / brightest;
+    let place = |k: usize| {
+        let cell = ((k as f64 + 0.5) / SIDE_PX as f64 * CELLS as f64 - 0.5).clamp(0.0, CELLS as f64 - 1.0);
+        (cell as usize, (cell as usize + 1).min(CELLS - 1), cell.fract())
+    };
+    let pixel = |k: usize| {
+        let ((x0, x1, fx), (y0, y1, fy)) = (place(k % SIDE_PX), place(k / SIDE_PX));
+        let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+        let light = mix(mix(at(x0, y0), at(x1, y0), fx), mix(at(x0, y1), at(x1, y1), fx), fy);
+        let opacity = (light.powf(1.0 / 1.8) * 255.0).round() as u8;
+        Color32::from_rgba_premultiplied(opacity, opacity, opacity, opacity)
+    };
+    ColorImage::new([SIDE_PX, SIDE_PX], (0..SIDE_PX * SIDE_PX).map(pixel).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_show_the_shape() {
+        let light = |shape: Shape, intensity: f32, (x, y): (usize, usize)| {
+            picture(&Aperture { shape, intensity }, 0.1).pixels[y * SIDE_PX + x].a()
+        };
+        let middle = (SIDE_PX / 2, SIDE_PX / 2);
+        assert_eq!((light(Shape::Disc, 0.0, middle), light(Shape::Disc, 0.0, (0, 0))), (255, 0));
+        assert_eq!(light(Shape::Ring { inner: 0.5 }, 0.0, middle), 0);
+        let rim = (6, SIDE_PX / 2);
+        assert!(light(Shape::Disc, -1.0, rim) > light(Shape::Disc, -1.0, middle), "a soap bubble is bright at its rim");
+    }
+}

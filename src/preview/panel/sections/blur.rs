@@ -1,0 +1,110 @@
+//! How strong the blur is: by amount, or by the numbers of a lens.
+
+use egui::Ui;
+
+use super::Sheet;
+use crate::look::{Look, MAX_COC_PER_HEIGHT, Strength};
+use crate::optics::Lens;
+use crate::preview::panel::parts::{Number, choose, number, remark, switch};
+use crate::preview::state::tweak::{F_NUMBERS, LENS, amount};
+
+const WAYS: [(&str, &str); 2] = [
+    ("Amount", "Blur as a share of the picture, the same at every distance of focus"),
+    ("Lens", "What a real lens does: its f-number and focal length"),
+];
+
+/// The strength, and what is in front.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    let by_lens = matches!(sheet.look.strength, Strength::Lens(_));
+    if sheet.follows_depth() || by_lens {
+        let follows_depth = sheet.follows_depth();
+        let chosen = choose(ui, "Blur by", &WAYS, usize::from(by_lens), |index| index == 0 || follows_depth);
+        match chosen {
+            Some(1) if !by_lens => sheet.look.strength = Strength::Lens(LENS),
+            Some(0) if by_lens => sheet.look.strength = Strength::Default,
+            _ => {}
+        }
+        sheet.changed(chosen.is_some(), "blur by");
+    }
+    match sheet.look.strength {
+        Strength::Lens(lens) => by_numbers(ui, sheet, lens),
+        Strength::Default | Strength::AtInfinity(_) => by_amount(ui, sheet),
+    }
+    largest(ui, sheet);
+}
+
+fn by_amount(ui: &mut Ui, sheet: &mut Sheet) {
+    let Some(share) = amount(&sheet.look, sheet.height_px) else { return };
+    let mut percent = share * 100.0;
+    let how = Number {
+        label: "Amount of blur",
+        hint: "Radius of a far light, as a share of the picture's height. The wheel over the picture does the same",
+        range: 0.0..=MAX_COC_PER_HEIGHT * 100.0,
+        ratios: false,
+        digits: 1,
+        around: ["", " %"],
+    };
+    if number(ui, how, &mut percent) {
+        sheet.look.strength = Strength::AtInfinity(percent / 100.0 * sheet.height_px as f32);
+        sheet.changed(true, "amount");
+    }
+    if sheet.follows_depth() && sheet.state.focus_m.is_some() {
+        remark(ui, &like_lens(sheet));
+    }
+}
+
+/// The lens that blurs as much.
+fn like_lens(sheet: &Sheet) -> String {
+    let share = amount(&sheet.look, sheet.height_px).unwrap_or_default();
+    let focus_mm = sheet.state.focus_m.unwrap_or(1.0) * 1000.0;
+    let radius_mm = share * LENS.sensor_width_mm * 9.0 / 16.0;
+    let focal_mm = LENS.focal_length_mm;
+    let f_number = focal_mm * focal_mm / (2.0 * radius_mm * (focus_mm - focal_mm).max(1.0));
+    if f_number.is_finite() && f_number < 64.0 {
+        format!("Like {focal_mm:.0} mm at f/{f_number:.1} on full frame")
+    } else {
+        "No blur to be seen".to_owned()
+    }
+}
+
+fn by_numbers(ui: &mut Ui, sheet: &mut Sheet, mut lens: Lens) {
+    let number_of = |label, hint, range, digits, around| Number { label, hint, range, ratios: true, digits, around };
+    let f = number_of("Aperture", "f-number: smaller is more blur", F_NUMBERS, 1, ["f/", ""]);
+    let focal = number_of("Focal length", "Longer is more blur", 14.0..=200.0, 0, ["", " mm"]);
+    let sensor = number_of("Sensor width", "36 mm is full frame; smaller is more blur", 4.0..=54.0, 1, ["", " mm"]);
+    let by_f = number(ui, f, &mut lens.f_number);
+    let by_focal = number(ui, focal, &mut lens.focal_length_mm);
+    let by_sensor = number(ui, sensor, &mut lens.sensor_width_mm);
+    if by_f || by_focal || by_sensor {
+        sheet.look.strength = Strength::Lens(lens);
+    }
+    sheet.changed(by_f, "f-number");
+    sheet.changed(by_focal, "focal length");
+    sheet.changed(by_sensor, "sensor width");
+}
+
+/// The largest radius: near things would blur without bound.
+fn largest(ui: &mut Ui, sheet: &mut Sheet) {
+    let height_px = sheet.height_px as f32;
+    let own = sheet.look.max_coc_px.is_some();
+    if switch(ui, "Limit of my own", "Largest blur of anything, near or far; otherwise 6 % of the height", own) {
+        let Look { max_coc_px, .. } = &mut sheet.look;
+        *max_coc_px = if own { None } else { Some((MAX_COC_PER_HEIGHT * height_px).round()) };
+        sheet.changed(true, "own limit");
+    }
+    if let Some(limit_px) = sheet.look.max_coc_px {
+        let mut percent = limit_px / height_px * 100.0;
+        let how = Number {
+            label: "Largest blur",
+            hint: "Radius, as a share of the picture's height",
+            range: 0.0..=15.0,
+            ratios: false,
+            digits: 1,
+            around: ["", " %"],
+        };
+        if number(ui, how, &mut percent) {
+            sheet.look.max_coc_px = Some(percent / 100.0 * height_px);
+            sheet.changed(true, "limit");
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! The source, and the camera's controls.
+
+use egui::{ComboBox, Ui};
+
+use super::Sheet;
+use crate::preview::backstage::Control;
+use crate::preview::panel::parts::{Number, number, remark, switch};
+use crate::preview::state::{Action, Source};
+
+/// The source, and others to choose.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
+    let state = sheet.state;
+    let current = state.sources.iter().find(|choice| choice.name == state.source_name);
+    let label = match (current, &state.source) {
+        (Some(choice), _) => choice.label.as_str(),
+        (None, Source::Running(running)) => running.label.as_str(),
+        (None, _) if state.source_name.is_empty() => "the first camera",
+        (None, _) => state.source_name.as_str(),
+    };
+    ComboBox::from_id_salt("source").selected_text(label).truncate().show_ui(ui, |ui| {
+        for choice in &state.sources {
+            let chosen = choice.name == state.source_name;
+            if ui.selectable_label(chosen, &choice.label).on_hover_text(&choice.name).clicked() && !chosen {
+                sheet.act(Action::Open(choice.name.clone()));
+            }
+        }
+        if state.sources.is_empty() {
+            remark(ui, "Nothing else was found.");
+        }
+    });
+    match &state.source {
+        Source::Opening => remark(ui, "Opening…"),
+        Source::Running(running) => {
+            let (width, height) = running.size;
+            let rate = 1e9 / running.period_ns.max(1) as f64;
+            let depth = if running.has_depth { "with depth" } else { "without depth" };
+            remark(ui, &format!("{width} × {height}, {rate:.0} fps, {depth}"));
+            remark(ui, &running.executor);
+        }
+        Source::Lost(why) => remark(ui, &format!("Lost: {why}")),
+        Source::Ended => remark(ui, "It came to its end."),
+    }
+    ui.horizontal(|ui| {
+        if ui.button("Look for others").on_hover_text("Look again which cameras there are (F5)").clicked() {
+            sheet.act(Action::Refresh);
+        }
+        if ui.button("Open again").on_hover_text("Close the source and open it anew").clicked() {
+            sheet.act(Action::Retry);
+        }
+    });
+}
+
+/// The camera's controls.
+pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
+    let state = sheet.state;
+    for control in &state.controls {
+        let value = ui.add_enabled_ui(control.active, |ui| one(ui, control)).inner;
+        if let Some(value) = value {
+            sheet.act(Action::Control(control.name.clone(), value));
+        }
+    }
+}
+
+/// A control of the camera; its new value, if it was changed.
+fn one(ui: &mut Ui, control: &Control) -> Option<i64> {
+    let label = title(&control.name);
+    let hint = format!("--control {}={}", control.name, control.value);
+    if control.switch {
+        return switch(ui, &label, &hint, control.value != 0).then_some(i64::from(control.value == 0));
+    }
+    if !control.menu.is_empty() {
+        let chosen = control.menu.iter().find(|(value, _)| *value == control.value);
+        let text = chosen.map_or("?", |(_, name)| name.as_str());
+        let mut picked = None;
+        ui.label(label);
+        ComboBox::from_id_salt(&control.name).selected_text(text).truncate().show_ui(ui, |ui| {
+            for (value, name) in &control.menu {
+                if ui.selectable_label(*value == control.value, name).clicked() {
+                    picked = Some(*value);
+                }
+            }
+        });
+        return picked.filter(|&value| value != control.value);
+    }
+    let (least, most, step) = control.range;
+    let mut value = control.value as f32;
+    let range = least as f32..=(most.max(least)) as f32;
+    let how = Number { label: &label, hint: &hint, range, ratios: false, digits: 0, around: ["", ""] };
+    if !number(ui, how, &mut value) {
+        return None;
+    }
+    let steps = ((f64::from(value) - least as f64) / step.max(1) as f64).round() as i64;
+    let value = least.saturating_add(steps.saturating_mul(step.max(1)));
+    (value != control.value).then_some(value)
+}
+
+/// `exposure_auto_priority` as a person would write it.
+fn title(name: &str) -> String {
+    let mut letters = name.chars().map(|c| if c == '_' { ' ' } else { c });
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}

@@ -1,0 +1,90 @@
+//! The panel itself: a sheet at the right side, over the picture, that slides away.
+
+use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, pos2};
+
+use super::icons::{self, Icon};
+use super::sections::{self, Saving, Sheet, Thumbs};
+use super::state::{Action, State};
+use super::theme::{self, Colors, GAP, PAD, WIDTH};
+
+/// What the panel remembers.
+#[derive(Default)]
+pub struct Memory {
+    saving: Saving,
+    thumbs: Thumbs,
+    /// Where it was drawn last.
+    rect: Option<Rect>,
+}
+
+fn id() -> Id {
+    Id::unique("panel")
+}
+
+impl Memory {
+    /// Whether the pointer is over it or a control of it has the focus: then it stays.
+    pub fn is_in_use(&self, ctx: &Context) -> bool {
+        let pointer = ctx.input(|input| input.pointer.latest_pos());
+        let under_pointer = self.rect.zip(pointer).is_some_and(|(rect, at)| rect.contains(at));
+        under_pointer || ctx.memory(|memory| memory.focused().is_some()) || ctx.any_popup_open()
+    }
+
+    /// Draws as much of the panel as is in the window.
+    pub fn show(&mut self, ctx: &Context, state: &State, shown: bool, height_px: u32, actions: &mut Vec<Action>) {
+        let openness = ctx.animate_bool_with_time(id().with("open"), shown, 0.16);
+        if openness == 0.0 {
+            self.rect = None;
+            return;
+        }
+        let window = ctx.content_rect();
+        let width = WIDTH.min(window.width() - 2.0 * GAP).max(60.0);
+        let slide = (1.0 - openness) * (1.0 - openness) * (width + 2.0 * GAP);
+        let corner = pos2(window.right() - GAP - width + slide, window.top() + GAP);
+        let most_height = (window.height() - 2.0 * GAP).max(40.0);
+        let area = Area::new(id()).fixed_pos(corner).order(Order::Middle).constrain(false).fade_in(false);
+        let drawn = area.show(ctx, |ui| {
+            let colors = Colors::here(ui);
+            theme::card(&colors).show(ui, |ui| {
+                ui.set_width(width - 2.0 * PAD);
+                header(ui, state, actions);
+                let height = most_height - 2.0 * PAD - ui.min_rect().height() - ui.spacing().item_spacing.y;
+                let scroll = ScrollArea::vertical().max_height(height.max(20.0)).auto_shrink([false, true]);
+                scroll.show(ui, |ui| self.body(ui, state, height_px, actions));
+            });
+        });
+        self.rect = shown.then_some(drawn.response.rect);
+    }
+
+    fn body(&mut self, ui: &mut Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
+        // The bar floats over what is at the right.
+        ui.set_width(ui.available_width() - 4.0);
+        let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, height_px, actions };
+        sections::show(ui, &mut sheet, &mut self.saving, &mut self.thumbs);
+        let Sheet { look, stroke, .. } = sheet;
+        if stroke.is_some() && look != state.look {
+            actions.push(Action::Look { look: Box::new(look), stroke });
+        }
+    }
+}
+
+/// The name, and what concerns all of the look.
+fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.heading("Look");
+        let (undo, redo) = state.history.can();
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let buttons = [
+                (Icon::Close, "Hide the panel (P)", true, Action::Panel(false)),
+                (Icon::Help, "Keys (F1)", true, Action::Help(!state.help)),
+                (Icon::Reset, "Back to the look at the start (R)", state.look != state.first_look, Action::Reset),
+                (Icon::Redo, "Redo (Ctrl+Shift+Z)", redo, Action::Redo),
+                (Icon::Undo, "Undo (Ctrl+Z)", undo, Action::Undo),
+            ];
+            for (icon, hint, enabled, action) in buttons {
+                if icons::button(ui, icon, hint, enabled) {
+                    actions.push(action);
+                }
+            }
+        });
+    });
+}

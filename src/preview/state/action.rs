@@ -1,0 +1,116 @@
+//! What a person can do, what others have to do then, and what they tell.
+
+use super::{Output, Shown, Source};
+use crate::look::Look;
+use crate::preview::backstage::{Choice, Control, Preset};
+
+/// What a person can do. Every control and key is one of these.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Action {
+    /// Another look. Looks of the same `stroke` (one drag of one control) are undone together.
+    Look {
+        /// The look.
+        look: Box<Look>,
+        /// The control in hand, or `None` for a single change.
+        stroke: Option<&'static str>,
+    },
+    /// The control in hand was let go: what comes next is undone on its own.
+    Settle,
+    /// Back to the look before.
+    Undo,
+    /// And forth again.
+    Redo,
+    /// Back to the look at the start.
+    Reset,
+    /// The look of a preset.
+    Preset(String),
+    /// Saves the look as a preset.
+    SavePreset(String),
+    /// Shows something else of the frames.
+    Show(Shown),
+    /// Shows what was before the blur left of this fraction, or nowhere.
+    Split(Option<f32>),
+    /// Mirrors the window, or not.
+    Mirror(bool),
+    /// Keeps the picture, or lets the next ones come.
+    Freeze(bool),
+    /// Opens or closes the panel.
+    Panel(bool),
+    /// Shows or hides the instruments.
+    Instruments(bool),
+    /// Hides all but the picture, or not.
+    Bare(bool),
+    /// Shows or hides the help on keys.
+    Help(bool),
+    /// Fills the screen, or not.
+    FullScreen(bool),
+    /// Text and controls of this size, 1 as usual.
+    TextScale(f32),
+    /// Saves what is shown, and what is needed to make it again.
+    Snapshot,
+    /// Begins a recording (video), or ends it.
+    Record(bool),
+    /// Writes to this virtual camera, or to none.
+    VirtualCamera(Option<String>),
+    /// Opens another source.
+    Open(String),
+    /// Opens the source again.
+    Retry,
+    /// Sets a control of the camera.
+    Control(String, i64),
+    /// Looks again which sources and virtual cameras there are.
+    Refresh,
+    /// Puts the equivalent command on the clipboard.
+    CopyCommand,
+    /// Closes the window.
+    Close,
+}
+
+/// What others have to do after an action.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// The look changed.
+    Look(Box<Look>),
+    /// Save it under this name.
+    SavePreset(String, Box<Look>),
+    /// Save the frame that is shown.
+    Snapshot,
+    /// Begin to write to an output. A recording without a name is to be given one.
+    Begin(Output),
+    /// Complete an output.
+    End(Output),
+    /// Open a source.
+    Open(String),
+    /// Set a control.
+    Control(String, i64),
+    /// Look which sources and virtual cameras there are.
+    Refresh,
+    /// Put the equivalent command on the clipboard.
+    CopyCommand,
+    /// Fill the screen, or not.
+    FullScreen(bool),
+    /// Close the window.
+    Close,
+}
+
+/// What the session tells the window.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    /// The source is another one now.
+    Source(Source),
+    /// What can be chosen.
+    Choices {
+        /// Sources.
+        sources: Vec<Choice>,
+        /// Virtual cameras.
+        virtual_cameras: Vec<Choice>,
+    },
+    /// The presets.
+    Presets(Vec<Preset>),
+    /// The camera's controls.
+    Controls(Vec<Control>),
+    /// The outputs that are written to now: after each that was begun or ended, also where that failed.
+    Outputs(Vec<Output>),
+    /// A line for the person.
+    Note(String),
+}

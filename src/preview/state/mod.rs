@@ -1,0 +1,210 @@
+//! What the window shows and lets one change: a state, and the actions that change it.
+//!
+//! Nothing here draws, waits or asks the system: [`State::apply`] and [`State::hear`] are functions of the state alone.
+
+mod action;
+mod apply;
+mod hear;
+mod history;
+#[cfg(test)]
+mod tests;
+pub mod tweak;
+
+pub use action::{Action, Effect, Told};
+pub use apply::{NO_DEPTH, NO_VIRTUAL_CAMERA};
+pub use history::History;
+
+use super::backstage::{Choice, Control, Preset};
+use super::meters::Meters;
+use super::views::Legend;
+use crate::look::Look;
+
+/// What of a frame is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Shown {
+    /// The picture.
+    #[default]
+    Picture,
+    /// Its depth, in colours, with a legend in metres.
+    Depth,
+    /// Its circle of confusion.
+    Coc,
+    /// The bins that it is split into.
+    Bins,
+}
+
+/// The source as it is now.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Source {
+    /// It is being opened.
+    #[default]
+    Opening,
+    /// Frames come.
+    Running(Running),
+    /// There are no frames any more, or never were: why. The last picture stays.
+    Lost(String),
+    /// It came to its end. The last picture stays.
+    Ended,
+}
+
+/// A source whose frames come.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Running {
+    /// What it calls itself.
+    pub label: String,
+    /// Width and height of its pictures.
+    pub size: (u32, u32),
+    /// Time from frame to frame.
+    pub period_ns: u64,
+    /// Whether its frames have depth.
+    pub has_depth: bool,
+    /// What blurs them.
+    pub executor: String,
+    /// Time that a frame's blur may take.
+    pub budget_ns: u64,
+}
+
+/// An output that is written to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Output {
+    /// What the command line calls it.
+    pub name: String,
+    /// Whether it is a virtual camera; otherwise a recording.
+    pub is_camera: bool,
+}
+
+/// A line for the person. It is shown for a while.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// Counts from 1; another line has another number.
+    pub number: u64,
+    /// What it says.
+    pub text: String,
+}
+
+/// Text is between this many times its usual size, and as many.
+pub const TEXT_SCALES: std::ops::RangeInclusive<f32> = 0.75..=3.0;
+
+/// All that the window shows, but the picture itself.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// The look as it was chosen.
+    pub look: Look,
+    /// What `reset` goes back to.
+    pub first_look: Look,
+    /// What the source is called on the command line.
+    pub source_name: String,
+    /// The source.
+    pub source: Source,
+    /// The sources that can be chosen.
+    pub sources: Vec<Choice>,
+    /// The virtual cameras that can be chosen.
+    pub virtual_cameras: Vec<Choice>,
+    /// The camera's controls.
+    pub controls: Vec<Control>,
+    /// The presets.
+    pub presets: Vec<Preset>,
+    /// Where pictures go besides the window.
+    pub outputs: Vec<Output>,
+    /// What of a frame is shown.
+    pub shown: Shown,
+    /// Whether the window shows pictures as a mirror does.
+    pub mirror: bool,
+    /// Whether the window keeps the picture it has.
+    pub frozen: bool,
+    /// Left of this fraction of the picture's width, it is shown as it was before the blur.
+    pub split: Option<f32>,
+    /// Whether the panel is open.
+    pub panel: bool,
+    /// Whether the instruments are shown.
+    pub instruments: bool,
+    /// Whether nothing but the picture is shown.
+    pub bare: bool,
+    /// Whether the help on keys is shown.
+    pub help: bool,
+    /// Whether the window fills the screen.
+    pub full_screen: bool,
+    /// Distance of the focal plane in the last frame, in metres.
+    pub focus_m: Option<f32>,
+    /// What the colours of a view other than the picture mean.
+    pub legend: Option<Legend>,
+    /// Lines for the person, the newest last, and no more than a few.
+    pub notes: Vec<Note>,
+    /// How large text and controls are, in [`TEXT_SCALES`]; 1 is usual.
+    pub text_scale: f32,
+    /// What was measured.
+    pub meters: Meters,
+    /// The looks before, and those that were undone.
+    pub history: History,
+    /// Notes made.
+    noted: u64,
+}
+
+/// Notes kept.
+const NOTES: usize = 6;
+
+impl State {
+    /// A window that opens `source_name` and shows it in `look`, with the panel open.
+    pub fn new(look: Look, source_name: String) -> Self {
+        Self {
+            first_look: look.clone(),
+            look,
+            source_name,
+            source: Source::default(),
+            sources: Vec::new(),
+            virtual_cameras: Vec::new(),
+            controls: Vec::new(),
+            presets: Vec::new(),
+            outputs: Vec::new(),
+            shown: Shown::default(),
+            mirror: false,
+            frozen: false,
+            split: None,
+            panel: true,
+            instruments: false,
+            bare: false,
+            help: false,
+            full_screen: false,
+            focus_m: None,
+            legend: None,
+            notes: Vec::new(),
+            text_scale: 1.0,
+            meters: Meters::default(),
+            history: History::default(),
+            noted: 0,
+        }
+    }
+
+    /// Adds a line for the person.
+    pub fn note(&mut self, text: impl Into<String>) {
+        self.noted += 1;
+        self.notes.push(Note { number: self.noted, text: text.into() });
+        if self.notes.len() > NOTES {
+            self.notes.remove(0);
+        }
+    }
+
+    /// Whether frames have depth, as far as is known: one that is being opened may.
+    pub fn may_have_depth(&self) -> bool {
+        match &self.source {
+            Source::Running(running) => running.has_depth,
+            Source::Opening | Source::Lost(_) | Source::Ended => true,
+        }
+    }
+
+    /// The recording that is being written, if any.
+    pub fn recording(&self) -> Option<&Output> {
+        self.outputs.iter().find(|output| !output.is_camera)
+    }
+
+    /// The virtual camera that is written to, if any.
+    pub fn virtual_camera(&self) -> Option<&Output> {
+        self.outputs.iter().find(|output| output.is_camera)
+    }
+
+    /// Whether the look is that of a preset, wherever it is focused.
+    pub fn is_in_use(&self, preset: &Preset) -> bool {
+        let look = &preset.look;
+        look.effect == self.look.effect && Look { focus: self.look.focus, ..look.clone() } == self.look
+    }
+}

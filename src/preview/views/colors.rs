@@ -1,0 +1,57 @@
+//! Colours for numbers.
+
+use std::sync::LazyLock;
+
+/// Entries of a table of colours.
+pub const ENTRIES: usize = 256;
+
+/// Colours of bins, front to back: neighbours differ in lightness, too (after Okabe and Ito, and lighter or darker ones).
+pub const BINS: [[u8; 3]; 13] = [
+    [230, 159, 0],
+    [120, 60, 20],
+    [240, 228, 66],
+    [0, 114, 178],
+    [150, 205, 240],
+    [0, 100, 75],
+    [204, 121, 167],
+    [110, 40, 90],
+    [213, 170, 150],
+    [180, 70, 0],
+    [190, 230, 190],
+    [70, 70, 90],
+    [220, 220, 225],
+];
+
+/// Viridis by polynomials (Matt Zucker, public domain), the table made once.
+static PERCEPTUAL: LazyLock<[[u8; 3]; ENTRIES]> = LazyLock::new(|| {
+    const TERMS: [[f64; 3]; 7] = [
+        [0.277_727_327_223_417_7, 0.005_407_344_544_966_578, 0.334_099_805_335_306_1],
+        [0.105_093_043_108_577_4, 1.404_613_529_898_575, 1.384_590_162_594_685],
+        [-0.330_861_828_725_556_3, 0.214_847_559_468_213, 0.095_095_163_028_236_59],
+        [-4.634_230_498_983_486, -5.799_100_973_351_585, -19.332_440_956_279_87],
+        [6.228_269_936_347_081, 14.179_933_366_805_09, 56.690_552_600_681_05],
+        [4.776_384_997_670_288, -13.745_145_377_746_01, -65.353_032_633_372_34],
+        [-5.435_455_855_934_631, 4.645_852_612_178_535, 26.312_435_249_583_2],
+    ];
+    std::array::from_fn(|k| {
+        let t = k as f64 / (ENTRIES - 1) as f64;
+        let at = |channel: usize| TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term[channel]);
+        [0, 1, 2].map(|channel| (at(channel) * 255.0).round().clamp(0.0, 255.0) as u8)
+    })
+});
+
+/// The colours from 0 (darkest, violet) to 1 (lightest, yellow): even steps look even.
+pub fn perceptual() -> &'static [[u8; 3]; ENTRIES] {
+    &PERCEPTUAL
+}
+
+/// From -1 (in front: red-brown) over 0 (sharp: nearly white) to 1 (behind: blue); as dark on either side.
+pub fn diverging(share: f32) -> [u8; 3] {
+    const SHARP: [f32; 3] = [246.0, 246.0, 242.0];
+    const NEAR: [[f32; 3]; 2] = [[238.0, 150.0, 70.0], [122.0, 30.0, 20.0]];
+    const FAR: [[f32; 3]; 2] = [[90.0, 160.0, 215.0], [16.0, 42.0, 105.0]];
+    let [middle, end] = if share < 0.0 { NEAR } else { FAR };
+    let t = 2.0 * share.abs().min(1.0);
+    let (from, to, t) = if t < 1.0 { (SHARP, middle, t) } else { (middle, end, t - 1.0) };
+    std::array::from_fn(|k| (from[k] + (to[k] - from[k]) * t).round() as u8)
+}

@@ -1,0 +1,83 @@
+//! Pictures of what a picture was made from: depth, circle of confusion and bins, in colours with a legend.
+
+mod bins;
+mod colors;
+mod depth;
+mod radius;
+mod sample;
+#[cfg(test)]
+mod tests;
+
+pub use bins::MOST as MOST_BINS;
+pub use colors::{BINS as BIN_COLORS, diverging, perceptual};
+pub use depth::share_of as depth_share;
+
+use crate::bokeh::Settings;
+use crate::frame::ColorImage;
+use crate::pipeline::View;
+
+use super::state::Shown;
+
+/// What the colours of a view mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Legend {
+    /// Depth: [`perceptual`] colours, even in dioptres, light is near.
+    Depth {
+        /// What is lightest, in metres; nearer is no lighter.
+        near_m: f32,
+        /// What is darkest, in metres; infinity where nothing is known.
+        far_m: f32,
+    },
+    /// Circle of confusion: [`diverging`] colours, hatched in front.
+    Coc {
+        /// Radius of the darkest on either side, in pixels.
+        most_px: f32,
+    },
+    /// Bins, front to back, by [`BIN_COLORS`].
+    Bins {
+        /// How many there are.
+        count: usize,
+        /// Signed CoC at which each ends, in pixels; infinite for the last.
+        high_px: [f32; MOST_BINS],
+    },
+}
+
+/// Makes views; keeps the memory for them, and what steadies their colours.
+#[derive(Default)]
+pub struct Views {
+    image: ColorImage,
+    legend: Option<Legend>,
+    depth: depth::Range,
+    columns: Vec<u32>,
+    bins: bins::Bins,
+}
+
+impl Views {
+    /// The picture of `shown` of this frame, as large as the frame's; `None` where that is the picture itself or
+    /// cannot be shown. `settings` are those that it was blurred with. Allocates nothing but for another size, and for
+    /// bins of other settings.
+    pub fn draw(&mut self, shown: Shown, view: &View, settings: Option<&Settings>) -> Option<&ColorImage> {
+        self.legend = None;
+        let size = view.picture.size();
+        let depth = view.depth.as_deref();
+        let field = sample::Field::new(&view.coc, depth, size, &mut self.columns);
+        let (image, columns) = (&mut self.image, &self.columns[..]);
+        image.resize(size.0, size.1);
+        self.legend = match shown {
+            Shown::Picture => None,
+            Shown::Depth => depth.map(|depth| depth::draw(depth, columns, &mut self.depth, image)),
+            Shown::Coc => field.map(|field| radius::draw(&field, columns, settings, image)),
+            Shown::Bins => {
+                let level = view.trace.quality;
+                let plan = settings.map(|settings| self.bins.of(settings, size, level, depth, &view.coc));
+                field.zip(plan).map(|(field, plan)| bins::draw(&field, columns, plan, image))
+            }
+        };
+        self.legend.map(|_| &self.image)
+    }
+
+    /// What the colours of the view that was drawn last mean.
+    pub fn legend(&self) -> Option<Legend> {
+        self.legend
+    }
+}
