@@ -12,6 +12,7 @@ mod loopback;
 mod png;
 mod rate;
 mod staged;
+pub mod switch;
 mod tee;
 mod y4m;
 pub mod yuv;
@@ -28,6 +29,7 @@ pub use ffmpeg::Ffmpeg;
 #[cfg(feature = "camera")]
 pub use loopback::Loopback;
 pub use png::PngFolder;
+pub use switch::{Switch, Switchboard};
 pub use tee::Tee;
 pub use y4m::{Y4m, Y4mFile};
 
@@ -50,12 +52,13 @@ pub trait Sink: Send {
         None
     }
 
-    /// Shows the last picture again; a still card before the first, and while nobody watches. `Break` as for [`Sink::put`].
+    /// Shows the last picture again; a still card before the first, and while nobody watches. `Continue` says whether
+    /// anything was shown; `Break` as for [`Sink::put`].
     ///
     /// # Errors
     /// It could not be written.
-    fn repeat(&mut self) -> Result<ControlFlow<()>, SinkError> {
-        Ok(ControlFlow::Continue(()))
+    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+        Ok(ControlFlow::Continue(false))
     }
 
     /// Whether anything becomes of the frames it is given now; otherwise, where there is a viewer, only that counts.
