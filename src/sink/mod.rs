@@ -17,6 +17,7 @@ mod tee;
 mod y4m;
 pub mod yuv;
 
+use std::fmt;
 use std::fs;
 use std::ops::ControlFlow;
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
@@ -106,6 +107,8 @@ pub enum Target {
     Video(PathBuf),
     /// `/dev/videoN`, or another name of a device: a virtual camera.
     Device(PathBuf),
+    /// `window`: seen on the screen.
+    Window,
     /// `DIR/`, or any other name without an extension: numbered PNG files.
     Folder(PathBuf),
 }
@@ -120,6 +123,7 @@ impl FromStr for Target {
             ("", _) => Err(SinkError::Target { name: name.into() }),
             ("null", _) => Ok(Self::Null),
             ("-", _) => Ok(Self::Stdout),
+            ("window", _) => Ok(Self::Window),
             _ if is_device(&path) => Ok(Self::Device(path)),
             _ if name.ends_with('/') => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
@@ -136,6 +140,17 @@ fn is_device(path: &Path) -> bool {
     let number = path.to_str().and_then(|name| name.strip_prefix("/dev/video"));
     number.is_some_and(|number| number.bytes().all(|digit| digit.is_ascii_digit()))
         || fs::metadata(path).is_ok_and(|node| node.file_type().is_char_device())
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => f.write_str("null"),
+            Self::Stdout => f.write_str("-"),
+            Self::Window => f.write_str("window"),
+            Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => path.display().fmt(f),
+        }
+    }
 }
 
 /// What the frames will be like, what may be overwritten, and who is told of readers.
@@ -164,7 +179,8 @@ impl Target {
     /// Opens the sink.
     ///
     /// # Errors
-    /// Something of that name exists and `force` is not set, the place cannot be written, or ffmpeg is missing.
+    /// Something of that name exists and `force` is not set, the place cannot be written, or ffmpeg is missing. A
+    /// window is no sink: it is opened by who starts the run.
     pub fn open(&self, options: &Options) -> Result<Box<dyn Sink>, SinkError> {
         Ok(match self {
             Self::Null => Box::new(Null),
@@ -175,12 +191,18 @@ impl Target {
             Self::Device(path) => Box::new(Loopback::open(path, options)?),
             #[cfg(not(feature = "camera"))]
             Self::Device(path) => return Err(SinkError::NoCamera { path: path.clone() }),
+            Self::Window => return Err(SinkError::Window),
             Self::Folder(path) => Box::new(PngFolder::create(path, options)?),
         })
     }
 
     /// Whether frames are seen as they come, and none later.
     pub fn is_live(&self) -> bool {
+        matches!(self, Self::Device(_) | Self::Window)
+    }
+
+    /// Whether this is a device: a virtual camera.
+    pub fn is_camera(&self) -> bool {
         matches!(self, Self::Device(_))
     }
 
@@ -188,7 +210,7 @@ impl Target {
     pub fn collides_with(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Null, Self::Null) => false,
-            (Self::Stdout, Self::Stdout) => true,
+            (Self::Stdout, Self::Stdout) | (Self::Window, Self::Window) => true,
             _ => match (self.path(), other.path()) {
                 (Some(own), Some(others)) => same_place(own, others),
                 _ => false,
@@ -204,7 +226,7 @@ impl Target {
     /// The file, folder or device that this writes to, if it is one.
     pub fn path(&self) -> Option<&Path> {
         match self {
-            Self::Null | Self::Stdout => None,
+            Self::Null | Self::Stdout | Self::Window => None,
             Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => Some(path),
         }
     }
