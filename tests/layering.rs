@@ -29,7 +29,7 @@ const DOORS: [(&str, &[&str]); 19] = [
     ("image", &["recording", "sink"]),
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
-    ("rustix", &["clock", "link/bell", "v4l2"]),
+    ("rustix", &["capture/synthetic", "clock", "link/bell", "v4l2"]),
     ("saphyr_parser", &["calibration"]),
     ("softbuffer", &["preview/present"]),
     ("strsim", &["v4l2"]),
