@@ -77,7 +77,7 @@ fn the_version_is_the_packages() {
 
 #[test]
 fn wrong_arguments_cost_one_line_and_exit_code_2() {
-    let cases: [(&[&str], &str); 27] = [
+    let cases: [(&[&str], &str); 29] = [
         (&["stream", "nowhere", "--to", "null"], "a folder with a recording, or synthetic"),
         (&["stream", "Cargo.toml", "--to", "null"], "a folder with a recording, or synthetic"),
         (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
@@ -86,7 +86,9 @@ fn wrong_arguments_cost_one_line_and_exit_code_2() {
         (&["stream", "synthetic", "--to", "null", "--size", "640"], "1280x720"),
         (&["stream", "synthetic", "--to", "null", "--depth", "none", "--effect", "dof"], "--effect blur"),
         (&["stream", "synthetic"], "--to"),
-        (&["stream", "synthetic", "--to", "-", "--to", "-"], "twice"),
+        (&["stream", "synthetic", "--to", "-", "--to", "-"], "-: given twice"),
+        (&["stream", "synthetic", "--to", "window", "--to", "window"], "window: given twice"),
+        (&["stream", "synthetic", "--to", "window", "--on-demand"], "--to /dev/videoN"),
         (&["stream", "synthetic", "--to", "x/a.y4m", "--to", "null", "--to", "./x/a.y4m"], "twice"),
         (&["stream", "synthetic", "--to", "/dev/null", "--to", "/dev/../dev/null"], "twice"),
         (&["stream", "synthetic", "--to", "null", "--on-demand"], "--to /dev/videoN"),

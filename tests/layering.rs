@@ -28,7 +28,7 @@ const DOORS: [(&str, &[&str]); 18] = [
     ("image", &["recording", "sink"]),
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
-    ("rustix", &["clock", "link/bell", "v4l2"]),
+    ("rustix", &["capture/synthetic", "clock", "link/bell", "v4l2"]),
     ("saphyr_parser", &["calibration"]),
     ("softbuffer", &["preview/present"]),
     ("strsim", &["v4l2"]),

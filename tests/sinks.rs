@@ -72,6 +72,9 @@ fn names_become_sinks() {
     for (name, target) in [
         ("null", Target::Null),
         ("-", Target::Stdout),
+        ("window", Target::Window),
+        ("./window", Target::Folder("./window".into())),
+        ("window/", Target::Folder("window/".into())),
         ("out/", Target::Folder("out/".into())),
         ("clip.mp4/", Target::Folder("clip.mp4/".into())),
         ("out", Target::Folder("out".into())),

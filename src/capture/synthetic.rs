@@ -1,5 +1,9 @@
 //! The project's own scene as a camera, with exact depth.
 
+mod cycle;
+
+use cycle::Cycle;
+
 use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use crate::frame::Stamp;
 use crate::scene::{Scene, View};
@@ -15,6 +19,10 @@ pub struct Format {
     pub frames: Option<u64>,
     /// Threads that render, > 0.
     pub threads: usize,
+    /// Frames of the scene's motion (which repeats itself after [`Scene::period_s`]) that are rendered once and kept, so
+    /// that they are played at the full rate for ever, on any machine; fewer where they would take more than 128 MiB.
+    /// Which one is shown when depends on how many there are yet. `None` renders every frame anew.
+    pub cycle: Option<u64>,
 }
 
 /// Renders a moving portrait.
@@ -23,6 +31,7 @@ pub struct Synthetic {
     view: View,
     format: Format,
     position: u64,
+    cycle: Option<Cycle>,
 }
 
 /// One ray per pixel: a camera has to keep pace.
@@ -41,11 +50,20 @@ impl Synthetic {
         if !sides.contains(&width) || !sides.contains(&height) || !(0.001..=1000.0).contains(&fps) {
             return Err(CaptureError::Format { width, height, fps });
         }
-        Ok(Self { scene: Scene::portrait(), view: View::new(width, height), format, position: 0 })
+        let (scene, view) = (Scene::portrait(), View::new(width, height));
+        let keep = |frames| Cycle::new(scene.clone(), view, frames, fps, format.threads.max(1));
+        Ok(Self { cycle: format.cycle.map(keep), scene, view, format, position: 0 })
     }
 
     fn time_ns(&self, position: u64) -> u64 {
         (position as f64 / self.format.fps * 1e9).round() as u64
+    }
+
+    fn advance(&mut self) {
+        self.position += 1;
+        if let Some(cycle) = &mut self.cycle {
+            cycle.advance();
+        }
     }
 
     fn at_end(&self) -> bool {
@@ -69,18 +87,23 @@ impl Camera for Synthetic {
         if self.at_end() {
             return Ok(Captured::End);
         }
-        let time_s = self.position as f64 / self.format.fps;
-        let threads = self.format.threads.max(1);
-        self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, shot.color, shot.depth);
+        match &mut self.cycle {
+            Some(cycle) => cycle.read(shot),
+            None => {
+                let time_s = self.position as f64 / self.format.fps;
+                let threads = self.format.threads.max(1);
+                self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, shot.color, shot.depth);
+            }
+        }
         let stamp = Stamp { index: self.position as usize, time_ns: self.time_ns(self.position), captured_ns: None };
-        self.position += 1;
+        self.advance();
         Ok(Captured::Frame(stamp))
     }
 
     fn skip(&mut self, until_ns: u64) -> u64 {
         let from = self.position;
         while !self.at_end() && self.time_ns(self.position) < until_ns {
-            self.position += 1;
+            self.advance();
         }
         self.position - from
     }

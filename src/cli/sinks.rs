@@ -13,15 +13,14 @@ use crate::sink::{Options, Sink, Target, Tee};
 pub fn check(targets: &[Target], stream: &options::Stream, devices: &[&Path]) -> Result<(), CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
     for (at, target) in targets.iter().enumerate() {
-        let name = || target.path().map_or("-".to_string(), |path| path.display().to_string());
         if targets[..at].iter().any(|other| other.collides_with(target)) {
-            return usage(format!("--to {}: given twice; each sink needs a place of its own", name()));
+            return usage(format!("--to {target}: given twice; each sink needs a place of its own"));
         }
         if devices.iter().any(|device| target.is_device(device)) {
-            return usage(format!("--to {}: this is the source itself; take a virtual camera of its own", name()));
+            return usage(format!("--to {target}: this is the source itself; take a virtual camera of its own"));
         }
     }
-    let has_camera = targets.iter().any(Target::is_live);
+    let has_camera = targets.iter().any(Target::is_camera);
     if stream.on_demand && !has_camera {
         return usage("--on-demand needs a virtual camera, to be told who watches: add --to /dev/videoN".to_string());
     }

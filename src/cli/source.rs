@@ -264,6 +264,7 @@ impl Opened {
                     fps: frames.fps.unwrap_or(defaults::FPS),
                     frames: frames.frames,
                     threads: cores(),
+                    cycle: None,
                 })?;
                 Ok(of(Box::new(camera)))
             }

@@ -31,13 +31,18 @@ pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
     /// folder with a recording, or `synthetic`
     source: SourceName,
-    /// /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, .mkv or .webm
-    /// (ffmpeg), or null; may be given more than once
-    #[arg(long, value_name = "SINK", required = true)]
+    #[arg(long, value_name = "SINK", required = true, help = TO)]
     to: Vec<Target>,
     #[command(flatten)]
     parts: options::Streaming,
 }
+
+#[cfg(feature = "window")]
+const TO: &str = "/dev/videoN (virtual camera), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), \
+                  FILE.mp4, .mkv or .webm (ffmpeg), or null; may be given more than once";
+#[cfg(not(feature = "window"))]
+const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, \
+                  .mkv or .webm (ffmpeg), or null; may be given more than once";
 
 /// Runs the command. The report is written whenever the pipeline ran, however it ended.
 ///

@@ -1,5 +1,7 @@
 //! Last stage, on the caller's thread: hands pictures to the sink.
 
+use std::ops::ControlFlow;
+
 use super::blur::Blurred;
 use super::playout::Playout;
 use super::{Ended, Frame, Progress, View};
@@ -37,13 +39,13 @@ impl Stage<'_> {
         loop {
             let Frame { ticket, stamp, trace, item: mut frame } = match self.next(&mut from) {
                 Received::Item(frame) => frame,
-                Received::Nothing => {
-                    if self.sink.repeat()?.is_break() {
-                        break;
+                Received::Nothing => match self.sink.repeat()? {
+                    ControlFlow::Continue(shown) => {
+                        *self.times.repeats += u64::from(shown);
+                        continue;
                     }
-                    *self.times.repeats += 1;
-                    continue;
-                }
+                    ControlFlow::Break(()) => break,
+                },
                 Received::Ended => break,
             };
             if self.mirror {

@@ -4,13 +4,19 @@ use std::path::{Path, PathBuf};
 #[cfg(feature = "camera")]
 use crate::v4l2::loopback::LoopbackError;
 
+const NO_WINDOW: &str =
+    "the window is opened by who shows it, such as `bokehcam preview SOURCE`; for a folder of this name, ./window";
+const NOT_BUILT: &str = "this program was built without a window; build it with the feature window. For a folder of \
+                         this name, ./window";
+
 /// Why a frame could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum SinkError {
     /// Not the name of a sink.
     #[error(
-        "no sink '{name}': use /dev/videoN (a virtual camera), DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm, \
-         - (y4m on standard output) or null"
+        "no sink '{name}': use /dev/videoN (a virtual camera), {}DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm, \
+         - (y4m on standard output) or null",
+        if cfg!(feature = "window") { "window, " } else { "" }
     )]
     Target {
         /// What was given.
@@ -71,6 +77,9 @@ pub enum SinkError {
         /// Its last lines, joined by ` | `.
         said: String,
     },
+    /// A window where none can be opened.
+    #[error("{}", if cfg!(feature = "window") { NO_WINDOW } else { NOT_BUILT })]
+    Window,
     /// The virtual camera cannot be written to.
     #[cfg(feature = "camera")]
     #[error(transparent)]

@@ -12,10 +12,12 @@ mod loopback;
 mod png;
 mod rate;
 mod staged;
+pub mod switch;
 mod tee;
 mod y4m;
 pub mod yuv;
 
+use std::fmt;
 use std::fs;
 use std::ops::ControlFlow;
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
@@ -28,6 +30,7 @@ pub use ffmpeg::Ffmpeg;
 #[cfg(feature = "camera")]
 pub use loopback::Loopback;
 pub use png::PngFolder;
+pub use switch::{Switch, Switchboard};
 pub use tee::Tee;
 pub use y4m::{Y4m, Y4mFile};
 
@@ -50,12 +53,13 @@ pub trait Sink: Send {
         None
     }
 
-    /// Shows the last picture again; a still card before the first, and while nobody watches. `Break` as for [`Sink::put`].
+    /// Shows the last picture again; a still card before the first, and while nobody watches. `Continue` says whether
+    /// anything was shown; `Break` as for [`Sink::put`].
     ///
     /// # Errors
     /// It could not be written.
-    fn repeat(&mut self) -> Result<ControlFlow<()>, SinkError> {
-        Ok(ControlFlow::Continue(()))
+    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+        Ok(ControlFlow::Continue(false))
     }
 
     /// Whether anything becomes of the frames it is given now; otherwise, where there is a viewer, only that counts.
@@ -103,6 +107,8 @@ pub enum Target {
     Video(PathBuf),
     /// `/dev/videoN`, or another name of a device: a virtual camera.
     Device(PathBuf),
+    /// `window`: seen on the screen.
+    Window,
     /// `DIR/`, or any other name without an extension: numbered PNG files.
     Folder(PathBuf),
 }
@@ -117,6 +123,7 @@ impl FromStr for Target {
             ("", _) => Err(SinkError::Target { name: name.into() }),
             ("null", _) => Ok(Self::Null),
             ("-", _) => Ok(Self::Stdout),
+            ("window", _) => Ok(Self::Window),
             _ if is_device(&path) => Ok(Self::Device(path)),
             _ if name.ends_with('/') => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
@@ -133,6 +140,17 @@ fn is_device(path: &Path) -> bool {
     let number = path.to_str().and_then(|name| name.strip_prefix("/dev/video"));
     number.is_some_and(|number| number.bytes().all(|digit| digit.is_ascii_digit()))
         || fs::metadata(path).is_ok_and(|node| node.file_type().is_char_device())
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => f.write_str("null"),
+            Self::Stdout => f.write_str("-"),
+            Self::Window => f.write_str("window"),
+            Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => path.display().fmt(f),
+        }
+    }
 }
 
 /// What the frames will be like, what may be overwritten, and who is told of readers.
@@ -161,7 +179,8 @@ impl Target {
     /// Opens the sink.
     ///
     /// # Errors
-    /// Something of that name exists and `force` is not set, the place cannot be written, or ffmpeg is missing.
+    /// Something of that name exists and `force` is not set, the place cannot be written, or ffmpeg is missing. A
+    /// window is no sink: it is opened by who starts the run.
     pub fn open(&self, options: &Options) -> Result<Box<dyn Sink>, SinkError> {
         Ok(match self {
             Self::Null => Box::new(Null),
@@ -172,12 +191,18 @@ impl Target {
             Self::Device(path) => Box::new(Loopback::open(path, options)?),
             #[cfg(not(feature = "camera"))]
             Self::Device(path) => return Err(SinkError::NoCamera { path: path.clone() }),
+            Self::Window => return Err(SinkError::Window),
             Self::Folder(path) => Box::new(PngFolder::create(path, options)?),
         })
     }
 
     /// Whether frames are seen as they come, and none later.
     pub fn is_live(&self) -> bool {
+        matches!(self, Self::Device(_) | Self::Window)
+    }
+
+    /// Whether this is a device: a virtual camera.
+    pub fn is_camera(&self) -> bool {
         matches!(self, Self::Device(_))
     }
 
@@ -185,7 +210,7 @@ impl Target {
     pub fn collides_with(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Null, Self::Null) => false,
-            (Self::Stdout, Self::Stdout) => true,
+            (Self::Stdout, Self::Stdout) | (Self::Window, Self::Window) => true,
             _ => match (self.path(), other.path()) {
                 (Some(own), Some(others)) => same_place(own, others),
                 _ => false,
@@ -201,7 +226,7 @@ impl Target {
     /// The file, folder or device that this writes to, if it is one.
     pub fn path(&self) -> Option<&Path> {
         match self {
-            Self::Null | Self::Stdout => None,
+            Self::Null | Self::Stdout | Self::Window => None,
             Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => Some(path),
         }
     }

@@ -20,31 +20,36 @@ impl Tee {
         Self { sinks, name: names.join(", ") }
     }
 
+    /// `Continue` says whether any of them showed something.
     fn each(
         &mut self,
-        mut give: impl FnMut(&mut dyn Sink) -> Result<ControlFlow<()>, SinkError>,
-    ) -> Result<ControlFlow<()>, SinkError> {
-        let mut at = 0;
+        mut give: impl FnMut(&mut dyn Sink) -> Result<ControlFlow<(), bool>, SinkError>,
+    ) -> Result<ControlFlow<(), bool>, SinkError> {
+        let (mut at, mut any) = (0, false);
         while at < self.sinks.len() {
             match give(&mut *self.sinks[at])? {
-                ControlFlow::Continue(()) => at += 1,
+                ControlFlow::Continue(shown) => {
+                    any |= shown;
+                    at += 1;
+                }
                 ControlFlow::Break(()) => self.sinks.remove(at).finish()?,
             }
         }
-        Ok(if self.sinks.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        Ok(if self.sinks.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(any) })
     }
 }
 
 impl Sink for Tee {
     fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
-        self.each(|sink| sink.put(frame))
+        let flow = self.each(|sink| Ok(sink.put(frame)?.map_continue(|()| true)))?;
+        Ok(flow.map_continue(|_| ()))
     }
 
     fn hold(&self) -> Option<Duration> {
         self.sinks.iter().filter_map(|sink| sink.hold()).min()
     }
 
-    fn repeat(&mut self) -> Result<ControlFlow<()>, SinkError> {
+    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         self.each(|sink| sink.repeat())
     }
 
@@ -97,9 +102,9 @@ mod tests {
             self.hold_ms.map(Duration::from_millis)
         }
 
-        fn repeat(&mut self) -> Result<ControlFlow<()>, SinkError> {
+        fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
             self.note("repeat");
-            Ok(ControlFlow::Continue(()))
+            Ok(ControlFlow::Continue(self.hold_ms.is_some()))
         }
 
         fn finish(self: Box<Self>) -> Result<(), SinkError> {
@@ -126,7 +131,7 @@ mod tests {
         assert_eq!((tee.describe().as_str(), tee.hold()), ("a, b", Some(Duration::from_millis(50))));
         let frame = ColorImage::new(2, 2);
         assert!(tee.put(&frame).unwrap().is_continue());
-        assert!(tee.repeat().unwrap().is_continue());
+        assert_eq!(tee.repeat().unwrap(), ControlFlow::Continue(true));
         assert!(tee.put(&frame).unwrap().is_break());
         assert_eq!(tee.hold(), None);
         tee.finish().unwrap();

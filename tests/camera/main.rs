@@ -11,6 +11,7 @@ mod demand;
 mod devices;
 mod faults;
 mod formats;
+mod knobs;
 mod machine;
 mod two_eyes;
 mod virtual_camera;

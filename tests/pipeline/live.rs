@@ -78,9 +78,9 @@ impl Sink for Screen {
         Some(if self.watch.is_some() { Duration::from_secs(600) } else { Duration::from_millis(20) })
     }
 
-    fn repeat(&mut self) -> Result<ControlFlow<()>, SinkError> {
+    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         assert!(self.watch.is_none(), "the camera's pictures come before the hold is over");
-        Ok(self.show())
+        Ok(self.show().map_continue(|()| true))
     }
 
     fn finish(self: Box<Self>) -> Result<(), SinkError> {

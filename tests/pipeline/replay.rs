@@ -241,8 +241,33 @@ fn asap_twice_gives_identical_files() {
 }
 
 #[test]
+fn a_kept_synthetic_scene_has_the_same_times_and_end() {
+    let format = Format { size: (48, 27), fps: 12.5, frames: Some(9), threads: 1, cycle: Some(5) };
+    let (mut kept, mut anew) =
+        (Synthetic::new(format).unwrap(), Synthetic::new(Format { cycle: None, ..format }).unwrap());
+    assert_eq!(kept.info(), anew.info());
+    let stamp = |camera: &mut Synthetic| {
+        let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+        match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
+            Captured::Frame(stamp) => {
+                assert_eq!((color.size(), depth.size()), ((48, 27), (48, 27)));
+                Some((stamp, color))
+            }
+            Captured::End => None,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(stamp(&mut kept), stamp(&mut anew), "the first frame is the scene's first");
+    assert_eq!((kept.skip(300_000_000), anew.skip(300_000_000)), (3, 3));
+    for _ in 4..10 {
+        assert_eq!(stamp(&mut kept).map(|(stamp, _)| stamp), stamp(&mut anew).map(|(stamp, _)| stamp));
+    }
+    assert!(stamp(&mut kept).is_none());
+}
+
+#[test]
 fn the_synthetic_camera_knows_its_depth() {
-    let format = Format { size: (48, 27), fps: 12.5, frames: Some(3), threads: 1 };
+    let format = Format { size: (48, 27), fps: 12.5, frames: Some(3), threads: 1, cycle: None };
     let mut camera = Synthetic::new(format).unwrap();
     let info = camera.info();
     assert_eq!((info.size, info.period_ns, info.frames), ((48, 27), 80_000_000, Some(3)));

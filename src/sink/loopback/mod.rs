@@ -124,13 +124,13 @@ impl Sink for Loopback {
         }
     }
 
-    fn repeat(&mut self) -> Result<ControlFlow<()>, SinkError> {
+    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         if self.rests() && !self.shows_card {
             self.show_card()?;
         } else {
             self.output.write(&self.bytes)?;
         }
-        Ok(ControlFlow::Continue(()))
+        Ok(ControlFlow::Continue(true))
     }
 
     fn finish(self: Box<Self>) -> Result<(), SinkError> {

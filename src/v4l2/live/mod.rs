@@ -3,6 +3,7 @@
 
 mod address;
 pub mod error;
+pub mod knobs;
 mod light;
 pub mod negotiate;
 mod session;

@@ -1,0 +1,211 @@
+use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use super::*;
+
+/// A member that behaves as it is told to.
+#[derive(Default)]
+struct Fake {
+    name: &'static str,
+    /// Frames that it was given, by their first byte.
+    got: Arc<std::sync::Mutex<Vec<u8>>>,
+    repeats: Arc<AtomicU64>,
+    hold: Option<Duration>,
+    /// The frame that its reader wants no more.
+    leaves_at: Option<usize>,
+    /// The frame that it cannot write.
+    fails_at: Option<usize>,
+    finish_takes: Duration,
+    finish_fails: bool,
+    finish_panics: bool,
+}
+
+fn full(name: &str) -> SinkError {
+    SinkError::write(name.as_ref())(io::Error::other("full"))
+}
+
+impl Sink for Fake {
+    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+        let mut got = self.got.lock().unwrap();
+        if self.fails_at == Some(got.len()) {
+            return Err(full(self.name));
+        }
+        if self.leaves_at == Some(got.len()) {
+            return Ok(ControlFlow::Break(()));
+        }
+        got.push(frame.rgb[0]);
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn hold(&self) -> Option<Duration> {
+        self.hold
+    }
+
+    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+        self.repeats.fetch_add(1, Ordering::SeqCst);
+        Ok(ControlFlow::Continue(self.hold.is_some()))
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+        thread::sleep(self.finish_takes);
+        assert!(!self.finish_panics, "as it should");
+        if self.finish_fails { Err(full(self.name)) } else { Ok(()) }
+    }
+
+    fn describe(&self) -> String {
+        self.name.into()
+    }
+}
+
+fn switch() -> (Box<Switch>, Switchboard, Receiver<Told>) {
+    let (to, told) = mpsc::channel();
+    let (switch, board) = Switch::new("window", move |what| drop(to.send(what)));
+    (Box::new(switch), board, told)
+}
+
+fn put(switch: &mut Switch, numbers: std::ops::Range<u8>) {
+    for number in numbers {
+        let mut frame = ColorImage::new(2, 2);
+        frame.rgb.fill(number);
+        assert!(switch.put(&frame).unwrap().is_continue());
+    }
+}
+
+/// All that was told until now, members' names in their order.
+fn all(told: &Receiver<Told>) -> Vec<(String, Fate)> {
+    let mut all: Vec<_> = told.try_iter().map(|told| (told.member, told.fate)).collect();
+    all.sort_by(|a, b| a.0.cmp(&b.0));
+    all
+}
+
+fn began(name: &str) -> (String, Fate) {
+    (name.into(), Fate::Began)
+}
+
+fn completed(name: &str, frames: u64) -> (String, Fate) {
+    (name.into(), Fate::Completed { frames })
+}
+
+fn failed(name: &str, frames: u64, why: &str) -> (String, Fate) {
+    (name.into(), Fate::Failed { frames, why: why.into() })
+}
+
+#[test]
+fn members_come_and_go_and_each_gets_the_frames_of_its_time() {
+    let (mut switch, board, told) = switch();
+    assert!(!switch.keeps());
+    put(&mut switch, 0..2);
+    let (early, late) = (Fake::default(), Fake::default());
+    let got = [Arc::clone(&early.got), Arc::clone(&late.got)];
+    board.add("early", Box::new(early)).unwrap();
+    put(&mut switch, 2..4);
+    assert!(switch.keeps());
+    let other = board.clone();
+    thread::spawn(move || other.add("late", Box::new(late)).unwrap()).join().unwrap();
+    put(&mut switch, 4..5);
+    board.remove("early");
+    board.remove("nobody");
+    put(&mut switch, 5..7);
+    switch.finish().unwrap();
+    assert_eq!(got.map(|got| got.lock().unwrap().clone()), [vec![2, 3, 4], vec![4, 5, 6]]);
+    let expected = [began("early"), completed("early", 3), began("late"), completed("late", 3)];
+    assert_eq!(all(&told), expected);
+}
+
+#[test]
+fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() {
+    let (mut switch, board, told) = switch();
+    let good = Fake::default();
+    let got = Arc::clone(&good.got);
+    board.add("a", Box::new(Fake { name: "a", fails_at: Some(1), ..Fake::default() })).unwrap();
+    board.add("b", Box::new(good)).unwrap();
+    board.add("c", Box::new(Fake { leaves_at: Some(2), ..Fake::default() })).unwrap();
+    put(&mut switch, 0..5);
+    assert_eq!(switch.members.len(), 1);
+    // A member that failed while it ran is its own affair, not the run's.
+    switch.finish().unwrap();
+    assert_eq!(*got.lock().unwrap(), [0, 1, 2, 3, 4]);
+    let [a, b, c] = [failed("a", 1, "cannot write a: full"), completed("b", 5), completed("c", 2)];
+    assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);
+}
+
+#[test]
+fn a_member_that_takes_long_to_complete_does_not_hold_frames_up() {
+    let (mut switch, board, told) = switch();
+    let slow = Duration::from_millis(400);
+    board.add("slow", Box::new(Fake { finish_takes: slow, ..Fake::default() })).unwrap();
+    put(&mut switch, 0..1);
+    board.remove("slow");
+    let began_at = Instant::now();
+    put(&mut switch, 1..100);
+    assert!(began_at.elapsed() < slow / 2, "{:?}", began_at.elapsed());
+    assert_eq!(all(&told), [began("slow")]);
+    switch.finish().unwrap();
+    assert!(began_at.elapsed() >= slow, "the end waits for it");
+    assert_eq!(all(&told), [completed("slow", 1)]);
+}
+
+#[test]
+fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
+    let (mut switch, board, told) = switch();
+    board.add("a", Box::new(Fake { finish_panics: true, ..Fake::default() })).unwrap();
+    board.add("b", Box::new(Fake { name: "b", finish_fails: true, ..Fake::default() })).unwrap();
+    let slow = Duration::from_millis(50);
+    board.add("c", Box::new(Fake { finish_takes: slow, ..Fake::default() })).unwrap();
+    put(&mut switch, 0..2);
+    assert_eq!(switch.finish().unwrap_err().to_string(), "cannot write b: full");
+    let [a, b, c] = [failed("a", 2, "it was given up"), failed("b", 2, "cannot write b: full"), completed("c", 2)];
+    assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);
+    // Whoever comes too late learns it, in both ways.
+    assert_eq!(board.add("d", Box::new(Fake::default())), Err(Over));
+    assert_eq!(all(&told), [failed("d", 0, "it was given up")]);
+}
+
+#[test]
+fn what_was_recorded_is_completed_though_the_run_fails() {
+    let (mut switch, board, told) = switch();
+    board.add("a", Box::new(Fake::default())).unwrap();
+    put(&mut switch, 0..3);
+    board.add("b", Box::new(Fake::default())).unwrap();
+    drop(switch);
+    assert_eq!(all(&told), [began("a"), completed("a", 3), began("b"), completed("b", 0)]);
+}
+
+#[test]
+fn a_name_that_is_taken_goes_to_the_newer_member() {
+    let (mut switch, board, told) = switch();
+    for _ in 0..2 {
+        board.add("a", Box::new(Fake::default())).unwrap();
+        put(&mut switch, 0..2);
+    }
+    assert_eq!(switch.members.len(), 1);
+    switch.finish().unwrap();
+    let told: Vec<_> = all(&told).into_iter().filter(|told| *told == completed("a", 2)).collect();
+    assert_eq!(told.len(), 2);
+}
+
+#[test]
+fn without_pictures_orders_are_taken_and_live_members_repeat_when_they_are_due() {
+    let (mut switch, board, told) = switch();
+    assert_eq!(switch.hold(), Some(TICK));
+    let live = Fake { hold: Some(Duration::from_millis(250)), ..Fake::default() };
+    let (repeats, file) = (Arc::clone(&live.repeats), Fake::default());
+    board.add("file", Box::new(file)).unwrap();
+    assert_eq!(switch.repeat().unwrap(), ControlFlow::Continue(false));
+    assert_eq!(all(&told), [began("file")]);
+    board.add("live", Box::new(live)).unwrap();
+    put(&mut switch, 0..1);
+    let mut shown = Vec::new();
+    let mut waited = Duration::ZERO;
+    while waited < Duration::from_secs(1) {
+        waited += switch.hold().unwrap();
+        shown.push(switch.repeat().unwrap() == ControlFlow::Continue(true));
+    }
+    assert_eq!(repeats.load(Ordering::SeqCst), 4, "every 250 ms");
+    assert_eq!(shown.iter().filter(|shown| **shown).count(), 4);
+    board.remove("file");
+    assert_eq!(switch.repeat().unwrap(), ControlFlow::Continue(false));
+    switch.finish().unwrap();
+    assert_eq!(all(&told), [completed("file", 1), began("live"), completed("live", 1)]);
+}

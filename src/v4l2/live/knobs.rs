@@ -1,0 +1,143 @@
+//! The controls of a camera that a person would turn while it streams, through a second opening of its node.
+
+use std::path::Path;
+
+use v4l::v4l_sys as sys;
+
+use super::OpenError;
+use crate::v4l2::controls::{self, Control, Kind, Value};
+use crate::v4l2::device::Device;
+use crate::v4l2::node;
+
+/// A control with a number that a person understands: brightness, exposure, white balance, zoom, focus and the like.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Knob {
+    /// Its name as tools write it: `exposure_time_absolute`.
+    pub name: String,
+    /// What it is set to.
+    pub value: i64,
+    /// Least and largest value, and the step between, at least 1.
+    pub range: (i64, i64, i64),
+    /// Names of the values of a menu, by value; empty otherwise.
+    pub menu: Vec<(i64, String)>,
+    /// Whether it is on (1) or off (0).
+    pub switch: bool,
+    /// Whether it can be changed now, and has an effect.
+    pub active: bool,
+}
+
+/// The knobs of the camera that is meant by `name` (see [`node::resolve`]), in the driver's order, as they are now. The
+/// camera may be streaming, here or elsewhere.
+///
+/// # Errors
+/// There is no such camera, it cannot be opened, or it fails.
+pub fn list(name: &str) -> Result<Vec<Knob>, OpenError> {
+    knobs(&open(name)?)
+}
+
+/// Turns one of them; gives back all, since others may follow it. Where a value is none that the control takes, nothing
+/// changes.
+///
+/// # Errors
+/// As for [`list`]; there is no such knob, it does not take this value or none now, or the camera refuses.
+pub fn turn(name: &str, knob: &str, value: i64) -> Result<Vec<Knob>, OpenError> {
+    let device = open(name)?;
+    controls::set(&device, knob, &value.to_string())
+        .map_err(|source| OpenError::Control { path: device.path().to_owned(), source })?;
+    knobs(&device)
+}
+
+fn open(name: &str) -> Result<Device, OpenError> {
+    let path: &Path = &node::resolve(name)?;
+    Device::open(path).map_err(|error| OpenError::at(path, "it cannot be opened", error))
+}
+
+fn knobs(device: &Device) -> Result<Vec<Knob>, OpenError> {
+    let all =
+        controls::list(device).map_err(|error| OpenError::at(device.path(), "its controls cannot be listed", error))?;
+    Ok(all.into_iter().filter_map(knob).collect())
+}
+
+/// Nothing for what is no knob: it only tells something, has no number, is about sound, or is a driver's own affair.
+fn knob(control: Control) -> Option<Knob> {
+    /// In a class, the numbers from here on are those of single drivers.
+    const DRIVERS_OWN: u32 = 0x1000;
+    let is_a_persons = matches!(control.id & !0xffff, sys::V4L2_CTRL_CLASS_USER | sys::V4L2_CTRL_CLASS_CAMERA)
+        && control.id & 0xffff < (sys::V4L2_CID_BASE & 0xffff) + DRIVERS_OWN
+        && !(sys::V4L2_CID_AUDIO_VOLUME..=sys::V4L2_CID_AUDIO_LOUDNESS).contains(&control.id);
+    let has_number = matches!(control.kind, Kind::Integer | Kind::Boolean | Kind::Menu | Kind::IntegerMenu);
+    let Some(Value::Number(value)) = control.value else { return None };
+    if !is_a_persons || !has_number || control.read_only {
+        return None;
+    }
+    let step = i64::try_from(control.step).unwrap_or(1);
+    Some(Knob {
+        value,
+        range: (control.minimum, control.maximum, step),
+        menu: control.items.into_iter().map(|item| (item.index, item.name)).collect(),
+        switch: control.kind == Kind::Boolean,
+        active: !control.inactive && !control.grabbed,
+        name: control.name,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::v4l2::controls::Item;
+
+    fn control(id: u32, kind: Kind) -> Control {
+        Control {
+            name: "it".into(),
+            label: "It".into(),
+            id,
+            kind,
+            minimum: 0,
+            maximum: 9,
+            step: 3,
+            default: 0,
+            items: Vec::new(),
+            value: Some(Value::Number(6)),
+            read_only: false,
+            inactive: false,
+            grabbed: false,
+        }
+    }
+
+    #[test]
+    fn only_what_a_person_would_turn_is_a_knob() {
+        let brightness = control(sys::V4L2_CID_BRIGHTNESS, Kind::Integer);
+        let turned =
+            Knob { name: "it".into(), value: 6, range: (0, 9, 3), menu: Vec::new(), switch: false, active: true };
+        assert_eq!(knob(brightness.clone()), Some(turned.clone()));
+        let grabbed = Control { grabbed: true, ..brightness.clone() };
+        assert_eq!(knob(grabbed), Some(Knob { active: false, ..turned.clone() }));
+        let inactive = Control { inactive: true, ..brightness.clone() };
+        assert_eq!(knob(inactive), Some(Knob { active: false, ..turned.clone() }));
+        let items = vec![Item { index: 1, name: "Manual Mode".into() }];
+        let menu = Control { items, ..control(sys::V4L2_CID_EXPOSURE_AUTO, Kind::Menu) };
+        assert_eq!(knob(menu), Some(Knob { menu: vec![(1, "Manual Mode".into())], ..turned }));
+        for (id, kind) in [
+            (sys::V4L2_CID_BRIGHTNESS, Kind::Bitmask),
+            (sys::V4L2_CID_DO_WHITE_BALANCE, Kind::Button),
+            (sys::V4L2_CID_BASE + DRIVERS_OWN_EXAMPLE, Kind::Integer),
+            (sys::V4L2_CID_MPEG_VIDEO_BITRATE, Kind::Integer),
+            (sys::V4L2_CID_AUDIO_MUTE, Kind::Boolean),
+        ] {
+            assert_eq!(knob(control(id, kind)), None, "{id:#x}");
+        }
+        assert_eq!(knob(Control { read_only: true, ..brightness.clone() }), None);
+        assert_eq!(knob(Control { value: None, ..brightness }), None);
+    }
+
+    const DRIVERS_OWN_EXAMPLE: u32 = 0x1001;
+
+    #[test]
+    fn a_device_that_is_no_camera_has_none_and_one_that_is_not_there_is_named() {
+        assert_eq!(list("/dev/null").unwrap(), []);
+        let said = turn("/dev/null", "brightness", 1).unwrap_err().to_string();
+        assert_eq!(said, "/dev/null: control brightness: the device has no controls");
+        let said = list("/dev/video199").unwrap_err().to_string();
+        assert!(said.starts_with("there is no camera '/dev/video199'") && !said.contains('\n'), "{said}");
+    }
+}

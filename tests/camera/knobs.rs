@@ -1,0 +1,79 @@
+//! Turning a camera's controls while it streams.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use bokehcam::v4l2::live::knobs::{self, Knob};
+
+use super::machine::{CAMERA, Machine, frame, open, sh, until, wish};
+
+fn knob<'a>(knobs: &'a [Knob], name: &str) -> &'a Knob {
+    knobs.iter().find(|knob| knob.name == name).unwrap_or_else(|| panic!("no {name} in {knobs:?}"))
+}
+
+/// What another program says a control is set to.
+fn told(name: &str) -> i64 {
+    sh(&format!("v4l2-ctl -d {CAMERA} -C {name}")).trim().rsplit_once(' ').unwrap().1.parse().unwrap()
+}
+
+#[test]
+#[ignore = "needs the camera VM (tests/vm/run)"]
+fn knobs_are_listed_turned_and_read_back_while_the_camera_streams() {
+    let _machine = Machine::new();
+    let mut camera = open(CAMERA, wish((320, 180), 25.0, None));
+    // The mean of the newest picture's bytes, in thousandths, and how many pictures there were.
+    let (mean, count, over) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            while !over.load(Ordering::SeqCst) {
+                let (image, _) = frame(&mut camera);
+                let sum: u64 = image.rgb.iter().map(|byte| u64::from(*byte)).sum();
+                mean.store(1000 * sum / image.rgb.len() as u64, Ordering::SeqCst);
+                count.fetch_add(1, Ordering::SeqCst);
+            }
+        });
+        let _ends = Ends(&over);
+        let wait = |what: &str, is: &mut dyn FnMut() -> bool| until(what, Duration::from_secs(20), is);
+        wait("pictures", &mut || count.load(Ordering::SeqCst) > 2);
+
+        let all = knobs::list("vivid").unwrap();
+        assert_eq!(all, knobs::list(CAMERA).unwrap());
+        assert!(all.iter().all(|knob| !["mute", "volume", "test_pattern", "button", "string"].contains(&&*knob.name)));
+        let brightness = knob(&all, "brightness");
+        assert_eq!((brightness.range, brightness.value), ((0, 255, 1), told("brightness")));
+        assert!(brightness.active && !brightness.switch && brightness.menu.is_empty());
+        let automatic = knob(&all, "gain_automatic");
+        assert!(automatic.switch && automatic.range == (0, 1, 1));
+
+        let before = mean.load(Ordering::SeqCst);
+        let all = knobs::turn("0", "brightness", 200).unwrap();
+        assert_eq!((knob(&all, "brightness").value, told("brightness")), (200, 200));
+        wait("a lighter picture", &mut || mean.load(Ordering::SeqCst) > before + 30_000);
+
+        // What has no effect says so, and comes back when what overrides it is turned off.
+        let all = knobs::turn("0", "gain_automatic", 1).unwrap();
+        assert!(!knob(&all, "gain").active);
+        let said = knobs::turn("0", "gain", 3).unwrap_err().to_string();
+        assert!(said.starts_with(CAMERA) && said.contains("another control overrides it"), "{said}");
+        let all = knobs::turn("0", "gain_automatic", 0).unwrap();
+        assert!(knob(&all, "gain").active);
+        let all = knobs::turn("0", "gain", 3).unwrap();
+        assert_eq!((knob(&all, "gain").value, told("gain")), (3, 3));
+
+        let said = knobs::turn("0", "brightness", 256).unwrap_err().to_string();
+        assert!(said.contains("use 0 to 255") && !said.contains('\n'), "{said}");
+        assert_eq!(told("brightness"), 200, "a refused value changes nothing");
+        let streamed = count.load(Ordering::SeqCst);
+        wait("more pictures", &mut || count.load(Ordering::SeqCst) > streamed + 2);
+    });
+}
+
+/// Ends the other thread, also when the test fails.
+struct Ends<'a>(&'a AtomicBool);
+
+impl Drop for Ends<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::SeqCst);
+    }
+}
