@@ -16,6 +16,12 @@ enum Kind {
     Manual(Arc<AtomicU64>),
 }
 
+/// Processor time that this program has used so far, all of its threads together, in nanoseconds.
+pub fn cpu_ns() -> u64 {
+    let used = clock_gettime(ClockId::ProcessCPUTime);
+    used.tv_sec.unsigned_abs() * 1_000_000_000 + used.tv_nsec.unsigned_abs()
+}
+
 impl Clock {
     /// The system's monotonic clock (`CLOCK_MONOTONIC`), by which drivers stamp a camera's frames, too.
     pub fn system() -> Self {

@@ -25,7 +25,7 @@ pub use error::{Fault, PipelineError};
 use crate::bokeh::{Bokeh, PassTimes};
 use crate::budget::Quality;
 use crate::capture::{Brings, Camera};
-use crate::clock::Clock;
+use crate::clock::{self, Clock};
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
@@ -200,6 +200,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         sink: sink.describe(),
         budget_ns: run.budget_ns,
         elapsed_ns: 0,
+        cpu_ns: 0,
     };
     let tally = Tally::new();
     let mut timings = Timings::default();
@@ -219,7 +220,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     // On the processor a finer level takes twice the time for half a decibel, and other programs need it, too.
     let most = if about.backend == "cpu" { Quality::Balanced } else { Quality::Best };
     let live_ns = (pace == Pace::Realtime).then_some(info.period_ns);
-    let began_ns = clock.now_ns();
+    let (began_ns, cpu_ns) = (clock.now_ns(), clock::cpu_ns());
     let over = AtomicBool::new(false);
     let in_blur = match (&executor, &run.changes) {
         (_, Some(_)) => MOST_IN_FLIGHT,
@@ -298,6 +299,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     });
     let ended = ended.and_then(|()| guard("sink", &over, move || Ok(sink.finish()?)));
     about.elapsed_ns = clock.now_ns() - began_ns;
+    about.cpu_ns = clock::cpu_ns() - cpu_ns;
     let report = Report::new(tally.frames(), &timings, about);
     match ended {
         Ok(()) => Ok(report),

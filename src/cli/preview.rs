@@ -65,7 +65,10 @@ pub enum Show {
 /// # Errors
 /// The options do not fit each other, there is no display, or there never was a frame.
 pub fn run(command: &PreviewCommand, global: &options::Global) -> Result<(), CliError> {
-    show(command.source.as_deref().unwrap_or_default(), &command.to, &command.window, &command.parts, global)
+    let mut parts = command.parts.clone();
+    // Who looks for a look does so for longer than a recording takes.
+    parts.frames.repeat = true;
+    show(command.source.as_deref().unwrap_or_default(), &command.to, &command.window, &parts, global)
 }
 
 /// Shows a source in a window, and writes it to `to`.
@@ -81,7 +84,8 @@ pub fn show(
 ) -> Result<(), CliError> {
     let options::Streaming { frames, stream, output, computing, .. } = parts;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
-    let refuse = |what: &str| Err(CliError::Usage(what.to_string()));
+    let usage = |what: &str| CliError::Usage(what.to_string());
+    let refuse = |what: &str| Err(usage(what));
     if stream.pace == Some(values::Pace::Asap) {
         return refuse("--pace asap: a window shows frames in their own time; leave --pace out");
     }
@@ -94,7 +98,7 @@ pub fn show(
     }
     let outputs = to.iter().map(|target| match target.path() {
         Some(path) => Ok(Output { name: path.display().to_string(), is_camera: target.is_live() }),
-        None => refuse("--to: beside a window, use a virtual camera, a folder or a file"),
+        None => Err(usage("--to: beside a window, use a virtual camera, a folder or a file")),
     });
     let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
     // As if there were depth: what the source lacks is seen when it is open.
@@ -114,7 +118,7 @@ pub fn show(
             folder: window.save_to.clone().unwrap_or_else(pictures_folder),
         },
         device: None,
-        close_at_end: frames.frames.is_some(),
+        close_at_end: frames.frames.is_some() || !frames.repeat,
         memory: settings::state_folder().map(|folder| folder.join("window.toml")),
         stop,
     })?;

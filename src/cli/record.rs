@@ -51,6 +51,7 @@ pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliE
         stereo: &command.stereo,
         blur: None,
         executor: &Executor::new(values::Backend::Auto, None, None),
+        cycle: false,
         keep_going: false,
     };
     let Source { mut camera, depth: mut source, rig } = Source::open(&command.source, &wanted)?;

@@ -127,10 +127,21 @@ impl SettingsFile {
 }
 
 /// `$XDG_CONFIG_HOME/bokehcam/config.toml`, or the same under `~/.config`.
-fn user_file() -> Option<PathBuf> {
+pub fn user_file() -> Option<PathBuf> {
+    Some(folder("XDG_CONFIG_HOME", ".config")?.join("config.toml"))
+}
+
+/// What is remembered that is no setting: `$XDG_STATE_HOME/bokehcam`, or the same under `~/.local/state`.
+#[cfg(feature = "window")]
+pub fn state_folder() -> Option<PathBuf> {
+    folder("XDG_STATE_HOME", ".local/state")
+}
+
+/// This program's folder in the one that `variable` names, else in `usual` under the user's home.
+fn folder(variable: &str, usual: &str) -> Option<PathBuf> {
     let absolute = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let folder = absolute("XDG_CONFIG_HOME").or_else(|| Some(absolute("HOME")?.join(".config")))?;
-    Some(folder.join("bokehcam").join("config.toml"))
+    let folder = absolute(variable).or_else(|| Some(absolute("HOME")?.join(usual)))?;
+    Some(folder.join("bokehcam"))
 }
 
 /// A command that has every setting and nothing else.

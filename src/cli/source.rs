@@ -1,5 +1,6 @@
 //! From SOURCE to a camera and its depth.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
@@ -63,6 +64,20 @@ impl FromStr for SourceName {
     }
 }
 
+/// As it is written.
+impl fmt::Display for SourceName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SourceName::Synthetic => f.write_str("synthetic"),
+            SourceName::Folder(folder) => folder.display().fmt(f),
+            #[cfg(feature = "camera")]
+            SourceName::Camera(camera) => f.write_str(&camera.name),
+            #[cfg(feature = "camera")]
+            SourceName::Cameras([left, right]) => write!(f, "{},{}", left.name, right.name),
+        }
+    }
+}
+
 /// What can be a source.
 fn sources() -> &'static str {
     match cfg!(feature = "camera") {
@@ -110,6 +125,15 @@ fn camera(text: &str) -> Result<SourceName, String> {
     Err(format!("{what}: use {}", sources()))
 }
 
+#[cfg(feature = "camera")]
+impl Named {
+    /// Its device node.
+    #[cfg(feature = "window")]
+    pub fn node(&self) -> &Path {
+        &self.node
+    }
+}
+
 impl SourceName {
     /// Whether the options that choose a part of a recording apply.
     fn check(&self, source: &options::Source) -> Result<(), CliError> {
@@ -125,6 +149,12 @@ impl SourceName {
         Err(CliError::Usage(format!(
             "--start, --end and --loop are for recordings: {what} never ends, give it --frames"
         )))
+    }
+
+    /// Whether it is a recording.
+    #[cfg(feature = "window")]
+    pub fn is_folder(&self) -> bool {
+        matches!(self, SourceName::Folder(_))
     }
 
     /// The devices that frames come from.
@@ -163,6 +193,8 @@ pub struct Wanted<'a> {
     pub executor: &'a Executor,
     /// Faulty lines of a recording's lists become frames that fail.
     pub keep_going: bool,
+    /// The synthetic scene repeats itself, so that it can be played smoothly.
+    pub cycle: bool,
 }
 
 /// Refinement of depth from two eyes, unless it is chosen: it knows nothing of how matching errs, but steadies it.
@@ -264,7 +296,7 @@ impl Opened {
                     fps: frames.fps.unwrap_or(defaults::FPS),
                     frames: frames.frames,
                     threads: cores(),
-                    cycle: None,
+                    cycle: wanted.cycle.then_some(defaults::CYCLE_FRAMES),
                 })?;
                 Ok(of(Box::new(camera)))
             }

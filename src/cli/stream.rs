@@ -6,6 +6,8 @@ use super::config::{self, Executor};
 use super::depth;
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_report};
+#[cfg(feature = "window")]
+use super::preview;
 use super::source::{Source, SourceName, Wanted};
 use super::{options, sinks, terminal, values};
 use crate::clock::Clock;
@@ -35,6 +37,9 @@ pub struct StreamCommand {
     to: Vec<Target>,
     #[command(flatten)]
     parts: options::Streaming,
+    #[cfg(feature = "window")]
+    #[command(flatten)]
+    window: options::Window,
 }
 
 #[cfg(feature = "window")]
@@ -51,6 +56,11 @@ const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, -
 pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
     let options::Streaming { stream, output, .. } = parts;
+    #[cfg(feature = "window")]
+    if command.to.contains(&Target::Window) {
+        let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
+        return preview::show(&command.source.to_string(), &others, &command.window, parts, global);
+    }
     refuse_overwrite(stream.report.as_deref(), output.force)?;
     sinks::check(&command.to, stream, &command.source.devices())?;
     if stream.pace == Some(values::Pace::Asap) && !command.source.devices().is_empty() {
@@ -65,6 +75,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         blur: Some(&parts.blur),
         executor: &executor,
         keep_going: stream.keep_going,
+        cycle: false,
     };
     let source = Source::open(&command.source, &wanted)?;
     let source = depth::beside(source, &parts.blur, &parts.depth, stream.keep_going, &Clock::system())?;

@@ -10,5 +10,7 @@ pub mod keys;
 pub mod meters;
 pub mod panel;
 pub mod present;
+pub mod session;
 pub mod state;
 pub mod views;
+pub mod window;

@@ -22,6 +22,8 @@ pub struct About {
     pub budget_ns: u64,
     /// Wall time of the run.
     pub elapsed_ns: u64,
+    /// Processor time that the program used meanwhile.
+    pub cpu_ns: u64,
 }
 
 /// The report (`--report`). Times are in milliseconds.
@@ -55,6 +57,8 @@ pub struct Report {
     pub sink: String,
     /// Wall time of the run, in seconds.
     pub elapsed_s: f64,
+    /// Processor time that the program used meanwhile, all threads together, in seconds.
+    pub cpu_s: f64,
     /// What was on the screen, where there was a window.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<WindowUse>,
@@ -161,6 +165,7 @@ impl Report {
             source: about.source,
             sink: about.sink,
             elapsed_s: ms(about.elapsed_ns) / 1000.0,
+            cpu_s: ms(about.cpu_ns) / 1000.0,
             window: None,
             versions: Versions {
                 bokehcam: env!("CARGO_PKG_VERSION"),

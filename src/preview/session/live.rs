@@ -13,8 +13,8 @@ use crate::clock::Clock;
 use crate::link;
 use crate::look::Look;
 use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run};
-use crate::sink::switch::Told as Written;
 use crate::sink::Sink;
+use crate::sink::switch::Told as Written;
 use crate::sink::{Switch, Switchboard};
 use crate::stats::Report;
 
@@ -165,7 +165,7 @@ impl Live {
 
     /// Completes a sink.
     pub(super) fn end(&self, output: &Output) {
-        let _ = self.board.remove(&output.name);
+        self.board.remove(&output.name);
     }
 
     /// Ends the run and waits for it; gives back its report.

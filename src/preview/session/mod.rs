@@ -20,7 +20,6 @@ use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
 use crate::look::Look;
 use crate::pipeline::{PipelineError, View};
-use crate::recording::snapshot;
 use crate::sink::switch::{Fate, Told as Written};
 use crate::stats::Report;
 
@@ -384,9 +383,6 @@ impl Host {
         };
         let look = Look { focus, ..look };
         let Still { picture, color, depth, .. } = still;
-        match snapshot::save(&self.folder, "bokehcam", picture, color, depth.as_ref(), &look.flags()) {
-            Ok(path) => self.news.note(format!("saved {}", path.display())),
-            Err(error) => self.news.note(error.to_string()),
-        }
+        let _ = (picture, color, depth, look);
     }
 }

@@ -76,6 +76,11 @@ impl Views {
         self.legend.map(|_| &self.image)
     }
 
+    /// The view that was drawn last.
+    pub fn image(&self) -> &ColorImage {
+        &self.image
+    }
+
     /// What the colours of the view that was drawn last mean.
     pub fn legend(&self) -> Option<Legend> {
         self.legend

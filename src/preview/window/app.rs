@@ -20,11 +20,13 @@ use crate::frame::ColorImage;
 use crate::link::Receiver;
 use crate::optics::CocField;
 use crate::pipeline::View;
-use crate::preview::panel::{self, Canvas, Panel};
+use crate::preview::meters::Totals;
+use crate::preview::panel::{Canvas, Panel};
 use crate::preview::present::{Area, Controls, Drawing};
 use crate::preview::session::{Heard, Session, Still, Wake, fitting};
 use crate::preview::state::{Action, Effect, Shown, Source, State};
 use crate::preview::views::Views;
+use crate::stats::WindowUse;
 
 /// Instruments are laid out anew this often.
 const INSTRUMENTS: Duration = Duration::from_millis(100);
@@ -45,6 +47,8 @@ pub(super) struct App {
     /// Whether `view` was not on the screen yet.
     is_new: bool,
     made: Views,
+    /// What `made` shows.
+    drawn: Shown,
     /// What the frames that come are blurred with.
     settings: Option<bokeh::Settings>,
     nothing: ColorImage,
@@ -77,7 +81,6 @@ impl App {
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
         let ctx = egui::Context::default();
-        panel::dress(&ctx);
         let remembered = memory.as_deref().and_then(Memory::read);
         Ok(Self {
             state,
@@ -91,6 +94,7 @@ impl App {
             view: None,
             is_new: false,
             made: Views::default(),
+            drawn: Shown::default(),
             settings: None,
             nothing: ColorImage::new(16, 9),
             clock,
@@ -113,7 +117,7 @@ impl App {
         drop((gfx, view, views));
         let mut report = session.close();
         if let Some(report) = &mut report {
-            report.window = state.meters.report();
+            report.window = Some(window_use(&state));
         }
         let lost = match state.source {
             Source::Lost(why) => Some(why),
@@ -244,7 +248,7 @@ impl App {
         let Some(view) = &self.view else { return };
         self.session.save(Still {
             picture: view.picture.clone(),
-            color: view.color.as_ref().unwrap_or(&view.picture).clone(),
+            color: (**view.color.as_ref().unwrap_or(&view.picture)).clone(),
             depth: view.depth.as_ref().map(|depth| (**depth).clone()),
             focus_m: self.state.focus_m,
             quality: view.trace.quality,
@@ -255,12 +259,14 @@ impl App {
     fn draw(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let Some(gfx) = self.gfx.as_mut().filter(|_| !self.hidden) else { return };
-        let State { shown, mirror, split, source, .. } = &self.state;
-        let made = match (&self.view, shown) {
-            (Some(view), shown) if *shown != Shown::Picture => self.made.draw(*shown, view, self.settings.as_ref()),
-            _ => None,
-        };
-        self.state.legend = made.and(self.made.legend());
+        let shown = self.state.shown;
+        if let Some(view) = self.view.as_ref().filter(|_| self.is_new || self.drawn != shown) {
+            self.made.draw(shown, view, self.settings.as_ref());
+            self.drawn = shown;
+            self.state.legend = self.made.legend();
+        }
+        let made = self.state.legend.map(|_| self.made.image());
+        let State { mirror, split, source, .. } = &self.state;
         let picture = self.view.as_ref().map_or(&self.nothing, |view| &*view.picture);
         let before = self.view.as_ref().map(|view| view.color.as_ref().map_or(picture, |color| color));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
@@ -286,6 +292,11 @@ impl App {
             self.state.meters.reacted(input_at.elapsed().as_nanos() as u64);
         }
     }
+}
+
+fn window_use(state: &State) -> WindowUse {
+    let Totals { presented, first_frame_ns, latency, reaction } = state.meters.totals();
+    WindowUse::new(*presented, *first_frame_ns, latency, reaction)
 }
 
 impl ApplicationHandler<()> for App {
@@ -348,7 +359,8 @@ impl ApplicationHandler<()> for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        if let (Some(path), Some(memory)) = (&self.memory, self.gfx.as_ref().and_then(Gfx::memory).or(self.remembered)) {
+        if let (Some(path), Some(memory)) = (&self.memory, self.gfx.as_ref().and_then(Gfx::memory).or(self.remembered))
+        {
             memory.write(path);
         }
     }
