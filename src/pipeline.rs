@@ -14,18 +14,21 @@ mod pacer;
 mod playout;
 mod quality;
 mod rate;
+mod wanted;
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::thread::{self, Scope, ScopedJoinHandle};
 
 pub use change::{Change, Executor};
 pub use error::{Fault, PipelineError};
+pub use wanted::Wanted;
 
 use crate::bokeh::{Bokeh, PassTimes};
 use crate::budget::Quality;
 use crate::capture::{Brings, Camera};
 use crate::clock::{self, Clock};
+use crate::compute::DevicePicture;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
@@ -119,6 +122,9 @@ pub struct Run<'a> {
     pub demand: Option<Demand>,
     /// Flip the pictures left to right on their way out.
     pub mirror: bool,
+    /// Where blurred pictures are wanted; `None` is in memory, as is a mirrored picture always. The sink is given none
+    /// that is not in memory.
+    pub wanted: Option<Arc<Wanted>>,
     /// Who is shown each frame that the sink took, with what it was made of; the newest wins. Where the sink
     /// [keeps](Sink::keeps) nothing, a frame is delivered once it was taken from here.
     pub view: Option<Sender<View>>,
@@ -145,8 +151,12 @@ pub struct Progress {
 
 /// A frame, for who looks at more than the picture.
 pub struct View {
-    /// The picture as the sink was given it.
+    /// The picture as the sink was given it; any picture where it is not in memory.
     pub picture: Pooled<ColorImage>,
+    /// Whether the picture is in memory.
+    pub in_memory: bool,
+    /// The picture on the device that blurs, where it was wanted there and is.
+    pub on_device: Option<Pooled<DevicePicture>>,
     /// The picture before the blur; `None` where nothing was blurred.
     pub color: Option<Pooled<ColorImage>>,
     /// The depth that it was blurred by, holes filled.
@@ -270,6 +280,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         late: live_ns.map(quality::LateRule::new),
         picker: quality::Picker::new(run.quality, most, run.budget_ns, live_ns),
         outs: &outs,
+        wanted: run.wanted.filter(|_| !run.mirror),
         viewed: places.viewed,
         tally: &tally,
         clock: &clock,

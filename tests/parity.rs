@@ -11,6 +11,7 @@ use bokehcam::bokeh::gpu::GpuBokeh;
 use bokehcam::bokeh::plan::{CELL, Compositing, Plan, SEGMENT};
 use bokehcam::bokeh::{Bokeh, Effect, Job, Method, Probe, Rank, Settings};
 use bokehcam::budget::Quality;
+use bokehcam::compute::Place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocField;
@@ -37,6 +38,7 @@ fn job(ticket: u64, color: &ColorImage, map: &DepthMap, field: &CocField) -> Job
         depth: Some(Pooled::detached(map.clone())),
         coc: *field,
         quality: Quality::default(),
+        place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
     }
 }

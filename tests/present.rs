@@ -6,13 +6,13 @@ mod common;
 
 use bokehcam::frame::ColorImage;
 use bokehcam::preview::present::soft::Painter;
-use bokehcam::preview::present::{Area, Controls, Drawing};
+use bokehcam::preview::present::{Area, Controls, Drawing, Image};
 use common::{color, noise};
 
 const BACKGROUND: [u8; 3] = [9, 8, 7];
 
 fn drawing(picture: &ColorImage, area: Area) -> Drawing<'_> {
-    Drawing { area, picture, before: None, mirror: false, stale: false, background: BACKGROUND }
+    Drawing { area, picture: Image::Memory(picture), before: None, mirror: false, stale: false, background: BACKGROUND }
 }
 
 fn area(x: u32, y: u32, width: u32, height: u32) -> Area {

@@ -5,6 +5,7 @@ use std::fmt;
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Effect, Job, Rank, Settings};
 use bokehcam::budget::Quality;
+use bokehcam::compute::Place;
 use bokehcam::depth::{fill::Filler, refine::Refiner};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
@@ -190,6 +191,7 @@ impl Blurrer {
             depth: Some(Pooled::detached(depth)),
             coc: CocField::Depth(shot.lens),
             quality: Quality::default(),
+            place: Place::Memory,
             out: Pooled::detached(ColorImage::default()),
         })?;
         let finished = bokeh.collect(true)?;

@@ -162,6 +162,7 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         keep_going: false,
         demand: None,
         mirror: false,
+        wanted: None,
         view: None,
         clock,
         stop: &stop,

@@ -15,11 +15,15 @@ pub mod rung;
 pub mod share;
 pub mod split;
 
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::budget::Quality;
 pub use crate::compute::Backend;
-use crate::compute::GpuError;
+#[cfg(feature = "gpu")]
+use crate::compute::device::Device;
+use crate::compute::{DevicePicture, GpuError, Place};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::optics::CocField;
@@ -90,7 +94,9 @@ pub struct Job {
     pub coc: CocField,
     /// The rung of the quality ladder; of an executor made for one ([`Settings::adaptive`]), that one holds.
     pub quality: Quality,
-    /// Where the result goes; resized to the picture's size.
+    /// Where the result is wanted.
+    pub place: Place,
+    /// Where it goes in memory; resized to the picture's size.
     pub out: Pooled<ColorImage>,
 }
 
@@ -98,8 +104,12 @@ pub struct Job {
 pub struct Finished {
     /// The job's ticket.
     pub ticket: u64,
-    /// The result.
+    /// The result, where it is in memory; any picture otherwise.
     pub out: Pooled<ColorImage>,
+    /// Whether it is. A result that was wanted on the device alone may be here instead.
+    pub in_memory: bool,
+    /// The result on the device, where it was wanted there and is.
+    pub on_device: Option<Pooled<DevicePicture>>,
     /// The job's picture.
     pub color: Pooled<ColorImage>,
     /// The job's depth.
@@ -202,6 +212,16 @@ pub fn create(
         return Err(GpuError::left_out().into());
     }
     Ok(Box::new(cpu::CpuBokeh::new(plan, threads)))
+}
+
+/// The executor for pictures of `size` (width, height) on a device that is open already.
+///
+/// # Errors
+/// The device is too small for such pictures, or failed.
+#[cfg(feature = "gpu")]
+pub fn create_on(settings: &Settings, size: (u32, u32), device: Arc<Device>) -> Result<Box<dyn Bokeh>, BokehError> {
+    let plan = plan::Plan::new(settings, size.0, size.1);
+    Ok(Box::new(gpu::GpuBokeh::on(&plan, device)?))
 }
 
 /// An executor of the plan.

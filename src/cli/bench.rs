@@ -13,7 +13,7 @@ use super::values::{self, Size, above_zero};
 use super::{defaults, options, print, render};
 use crate::bokeh::{Bokeh, Job, PassTimes};
 use crate::budget::Quality;
-use crate::compute::team::cores;
+use crate::compute::{Place, team::cores};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
 use crate::look::COC_AT_INFINITY_PER_HEIGHT;
@@ -203,6 +203,7 @@ impl Buffers {
             depth: self.depths.as_ref().map(Pool::take),
             coc,
             quality: Quality::default(),
+            place: Place::Memory,
             out: self.results.take(),
         };
         let began = Instant::now();

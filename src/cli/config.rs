@@ -1,10 +1,15 @@
 //! Resolved, validated configuration: what the raw options mean. Nothing below the command line sees an option.
 
+#[cfg(feature = "window")]
+use std::sync::Arc;
+
 use super::error::CliError;
 use super::options;
 use super::quality::QualityChoice;
 use super::values::{self, ApertureName, DepthChoice, Effect, Focus, Method, Rank};
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
+#[cfg(feature = "window")]
+use crate::compute::device::Device;
 use crate::compute::team::cores;
 use crate::depth::DepthError;
 use crate::depth::focus::FocusRule;
@@ -110,6 +115,32 @@ impl Executor {
             values::Backend::Cpu => Backend::Cpu,
         };
         Self { backend, adapter, threads }
+    }
+
+    /// The GPU to blur and draw with; `None` where the CPU does.
+    ///
+    /// # Errors
+    /// A GPU was asked for and there is none that fits.
+    #[cfg(feature = "window")]
+    pub fn device(&self) -> Result<Option<Arc<Device>>, CliError> {
+        let asked_for = self.backend == Backend::Gpu || self.adapter.is_some();
+        if self.backend == Backend::Cpu {
+            return Ok(None);
+        }
+        match Device::open(!asked_for, self.adapter.as_deref()) {
+            Ok(device) => Ok(Some(Arc::new(device))),
+            Err(error) if asked_for => Err(bokeh::BokehError::from(error).into()),
+            Err(error) => {
+                tracing::info!("blurring and drawing on the CPU: {error}");
+                Ok(None)
+            }
+        }
+    }
+
+    /// Threads of the CPU executor; all cores when `None`.
+    #[cfg(feature = "window")]
+    pub fn threads(&self) -> Option<usize> {
+        self.threads
     }
 
     /// An executor for pictures of `size` pixels.

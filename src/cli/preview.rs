@@ -4,6 +4,7 @@ mod wings;
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
 
@@ -104,20 +105,22 @@ pub fn show(
     // As if there were depth: what the source lacks is seen when it is open.
     let look = config::look(&parts.blur, &parts.aperture, computing.quality, true)?;
     let executor = Executor::of(computing);
+    let device = executor.device()?;
     let state = first_state(look.clone(), source, window, stream.mirror);
     let stop = terminal::stop_flag()?;
     let ended = window::show(Preview {
         state,
         session: Start {
-            backstage: Box::new(Wings::new(parts, executor)),
+            backstage: Box::new(Wings::new(parts, executor, device.clone())),
             look,
             source: source.to_owned(),
             outputs,
             keep_going: stream.keep_going,
             budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
+            wanted: Arc::default(),
             folder: window.save_to.clone().unwrap_or_else(pictures_folder),
         },
-        device: None,
+        device: device.clone(),
         close_at_end: frames.frames.is_some() || !frames.repeat,
         memory: settings::state_folder().map(|folder| folder.join("window.toml")),
         stop,

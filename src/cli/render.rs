@@ -9,6 +9,7 @@ use super::error::CliError;
 use super::files::refuse_overwrite;
 use super::{debug, options, terminal};
 use crate::bokeh::{BokehError, Job};
+use crate::compute::Place;
 use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -96,6 +97,7 @@ fn blurred(
         depth: depth.map(Pooled::detached),
         coc,
         quality: settings.quality,
+        place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
     })?;
     match bokeh.collect(true)? {

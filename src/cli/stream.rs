@@ -125,6 +125,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
         keep_going: stream.keep_going,
         demand,
         mirror: stream.mirror,
+        wanted: None,
         view: None,
         clock: Clock::system(),
         stop: &stop,

@@ -15,6 +15,10 @@ pub struct Shader {
 
 /// A device and its queue.
 pub struct Device {
+    /// What it was found by; surfaces of windows are made by it, too.
+    pub instance: wgpu::Instance,
+    /// What it was opened on.
+    pub adapter: wgpu::Adapter,
     /// The device.
     pub device: wgpu::Device,
     /// Its queue.
@@ -58,7 +62,7 @@ impl Device {
                 found: if names.is_empty() { "none".to_owned() } else { names.join("; ") },
             });
         };
-        let (adapter, name) = (&adapters[best], describe(&infos[best]));
+        let (adapter, name) = (adapters[best].clone(), describe(&infos[best]));
         let timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("bokehcam"),
@@ -85,7 +89,7 @@ impl Device {
                 on_loss(format!("device lost: {message}"));
             }
         });
-        Ok(Self { device, queue, name, timestamps, fault })
+        Ok(Self { instance, adapter, device, queue, name, timestamps, fault })
     }
 
     /// A pass with its `override` constants.
@@ -110,11 +114,20 @@ impl Device {
         pipeline: &wgpu::ComputePipeline,
         buffers: impl Iterator<Item = wgpu::BufferBinding<'a>>,
     ) -> wgpu::BindGroup {
+        self.bound(&pipeline.get_bind_group_layout(0), buffers)
+    }
+
+    /// Buffers in the order of a layout's bindings.
+    pub fn bound<'a>(
+        &self,
+        layout: &wgpu::BindGroupLayout,
+        buffers: impl Iterator<Item = wgpu::BufferBinding<'a>>,
+    ) -> wgpu::BindGroup {
         let entry =
             |(k, buffer)| wgpu::BindGroupEntry { binding: k as u32, resource: wgpu::BindingResource::Buffer(buffer) };
         self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
-            layout: &pipeline.get_bind_group_layout(0),
+            layout,
             entries: &buffers.enumerate().map(entry).collect::<Vec<_>>(),
         })
     }
@@ -140,6 +153,44 @@ impl Device {
             Some(message) => Err(GpuError::Failed(format!("{}: {message}", self.name))),
             None => Ok(()),
         }
+    }
+}
+
+/// An 8-bit sRGB picture in a device's memory: the bytes of a [`crate::frame::ColorImage`].
+#[derive(Debug)]
+pub struct DevicePicture {
+    device: wgpu::Device,
+    size: (u32, u32),
+    buffer: wgpu::Buffer,
+}
+
+impl DevicePicture {
+    /// Memory for a picture of `size` pixels.
+    pub fn new(device: &Device, size: (u32, u32)) -> Self {
+        let quads = (u64::from(size.0) * u64::from(size.1)).div_ceil(4);
+        let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("picture"),
+            // Whole quads of pixels: what follows the last pixel is unspecified. A binding must not be empty.
+            size: (quads * 12).max(16),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self { device: device.device.clone(), size, buffer }
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// Where it is.
+    pub fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+
+    /// Whether that is this device's memory.
+    pub fn is_on(&self, device: &Device) -> bool {
+        self.device == device.device
     }
 }
 

@@ -6,6 +6,14 @@ pub mod device;
 pub mod simd;
 pub mod team;
 
+#[cfg(feature = "gpu")]
+pub use device::DevicePicture;
+
+/// A picture in a GPU's memory, of which this build has none.
+#[cfg(not(feature = "gpu"))]
+#[derive(Debug)]
+pub enum DevicePicture {}
+
 /// Where the executors run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Backend {
@@ -16,6 +24,18 @@ pub enum Backend {
     Gpu,
     /// The CPU.
     Cpu,
+}
+
+/// Where a picture is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Place {
+    /// In memory.
+    #[default]
+    Memory,
+    /// In the memory of the GPU that made it; who computes elsewhere leaves it in memory.
+    Device,
+    /// In both.
+    Both,
 }
 
 /// Why there is no GPU to compute on.

@@ -1,13 +1,16 @@
 //! Third stage: drops what is too late, and blurs the rest; takes another executor when one comes.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use super::depth::Ready;
 use super::quality::{LateRule, Picker};
+use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, Trace, hand_on};
 use crate::bokeh::{Bokeh, Finished, Job, PassTimes};
 use crate::budget::Quality;
 use crate::clock::Clock;
+use crate::compute::{DevicePicture, Place};
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Receiver, Sender};
@@ -17,6 +20,9 @@ use crate::stats::{Cause, Histogram, PassHistograms, RungCounts, Tally, Ticket};
 /// A blurred picture, and what it was made of.
 pub(super) struct Blurred {
     pub picture: Pooled<ColorImage>,
+    /// Whether the picture is in memory; otherwise it is on the device alone.
+    pub in_memory: bool,
+    pub on_device: Option<Pooled<DevicePicture>>,
     /// The picture before; `None` where nothing was blurred, or nobody looks at it.
     pub color: Option<Pooled<ColorImage>>,
     pub depth: Option<Pooled<DepthMap>>,
@@ -32,6 +38,8 @@ pub(super) struct Stage<'a> {
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     pub picker: Picker,
+    /// Where pictures are wanted; in memory where nobody says.
+    pub wanted: Option<Arc<Wanted>>,
     /// Whether somebody looks at what the pictures were made of.
     pub viewed: bool,
     pub budget_ns: u64,
@@ -111,7 +119,14 @@ impl Stage<'_> {
             self.tally.dropped(ticket, Cause::Late);
             return true;
         }
-        let item = Blurred { picture: color, color: None, depth: depth.filter(|_| self.viewed), coc };
+        let item = Blurred {
+            picture: color,
+            in_memory: true,
+            on_device: None,
+            color: None,
+            depth: depth.filter(|_| self.viewed),
+            coc,
+        };
         hand_on(to, Frame { ticket, stamp, trace, item }, self.tally)
     }
 
@@ -132,7 +147,8 @@ impl Stage<'_> {
         }
         self.picker.begin(began_ns.saturating_sub(ticket.captured_ns));
         let quality = self.picker.quality();
-        let job = Job { ticket: ticket.id.0, color, depth, coc, quality, out: self.outs.take() };
+        let place = self.wanted.as_ref().map_or(Place::Memory, |wanted| wanted.place());
+        let job = Job { ticket: ticket.id.0, color, depth, coc, quality, place, out: self.outs.take() };
         pending.push_back(Pending { ticket, stamp, trace, coc, began_ns, quality });
         match executor.submit(job) {
             Ok(()) => Ok(true),
@@ -158,11 +174,13 @@ impl Stage<'_> {
         let Some(done) = pending.pop_front().filter(|oldest| oldest.ticket.id.0 == finished.ticket) else {
             return Err(Fault::LostFrame);
         };
-        let Finished { out, color, depth, times, .. } = finished;
+        let Finished { out, in_memory, on_device, color, depth, times, .. } = finished;
         let blur_ns = self.measure(&done, &times, executor.capacity());
         let Pending { ticket, stamp, trace, coc, quality, .. } = done;
         let item = Blurred {
             picture: out,
+            in_memory,
+            on_device,
             color: Some(color).filter(|_| self.viewed),
             depth: depth.filter(|_| self.viewed),
             coc,

@@ -55,12 +55,14 @@ impl Stage<'_> {
                 self.clock.sleep_until_ns(playout.due_ns(ticket.captured_ns, self.clock.now_ns()));
             }
             let began_ns = self.clock.now_ns();
-            match self.sink.put(&frame.picture) {
-                Ok(flow) if flow.is_break() => break,
-                Ok(_) => {}
-                Err(error) => {
-                    self.tally.dropped(ticket, Cause::Failed);
-                    return Err(error.into());
+            if frame.in_memory {
+                match self.sink.put(&frame.picture) {
+                    Ok(flow) if flow.is_break() => break,
+                    Ok(_) => {}
+                    Err(error) => {
+                        self.tally.dropped(ticket, Cause::Failed);
+                        return Err(error.into());
+                    }
                 }
             }
             let now_ns = self.clock.now_ns();
@@ -71,13 +73,14 @@ impl Stage<'_> {
             }
             let captured_ns = ticket.captured_ns;
             // Where the viewer alone takes frames, one is delivered once it did.
-            let (sunk, kept) =
-                if self.view.is_none() || self.sink.keeps() { (Some(ticket), None) } else { (None, Some(ticket)) };
+            let taken = frame.in_memory && self.sink.keeps();
+            let (sunk, kept) = if self.view.is_none() || taken { (Some(ticket), None) } else { (None, Some(ticket)) };
             sunk.into_iter().for_each(|ticket| self.tally.delivered(ticket));
             if let Some(view) = &mut self.view {
-                let Blurred { picture, color, depth, coc } = frame;
+                let Blurred { picture, in_memory, on_device, color, depth, coc } = frame;
                 let frames = self.tally.frames();
-                match view.send(View { picture, color, depth, coc, stamp, captured_ns, trace, frames }) {
+                let item = View { picture, in_memory, on_device, color, depth, coc, stamp, captured_ns, trace, frames };
+                match view.send(item) {
                     Ok(displaced) => self.looked_at(displaced.is_none(), std::mem::replace(&mut viewed, kept)),
                     // Nobody knows this frame's fate: it stays in flight.
                     Err(link::Abandoned) => break,

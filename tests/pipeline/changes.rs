@@ -43,7 +43,8 @@ impl Bokeh for Made {
             job.out.rgb.copy_from_slice(&job.color.rgb);
             job.out.rgb[0] = self.radius_px as u8;
             let times = PassTimes::new();
-            Finished { ticket: job.ticket, out: job.out, color: job.color, depth: job.depth, times }
+            let Job { ticket, out, color, depth, .. } = job;
+            Finished { ticket, out, in_memory: true, on_device: None, color, depth, times }
         }))
     }
 

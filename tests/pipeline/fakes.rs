@@ -169,7 +169,15 @@ impl Bokeh for FakeBokeh {
             let mut times = PassTimes::new();
             times.add("rows", Duration::from_micros(400));
             times.add("columns", Duration::from_micros(300));
-            Finished { ticket: job.ticket, out: job.out, color: job.color, depth: job.depth, times }
+            Finished {
+                ticket: job.ticket,
+                out: job.out,
+                in_memory: true,
+                on_device: None,
+                color: job.color,
+                depth: job.depth,
+                times,
+            }
         }))
     }
 
@@ -309,6 +317,7 @@ impl Setup {
             keep_going: self.keep_going,
             demand: None,
             mirror: false,
+            wanted: None,
             view: None,
             clock: Clock::system(),
             stop: &stop,
@@ -381,6 +390,7 @@ pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a Atomic
         keep_going: false,
         demand: None,
         mirror: false,
+        wanted: None,
         view: None,
         clock: Clock::system(),
         stop,

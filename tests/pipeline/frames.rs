@@ -91,7 +91,15 @@ impl Bokeh for Paced {
         job.out.rgb.copy_from_slice(&job.color.rgb);
         let mut times = PassTimes::new();
         times.add("all", self.0.mul_f64(COSTS[job.quality as usize]));
-        self.1 = Some(Finished { ticket: job.ticket, out: job.out, color: job.color, depth: job.depth, times });
+        self.1 = Some(Finished {
+            ticket: job.ticket,
+            out: job.out,
+            in_memory: true,
+            on_device: None,
+            color: job.color,
+            depth: job.depth,
+            times,
+        });
         Ok(())
     }
     fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {

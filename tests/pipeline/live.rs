@@ -111,6 +111,7 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
         keep_going: false,
         demand: Some(demand),
         mirror: false,
+        wanted: None,
         view: None,
         clock: Clock::system(),
         stop: &AtomicBool::new(false),

@@ -291,7 +291,7 @@ impl Bokeh for CpuBokeh {
         self.plan.set_quality(job.quality);
         let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
         let Job { ticket, color, depth, out, .. } = job;
-        self.done = Some(Finished { ticket, out, color, depth, times });
+        self.done = Some(Finished { ticket, out, in_memory: true, on_device: None, color, depth, times });
         Ok(())
     }
 

@@ -7,29 +7,38 @@ mod probe;
 mod readback;
 pub mod shaders;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use buffers::Buffers;
 use layout::{Capacity, Layout};
 use passes::Passes;
-use readback::{CAPACITY, MAX_QUERIES, Ring};
+use readback::{CAPACITY, MAX_QUERIES, Ring, Sent};
 
 use super::bank::STEPS_PER_PX;
 use super::plan::{Compositing, Plan};
 use super::{Bokeh, BokehError, Finished, Job};
-use crate::compute::{GpuError, device::Device};
+use crate::compute::device::{Device, DevicePicture};
+use crate::compute::{GpuError, Place};
+use crate::link::pool::{Pool, Pooled};
 use crate::optics::CocField;
+
+/// Results that may be on the device at once: those in flight, those on their way, and those that somebody looks at.
+/// When all are out, results go to memory.
+const ON_DEVICE: usize = CAPACITY + 7;
 
 /// Runs a plan with wgpu compute passes.
 pub struct GpuBokeh {
     plan: Plan,
-    device: Device,
+    device: Arc<Device>,
     buffers: Buffers,
     depth: wgpu::Buffer,
     capacity: Capacity,
     layout: Layout,
     passes: Passes,
     ring: Ring,
+    /// Results that stay on the device, once any is wanted there.
+    results: Option<Pool<DevicePicture>>,
     queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
 }
 
@@ -40,7 +49,14 @@ impl GpuBokeh {
     /// # Errors
     /// No adapter fits, or its device failed.
     pub fn new(plan: &Plan, hardware_only: bool, adapter: Option<&str>) -> Result<Self, BokehError> {
-        let device = Device::open(hardware_only, adapter)?;
+        Self::on(plan, Arc::new(Device::open(hardware_only, adapter)?))
+    }
+
+    /// An executor of `plan` on a device.
+    ///
+    /// # Errors
+    /// The device is too small for such pictures, or failed.
+    pub fn on(plan: &Plan, device: Arc<Device>) -> Result<Self, BokehError> {
         let most = device.device.limits().max_storage_buffer_binding_size;
         let capacity = Capacity::of(plan);
         let rows = capacity.rows * plan.levels.most_terms().min(4);
@@ -71,7 +87,17 @@ impl GpuBokeh {
             (set, resolved)
         });
         device.check()?;
-        Ok(Self { plan: plan.clone(), device, buffers, depth, capacity, layout: Layout::new(), passes, ring, queries })
+        let (plan, layout, results) = (plan.clone(), Layout::new(), None);
+        Ok(Self { plan, device, buffers, depth, capacity, layout, passes, ring, results, queries })
+    }
+
+    /// Where a result is left on the device, if it shall be and there is room.
+    fn room(&mut self, place: Place) -> Option<Pooled<DevicePicture>> {
+        if place == Place::Memory {
+            return None;
+        }
+        let (device, size) = (&self.device, (self.plan.width as u32, self.plan.height as u32));
+        self.results.get_or_insert_with(|| Pool::new(ON_DEVICE, || DevicePicture::new(device, size))).try_take()
     }
 
     fn frame(&self, job: &Job) -> shaders::Frame {
@@ -127,6 +153,7 @@ impl Bokeh for GpuBokeh {
             return Err(GpuError::Failed(format!("more than {CAPACITY} frames submitted and not collected")).into());
         };
         let started = Instant::now();
+        let on_device = self.room(job.place);
         job.out.resize(made_for.0, made_for.1);
         if let Some(map) = &job.depth {
             let bytes: &[u8] = bytemuck::cast_slice(&map.metres);
@@ -147,14 +174,21 @@ impl Bokeh for GpuBokeh {
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let set = self.queries.as_ref().map(|(set, _)| set);
         self.passes.encode(&mut encoder, &self.plan, &self.layout, set, &mut slot.passes);
-        encoder.copy_buffer_to_buffer(&self.buffers.result, 0, &slot.picture, 0, slot.picture.size());
+        let result = &self.buffers.result;
+        if let Some(picture) = &on_device {
+            encoder.copy_buffer_to_buffer(result, 0, picture.buffer(), 0, result.size().min(picture.buffer().size()));
+        }
+        let in_memory = on_device.is_none() || job.place == Place::Both;
+        if in_memory {
+            encoder.copy_buffer_to_buffer(result, 0, &slot.picture, 0, slot.picture.size());
+        }
         if let (Some((set, resolved)), Some(back)) = (&self.queries, &slot.stamps) {
             let count = 2 * slot.passes.len() as u32;
             encoder.resolve_query_set(set, 0..count, resolved, 0);
             encoder.copy_buffer_to_buffer(resolved, 0, back, 0, u64::from(count) * 8);
         }
         let submission = self.device.queue.submit([encoder.finish()]);
-        self.ring.push(slot, job, submission, started);
+        self.ring.push(&self.device, slot, Sent { job, on_device, in_memory, submission, started });
         Ok(())
     }
 

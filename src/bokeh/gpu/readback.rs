@@ -1,5 +1,5 @@
 //! The way back from the device: a ring of buffers, copied to after a frame and mapped later, so that submitting never
-//! waits.
+//! waits. A picture that stays on the device goes the same way, without being copied.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 
 use crate::bokeh::{BokehError, Finished, Job, PassTimes};
 use crate::compute::GpuError;
-use crate::compute::device::Device;
+use crate::compute::device::{Device, DevicePicture};
+use crate::link::pool::Pooled;
 
 /// Frames that may be in flight: one on the device, one waiting, one on its way back.
 pub const CAPACITY: usize = 3;
@@ -29,11 +30,23 @@ pub struct Slot {
     pub passes: Vec<&'static str>,
 }
 
+/// A frame that was submitted.
+pub struct Sent {
+    /// What was to be done.
+    pub job: Job,
+    /// Where the result is left on the device.
+    pub on_device: Option<Pooled<DevicePicture>>,
+    /// Whether it was copied to the slot.
+    pub in_memory: bool,
+    /// When it is done.
+    pub submission: wgpu::SubmissionIndex,
+    /// When it was begun.
+    pub started: Instant,
+}
+
 struct Pending {
     slot: Slot,
-    job: Job,
-    submission: wgpu::SubmissionIndex,
-    started: Instant,
+    sent: Sent,
     state: Arc<AtomicU8>,
 }
 
@@ -76,16 +89,24 @@ impl Ring {
     }
 
     /// Starts the way back of a frame that was submitted.
-    pub fn push(&mut self, slot: Slot, job: Job, submission: wgpu::SubmissionIndex, started: Instant) {
+    pub fn push(&mut self, device: &Device, slot: Slot, sent: Sent) {
         let state = Arc::new(AtomicU8::new(PENDING));
-        if let Some(stamps) = &slot.stamps {
-            stamps.map_async(wgpu::MapMode::Read, .., |_| {});
-        }
         let done = Arc::clone(&state);
-        slot.picture.map_async(wgpu::MapMode::Read, .., move |result| {
-            done.store(if result.is_ok() { READY } else { FAILED }, Ordering::Release);
-        });
-        self.pending.push_back(Pending { slot, job, submission, started, state });
+        let done = move |is_ok: bool| done.store(if is_ok { READY } else { FAILED }, Ordering::Release);
+        // What is mapped last tells that all is: a device calls back in this order.
+        match &slot.stamps {
+            Some(stamps) if !sent.in_memory => {
+                stamps.map_async(wgpu::MapMode::Read, .., move |result| done(result.is_ok()));
+            }
+            None if !sent.in_memory => device.queue.on_submitted_work_done(move || done(true)),
+            stamps => {
+                if let Some(stamps) = stamps {
+                    stamps.map_async(wgpu::MapMode::Read, .., |_| {});
+                }
+                slot.picture.map_async(wgpu::MapMode::Read, .., move |result| done(result.is_ok()));
+            }
+        }
+        self.pending.push_back(Pending { slot, sent, state });
     }
 
     /// The oldest frame, if it is back (`wait`: when it is back).
@@ -95,7 +116,7 @@ impl Ring {
     pub fn pop(&mut self, device: &Device, wait: bool) -> Result<Option<Finished>, BokehError> {
         let Some(oldest) = self.pending.front() else { return Ok(None) };
         let poll = if wait {
-            wgpu::PollType::Wait { submission_index: Some(oldest.submission.clone()), timeout: None }
+            wgpu::PollType::Wait { submission_index: Some(oldest.sent.submission.clone()), timeout: None }
         } else {
             wgpu::PollType::Poll
         };
@@ -108,23 +129,27 @@ impl Ring {
             }
             _ => return Ok(None),
         }
-        let Some(mut oldest) = self.pending.pop_front() else { return Ok(None) };
+        let Some(Pending { slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
+        let Sent { mut job, on_device, in_memory, started, .. } = sent;
+        let mut slot = slot;
         let fault = |error: wgpu::MapRangeError| GpuError::Failed(error.to_string());
-        {
-            let bytes = oldest.slot.picture.get_mapped_range(..).map_err(fault)?;
-            let out = &mut oldest.job.out.rgb;
-            let length = out.len();
-            out.copy_from_slice(&bytes[..length]);
+        if in_memory {
+            {
+                let bytes = slot.picture.get_mapped_range(..).map_err(fault)?;
+                let out = &mut job.out.rgb;
+                let length = out.len();
+                out.copy_from_slice(&bytes[..length]);
+            }
+            slot.picture.unmap();
         }
-        oldest.slot.picture.unmap();
         let mut times = PassTimes::new();
-        if let Some(stamps) = &oldest.slot.stamps {
+        if let Some(stamps) = &slot.stamps {
             {
                 let bytes = stamps.get_mapped_range(..).map_err(fault)?;
                 let stamp =
                     |k: usize| bytes.get(k * 8..k * 8 + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
                 let period_ns = f64::from(device.queue.get_timestamp_period());
-                for (k, name) in oldest.slot.passes.iter().enumerate() {
+                for (k, name) in slot.passes.iter().enumerate() {
                     let Some((from, to)) = stamp(2 * k).zip(stamp(2 * k + 1)) else { continue };
                     if to < from {
                         // Stamps may run backwards when clocks change; such a frame's times say nothing.
@@ -137,13 +162,13 @@ impl Ring {
             stamps.unmap();
         } else {
             // One frame after the other: what it waited for the one before is not its own time.
-            let began = self.last.map_or(oldest.started, |last| last.max(oldest.started));
+            let began = self.last.map_or(started, |last| last.max(started));
             times.add("gpu", began.elapsed());
         }
         self.last = Some(Instant::now());
-        oldest.slot.passes.clear();
-        self.free.push(oldest.slot);
-        let Job { ticket, color, depth, out, .. } = oldest.job;
-        Ok(Some(Finished { ticket, out, color, depth, times }))
+        slot.passes.clear();
+        self.free.push(slot);
+        let Job { ticket, color, depth, out, .. } = job;
+        Ok(Some(Finished { ticket, out, in_memory, on_device, color, depth, times }))
     }
 }

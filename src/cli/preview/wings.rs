@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use super::super::config::Executor;
 use super::super::depth;
 use super::super::options::{self, Streaming};
 use super::super::settings;
 use super::super::source::{Source, SourceName, Wanted};
-use crate::bokeh::{self, Bokeh};
+use crate::bokeh::{self, Backend, Bokeh};
 use crate::clock::Clock;
+use crate::compute::device::Device;
 use crate::look::Look;
 use crate::preview::backstage::{Backstage, Choice, Control, Opened, Preset};
 use crate::sink::{self, Sink, Target};
@@ -23,6 +25,8 @@ const SYNTHETIC: &str = "synthetic";
 pub(super) struct Wings {
     parts: Streaming,
     executor: Executor,
+    /// The GPU that blurs and draws, where one does.
+    device: Option<Arc<Device>>,
     settings_file: Option<PathBuf>,
     /// The camera that was opened last, where its controls can be set.
     camera: Option<String>,
@@ -30,11 +34,11 @@ pub(super) struct Wings {
 
 impl Wings {
     /// Opens what is asked for as `parts` say.
-    pub fn new(parts: &Streaming, executor: Executor) -> Self {
+    pub fn new(parts: &Streaming, executor: Executor, device: Option<Arc<Device>>) -> Self {
         let mut parts = parts.clone();
         // Of depth the window may make use later.
         parts.blur.effect = None;
-        Self { parts, executor, settings_file: settings::user_file(), camera: None }
+        Self { parts, executor, device, settings_file: settings::user_file(), camera: None }
     }
 
     fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
@@ -95,7 +99,11 @@ impl Backstage for Wings {
     }
 
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
-        self.executor.create(settings, size).map_err(|error| error.to_string())
+        let made = match &self.device {
+            Some(device) => bokeh::create_on(settings, size, Arc::clone(device)),
+            None => bokeh::create(settings, size, Backend::Cpu, None, self.executor.threads()),
+        };
+        made.map_err(|error| error.to_string())
     }
 
     fn output(&mut self, name: &str, size: (u32, u32), period_ns: u64) -> Result<Box<dyn Sink>, String> {

@@ -3,6 +3,7 @@
 //! `gpu` draws with the device that blurs, so that a picture blurred there is shown without a way back; `soft` draws
 //! on the CPU into memory shared with the display server, where there is no GPU.
 
+pub mod gpu;
 pub mod soft;
 mod split;
 
@@ -11,7 +12,7 @@ use std::sync::Arc;
 pub use split::Split;
 use winit::window::Window;
 
-use crate::compute::device::Device;
+use crate::compute::device::{Device, DevicePicture};
 use crate::frame::ColorImage;
 
 /// Where something lies in the window, in its pixels.
@@ -27,13 +28,32 @@ pub struct Area {
     pub height: u32,
 }
 
+/// A picture, where it is.
+#[derive(Clone, Copy, Debug)]
+pub enum Image<'a> {
+    /// In memory.
+    Memory(&'a ColorImage),
+    /// In a GPU's memory; only who [takes](Presenter::takes) it shows it.
+    Device(&'a DevicePicture),
+}
+
+impl Image<'_> {
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        match self {
+            Self::Memory(picture) => picture.size(),
+            Self::Device(picture) => picture.size(),
+        }
+    }
+}
+
 /// What is drawn under the controls.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawing<'a> {
     /// Where the picture goes, scaled to fill it; the rest of the window is the background.
     pub area: Area,
     /// The picture.
-    pub picture: &'a ColorImage,
+    pub picture: Image<'a>,
     /// Another one of the same size, shown instead left of this fraction of the area's width.
     pub before: Option<(&'a ColorImage, f32)>,
     /// Whether pictures are flipped left to right; the split is not.
@@ -78,6 +98,17 @@ pub trait Presenter {
     /// The window cannot be drawn to any more.
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError>;
 
+    /// Whether it shows this picture from where it is; otherwise it has to be in memory.
+    fn takes(&self, picture: &DevicePicture) -> bool {
+        let _ = picture;
+        false
+    }
+
+    /// Whether it draws with a GPU, so that pictures on it may stay there.
+    fn has_device(&self) -> bool {
+        false
+    }
+
     /// One line: what draws.
     fn describe(&self) -> String;
 }
@@ -93,6 +124,11 @@ pub struct PresentError(pub String);
 /// # Errors
 /// Neither can draw to it.
 pub fn create(window: Arc<Window>, device: Option<Arc<Device>>) -> Result<Box<dyn Presenter>, PresentError> {
-    let _ = device;
+    if let Some(device) = device {
+        match gpu::Gpu::new(Arc::clone(&window), device) {
+            Ok(gpu) => return Ok(Box::new(gpu)),
+            Err(error) => tracing::info!("drawing on the CPU: {error}"),
+        }
+    }
     Ok(Box::new(soft::Soft::new(window)?))
 }

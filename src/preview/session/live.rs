@@ -12,7 +12,7 @@ use crate::bokeh;
 use crate::clock::Clock;
 use crate::link;
 use crate::look::Look;
-use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run};
+use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run, Wanted};
 use crate::sink::Sink;
 use crate::sink::switch::Told as Written;
 use crate::sink::{Switch, Switchboard};
@@ -23,6 +23,7 @@ pub(super) struct Settings<'a> {
     pub look: &'a Look,
     pub keep_going: bool,
     pub budget_ns: Option<u64>,
+    pub wanted: Arc<Wanted>,
 }
 
 /// A run, and the ways into it.
@@ -67,6 +68,7 @@ impl Live {
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), settings.keep_going);
+        let wanted = Arc::clone(&settings.wanted);
         let (coc, refine, quality) = (look.coc_rule(info.size), look.refines(measured), look.quality_rule(ADAPTIVE));
         news.send(Heard::Views(views));
         let run = move || {
@@ -84,6 +86,7 @@ impl Live {
                 keep_going,
                 demand: None,
                 mirror: false,
+                wanted: Some(wanted),
                 view: Some(view),
                 clock: Clock::system(),
                 stop: &stopped,

@@ -19,7 +19,7 @@ use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
 use crate::look::Look;
-use crate::pipeline::{PipelineError, View};
+use crate::pipeline::{PipelineError, View, Wanted};
 use crate::sink::switch::{Fate, Told as Written};
 use crate::stats::Report;
 
@@ -42,6 +42,8 @@ pub struct Start {
     pub budget_ns: Option<u64>,
     /// Where snapshots and recordings go.
     pub folder: PathBuf,
+    /// Where blurred pictures are wanted.
+    pub wanted: Arc<Wanted>,
 }
 
 /// What comes from a session.
@@ -96,7 +98,7 @@ impl Session {
         let (told, heard) = mpsc::channel();
         let own = orders.clone();
         let thread = thread::Builder::new().name("session".into()).spawn(move || {
-            let Start { backstage, look, source, outputs, keep_going, budget_ns, folder } = start;
+            let Start { backstage, look, source, outputs, keep_going, budget_ns, folder, wanted } = start;
             let news = News { told, wake };
             let host = Host {
                 backstage,
@@ -106,6 +108,7 @@ impl Session {
                 keep_going,
                 budget_ns,
                 folder,
+                wanted,
                 news,
                 orders: own,
                 live: None,
@@ -172,6 +175,7 @@ struct Host {
     keep_going: bool,
     budget_ns: Option<u64>,
     folder: PathBuf,
+    wanted: Arc<Wanted>,
     news: News,
     orders: mpsc::Sender<Order>,
     live: Option<Live>,
@@ -288,7 +292,12 @@ impl Host {
         let ended = move |ended| {
             let _ = orders.send(Order::Ended(run, Box::new(ended)));
         };
-        let settings = live::Settings { look: &self.look, keep_going: self.keep_going, budget_ns: self.budget_ns };
+        let settings = live::Settings {
+            look: &self.look,
+            keep_going: self.keep_going,
+            budget_ns: self.budget_ns,
+            wanted: Arc::clone(&self.wanted),
+        };
         match Live::begin(opened, &settings, &mut *self.backstage, &self.news, wrote, ended) {
             Ok((live, source)) => {
                 self.live = Some(live);

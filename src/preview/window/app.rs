@@ -15,14 +15,15 @@ use super::memory::Memory;
 use super::{Ended, Preview, WindowError};
 use crate::bokeh;
 use crate::clock::Clock;
+use crate::compute::Place;
 use crate::compute::device::Device;
 use crate::frame::ColorImage;
 use crate::link::Receiver;
 use crate::optics::CocField;
-use crate::pipeline::View;
+use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
 use crate::preview::panel::{Canvas, Panel};
-use crate::preview::present::{Area, Controls, Drawing};
+use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::{Heard, Session, Still, Wake, fitting};
 use crate::preview::state::{Action, Effect, Shown, Source, State};
 use crate::preview::views::Views;
@@ -35,6 +36,9 @@ const LOOK_UP: Duration = Duration::from_millis(250);
 
 pub(super) struct App {
     state: State,
+    wanted: Arc<Wanted>,
+    /// A snapshot waits for a frame that is in memory.
+    snapshot_due: bool,
     panel: Panel,
     ctx: egui::Context,
     gfx: Option<Gfx>,
@@ -78,12 +82,15 @@ impl App {
                 let _ = proxy.send_event(());
             }
         });
+        let wanted = Arc::clone(&session.wanted);
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
         let ctx = egui::Context::default();
         let remembered = memory.as_deref().and_then(Memory::read);
         Ok(Self {
             state,
+            wanted,
+            snapshot_due: false,
             panel: Panel::default(),
             ctx,
             gfx: None,
@@ -151,13 +158,15 @@ impl App {
         if changed {
             self.look_changed();
             self.layout_at = Some(Instant::now());
+            self.place();
             self.set_title();
             if self.close_at_end && self.state.source == Source::Ended {
                 events.exit();
             }
         }
         let newest = self.views.as_mut().and_then(Receiver::try_recv);
-        if let Some(view) = newest.filter(|_| !self.state.frozen) {
+        let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.in_memory);
+        if let Some(view) = newest.filter(|_| !frozen) {
             self.state.focus_m = match view.coc {
                 CocField::Depth(coc) => Some(coc.focus_m),
                 _ => None,
@@ -165,6 +174,9 @@ impl App {
             self.view = Some(view);
             self.is_new = true;
             changed = true;
+            if self.snapshot_due {
+                self.snapshot();
+            }
         }
         if changed {
             self.ask_for_redraw();
@@ -242,10 +254,28 @@ impl App {
                 other => self.session.order(other),
             }
         }
+        self.place();
     }
 
+    /// Where pictures are needed from now on: only what stays on the GPU costs no way back.
+    fn place(&self) {
+        let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
+        let used = self.state.frozen || self.snapshot_due || !self.state.outputs.is_empty();
+        self.wanted.set(match (drawn_on_gpu, used) {
+            (false, _) => Place::Memory,
+            (true, false) => Place::Device,
+            (true, true) => Place::Both,
+        });
+    }
+
+    /// Saves the frame that is shown, or the next one where this one is on the GPU alone.
     fn snapshot(&mut self) {
         let Some(view) = &self.view else { return };
+        self.snapshot_due = !view.in_memory;
+        self.place();
+        if self.snapshot_due {
+            return;
+        }
         self.session.save(Still {
             picture: view.picture.clone(),
             color: (**view.color.as_ref().unwrap_or(&view.picture)).clone(),
@@ -267,12 +297,15 @@ impl App {
         }
         let made = self.state.legend.map(|_| self.made.image());
         let State { mirror, split, source, .. } = &self.state;
-        let picture = self.view.as_ref().map_or(&self.nothing, |view| &*view.picture);
-        let before = self.view.as_ref().map(|view| view.color.as_ref().map_or(picture, |color| color));
+        let view = self.view.as_ref();
+        let in_memory = view.filter(|view| view.in_memory).map_or(&self.nothing, |view| &*view.picture);
+        let on_device = view.and_then(|view| view.on_device.as_deref()).filter(|there| gfx.presenter.takes(there));
+        let picture = on_device.map_or(Image::Memory(in_memory), Image::Device);
+        let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
         let drawing = Drawing {
             area: if self.view.is_some() { gfx.area(size) } else { Area::default() },
-            picture: made.unwrap_or(picture),
+            picture: made.map_or(picture, Image::Memory),
             before: before.zip(*split),
             mirror: *mirror,
             stale: !matches!(source, Source::Running(_) | Source::Opening),
@@ -305,7 +338,10 @@ impl ApplicationHandler<()> for App {
             return;
         }
         match Gfx::open(events, &self.ctx, self.remembered, self.state.full_screen, self.device.clone()) {
-            Ok(gfx) => self.gfx = Some(gfx),
+            Ok(gfx) => {
+                self.gfx = Some(gfx);
+                self.place();
+            }
             Err(error) => {
                 self.failed = Some(error);
                 return events.exit();

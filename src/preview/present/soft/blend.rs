@@ -51,9 +51,9 @@ mod tests {
                 for light in [0, alpha / 3, alpha, 255] {
                     let share = f64::from(below) * f64::from(255 - alpha) / 255.0;
                     let expected = (light + share.round() as u32).min(255);
-                    let got = over(alpha << 24 | light * 0x0001_0101, below * 0x0101_0101);
+                    let got = over((alpha << 24) | (light * 0x0001_0101), below * 0x0101_0101);
                     let alpha_left = (alpha + share.round() as u32).min(255);
-                    assert_eq!(got, alpha_left << 24 | expected * 0x0001_0101, "{alpha} {light} {below}");
+                    assert_eq!(got, (alpha_left << 24) | (expected * 0x0001_0101), "{alpha} {light} {below}");
                 }
             }
         }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use egui::TextureId;
 use egui::epaint::{ClippedPrimitive, Mesh, Primitive, Vertex};
 use pulp::{Arch, Simd, WithSimd};
 
@@ -27,6 +28,8 @@ pub struct Overlay {
     textures: Textures,
     primitives: Vec<ClippedPrimitive>,
     pixels_per_point: f32,
+    /// Textures that only these controls still need.
+    freed: Vec<TextureId>,
     /// Whether `pixels` shows something else.
     outdated: bool,
 }
@@ -48,20 +51,19 @@ impl Overlay {
 
     /// Other controls, from the next [`Overlay::paint`] on.
     pub fn set(&mut self, controls: Controls) {
-        let Controls { primitives, textures, pixels_per_point } = controls;
+        let Controls { primitives, mut textures, pixels_per_point } = controls;
+        // The controls so far were the last to need these.
+        self.textures.free(self.freed.drain(..));
         self.textures.set(&textures);
-        // Those that are freed are still needed for what is painted now, so painting does not wait.
+        self.freed.extend(&textures.free);
+        textures.clear();
         (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
-        if !textures.free.is_empty() {
-            self.paint();
-            self.textures.free(&textures);
-        }
     }
 
-    /// Paints what changed; gives back whether anything did.
-    pub fn paint(&mut self) -> bool {
+    /// Paints what changed.
+    pub fn paint(&mut self) {
         if !std::mem::take(&mut self.outdated) {
-            return false;
+            return;
         }
         let width = self.size.0;
         for (row, cells) in self.pixels.chunks_exact_mut(width.max(1)).zip(&mut self.cells) {
@@ -78,7 +80,6 @@ impl Overlay {
             }
         }
         self.primitives = primitives;
-        true
     }
 
     fn clip(&self, rect: egui::Rect) -> Clip {
@@ -178,10 +179,10 @@ mod tests {
 
     #[test]
     fn runs_are_the_cells_that_are_set() {
-        let all = |cells, within| runs(cells, 10, within).collect::<Vec<_>>();
+        let all = |cells, within| runs(cells, 10, within).map(|run| (run.start, run.end)).collect::<Vec<_>>();
         assert!(all(0, 0..100).is_empty());
-        assert_eq!(all(u64::MAX, 0..640), [0..640]);
-        assert_eq!(all(1 << 63 | 0b1011, 5..635), [5..20, 30..40, 630..635]);
-        assert_eq!(all(0b1011, 20..35), [30..35]);
+        assert_eq!(all(u64::MAX, 0..640), [(0, 640)]);
+        assert_eq!(all(1 << 63 | 0b1011, 5..635), [(5, 20), (30, 40), (630, 635)]);
+        assert_eq!(all(0b1011, 20..35), [(30, 35)]);
     }
 }

@@ -7,7 +7,8 @@ use pulp::Arch;
 use super::controls::Overlay;
 use super::picture::{Scaler, Scratch};
 use crate::compute::team::{self, Shelf, Team};
-use crate::preview::present::{Area, Controls, Drawing};
+use crate::frame::ColorImage;
+use crate::preview::present::{Area, Controls, Drawing, Image};
 
 /// Rows that one thread paints at a time.
 const BAND: usize = 16;
@@ -79,13 +80,16 @@ impl Painter {
         }
         self.overlay.paint();
         let around = self.around.begin(age, drawing);
-        let shown = drawing.area.width > 0 && drawing.area.height > 0 && !drawing.picture.rgb.is_empty();
-        if shown {
-            self.scaler.adapt(drawing);
-        }
+        let picture = match drawing.picture {
+            Image::Memory(picture) if !picture.rgb.is_empty() && drawing.area.width > 0 && drawing.area.height > 0 => {
+                self.scaler.adapt(picture, drawing.area);
+                Some(picture)
+            }
+            _ => None,
+        };
         let Self { arch, size: (width, _), overlay, scaler, team, scratch, taken, .. } = self;
         let (arch, width, overlay, scaler) = (*arch, *width, &*overlay, &*scaler);
-        let window = Window { arch, width, overlay, scaler, drawing, shown, around };
+        let window = Window { arch, width, overlay, scaler, drawing, picture, around };
         let bands = pixels.len().div_ceil(width * BAND);
         let band = |scratch: &mut Scratch, band: usize, pixels: &mut [u32]| {
             for (y, row) in (band * BAND..).zip(pixels.chunks_exact_mut(width)) {
@@ -141,28 +145,28 @@ struct Window<'a> {
     overlay: &'a Overlay,
     scaler: &'a Scaler,
     drawing: &'a Drawing<'a>,
-    /// Whether there is a picture.
-    shown: bool,
+    /// The picture, where there is one in memory.
+    picture: Option<&'a ColorImage>,
     /// Whether what is around it is painted.
     around: bool,
 }
 
 impl Window<'_> {
     fn row(&self, y: usize, scratch: &mut Scratch, row: &mut [u32]) {
-        let Self { arch, width, overlay, scaler, drawing, shown, around } = *self;
+        let Self { arch, width, overlay, scaler, drawing, picture, around } = *self;
         let Area { x, y: top, width: across, height } = drawing.area;
         let [r, g, b] = drawing.background;
         let background = u32::from_be_bytes([0, r, g, b]);
         let (left, right) = ((x as usize).min(width), (x as usize + across as usize).min(width));
         let (top, bottom) = (top as usize, top as usize + height as usize);
-        if !shown || !(top..bottom).contains(&y) {
-            if around || !shown {
+        let Some(picture) = picture.filter(|_| (top..bottom).contains(&y)) else {
+            if around || self.picture.is_none() {
                 row.fill(background);
                 overlay.blend(arch, y, 0..width, row);
             }
             return;
-        }
-        scaler.row(arch, drawing, y - top, scratch, &mut row[left..right]);
+        };
+        scaler.row(arch, (drawing, picture), y - top, scratch, &mut row[left..right]);
         if around {
             row[..left].fill(background);
             row[right..].fill(background);

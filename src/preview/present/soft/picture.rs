@@ -6,7 +6,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::frame::ColorImage;
 use crate::frame::scale::Scale;
-use crate::preview::present::{Drawing, Tone};
+use crate::preview::present::{Area, Drawing, Tone};
 
 /// Scales pictures into an area; keeps its weights from one to the next.
 #[derive(Debug, Default)]
@@ -22,17 +22,24 @@ pub struct Scratch {
 }
 
 impl Scaler {
-    /// For pictures of this drawing.
-    pub fn adapt(&mut self, drawing: &Drawing) {
-        let [from, to] = [drawing.picture.size(), (drawing.area.width, drawing.area.height)]
-            .map(|(width, height)| (width as usize, height as usize));
+    /// For pictures of this size in this area; neither is without pixels.
+    pub fn adapt(&mut self, picture: &ColorImage, area: Area) {
+        let [from, to] =
+            [picture.size(), (area.width, area.height)].map(|(width, height)| (width as usize, height as usize));
         if from != to {
             self.scale.adapt(from, to);
         }
     }
 
-    /// The row `y` of the area, whose first columns `row` holds.
-    pub fn row(&self, arch: Arch, drawing: &Drawing, y: usize, scratch: &mut Scratch, row: &mut [u32]) {
+    /// The row `y` of the area, whose first columns `row` holds, with this picture.
+    pub fn row(
+        &self,
+        arch: Arch,
+        (drawing, picture): (&Drawing, &ColorImage),
+        y: usize,
+        scratch: &mut Scratch,
+        row: &mut [u32],
+    ) {
         let mut whole = |picture: &ColorImage, columns: Range<usize>, row: &mut [u32]| {
             let columns = columns.start..columns.end.min(row.len());
             let Some(row) = row.get_mut(columns.clone()).filter(|row| !row.is_empty()) else { return };
@@ -52,11 +59,11 @@ impl Scaler {
         };
         let width = drawing.area.width as usize;
         let Some((before, split)) = drawing.split() else {
-            whole(drawing.picture, 0..width, row);
+            whole(picture, 0..width, row);
             return self.tone(arch, drawing, row);
         };
         whole(before, 0..split.at, row);
-        whole(drawing.picture, split.at..width, row);
+        whole(picture, split.at..width, row);
         self.tone(arch, drawing, row);
         for (columns, [r, g, b]) in split.divider() {
             let columns = columns.start.min(row.len())..columns.end.min(row.len());

@@ -37,9 +37,9 @@ impl Textures {
     }
 
     /// Drops what is needed no more.
-    pub fn free(&mut self, delta: &TexturesDelta) {
-        for id in &delta.free {
-            self.0.remove(id);
+    pub fn free(&mut self, ids: impl Iterator<Item = TextureId>) {
+        for id in ids {
+            self.0.remove(&id);
         }
     }
 
@@ -151,6 +151,7 @@ mod tests {
         delta.push(TextureId::default(), ImageDelta::full(image, options));
         let mut textures = Textures::default();
         textures.set(&delta);
+        delta.clear();
         textures
     }
 
@@ -181,10 +182,10 @@ mod tests {
         delta.push(TextureId::default(), ImageDelta::partial([1, 0], dot.clone(), TextureOptions::NEAREST));
         delta.push(TextureId::default(), ImageDelta::partial([2, 0], dot, TextureOptions::NEAREST));
         textures.set(&delta);
+        delta.clear();
         let texture = textures.get(TextureId::default()).unwrap();
         assert_eq!((texture.at([1.5, 0.5]), texture.at([0.5, 1.5])), (0xffff_0000, 0xffc8_6432));
-        delta.free(TextureId::default());
-        textures.free(&delta);
+        textures.free([TextureId::default()].into_iter());
         assert!(textures.get(TextureId::default()).is_none());
     }
 }

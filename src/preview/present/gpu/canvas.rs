@@ -1,0 +1,203 @@
+//! Draws pictures and controls to a texture: all but the way to the screen.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::controls::Overlay;
+use crate::compute::device::{Device, Shader};
+use crate::frame::ColorImage;
+use crate::preview::present::{Controls, Drawing, Image, Tone};
+
+/// The picture in its area, and the background.
+pub const PRESENT: Shader = Shader { name: "present", source: include_str!("../../../../shaders/present.wgsl") };
+
+/// Combinations of buffers that are kept bound.
+const MOST_BOUND: usize = 16;
+
+/// `Window` of `present.wgsl`, where each field is explained.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Window {
+    pub area: [u32; 4],
+    pub size: [u32; 2],
+    pub split: u32,
+    pub mirror: u32,
+    pub stale: [f32; 4],
+    pub divider: [u32; 4],
+    pub stripes: [[f32; 4]; 3],
+    pub background: [f32; 4],
+}
+
+/// Draws to textures of one format.
+pub struct Canvas {
+    device: Arc<Device>,
+    /// Whether what is written is taken as linear light.
+    linear: bool,
+    pipeline: wgpu::RenderPipeline,
+    window: wgpu::Buffer,
+    /// Where the picture and the one before the blur go that come from memory.
+    uploads: [wgpu::Buffer; 2],
+    bound: Vec<Bound>,
+    overlay: Overlay,
+}
+
+struct Bound {
+    pictures: [wgpu::Buffer; 2],
+    bindings: wgpu::BindGroup,
+}
+
+impl Canvas {
+    /// For textures of `format`.
+    pub fn new(device: Arc<Device>, format: wgpu::TextureFormat) -> Self {
+        let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(PRESENT.name),
+            source: wgpu::ShaderSource::Wgsl(PRESENT.source.into()),
+        });
+        let pipeline = device.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(PRESENT.name),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("corner"),
+                buffers: &[],
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: None,
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some(PRESENT.name),
+                targets: &[Some(format.into())],
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        let window = device.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("window"),
+            size: size_of::<Window>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let uploads = [upload(&device, 0), upload(&device, 0)];
+        let overlay = Overlay::new(&device, format);
+        Self { device, linear: format.is_srgb(), pipeline, window, uploads, bound: Vec::new(), overlay }
+    }
+
+    /// Controls to paint from now on.
+    pub fn set_controls(&mut self, controls: Controls) {
+        self.overlay.set(&self.device, controls);
+    }
+
+    /// Draws to all of `target`, which has `size` pixels.
+    pub fn draw(&mut self, target: &wgpu::TextureView, size: (u32, u32), drawing: &Drawing) {
+        let split = drawing.split();
+        let picture = match drawing.picture {
+            Image::Memory(picture) => self.upload(0, picture),
+            Image::Device(picture) if picture.is_on(&self.device) => picture.buffer().clone(),
+            Image::Device(_) => self.uploads[0].clone(),
+        };
+        let before = split.map(|(before, _)| self.upload(1, before));
+        let pictures = [picture, before.unwrap_or_else(|| self.uploads[1].clone())];
+        let window = self.window(drawing);
+        self.device.queue.write_buffer(&self.window, 0, bytemuck::bytes_of(&window));
+        let bound = self.bind(pictures);
+
+        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut submitted = self.overlay.upload(&self.device, &mut encoder, size);
+        {
+            let mut pass = encoder
+                .begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some(PRESENT.name),
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: target,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations {
+                            load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                            store: wgpu::StoreOp::Store,
+                        },
+                    })],
+                    depth_stencil_attachment: None,
+                    timestamp_writes: None,
+                    occlusion_query_set: None,
+                    multiview_mask: None,
+                })
+                .forget_lifetime();
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &self.bound[bound].bindings, &[]);
+            pass.draw(0..3, 0..1);
+            self.overlay.draw(&mut pass);
+        }
+        submitted.push(encoder.finish());
+        self.device.queue.submit(submitted);
+    }
+
+    fn window(&self, drawing: &Drawing) -> Window {
+        let color = |[r, g, b]: [u8; 3], w: f32| [f32::from(r) / 255.0, f32::from(g) / 255.0, f32::from(b) / 255.0, w];
+        let flag = |on: bool| f32::from(u8::from(on));
+        let area = drawing.area;
+        let (width, height) = drawing.picture.size();
+        // A picture without pixels is not drawn, and one of another device neither.
+        let shown = match drawing.picture {
+            Image::Memory(picture) => !picture.rgb.is_empty(),
+            Image::Device(picture) => picture.is_on(&self.device),
+        };
+        let [red, green, blue] = Tone::STALE_WEIGHTS.map(|weight| weight as f32 / (1 << Tone::STALE_BITS) as f32);
+        let mut window = Window {
+            area: if shown { [area.x, area.y, area.width, area.height] } else { [0; 4] },
+            size: [width, height],
+            mirror: u32::from(drawing.mirror),
+            stale: [red, green, blue, flag(drawing.stale)],
+            background: color(drawing.background, flag(self.linear)),
+            ..Window::default()
+        };
+        if let Some((_, split)) = drawing.split() {
+            window.split = split.at as u32;
+            for (k, (columns, stripe)) in split.divider().into_iter().enumerate() {
+                window.divider[k] = columns.start as u32;
+                window.divider[k + 1] = columns.end as u32;
+                window.stripes[k] = color(stripe, 0.0);
+            }
+        }
+        window
+    }
+
+    /// Uploads a picture to the buffer `k`.
+    fn upload(&mut self, k: usize, picture: &ColorImage) -> wgpu::Buffer {
+        if (self.uploads[k].size() as usize) < picture.rgb.len() {
+            self.uploads[k] = upload(&self.device, picture.rgb.len());
+        }
+        self.device.upload(&self.uploads[k], 0, &picture.rgb);
+        self.uploads[k].clone()
+    }
+
+    /// The index of these buffers' bindings.
+    fn bind(&mut self, pictures: [wgpu::Buffer; 2]) -> usize {
+        if let Some(bound) = self.bound.iter().position(|bound| bound.pictures == pictures) {
+            return bound;
+        }
+        // Those of buffers that are used no more must not live on.
+        if self.bound.len() >= MOST_BOUND {
+            self.bound.clear();
+        }
+        let buffers = [&self.window, &pictures[0], &pictures[1]].map(|buffer| buffer.as_entire_buffer_binding());
+        let bindings = self.device.bound(&self.pipeline.get_bind_group_layout(0), buffers.into_iter());
+        self.bound.push(Bound { pictures, bindings });
+        self.bound.len() - 1
+    }
+}
+
+/// A buffer for a picture of so many bytes.
+fn upload(device: &Device, bytes: usize) -> wgpu::Buffer {
+    device.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("picture to present"),
+        // The last pixel may reach into a word of its own; a binding must not be empty.
+        size: (bytes.next_multiple_of(4) + 16) as u64,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}

@@ -1,0 +1,139 @@
+//! With the GPU, on the device that blurs.
+
+mod canvas;
+mod controls;
+
+use std::sync::Arc;
+
+pub use canvas::{Canvas, PRESENT, Window as WindowUniform};
+use winit::window::Window;
+
+use super::{Controls, Drawing, PresentError, Presenter};
+use crate::compute::device::{Device, DevicePicture};
+
+/// Presents with a GPU.
+pub struct Gpu {
+    device: Arc<Device>,
+    window: Arc<Window>,
+    surface: wgpu::Surface<'static>,
+    config: wgpu::SurfaceConfiguration,
+    /// Whether the surface is configured; a window without pixels has none.
+    configured: bool,
+    canvas: Canvas,
+}
+
+impl Gpu {
+    /// For this window.
+    ///
+    /// # Errors
+    /// The device cannot draw to it.
+    pub fn new(window: Arc<Window>, device: Arc<Device>) -> Result<Self, PresentError> {
+        let surface = surface(&window, &device)?;
+        let able = surface.get_capabilities(&device.adapter);
+        // Pictures and controls are encoded already.
+        let plain = |format: &wgpu::TextureFormat| {
+            matches!(format, wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Rgba8Unorm)
+        };
+        let format = able.formats.iter().copied().find(plain).or_else(|| able.formats.first().copied());
+        let Some(format) = format else {
+            return Err(PresentError(format!("{} has no pixel format for it", device.name)));
+        };
+        let newest = able.present_modes.contains(&wgpu::PresentMode::Mailbox);
+        let config = wgpu::SurfaceConfiguration {
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+            format,
+            color_space: wgpu::SurfaceColorSpace::default(),
+            width: 0,
+            height: 0,
+            present_mode: if newest { wgpu::PresentMode::Mailbox } else { wgpu::PresentMode::Fifo },
+            desired_maximum_frame_latency: 1,
+            alpha_mode: wgpu::CompositeAlphaMode::Auto,
+            view_formats: Vec::new(),
+        };
+        let canvas = Canvas::new(Arc::clone(&device), format);
+        device.check().map_err(fault)?;
+        let size = window.inner_size();
+        let mut gpu = Self { device, window, surface, config, configured: false, canvas };
+        gpu.resize((size.width, size.height));
+        gpu.device.check().map_err(fault)?;
+        Ok(gpu)
+    }
+
+    fn configure(&mut self) {
+        self.configured = self.config.width > 0 && self.config.height > 0;
+        if self.configured {
+            self.surface.configure(&self.device.device, &self.config);
+        }
+    }
+
+    /// The texture to draw to; none where nothing is to be seen now.
+    fn texture(&mut self) -> Result<Option<wgpu::SurfaceTexture>, PresentError> {
+        use wgpu::CurrentSurfaceTexture as Current;
+        // Once more after what is wrong with the surface was put right.
+        for _ in 0..2 {
+            match self.surface.get_current_texture() {
+                Current::Success(texture) | Current::Suboptimal(texture) => return Ok(Some(texture)),
+                Current::Timeout | Current::Occluded => return Ok(None),
+                Current::Outdated => self.configure(),
+                Current::Lost => {
+                    self.surface = surface(&self.window, &self.device)?;
+                    self.configure();
+                }
+                Current::Validation => self.device.check().map_err(fault)?,
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn fault(error: impl std::fmt::Display) -> PresentError {
+    PresentError(error.to_string())
+}
+
+fn surface(window: &Arc<Window>, device: &Device) -> Result<wgpu::Surface<'static>, PresentError> {
+    let surface = device.instance.create_surface(Arc::clone(window)).map_err(fault)?;
+    if !device.adapter.is_surface_supported(&surface) {
+        return Err(PresentError(format!("{} cannot draw to windows of this display", device.name)));
+    }
+    Ok(surface)
+}
+
+impl Presenter for Gpu {
+    fn resize(&mut self, (width, height): (u32, u32)) {
+        if (self.config.width, self.config.height) == (width, height) && self.configured {
+            return;
+        }
+        let most = self.device.device.limits().max_texture_dimension_2d;
+        (self.config.width, self.config.height) = (width.min(most), height.min(most));
+        self.configure();
+    }
+
+    fn set_controls(&mut self, controls: Controls) {
+        self.canvas.set_controls(controls);
+    }
+
+    fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
+        if !self.configured {
+            return Ok(());
+        }
+        let Some(texture) = self.texture()? else { return Ok(()) };
+        let view = texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
+        self.canvas.draw(&view, (self.config.width, self.config.height), drawing);
+        self.window.pre_present_notify();
+        self.device.queue.present(texture);
+        self.device.check().map_err(fault)
+    }
+
+    fn has_device(&self) -> bool {
+        true
+    }
+
+    fn takes(&self, picture: &DevicePicture) -> bool {
+        picture.is_on(&self.device)
+    }
+
+    fn describe(&self) -> String {
+        let mode = if self.config.present_mode == wgpu::PresentMode::Mailbox { "newest picture" } else { "in order" };
+        format!("{}, {mode}", self.device.name)
+    }
+}
