@@ -1,0 +1,127 @@
+//! Every key there is.
+
+use std::thread;
+use std::time::Duration;
+
+use bokehcam::preview::keys::{Chord, GROUPS};
+use egui::Key;
+
+use super::input::sym;
+use super::picture::{distance, is_photograph};
+use super::program::{PORTRAIT, Program};
+use super::screen::{Screen, until};
+use super::window::{PATIENCE, Window};
+
+/// The key symbol of a key in the table.
+fn symbol(key: Key) -> u32 {
+    match key {
+        Key::ArrowLeft => 0xff51,
+        Key::ArrowUp => 0xff52,
+        Key::ArrowRight => 0xff53,
+        Key::ArrowDown => 0xff54,
+        Key::Escape => sym::ESCAPE,
+        Key::Space => u32::from(' '),
+        Key::F1 => sym::F1,
+        Key::F5 => sym::F1 + 4,
+        Key::F11 => sym::F11,
+        Key::OpenBracket => u32::from('['),
+        Key::CloseBracket => u32::from(']'),
+        Key::Semicolon => u32::from(';'),
+        Key::Quote => u32::from('\''),
+        Key::Comma => u32::from(','),
+        Key::Period => u32::from('.'),
+        Key::Minus => u32::from('-'),
+        Key::Plus => u32::from('+'),
+        Key::Equals => u32::from('='),
+        Key::Questionmark => u32::from('?'),
+        key => match key.name().as_bytes() {
+            [byte] => u32::from(byte.to_ascii_lowercase()),
+            _ => panic!("{}: the test has no symbol for this key", key.name()),
+        },
+    }
+}
+
+fn press(window: &Window, chord: Chord) {
+    let held: Vec<u32> = [(chord.ctrl, sym::CONTROL), (chord.shift, sym::SHIFT)]
+        .into_iter()
+        .filter_map(|(held, symbol)| held.then_some(symbol))
+        .collect();
+    window.key(&held, symbol(chord.key));
+}
+
+/// Whether a chord closes the window.
+fn closes(chord: &Chord) -> bool {
+    chord.key == Key::Q || (chord.ctrl && chord.key == Key::W)
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn every_key_leaves_it_alive() {
+    let screen = Screen::new();
+    let mut program = Program::start(&screen, &[PORTRAIT]);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
+    // Twice, so that what was turned on is turned off.
+    for _ in 0..2 {
+        for binding in GROUPS.iter().flat_map(|group| group.bindings) {
+            for chord in binding.chords.iter().filter(|chord| !closes(chord)) {
+                press(&window, *chord);
+                thread::sleep(Duration::from_millis(60));
+                assert!(program.runs(), "{}: {}", binding.keys, program.said());
+            }
+        }
+    }
+    until("it reacts", PATIENCE, || {
+        window.key(&[], sym::F11);
+        thread::sleep(Duration::from_millis(500));
+        window.is_full_screen()
+    });
+    press(&window, Chord { key: Key::Q, ctrl: true, shift: false });
+    program.end().succeeded();
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn keys_that_close_close() {
+    let screen = Screen::new();
+    let chords = GROUPS.iter().flat_map(|group| group.bindings).flat_map(|binding| binding.chords);
+    let closing: Vec<Chord> = chords.filter(|chord| closes(chord)).copied().collect();
+    assert!(closing.len() > 1);
+    for chord in closing {
+        let mut program = Program::start(&screen, &[PORTRAIT]);
+        let window = program.window();
+        window.until("the first picture", is_photograph);
+        press(&window, chord);
+        program.end().succeeded();
+    }
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn what_is_seen_follows_the_keys_and_comes_back() {
+    let screen = Screen::new();
+    let mut program = Program::start(&screen, &[PORTRAIT]);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
+    let key = |c: char| window.key(&[], u32::from(c));
+    // A still picture, and nothing beside it.
+    key('z');
+    key('h');
+    let still = || {
+        let mut last = window.look();
+        window.until("it stands still", |image| {
+            thread::sleep(Duration::from_millis(300));
+            let same = last.as_ref().is_some_and(|last| last.size() == image.size() && distance(last, image) < 0.01);
+            last = Some(image.clone());
+            same
+        })
+    };
+    let before = still();
+    for (name, c) in [("mirrored", 'm'), ("depth", 'd'), ("radii", 'c'), ("bins", 'n'), ("before and after", 'b')] {
+        key(c);
+        window.until(name, |image| distance(image, &before) > 1.0);
+        key(c);
+        window.until(&format!("not {name} any more"), |image| distance(image, &before) < 0.5);
+    }
+    program.close();
+}

@@ -1,0 +1,49 @@
+//! What is in a picture of the screen.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use bokehcam::frame::ColorImage;
+
+/// Writes a picture down for whoever looks why a test failed; says where.
+pub fn keep(image: &ColorImage, name: &str) -> String {
+    let name: String = name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.png"));
+    let saved = image::save_buffer(&path, &image.rgb, image.width, image.height, image::ColorType::Rgb8);
+    match saved {
+        Ok(()) => format!("see {}", path.display()),
+        Err(error) => format!("{}: {error}", path.display()),
+    }
+}
+
+/// A part of a picture: from this column and row on, so many of them.
+pub fn part(image: &ColorImage, (left, top): (u32, u32), (width, height): (u32, u32)) -> ColorImage {
+    let mut cut = ColorImage::new(width, height);
+    let row_bytes = 3 * width as usize;
+    for (row, out) in (top..).zip(cut.rgb.chunks_exact_mut(row_bytes)) {
+        let from = 3 * (row * image.width + left) as usize;
+        out.copy_from_slice(&image.rgb[from..from + row_bytes]);
+    }
+    cut
+}
+
+/// The middle quarter, where no control is.
+pub fn middle(image: &ColorImage) -> ColorImage {
+    let (width, height) = image.size();
+    part(image, (width / 4, height / 4), (width / 2, height / 2))
+}
+
+/// Whether there is a photograph in the middle, not an empty window nor text: by how many colours there are.
+pub fn is_photograph(image: &ColorImage) -> bool {
+    const LEAST: usize = 150;
+    let middle = middle(image);
+    let colours: HashSet<[u8; 3]> = middle.rgb.as_chunks::<3>().0.iter().map(|rgb| rgb.map(|byte| byte / 8)).collect();
+    colours.len() > LEAST
+}
+
+/// How far two pictures of one size are from each other: the mean over all bytes, 0 to 255.
+pub fn distance(a: &ColorImage, b: &ColorImage) -> f64 {
+    assert_eq!(a.size(), b.size());
+    let sum: u64 = a.rgb.iter().zip(&b.rgb).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    sum as f64 / a.rgb.len().max(1) as f64
+}

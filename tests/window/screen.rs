@@ -1,0 +1,116 @@
+//! A screen of the test's own: an X server without hardware, and a window manager.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{Atom, AtomEnum, ClientMessageEvent, ConnectionExt, EventMask, Window};
+use x11rb::rust_connection::RustConnection;
+
+/// Size of the screen, in pixels.
+pub const SIZE: (u16, u16) = (1600, 1000);
+
+/// An X server with a window manager; both end with it.
+pub struct Screen {
+    /// The server, as a client of it sees it.
+    pub x: RustConnection,
+    /// The window that has all others.
+    pub root: Window,
+    /// What `DISPLAY` has to be.
+    pub display: String,
+    _manager: Beside,
+    _server: Beside,
+    _settings: TempDir,
+}
+
+/// The window manager without keys of its own, so that all of them come to the program.
+const OPENBOX: &str = r#"<?xml version="1.0"?>
+<openbox_config xmlns="http://openbox.org/3.4/rc">
+  <focus><focusNew>yes</focusNew></focus>
+  <placement><policy>Smart</policy><center>yes</center></placement>
+  <theme><name>Clearlooks</name><titleLayout>NLIMC</titleLayout></theme>
+  <desktops><number>1</number></desktops>
+  <mouse><context name="Client"><mousebind button="Left" action="Press"><action name="Focus"/></mousebind></context></mouse>
+</openbox_config>
+"#;
+
+impl Screen {
+    /// Starts both, and waits until windows are managed.
+    pub fn new() -> Self {
+        let mut xvfb = Command::new("setpriv");
+        let size = format!("{}x{}x24", SIZE.0, SIZE.1);
+        xvfb.args(["--pdeathsig", "KILL", "Xvfb", "-displayfd", "1", "-screen", "0", &size, "-nolisten", "tcp"]);
+        let mut server = Beside::start(xvfb.stdout(Stdio::piped()).stderr(Stdio::null()));
+        let mut number = String::new();
+        BufReader::new(server.0.stdout.as_mut().unwrap()).read_line(&mut number).unwrap();
+        assert!(!number.is_empty(), "Xvfb does not start: scripts/setup window installs what is needed");
+        let display = format!(":{}", number.trim());
+
+        let settings = tempfile::tempdir().unwrap();
+        let rules = settings.path().join("openbox.xml");
+        fs::write(&rules, OPENBOX).unwrap();
+        let mut openbox = Command::new("setpriv");
+        openbox.args(["--pdeathsig", "KILL", "openbox", "--sm-disable", "--config-file"]).arg(rules);
+        openbox.env("DISPLAY", &display).env("HOME", settings.path()).env_remove("XDG_CONFIG_HOME");
+        let manager = Beside::start(openbox.stdout(Stdio::null()).stderr(Stdio::null()));
+
+        let (x, number) = x11rb::connect(Some(&display)).unwrap();
+        let root = x.setup().roots[number].root;
+        let screen = Self { x, root, display, _manager: manager, _server: server, _settings: settings };
+        until("a window manager", Duration::from_secs(20), || {
+            !screen.property(root, "_NET_SUPPORTING_WM_CHECK").is_empty()
+        });
+        screen
+    }
+
+    /// The number of a name.
+    pub fn atom(&self, name: &str) -> Atom {
+        self.x.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom
+    }
+
+    /// A window's property of 32-bit values; empty where there is none, or no such window any more.
+    pub fn property(&self, window: Window, name: &str) -> Vec<u32> {
+        let asked = self.x.get_property(false, window, self.atom(name), AtomEnum::ANY, 0, 1024).unwrap();
+        let Ok(reply) = asked.reply() else { return Vec::new() };
+        reply.value32().map(Iterator::collect).unwrap_or_default()
+    }
+
+    /// Asks the window manager something about a window.
+    pub fn ask_manager(&self, window: Window, what: &str, data: [u32; 5]) {
+        let message = ClientMessageEvent::new(32, window, self.atom(what), data);
+        let to = EventMask::SUBSTRUCTURE_REDIRECT | EventMask::SUBSTRUCTURE_NOTIFY;
+        self.x.send_event(false, self.root, to, message).unwrap();
+        self.x.flush().unwrap();
+    }
+}
+
+/// A program that runs beside the test, and ends with it.
+pub struct Beside(pub Child);
+
+impl Beside {
+    /// Starts it.
+    pub fn start(command: &mut Command) -> Self {
+        let started = command.stdin(Stdio::null()).spawn();
+        Self(started.unwrap_or_else(|error| panic!("{command:?}: {error}")))
+    }
+}
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Waits until something is so; gives back for how long.
+pub fn until(what: &str, within: Duration, mut is: impl FnMut() -> bool) -> Duration {
+    let began = Instant::now();
+    while !is() {
+        assert!(began.elapsed() < within, "not within {within:?}: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    began.elapsed()
+}
