@@ -182,7 +182,7 @@ mod tests {
     fn the_strength_is_a_share_of_the_height_a_radius_or_a_lens() {
         let rule = |flags: &[&str]| resolve(flags, true).unwrap().coc_rule(SIZE);
         let depth = |flags: &[&str]| match rule(flags) {
-            CocRule::Depth { lens, max_coc_px, .. } => match lens.field(2.0, SIZE.0, max_coc_px) {
+            CocRule::Depth { lens, max_coc_px, .. } => match lens.field((2.0, 0.0), SIZE.0, max_coc_px) {
                 CocField::Depth(depth) => (depth.coc_at_infinity_px, depth.max_coc_px),
                 other => panic!("{other:?}"),
             },

@@ -117,7 +117,7 @@ pub fn prepared(
     match (look.coc_rule(color.size()), depth) {
         (CocRule::Fixed(field), _) => Ok((field, None)),
         (CocRule::Depth { .. }, None) => Err(BokehError::NoDepth),
-        (CocRule::Depth { focus, lens, max_coc_px }, Some(mut map)) => {
+        (CocRule::Depth { focus, lens, range_m, max_coc_px }, Some(mut map)) => {
             // Focus looks at what was measured, so it comes before the holes are filled.
             let focus_m = Focus::new(focus).focus_m(&map, 0);
             match look.refines(false) {
@@ -128,7 +128,7 @@ pub fn prepared(
                 }
                 false => Filler::new().fill_by(&mut map, color),
             }
-            Ok((lens.field(focus_m, color.width, max_coc_px), Some(map)))
+            Ok((lens.field((focus_m, range_m), color.width, max_coc_px), Some(map)))
         }
     }
 }

@@ -109,6 +109,7 @@ impl Look {
                     Strength::Lens(lens) => CocAtInfinity::Lens(lens),
                     Strength::Default | Strength::AtInfinity(_) => CocAtInfinity::Px(self.even_px(size)),
                 },
+                range_m: 0.0,
                 max_coc_px,
             },
         }
