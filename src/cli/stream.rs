@@ -102,7 +102,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
 
     if info.live && !global.quiet {
         terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
-        if command.blur.effect.is_none() && !source.has_depth() {
+        if command.blur.effect == values::Effect::Auto && !source.has_depth() {
             terminal::say(
                 "there is no depth, so the whole picture is blurred: --depth NAME takes a depth camera's, --effect \
                  tilt-shift keeps a band sharp",
