@@ -22,7 +22,7 @@ struct Frame {
     nodes: u32,
     groups: u32,                // of four terms each
     most_px: f32,               // no |CoC| is above this
-    coc: vec4<f32>,             // uniform: radius; ramp: normal, offset, half band; depth: c_inf, focus, max
+    coc: vec4<f32>,             // uniform: radius; ramp: normal, offset, half band; depth: c_inf, sharp from and to, max
     ramp: vec2<f32>,            // slope, max
     expansion: f32,             // 0: highlights stay as they are
     steps_per_px: f32,          // nodes of the bank per pixel of radius

@@ -28,7 +28,9 @@ fn coc_of(x: u32, y: u32) -> f32 {
     if metres > 0.0 && metres < 3.0e38 {
         inverse_m = 1.0 / metres;
     }
-    return clamp(frame.coc.x * (1.0 - frame.coc.y * inverse_m), -frame.coc.z, frame.coc.z);
+    // 1 within the sharp range, and what is nearer to 1 of both its ends without.
+    let ratio = max(frame.coc.y * inverse_m, min(frame.coc.z * inverse_m, 1.0));
+    return clamp(frame.coc.x * (1.0 - ratio), -frame.coc.w, frame.coc.w);
 }
 
 @compute @workgroup_size(16, 16)

@@ -2,7 +2,8 @@
 //!
 //! A thin lens of focal length `f` and f-number `N`, focused at `z_f`, images a point at depth `z` as a disc of
 //! signed radius `c(z) = c_inf (1 - z_f / z)`, where `c_inf = f^2 / (2 N (z_f - f))` divided by the pixel pitch
-//! is the radius at infinity.
+//! is the radius at infinity. A range of distances around `z_f` may be sharp as a whole: the radius then grows from its
+//! nearer end.
 
 /// A camera lens in the terms on its barrel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,17 +106,35 @@ pub struct DepthCoc {
     pub coc_at_infinity_px: f32,
     /// Distance of the focal plane, in metres, > 0.
     pub focus_m: f32,
+    /// All within half of this to either side of the focal plane is sharp, in metres, >= 0.
+    pub range_m: f32,
     /// `|c|` is cut here, in pixels: near points would otherwise grow without bound.
     pub max_coc_px: f32,
 }
 
 impl DepthCoc {
+    /// Distance at which what is sharp begins, in metres, > 0: at least a tenth of the focal plane's.
+    #[inline(always)]
+    pub fn near_m(&self) -> f32 {
+        (self.focus_m - 0.5 * self.range_m).max(0.1 * self.focus_m)
+    }
+
+    /// Distance at which what is sharp ends, in metres.
+    #[inline(always)]
+    pub fn far_m(&self) -> f32 {
+        self.focus_m + 0.5 * self.range_m
+    }
+
     /// Signed CoC radius in pixels of a point at `depth_m`; unknown depth counts as infinitely far, so that what
     /// nobody measured is blurred rather than shown.
     #[inline(always)]
     pub fn coc_px(&self, depth_m: f32) -> f32 {
         let inverse_m = if depth_m > 0.0 { 1.0 / depth_m } else { 0.0 };
-        let coc_px = self.coc_at_infinity_px * (1.0 - self.focus_m * inverse_m);
+        // 1 within the range, and what is nearer to 1 of both its ends without.
+        let (near, far) = (self.near_m() * inverse_m, self.far_m() * inverse_m);
+        let far = if far < 1.0 { far } else { 1.0 };
+        let ratio = if near > far { near } else { far };
+        let coc_px = self.coc_at_infinity_px * (1.0 - ratio);
         let most_px = self.max_coc_px;
         let coc_px = if coc_px < -most_px { -most_px } else { coc_px };
         if coc_px > most_px { most_px } else { coc_px }
@@ -128,7 +147,7 @@ mod tests {
 
     #[test]
     fn thin_lens_laws() {
-        let coc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 2.0, max_coc_px: 40.0 };
+        let coc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 2.0, range_m: 0.0, max_coc_px: 40.0 };
         assert_eq!(coc.coc_px(2.0), 0.0);
         assert!(coc.coc_px(1.9) < 0.0 && coc.coc_px(2.1) > 0.0);
         assert_eq!(coc.coc_px(f32::INFINITY), 16.0);
@@ -136,6 +155,49 @@ mod tests {
             assert_eq!(coc.coc_px(unknown), 16.0);
         }
         assert_eq!(coc.coc_px(1e-6), -40.0);
+    }
+
+    /// Distances from 0.1 mm to 10 km, evenly in their logarithm.
+    fn distances_m() -> impl Iterator<Item = f32> {
+        (0..8000).map(|step| 1e-4 * 10f32.powf(step as f32 * 1e-3))
+    }
+
+    #[test]
+    fn without_a_range_every_radius_is_that_of_the_plain_formula_to_the_bit() {
+        for focus_m in [0.03, 0.7, 1.0, 2.3, 11.7, 1e4] {
+            let coc = DepthCoc { coc_at_infinity_px: 16.3, focus_m, range_m: 0.0, max_coc_px: 40.1 };
+            let odd_m = [0.0, -1.0, f32::NAN, f32::INFINITY, f32::MIN_POSITIVE, 1e-40, f32::MAX, focus_m];
+            for depth_m in distances_m().chain(odd_m) {
+                let inverse_m = if depth_m > 0.0 { 1.0 / depth_m } else { 0.0 };
+                let plain_px = (16.3f32 * (1.0 - focus_m * inverse_m)).clamp(-40.1, 40.1);
+                assert_eq!(coc.coc_px(depth_m).to_bits(), plain_px.to_bits(), "{focus_m} m, {depth_m} m");
+            }
+        }
+    }
+
+    #[test]
+    fn all_within_the_range_is_sharp_and_the_radius_grows_from_its_ends() {
+        for (focus_m, range_m) in [(2.0, 0.5), (1.0, 1.5), (1.0, 30.0), (0.4, 0.01)] {
+            let coc = DepthCoc { coc_at_infinity_px: 16.0, focus_m, range_m, max_coc_px: 40.0 };
+            let (near_m, far_m) = (coc.near_m(), coc.far_m());
+            assert!(near_m >= 0.1 * focus_m && near_m < focus_m && (far_m - focus_m - range_m / 2.0).abs() < 1e-6);
+            let mut before_px = -40.0;
+            for depth_m in distances_m() {
+                let coc_px = coc.coc_px(depth_m);
+                assert!(coc_px >= before_px, "the radius falls at {depth_m} m");
+                // One step is 0.23 % of the distance, which is worth no more than that of the slope there.
+                assert!(coc_px - before_px < 40.0 * 0.0024 + 16.0 * 0.0024, "the radius jumps at {depth_m} m");
+                match depth_m {
+                    _ if depth_m < 0.9999 * near_m => assert!(coc_px < 0.0),
+                    _ if depth_m > 1.0001 * far_m => assert!(coc_px > 0.0),
+                    _ if depth_m > 1.0001 * near_m && depth_m < 0.9999 * far_m => assert_eq!(coc_px, 0.0),
+                    _ => assert!(coc_px.abs() < 0.01),
+                }
+                before_px = coc_px;
+            }
+            assert_eq!(coc.coc_px(f32::INFINITY), 16.0);
+            assert_eq!(coc.coc_px(f32::NAN), 16.0);
+        }
     }
 
     #[test]

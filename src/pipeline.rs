@@ -68,6 +68,8 @@ pub enum CocRule {
         focus: FocusRule,
         /// How large the CoC grows.
         lens: CocAtInfinity,
+        /// All within half of this to either side of the focal plane is sharp, in metres, >= 0.
+        range_m: f32,
         /// Largest CoC radius, in pixels.
         max_coc_px: f32,
     },
@@ -83,13 +85,14 @@ pub enum CocAtInfinity {
 }
 
 impl CocAtInfinity {
-    /// The CoC over depth of a picture `width_px` wide, focused at `focus_m` metres.
-    pub fn field(self, focus_m: f32, width_px: u32, max_coc_px: f32) -> CocField {
+    /// The CoC over depth of a picture `width_px` wide, focused at `focus_m` metres, with a sharp range of `range_m`
+    /// around.
+    pub fn field(self, (focus_m, range_m): (f32, f32), width_px: u32, max_coc_px: f32) -> CocField {
         let coc_at_infinity_px = match self {
             Self::Px(radius_px) => radius_px,
             Self::Lens(lens) => lens.coc_at_infinity_px(focus_m, width_px),
         };
-        CocField::Depth(DepthCoc { coc_at_infinity_px, focus_m, max_coc_px })
+        CocField::Depth(DepthCoc { coc_at_infinity_px, focus_m, range_m, max_coc_px })
     }
 }
 

@@ -134,7 +134,8 @@ fn psnr_db(a: &ColorImage, b: &ColorImage) -> f64 {
 /// A change of level shows no more than one frame differs from the next.
 #[test]
 fn a_change_of_level_is_no_jump() {
-    let lens = |focus_m| CocField::Depth(DepthCoc { coc_at_infinity_px: 14.0, focus_m, max_coc_px: 22.0 });
+    let lens =
+        |focus_m| CocField::Depth(DepthCoc { coc_at_infinity_px: 14.0, focus_m, range_m: 0.0, max_coc_px: 22.0 });
     for (name, frames) in scenes() {
         let settings = Settings { adaptive: true, far_max_px: 14.0, near_max_px: 22.0, ..settings(Effect::Dof) };
         let mut cpu = CpuBokeh::new(Plan::new(&settings, frames[0].0.width, frames[0].0.height), Some(2));

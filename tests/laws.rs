@@ -90,7 +90,7 @@ fn the_exact_gather_is_the_two_dimensional_convolution_too() {
     let image = noise(40, 30);
     let settings =
         Settings { method: Method::Gather, rank: Some(Rank::Full), near_max_px: 6.5, ..settings(Effect::Dof) };
-    let lens = DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, max_coc_px: 6.5 };
+    let lens = DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 6.5 };
     let map = depth(40, 30, |_, _| 100.0);
     let plan = Plan::new(&settings, 40, 30);
     let direct = convolve(&image, &plan, 6.5);
@@ -130,7 +130,8 @@ fn a_blurred_point_does_not_shift() {
     for quality in Quality::ALL {
         for size in [4, 5, 6, 7] {
             let (image, middle) = bright_square(size);
-            let field = CocField::Depth(DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, max_coc_px: 18.0 });
+            let field =
+                CocField::Depth(DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 18.0 });
             let out = blur(&Settings { quality, ..settings(Effect::Dof) }, &image, &far, &field);
             let (x, y, _) = spot(&out, 0.0);
             assert!((x - middle).abs() < 0.05 && (y - middle).abs() < 0.05, "{quality} {size}: {x} {y} {middle}");
@@ -143,7 +144,8 @@ fn quality_changes_fidelity_never_the_amount_of_blur() {
     let far = depth(101, 101, |_, _| 1e6);
     let (image, _) = bright_square(5);
     for coc_px in [3.0, 5.0, 8.0, 12.0] {
-        let field = CocField::Depth(DepthCoc { coc_at_infinity_px: coc_px, focus_m: 1.0, max_coc_px: 18.0 });
+        let field =
+            CocField::Depth(DepthCoc { coc_at_infinity_px: coc_px, focus_m: 1.0, range_m: 0.0, max_coc_px: 18.0 });
         let spread = |quality| {
             let settings = Settings { quality, far_max_px: coc_px, ..settings(Effect::Dof) };
             spot(&blur(&settings, &image, &far, &field), 0.0).2
@@ -262,4 +264,24 @@ fn a_frame_leaves_no_trace_in_the_next() {
         cpu.blur(&image, Some(&map), &field, &mut out).expect("a blur");
         assert_eq!(out, blur(&settings(Effect::Dof), &image, &map, &field), "frame {k}");
     }
+}
+
+#[test]
+fn a_range_of_focus_is_sharp_as_a_whole_and_its_ends_are_focal_planes() {
+    let (width, height) = (150, 110);
+    let image = noise(width, height);
+    let lens =
+        |focus_m, range_m| CocField::Depth(DepthCoc { coc_at_infinity_px: 12.0, focus_m, range_m, max_coc_px: 18.0 });
+    let settings = settings(Effect::Dof);
+    let (near_m, far_m) = (1.0 - 0.5 * 0.4f32, 1.0 + 0.5 * 0.4f32);
+    let within = depth(width, height, |x, y| 0.801 + 0.398 * ((x * 7 + y * 13) % 101) as f32 / 101.0);
+    let out = blur(&settings, &image, &within, &lens(1.0, 0.4));
+    let worst = out.rgb.iter().zip(&image.rgb).map(|(a, b)| a.abs_diff(*b)).max();
+    assert!(worst <= Some(1), "{worst:?}");
+    assert!(out != blur(&settings, &image, &within, &lens(1.0, 0.0)), "without a range some of it is blurred");
+    // Behind the range it is as if the focus were at its far end, in front of it as if at its near one.
+    let behind = depth(width, height, |x, _| [1.2, 1.9, 6.0, 0.0][x as usize / 10 % 4]);
+    assert_eq!(blur(&settings, &image, &behind, &lens(1.0, 0.4)), blur(&settings, &image, &behind, &lens(far_m, 0.0)));
+    let before = depth(width, height, |x, _| [0.8, 0.6, 0.3][x as usize / 10 % 3]);
+    assert_eq!(blur(&settings, &image, &before, &lens(1.0, 0.4)), blur(&settings, &image, &before, &lens(near_m, 0.0)));
 }

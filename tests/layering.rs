@@ -17,7 +17,7 @@ const LAYERS: [&[&str]; 9] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 18] = [
+const DOORS: [(&str, &[&str]); 21] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
@@ -28,10 +28,12 @@ const DOORS: [(&str, &[&str]); 18] = [
     ("image", &["recording", "sink"]),
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
+    ("png", &["recording", "sink"]),
     ("rustix", &["capture/synthetic", "clock", "link/bell", "v4l2"]),
     ("saphyr_parser", &["calibration"]),
     ("softbuffer", &["preview/present"]),
     ("strsim", &["v4l2"]),
+    ("toml_edit", &["cli"]),
     ("v4l", &["v4l2"]),
     ("wgpu", &["bokeh/gpu", "compute/device", "depth/stereo/gpu", "preview/present"]),
     ("winit", &["preview/present", "preview/window"]),

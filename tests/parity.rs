@@ -14,7 +14,7 @@ use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
-use bokehcam::optics::CocField;
+use bokehcam::optics::{CocField, DepthCoc};
 use common::{EFFECTS, Numbers, coc, color, depth, noise, settings, shapes, three_depths};
 
 /// Difference of an 8-bit value that at most one in a thousand may exceed, and that none may exceed twice over: a
@@ -131,6 +131,20 @@ fn the_comparison_methods_agree() {
         let aperture = Aperture { shape: Shape::Heart, intensity: 0.0 };
         let settings = Settings { method: Method::Gather, rank: Some(rank), aperture, ..settings(Effect::Dof) };
         same(&settings, &image, &map, &coc(Effect::Dof, 48), &format!("gather {rank:?}"));
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_range_of_focus_agrees() {
+    let (width, height) = (97, 71);
+    let (image, slope) = (noise(width, height), depth(width, height, |x, y| 0.3 + 0.02 * (x + y / 8) as f32));
+    for (focus_m, range_m) in [(1.0, 0.3), (1.1, 1.0), (0.7, 9.0)] {
+        let lens = DepthCoc { coc_at_infinity_px: 12.0, focus_m, range_m, max_coc_px: 18.0 };
+        for (name, map) in [("slope", &slope), ("three depths", &three_depths(width, height))] {
+            let what = format!("{name} {range_m} m around {focus_m} m");
+            same(&settings(Effect::Dof), &image, map, &CocField::Depth(lens), &what);
+        }
     }
 }
 

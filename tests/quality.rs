@@ -166,7 +166,7 @@ fn depth_gives_back_the_coc() {
     let coc_px = scene.coc();
     assert_eq!(coc_px.at(30, 25), -6.0);
     assert_eq!(coc_px.at(18, 25), 0.0);
-    let lens = DepthCoc { coc_at_infinity_px: 20.0, focus_m: scenes::FOCUS_M, max_coc_px: 99.0 };
+    let lens = DepthCoc { coc_at_infinity_px: 20.0, focus_m: scenes::FOCUS_M, range_m: 0.0, max_coc_px: 99.0 };
     let depth = truth::depth(&coc_px, 20.0);
     assert!(depth.metres.iter().zip(&coc_px.data).all(|(&z_m, c)| (lens.coc_px(z_m) - c).abs() < 1e-4));
 }

@@ -47,7 +47,7 @@ fn of(shape: Shape) -> Aperture {
 #[test]
 fn a_point_becomes_a_disc_of_the_thin_lens_radius() {
     let disc = lens_points(&of(Shape::Disc), 6000);
-    let coc = DepthCoc { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: FOCUS_M, max_coc_px: 100.0 };
+    let coc = DepthCoc { coc_at_infinity_px: COC_AT_INFINITY_PX, focus_m: FOCUS_M, range_m: 0.0, max_coc_px: 100.0 };
     for depth_m in [0.5, 0.8, 2.0, 4.0, 12.0] {
         let (mean, spread) = moments_px(&blurred(light_at(depth_m, 3.0), &disc));
         // A disc of radius r spreads by r^2 / 2; the light itself, 3 px, and the pixel, a square, add theirs.

@@ -94,7 +94,7 @@ impl Shot {
     /// The lens for a scene, as the product's command line sets it up from `--coc-at-infinity` and `--focus`.
     pub fn lens(coc_at_infinity_px: f32, focus_m: f32, height: usize) -> DepthCoc {
         let max_coc_px = coc_at_infinity_px.max(height as f32 * MAX_COC_PER_HEIGHT);
-        DepthCoc { coc_at_infinity_px, focus_m, max_coc_px }
+        DepthCoc { coc_at_infinity_px, focus_m, range_m: 0.0, max_coc_px }
     }
 
     /// The CoC that the rivals see: unknown depth is that of the nearest known pixel.

@@ -153,7 +153,7 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         camera: Box::new(Looped::new(recording, &name, frames, clock.clone(), stamps.clone())),
         bokeh: Some(Box::new(Slowed::new(executor, options.slow))),
         quality: options.quality,
-        coc: CocRule::Depth { focus: FocusRule::Auto, lens: CocAtInfinity::Px(coc_px), max_coc_px },
+        coc: CocRule::Depth { focus: FocusRule::Auto, lens: CocAtInfinity::Px(coc_px), range_m: 0.0, max_coc_px },
         refine: !options.no_refine,
         changes: None,
         sink: Box::new(Stamping::new(clock.clone(), stamps.clone())),

@@ -15,6 +15,8 @@ pub mod rung;
 pub mod share;
 pub mod split;
 
+use std::fmt;
+use std::str::FromStr;
 #[cfg(feature = "gpu")]
 use std::sync::Arc;
 use std::time::Duration;
@@ -55,6 +57,26 @@ pub enum Rank {
     Terms(u32),
     /// Every term that the aperture's picture has.
     Full,
+}
+
+impl FromStr for Rank {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            _ if text == "full" => Ok(Rank::Full),
+            Ok(terms @ 1..=16) => Ok(Rank::Terms(terms)),
+            _ => Err("use 1 to 16, or full".to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Rank {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Rank::Terms(terms) => write!(f, "{terms}"),
+            Rank::Full => f.write_str("full"),
+        }
+    }
 }
 
 /// Everything about the blur that stays the same from frame to frame.

@@ -9,10 +9,11 @@ use serde::Serialize;
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_whole};
 use super::options::{Global, Output};
-use super::values::{ApertureName, between};
+use super::values::between;
 use super::{aperture_plot, aperture_sheet, defaults, terminal};
 use crate::bokeh::aperture::Mask;
 use crate::bokeh::low_rank::Decomposition;
+use crate::look::ApertureName;
 use crate::recording::still::write_color;
 
 /// The error curves end at this rank.

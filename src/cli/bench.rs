@@ -8,15 +8,14 @@ use serde::Serialize;
 
 use super::config::{self, Executor};
 use super::error::CliError;
-use super::quality::QualityChoice;
-use super::values::{self, Size, above_zero};
+use super::values::{self, OrAuto, Size, above_zero};
 use super::{defaults, options, print, render};
 use crate::bokeh::{Bokeh, Job, PassTimes};
 use crate::budget::Quality;
 use crate::compute::{Place, team::cores};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
-use crate::look::COC_AT_INFINITY_PER_HEIGHT;
+use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Strength};
 use crate::optics::CocField;
 use crate::scene::{Scene, View};
 
@@ -136,15 +135,15 @@ fn measure(
     if command.blur.depth.is_elsewhere() {
         return Err(CliError::Usage("--depth FOLDER or a depth camera are for `stream`".to_string()));
     }
-    let options = options::Blur { coc_at_infinity: Some(coc_px), ..command.blur.clone() };
-    let look = config::look(&options, &command.aperture, QualityChoice::Level(quality), true)?;
+    let options = options::Blur { coc_at_infinity: Some(Strength::AtInfinity(coc_px)), ..command.blur.clone() };
+    let look = config::look(&options, &command.aperture, OrAuto::This(quality), true)?;
     let size = color.size();
     let Some(settings) = look.settings(size, false) else {
         return Err(CliError::Usage(
             "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
         ));
     };
-    let (coc, depth) = render::prepared(&look, color, Some(depth.clone()))?;
+    let (coc, depth) = render::prepared(&look, color, Some(render::Depth::Measured(depth.clone())))?;
     let mut bokeh = executor.create(&settings, size)?;
     let buffers = Buffers {
         colors: Pool::new(bokeh.capacity(), || color.clone()),

@@ -10,7 +10,7 @@ use super::config::Executor;
 use super::debug_pictures::{coc, grey, light};
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_whole};
-use super::render::prepared;
+use super::render::{Depth, prepared};
 use crate::bokeh::cpu::CpuBokeh;
 use crate::bokeh::plan::{Bin, Compositing};
 use crate::bokeh::{Bokeh, Probe};
@@ -92,7 +92,7 @@ impl Range {
 /// As without a folder; the folder or a file in it cannot be written, or exists and may not be overwritten.
 pub fn blurred(
     color: ColorImage,
-    depth: Option<DepthMap>,
+    depth: Option<Depth>,
     look: &Look,
     executor: &Executor,
     (dir, force): (&Path, bool),

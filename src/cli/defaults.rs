@@ -1,17 +1,10 @@
 //! Every default of the command line, in one place.
 
 use super::values::Size;
+pub use crate::look::defaults::{FOCUS_RANGE_M, HIGHLIGHTS, INTENSITY, RIM, TILT};
 
-/// Soft rim of the aperture, as a fraction of its radius: rank 3 is then as good as rank 7 of a hard disc.
-pub const RIM: f32 = 0.2;
-/// Highlight recovery; off, because it invents light.
-pub const HIGHLIGHTS: f32 = 0.0;
-/// Radial intensity of the aperture: flat.
-pub const INTENSITY: f32 = 0.0;
 /// Shape of the aperture.
 pub const APERTURE: &str = "disc";
-/// Middle of the sharp band, its width, both as fractions of the height, and its turn in degrees.
-pub const TILT: &str = "0.55:0.15:0";
 /// Units of a 16-bit depth picture per metre: the TUM convention.
 pub const DEPTH_SCALE: f32 = 5000.0;
 /// The same of depth cameras, most of which give millimetres.

@@ -28,7 +28,7 @@ pub fn beside(
     if !blur.depth.is_elsewhere() {
         return Ok(source);
     }
-    if !matches!(blur.effect, None | Some(Effect::Dof)) {
+    if !matches!(blur.effect, Effect::Auto | Effect::Dof) {
         return usage("--depth names depth, and only --effect dof uses any: leave one of them out");
     }
     if source.camera.info().brings == Brings::Depth {

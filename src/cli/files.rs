@@ -1,6 +1,7 @@
 //! Files that appear whole or not at all.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::Write;
 use std::path::Path;
 
 use super::error::CliError;
@@ -15,7 +16,7 @@ pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bo
     }
 }
 
-/// Writes a file under another name in the same folder, and then gives it its own.
+/// Writes a file under another name in the same folder, and then gives it its own; what was there gives its permissions.
 ///
 /// # Errors
 /// [`CliError::Io`] when the folder cannot be written.
@@ -23,7 +24,14 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     let mut part = path.as_os_str().to_owned();
     part.push(format!(".{}.part", std::process::id()));
     let part = Path::new(&part);
-    fs::write(part, bytes).and_then(|()| fs::rename(part, path)).map_err(|error| {
+    let written = File::create(part).and_then(|mut file| {
+        if let Ok(there) = fs::metadata(path) {
+            file.set_permissions(there.permissions())?;
+        }
+        file.write_all(bytes)?;
+        file.sync_all()
+    });
+    written.and_then(|()| fs::rename(part, path)).map_err(|error| {
         // The first failure is the one to tell.
         let _ = fs::remove_file(part);
         CliError::io(path)(error)

@@ -6,6 +6,7 @@ mod aperture_sheet;
 mod bench;
 #[cfg(feature = "camera")]
 mod calibration;
+mod command_line;
 mod config;
 mod debug;
 mod debug_pictures;
@@ -18,7 +19,9 @@ mod doctor;
 mod dump;
 mod error;
 mod files;
+mod layers;
 mod options;
+mod presets;
 #[cfg(feature = "window")]
 mod preview;
 mod quality;
@@ -40,6 +43,7 @@ use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use error::CliError;
+use layers::Layers;
 use settings::SettingsFile;
 
 /// Depth-aware, disc-shaped background blur for RGB-D recordings and stills
@@ -51,7 +55,8 @@ Examples:
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png
   bokehcam aperture --out kernels/
 
-Settings come from flags, then the environment (BOKEHCAM_RIM for --rim), then the settings file, then defaults.
+Settings come from flags, then the environment (BOKEHCAM_RIM for --rim), then the preset, then the settings file,
+then defaults.
 `bokehcam config dump` shows them all. Exit code: 0 done, 1 failed, 2 wrong arguments.")]
 struct Cli {
     #[command(flatten)]
@@ -105,13 +110,13 @@ Examples:
 /// Runs the program. What goes wrong becomes one line on stderr and an exit code: 1 at run time, 2 in the arguments.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args: Vec<OsString> = args.into_iter().collect();
-    let (cli, matches, file) = match parse(&args) {
+    let Parsed { cli, matches, file, layers } = match parse(&args) {
         Ok(parsed) => parsed,
         Err(Refusal::Settings(error)) => return fail(&error),
         Err(Refusal::Arguments(error)) => return refuse(&error),
     };
     terminal::start_log(&cli.global);
-    match perform(cli, &matches, &file) {
+    match perform(cli, &matches, &file, &layers) {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever read our output has seen enough.
         Err(error) if error.is_broken_pipe() => ExitCode::SUCCESS,
@@ -119,11 +124,11 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile) -> Result<(), CliError> {
+fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers) -> Result<(), CliError> {
     match cli.command {
         #[cfg(feature = "window")]
-        Command::Preview(command) => preview::run(&command, &cli.global),
-        Command::Stream(command) => stream::run(&command, &cli.global),
+        Command::Preview(command) => preview::run(&command, &cli.global, layers.given(matches)),
+        Command::Stream(command) => stream::run(&command, &cli.global, layers.given(matches)),
         Command::Render(command) => render::run(&command, &cli.global),
         Command::Depth(command) => disparity::run(&command, &cli.global),
         Command::Record(command) => record::run(&command, &cli.global),
@@ -136,7 +141,9 @@ fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile) -> Result<(), Cl
             clap_complete::generate(shell, &mut Cli::command(), "bokehcam", &mut script);
             print(&script)
         }
-        Command::Config(ConfigCommand::Dump { .. }) => print(dump::as_toml(&file.resolved(leaf(matches))).as_bytes()),
+        Command::Config(ConfigCommand::Dump { .. }) => {
+            print(dump::as_toml(&layers.resolved(matches), &file.presets).as_bytes())
+        }
     }
 }
 
@@ -151,14 +158,23 @@ impl From<clap::Error> for Refusal {
     }
 }
 
-fn parse(args: &[OsString]) -> Result<(Cli, ArgMatches, SettingsFile), Refusal> {
+/// A command line, and what stands behind it.
+struct Parsed {
+    cli: Cli,
+    matches: ArgMatches,
+    file: SettingsFile,
+    layers: Layers,
+}
+
+fn parse(args: &[OsString]) -> Result<Parsed, Refusal> {
     let command = settings::with_environment(Cli::command());
-    // Once without the settings file, to learn its name; then again with its values as defaults.
+    // Once without the settings file, to learn its name and the preset's; then again with their values as defaults.
     let given = command.clone().try_get_matches_from(args)?;
     let chosen = Cli::from_arg_matches(&given)?.global.config;
     let file = SettingsFile::load(chosen.as_deref()).map_err(Refusal::Settings)?;
-    let matches = file.as_defaults(command, leaf(&given)).try_get_matches_from(args)?;
-    Ok((Cli::from_arg_matches(&matches)?, matches, file))
+    let layers = Layers::of(&file, &given).map_err(Refusal::Settings)?;
+    let matches = layers.as_defaults(command).try_get_matches_from(args)?;
+    Ok(Parsed { cli: Cli::from_arg_matches(&matches)?, matches, file, layers })
 }
 
 /// The matches of the innermost command.

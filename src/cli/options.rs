@@ -9,13 +9,16 @@ use clap::{Args, value_parser};
 use super::defaults;
 #[cfg(feature = "window")]
 use super::preview::Show;
-use super::quality::{QualityChoice, level_or_auto};
+use super::quality::level_or_auto;
 use super::values::{
-    ApertureName, Backend, DepthChoice, Effect, Focus, LogFormat, Method, Pace, Rank, Refine, Size, above_zero,
-    between, not_negative, seconds,
+    Backend, DepthChoice, Effect, LogFormat, Method, OrAuto, Pace, Refine, Size, above_zero, between, not_negative,
+    seconds,
 };
+use crate::bokeh::Rank;
+use crate::budget::Quality;
+use crate::depth::focus::FocusRule;
 use crate::depth::stereo::Settings;
-use crate::look::Tilt;
+use crate::look::{ApertureName, Strength, Tilt};
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
 
@@ -129,9 +132,13 @@ pub struct Stereo {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Blur")]
 pub struct Blur {
-    /// What the blur follows [default: dof with depth, else blur]
-    #[arg(long, value_enum, value_name = "WHAT")]
-    pub effect: Option<Effect>,
+    /// A look by name: portrait, cinematic, dreamy, product, miniature, or one of your own ([presets.NAME] in the
+    /// settings file); other settings of the look go before it
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<String>,
+    /// What the blur follows
+    #[arg(long, value_enum, value_name = "WHAT", default_value = "auto")]
+    pub effect: Effect,
     /// How dof is composited
     #[arg(long, value_enum, value_name = "HOW", default_value = "layered")]
     pub method: Method,
@@ -145,11 +152,15 @@ pub struct Blur {
     pub refine: Refine,
     /// Distance of the focal plane: METRES, auto, or X,Y as fractions of width and height
     #[arg(long, value_name = "WHERE", default_value = "auto")]
-    pub focus: Focus,
-    /// Blur radius of a point at infinity, in pixels: the strength of the blur [default: height / 45]
-    #[arg(long, value_name = "PX", value_parser = not_negative,
+    pub focus: FocusRule,
+    /// Distances that are sharp as a whole, in metres: half of it on either side of the focal plane
+    #[arg(long, value_name = "METRES", default_value_t = defaults::FOCUS_RANGE_M, value_parser = not_negative)]
+    pub focus_range: f32,
+    /// Blur radius of a point at infinity: the strength of the blur, in pixels, or as a share of the height such as 3%
+    /// [default: auto, which is height / 45]
+    #[arg(long, value_name = "PX",
           conflicts_with_all = ["f_number", "focal_length", "sensor_width"])]
-    pub coc_at_infinity: Option<f32>,
+    pub coc_at_infinity: Option<Strength>,
     /// The strength by a lens instead: its f-number, with --focal-length and --sensor-width
     #[arg(long, value_name = "N", value_parser = above_zero)]
     pub f_number: Option<f32>,
@@ -159,11 +170,11 @@ pub struct Blur {
     /// Width of the sensor behind that lens, in millimetres
     #[arg(long, value_name = "MM", value_parser = above_zero)]
     pub sensor_width: Option<f32>,
-    /// Largest blur radius, in pixels [default: 0.06 x height]
-    #[arg(long, value_name = "PX", value_parser = not_negative)]
-    pub max_coc: Option<f32>,
+    /// Largest blur radius, in pixels [default: auto, which is 0.06 x height]
+    #[arg(long, value_name = "PX", value_parser = OrAuto::parser(not_negative))]
+    pub max_coc: Option<OrAuto<f32>>,
     /// Sharp band of tilt-shift: CENTER_Y[:BAND[:ANGLE_DEG]], the first two as fractions of the height
-    #[arg(long, value_name = "BAND", default_value = defaults::TILT)]
+    #[arg(long, value_name = "BAND", default_value_t = defaults::TILT)]
     pub tilt: Tilt,
 }
 
@@ -181,9 +192,9 @@ pub struct Aperture {
     /// Width of the soft rim, as a fraction of the radius
     #[arg(long, value_name = "W", default_value_t = defaults::RIM, value_parser = between(0.0, 1.0))]
     pub rim: f32,
-    /// Separable terms, 1 to 16 or full [default: the quality level's]
-    #[arg(long, value_name = "TERMS")]
-    pub rank: Option<Rank>,
+    /// Separable terms, 1 to 16 or full [default: auto, which is the quality level's]
+    #[arg(long, value_name = "TERMS", value_parser = OrAuto::parser(str::parse::<Rank>))]
+    pub rank: Option<OrAuto<Rank>>,
     /// Take clipped white as this many times as bright; 0 is off
     #[arg(long, value_name = "M", default_value_t = defaults::HIGHLIGHTS, value_parser = between(0.0, 1000.0))]
     pub highlights: f32,
@@ -196,7 +207,7 @@ pub struct Computing {
     /// Quality level: changes fidelity, never the amount of blur. auto follows the time there is (--budget-ms) where
     /// frames come in real time, up to balanced on the CPU and best on a GPU; elsewhere it is balanced
     #[arg(long, value_name = "LEVEL", default_value = "auto", value_parser = level_or_auto())]
-    pub quality: QualityChoice,
+    pub quality: OrAuto<Quality>,
     /// What runs the blur
     #[arg(long, value_enum, value_name = "WHICH", default_value = "auto")]
     pub backend: Backend,

@@ -61,15 +61,15 @@ pub enum Show {
     Bins,
 }
 
-/// Runs the command.
+/// Runs the command; `given` is what was said of other things than the look.
 ///
 /// # Errors
 /// The options do not fit each other, there is no display, or there never was a frame.
-pub fn run(command: &PreviewCommand, global: &options::Global) -> Result<(), CliError> {
+pub fn run(command: &PreviewCommand, global: &options::Global, given: Vec<(String, String)>) -> Result<(), CliError> {
     let mut parts = command.parts.clone();
     // Who looks for a look does so for longer than a recording takes.
     parts.frames.repeat = true;
-    show(command.source.as_deref().unwrap_or_default(), &command.to, &command.window, &parts, global)
+    show(command.source.as_deref().unwrap_or_default(), &command.to, &command.window, &parts, (global, given))
 }
 
 /// Shows a source in a window, and writes it to `to`.
@@ -81,7 +81,7 @@ pub fn show(
     to: &[Target],
     window: &options::Window,
     parts: &options::Streaming,
-    global: &options::Global,
+    (global, given): (&options::Global, Vec<(String, String)>),
 ) -> Result<(), CliError> {
     let options::Streaming { frames, stream, output, computing, .. } = parts;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
@@ -111,7 +111,7 @@ pub fn show(
     let ended = window::show(Preview {
         state,
         session: Start {
-            backstage: Box::new(Wings::new(parts, executor, device.clone())),
+            backstage: Box::new(Wings::new(parts, &executor, device.clone(), global.config.clone(), given)),
             look,
             source: source.to_owned(),
             outputs,

@@ -1,6 +1,6 @@
 //! `render`: one still picture.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -16,7 +16,7 @@ use crate::link::pool::Pooled;
 use crate::look::Look;
 use crate::optics::CocField;
 use crate::pipeline::CocRule;
-use crate::recording::still;
+use crate::recording::{snapshot, still};
 
 /// Blur one still picture
 #[derive(Args, Debug)]
@@ -26,13 +26,20 @@ Examples:
   bokehcam render photo.jpg --depth-map depth.pfm --focus 0.5,0.4 --aperture polygon:6 --out portrait.png
   bokehcam render photo.jpg --effect tilt-shift --tilt 0.6:0.1:10 --out small-world.png
   bokehcam render photo.jpg --effect blur --coc-at-infinity 12 --aperture heart --out hearts.png
-  bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/")]
+  bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/
+  bokehcam render photo.jpg --depth-map depth.png --preset cinematic --out film.png
+  bokehcam render --like snapshot.png --rim 0.1 --out another.png")]
 pub struct RenderCommand {
-    /// The picture, PNG or JPEG
-    image: PathBuf,
+    /// The picture, PNG or JPEG [default: the one that the snapshot of --like was made of]
+    #[arg(required_unless_present = "like")]
+    image: Option<PathBuf>,
     /// Its depth: 16-bit grey PNG, or PFM in metres
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
+    /// Take the settings of a snapshot of the preview; flags go before them. Without IMAGE, its NAME-color.png and, without
+    /// --depth-map, its NAME-depth.pfm are blurred, which gives the same picture again
+    #[arg(long, value_name = "NAME.png")]
+    like: Option<PathBuf>,
     /// Where the result goes, .png or .jpg
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -63,10 +70,7 @@ pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliE
         let what = "--depth FOLDER or a depth camera are for `stream`: give a picture's depth with --depth-map";
         return Err(CliError::Usage(what.to_string()));
     }
-    let color = still::read_color(&command.image)?;
-    let read_depth =
-        |file: &PathBuf| still::read_depth(file, command.depth.file_scale(), Some(command.depth.depth_invalid));
-    let depth = command.depth_map.as_ref().map(read_depth).transpose()?;
+    let (color, depth) = read(command)?;
     let look = config::look(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
     let executor = Executor::of(&command.computing);
     let (result, by) = match &command.debug_dir {
@@ -80,10 +84,34 @@ pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliE
     Ok(())
 }
 
+/// A depth map for one picture.
+pub enum Depth {
+    /// As it was measured: with holes, and noise.
+    Measured(DepthMap),
+    /// As a blur had it.
+    Final(DepthMap),
+}
+
+/// The picture, and its depth if there is any.
+fn read(command: &RenderCommand) -> Result<(ColorImage, Option<Depth>), CliError> {
+    let sources = command.like.as_ref().map(|like| snapshot::sources(like));
+    let read_depth =
+        |file: &Path| still::read_depth(file, command.depth.file_scale(), Some(command.depth.depth_invalid));
+    let given = command.depth_map.as_deref().map(read_depth).transpose()?.map(Depth::Measured);
+    match (&command.image, sources) {
+        (None, Some((color, depth))) => {
+            let kept = given.is_none() && depth.exists();
+            let kept = kept.then(|| read_depth(&depth)).transpose()?.map(Depth::Final);
+            Ok((still::read_color(&color)?, given.or(kept)))
+        }
+        (image, _) => Ok((still::read_color(image.as_deref().unwrap_or(Path::new("")))?, given)),
+    }
+}
+
 /// The blurred picture, and what blurred it.
 fn blurred(
     color: ColorImage,
-    depth: Option<DepthMap>,
+    depth: Option<Depth>,
     look: &Look,
     executor: &Executor,
 ) -> Result<(ColorImage, String), CliError> {
@@ -106,31 +134,34 @@ fn blurred(
     }
 }
 
-/// What a frame on its own is blurred by: the radius of every pixel, and the depth map (holes filled, and
-/// refined if that was asked for) if that needs it.
+/// What a frame on its own is blurred by: the radius of every pixel, and the depth map (if it was measured, with holes
+/// filled, and refined if that was asked for) if that needs it.
 ///
 /// # Errors
 /// [`BokehError::NoDepth`] when the blur follows depth and there is none.
 pub fn prepared(
     look: &Look,
     color: &ColorImage,
-    depth: Option<DepthMap>,
+    depth: Option<Depth>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
     match (look.coc_rule(color.size()), depth) {
         (CocRule::Fixed(field), _) => Ok((field, None)),
         (CocRule::Depth { .. }, None) => Err(BokehError::NoDepth),
-        (CocRule::Depth { focus, lens, max_coc_px }, Some(mut map)) => {
+        (CocRule::Depth { focus, lens, range_m, max_coc_px }, Some(depth)) => {
+            let (mut map, measured) = match depth {
+                Depth::Measured(map) => (map, true),
+                Depth::Final(map) => (map, false),
+            };
             // Focus looks at what was measured, so it comes before the holes are filled.
             let focus_m = Focus::new(focus).focus_m(&map, 0);
-            match look.refines(false) {
-                true => {
-                    let mut refiner = Refiner::new();
-                    refiner.focus_at(focus_m);
-                    refiner.refine(&mut map, color, 0);
-                }
-                false => Filler::new().fill_by(&mut map, color),
+            if measured && look.refines(false) {
+                let mut refiner = Refiner::new();
+                refiner.focus_at(focus_m);
+                refiner.refine(&mut map, color, 0);
+            } else if measured {
+                Filler::new().fill_by(&mut map, color);
             }
-            Ok((lens.field(focus_m, color.width, max_coc_px), Some(map)))
+            Ok((lens.field((focus_m, range_m), color.width, max_coc_px), Some(map)))
         }
     }
 }

@@ -1,39 +1,35 @@
-//! Where settings come from: flag > environment > file > default.
+//! Settings by their names, and the file that they can be in.
 //!
 //! The parser of the flags is the only one there is. A setting's environment variable and its key in the file are
-//! its flag's name, and the file's values become the flags' default values.
+//! its flag's name. Which value holds where there are several is up to [`super::layers`].
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
-use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, Command};
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 use super::error::CliError;
 use super::one_line;
 use super::options::Every;
+use crate::look::{flags, presets};
 
-/// The settings file, each value as it would follow its flag.
+/// Settings by their flags without the dashes, each value as it would follow its flag.
+pub type Values = BTreeMap<String, String>;
+
+/// The settings file.
 #[derive(Debug, Default)]
 pub struct SettingsFile {
-    values: BTreeMap<String, String>,
+    /// Its settings.
+    pub values: Values,
+    /// The settings of each preset in it.
+    pub presets: BTreeMap<String, Values>,
 }
 
-/// One setting, resolved.
-#[derive(Debug, PartialEq)]
-pub struct Setting {
-    /// Its flag without the dashes.
-    pub name: String,
-    /// Its value as it would follow the flag; none when its default depends on the picture.
-    pub value: Option<String>,
-    /// Where the value comes from.
-    pub origin: String,
-    /// What it does.
-    pub help: String,
-}
+/// The table of the file that the presets are in.
+pub const PRESETS: &str = "presets";
 
 /// Gives every setting its environment variable: `BOKEHCAM_` and the flag's name in capitals.
 pub fn with_environment(command: Command) -> Command {
@@ -57,73 +53,121 @@ impl SettingsFile {
         Self::parse(&path, &text)
     }
 
-    fn parse(path: &Path, text: &str) -> Result<Self, CliError> {
-        let refuse = |at: usize, what: String| CliError::Settings {
+    /// Reads the text of the file `path`.
+    ///
+    /// # Errors
+    /// As [`SettingsFile::load`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, CliError> {
+        let refuse = |(at, what): (usize, String)| CliError::Settings {
             path: path.to_owned(),
             line: text[..at.min(text.len())].matches('\n').count() + 1,
             what,
         };
-        let not_toml = |error: &toml::de::Error| {
-            refuse(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "))
-        };
-        let keys = DeTable::parse(text).map_err(|error| not_toml(&error))?;
-        let table: toml::Table = text.parse().map_err(|error| not_toml(&error))?;
-        let mut keys: Vec<_> = keys.get_ref().keys().map(|key| (key.span().start, key.get_ref().as_ref())).collect();
-        keys.sort_unstable();
-        let mut values = BTreeMap::new();
-        for (at, name) in keys {
-            if !is_setting(name) {
-                let hint = nearest_setting(name).map_or(String::new(), |near| format!(", did you mean {near}?"));
-                return Err(refuse(
-                    at,
-                    format!("there is no setting '{name}'{hint} `bokehcam config dump` shows them all"),
-                ));
+        let keys = DeTable::parse(text).map_err(|error| {
+            refuse((error.span().map_or(0, |span| span.start), error.message().replace('\n', ", ")))
+        })?;
+        let mut file = Self::default();
+        let (tables, settings): (Vec<_>, Vec<_>) = in_order(keys.get_ref()).partition(|entry| entry.name == PRESETS);
+        file.values = values(settings, &is_setting).map_err(refuse)?;
+        for presets in tables {
+            let no_table = || refuse((presets.at, "presets are tables: write [presets.NAME]".to_string()));
+            for entry in in_order(presets.value.as_table().ok_or_else(no_table)?) {
+                let settings = entry.value.as_table().ok_or_else(no_table)?;
+                check_name(entry.name).map_err(|what| refuse((entry.at, what)))?;
+                let of_a_look = |name: &str| flags::NAMES.contains(&name);
+                let values = values(in_order(settings), &of_a_look).map_err(refuse)?;
+                file.presets.insert(entry.name.to_owned(), values);
             }
-            let value = match table.get(name) {
-                Some(toml::Value::String(text)) => text.clone(),
-                Some(plain @ (toml::Value::Integer(_) | toml::Value::Float(_) | toml::Value::Boolean(_))) => {
-                    plain.to_string()
-                }
-                _ => return Err(refuse(at, format!("'{name}' must be a text, a number, true or false"))),
-            };
-            values.insert(name.to_owned(), value);
-            // With those before it, so that two settings that exclude each other are found, too.
-            parse_flags(&values).map_err(|error| refuse(at, one_line(&error)))?;
         }
-        Ok(Self { values })
+        if let Some(unknown) = file.values.get("preset").filter(|name| file.preset(name).is_none()) {
+            let at = in_order(keys.get_ref()).find(|entry| entry.name == "preset").map_or(0, |entry| entry.at);
+            return Err(refuse((at, file.no_preset(unknown))));
+        }
+        Ok(file)
     }
 
-    /// The command with the file's values as defaults, except those that a setting in `given` excludes.
-    pub fn as_defaults(&self, command: Command, given: &ArgMatches) -> Command {
-        let excluded = excluded_by(given);
-        on_settings(command, &|arg, name| match self.values.get(name) {
-            Some(value) if !excluded.iter().any(|other| other == name) => arg.default_value(value.clone()),
-            _ => arg,
-        })
+    /// The settings of a preset, built-in or in this file.
+    pub fn preset(&self, name: &str) -> Option<Values> {
+        let owned = |&(name, value): &(&str, &str)| (name.to_owned(), value.to_owned());
+        let built_in = presets::built_in(name).map(|preset| preset.settings.iter().map(owned).collect());
+        built_in.or_else(|| self.presets.get(name).cloned())
     }
 
-    /// All settings of the command that `given` belongs to, in the order of its help.
-    pub fn resolved(&self, given: &ArgMatches) -> Vec<Setting> {
-        let excluded = excluded_by(given);
-        let describe = |arg: &Arg| {
-            let name = arg.get_long()?.to_owned();
-            let id = arg.get_id().as_str();
-            // A list as it would be written.
-            let listed = |values: clap::parser::RawValues| {
-                values.map(|value| value.to_string_lossy().into_owned()).collect::<Vec<_>>().join(",")
-            };
-            let value = given.get_raw(id).map(listed);
-            let origin = match given.value_source(id) {
-                Some(ValueSource::CommandLine) => "flag".to_string(),
-                Some(ValueSource::EnvVariable) => "environment".to_string(),
-                _ if self.values.contains_key(&name) && !excluded.contains(&name) => "file".to_string(),
-                _ => "default".to_string(),
-            };
-            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-            Some(Setting { name, value, origin, help })
+    /// Says that there is no preset of this name, and which there are.
+    pub fn no_preset(&self, name: &str) -> String {
+        let built_in = presets::BUILT_IN.iter().map(|preset| preset.name);
+        let all: Vec<&str> = built_in.chain(self.presets.keys().map(String::as_str)).collect();
+        format!("there is no preset '{name}': use {}", all.join(", "))
+    }
+}
+
+/// Whether a preset of the person's own can have this name.
+///
+/// # Errors
+/// It cannot: why.
+pub fn check_name(name: &str) -> Result<(), String> {
+    if name.trim().is_empty() {
+        return Err("a preset needs a name".to_string());
+    }
+    if name.contains(char::is_control) {
+        return Err(format!("the name {name:?} of a preset has control characters: leave them out"));
+    }
+    match presets::built_in(name) {
+        Some(_) => Err(format!("the preset '{name}' is built in: choose another name")),
+        None => Ok(()),
+    }
+}
+
+/// A key of the file.
+struct Entry<'a> {
+    name: &'a str,
+    /// Where it is, in bytes.
+    at: usize,
+    value: &'a DeValue<'a>,
+}
+
+/// The keys of a table, as they are in the file.
+fn in_order<'a>(table: &'a DeTable<'a>) -> impl Iterator<Item = Entry<'a>> {
+    let mut keys: Vec<_> = table.iter().collect();
+    keys.sort_unstable_by_key(|(key, _)| key.span().start);
+    keys.into_iter().map(|(key, value)| Entry { name: key.get_ref(), at: key.span().start, value: value.get_ref() })
+}
+
+/// Settings as their flags would take them; or where something is wrong with them, and what.
+fn values<'a>(
+    entries: impl IntoIterator<Item = Entry<'a>>,
+    allowed: &dyn Fn(&str) -> bool,
+) -> Result<Values, (usize, String)> {
+    let mut values = Values::new();
+    for Entry { name, at, value } in entries {
+        if !is_setting(name) {
+            let hint = nearest_setting(name).map_or(String::new(), |near| format!(", did you mean {near}?"));
+            let what = format!("there is no setting '{name}'{hint} `bokehcam config dump` shows them all");
+            return Err((at, what));
+        }
+        if !allowed(name) {
+            return Err((at, format!("'{name}' is not about the look, and a preset is: it can have {}", names())));
+        }
+        let value = match value {
+            DeValue::String(text) => text.clone().into_owned(),
+            DeValue::Boolean(yes) => yes.to_string(),
+            // With another base or other marks it is no number to the flags.
+            DeValue::Integer(number) => {
+                i64::from_str_radix(number.as_str(), number.radix()).map_or(number.to_string(), |n| n.to_string())
+            }
+            DeValue::Float(number) => number.as_str().to_owned(),
+            _ => return Err((at, format!("'{name}' must be a text, a number, true or false"))),
         };
-        all_settings().get_arguments().filter_map(describe).collect()
+        values.insert(name.to_owned(), value);
+        // With those before it, so that two settings that exclude each other are found, too.
+        parse_flags(&values).map_err(|error| (at, one_line(&error)))?;
     }
+    Ok(values)
+}
+
+/// The settings of a look, as a list for people.
+fn names() -> String {
+    flags::NAMES.join(", ")
 }
 
 /// `$XDG_CONFIG_HOME/bokehcam/config.toml`, or the same under `~/.config`.
@@ -145,7 +189,7 @@ fn folder(variable: &str, usual: &str) -> Option<PathBuf> {
 }
 
 /// A command that has every setting and nothing else.
-fn all_settings() -> Command {
+pub fn all_settings() -> Command {
     Every::augment_args(Command::new("settings").disable_help_flag(true).no_binary_name(true))
 }
 
@@ -160,30 +204,30 @@ fn nearest_setting(name: &str) -> Option<String> {
     (error.kind() == ErrorKind::UnknownArgument).then(|| suggested.to_string().trim_start_matches('-').to_owned())
 }
 
-fn parse_flags(values: &BTreeMap<String, String>) -> Result<ArgMatches, clap::Error> {
+/// Settings as if they were flags.
+///
+/// # Errors
+/// One of them would be refused.
+pub fn parse_flags(values: &Values) -> Result<ArgMatches, clap::Error> {
     let flags = values.iter().map(|(name, value)| OsString::from(format!("--{name}={value}")));
     all_settings().try_get_matches_from(flags)
 }
 
-/// Names of the settings that exclude, or are excluded by, one that a flag or the environment gives.
-fn excluded_by(given: &ArgMatches) -> Vec<String> {
+/// Names of the settings that exclude, or are excluded by, one of `names`.
+pub fn excluded_by(names: &[String]) -> Vec<String> {
     let every = all_settings();
-    let is_given = |arg: &&Arg| {
-        let id = arg.get_id().as_str();
-        given.try_contains_id(id).is_ok_and(|present| present)
-            && matches!(given.value_source(id), Some(ValueSource::CommandLine | ValueSource::EnvVariable))
-    };
     let exclude_each_other = |a: &Arg, b: &Arg| {
         let names = |from: &Arg, to: &Arg| every.get_arg_conflicts_with(from).iter().any(|x| x.get_id() == to.get_id());
         names(a, b) || names(b, a)
     };
-    let (given, rest): (Vec<&Arg>, Vec<&Arg>) = every.get_arguments().partition(is_given);
-    let excluded = rest.into_iter().filter(|arg| given.iter().any(|other| exclude_each_other(arg, other)));
+    let is_named = |arg: &&Arg| arg.get_long().is_some_and(|long| names.iter().any(|name| name == long));
+    let (named, rest): (Vec<&Arg>, Vec<&Arg>) = every.get_arguments().partition(is_named);
+    let excluded = rest.into_iter().filter(|arg| named.iter().any(|other| exclude_each_other(arg, other)));
     excluded.filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
 }
 
 /// Rewrites each setting of a command and of those below it.
-fn on_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Command {
+pub fn on_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Command {
     let settings = all_settings();
     // By id: a command may have an option of the same name that is no setting.
     rewrite_args(command, &|arg: Arg| match settings.get_arguments().find(|setting| setting.get_id() == arg.get_id()) {
@@ -227,5 +271,35 @@ mod tests {
         assert_eq!(file.values["rim"], "0.5");
         assert_eq!(file.values["loop"], "true");
         assert_eq!(file.values.len(), 5);
+        let numbers =
+            SettingsFile::parse(Path::new("c.toml"), "frames = 0x1_0\nhighlights = 1_0.5\nrim = +0.5\n").unwrap();
+        assert_eq!(["frames", "highlights", "rim"].map(|name| numbers.values[name].as_str()), ["16", "10.5", "0.5"]);
+    }
+
+    #[test]
+    fn presets_are_tables_of_settings_of_the_look() {
+        let text = "rim = 0.1\npreset = 'mine'\n[presets.mine]\nrim = 0.5\neffect = \"blur\"\n[presets.\"b c\"]\n";
+        let file = SettingsFile::parse(Path::new("c.toml"), text).unwrap();
+        assert_eq!(file.preset("mine").unwrap()["rim"], "0.5");
+        assert_eq!(file.preset("b c").unwrap().len(), 0);
+        assert_eq!(file.preset("portrait").unwrap()["aperture"], "disc");
+        for (text, line, said) in [
+            ("[presets.mine]\n\nrimm = 1\n", 3, "did you mean rim?"),
+            ("[presets.mine]\nrim = 2\n", 2, "from 0 to 1"),
+            ("[presets.mine]\nmirror = true\n", 2, "is not about the look"),
+            ("[presets.mine]\npreset = 'portrait'\n", 2, "is not about the look"),
+            ("[presets.mine]\nf-number = 2\ncoc-at-infinity = 3\n", 3, "cannot be used with"),
+            ("[presets.mine.rim]\nx = 1\n", 1, "must be a text, a number"),
+            ("rim = 0.1\n[presets.portrait]\nrim = 0.2\n", 2, "is built in"),
+            ("[presets.\" \"]\n", 1, "needs a name"),
+            ("[presets.\"a\\nb\"]\n", 1, "control characters"),
+            ("presets = 3\n", 1, "[presets.NAME]"),
+            ("[presets]\nmine = 3\n", 1, "[presets.NAME]"),
+            ("rim = 0.1\npreset = 'mina'\n[presets.mine]\n", 2, "no preset 'mina': use portrait, cinematic, dreamy"),
+        ] {
+            let refused = refusal(text);
+            assert!(refused.starts_with(&format!("c.toml:{line}: ")) && refused.contains(said), "{text}: {refused}");
+            assert!(!refused.contains('\n'), "{refused}");
+        }
     }
 }

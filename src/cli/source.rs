@@ -253,7 +253,7 @@ impl Wanted<'_> {
 
     /// Whether the effect is one that uses depth.
     fn uses_depth(&self) -> bool {
-        self.blur.is_none_or(|blur| matches!(blur.effect, None | Some(Effect::Dof)))
+        self.blur.is_none_or(|blur| matches!(blur.effect, Effect::Auto | Effect::Dof))
     }
 
     fn check_effect(&self) -> Result<(), CliError> {

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use super::config::Executor;
 use super::error::CliError;
 use super::options;
-use super::values::Focus;
 use crate::calibration;
 use crate::calibration::rectification::Rectification;
 use crate::calibration::rectifier::Rectifier;
 use crate::capture::SourceInfo;
+use crate::depth::focus::FocusRule;
 use crate::depth::stereo::source::StereoDepth;
 use crate::depth::stereo::{Effort, Settings};
 use crate::optics::StereoRig;
@@ -129,7 +129,8 @@ pub fn open(
 pub fn check_focus(rig: &StereoRig, blur: &options::Blur) -> Result<(), CliError> {
     let needs = match (blur.focus, blur.f_number) {
         _ if rig.metric => return Ok(()),
-        (Focus::Metres(metres), _) => format!("--focus {metres}"),
+        (FocusRule::Metres(metres), _) => format!("--focus {metres}"),
+        _ if blur.focus_range > 0.0 => format!("--focus-range {}", blur.focus_range),
         (_, Some(f_number)) => format!("--f-number {f_number}"),
         _ => return Ok(()),
     };

@@ -49,18 +49,21 @@ const TO: &str = "/dev/videoN (virtual camera), window, DIR/ (numbered PNG), FIL
 const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, \
                   .mkv or .webm (ffmpeg), or null; may be given more than once";
 
-/// Runs the command. The report is written whenever the pipeline ran, however it ended.
+/// Runs the command; `given` is what was said of other things than the look. The report is written whenever the pipeline
+/// ran, however it ended.
 ///
 /// # Errors
 /// The options do not fit the source, something would be overwritten, or a stage of the pipeline failed.
-pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliError> {
+pub fn run(command: &StreamCommand, global: &options::Global, given: Vec<(String, String)>) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
     let options::Streaming { stream, output, .. } = parts;
     #[cfg(feature = "window")]
     if command.to.contains(&Target::Window) {
         let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
-        return preview::show(&command.source.to_string(), &others, &command.window, parts, global);
+        return preview::show(&command.source.to_string(), &others, &command.window, parts, (global, given));
     }
+    #[cfg(not(feature = "window"))]
+    let _ = given;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
     sinks::check(&command.to, stream, &command.source.devices())?;
     if stream.pace == Some(values::Pace::Asap) && !command.source.devices().is_empty() {
@@ -102,7 +105,7 @@ pub fn run(command: &StreamCommand, global: &options::Global) -> Result<(), CliE
 
     if info.live && !global.quiet {
         terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
-        if parts.blur.effect.is_none() && !source.has_depth() {
+        if parts.blur.effect == values::Effect::Auto && !source.has_depth() {
             terminal::say(
                 "there is no depth, so the whole picture is blurred: --depth NAME takes a depth camera's, --effect \
                  tilt-shift keeps a band sharp",

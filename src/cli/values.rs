@@ -1,19 +1,18 @@
 //! Values of options that are more than a number: how they are written, read and checked.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::sync::Arc;
 
 use clap::ValueEnum;
 
-use super::error::CliError;
-use crate::bokeh::aperture::{Aperture, Picture, Shape};
-use crate::recording::still::read_grey;
+use crate::bokeh;
+use crate::look::{self, number_in};
 
 /// What drives the blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Effect {
+    /// dof with depth, else blur
+    Auto,
     /// The radius follows depth
     Dof,
     /// A sharp band, and blur that grows away from it
@@ -31,6 +30,15 @@ pub enum Method {
     Layered,
     /// Every pixel gathers with its own radius: the paper's plain form
     Gather,
+}
+
+impl From<Method> for bokeh::Method {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Layered => Self::Layered,
+            Method::Gather => Self::Gather,
+        }
+    }
 }
 
 /// Where depth comes from.
@@ -87,6 +95,16 @@ pub enum Refine {
     Off,
 }
 
+impl From<Refine> for look::Refine {
+    fn from(refine: Refine) -> Self {
+        match refine {
+            Refine::Auto => Self::Auto,
+            Refine::On => Self::On,
+            Refine::Off => Self::Off,
+        }
+    }
+}
+
 /// What runs the blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Backend {
@@ -116,30 +134,31 @@ pub enum LogFormat {
     Json,
 }
 
-/// Where the focal plane is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Focus {
-    /// Chosen from the depth map.
+/// A value, or `auto`: what the picture or the quality level calls for. The file's may be set aside so, too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OrAuto<T> {
+    /// `auto`.
     Auto,
-    /// At this distance in metres, > 0.
-    Metres(f32),
-    /// At the depth seen at this point, in fractions of width and height.
-    Point(f32, f32),
+    /// This one.
+    This(T),
 }
 
-impl FromStr for Focus {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let use_this = || "use METRES above 0, auto, or X,Y as fractions of width and height (0 to 1)".to_string();
-        if text == "auto" {
-            return Ok(Focus::Auto);
+impl<T> OrAuto<T> {
+    /// The value, where one is chosen.
+    pub fn chosen(self) -> Option<T> {
+        match self {
+            Self::Auto => None,
+            Self::This(value) => Some(value),
         }
-        match text.split_once(',') {
-            Some((x, y)) => Ok(Focus::Point(
-                number_in(x, 0.0, 1.0).ok_or_else(use_this)?,
-                number_in(y, 0.0, 1.0).ok_or_else(use_this)?,
-            )),
-            None => number_in(text, 0.0, f32::MAX).filter(|m| *m > 0.0).map(Focus::Metres).ok_or_else(use_this),
+    }
+
+    /// A parser of what `parse` does, and of `auto`.
+    pub fn parser(
+        parse: impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static,
+    ) -> impl Fn(&str) -> Result<Self, String> + Clone + Send + Sync + 'static {
+        move |text| match text {
+            "auto" => Ok(Self::Auto),
+            value => parse(value).map(Self::This).map_err(|accepted| format!("{accepted}, or auto")),
         }
     }
 }
@@ -161,135 +180,6 @@ impl FromStr for Size {
             .and_then(|(width, height)| Some(Size { width: side(width)?, height: side(height)? }))
             .ok_or_else(|| "use WIDTHxHEIGHT, each 1 to 16384, such as 1280x720".to_string())
     }
-}
-
-/// How many separable terms approximate the aperture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rank {
-    /// The first terms, 1 to 16.
-    Terms(u32),
-    /// All.
-    Full,
-}
-
-impl FromStr for Rank {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.parse() {
-            _ if text == "full" => Ok(Rank::Full),
-            Ok(terms @ 1..=16) => Ok(Rank::Terms(terms)),
-            _ => Err("use 1 to 16, or full".to_string()),
-        }
-    }
-}
-
-/// An aperture as it is written: its picture, if any, not yet read.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ApertureName {
-    /// `disc`.
-    Disc,
-    /// `ring:INNER`.
-    Ring {
-        /// Radius of the hole, 0 to below 1.
-        inner: f32,
-    },
-    /// `polygon:N[:ROTATION_DEG[:CURVATURE]]`.
-    Polygon {
-        /// Number of blades, 3 to 16.
-        blades: u32,
-        /// Turn clockwise in degrees.
-        rotation_deg: f32,
-        /// 0 straight blades to 1 a circle.
-        curvature: f32,
-    },
-    /// `heart`.
-    Heart,
-    /// `star:N`.
-    Star {
-        /// Number of points, 3 to 16.
-        points: u32,
-    },
-    /// `image:FILE`.
-    Image(PathBuf),
-}
-
-impl FromStr for ApertureName {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        const FORMS: &str = "use disc, ring:INNER (0 to below 1), polygon:N[:ROTATION_DEG[:CURVATURE]] (N 3 to 16, \
-                             CURVATURE 0 to 1), heart, star:N (3 to 16) or image:FILE";
-        if let Some(file) = text.strip_prefix("image:").filter(|file| !file.is_empty()) {
-            return Ok(ApertureName::Image(file.into()));
-        }
-        let parts: Vec<&str> = text.split(':').collect();
-        let corners = |text: &str| text.parse().ok().filter(|n| (3..=16).contains(n));
-        let name = match parts[..] {
-            ["disc"] => Some(ApertureName::Disc),
-            ["heart"] => Some(ApertureName::Heart),
-            ["ring", inner] => {
-                number_in(inner, 0.0, 1.0).filter(|r| *r < 1.0).map(|inner| ApertureName::Ring { inner })
-            }
-            ["star", points] => corners(points).map(|points| ApertureName::Star { points }),
-            ["polygon", blades, ref rest @ ..] if rest.len() <= 2 => (|| {
-                Some(ApertureName::Polygon {
-                    blades: corners(blades)?,
-                    rotation_deg: rest.first().map_or(Some(0.0), |text| number_in(text, -360.0, 360.0))?,
-                    curvature: rest.get(1).map_or(Some(0.0), |text| number_in(text, 0.0, 1.0))?,
-                })
-            })(),
-            _ => None,
-        };
-        name.ok_or_else(|| FORMS.to_string())
-    }
-}
-
-impl fmt::Display for ApertureName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ApertureName::Disc => f.write_str("disc"),
-            ApertureName::Ring { inner } => write!(f, "ring:{inner}"),
-            ApertureName::Polygon { blades, rotation_deg, curvature } => {
-                write!(f, "polygon:{blades}")?;
-                if *rotation_deg != 0.0 || *curvature != 0.0 {
-                    write!(f, ":{rotation_deg}")?;
-                }
-                if *curvature != 0.0 {
-                    write!(f, ":{curvature}")?;
-                }
-                Ok(())
-            }
-            ApertureName::Heart => f.write_str("heart"),
-            ApertureName::Star { points } => write!(f, "star:{points}"),
-            ApertureName::Image(file) => write!(f, "image:{}", file.display()),
-        }
-    }
-}
-
-impl ApertureName {
-    /// The aperture, with the radial `intensity` -1 to 1.
-    ///
-    /// # Errors
-    /// The picture of `image:FILE` cannot be read.
-    pub fn load(&self, intensity: f32) -> Result<Aperture, CliError> {
-        let shape = match *self {
-            ApertureName::Disc => Shape::Disc,
-            ApertureName::Ring { inner } => Shape::Ring { inner },
-            ApertureName::Polygon { blades, rotation_deg, curvature } => {
-                Shape::Polygon { blades, rotation_deg, curvature }
-            }
-            ApertureName::Heart => Shape::Heart,
-            ApertureName::Star { points } => Shape::Star { points },
-            ApertureName::Image(ref file) => {
-                let (width, height, grey) = read_grey(file)?;
-                Shape::Picture(Arc::new(Picture { width, height, grey }))
-            }
-        };
-        Ok(Aperture { shape, intensity })
-    }
-}
-
-fn number_in(text: &str, low: f32, high: f32) -> Option<f32> {
-    text.trim().parse().ok().filter(|number| (low..=high).contains(number))
 }
 
 /// A parser of numbers from `low` to `high`, both accepted.

@@ -2,6 +2,9 @@
 //!
 //! The focus moves like a lens, in dioptres (1/m): it eases towards its target and does not follow small changes.
 
+use std::fmt;
+use std::str::FromStr;
+
 use crate::frame::DepthMap;
 
 /// What the lens focuses on.
@@ -18,6 +21,29 @@ pub enum FocusRule {
         /// Fraction of the height, from the top.
         y: f32,
     },
+}
+
+impl FromStr for FocusRule {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let within = |text: &str, most: f32| text.trim().parse().ok().filter(|number| (0.0..=most).contains(number));
+        let rule = match text.split_once(',') {
+            None if text == "auto" => Some(Self::Auto),
+            None => within(text, f32::MAX).filter(|metres| *metres > 0.0).map(Self::Metres),
+            Some((x, y)) => within(x, 1.0).zip(within(y, 1.0)).map(|(x, y)| Self::Point { x, y }),
+        };
+        rule.ok_or_else(|| "use METRES above 0, auto, or X,Y as fractions of width and height (0 to 1)".to_string())
+    }
+}
+
+impl fmt::Display for FocusRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Metres(metres) => write!(f, "{metres}"),
+            Self::Point { x, y } => write!(f, "{x},{y}"),
+        }
+    }
 }
 
 /// Used when nothing was ever known to focus on: the distance of somebody at a desk.

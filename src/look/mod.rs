@@ -3,33 +3,29 @@
 //! The command line and the preview window make looks; what runs them, [`crate::bokeh`] and [`crate::pipeline`], is
 //! told of one picture size.
 
+mod aperture;
+pub mod defaults;
+pub mod flags;
+pub mod presets;
+mod strength;
 mod tilt;
 
 use std::path::PathBuf;
 
+pub use aperture::ApertureName;
+pub use strength::Strength;
 pub use tilt::Tilt;
 
 use crate::bokeh::{self, aperture::Aperture};
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
-use crate::optics::{CocField, Lens};
+use crate::optics::CocField;
 use crate::pipeline::{CocAtInfinity, CocRule, QualityRule};
 
 /// CoC radius at infinity, as a fraction of the picture's height: a portrait lens wide open.
 pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
 /// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
 pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
-
-/// How strong the blur is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Strength {
-    /// A fraction of the picture's height.
-    Default,
-    /// CoC radius at infinity, in pixels.
-    AtInfinity(f32),
-    /// What this lens does at the distance of focus.
-    Lens(Lens),
-}
 
 /// Whether depth is refined before the blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +47,7 @@ pub struct Look {
     pub method: bokeh::Method,
     /// Where the focal plane is.
     pub focus: FocusRule,
-    /// Depth range around the focal plane that stays sharp, in metres, 0 or more.
+    /// All within half of this to either side of the focal plane is sharp, in metres, >= 0.
     pub focus_range_m: f32,
     /// How strong the blur is.
     pub strength: Strength,
@@ -76,6 +72,26 @@ pub struct Look {
 }
 
 impl Look {
+    /// Everything as it is where nothing is said, with this effect.
+    pub fn plain(effect: Option<bokeh::Effect>) -> Self {
+        Self {
+            effect,
+            method: bokeh::Method::Layered,
+            focus: FocusRule::Auto,
+            focus_range_m: defaults::FOCUS_RANGE_M,
+            strength: Strength::Default,
+            max_coc_px: None,
+            refine: Refine::Auto,
+            tilt: defaults::TILT,
+            aperture: Aperture::default(),
+            aperture_file: None,
+            rim: defaults::RIM,
+            rank: None,
+            highlights: defaults::HIGHLIGHTS,
+            quality: None,
+        }
+    }
+
     /// The executor's settings for pictures of `size` pixels; none when frames pass through.
     /// `adaptive` says whether the quality may follow the time there is.
     pub fn settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
@@ -109,8 +125,9 @@ impl Look {
                 focus: self.focus,
                 lens: match self.strength {
                     Strength::Lens(lens) => CocAtInfinity::Lens(lens),
-                    Strength::Default | Strength::AtInfinity(_) => CocAtInfinity::Px(self.even_px(size)),
+                    _ => CocAtInfinity::Px(self.even_px(size)),
                 },
+                range_m: self.focus_range_m,
                 max_coc_px,
             },
         }
@@ -137,6 +154,7 @@ impl Look {
     fn even_px(&self, (width, height): (u32, u32)) -> f32 {
         match (self.strength, self.focus) {
             (Strength::Default, _) => height as f32 * COC_AT_INFINITY_PER_HEIGHT,
+            (Strength::Percent(percent), _) => height as f32 * percent / 100.0,
             (Strength::AtInfinity(radius_px), _) => radius_px,
             (Strength::Lens(lens), FocusRule::Metres(focus_m)) => lens.coc_at_infinity_px(focus_m, width),
             // Whatever the lens may give: the largest CoC is the bound.
@@ -149,8 +167,13 @@ impl Look {
     fn max_coc_px(&self, size: (u32, u32)) -> f32 {
         let by_height_px = size.1 as f32 * MAX_COC_PER_HEIGHT;
         self.max_coc_px.unwrap_or(match self.strength {
-            Strength::AtInfinity(radius_px) => by_height_px.max(radius_px),
+            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.even_px(size)),
             Strength::Default | Strength::Lens(_) => by_height_px,
         })
     }
+}
+
+/// The number that `text` is, if it lies from `low` to `high`.
+pub(crate) fn number_in(text: &str, low: f32, high: f32) -> Option<f32> {
+    text.trim().parse().ok().filter(|number| (low..=high).contains(number))
 }

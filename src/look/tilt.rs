@@ -1,5 +1,6 @@
 //! The sharp band of tilt-shift.
 
+use std::fmt;
 use std::str::FromStr;
 
 use crate::optics::Ramp;
@@ -32,6 +33,12 @@ impl FromStr for Tilt {
         })();
         tilt.filter(|_| parts.next().is_none())
             .ok_or_else(|| "use CENTER_Y[:BAND[:ANGLE_DEG]], the first two from 0 to 1, such as 0.6:0.1:15".to_string())
+    }
+}
+
+impl fmt::Display for Tilt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.center_y, self.band, self.angle_deg)
     }
 }
 

@@ -56,6 +56,7 @@ struct DepthCoc {
     focus: Focus,
     maker: Maker,
     lens: CocAtInfinity,
+    range_m: f32,
     max_coc_px: f32,
 }
 
@@ -69,10 +70,11 @@ impl Coc {
     fn new(rule: CocRule, refine: bool) -> Self {
         match rule {
             CocRule::Fixed(field) => Self::Fixed(field),
-            CocRule::Depth { focus, lens, max_coc_px } => Self::Depth(Box::new(DepthCoc {
+            CocRule::Depth { focus, lens, range_m, max_coc_px } => Self::Depth(Box::new(DepthCoc {
                 focus: Focus::new(focus),
                 maker: Maker::new(refine),
                 lens,
+                range_m,
                 max_coc_px,
             })),
         }
@@ -81,9 +83,9 @@ impl Coc {
     /// Follows another rule, from where the lens stands now.
     fn follow(&mut self, rule: CocRule, refine: bool) {
         match (self, rule) {
-            (Self::Depth(coc), CocRule::Depth { focus, lens, max_coc_px }) => {
+            (Self::Depth(coc), CocRule::Depth { focus, lens, range_m, max_coc_px }) => {
                 coc.focus.follow(focus);
-                (coc.lens, coc.max_coc_px) = (lens, max_coc_px);
+                (coc.lens, coc.range_m, coc.max_coc_px) = (lens, range_m, max_coc_px);
                 if refine != matches!(coc.maker, Maker::Refine(_)) {
                     coc.maker = Maker::new(refine);
                 }
@@ -110,7 +112,7 @@ impl DepthCoc {
                 refiner.refine(map, color, time_ns);
             }
         }
-        self.lens.field(focus_m, color.width, self.max_coc_px)
+        self.lens.field((focus_m, self.range_m), color.width, self.max_coc_px)
     }
 }
 

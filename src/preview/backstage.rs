@@ -26,6 +26,9 @@ pub struct Preset {
     pub own: bool,
 }
 
+/// An option of the command line that is none of the look: its name and its value.
+pub type Switch = (String, String);
+
 /// A camera's control that can be changed while it streams.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Control {
@@ -93,8 +96,9 @@ pub trait Backstage: Send {
     /// It cannot be opened.
     fn output(&mut self, name: &str, size: (u32, u32), period_ns: u64) -> Result<Box<dyn Sink>, String>;
 
-    /// The command that shows `source` in this look: `bokehcam preview ...`, or `bokehcam stream ...` into `outputs`.
-    fn command(&self, look: &Look, source: &str, outputs: &[String]) -> String;
+    /// The command that shows `source` in this look: `bokehcam preview ...` with the window's `switches`, or
+    /// `bokehcam stream ...` into `outputs`.
+    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String;
 
     /// The presets, the person's own last, each upon `look`.
     fn presets(&mut self, look: &Look) -> Vec<Preset>;

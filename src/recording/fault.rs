@@ -163,6 +163,9 @@ pub enum PictureFault {
     /// The pixels do not make a picture.
     #[error("cannot be encoded: {0}")]
     Encoding(String),
+    /// A picture that does not say how it was made.
+    #[error("no snapshot: it has no settings of bokehcam in it; name one, or give the settings themselves")]
+    NoSettings,
     /// A picture that holds something else than depth.
     #[error("{0} is not depth; export depth as a 16-bit grey PNG")]
     NotDepth(&'static str),

@@ -1,9 +1,10 @@
-//! Recordings on disk, read and written frame by frame; and single pictures ([`still`]).
+//! Recordings on disk, read and written frame by frame; and single pictures ([`still`], [`snapshot`]).
 //!
 //! A [`Recording`] is opened by its folder, and its layout is recognised by its content. [`tum`] is the layout that
 //! is read and written; `kitti`, `euroc` and `middlebury` are read, and have two eyes.
 
 pub mod geometry;
+pub mod snapshot;
 pub mod still;
 pub mod tum;
 

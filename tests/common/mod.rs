@@ -67,7 +67,8 @@ pub fn settings(effect: Effect) -> Settings {
     }
 }
 
-pub const DOF: CocField = CocField::Depth(DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, max_coc_px: 18.0 });
+pub const DOF: CocField =
+    CocField::Depth(DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 18.0 });
 
 pub fn coc(effect: Effect, height: u32) -> CocField {
     match effect {

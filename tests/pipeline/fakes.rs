@@ -261,7 +261,12 @@ pub struct Setup {
 }
 
 pub fn dof() -> CocRule {
-    CocRule::Depth { focus: FocusRule::Point { x: 0.0, y: 0.0 }, lens: CocAtInfinity::Px(8.0), max_coc_px: 20.0 }
+    CocRule::Depth {
+        focus: FocusRule::Point { x: 0.0, y: 0.0 },
+        lens: CocAtInfinity::Px(8.0),
+        range_m: 0.0,
+        max_coc_px: 20.0,
+    }
 }
 
 pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {

@@ -201,6 +201,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
                 coc: CocRule::Depth {
                     focus: FocusRule::Point { x: focus.0, y: focus.1 },
                     lens: CocAtInfinity::Px(8.0),
+                    range_m: 0.0,
                     max_coc_px: 16.0,
                 },
                 ..simple(Box::new(TwoPlanes(1)), fake_sink(&received), &stop, Pace::Asap)

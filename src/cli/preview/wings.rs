@@ -1,19 +1,21 @@
 //! What the window asks for by name, got as the other commands get it.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use super::super::config::Executor;
-use super::super::depth;
 use super::super::options::{self, Streaming};
-use super::super::settings;
+use super::super::settings::SettingsFile;
 use super::super::source::{Source, SourceName, Wanted};
+use super::super::values::Effect;
+use super::super::{command_line, depth, presets};
 use crate::bokeh::{self, Backend, Bokeh};
 use crate::clock::Clock;
 use crate::compute::device::Device;
 use crate::look::Look;
-use crate::preview::backstage::{Backstage, Choice, Control, Opened, Preset};
+use crate::preview::backstage::{Backstage, Choice, Control, Opened, Preset, Switch};
 use crate::sink::{self, Sink, Target};
 
 /// What is said when there is nothing to look at but our own scene.
@@ -27,18 +29,29 @@ pub(super) struct Wings {
     executor: Executor,
     /// The GPU that blurs and draws, where one does.
     device: Option<Arc<Device>>,
-    settings_file: Option<PathBuf>,
+    /// The settings file, where one was chosen.
+    chosen: Option<PathBuf>,
+    /// What was said of other things than the look.
+    given: Vec<(String, String)>,
+    /// Controls that were set, by name.
+    set: BTreeMap<String, i64>,
     /// The camera that was opened last, where its controls can be set.
     camera: Option<String>,
 }
 
 impl Wings {
     /// Opens what is asked for as `parts` say.
-    pub fn new(parts: &Streaming, executor: Executor, device: Option<Arc<Device>>) -> Self {
+    pub fn new(
+        parts: &Streaming,
+        executor: &Executor,
+        device: Option<Arc<Device>>,
+        chosen: Option<PathBuf>,
+        given: Vec<(String, String)>,
+    ) -> Self {
         let mut parts = parts.clone();
         // Of depth the window may make use later.
-        parts.blur.effect = None;
-        Self { parts, executor, device, settings_file: settings::user_file(), camera: None }
+        parts.blur.effect = Effect::Auto;
+        Self { parts, executor: executor.clone(), device, chosen, given, set: BTreeMap::new(), camera: None }
     }
 
     fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
@@ -85,6 +98,7 @@ impl Backstage for Wings {
             name => name.to_owned(),
         };
         let (source, source_name) = self.open_source(&name)?;
+        self.set.clear();
         self.camera = devices::camera_of(&source_name);
         let controls = self.camera.as_deref().map(devices::controls).unwrap_or_default();
         let (has_depth, measured) = (source.has_depth(), source.is_measured());
@@ -93,7 +107,11 @@ impl Backstage for Wings {
 
     fn set_control(&mut self, name: &str, value: i64) -> Result<Vec<Control>, String> {
         match &self.camera {
-            Some(camera) => devices::set_control(camera, name, value),
+            Some(camera) => {
+                let controls = devices::set_control(camera, name, value)?;
+                self.set.insert(name.to_owned(), value);
+                Ok(controls)
+            }
             None => Err("this source has no controls".to_owned()),
         }
     }
@@ -114,27 +132,34 @@ impl Backstage for Wings {
         target.open(&options).map_err(|error| error.to_string())
     }
 
-    fn command(&self, look: &Look, source: &str, outputs: &[String]) -> String {
-        {
-            let _ = (look, source, outputs);
-            String::new()
+    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        let mut switches = match outputs {
+            [] => switches.to_vec(),
+            // They are the window's own.
+            _ => Vec::new(),
+        };
+        let is_new = |(name, _): &&Switch| !switches.iter().any(|(other, _)| other == name);
+        let given: Vec<Switch> = self.given.iter().filter(is_new).cloned().collect();
+        switches.extend(given);
+        if !self.set.is_empty() {
+            let controls: Vec<String> = self.set.iter().map(|(name, value)| format!("{name}={value}")).collect();
+            switches.push(("control".into(), controls.join(",")));
         }
+        command_line::equivalent(source, outputs, &look.flags(), &switches)
     }
 
     fn presets(&mut self, look: &Look) -> Vec<Preset> {
-        let _ = look;
-        let presets: Vec<(String, Look, bool)> = Vec::new();
-        presets.into_iter().map(|(name, look, own)| Preset { name, look, own }).collect()
+        let file = SettingsFile::load(self.chosen.as_deref()).unwrap_or_else(|error| {
+            tracing::warn!("{error}");
+            SettingsFile::default()
+        });
+        let presets = presets::all_upon(&file, look, true).into_iter();
+        presets.map(|presets::Upon { name, look, own }| Preset { name, look, own }).collect()
     }
 
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
-        let Some(file) = &self.settings_file else {
-            return Err("there is no place for settings: set HOME or XDG_CONFIG_HOME".to_owned());
-        };
-        {
-            let _ = (file, name, look);
-            Ok(())
-        }
+        let saved = presets::file_to_save(self.chosen.as_deref());
+        saved.and_then(|file| presets::save(&file, name, &look.every_flag())).map_err(|error| error.to_string())
     }
 }
 

@@ -202,7 +202,7 @@ mod tests {
         for rig in [RIG, StereoRig::assumed(640), StereoRig { focal_px: 721.5, baseline_m: 0.54, ..RIG }] {
             let mut map = DepthMap::default();
             metres(&disparity, &rig, &mut map);
-            let coc = DepthCoc { coc_at_infinity_px: 12.0, focus_m: map.metres[2], max_coc_px: 100.0 };
+            let coc = DepthCoc { coc_at_infinity_px: 12.0, focus_m: map.metres[2], range_m: 0.0, max_coc_px: 100.0 };
             let in_focus_px = 16.0 + rig.doffs_px;
             for (&d_px, &z_m) in disparity.px.iter().zip(&map.metres) {
                 let expected_px = 12.0 / in_focus_px * (16.0 - d_px);

@@ -12,14 +12,15 @@ use std::thread::{self, JoinHandle};
 
 use live::Live;
 
-use super::backstage::Backstage;
+use super::backstage::{Backstage, Switch};
 use super::state::{Effect, Output, Source, Told};
-use crate::bokeh;
 use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
 use crate::look::Look;
+use crate::optics::CocField;
 use crate::pipeline::{PipelineError, View, Wanted};
+use crate::recording::snapshot::{self, Snapshot};
 use crate::sink::switch::{Fate, Told as Written};
 use crate::stats::Report;
 
@@ -64,8 +65,8 @@ pub struct Still {
     pub color: ColorImage,
     /// What it was blurred by.
     pub depth: Option<DepthMap>,
-    /// Distance of the focal plane.
-    pub focus_m: Option<f32>,
+    /// The radius of every pixel.
+    pub coc: CocField,
     /// The rung that it was blurred at.
     pub quality: Option<Quality>,
 }
@@ -74,6 +75,7 @@ pub struct Still {
 enum Order {
     Do(Effect),
     Save(Box<Still>),
+    Copy(Vec<Switch>),
     /// What became of an output.
     Wrote(Written),
     /// The run of this number ended.
@@ -128,6 +130,11 @@ impl Session {
     /// Saves a frame.
     pub fn save(&self, still: Still) {
         let _ = self.orders.send(Order::Save(Box::new(still)));
+    }
+
+    /// Has the equivalent command put together; `switches` are the window's own.
+    pub fn copy(&self, switches: Vec<Switch>) {
+        let _ = self.orders.send(Order::Copy(switches));
     }
 
     /// The next news, if there are any.
@@ -207,6 +214,7 @@ impl Host {
                     }
                     Order::Do(effect) => self.bring_about(effect),
                     Order::Save(still) => self.save(&still),
+                    Order::Copy(switches) => self.copy(&switches),
                     Order::Wrote(written) => self.wrote(&written),
                     Order::Ended(run, ended) => self.ended(run, *ended),
                     Order::Close => {
@@ -250,14 +258,8 @@ impl Host {
                 }
                 Err(line) => self.news.note(line),
             },
-            Effect::CopyCommand => {
-                let outputs: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
-                let command = self.backstage.command(&self.look, &self.source, &outputs);
-                self.news.note(format!("copied: {command}"));
-                self.news.send(Heard::Copy(command));
-            }
             // These are the window's own, or come another way.
-            Effect::Look(_) | Effect::Snapshot | Effect::FullScreen(_) | Effect::Close => {}
+            Effect::Look(_) | Effect::Snapshot | Effect::CopyCommand | Effect::FullScreen(_) | Effect::Close => {}
         }
     }
 
@@ -318,6 +320,8 @@ impl Host {
         {
             self.news.note(line);
         }
+        // They change other looks than before.
+        self.news.tell(Told::Presets(self.backstage.presets(&self.look)));
     }
 
     fn begin(&mut self, mut output: Output) {
@@ -338,6 +342,13 @@ impl Host {
     fn free_name(&self) -> PathBuf {
         let name = |number: u32| self.folder.join(format!("bokehcam-{number}.mp4"));
         (1..u32::MAX).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
+    }
+
+    fn copy(&self, switches: &[Switch]) {
+        let outputs: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
+        let command = self.backstage.command(&self.look, &self.source, &outputs, switches);
+        self.news.note(format!("Copied: {command}"));
+        self.news.send(Heard::Copy(command));
     }
 
     fn wrote(&mut self, Written { member, fate }: &Written) {
@@ -385,13 +396,12 @@ impl Host {
             Some(live) => live.effective(&self.look),
             None => self.look.clone(),
         };
-        let look = Look { quality: still.quality.or(look.quality), ..look };
-        let focus = match (look.effect, still.focus_m) {
-            (Some(bokeh::Effect::Dof), Some(focus_m)) => crate::depth::focus::FocusRule::Metres(focus_m),
-            _ => look.focus,
-        };
-        let look = Look { focus, ..look };
+        let settings = look.flags_of_frame(&still.coc, still.quality);
         let Still { picture, color, depth, .. } = still;
-        let _ = (picture, color, depth, look);
+        let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
+        match snapshot::save(&self.folder, "bokehcam", &snapshot) {
+            Ok(path) => self.news.note(format!("Saved {}", path.display())),
+            Err(error) => self.news.note(error.to_string()),
+        }
     }
 }

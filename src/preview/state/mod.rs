@@ -6,6 +6,7 @@ mod action;
 mod apply;
 mod hear;
 mod history;
+mod switches;
 #[cfg(test)]
 mod tests;
 pub mod tweak;

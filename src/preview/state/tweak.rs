@@ -19,6 +19,7 @@ pub fn amount(look: &Look, height_px: u32) -> Option<f32> {
     match look.strength {
         Strength::Default => Some(COC_AT_INFINITY_PER_HEIGHT),
         Strength::AtInfinity(radius_px) => Some(radius_px / height_px.max(1) as f32),
+        Strength::Percent(percent) => Some(percent / 100.0),
         Strength::Lens(_) => None,
     }
 }
@@ -30,7 +31,7 @@ pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
         // Below, blur is none to be seen; from there one gets back by a first step.
         Some(share) => {
             let share = if share < least && factor < 1.0 { 0.0 } else { share.max(least / 2.0) * factor };
-            look.strength = Strength::AtInfinity(share.min(MAX_COC_PER_HEIGHT) * height_px as f32);
+            look.strength = Strength::Percent(share.min(MAX_COC_PER_HEIGHT) * 100.0);
         }
         None => f_number_by(look, 1.0 / factor),
     }
@@ -40,7 +41,7 @@ pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
 pub fn f_number_by(look: &mut Look, factor: f32) {
     let lens = match look.strength {
         Strength::Lens(lens) => Lens { f_number: lens.f_number * factor, ..lens },
-        Strength::Default | Strength::AtInfinity(_) => LENS,
+        Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => LENS,
     };
     let f_number = lens.f_number.clamp(*F_NUMBERS.start(), *F_NUMBERS.end());
     look.strength = Strength::Lens(Lens { f_number, ..lens });

@@ -241,6 +241,7 @@ impl App {
         for effect in self.state.apply(action) {
             match effect {
                 Effect::Snapshot => self.snapshot(),
+                Effect::CopyCommand => self.session.copy(self.state.switches()),
                 Effect::FullScreen(on) => {
                     if let Some(gfx) = &self.gfx {
                         gfx.window.set_fullscreen(on.then_some(Fullscreen::Borderless(None)));
@@ -280,7 +281,7 @@ impl App {
             picture: view.picture.clone(),
             color: (**view.color.as_ref().unwrap_or(&view.picture)).clone(),
             depth: view.depth.as_ref().map(|depth| (**depth).clone()),
-            focus_m: self.state.focus_m,
+            coc: view.coc,
             quality: view.trace.quality,
         });
     }

@@ -28,7 +28,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     }
     match sheet.look.strength {
         Strength::Lens(lens) => by_numbers(ui, sheet, lens),
-        Strength::Default | Strength::AtInfinity(_) => by_amount(ui, sheet),
+        Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => by_amount(ui, sheet),
     }
     largest(ui, sheet);
 }
@@ -45,7 +45,7 @@ fn by_amount(ui: &mut Ui, sheet: &mut Sheet) {
         around: ["", " %"],
     };
     if number(ui, how, &mut percent) {
-        sheet.look.strength = Strength::AtInfinity(percent / 100.0 * sheet.height_px as f32);
+        sheet.look.strength = Strength::Percent(percent);
         sheet.changed(true, "amount");
     }
     if sheet.follows_depth() && sheet.state.focus_m.is_some() {

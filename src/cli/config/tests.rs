@@ -1,0 +1,186 @@
+use clap::{Args, Command, FromArgMatches};
+
+use super::*;
+use crate::bokeh::Effect;
+use crate::bokeh::aperture::{Aperture, Shape};
+use crate::frame::ColorImage;
+use crate::look::{Refine, Tilt, flags};
+use crate::optics::{CocField, Lens};
+use crate::pipeline::CocRule;
+
+const SIZE: (u32, u32) = (640, 450);
+
+fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, CliError> {
+    let command = options::Every::augment_args(Command::new("test").no_binary_name(true));
+    let matches = command.try_get_matches_from(flags).unwrap();
+    let every = options::Every::from_arg_matches(&matches).unwrap();
+    look(&every.blur, &every.aperture, every.computing.quality, has_depth)
+}
+
+fn refusal(flags: &[&str], has_depth: bool) -> String {
+    resolve(flags, has_depth).unwrap_err().to_string()
+}
+
+#[test]
+fn the_effect_follows_what_the_source_has() {
+    assert_eq!(resolve(&[], true).unwrap().effect, Some(bokeh::Effect::Dof));
+    assert_eq!(resolve(&[], false).unwrap().effect, Some(bokeh::Effect::Blur));
+    assert_eq!(resolve(&["--depth=none"], true).unwrap().effect, Some(bokeh::Effect::Blur));
+    assert!(resolve(&["--effect=none"], true).unwrap().settings(SIZE, false).is_none());
+    assert!(refusal(&["--effect=dof"], false).contains("the source has none"));
+    assert!(refusal(&["--effect=dof", "--depth=none"], true).contains("--depth none"));
+}
+
+#[test]
+fn the_strength_is_a_share_of_the_height_a_radius_or_a_lens() {
+    let rule = |flags: &[&str]| resolve(flags, true).unwrap().coc_rule(SIZE);
+    let depth = |flags: &[&str]| match rule(flags) {
+        CocRule::Depth { lens, max_coc_px, .. } => match lens.field((2.0, 0.0), SIZE.0, max_coc_px) {
+            CocField::Depth(depth) => (depth.coc_at_infinity_px, depth.max_coc_px),
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(depth(&[]), (10.0, 27.0));
+    assert_eq!(depth(&["--coc-at-infinity=40"]), (40.0, 40.0));
+    assert_eq!(depth(&["--coc-at-infinity=40", "--max-coc=30"]), (40.0, 30.0));
+    assert_eq!(depth(&["--coc-at-infinity=4%"]), (18.0, 27.0));
+    assert_eq!(depth(&["--coc-at-infinity=8%"]), (36.0, 36.0));
+    assert_eq!(depth(&["--coc-at-infinity=auto", "--max-coc=auto"]), depth(&[]));
+    let lens = ["--f-number=2", "--focal-length=50", "--sensor-width=36"];
+    assert!((depth(&lens).0 - 5.698).abs() < 1e-2);
+    assert!(refusal(&lens[..2], true).contains("--sensor-width"));
+    assert!(refusal(&lens, false).contains("--focus METRES"));
+    let even = CocRule::Fixed(CocField::Uniform { radius_px: 7.0 });
+    assert_eq!(rule(&["--effect=blur", "--coc-at-infinity=7"]), even);
+}
+
+#[test]
+fn the_executor_is_made_for_every_radius_that_can_come() {
+    let dof = resolve(&["--f-number=2", "--focal-length=50", "--sensor-width=36"], true).unwrap();
+    let settings = dof.settings(SIZE, false).unwrap();
+    assert_eq!((settings.far_max_px, settings.near_max_px), (27.0, 27.0));
+    let blur = resolve(&["--coc-at-infinity=7"], false).unwrap().settings(SIZE, false).unwrap();
+    assert_eq!((blur.far_max_px, blur.near_max_px), (7.0, 0.0));
+}
+
+#[test]
+fn tilt_shift_is_sharp_in_its_band_and_strongest_in_the_farthest_corner() {
+    for angle in ["0", "30", "-90"] {
+        let tilt = format!("--tilt=0.25:0.1:{angle}");
+        let blur = resolve(&["--effect=tilt-shift", "--coc-at-infinity=8", &tilt], true).unwrap();
+        let CocRule::Fixed(CocField::Ramp(ramp)) = blur.coc_rule(SIZE) else { panic!("no ramp") };
+        assert_eq!(ramp.coc_px(320.0, 112.5), 0.0);
+        let corners = [(0.0, 0.0), (640.0, 0.0), (0.0, 450.0), (640.0, 450.0)];
+        let most = corners.map(|(x, y)| ramp.coc_px(x, y)).into_iter().fold(0.0, f32::max);
+        assert!((most - 8.0).abs() < 1e-3, "{angle}: {most}");
+    }
+}
+
+#[test]
+fn the_range_of_focus_reaches_the_lens() {
+    let field = |flags: &[&str]| match resolve(flags, true).unwrap().coc_rule(SIZE) {
+        CocRule::Depth { lens, range_m, max_coc_px, .. } => match lens.field((2.0, range_m), SIZE.0, max_coc_px) {
+            CocField::Depth(depth) => depth,
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
+    };
+    assert_eq!((field(&[]).near_m(), field(&[]).far_m()), (2.0, 2.0));
+    let wide = field(&["--focus-range=1"]);
+    assert_eq!((wide.near_m(), wide.far_m(), wide.focus_m), (1.5, 2.5, 2.0));
+    assert_eq!(field(&["--focus-range=100"]).near_m(), 0.2);
+}
+
+/// Looks that differ from the plain one in every field, in every form that it has.
+fn looks(picture: &std::path::Path) -> Vec<Look> {
+    let plain = Look::plain(Some(Effect::Dof));
+    let mut looks = vec![plain.clone()];
+    let mut add = |change: &dyn Fn(&mut Look)| {
+        let mut look = plain.clone();
+        change(&mut look);
+        assert_ne!(look, plain);
+        looks.push(look);
+    };
+    for effect in [None, Some(Effect::Blur), Some(Effect::TiltShift)] {
+        add(&|look| look.effect = effect);
+    }
+    // Numbers that have no short form in binary, large ones and small ones.
+    for number in [0.1, 1.0 / 3.0, 1e-7, 0.3 - 0.1, 1e-40, 0.999_999_94] {
+        add(&|look| look.rim = number);
+        add(&|look| look.aperture.intensity = -number);
+        add(&|look| look.focus = FocusRule::Metres(number));
+        add(&|look| look.focus = FocusRule::Point { x: number, y: 1.0 - number });
+        add(&|look| look.strength = Strength::Percent(number));
+        add(&|look| look.tilt = Tilt { center_y: number, band: 0.0, angle_deg: -360.0 * number });
+        add(&|look| look.aperture.shape = Shape::Ring { inner: number });
+        add(&|look| {
+            look.aperture.shape = Shape::Polygon { blades: 7, rotation_deg: -100.0 * number, curvature: number };
+        });
+        add(&|look| look.aperture.shape = Shape::Polygon { blades: 16, rotation_deg: 0.0, curvature: number });
+    }
+    for number in [0.0, 12.0, 1e30, 3.4e38] {
+        add(&|look| look.strength = Strength::AtInfinity(number));
+        add(&|look| look.max_coc_px = Some(number));
+        add(&|look| look.focus_range_m = number + 0.25);
+    }
+    add(&|look| look.highlights = 999.5);
+    add(&|look| {
+        look.strength = Strength::Lens(Lens { focal_length_mm: 85.0, f_number: 1.2, sensor_width_mm: 35.9 });
+    });
+    for shape in [Shape::Heart, Shape::Star { points: 5 }, Shape::Ring { inner: 0.0 }] {
+        add(&|look| look.aperture = Aperture { shape: shape.clone(), intensity: 0.5 });
+    }
+    add(&|look| {
+        look.aperture = ApertureName::Image(picture.to_owned()).load(-1.0).unwrap();
+        look.aperture_file = Some(picture.to_owned());
+    });
+    add(&|look| look.method = bokeh::Method::Gather);
+    for refine in [Refine::On, Refine::Off] {
+        add(&|look| look.refine = refine);
+    }
+    for rank in [bokeh::Rank::Terms(1), bokeh::Rank::Terms(16), bokeh::Rank::Full] {
+        add(&|look| look.rank = Some(rank));
+    }
+    for quality in Quality::ALL {
+        add(&|look| look.quality = Some(quality));
+    }
+    looks
+}
+
+#[test]
+fn the_flags_of_a_look_give_the_look() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("a cat's, odd: name.png");
+    crate::recording::still::write_color(&picture, &ColorImage::new(3, 2), false).unwrap();
+    let written = |flags: &[flags::Flag]| -> Vec<String> {
+        flags.iter().map(|(name, value)| format!("--{name}={value}")).collect()
+    };
+    let parsed = |flags: &[flags::Flag]| {
+        let written = written(flags);
+        resolve(&written.iter().map(String::as_str).collect::<Vec<_>>(), true).unwrap()
+    };
+    let looks = looks(&picture);
+    assert_eq!(looks[0].flags(), []);
+    assert_eq!(resolve(&[], true).unwrap(), looks[0]);
+    for (k, look) in looks.iter().enumerate() {
+        assert_eq!(parsed(&look.flags()), *look, "{:?}", look.flags());
+        assert_eq!(parsed(&look.every_flag()), *look);
+        // One change, one setting; a lens is three.
+        let count = if matches!(look.strength, Strength::Lens(_)) { 3 } else { look.flags().len().min(2) };
+        assert_eq!(look.flags().len(), count, "{:?}", look.flags());
+        // From any look to any other, all of the first being there.
+        let other = &looks[(k * 7 + 3) % looks.len()];
+        let mut all: Vec<_> = other.every_flag();
+        let beside = look.flags_beside(other);
+        let is_strength = |name: &str| ["coc-at-infinity", "f-number", "focal-length", "sensor-width"].contains(&name);
+        let strength = beside.iter().any(|(name, _)| is_strength(name));
+        let is_replaced = |name: &str| beside.iter().any(|(other, _)| *other == name) || strength && is_strength(name);
+        all.retain(|(name, _)| !is_replaced(name));
+        all.extend(beside);
+        assert_eq!(parsed(&all), *look);
+    }
+    let names: Vec<_> = looks.iter().flat_map(Look::every_flag).map(|(name, _)| name).collect();
+    assert!(flags::NAMES.iter().all(|name| names.contains(name)) && names.iter().all(|n| flags::NAMES.contains(n)));
+    assert_eq!(written(&Look { rim: 0.1, ..looks[0].clone() }.flags()), ["--rim=0.1"]);
+}

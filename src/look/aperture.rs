@@ -1,0 +1,112 @@
+//! The lens opening as it is written: its picture, if any, not yet read.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use super::number_in;
+use crate::bokeh::aperture::{Aperture, Picture, Shape};
+use crate::recording::RecordingError;
+use crate::recording::still::read_grey;
+
+/// An aperture as it is written: its picture, if any, not yet read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ApertureName {
+    /// A shape by its name and numbers; no [`Shape::Picture`].
+    Drawn(Shape),
+    /// `image:FILE`.
+    Image(PathBuf),
+}
+
+impl FromStr for ApertureName {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        const FORMS: &str = "use disc, ring:INNER (0 to below 1), polygon:N[:ROTATION_DEG[:CURVATURE]] (N 3 to 16, \
+                             CURVATURE 0 to 1), heart, star:N (3 to 16) or image:FILE";
+        if let Some(file) = text.strip_prefix("image:").filter(|file| !file.is_empty()) {
+            return Ok(ApertureName::Image(file.into()));
+        }
+        let parts: Vec<&str> = text.split(':').collect();
+        let corners = |text: &str| text.parse().ok().filter(|n| (3..=16).contains(n));
+        let shape = match parts[..] {
+            ["disc"] => Some(Shape::Disc),
+            ["heart"] => Some(Shape::Heart),
+            ["ring", inner] => number_in(inner, 0.0, 1.0).filter(|r| *r < 1.0).map(|inner| Shape::Ring { inner }),
+            ["star", points] => corners(points).map(|points| Shape::Star { points }),
+            ["polygon", blades, ref rest @ ..] if rest.len() <= 2 => (|| {
+                Some(Shape::Polygon {
+                    blades: corners(blades)?,
+                    rotation_deg: rest.first().map_or(Some(0.0), |text| number_in(text, -360.0, 360.0))?,
+                    curvature: rest.get(1).map_or(Some(0.0), |text| number_in(text, 0.0, 1.0))?,
+                })
+            })(),
+            _ => None,
+        };
+        shape.map(ApertureName::Drawn).ok_or_else(|| FORMS.to_string())
+    }
+}
+
+impl fmt::Display for ApertureName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shape = match self {
+            ApertureName::Image(file) => return write!(f, "image:{}", file.display()),
+            ApertureName::Drawn(shape) => shape,
+        };
+        match shape {
+            Shape::Disc => f.write_str("disc"),
+            Shape::Ring { inner } => write!(f, "ring:{inner}"),
+            Shape::Polygon { blades, rotation_deg, curvature } => {
+                write!(f, "polygon:{blades}")?;
+                if *rotation_deg != 0.0 || *curvature != 0.0 {
+                    write!(f, ":{rotation_deg}")?;
+                }
+                if *curvature != 0.0 {
+                    write!(f, ":{curvature}")?;
+                }
+                Ok(())
+            }
+            Shape::Heart => f.write_str("heart"),
+            Shape::Star { points } => write!(f, "star:{points}"),
+            Shape::Picture(_) => f.write_str("image"),
+        }
+    }
+}
+
+impl ApertureName {
+    /// The aperture, with the radial `intensity` -1 to 1.
+    ///
+    /// # Errors
+    /// The picture of `image:FILE` cannot be read.
+    pub fn load(&self, intensity: f32) -> Result<Aperture, RecordingError> {
+        let shape = match self {
+            ApertureName::Drawn(shape) => shape.clone(),
+            ApertureName::Image(file) => {
+                let (width, height, grey) = read_grey(file)?;
+                Shape::Picture(Arc::new(Picture { width, height, grey }))
+            }
+        };
+        Ok(Aperture { shape, intensity })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn apertures_read_back_what_they_print() {
+        for text in
+            ["disc", "ring:0.5", "polygon:5", "polygon:6:15", "polygon:8:0:0.5", "heart", "star:5", "image:a:b.png"]
+        {
+            assert_eq!(text.parse::<ApertureName>().unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn wrong_apertures_say_what_is_accepted() {
+        for text in ["", "circle", "ring", "ring:1", "ring:nan", "polygon:2", "polygon:5:0:2", "star:99", "image:"] {
+            assert!(text.parse::<ApertureName>().unwrap_err().contains("polygon:N"), "{text}");
+        }
+    }
+}

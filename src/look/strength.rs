@@ -1,0 +1,44 @@
+//! How strong the blur is, for pictures of any size.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::number_in;
+use crate::optics::Lens;
+
+/// How strong the blur is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Strength {
+    /// A fraction of the picture's height.
+    Default,
+    /// CoC radius at infinity, in pixels.
+    AtInfinity(f32),
+    /// CoC radius at infinity, in percent of the picture's height.
+    Percent(f32),
+    /// What this lens does at the distance of focus.
+    Lens(Lens),
+}
+
+impl FromStr for Strength {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let strength = match text.strip_suffix('%') {
+            None if text == "auto" => Some(Self::Default),
+            None => number_in(text, 0.0, f32::MAX).map(Self::AtInfinity),
+            Some(percent) => number_in(percent, 0.0, 100.0).map(Self::Percent),
+        };
+        strength.ok_or_else(|| "use pixels from 0, a share of the height such as 3%, or auto".to_string())
+    }
+}
+
+impl fmt::Display for Strength {
+    /// As the setting `coc-at-infinity` has it; a lens has settings of its own.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Default => f.write_str("auto"),
+            Self::AtInfinity(radius_px) => write!(f, "{radius_px}"),
+            Self::Percent(percent) => write!(f, "{percent}%"),
+            Self::Lens(lens) => write!(f, "{} mm f/{}", lens.focal_length_mm, lens.f_number),
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! What the window shows, as options of the command line.
+
+use super::{Shown, State};
+use crate::preview::backstage::Switch;
+
+impl State {
+    /// The options that show the window as it is, beside those of the look; what is usual is left out.
+    pub fn switches(&self) -> Vec<Switch> {
+        let shown = match self.shown {
+            Shown::Picture => None,
+            Shown::Depth => Some("depth"),
+            Shown::Coc => Some("coc"),
+            Shown::Bins => Some("bins"),
+        };
+        let yes = |on: bool| on.then(|| "true".to_owned());
+        let switches = [
+            ("show", shown.map(str::to_owned)),
+            ("split", self.split.map(|at| format!("{at:.3}"))),
+            ("mirror", yes(self.mirror)),
+            ("full-screen", yes(self.full_screen)),
+            ("instruments", yes(self.instruments)),
+            ("panel", (!self.panel).then(|| "false".to_owned())),
+            ("text-scale", (self.text_scale != 1.0).then(|| format!("{:.2}", self.text_scale))),
+        ];
+        switches.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
+    }
+}

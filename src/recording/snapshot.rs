@@ -1,0 +1,167 @@
+//! Snapshots: a blurred picture that says how it was made, and what it was made of beside it.
+//!
+//! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`. `NAME-color.png` is the picture
+//! before the blur, `NAME-depth.pfm` its depth as the blur had it, in metres.
+
+use std::fs::{self, File};
+use std::io::{self, Cursor, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use super::decode::Scratch;
+use super::error::RecordingError;
+use super::fault::PictureFault;
+use super::still::{write_color, write_depth};
+use crate::frame::{ColorImage, DepthMap};
+
+/// The keyword of the text in a PNG that has the settings.
+pub const KEYWORD: &str = "bokehcam";
+
+/// A frame to keep.
+#[derive(Clone, Copy, Debug)]
+pub struct Snapshot<'a> {
+    /// The picture after the blur.
+    pub picture: &'a ColorImage,
+    /// The picture before the blur.
+    pub color: &'a ColorImage,
+    /// Its depth, if the blur had any.
+    pub depth: Option<&'a DepthMap>,
+    /// The settings, by their flags without the dashes.
+    pub settings: &'a [(&'static str, String)],
+}
+
+/// Saves a frame as `dir/stem.png` and the files beside it; where one of these names is taken, under the first of
+/// `stem-2`, `stem-3` and so on that is free. Makes the folder. Gives back the picture's path. The picture appears
+/// last: where it is, the others are. When something fails, none of them stays.
+///
+/// # Errors
+/// The folder or a file in it cannot be written; `stem` is no plain file name; a setting has a line break.
+pub fn save(dir: &Path, stem: &str, snapshot: &Snapshot) -> Result<PathBuf, RecordingError> {
+    let unfit = |what: &str| RecordingError::picture(&dir.join(stem))(PictureFault::Encoding(what.to_string()));
+    if Path::new(stem).file_name() != Some(stem.as_ref()) {
+        return Err(unfit("its name is no file name"));
+    }
+    if snapshot.settings.iter().any(|(_, value)| value.contains(['\n', '\r'])) {
+        return Err(unfit("a setting has a line break in it"));
+    }
+    let mut png = Vec::new();
+    encode(snapshot, &mut png).map_err(|error| unfit(&error.to_string()))?;
+    fs::create_dir_all(dir).map_err(RecordingError::io("create", dir))?;
+    let mut place = Place::find(dir, stem)?;
+    let files = [beside(&place.path, COLOR), beside(&place.path, DEPTH)];
+    let written = write_color(&files[0], snapshot.color, false)
+        .and_then(|()| snapshot.depth.map_or(Ok(()), |depth| write_depth(&files[1], depth, 1.0, false)))
+        .and_then(|()| place.fill(&png));
+    if written.is_err() {
+        // The first failure is the one to tell.
+        files.iter().chain([&place.part]).for_each(|file| drop(fs::remove_file(file)));
+    }
+    written.map(|()| place.path)
+}
+
+/// What follows the name of the picture in those of the files beside it.
+const COLOR: &str = "-color.png";
+const DEPTH: &str = "-depth.pfm";
+
+/// The picture before the blur and its depth, as they are called beside the snapshot `path`. The depth need not be
+/// there.
+pub fn sources(path: &Path) -> (PathBuf, PathBuf) {
+    (beside(path, COLOR), beside(path, DEPTH))
+}
+
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(ending);
+    path.with_file_name(name)
+}
+
+/// The settings in a snapshot, by their flags without the dashes.
+///
+/// # Errors
+/// The file is missing, no PNG, damaged, or has no settings in it.
+pub fn settings(path: &Path) -> Result<Vec<(String, String)>, RecordingError> {
+    text(path).and_then(|text| parse(&text)).map_err(RecordingError::picture(path))
+}
+
+fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
+    let setting = |line: &str| {
+        let (name, value) = line.strip_prefix("--")?.split_once('=')?;
+        Some((name.to_owned(), value.to_owned()))
+    };
+    let short = |line: &str| line.chars().take(40).collect::<String>();
+    let parsed = |line| {
+        setting(line).ok_or_else(|| PictureFault::Damaged(format!("its setting {:?} is not --NAME=VALUE", short(line))))
+    };
+    text.lines().filter(|line| !line.trim().is_empty()).map(parsed).collect()
+}
+
+/// The text under our keyword.
+fn text(path: &Path) -> Result<String, PictureFault> {
+    let mut scratch = Scratch::default();
+    let file = scratch.read_file(path)?;
+    if !file.starts_with(b"\x89PNG\r\n\x1a\n") {
+        return Err(PictureFault::Format("PNG"));
+    }
+    let fault = |error: png::DecodingError| match error {
+        png::DecodingError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
+        other => PictureFault::Damaged(other.to_string()),
+    };
+    let reader = png::Decoder::new(Cursor::new(file)).read_info().map_err(fault)?;
+    let info = reader.info();
+    if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == KEYWORD) {
+        return chunk.get_text().map_err(fault);
+    }
+    // As other programs write it anew.
+    let plain = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD);
+    let packed = info.compressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD);
+    match (plain, packed) {
+        (Some(chunk), _) => Ok(chunk.text.clone()),
+        (None, Some(chunk)) => chunk.get_text().map_err(fault),
+        (None, None) => Err(PictureFault::NoSettings),
+    }
+}
+
+fn encode(snapshot: &Snapshot, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
+    let lines = snapshot.settings.iter().map(|(name, value)| format!("--{name}={value}\n"));
+    let mut encoder = png::Encoder::new(file, snapshot.picture.width, snapshot.picture.height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    encoder.set_filter(png::Filter::Paeth);
+    encoder.add_itxt_chunk(KEYWORD.to_string(), lines.collect())?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&snapshot.picture.rgb)?;
+    writer.finish()
+}
+
+/// Where a snapshot goes: names that nothing has, kept from others by the unfinished picture.
+struct Place {
+    path: PathBuf,
+    part: PathBuf,
+    file: File,
+}
+
+impl Place {
+    fn find(dir: &Path, stem: &str) -> Result<Self, RecordingError> {
+        for number in 1u32.. {
+            let name = if number == 1 { stem.to_owned() } else { format!("{stem}-{number}") };
+            let path = dir.join(format!("{name}.png"));
+            let part = dir.join(format!("{name}.png.part"));
+            let file = match File::create_new(&part) {
+                Ok(file) => file,
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
+                Err(error) => return Err(RecordingError::io("create", &part)(error)),
+            };
+            let (color, depth) = sources(&path);
+            if [&path, &color, &depth].iter().all(|path| path.symlink_metadata().is_err()) {
+                return Ok(Self { path, part, file });
+            }
+            fs::remove_file(&part).map_err(RecordingError::io("remove", &part))?;
+        }
+        Err(RecordingError::io("create", &dir.join(stem))(io::Error::from(ErrorKind::AlreadyExists)))
+    }
+
+    fn fill(&mut self, bytes: &[u8]) -> Result<(), RecordingError> {
+        let written = self.file.write_all(bytes).and_then(|()| self.file.sync_all());
+        written.and_then(|()| fs::rename(&self.part, &self.path)).map_err(RecordingError::io("write", &self.path))
+    }
+}
