@@ -39,7 +39,8 @@ fn every_file_is_a_pass_or_shared_and_short() {
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
         let known = ["common", "work", "filter", "level", "range", "stereo_common", "stereo_path"]
             .contains(&name.as_str())
-            || ALL.iter().chain(&stereo::ALL).any(|shader| shader.name == name);
+            || ALL.iter().chain(&stereo::ALL).any(|shader| shader.name == name)
+            || name == "present";
         assert!(known, "{} belongs to no pass", path.display());
         let lines = std::fs::read_to_string(&path).expect("a text").lines().count();
         assert!(lines <= 150, "{} has {lines} lines", path.display());
@@ -125,4 +126,25 @@ fn the_array_of_bins_holds_as_many_as_a_plan_has() {
             }
         }
     }
+}
+
+#[cfg(feature = "window")]
+#[test]
+fn what_draws_the_window_validates_and_takes_what_rust_gives_it() {
+    use bokehcam::preview::present::gpu::{PRESENT, WindowUniform};
+
+    let module = parse(PRESENT.source);
+    if let Err(error) = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module) {
+        panic!("{}", error.emit_to_string(PRESENT.source));
+    }
+    let entries: Vec<_> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
+    assert_eq!(entries, ["corner", PRESENT.name]);
+    let kind = module.types.iter().map(|(_, kind)| kind).find(|kind| kind.name.as_deref() == Some("Window"));
+    let Some(naga::TypeInner::Struct { members, span }) = kind.map(|kind| &kind.inner) else { panic!("a struct") };
+    let theirs: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap_or_default(), m.offset as usize)).collect();
+    macro_rules! fields {
+        ($($field:ident),*) => { [$((stringify!($field), offset_of!(WindowUniform, $field))),*] };
+    }
+    assert_eq!(theirs, fields!(area, size, split, mirror, stale, divider, stripes, background));
+    assert_eq!(*span as usize, size_of::<WindowUniform>());
 }

@@ -3,14 +3,19 @@
 
 use std::ops::Range;
 
+use pulp::{Arch, Simd, WithSimd};
+
 /// Fractional bits of the weights of a row's or column's taps.
 const WEIGHT_BITS: u32 = 14;
 /// Fractional bits of a value that is filtered down the columns but not yet along the row; fits 16 bits.
 const VALUE_BITS: u32 = 8;
+/// The weight of a tap that is alone.
+const ONE: u16 = 1 << WEIGHT_BITS;
 
 /// From one size to another.
 #[derive(Debug, Default)]
 pub struct Scale {
+    arch: Arch,
     across: Axis,
     down: Axis,
 }
@@ -28,41 +33,79 @@ impl Scale {
         if columns.is_empty() {
             return;
         }
-        let stride = 3 * self.across.from;
-        scratch.resize(stride, 0);
-        let (first, weights) = self.down.taps(y);
-        let needed = self.across.needs(&columns);
+        // A pixel is read as four values.
+        scratch.resize(3 * self.across.from + 1, 0);
+        self.arch.dispatch(Row { scale: self, from, y, columns, row: scratch, scaled });
+    }
+}
+
+/// Some columns of one row.
+struct Row<'a> {
+    scale: &'a Scale,
+    from: &'a [u8],
+    y: usize,
+    columns: Range<usize>,
+    row: &'a mut [u16],
+    scaled: &'a mut [u8],
+}
+
+impl WithSimd for Row<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { scale: Scale { across, down, .. }, from, y, columns, row, scaled } = self;
+        let stride = 3 * across.from;
+        let (first, weights) = down.taps(y);
+        let needed = across.needs(&columns);
         let needed = 3 * needed.start..3 * needed.end;
-        filter_down(&from[stride * first + needed.start..], stride, weights, &mut scratch[needed]);
-        self.across.filter(scratch, columns, scaled);
+        filter_down(&from[stride * first + needed.start..], stride, weights, &mut row[needed]);
+        match across.taps {
+            2 => across.filter::<2>(row, columns, scaled),
+            3 => across.filter::<3>(row, columns, scaled),
+            4 => across.filter::<4>(row, columns, scaled),
+            _ => across.filter_many(row, columns, scaled),
+        }
     }
 }
 
 /// The weighted sum of `weights.len()` rows of `stride` values each.
+#[inline(always)]
 fn filter_down(rows: &[u8], stride: usize, weights: &[u16], row: &mut [u16]) {
-    const SHIFT: u32 = WEIGHT_BITS - VALUE_BITS;
+    if let Some(alone) = weights.iter().position(|&weight| weight == ONE) {
+        for (sum, &value) in row.iter_mut().zip(&rows[alone * stride..]) {
+            *sum = u16::from(value) << VALUE_BITS;
+        }
+        return;
+    }
     match *weights {
-        [weight] if weight == 1 << WEIGHT_BITS => {
-            for (sum, &value) in row.iter_mut().zip(rows) {
-                *sum = u16::from(value) << VALUE_BITS;
+        [a, b] => {
+            for ((sum, &upper), &lower) in row.iter_mut().zip(rows).zip(&rows[stride..]) {
+                *sum = share(upper, a) + share(lower, b);
             }
         }
-        [a, b] => {
-            let (a, b) = (u32::from(a), u32::from(b));
-            for ((sum, &upper), &lower) in row.iter_mut().zip(rows).zip(&rows[stride..]) {
-                *sum = ((a * u32::from(upper) + b * u32::from(lower)) >> SHIFT) as u16;
+        [a, b, c] => {
+            let (second, third) = (&rows[stride..], &rows[2 * stride..]);
+            for (((sum, &upper), &middle), &lower) in row.iter_mut().zip(rows).zip(second).zip(third) {
+                *sum = share(upper, a) + share(middle, b) + share(lower, c);
             }
         }
         _ => {
             row.fill(0);
             for (values, &weight) in rows.chunks(stride).zip(weights) {
                 for (sum, &value) in row.iter_mut().zip(values) {
-                    // Each term cut to 8 bits of fraction: below a tenth of a code in all, for every usual size.
-                    *sum += ((u32::from(weight) * u32::from(value)) >> SHIFT) as u16;
+                    *sum += share(value, weight);
                 }
             }
         }
     }
+}
+
+/// A value times a weight below [`ONE`], cut to 8 bits of fraction: below a tenth of a code in all, for every usual size.
+/// The upper half of a product of 16 bits each, which vectors have.
+#[inline(always)]
+fn share(value: u8, weight: u16) -> u16 {
+    let (value, weight) = (u16::from(value) << VALUE_BITS, weight << (16 - WEIGHT_BITS));
+    ((u32::from(value) * u32::from(weight)) >> 16) as u16
 }
 
 /// The taps of every pixel along one axis of the scaled picture: equally many each, within the source.
@@ -113,22 +156,37 @@ impl Axis {
         self.firsts[pixels.start]..self.firsts[pixels.end - 1] + self.taps
     }
 
-    /// Filters some of a row of 3-channel pixels.
-    fn filter(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
-        const SHIFT: u32 = WEIGHT_BITS + VALUE_BITS;
-        let pixels = row.as_chunks::<3>().0;
+    /// Filters some of a row of 3-channel pixels, by `N` taps each.
+    #[inline(always)]
+    fn filter<const N: usize>(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
+        let weights = &self.weights.as_chunks::<N>().0[columns.clone()];
+        let firsts = &self.firsts[columns];
+        for ((pixel, &first), weights) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(firsts).zip(weights) {
+            *pixel = filtered(&row[3 * first..][..3 * N + 1], weights);
+        }
+    }
+
+    #[inline(always)]
+    fn filter_many(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
         let weights = self.weights[columns.start * self.taps..columns.end * self.taps].chunks_exact(self.taps);
         let firsts = &self.firsts[columns];
         for ((pixel, &first), weights) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(firsts).zip(weights) {
-            let mut sums = [1_u32 << (SHIFT - 1); 3];
-            for (values, &weight) in pixels[first..].iter().zip(weights) {
-                for channel in 0..3 {
-                    sums[channel] += u32::from(weight) * u32::from(values[channel]);
-                }
-            }
-            for channel in 0..3 {
-                pixel[channel] = (sums[channel] >> SHIFT) as u8;
-            }
+            *pixel = filtered(&row[3 * first..][..3 * self.taps + 1], weights);
         }
     }
+}
+
+/// The weighted sum of pixels. Each is read as four values; what the fourth makes is not used.
+#[inline(always)]
+fn filtered(pixels: &[u16], weights: &[u16]) -> [u8; 3] {
+    const SHIFT: u32 = WEIGHT_BITS + VALUE_BITS;
+    let mut sums = [1_u32 << (SHIFT - 1); 4];
+    for (tap, &weight) in weights.iter().enumerate() {
+        let values = &pixels[3 * tap..][..4];
+        for (sum, &value) in sums.iter_mut().zip(values) {
+            *sum += u32::from(weight) * u32::from(value);
+        }
+    }
+    let [r, g, b, _] = sums.map(|sum| (sum >> SHIFT) as u8);
+    [r, g, b]
 }
