@@ -7,6 +7,8 @@ mod apply;
 mod hear;
 mod history;
 #[cfg(test)]
+pub mod sample;
+#[cfg(test)]
 mod tests;
 pub mod tweak;
 
