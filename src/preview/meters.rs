@@ -144,6 +144,28 @@ impl Meters {
         self.reaction_ms.push(after_ns as f64 * MS);
     }
 
+    /// A run with something to see.
+    #[cfg(test)]
+    pub fn fill_for_looks(&mut self) {
+        let rungs = [Quality::Balanced, Quality::High, Quality::Fast, Quality::Balanced];
+        for k in 0..300u64 {
+            let mut passes = crate::bokeh::PassTimes::new();
+            for (name, us) in [("bin", 3100), ("fill", 800), ("reach", 450), ("blur", 9400), ("composite", 3600)] {
+                passes.add(name, std::time::Duration::from_micros(us));
+            }
+            let wave = 4.0 * (k as f64 / 9.0).sin() + 3.0 * (k as f64 / 2.3).sin();
+            let blur_ms = 20.0 + wave + if k % 97 == 3 { 22.0 } else { 0.0 };
+            let quality = Some(rungs[(k / 80) as usize % rungs.len()]);
+            let trace =
+                Trace { decode_ns: 4_100_000, depth_ns: 6_300_000, blur_ns: (blur_ms * 1e6) as u64, passes, quality };
+            self.count(&trace, k * 33_400_000, 41_000_000 + k * 20_000, 1_900_000);
+        }
+        self.reacted(24_000_000);
+        self.frames.captured = 300;
+        self.frames.dropped.late = 2;
+        self.frames.dropped.evicted = 5;
+    }
+
     /// The last frames, the oldest first.
     pub fn bars(&self) -> impl ExactSizeIterator<Item = &Bar> {
         let first = self.next + FRAMES - self.held;

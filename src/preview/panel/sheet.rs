@@ -28,6 +28,12 @@ impl Memory {
         under_pointer || ctx.memory(|memory| memory.focused().is_some()) || ctx.any_popup_open()
     }
 
+    /// Where it was drawn last, if it is open.
+    #[cfg(test)]
+    pub fn rect(&self) -> Option<Rect> {
+        self.rect
+    }
+
     /// Draws as much of the panel as is in the window.
     pub fn show(&mut self, ctx: &Context, state: &State, shown: bool, height_px: u32, actions: &mut Vec<Action>) {
         let openness = ctx.animate_bool_with_time(id().with("open"), shown, 0.16);

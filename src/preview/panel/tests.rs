@@ -1,1 +1,123 @@
+//! The panel without a display: real input events in, actions and shapes out.
 
+mod gestures;
+mod keyboard;
+mod looks;
+mod paint;
+mod sizes;
+
+use egui::{Event, FullOutput, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2, pos2};
+
+use super::super::state::{Action, State, sample};
+use super::{Canvas, Panel};
+use crate::preview::present::Area;
+
+/// A window of the controls alone.
+struct Window {
+    ctx: egui::Context,
+    panel: Panel,
+    state: State,
+    canvas: Canvas,
+    size: Vec2,
+    native: f32,
+    time_s: f64,
+}
+
+impl Window {
+    /// A window of 1280 x 720 pixels that the picture fills.
+    fn new() -> Self {
+        Self::of(sample::state(), (1280, 720))
+    }
+
+    fn of(state: State, (width, height): (u32, u32)) -> Self {
+        let area = Area { x: 0, y: 0, width, height };
+        let mut window = Self {
+            ctx: egui::Context::default(),
+            panel: Panel::default(),
+            state,
+            canvas: Canvas { area, size: (1280, 720) },
+            size: Vec2::new(width as f32, height as f32),
+            native: 1.0,
+            time_s: 0.0,
+        };
+        // Fonts and measures hold from the second pass on.
+        for _ in 0..4 {
+            window.pass(Vec::new());
+        }
+        window
+    }
+
+    /// One pass of egui; what was done is applied, as the window does.
+    fn pass_with_output(&mut self, events: Vec<Event>) -> (Vec<Action>, FullOutput) {
+        self.time_s += 1.0 / 60.0;
+        let mut input = RawInput {
+            time: Some(self.time_s),
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, self.size / (self.native * self.ctx.zoom_factor()))),
+            events,
+            focused: true,
+            ..RawInput::default()
+        };
+        input.viewports.entry(egui::ViewportId::ROOT).or_default().native_pixels_per_point = Some(self.native);
+        let mut actions = Vec::new();
+        let Self { ctx, panel, state, canvas, .. } = self;
+        let output = ctx.run_ui(input, |ui| panel.show(ui, state, *canvas, &mut actions));
+        for action in actions.clone() {
+            self.state.apply(action);
+        }
+        (actions, output)
+    }
+
+    fn pass(&mut self, events: Vec<Event>) -> Vec<Action> {
+        let (actions, output) = self.pass_with_output(events);
+        output.drop_without_applying_deltas();
+        actions
+    }
+
+    /// Passes until `seconds` are over, without any input.
+    fn wait(&mut self, seconds: f64) -> Vec<Action> {
+        let end_s = self.time_s + seconds;
+        let mut actions = Vec::new();
+        while self.time_s < end_s {
+            actions.extend(self.pass(Vec::new()));
+        }
+        actions
+    }
+
+    fn press(&mut self, key: Key, modifiers: Modifiers) -> Vec<Action> {
+        let mut actions = self.pass(vec![pressed(key, modifiers, true)]);
+        actions.extend(self.pass(vec![pressed(key, modifiers, false)]));
+        actions
+    }
+
+    fn click(&mut self, at: Pos2) -> Vec<Action> {
+        let mut actions = self.pass(vec![Event::PointerMoved(at)]);
+        actions.extend(self.pass(vec![button(at, true)]));
+        actions.extend(self.pass(vec![button(at, false)]));
+        actions.extend(self.pass(Vec::new()));
+        actions
+    }
+
+    fn drag(&mut self, from: Pos2, to: Pos2) -> Vec<Action> {
+        let mut actions = self.pass(vec![Event::PointerMoved(from)]);
+        actions.extend(self.pass(vec![button(from, true)]));
+        for step in 1..=8 {
+            let at = from + (to - from) * (step as f32 / 8.0);
+            actions.extend(self.pass(vec![Event::PointerMoved(at)]));
+        }
+        actions.extend(self.pass(vec![button(to, false)]));
+        actions
+    }
+}
+
+fn pressed(key: Key, modifiers: Modifiers, pressed: bool) -> Event {
+    Event::Key { key, physical_key: Some(key), pressed, repeat: false, modifiers }
+}
+
+fn button(pos: Pos2, pressed: bool) -> Event {
+    Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE }
+}
+
+/// Where on the panel one may click without hitting the picture.
+fn on_panel() -> Pos2 {
+    pos2(1280.0 - 40.0, 400.0)
+}

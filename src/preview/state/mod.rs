@@ -8,6 +8,8 @@ mod hear;
 mod history;
 mod switches;
 #[cfg(test)]
+pub mod sample;
+#[cfg(test)]
 mod tests;
 pub mod tweak;
 

@@ -1,1 +1,252 @@
+use super::sample::{blurred, look, running, state};
+use super::*;
+use crate::bokeh;
+use crate::look::Strength;
 
+fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<Effect> {
+    state.apply(Action::Look { look: Box::new(blurred(radius_px)), stroke })
+}
+
+fn radius_px(state: &State) -> f32 {
+    match state.look.strength {
+        Strength::AtInfinity(radius_px) => radius_px,
+        Strength::Default | Strength::Lens(_) => 0.0,
+    }
+}
+
+#[test]
+fn a_look_takes_effect_and_can_be_undone_and_redone() {
+    let mut state = state();
+    assert_eq!(state.history.can(), (false, false));
+    for radius_px in [1.0, 2.0, 3.0] {
+        let effects = set(&mut state, radius_px, None);
+        assert_eq!(effects, [Effect::Look(Box::new(blurred(radius_px)))]);
+    }
+    assert_eq!(set(&mut state, 3.0, None), [], "nothing changed");
+    assert_eq!(state.apply(Action::Undo), [Effect::Look(Box::new(blurred(2.0)))]);
+    state.apply(Action::Undo);
+    assert_eq!((radius_px(&state), state.history.can()), (1.0, (true, true)));
+    state.apply(Action::Redo);
+    assert_eq!(radius_px(&state), 2.0);
+    // Another look closes the way forth.
+    set(&mut state, 9.0, None);
+    assert_eq!((state.apply(Action::Redo), radius_px(&state)), (vec![], 9.0));
+    for _ in 0..9 {
+        state.apply(Action::Undo);
+    }
+    assert_eq!((&state.look, state.history.can()), (&look(), (false, true)));
+}
+
+#[test]
+fn the_changes_of_a_stroke_are_one() {
+    let mut state = state();
+    for radius_px in 1..=20 {
+        set(&mut state, radius_px as f32, Some("slider"));
+    }
+    state.apply(Action::Settle);
+    for radius_px in 30..=40 {
+        set(&mut state, radius_px as f32, Some("slider"));
+    }
+    set(&mut state, 50.0, Some("wheel"));
+    state.apply(Action::Undo);
+    assert_eq!(radius_px(&state), 40.0, "another control");
+    state.apply(Action::Undo);
+    assert_eq!(radius_px(&state), 20.0, "the same one, taken up again");
+    state.apply(Action::Undo);
+    assert_eq!(state.look, look());
+}
+
+#[test]
+fn history_is_bounded() {
+    let mut state = state();
+    for radius_px in 0..1000 {
+        set(&mut state, radius_px as f32, None);
+    }
+    let undone = std::iter::repeat_with(|| state.apply(Action::Undo)).take_while(|effects| !effects.is_empty()).count();
+    assert_eq!(undone, 100);
+    assert_eq!(radius_px(&state), 899.0);
+}
+
+#[test]
+fn reset_goes_to_the_first_look_and_can_be_undone() {
+    let mut state = state();
+    assert_eq!(state.apply(Action::Reset), []);
+    set(&mut state, 7.0, None);
+    assert_eq!(state.apply(Action::Reset), [Effect::Look(Box::new(look()))]);
+    state.apply(Action::Undo);
+    assert_eq!(radius_px(&state), 7.0);
+}
+
+#[test]
+fn presets_are_looks_by_name() {
+    let mut state = state();
+    let effects = state.apply(Action::Preset("cinematic".into()));
+    assert_eq!((effects.len(), radius_px(&state)), (1, 30.0));
+    let in_use: Vec<_> = state.presets.iter().filter(|preset| state.is_in_use(preset)).map(|p| &p.name[..]).collect();
+    assert_eq!(in_use, ["cinematic"]);
+    // Where it is focused is no part of what a preset is.
+    state.look.focus = crate::depth::focus::FocusRule::Metres(3.0);
+    assert!(state.is_in_use(&state.presets[1]));
+    assert_eq!(state.apply(Action::Preset("nothing".into())), []);
+    assert!(state.notes.last().unwrap().text.contains("nothing"));
+    assert_eq!(state.apply(Action::SavePreset("  mine ".into())).len(), 1);
+    assert_eq!(state.apply(Action::SavePreset("  ".into())), []);
+}
+
+#[test]
+fn what_needs_depth_says_so_where_there_is_none() {
+    let mut state = state();
+    state.hear(Told::Source(running(false)));
+    for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
+        let before = state.notes.len();
+        assert_eq!(state.apply(action), []);
+        assert_eq!((state.notes.len(), &state.notes.last().unwrap().text[..]), (before + 1, NO_DEPTH));
+    }
+    assert_eq!((state.shown, &state.look), (Shown::Picture, &look()));
+    assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
+    assert_eq!(state.look.effect, Some(bokeh::Effect::TiltShift));
+    // A view of depth goes back to the picture when the next source has none.
+    state.hear(Told::Source(running(true)));
+    state.apply(Action::Show(Shown::Depth));
+    state.hear(Told::Source(running(false)));
+    assert_eq!(state.shown, Shown::Picture);
+}
+
+#[test]
+fn switches_are_what_they_were_set_to() {
+    let mut state = state();
+    for on in [true, false] {
+        for action in [
+            Action::Mirror(on),
+            Action::Freeze(on),
+            Action::Panel(on),
+            Action::Instruments(on),
+            Action::Bare(on),
+            Action::Help(on),
+        ] {
+            assert_eq!(state.apply(action), []);
+        }
+        let switches = [state.mirror, state.frozen, state.panel, state.instruments, state.bare, state.help];
+        assert_eq!(switches, [on; 6]);
+        assert_eq!(state.apply(Action::FullScreen(on)), [Effect::FullScreen(on)]);
+        assert_eq!(state.full_screen, on);
+    }
+    for (asked, got) in [(0.3, Some(0.3)), (-1.0, Some(0.0)), (7.0, Some(1.0)), (f32::NAN, None)] {
+        state.apply(Action::Split(Some(asked)));
+        assert_eq!(state.split, got);
+    }
+    for (asked, got) in [(1.5, 1.5), (9.0, 3.0), (0.0, 0.75), (f32::NAN, 0.75)] {
+        state.apply(Action::TextScale(asked));
+        assert_eq!(state.text_scale, got);
+    }
+}
+
+#[test]
+fn outputs_begin_once_and_end_once() {
+    let mut state = state();
+    let recording = Output { name: String::new(), is_camera: false };
+    assert_eq!(state.apply(Action::Record(true)), [Effect::Begin(recording.clone())]);
+    assert_eq!(state.apply(Action::Record(true)), [], "twice at once");
+    let named = Output { name: "clip.mp4".into(), is_camera: false };
+    state.hear(Told::Outputs(vec![named.clone()]));
+    assert_eq!(state.recording(), Some(&named));
+    assert_eq!(state.apply(Action::Record(false)), [Effect::End(named)]);
+    assert_eq!(state.apply(Action::Record(false)), []);
+
+    let camera = |name: &str| Output { name: name.into(), is_camera: true };
+    let choose = |name: &str| Action::VirtualCamera(Some(name.to_owned()));
+    assert_eq!(state.apply(choose("a")), [Effect::Begin(camera("a"))]);
+    assert_eq!(state.apply(choose("a")), []);
+    assert_eq!(state.apply(choose("b")), [Effect::End(camera("a")), Effect::Begin(camera("b"))]);
+    assert_eq!(state.apply(Action::VirtualCamera(None)), [Effect::End(camera("b"))]);
+    assert_eq!(state.apply(Action::VirtualCamera(None)), []);
+    assert_eq!(state.notes.last().unwrap().text, NO_VIRTUAL_CAMERA);
+}
+
+#[test]
+fn a_source_is_opened_lost_and_opened_again() {
+    let mut state = state();
+    state.frozen = true;
+    assert_eq!(state.apply(Action::Open("/dev/video0".into())), [Effect::Open("/dev/video0".into())]);
+    assert_eq!((&state.source, state.frozen, state.controls.len()), (&Source::Opening, false, 0));
+    for end in [Source::Lost("unplugged".into()), Source::Ended] {
+        state.hear(Told::Source(end.clone()));
+        assert_eq!(state.source, end);
+        assert_eq!(state.apply(Action::Retry), [Effect::Open("/dev/video0".into())]);
+        assert_eq!(state.source, Source::Opening);
+    }
+}
+
+#[test]
+fn controls_of_the_camera_stay_in_their_range() {
+    let mut state = state();
+    let set = |state: &mut State, value: i64| state.apply(Action::Control("brightness".into(), value));
+    assert_eq!(set(&mut state, 500), [Effect::Control("brightness".into(), 64)]);
+    assert_eq!(set(&mut state, 64), [], "it is that already");
+    assert_eq!(state.apply(Action::Control("exposure_time_absolute".into(), 3)), [], "it cannot be changed now");
+    assert_eq!(state.apply(Action::Control("nothing".into(), 3)), []);
+}
+
+#[test]
+fn what_others_do_is_asked_of_them() {
+    let mut state = state();
+    for (action, effect) in [
+        (Action::Snapshot, Effect::Snapshot),
+        (Action::Refresh, Effect::Refresh),
+        (Action::CopyCommand, Effect::CopyCommand),
+        (Action::Close, Effect::Close),
+    ] {
+        assert_eq!(state.apply(action), [effect]);
+    }
+}
+
+#[test]
+fn notes_are_few_and_numbered() {
+    let mut state = state();
+    for k in 0..20 {
+        state.hear(Told::Note(format!("note {k}")));
+    }
+    let numbers: Vec<u64> = state.notes.iter().map(|note| note.number).collect();
+    assert_eq!(numbers, [15, 16, 17, 18, 19, 20]);
+    assert_eq!(state.notes.last().unwrap().text, "note 19");
+}
+
+#[test]
+fn the_wheel_gets_away_from_no_blur_and_back() {
+    let mut look = look();
+    for _ in 0..200 {
+        tweak::blur_by(&mut look, 0.8, 720);
+    }
+    assert_eq!(look.strength, Strength::AtInfinity(0.0));
+    for _ in 0..200 {
+        tweak::blur_by(&mut look, 1.25, 720);
+    }
+    assert_eq!(look.strength, Strength::AtInfinity(crate::look::MAX_COC_PER_HEIGHT * 720.0));
+    tweak::f_number_by(&mut look, 1.0);
+    for (factor, f_number) in [(1.0, 1.8), (1e3, 0.7), (1e-6, 22.0)] {
+        tweak::blur_by(&mut look, factor, 720);
+        let Strength::Lens(lens) = look.strength else { panic!("{:?}", look.strength) };
+        assert!((lens.f_number - f_number).abs() < 1e-5, "{factor}: {lens:?}");
+    }
+}
+
+#[test]
+fn arrows_move_what_is_sharp() {
+    use crate::depth::focus::FocusRule;
+    let mut look = look();
+    tweak::move_focus(&mut look, 0.02, 0.0);
+    assert_eq!(look.focus, FocusRule::Point { x: 0.52, y: 0.5 });
+    for _ in 0..100 {
+        tweak::move_focus(&mut look, 0.02, -0.02);
+    }
+    assert_eq!(look.focus, FocusRule::Point { x: 1.0, y: 0.0 });
+    look.focus = FocusRule::Metres(2.0);
+    tweak::move_focus(&mut look, 0.0, -0.02);
+    assert!(matches!(look.focus, FocusRule::Metres(metres) if metres > 2.0));
+    look.effect = Some(bokeh::Effect::TiltShift);
+    tweak::move_focus(&mut look, 0.02, 0.1);
+    assert!((look.tilt.center_y - 0.6).abs() < 1e-6 && (look.tilt.angle_deg - 2.0).abs() < 1e-6);
+    for (angle, by, is) in [(89.0, 2.0, -89.0), (-89.0, -2.0, 89.0), (0.0, 360.0, 0.0)] {
+        assert!((tweak::turned(angle, by) - is).abs() < 1e-4, "{angle} by {by}");
+    }
+}

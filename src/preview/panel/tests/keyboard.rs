@@ -1,0 +1,145 @@
+//! The panel by keyboard alone, and when it hides.
+
+use std::collections::HashSet;
+
+use egui::{Event, Key, Modifiers, pos2};
+
+use super::{Action, Window, on_panel, pressed, sample};
+use crate::preview::keys::GROUPS;
+use crate::preview::state::Source;
+
+#[test]
+fn every_key_reaches_the_window() {
+    for (group, binding) in GROUPS.iter().flat_map(|group| group.bindings.iter().map(move |b| (group.name, b))) {
+        let mut window = Window::new();
+        // Something to undo and to redo, and some range to take back.
+        window.state.look.focus_range_m = 0.5;
+        window.state.look.focus = crate::depth::focus::FocusRule::Metres(2.0);
+        for chord in binding.chords.iter().take(6) {
+            let mut modifiers = if chord.ctrl { Modifiers::CTRL | Modifiers::COMMAND } else { Modifiers::NONE };
+            modifiers.shift = chord.shift;
+            let actions = window.press(chord.key, modifiers);
+            let done = actions.iter().any(|action| *action != Action::Settle);
+            // The panel's own key is pressed twice: Esc then has nothing to close.
+            assert!(done || chord.key == Key::Escape, "{group}: {} gave {actions:?}", binding.keys);
+        }
+    }
+}
+
+/// All that can be focused, by pressing Tab until it comes round.
+fn stops(window: &mut Window) -> usize {
+    let mut seen = HashSet::new();
+    for _ in 0..400 {
+        window.press(Key::Tab, Modifiers::NONE);
+        let focused = window.ctx.memory(|memory| memory.focused());
+        if let Some(id) = focused
+            && !seen.insert(id)
+        {
+            break;
+        }
+    }
+    seen.len()
+}
+
+#[test]
+fn tab_reaches_the_controls() {
+    let mut window = Window::new();
+    let all = stops(&mut window);
+    assert!(all > 40, "only {all}");
+    // Without frames there is a button more, and fewer presets are no stops.
+    window.state.source = Source::Lost("gone".into());
+    assert!(stops(&mut window) > all);
+}
+
+#[test]
+fn a_control_in_focus_is_worked_by_the_keyboard() {
+    let mut window = Window::new();
+    let mut done: Vec<Action> = Vec::new();
+    for _ in 0..60 {
+        window.press(Key::Tab, Modifiers::NONE);
+        done.extend(window.press(Key::Enter, Modifiers::NONE));
+        window.press(Key::Escape, Modifiers::NONE);
+    }
+    assert!(done.iter().any(|action| matches!(action, Action::Preset(_))), "{done:?}");
+    assert!(done.iter().any(|action| matches!(action, Action::Look { .. })), "{done:?}");
+}
+
+/// Whether the panel is seen: whether a click in its place reaches something else than the picture.
+fn is_seen(window: &Window) -> bool {
+    window.ctx.layer_id_at(on_panel()).is_some_and(|layer| layer.order != egui::Order::Background)
+}
+
+#[test]
+fn the_panel_hides_itself_and_comes_back() {
+    let mut window = Window::new();
+    window.pass(vec![Event::PointerMoved(pos2(300.0, 300.0))]);
+    assert!(is_seen(&window));
+    window.wait(5.0);
+    assert!(!is_seen(&window), "nobody is there");
+    window.pass(vec![Event::PointerMoved(pos2(310.0, 300.0))]);
+    window.wait(0.5);
+    assert!(is_seen(&window), "the pointer moved");
+    window.wait(5.0);
+    window.press(Key::I, Modifiers::NONE);
+    window.wait(0.5);
+    assert!(is_seen(&window), "a key was pressed");
+    // While the pointer is over it, it stays.
+    window.pass(vec![Event::PointerMoved(on_panel())]);
+    window.wait(20.0);
+    assert!(is_seen(&window));
+    window.pass(vec![Event::PointerMoved(pos2(300.0, 300.0))]);
+    window.wait(5.0);
+    assert!(!is_seen(&window));
+    // While one of its controls has the focus, it stays, too.
+    window.press(Key::Tab, Modifiers::NONE);
+    window.wait(20.0);
+    assert!(is_seen(&window));
+}
+
+#[test]
+fn the_panel_is_closed_and_everything_hidden_by_keys() {
+    let mut window = Window::new();
+    window.press(Key::P, Modifiers::NONE);
+    window.wait(0.5);
+    assert!(!window.state.panel && !is_seen(&window));
+    window.press(Key::P, Modifiers::NONE);
+    window.wait(0.5);
+    assert!(is_seen(&window));
+    window.press(Key::H, Modifiers::NONE);
+    window.wait(0.5);
+    assert!(!is_seen(&window));
+}
+
+#[test]
+fn typing_a_name_presses_no_keys() {
+    let mut window = Window::new();
+    let names = |actions: &[Action]| -> Vec<String> {
+        let saved = actions.iter().filter_map(|action| match action {
+            Action::SavePreset(name) => Some(name.clone()),
+            _ => None,
+        });
+        saved.collect()
+    };
+    // To the button that asks for a name: the first stop after the presets.
+    let mut reached = false;
+    for _ in 0..20 {
+        window.press(Key::Tab, Modifiers::NONE);
+        window.press(Key::Enter, Modifiers::NONE);
+        window.wait(0.1);
+        if window.ctx.text_edit_focused() {
+            reached = true;
+            break;
+        }
+    }
+    assert!(reached, "no field to type a name in");
+    let state = (window.state.mirror, window.state.frozen);
+    let mut actions = Vec::new();
+    for (key, letter) in [(Key::M, "m"), (Key::Z, "z"), (Key::Q, "q")] {
+        actions.extend(window.pass(vec![pressed(key, Modifiers::NONE, true), Event::Text(letter.into())]));
+    }
+    assert_eq!((window.state.mirror, window.state.frozen), state);
+    actions.extend(window.press(Key::Enter, Modifiers::NONE));
+    actions.extend(window.wait(0.2));
+    assert_eq!(names(&actions), ["mzq"], "{actions:?}");
+    let _ = sample::state();
+}

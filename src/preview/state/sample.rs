@@ -1,0 +1,80 @@
+//! A state to try things on.
+
+use super::{Running, Source, State};
+use crate::bokeh::aperture::Aperture;
+use crate::bokeh::{Effect, Method};
+use crate::depth::focus::FocusRule;
+use crate::look::{Look, Refine, Strength, Tilt};
+use crate::preview::backstage::{Choice, Control, Preset};
+
+/// The look that the command line has without any flags.
+pub fn look() -> Look {
+    Look {
+        effect: Some(Effect::Dof),
+        method: Method::Layered,
+        focus: FocusRule::Auto,
+        focus_range_m: 0.0,
+        strength: Strength::Default,
+        max_coc_px: None,
+        refine: Refine::Auto,
+        tilt: Tilt { center_y: 0.5, band: 0.15, angle_deg: 0.0 },
+        aperture: Aperture::default(),
+        aperture_file: None,
+        rim: 0.2,
+        rank: None,
+        highlights: 8.0,
+        quality: None,
+    }
+}
+
+/// Another look than [`look`], by how strong it is.
+pub fn blurred(radius_px: f32) -> Look {
+    Look { strength: Strength::AtInfinity(radius_px), ..look() }
+}
+
+/// A source whose frames come.
+pub fn running(has_depth: bool) -> Source {
+    Source::Running(Running {
+        label: "Desk camera".into(),
+        size: (1280, 720),
+        period_ns: 33_333_333,
+        has_depth,
+        executor: "cpu, 2 threads, AVX2".into(),
+        budget_ns: 33_333_333,
+    })
+}
+
+/// A window that shows a running source with depth, and has everything to choose from.
+pub fn state() -> State {
+    let mut state = State::new(look(), "portrait".into());
+    state.source = running(true);
+    state.focus_m = Some(1.24);
+    let choice = |name: &str, label: &str| Choice { name: name.into(), label: label.into() };
+    state.sources = vec![choice("portrait", "Recording: portrait"), choice("/dev/video0", "Desk camera")];
+    state.virtual_cameras = vec![choice("/dev/video9", "bokehcam (/dev/video9)")];
+    let preset = |name: &str, look: Look, own: bool| Preset { name: name.into(), look, own };
+    state.presets = vec![
+        preset("portrait", look(), false),
+        preset("cinematic", blurred(30.0), false),
+        preset("dreamy", Look { highlights: 20.0, ..blurred(40.0) }, false),
+        preset("product", Look { focus_range_m: 0.2, ..blurred(12.0) }, false),
+        preset("miniature", Look { effect: Some(Effect::TiltShift), ..blurred(14.0) }, false),
+        preset("my desk", blurred(21.0), true),
+    ];
+    let control = |name: &str, value: i64, range: (i64, i64, i64)| Control {
+        name: name.into(),
+        value,
+        range,
+        menu: Vec::new(),
+        switch: false,
+        active: true,
+    };
+    let menu = vec![(1, "Manual Mode".to_owned()), (3, "Aperture Priority Mode".to_owned())];
+    state.controls = vec![
+        control("brightness", 10, (-64, 64, 1)),
+        Control { switch: true, ..control("white_balance_automatic", 1, (0, 1, 1)) },
+        Control { menu, ..control("auto_exposure", 3, (0, 3, 1)) },
+        Control { active: false, ..control("exposure_time_absolute", 157, (1, 5000, 1)) },
+    ];
+    state
+}
