@@ -26,7 +26,6 @@ pub mod sym {
     pub const SHIFT: u32 = 0xffe1;
     pub const CONTROL: u32 = 0xffe3;
     pub const ESCAPE: u32 = 0xff1b;
-    pub const TAB: u32 = 0xff09;
     pub const F1: u32 = 0xffbe;
     pub const F11: u32 = 0xffc8;
 }

@@ -105,8 +105,6 @@ fn what_is_seen_follows_the_keys_and_comes_back() {
     window.until("the first picture", is_photograph);
     let key = |c: char| window.key(&[], u32::from(c));
     // A still picture, and nothing beside it.
-    key('z');
-    key('h');
     let still = || {
         let mut last = window.look();
         window.until("it stands still", |image| {
@@ -116,6 +114,10 @@ fn what_is_seen_follows_the_keys_and_comes_back() {
             same
         })
     };
+    key('z');
+    let with_panel = still();
+    key('h');
+    window.until("nothing but the picture", |image| distance(image, &with_panel) > 1.0);
     let before = still();
     for (name, c) in [("mirrored", 'm'), ("depth", 'd'), ("radii", 'c'), ("bins", 'n'), ("before and after", 'b')] {
         key(c);

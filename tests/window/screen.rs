@@ -50,19 +50,19 @@ impl Screen {
         let display = format!(":{}", number.trim());
 
         let settings = tempfile::tempdir().unwrap();
-        let rules = settings.path().join("openbox.xml");
+        let (rules, ready) = (settings.path().join("openbox.xml"), settings.path().join("ready"));
         fs::write(&rules, OPENBOX).unwrap();
         let mut openbox = Command::new("setpriv");
         openbox.args(["--pdeathsig", "KILL", "openbox", "--sm-disable", "--config-file"]).arg(rules);
+        openbox.arg("--startup").arg(format!("touch {}", ready.display()));
         openbox.env("DISPLAY", &display).env("HOME", settings.path()).env_remove("XDG_CONFIG_HOME");
         let manager = Beside::start(openbox.stdout(Stdio::null()).stderr(Stdio::null()));
 
         let (x, number) = x11rb::connect(Some(&display)).unwrap();
         let root = x.setup().roots[number].root;
         let screen = Self { x, root, display, _manager: manager, _server: server, _settings: settings };
-        until("a window manager", Duration::from_secs(20), || {
-            !screen.property(root, "_NET_SUPPORTING_WM_CHECK").is_empty()
-        });
+        // A window that opens before that may stay unmanaged.
+        until("a window manager", Duration::from_secs(20), || ready.exists());
         screen
     }
 
