@@ -12,6 +12,7 @@ use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Bokeh, Effect, Job};
 use bokehcam::budget::Quality;
 use bokehcam::depth::focus::FocusRule;
+use bokehcam::compute::Place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::{Look, Strength};
@@ -160,6 +161,7 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
         depth: Some(Pooled::detached(map.clone())),
         coc: field,
         quality,
+        place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
     })
     .unwrap();

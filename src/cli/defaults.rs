@@ -16,8 +16,6 @@ pub const DEPTH_INVALID: &str = "0";
 pub const DISPARITIES: u32 = 64;
 /// Picture size of the synthetic scene.
 pub const SIZE: Size = Size { width: 640, height: 480 };
-/// Frames of it that a preview keeps.
-pub const CYCLE_FRAMES: u64 = 96;
 /// Frame rate of the synthetic scene.
 pub const FPS: f64 = 30.0;
 /// Apertures that the command `aperture` analyses.

@@ -57,6 +57,7 @@ const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, -
 pub fn run(command: &StreamCommand, global: &options::Global, given: Vec<(String, String)>) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
     let options::Streaming { stream, output, .. } = parts;
+    sinks::check(&command.to, stream, &command.source.devices())?;
     #[cfg(feature = "window")]
     if command.to.contains(&Target::Window) {
         let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
@@ -65,7 +66,6 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Vec<(String
     #[cfg(not(feature = "window"))]
     let _ = given;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
-    sinks::check(&command.to, stream, &command.source.devices())?;
     if stream.pace == Some(values::Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
