@@ -15,6 +15,7 @@ const BAND: usize = 16;
 /// Pixels from which on one thread is not enough, where they are copied and where they are scaled.
 const MANY_COPIED: u64 = 3_000_000;
 const MANY_SCALED: u64 = 700_000;
+/// The blur has the other half of the cores: who waits for a thread that gets none is slower than alone.
 const MOST_THREADS: usize = 4;
 /// Windows are double or triple buffered.
 const BUFFERS: usize = 4;
@@ -97,7 +98,7 @@ impl Painter {
             }
         };
         if is_much(drawing) {
-            let team = team.get_or_insert_with(|| Team::new("present", team::cores().min(MOST_THREADS)));
+            let team = team.get_or_insert_with(|| Team::new("present", (team::cores() / 2).min(MOST_THREADS)));
             scratch.resize_with(team.threads(), Scratch::default);
             let shelf = Shelf::new(pixels, width * BAND, taken);
             team.run_with(scratch, bands, &|scratch, part| band(scratch, part, shelf.part(part)));
