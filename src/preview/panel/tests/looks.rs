@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use egui::{Event, Theme, pos2};
 
 use super::paint::{Painter, over};
-use super::{Window, button, pressed};
+use super::{Window, button};
 use crate::bokeh::Effect;
 use crate::frame::ColorImage;
 use crate::preview::panel::theme::{Colors, rung};
@@ -93,6 +93,16 @@ fn pictures() {
         state.look.tilt.angle_deg = -12.0;
         state.source = sample::running(false);
     });
+    shot("badges", Theme::Dark, &|state| {
+        state.panel = false;
+        state.frozen = true;
+        state.apply(crate::preview::state::Action::Record(true));
+        state.apply(crate::preview::state::Action::VirtualCamera(Some("/dev/video9".into())));
+    });
+    shot("large", Theme::Dark, &|state| {
+        state.text_scale = 1.8;
+        state.look.strength = crate::look::Strength::Lens(crate::preview::state::tweak::LENS);
+    });
     shot("help", Theme::Dark, &|state| state.help = true);
     shot("help-light", Theme::Light, &|state| state.help = true);
     shot("lost", Theme::Light, &|state| {
@@ -133,10 +143,15 @@ fn pictures() {
         }
         save(&mut window, &mut painter, &format!("scrolled-{part}"));
     }
-    for _ in 0..6 {
-        window.pass(vec![pressed(egui::Key::Tab, egui::Modifiers::NONE, true)]);
+    for _ in 0..20 {
+        window.press(egui::Key::Tab, egui::Modifiers::NONE);
     }
     save(&mut window, &mut painter, "focused");
+    let button_at = pos2(1120.0, 410.0);
+    window.pass(vec![Event::PointerMoved(button_at)]);
+    window.pass(vec![button(button_at, true)]);
+    window.pass(vec![button(button_at, false)]);
+    save(&mut window, &mut painter, "popup");
     window.pass(vec![Event::PointerMoved(pos2(300.0, 300.0))]);
     window.pass(vec![button(pos2(300.0, 300.0), true)]);
     window.pass(vec![button(pos2(300.0, 300.0), false)]);
