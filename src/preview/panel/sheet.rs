@@ -14,6 +14,8 @@ pub struct Memory {
     thumbs: Thumbs,
     /// Where it was drawn last.
     rect: Option<Rect>,
+    /// What had the focus in the pass before.
+    focused: Option<Id>,
 }
 
 fn id() -> Id {
@@ -59,7 +61,23 @@ impl Memory {
                 scroll.show(ui, |ui| self.body(ui, state, height_px, actions));
             });
         });
+        if shown && matches!(state.source, Source::Running(_)) {
+            ctx.request_repaint_after_secs(TOLD_EVERY_S);
+        }
         self.rect = shown.then_some(drawn.response.rect);
+    }
+
+    /// Scrolls to a control that the keyboard has come to.
+    fn follow_focus(&mut self, ui: &Ui) {
+        let focused = ui.ctx().memory(|memory| memory.focused());
+        if let Some(id) = focused.filter(|_| focused != self.focused)
+            && let Some(response) = ui.ctx().read_response(id)
+            && response.layer_id == ui.layer_id()
+            && !ui.clip_rect().contains_rect(response.rect)
+        {
+            ui.scroll_to_rect(response.rect.expand(8.0), None);
+        }
+        self.focused = focused;
     }
 
     fn body(&mut self, ui: &mut Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
@@ -68,12 +86,16 @@ impl Memory {
         ui.spacing_mut().combo_width = ui.available_width();
         let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, height_px, actions };
         sections::show(ui, &mut sheet, &mut self.saving, &mut self.thumbs);
+        self.follow_focus(ui);
         let Sheet { look, stroke, .. } = sheet;
         if stroke.is_some() && look != state.look {
             actions.push(Action::Look { look: Box::new(look), stroke });
         }
     }
 }
+
+/// What the distance of focus is, is told so often, in seconds.
+const TOLD_EVERY_S: f32 = 0.5;
 
 /// What goes on, in one line.
 fn status(ui: &mut Ui, state: &State) {

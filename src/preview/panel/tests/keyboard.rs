@@ -67,6 +67,22 @@ fn a_control_in_focus_is_worked_by_the_keyboard() {
     assert!(done.iter().any(|action| matches!(action, Action::Look { .. })), "{done:?}");
 }
 
+#[test]
+fn the_panel_scrolls_to_what_has_the_focus() {
+    let mut window = Window::new();
+    let mut scrolled = 0;
+    for _ in 0..60 {
+        window.press(Key::Tab, Modifiers::NONE);
+        window.wait(1.0);
+        let Some(id) = window.ctx.memory(|memory| memory.focused()) else { continue };
+        let response = window.ctx.read_response(id).unwrap();
+        let panel = window.panel.sheet.rect().unwrap();
+        assert!(panel.contains_rect(response.rect), "{} is not in {panel}", response.rect);
+        scrolled += usize::from(response.rect.bottom() > panel.bottom() - 60.0);
+    }
+    assert!(scrolled > 0, "nothing was ever at the end of the panel");
+}
+
 /// Whether the panel is seen: whether a click in its place reaches something else than the picture.
 fn is_seen(window: &Window) -> bool {
     window.ctx.layer_id_at(on_panel()).is_some_and(|layer| layer.order != egui::Order::Background)
