@@ -1,6 +1,6 @@
 //! Pictures of the window in several states, to look at, and contrasts, to compute.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use egui::{Event, Theme, pos2};
 
@@ -15,9 +15,8 @@ use crate::recording::still::{read_color, write_color};
 
 /// The picture as large as the window.
 fn backdrop((width, height): (u32, u32)) -> ColorImage {
-    let blurred = Path::new("/tmp/panel-blurred.png");
     let recorded = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait/rgb/000000.png");
-    let source = read_color(if blurred.exists() { blurred } else { &recorded }).unwrap();
+    let source = read_color(&recorded).unwrap();
     let mut image = ColorImage::new(width, height);
     for y in 0..height {
         for x in 0..width {
@@ -44,7 +43,7 @@ fn save(window: &mut Window, painter: &mut Painter, name: &str) {
     let primitives = window.ctx.tessellate(output.shapes.clone(), output.pixels_per_point);
     painter.paint(&primitives, output.pixels_per_point, &mut image);
     output.drop_without_applying_deltas();
-    write_color(&PathBuf::from(format!("/tmp/panel-{name}.png")), &image, true).unwrap();
+    write_color(&std::env::temp_dir().join(format!("panel-{name}.png")), &image, true).unwrap();
 }
 
 /// A window whose textures are known from the beginning.
