@@ -121,7 +121,13 @@ fn looks_change_by_keys() {
     let amount = |key: Key| tweak::amount(&changed(key), 720).unwrap();
     let now = tweak::amount(&state.look, 720).unwrap();
     assert!(amount(Key::OpenBracket) < now && amount(Key::CloseBracket) > now);
-    let f_number = |key: Key| match changed(key).strength {
+    let mut lens = state.clone();
+    lens.look.strength = crate::look::Strength::Lens(tweak::LENS);
+    let with_lens = |key: Key| match does(&lens, key, Modifiers::NONE) {
+        Some(Action::Look { look, .. }) => *look,
+        other => panic!("{key:?}: {other:?}"),
+    };
+    let f_number = |key: Key| match with_lens(key).strength {
         crate::look::Strength::Lens(lens) => lens.f_number,
         other => panic!("{other:?}"),
     };

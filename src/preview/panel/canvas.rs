@@ -68,7 +68,8 @@ impl Place {
 impl Gestures {
     /// Reads what is done to the picture, and draws the marks on it.
     pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, actions: &mut Vec<Action>) {
-        let response = ui.interact(place.rect, Id::unique("picture"), Sense::click_and_drag());
+        // No stop for the Tab key: the arrow keys do what a click does.
+        let response = ui.interact(place.rect, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
         let line = split_line(ui, state, &place);
         let is_tilt = state.look.effect == Some(Effect::TiltShift) && state.shown == Shown::Picture && !state.bare;
         let own = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
@@ -153,7 +154,7 @@ fn split_line(ui: &mut Ui, state: &State, place: &Place) -> Option<Response> {
     let at = state.split?;
     let x = place.rect.left() + at * place.rect.width();
     let rect = Rect::from_x_y_ranges(x - HOLD..=x + HOLD, place.rect.y_range());
-    let line = ui.interact(rect, Id::unique("split line"), Sense::drag());
+    let line = ui.interact(rect, Id::unique("split line"), Sense::DRAG);
     Some(line.on_hover_and_drag_cursor(egui::CursorIcon::ResizeHorizontal))
 }
 

@@ -26,6 +26,7 @@ pub fn show(ctx: &Context, actions: &mut Vec<Action>) {
     let width = if columns == 2 { 660.0 } else { (window.width() - 2.0 * (GAP + PAD)).clamp(60.0, 340.0) };
     let drawn = area.fade_in(false).sense(Sense::click()).show(ctx, |ui| {
         let colors = Colors::here(ui);
+        ui.set_max_height(window.height() - 2.0 * GAP);
         card(&colors).show(ui, |ui| {
             ui.set_width(width);
             ui.horizontal(|ui| {
@@ -68,6 +69,7 @@ pub fn show(ctx: &Context, actions: &mut Vec<Action>) {
 
 fn keys<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &'a str)>) {
     let colors = Colors::here(ui);
+    ui.spacing_mut().interact_size.y = 17.0;
     ui.add_space(8.0);
     ui.label(RichText::new(name).family(medium()).color(colors.accent));
     Grid::new(name).num_columns(2).spacing(vec2(12.0, 4.0)).min_col_width(104.0).show(ui, |ui| {

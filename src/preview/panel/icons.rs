@@ -5,10 +5,13 @@ use std::f32::consts::TAU;
 use egui::{
     Color32, CornerRadius, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo,
 };
-use egui::{Role, pos2, vec2};
+use egui::{Role, vec2};
 
 use super::parts::focus_ring;
 use super::theme::Colors;
+
+/// Side of a button that is an icon, in points.
+pub const SIDE: f32 = 26.0;
 
 /// What an icon shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +32,7 @@ pub enum Icon {
 pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     let colors = Colors::here(ui);
     let sense = if enabled { Sense::click() } else { Sense::hover() };
-    let (rect, response) = ui.allocate_exact_size(Vec2::splat(26.0), sense);
+    let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), sense);
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, hint));
     if enabled && response.hovered() {
         ui.painter().rect_filled(rect, CornerRadius::same(7), colors.hover);
@@ -64,20 +67,18 @@ fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
     }
 }
 
-/// An arrow that turns left (-1) or right (1).
+/// An arrow over an arc, that points down at the left (-1) or right (1).
 fn turn(painter: &Painter, at: Pos2, side: f32, stroke: Stroke) {
-    let curve: Vec<Pos2> = (0..=12)
+    let mut curve: Vec<Pos2> = (0..=14)
         .map(|k| {
-            let angle = (-0.25 + 0.5 * k as f32 / 12.0) * TAU;
-            at + vec2(side * -(angle.cos() * 4.0 - 1.0), angle.sin() * 4.0 + 1.0)
+            let angle = 0.5 * TAU * k as f32 / 14.0;
+            at + vec2(side * (1.0 - 5.5 * angle.cos()), 1.5 - 5.5 * angle.sin())
         })
-        .map(|p| pos2(2.0 * at.x - p.x, p.y))
         .collect();
+    let tip = at + vec2(side * 6.5, 3.0);
+    (curve[0], curve[14]) = (at + vec2(side * -4.5, 3.5), tip);
     painter.add(Shape::line(curve, stroke));
-    let tip = at + vec2(side * 6.0, -3.0);
-    painter.line_segment([at + vec2(-side, -3.0), tip], stroke);
-    painter.line_segment([at + vec2(-side, 5.0), at + vec2(side * 3.0, 5.0)], stroke);
-    painter.add(Shape::line(vec![tip + vec2(side * -3.4, -3.4), tip, tip + vec2(side * -3.4, 3.4)], stroke));
+    painter.add(Shape::line(vec![tip + vec2(-3.6, -3.4), tip, tip + vec2(3.6, -3.4)], stroke));
 }
 
 fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: Stroke) {

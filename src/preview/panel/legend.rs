@@ -46,14 +46,9 @@ pub fn show(ui: &Ui, state: &State) {
             title("Circle of confusion: radius in pixels");
             ramp(painter, bar, |share| diverging(2.0 * share - 1.0));
             hatch(painter, Rect::from_min_max(bar.min, bar.center_bottom()));
-            for share in [-1.0f32, -0.5, 0.0, 0.5, 1.0] {
-                let x = bar.center().x + share * bar.width() / 2.0;
-                let label = match share {
-                    -1.0 => format!("{:.0} in front", most_px),
-                    1.0 => format!("{:.0} behind", most_px),
-                    _ => format!("{:.0}", share.abs() * most_px),
-                };
-                tick(painter, &colors, bar, x, &label);
+            let labels = [format!("{most_px:.0} in front"), "0".to_owned(), format!("{most_px:.0} behind")];
+            for (label, side) in labels.iter().zip([-1.0, 0.0, 1.0]) {
+                tick(painter, &colors, bar, bar.center().x + side * bar.width() / 2.0, label);
             }
         }
         Legend::Bins { count, high_px } => {

@@ -1,5 +1,6 @@
 //! The controls, as egui draws them.
 
+mod badges;
 mod canvas;
 mod help;
 mod icons;
@@ -74,6 +75,9 @@ impl Panel {
             legend::show(ui, state);
             let shown = state.panel && (awake || self.sheet.is_in_use(&ctx));
             self.sheet.show(&ctx, state, shown, height_px, actions);
+            if !shown {
+                badges::show(&ctx, state);
+            }
             if state.instruments {
                 self.instruments.show(&ctx, state);
             }

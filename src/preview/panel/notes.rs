@@ -5,7 +5,7 @@ use std::time::Duration;
 use egui::{Align2, Area, Context, Id, Label, Order, RichText, Ui, vec2};
 
 use super::state::{Action, Source, State};
-use super::theme::{Colors, GAP, WIDTH, card, medium};
+use super::theme::{Colors, GAP, card, medium};
 
 /// A note is shown for so long, and longer the more there is to read.
 const SHOWN_S: f64 = 3.5;
@@ -23,7 +23,7 @@ pub struct Ages {
 impl Ages {
     /// Draws notes, and the state of the source where there are no frames.
     pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) {
-        banner(ctx, state, actions);
+        let mut up = GAP + banner(ctx, state, actions);
         let now_s = ctx.input(|input| input.time);
         self.seen.retain(|(number, _)| state.notes.iter().any(|note| note.number == *number));
         for note in &state.notes {
@@ -48,62 +48,48 @@ impl Ages {
         if next_s.is_finite() {
             ctx.request_repaint_after(Duration::from_secs_f64(next_s + 0.005));
         }
-        if shown.is_empty() {
-            return;
-        }
-        let area =
-            Area::new(Id::unique("notes")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -GAP)).order(Order::Foreground);
-        area.interactable(false).fade_in(false).show(ctx, |ui| {
-            ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 460.0));
-            ui.with_layout(egui::Layout::top_down(egui::Align::Center), |ui| {
-                for &(text, opacity) in &shown[shown.len().saturating_sub(MOST)..] {
-                    ui.scope(|ui| {
-                        ui.set_opacity(opacity);
-                        let colors = Colors::here(ui);
-                        card(&colors).inner_margin(egui::Margin::symmetric(14, 9)).show(ui, |ui| {
-                            ui.add(Label::new(RichText::new(text).color(colors.text)).wrap());
-                        });
-                    });
-                }
+        for (&(text, opacity), place) in shown.iter().rev().take(MOST).zip(0..) {
+            let area = Area::new(Id::unique(("note", place))).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -up));
+            let drawn = area.order(Order::Foreground).interactable(false).fade_in(false).show(ctx, |ui| {
+                ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 460.0));
+                ui.set_opacity(opacity);
+                let colors = Colors::here(ui);
+                card(&colors).inner_margin(egui::Margin::symmetric(14, 9)).show(ui, |ui| {
+                    ui.add(Label::new(RichText::new(text).color(colors.text)).wrap());
+                });
             });
-        });
+            up += drawn.response.rect.height() + 6.0;
+        }
     }
 }
 
-/// What there is to know of a source without frames, with a way out.
-fn banner(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
+/// What there is to know of a source without frames, with a way out: at the bottom, clear of the picture's middle. Its
+/// height.
+fn banner(ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
     let (title, why, button) = match &state.source {
-        Source::Running(_) => return,
+        Source::Running(_) => return 0.0,
         Source::Opening => ("Opening…", "", None),
         Source::Lost(why) => ("No picture", why.as_str(), Some("Try again")),
         Source::Ended => ("The end", "The recording is over.", Some("Play again")),
     };
-    let area = Area::new(Id::unique("banner")).anchor(Align2::CENTER_CENTER, beside(ctx, state)).order(Order::Middle);
-    area.fade_in(false).show(ctx, |ui| {
+    let area = Area::new(Id::unique("banner")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -GAP)).order(Order::Middle);
+    let drawn = area.fade_in(false).show(ctx, |ui| {
         let colors = Colors::here(ui);
         ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 360.0));
         card(&colors).show(ui, |ui| lines(ui, &colors, (title, why, button), actions));
     });
+    drawn.response.rect.height() + 6.0
 }
 
 fn lines(ui: &mut Ui, colors: &Colors, (title, why, button): (&str, &str, Option<&str>), actions: &mut Vec<Action>) {
-    ui.vertical_centered(|ui| {
-        ui.label(RichText::new(title).family(medium()).size(16.0));
-        if !why.is_empty() {
-            ui.add(Label::new(RichText::new(why).color(colors.text)).wrap());
+    ui.label(RichText::new(title).family(medium()).size(16.0));
+    if !why.is_empty() {
+        ui.add(Label::new(RichText::new(why).color(colors.text)).wrap());
+    }
+    if let Some(button) = button {
+        ui.add_space(2.0);
+        if ui.button(button).on_hover_text("F5").clicked() {
+            actions.push(Action::Retry);
         }
-        if let Some(button) = button {
-            ui.add_space(4.0);
-            if ui.button(button).on_hover_text("F5").clicked() {
-                actions.push(Action::Retry);
-            }
-        }
-    });
-}
-
-/// The middle of what the panel leaves free.
-fn beside(ctx: &Context, state: &State) -> egui::Vec2 {
-    let room = ctx.content_rect().width();
-    let covered = if state.panel && !state.bare && room > 2.0 * WIDTH { WIDTH + GAP } else { 0.0 };
-    vec2(-covered / 2.0, 0.0)
+    }
 }

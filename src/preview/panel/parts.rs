@@ -47,7 +47,9 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
         ui.spacing_mut().interact_size.y = 20.0;
         let least = if ratios { f64::from(*range.start()).max(1e-3) } else { 0.0 };
         let slider = Slider::new(value, range).show_value(false).logarithmic(ratios).smallest_positive(least);
-        changed |= ui.add(slider).labelled_by(name.inner.id).on_hover_text(hint).changed();
+        let slider = ui.add(slider).labelled_by(name.inner.id).on_hover_text(hint);
+        focus_ring(ui, &slider, slider.rect.shrink2(Vec2::new(0.0, 1.0)));
+        changed |= slider.changed();
     });
     changed
 }
@@ -146,5 +148,6 @@ pub fn section<R>(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui
             ui.add_space(2.0);
             body(ui)
         });
+    focus_ring(ui, &folded.header_response, folded.header_response.rect.shrink(3.0));
     folded.body_returned
 }

@@ -4,7 +4,7 @@ use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, pos2};
 
 use super::icons::{self, Icon};
 use super::sections::{self, Saving, Sheet, Thumbs};
-use super::state::{Action, State};
+use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD, WIDTH};
 
 /// What the panel remembers.
@@ -14,6 +14,8 @@ pub struct Memory {
     thumbs: Thumbs,
     /// Where it was drawn last.
     rect: Option<Rect>,
+    /// What had the focus in the pass before.
+    focused: Option<Id>,
 }
 
 fn id() -> Id {
@@ -49,27 +51,71 @@ impl Memory {
         let area = Area::new(id()).fixed_pos(corner).order(Order::Middle).constrain(false).fade_in(false);
         let drawn = area.show(ctx, |ui| {
             let colors = Colors::here(ui);
+            ui.set_max_height(most_height);
             theme::card(&colors).show(ui, |ui| {
                 ui.set_width(width - 2.0 * PAD);
                 header(ui, state, actions);
+                status(ui, state);
                 let height = most_height - 2.0 * PAD - ui.min_rect().height() - ui.spacing().item_spacing.y;
                 let scroll = ScrollArea::vertical().max_height(height.max(20.0)).auto_shrink([false, true]);
                 scroll.show(ui, |ui| self.body(ui, state, height_px, actions));
             });
         });
+        if shown && matches!(state.source, Source::Running(_)) {
+            ctx.request_repaint_after_secs(TOLD_EVERY_S);
+        }
         self.rect = shown.then_some(drawn.response.rect);
+    }
+
+    /// Scrolls to a control that the keyboard has come to.
+    fn follow_focus(&mut self, ui: &Ui) {
+        let focused = ui.ctx().memory(|memory| memory.focused());
+        if let Some(id) = focused.filter(|_| focused != self.focused)
+            && let Some(response) = ui.ctx().read_response(id)
+            && response.layer_id == ui.layer_id()
+            && !ui.clip_rect().contains_rect(response.rect)
+        {
+            ui.scroll_to_rect(response.rect.expand(8.0), None);
+        }
+        self.focused = focused;
     }
 
     fn body(&mut self, ui: &mut Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
         // The bar floats over what is at the right.
         ui.set_width(ui.available_width() - 4.0);
+        ui.spacing_mut().combo_width = ui.available_width();
         let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, height_px, actions };
         sections::show(ui, &mut sheet, &mut self.saving, &mut self.thumbs);
+        self.follow_focus(ui);
         let Sheet { look, stroke, .. } = sheet;
         if stroke.is_some() && look != state.look {
             actions.push(Action::Look { look: Box::new(look), stroke });
         }
     }
+}
+
+/// What the distance of focus is, is told so often, in seconds.
+const TOLD_EVERY_S: f32 = 0.5;
+
+/// What goes on, in one line.
+fn status(ui: &mut Ui, state: &State) {
+    let colors = Colors::here(ui);
+    let mut parts: Vec<String> = Vec::new();
+    if let Source::Running(running) = &state.source {
+        parts.push(running.label.clone());
+    }
+    let focused = state.look.effect == Some(crate::bokeh::Effect::Dof);
+    if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
+        parts.push(format!("focused at {metres:.2} m"));
+    }
+    let text = match &state.source {
+        Source::Running(_) => parts.join(", "),
+        Source::Opening => "Opening…".to_owned(),
+        Source::Lost(_) => "No picture".to_owned(),
+        Source::Ended => "The recording is over".to_owned(),
+    };
+    let text = egui::RichText::new(text).text_style(egui::TextStyle::Small).color(colors.weak);
+    ui.add(egui::Label::new(text).truncate());
 }
 
 /// The name, and what concerns all of the look.
@@ -78,19 +124,19 @@ fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.heading("Look");
         let (undo, redo) = state.history.can();
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let buttons = [
-                (Icon::Close, "Hide the panel (P)", true, Action::Panel(false)),
-                (Icon::Help, "Keys (F1)", true, Action::Help(!state.help)),
-                (Icon::Reset, "Back to the look at the start (R)", state.look != state.first_look, Action::Reset),
-                (Icon::Redo, "Redo (Ctrl+Shift+Z)", redo, Action::Redo),
-                (Icon::Undo, "Undo (Ctrl+Z)", undo, Action::Undo),
-            ];
-            for (icon, hint, enabled, action) in buttons {
-                if icons::button(ui, icon, hint, enabled) {
-                    actions.push(action);
-                }
+        let buttons = [
+            (Icon::Undo, "Undo (Ctrl+Z)", undo, Action::Undo),
+            (Icon::Redo, "Redo (Ctrl+Shift+Z)", redo, Action::Redo),
+            (Icon::Reset, "Back to the look at the start (R)", state.look != state.first_look, Action::Reset),
+            (Icon::Help, "Keys (F1)", true, Action::Help(!state.help)),
+            (Icon::Close, "Hide the panel (P)", true, Action::Panel(false)),
+        ];
+        let room = buttons.len() as f32 * (icons::SIDE + ui.spacing().item_spacing.x);
+        ui.add_space((ui.available_width() - room).max(0.0));
+        for (icon, hint, enabled, action) in buttons {
+            if icons::button(ui, icon, hint, enabled) {
+                actions.push(action);
             }
-        });
+        }
     });
 }

@@ -94,10 +94,10 @@ pub fn rung(quality: Option<Quality>, theme: Theme) -> (Color32, &'static str) {
         Color32::from_rgb(r, g, b)
     };
     match quality {
-        None => (pick([150, 153, 160], [120, 124, 132]), "–"),
-        Some(Quality::Draft) => (pick([255, 122, 110], [190, 50, 40]), "D"),
-        Some(Quality::Fast) => (pick([255, 190, 92], [170, 96, 0]), "F"),
-        Some(Quality::Balanced) => (pick([126, 200, 140], [40, 120, 60]), "B"),
+        None => (pick([150, 153, 160], [96, 100, 108]), "–"),
+        Some(Quality::Draft) => (pick([255, 122, 110], [180, 44, 36]), "D"),
+        Some(Quality::Fast) => (pick([255, 190, 92], [150, 82, 0]), "F"),
+        Some(Quality::Balanced) => (pick([126, 200, 140], [30, 108, 52]), "B"),
         Some(Quality::High) => (pick([110, 180, 250], [20, 100, 180]), "H"),
         Some(Quality::Best) => (pick([200, 160, 255], [110, 60, 170]), "X"),
     }

@@ -142,6 +142,17 @@ fn every_field_can_be_shown_at_any_size() {
 }
 
 #[test]
+fn the_picture_keeps_its_memory() {
+    let size = (640, 360);
+    let (mut views, view, settings) = (Views::default(), view(size, (320, 180), CocField::Depth(LENS)), settings(size));
+    let place = |views: &mut Views, shown: Shown| views.draw(shown, &view, Some(&settings)).unwrap().rgb.as_ptr();
+    let first = place(&mut views, Shown::Depth);
+    for shown in [Shown::Coc, Shown::Bins, Shown::Depth] {
+        assert_eq!(place(&mut views, shown), first);
+    }
+}
+
+#[test]
 fn what_cannot_be_shown_is_not() {
     let mut views = Views::default();
     let mut view = view((16, 16), (16, 16), CocField::Depth(LENS));

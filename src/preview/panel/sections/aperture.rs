@@ -41,7 +41,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
         }
         Shape::Star { points } => whole(ui, part("Points", "How many", 3.0..=16.0, 0, ["", ""]), points),
     }
-    let light = part("Light", "-1: soap bubbles; 1: bright in the middle, soft at the rim", -1.0..=1.0, 2, ["", ""]);
+    let light =
+        part("Intensity", "-1: soap bubbles; 1: bright in the middle, soft at the rim", -1.0..=1.0, 2, ["", ""]);
     number(ui, light, &mut sheet.look.aperture.intensity);
     let shaped = before != sheet.look.aperture;
     sheet.changed(shaped, "aperture");

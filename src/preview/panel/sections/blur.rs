@@ -87,7 +87,7 @@ fn by_numbers(ui: &mut Ui, sheet: &mut Sheet, mut lens: Lens) {
 fn largest(ui: &mut Ui, sheet: &mut Sheet) {
     let height_px = sheet.height_px as f32;
     let own = sheet.look.max_coc_px.is_some();
-    if switch(ui, "Limit of my own", "Largest blur of anything, near or far; otherwise 6 % of the height", own) {
+    if switch(ui, "Own limit", "Largest blur of anything, near or far; otherwise 6 % of the height", own) {
         let Look { max_coc_px, .. } = &mut sheet.look;
         *max_coc_px = if own { None } else { Some((MAX_COC_PER_HEIGHT * height_px).round()) };
         sheet.changed(true, "own limit");

@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         sheet.changed(true, "focus distance");
     }
     let how = Number {
-        label: "In focus around it",
+        label: "Focal range",
         hint: "Depth that stays sharp in front of and behind the focal plane",
         range: FOCUS_RANGES_M,
         ratios: false,

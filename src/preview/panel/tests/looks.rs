@@ -1,11 +1,11 @@
 //! Pictures of the window in several states, to look at, and contrasts, to compute.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use egui::{Event, Theme, pos2};
 
 use super::paint::{Painter, over};
-use super::{Window, button, pressed};
+use super::{Window, button};
 use crate::bokeh::Effect;
 use crate::frame::ColorImage;
 use crate::preview::panel::theme::{Colors, rung};
@@ -15,9 +15,8 @@ use crate::recording::still::{read_color, write_color};
 
 /// The picture as large as the window.
 fn backdrop((width, height): (u32, u32)) -> ColorImage {
-    let blurred = Path::new("/tmp/panel-blurred.png");
     let recorded = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait/rgb/000000.png");
-    let source = read_color(if blurred.exists() { blurred } else { &recorded }).unwrap();
+    let source = read_color(&recorded).unwrap();
     let mut image = ColorImage::new(width, height);
     for y in 0..height {
         for x in 0..width {
@@ -44,7 +43,7 @@ fn save(window: &mut Window, painter: &mut Painter, name: &str) {
     let primitives = window.ctx.tessellate(output.shapes.clone(), output.pixels_per_point);
     painter.paint(&primitives, output.pixels_per_point, &mut image);
     output.drop_without_applying_deltas();
-    write_color(&PathBuf::from(format!("/tmp/panel-{name}.png")), &image, true).unwrap();
+    write_color(&std::env::temp_dir().join(format!("panel-{name}.png")), &image, true).unwrap();
 }
 
 /// A window whose textures are known from the beginning.
@@ -93,6 +92,16 @@ fn pictures() {
         state.look.tilt.angle_deg = -12.0;
         state.source = sample::running(false);
     });
+    shot("badges", Theme::Dark, &|state| {
+        state.panel = false;
+        state.frozen = true;
+        state.apply(crate::preview::state::Action::Record(true));
+        state.apply(crate::preview::state::Action::VirtualCamera(Some("/dev/video9".into())));
+    });
+    shot("large", Theme::Dark, &|state| {
+        state.text_scale = 1.8;
+        state.look.strength = crate::look::Strength::Lens(crate::preview::state::tweak::LENS);
+    });
     shot("help", Theme::Dark, &|state| state.help = true);
     shot("help-light", Theme::Light, &|state| state.help = true);
     shot("lost", Theme::Light, &|state| {
@@ -133,8 +142,12 @@ fn pictures() {
         }
         save(&mut window, &mut painter, &format!("scrolled-{part}"));
     }
-    for _ in 0..6 {
-        window.pass(vec![pressed(egui::Key::Tab, egui::Modifiers::NONE, true)]);
+    for _ in 0..20 {
+        for down in [true, false] {
+            let (_, output) =
+                window.pass_with_output(vec![super::pressed(egui::Key::Tab, egui::Modifiers::NONE, down)]);
+            painter.learn(output).drop_without_applying_deltas();
+        }
     }
     save(&mut window, &mut painter, "focused");
     window.pass(vec![Event::PointerMoved(pos2(300.0, 300.0))]);

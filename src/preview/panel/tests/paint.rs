@@ -74,7 +74,8 @@ impl Painter {
             (high(|p| p.x, clip[1].x.round(), onto.width), high(|p| p.y, clip[1].y.round(), onto.height));
         for y in top.floor() as u32..bottom.max(0.0).ceil() as u32 {
             for x in left.floor() as u32..right.max(0.0).ceil() as u32 {
-                let (px, py) = (x as f32 + 0.5, y as f32 + 0.5);
+                // Off the middle by a little, so that no sample lies on an edge of two triangles.
+                let (px, py) = (x as f32 + 0.50013, y as f32 + 0.50007);
                 if px < left || px > right || py < top || py > bottom {
                     continue;
                 }
@@ -82,8 +83,7 @@ impl Painter {
                     ((at[b] - at[a]).x * (py - at[a].y) - (at[b] - at[a]).y * (px - at[a].x)) / area
                 };
                 let weights = [edge(1, 2), edge(2, 0), edge(0, 1)];
-                // Each pixel of an edge between two triangles belongs to one of them: nearly always.
-                if weights.iter().any(|&weight| weight < 0.0) || weights.contains(&0.0) && (x + y) % 2 == 0 {
+                if weights.iter().any(|&weight| weight < 0.0) {
                     continue;
                 }
                 let mix = |value: &dyn Fn(&Vertex) -> f32| (0..3).map(|k| value(&corners[k]) * weights[k]).sum::<f32>();
