@@ -296,7 +296,10 @@ impl Opened {
                     fps: frames.fps.unwrap_or(defaults::FPS),
                     frames: frames.frames,
                     threads: cores(),
-                    cycle: wanted.cycle.then(|| Scene::portrait().period_s() * frames.fps.unwrap_or(defaults::FPS)).map(|n| n as u64),
+                    cycle: wanted
+                        .cycle
+                        .then(|| Scene::portrait().period_s() * frames.fps.unwrap_or(defaults::FPS))
+                        .map(|n| n as u64),
                 })?;
                 Ok(of(Box::new(camera)))
             }

@@ -15,7 +15,8 @@ use super::values::LogFormat;
 pub fn start_log(global: &Global) {
     let level = match (global.quiet, global.verbose) {
         (true, _) => "error",
-        (_, 0) => "warn",
+        // What others grumble about is seldom for who uses this.
+        (_, 0) => "bokehcam=warn,error",
         (_, 1) => "bokehcam=info,warn",
         (_, _) => "bokehcam=debug,info",
     };

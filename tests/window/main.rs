@@ -13,4 +13,5 @@ mod window;
 
 mod keys;
 mod life;
+mod looks;
 mod size;

@@ -66,8 +66,13 @@ impl Ages {
 /// What there is to know of a source without frames, with a way out: at the bottom, clear of the picture's middle. Its
 /// height.
 fn banner(ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
+    let silent;
     let (title, why, button) = match &state.source {
-        Source::Running(_) => return 0.0,
+        Source::Running(running) => {
+            let Some(silent_s) = state.silent_s else { return 0.0 };
+            silent = format!("{}: nothing for {silent_s} s. It goes on by itself once frames come.", running.label);
+            ("No picture", silent.as_str(), Some("Try again"))
+        }
         Source::Opening => ("Opening…", "", None),
         Source::Lost(why) => ("No picture", why.as_str(), Some("Try again")),
         Source::Ended => ("The end", "The recording is over.", Some("Play again")),

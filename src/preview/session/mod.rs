@@ -164,7 +164,9 @@ impl News {
     }
 
     fn note(&self, line: impl Into<String>) {
-        self.tell(Told::Note(line.into()));
+        let line = line.into();
+        tracing::info!("{line}");
+        self.tell(Told::Note(line));
     }
 
     fn send(&self, heard: Heard) {

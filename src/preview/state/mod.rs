@@ -6,9 +6,9 @@ mod action;
 mod apply;
 mod hear;
 mod history;
-mod switches;
 #[cfg(test)]
 pub mod sample;
+mod switches;
 #[cfg(test)]
 mod tests;
 pub mod tweak;
@@ -127,6 +127,8 @@ pub struct State {
     pub help: bool,
     /// Whether the window fills the screen.
     pub full_screen: bool,
+    /// For how many seconds no frame came, where one should have.
+    pub silent_s: Option<u64>,
     /// Distance of the focal plane in the last frame, in metres.
     pub focus_m: Option<f32>,
     /// What the colours of a view other than the picture mean.
@@ -168,6 +170,7 @@ impl State {
             bare: false,
             help: false,
             full_screen: false,
+            silent_s: None,
             focus_m: None,
             legend: None,
             notes: Vec::new(),

@@ -33,6 +33,9 @@ use crate::stats::WindowUse;
 const INSTRUMENTS: Duration = Duration::from_millis(100);
 /// A stop from outside is seen after this time at the latest.
 const LOOK_UP: Duration = Duration::from_millis(250);
+/// After so long without a frame, and so many periods of the source, the person is told.
+const SILENCE: Duration = Duration::from_secs(2);
+const SILENT_PERIODS: u32 = 10;
 
 pub(super) struct App {
     state: State,
@@ -57,6 +60,8 @@ pub(super) struct App {
     settings: Option<bokeh::Settings>,
     nothing: ColorImage,
     clock: Clock,
+    /// When the last frame came, or its source was opened.
+    heard_at: Instant,
     /// When controls are to be laid out next.
     layout_at: Option<Instant>,
     laid_out: Instant,
@@ -105,6 +110,7 @@ impl App {
             settings: None,
             nothing: ColorImage::new(16, 9),
             clock,
+            heard_at: Instant::now(),
             layout_at: Some(Instant::now()),
             laid_out: Instant::now(),
             input_at: None,
@@ -141,6 +147,7 @@ impl App {
         while let Some(heard) = self.session.hear() {
             match heard {
                 Heard::Views(views) => {
+                    self.heard_at = Instant::now();
                     self.views = Some(views);
                     self.state.meters.restart();
                 }
@@ -165,6 +172,10 @@ impl App {
             }
         }
         let newest = self.views.as_mut().and_then(Receiver::try_recv);
+        if newest.is_some() {
+            self.heard_at = Instant::now();
+            self.listen();
+        }
         let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.in_memory);
         if let Some(view) = newest.filter(|_| !frozen) {
             self.state.focus_m = match view.coc {
@@ -179,6 +190,22 @@ impl App {
             }
         }
         if changed {
+            self.ask_for_redraw();
+        }
+    }
+
+    /// Whether frames come. A camera that is gone may come back by itself: only its silence tells.
+    fn listen(&mut self) {
+        let silent = match (&self.state.source, &self.view) {
+            (Source::Running(running), Some(_)) => {
+                let patience = SILENCE.max(Duration::from_nanos(running.period_ns) * SILENT_PERIODS);
+                Some(self.heard_at.elapsed()).filter(|silent| *silent > patience)
+            }
+            _ => None,
+        };
+        let silent_s = silent.map(|silent| silent.as_secs());
+        if std::mem::replace(&mut self.state.silent_s, silent_s) != silent_s {
+            self.layout_at = Some(Instant::now());
             self.ask_for_redraw();
         }
     }
@@ -309,7 +336,7 @@ impl App {
             picture: made.map_or(picture, Image::Memory),
             before: before.zip(*split),
             mirror: *mirror,
-            stale: !matches!(source, Source::Running(_) | Source::Opening),
+            stale: self.state.silent_s.is_some() || !matches!(source, Source::Running(_) | Source::Opening),
             background,
         };
         let began_ns = self.clock.now_ns();
@@ -387,6 +414,7 @@ impl ApplicationHandler<()> for App {
         if self.stop.load(Ordering::Relaxed) {
             return events.exit();
         }
+        self.listen();
         let now = Instant::now();
         if self.layout_at.is_some_and(|at| at <= now) {
             self.ask_for_redraw();

@@ -1,0 +1,203 @@
+//! Finding a look: gestures on the picture, and what is kept of it.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use bokehcam::frame::ColorImage;
+use bokehcam::recording::still::read_color;
+
+use super::picture::{distance, is_photograph, part};
+use super::program::{PORTRAIT, Program};
+use super::screen::{Screen, until};
+use super::window::{PATIENCE, Window};
+
+/// Begins with one frame, again and again, and nothing over it, in which the person is sharp.
+const ONE_FRAME: [&str; 7] = ["--start", "0", "--end", "0.05", "--panel=false", "--quality", "balanced"];
+
+fn start<'a>(screen: &'a Screen, more: &[&str]) -> (Program<'a>, Window<'a>) {
+    let arguments: Vec<&str> = [PORTRAIT].iter().chain(&ONE_FRAME).chain(more).copied().collect();
+    let mut program = Program::start(screen, &arguments);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
+    (program, window)
+}
+
+/// Where something is in the recording: middle and size, as fractions of width and height.
+type Place = ((f64, f64), (f64, f64));
+const LEAVES: Place = ((0.18, 0.80), (0.14, 0.20));
+const FACE: Place = ((0.53, 0.45), (0.12, 0.16));
+
+/// How much detail there is: the mean step from pixel to pixel.
+fn detail(image: &ColorImage, ((x, y), (width, height)): Place) -> f64 {
+    let px = |share: f64, all: u32| (share * f64::from(all)).round() as u32;
+    let size = (px(width, image.width), px(height, image.height));
+    let cut = part(image, (px(x, image.width) - size.0 / 2, px(y, image.height) - size.1 / 2), size);
+    let next = part(&cut, (1, 0), (cut.width - 1, cut.height));
+    distance(&next, &part(&cut, (0, 0), next.size()))
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_click_focuses_there_and_a_double_click_on_the_subject_again() {
+    let screen = Screen::new();
+    let (program, window) = start(&screen, &[]);
+    let before = window.until("the face is sharp", |image| detail(image, FACE) > 1.3 * detail(image, LEAVES));
+    window.click(LEAVES.0, 1);
+    let near = window.until("the leaves are sharp", |image| detail(image, LEAVES) > 1.5 * detail(&before, LEAVES));
+    assert!(detail(&near, FACE) < 0.9 * detail(&before, FACE), "and the face is not");
+    window.click((0.9, 0.3), 2);
+    window.until("the face is sharp again", |image| {
+        detail(image, FACE) > 0.95 * detail(&before, FACE) && detail(image, LEAVES) < 1.1 * detail(&before, LEAVES)
+    });
+    program.close();
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn the_wheel_blurs_more_and_less_and_undo_goes_back() {
+    const WALL: Place = ((0.68, 0.62), (0.10, 0.14));
+    let screen = Screen::new();
+    let (program, window) = start(&screen, &["--effect", "blur"]);
+    let before = window.until("a picture", is_photograph);
+    window.wheel(WALL.0, 6);
+    let changed = |image: &ColorImage, factor: f64| {
+        let change = detail(image, WALL) / detail(&before, WALL);
+        if factor < 1.0 { change < factor } else { change > factor }
+    };
+    let up = window.until("another blur", |image| changed(image, 0.93) || changed(image, 1.07));
+    window.wheel(WALL.0, -6);
+    window.until("about as before", |image| distance(image, &before) < 0.35 * distance(&up, &before));
+    program.close();
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn the_line_between_before_and_after_is_dragged() {
+    const RIGHT_OF_IT: Place = ((0.62, 0.35), (0.06, 0.20));
+    let screen = Screen::new();
+    let (program, window) = start(&screen, &["--split", "0.5", "--coc-at-infinity", "5%"]);
+    let before = window.until("a picture", is_photograph);
+    window.drag((0.5, 0.6), (0.8, 0.6));
+    window.until("what the line passed is sharp", |image| {
+        detail(image, RIGHT_OF_IT) > 1.2 * detail(&before, RIGHT_OF_IT)
+    });
+    program.close();
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
+    let screen = Screen::new();
+    let (program, window) = start(&screen, &["--verbose", "--backend", "cpu"]);
+    window.key(&[], u32::from('2'));
+    std::thread::sleep(Duration::from_millis(500));
+    window.key(&[], u32::from('s'));
+    window.key(&[], u32::from('k'));
+    let picture = program.home().join("bokehcam.png");
+    until("the snapshot", PATIENCE, || picture.exists());
+    until("the command", PATIENCE, || program.said().contains("Copied: bokehcam preview"));
+    let ended = program.close();
+    let home = ended.home.path();
+    let bokehcam = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+        command.args(arguments).current_dir(home).env("XDG_CONFIG_HOME", home).env("DISPLAY", &screen.display);
+        command
+    };
+    let arguments = ["render", "--like", "bokehcam.png", "--out", "again.png", "--backend", "cpu"];
+    assert!(bokehcam(&arguments).status().unwrap().success());
+    let read = |name: &str| read_color(&home.join(name)).unwrap();
+    assert_eq!(read("bokehcam.png"), read("again.png"), "to the bit");
+
+    let copied = ended.said.split("Copied: bokehcam ").nth(1).and_then(|rest| rest.lines().next()).unwrap();
+    assert!(copied.contains("--aperture polygon") && copied.contains("--start=0"), "{copied}");
+    let arguments: Vec<&str> = copied.split(' ').chain(["--frames=3", "--report=again.json"]).collect();
+    let ran = bokehcam(&arguments).output().unwrap();
+    assert!(ran.status.success(), "{copied}: {}", String::from_utf8_lossy(&ran.stderr));
+    assert!(home.join("again.json").exists());
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_recording_is_begun_and_ended_by_a_key() {
+    let screen = Screen::new();
+    let (program, window) = start(&screen, &[]);
+    window.key(&[], u32::from('v'));
+    let video = program.home().join("bokehcam-1.mp4");
+    std::thread::sleep(Duration::from_millis(1500));
+    window.key(&[], u32::from('v'));
+    until("the video is whole", PATIENCE, || video.exists());
+    program.close();
+}
+
+/// The recording without its depth, in a folder of its own; also one with a picture that is broken, and which.
+fn without_depth(folder: &Path) {
+    fs::create_dir_all(folder.join("rgb")).unwrap();
+    let list = fs::read_to_string(Path::new(PORTRAIT).join("rgb.txt")).unwrap();
+    let lines: Vec<&str> = list.lines().filter(|line| !line.starts_with('#')).take(6).collect();
+    for file in lines.iter().filter_map(|line| line.split_whitespace().nth(1)) {
+        fs::copy(Path::new(PORTRAIT).join(file), folder.join(file)).unwrap();
+    }
+    fs::write(folder.join("rgb.txt"), lines.join("\n") + "\n").unwrap();
+}
+
+/// How colourful a picture is: the mean distance of red from blue.
+fn colour(image: &ColorImage) -> f64 {
+    let pixels = image.rgb.as_chunks::<3>().0;
+    let sum: f64 = pixels.iter().map(|rgb| f64::from(rgb[0].abs_diff(rgb[2]))).sum();
+    sum / pixels.len() as f64
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_camera_alone_is_shown_as_tilt_shift_and_a_lost_one_in_grey_until_it_is_back() {
+    let screen = Screen::new();
+    let folder = tempfile::tempdir().unwrap();
+    without_depth(folder.path());
+    let name = folder.path().to_str().unwrap();
+    let mut program = Program::start(&screen, &[name, "--panel=false", "--coc-at-infinity", "5%"]);
+    let window = program.window();
+    let shown = window.until("the first picture", is_photograph);
+    const TOP: Place = ((0.5, 0.1), (0.8, 0.15));
+    const BAND: Place = ((0.5, 0.55), (0.3, 0.10));
+    assert!(detail(&shown, BAND) > 1.5 * detail(&shown, TOP), "sharp in the band alone");
+
+    // The next picture that is read is broken: the source is lost.
+    let last = fs::read_dir(folder.path().join("rgb")).unwrap().map(|entry| entry.unwrap().path()).max().unwrap();
+    let whole = fs::read(&last).unwrap();
+    fs::write(&last, &whole[..whole.len() / 2]).unwrap();
+    window.until("the picture stays, in grey", |image| {
+        colour(image) < 0.35 * colour(&shown) && is_grey_photograph(image)
+    });
+    fs::write(&last, &whole).unwrap();
+    window.key(&[], super::input::sym::F1 + 4);
+    window.until("it is back", |image| colour(image) > 0.8 * colour(&shown) && is_photograph(image));
+    program.close();
+}
+
+fn is_grey_photograph(image: &ColorImage) -> bool {
+    let mut seen = [false; 256];
+    image.rgb.iter().step_by(3).for_each(|&byte| seen[usize::from(byte)] = true);
+    seen.iter().filter(|seen| **seen).count() > 60
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_gpu_shows_the_same_as_the_processor() {
+    let screen = Screen::new();
+    let shown = [&["--backend", "cpu"][..], &["--backend", "gpu", "--adapter", "llvmpipe"]].map(|backend| {
+        let (program, window) = start(&screen, backend);
+        let mut last: Option<ColorImage> = None;
+        let image = window.until("it stands still", |image| {
+            std::thread::sleep(Duration::from_millis(250));
+            let same = last.as_ref().is_some_and(|last| is_photograph(last) && distance(last, image) < 0.05);
+            last = Some(image.clone());
+            same
+        });
+        program.close();
+        image
+    });
+    let off = distance(&shown[0], &shown[1]);
+    assert!(off < 1.0, "{off}");
+}
