@@ -140,8 +140,9 @@ mod tests {
             strength: Strength::AtInfinity(9.0),
             ..Look::plain(Some(Effect::TiltShift))
         };
-        let file =
-            parsed("rim = 0.9\n[presets.lens]\nf-number = 2\nfocal-length = 50\nsensor-width = 36\n[presets.\"no\"]\n");
+        let file = parsed(
+            "rim = 0.9\n[presets.lens]\neffect = \"auto\"\nf-number = 2\nfocal-length = 50\nsensor-width = 36\n[presets.\"no\"]\n",
+        );
         let all = all_upon(&file, &base, true);
         let names: Vec<_> = all.iter().map(|preset| (preset.name.as_str(), preset.own)).collect();
         let built_in = ["portrait", "cinematic", "dreamy", "product", "miniature"].map(|name| (name, false));
@@ -149,7 +150,7 @@ mod tests {
         assert!(all.iter().all(|preset| preset.look.focus == base.focus && preset.look.rank == base.rank));
         assert_eq!(all[0].look, Look { focus: base.focus, rank: base.rank, ..Look::plain(Some(Effect::Dof)) });
         assert_eq!(all[6].look, base);
-        assert!(matches!(all[5].look, Look { strength: Strength::Lens(_), effect: Some(Effect::TiltShift), .. }));
+        assert!(matches!(all[5].look, Look { strength: Strength::Lens(_), effect: Some(Effect::Dof), .. }));
         assert_eq!(all[4].look.effect, Some(Effect::TiltShift));
         // From any preset to any other is the same as from the start.
         for from in &all[..5] {

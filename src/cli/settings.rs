@@ -155,7 +155,7 @@ fn values<'a>(
             DeValue::Integer(number) => {
                 i64::from_str_radix(number.as_str(), number.radix()).map_or(number.to_string(), |n| n.to_string())
             }
-            DeValue::Float(number) => number.as_str().to_owned(),
+            DeValue::Float(number) => number.as_str().trim_start_matches('+').to_owned(),
             _ => return Err((at, format!("'{name}' must be a text, a number, true or false"))),
         };
         values.insert(name.to_owned(), value);
