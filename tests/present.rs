@@ -13,6 +13,7 @@ use bokehcam::compute::Place;
 use bokehcam::compute::device::{Device, DevicePicture};
 use bokehcam::frame::ColorImage;
 use bokehcam::link::pool::Pooled;
+use bokehcam::preview::panel;
 use bokehcam::preview::present::gpu::Canvas;
 use bokehcam::preview::present::soft::Painter;
 use bokehcam::preview::present::{Area, Controls, Drawing, Image};
@@ -48,6 +49,13 @@ fn word([r, g, b]: [u8; 3]) -> u32 {
 
 fn at(image: &ColorImage, x: u32, y: u32) -> [u8; 3] {
     image.rgb.as_chunks().0[(y * image.width + x) as usize]
+}
+
+/// egui with the window's own fonts.
+fn context() -> egui::Context {
+    let context = egui::Context::default();
+    panel::dress(&context);
+    context
 }
 
 /// Controls of every kind, text first.
@@ -171,7 +179,7 @@ fn a_stale_picture_is_grey_and_darker() {
 
 #[test]
 fn buffers_that_come_back_show_the_same_as_new_ones() {
-    let (size, context) = ((200, 120), egui::Context::default());
+    let (size, context) = ((200, 120), context());
     let mut painter = painter(size, None);
     let picture = noise(100, 100);
     let drawings = [area(50, 10, 100, 100), area(0, 0, 100, 100), area(40, 0, 120, 120)];
@@ -211,7 +219,7 @@ fn what_does_not_fit_is_cut_and_what_is_nothing_shows_nothing() {
 
 #[test]
 fn text_and_controls_are_painted_over_the_picture() {
-    let (size, context) = ((480, 480), egui::Context::default());
+    let (size, context) = ((480, 480), context());
     let picture = color(480, 480, |_, _| [90, 140, 60]);
     let shown = drawing(&picture, area(0, 0, 480, 480));
     // A window grows to its content in its first frames.
@@ -314,7 +322,7 @@ fn both_presenters_show_the_same_controls() {
     let picture = noise(500, 500);
     let shown = drawing(&picture, area(0, 0, 500, 500));
     for pixels_per_point in [1.0, 1.5] {
-        let (ours, theirs) = (egui::Context::default(), egui::Context::default());
+        let (ours, theirs) = (context(), context());
         let (mut painter, mut pixels) = (painter((500, 500), None), vec![0; 500 * 500]);
         // A window grows to its content in its first frames; textures of the first ones are needed later, too.
         for frame in 0..3 {
@@ -419,7 +427,7 @@ fn bytes(device: &Device, picture: &DevicePicture) -> Vec<u8> {
 #[test]
 #[ignore = "measures time"]
 fn a_frame_costs_little() {
-    let (size, whole, context) = ((1280, 720), area(0, 0, 1280, 720), egui::Context::default());
+    let (size, whole, context) = ((1280, 720), area(0, 0, 1280, 720), context());
     let [picture, small, large] = [(1280, 720), (640, 360), (1920, 1080)].map(|(width, height)| noise(width, height));
     let mut painter = painter(size, Some(controls(&context, size, 1.0)));
     let mut pixels = vec![0; 1280 * 720];

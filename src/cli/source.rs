@@ -25,6 +25,7 @@ use crate::depth::DepthSource;
 use crate::depth::recorded::Recorded;
 use crate::optics::StereoRig;
 use crate::recording::{Options, Pair, Recording};
+use crate::scene::Scene;
 #[cfg(feature = "camera")]
 use crate::v4l2::{layout::Content, live::Wish};
 

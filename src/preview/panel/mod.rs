@@ -15,6 +15,8 @@ mod sheet;
 mod tests;
 mod theme;
 
+pub use theme::install as dress;
+
 use std::time::Duration;
 
 use egui::{Event, Ui};
