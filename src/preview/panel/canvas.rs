@@ -95,7 +95,8 @@ impl Gestures {
         let [x, y] = place.fractions(at);
         if look.effect == Some(Effect::TiltShift) {
             look.tilt.center_y = marks::center_through(&look.tilt, place.size, [x, y]);
-        } else if response.double_clicked() {
+        // A double click soon after another click counts as a third.
+        } else if response.double_clicked() || response.triple_clicked() {
             look.focus = FocusRule::Auto;
             self.ring = None;
         } else {

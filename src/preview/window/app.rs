@@ -408,6 +408,10 @@ impl ApplicationHandler<()> for App {
         if gfx.input.on_window_event(&gfx.window, &event).repaint {
             self.touched();
         }
+        // What is pressed is found by where the pointer is when controls are laid out: not after it has moved on.
+        if matches!(event, WindowEvent::MouseInput { .. }) {
+            self.lay_out(events);
+        }
     }
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
