@@ -14,6 +14,7 @@ mod pacer;
 mod playout;
 mod quality;
 mod rate;
+mod view;
 mod wanted;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,22 +23,22 @@ use std::thread::{self, Scope, ScopedJoinHandle};
 
 pub use change::{Change, Executor};
 pub use error::{Fault, PipelineError};
+pub use view::{Progress, Trace, View};
 pub use wanted::Wanted;
 
-use crate::bokeh::{Bokeh, PassTimes};
+use crate::bokeh::Bokeh;
 use crate::budget::Quality;
 use crate::capture::{Brings, Camera};
 use crate::clock::{self, Clock};
-use crate::compute::DevicePicture;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::demand::Demand;
-use crate::link::pool::{Pool, Pooled};
+use crate::link::pool::Pool;
 use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
 use crate::optics::{CocField, DepthCoc, Lens};
 use crate::sink::Sink;
-use crate::stats::{About, Cause, Frames, Report, Tally, Ticket, Timings};
+use crate::stats::{About, Cause, Report, Tally, Ticket, Timings};
 
 /// Whether frames wait for the program, or the program for frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,58 +138,6 @@ pub struct Run<'a> {
     pub stop: &'a AtomicBool,
     /// Told after each delivered frame, on the caller's thread.
     pub progress: &'a dyn Fn(Progress),
-}
-
-/// How far a run is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
-    /// Frames captured, those that were lost included.
-    pub captured: u64,
-    /// Frames delivered.
-    pub delivered: u64,
-    /// Frames dropped, for any cause.
-    pub dropped: u64,
-    /// Frames to be captured in all, where that is known.
-    pub total: Option<u64>,
-}
-
-/// A frame, for who looks at more than the picture.
-pub struct View {
-    /// The picture as the sink was given it; any picture where it is not in memory.
-    pub picture: Pooled<ColorImage>,
-    /// Whether the picture is in memory.
-    pub in_memory: bool,
-    /// The picture on the device that blurs, where it was wanted there and is.
-    pub on_device: Option<Pooled<DevicePicture>>,
-    /// The picture before the blur; `None` where nothing was blurred.
-    pub color: Option<Pooled<ColorImage>>,
-    /// The depth that it was blurred by, holes filled.
-    pub depth: Option<Pooled<DepthMap>>,
-    /// The radius of every pixel.
-    pub coc: CocField,
-    /// Which frame it is.
-    pub stamp: Stamp,
-    /// When it was captured, on the run's clock.
-    pub captured_ns: u64,
-    /// What it took.
-    pub trace: Trace,
-    /// The counts of the run up to this frame.
-    pub frames: Frames,
-}
-
-/// What a frame took on its way, in nanoseconds.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Trace {
-    /// Reading and decoding, waits excluded.
-    pub decode_ns: u64,
-    /// Depth and CoC; next to nothing where they were taken over from the frame before.
-    pub depth_ns: u64,
-    /// The blur; 0 where there was none.
-    pub blur_ns: u64,
-    /// Its passes.
-    pub passes: PassTimes,
-    /// The rung it was blurred at.
-    pub quality: Option<Quality>,
 }
 
 /// A frame on its way: what identifies it, what it took, and what there is of it at this point.

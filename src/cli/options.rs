@@ -8,7 +8,7 @@ use clap::{Args, value_parser};
 
 use super::defaults;
 #[cfg(feature = "window")]
-use super::preview::Show;
+pub use super::preview::options::Window;
 use super::quality::level_or_auto;
 use super::values::{
     Backend, DepthChoice, Effect, LogFormat, Method, OrAuto, Pace, Refine, Size, above_zero, between, not_negative,
@@ -248,37 +248,6 @@ pub struct Stream {
     /// Write what happened to every frame, and how long it took, to this JSON file
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-}
-
-/// What a window shows first; all of it can be changed there.
-#[cfg(feature = "window")]
-#[derive(Args, Clone, Debug)]
-#[command(next_help_heading = "Window")]
-pub struct Window {
-    /// What of each frame is shown
-    #[arg(long, value_enum, value_name = "WHAT", default_value = "picture")]
-    pub show: Show,
-    /// Show the picture as it was before the blur, left of this fraction of its width
-    #[arg(long, value_name = "FRACTION", value_parser = between(0.0, 1.0))]
-    pub split: Option<f32>,
-    /// Fill the screen
-    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
-    pub full_screen: bool,
-    /// Show frame times, latency and drops
-    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
-    pub instruments: bool,
-    /// Show the controls; --panel=false begins without
-    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = true,
-          default_missing_value = "true", action = clap::ArgAction::Set, hide_possible_values = true)]
-    pub panel: bool,
-    /// Size of text and controls, 1 as usual
-    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = between(0.75, 3.0))]
-    pub text_scale: f32,
-    /// Where snapshots and recordings go [default: the pictures folder]
-    #[arg(long, value_name = "DIR")]
-    pub save_to: Option<PathBuf>,
 }
 
 /// What may be overwritten.

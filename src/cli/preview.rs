@@ -1,24 +1,27 @@
 //! `preview`: a window that shows a source in portrait mode, live.
 
+pub mod options;
 mod wings;
 
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::config::{self, Executor};
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_report};
+use super::options::{Global, Streaming};
 use super::source::SourceName;
-use super::{options, settings, sinks, terminal, values};
+use super::{settings, sinks, terminal, values};
 use crate::look::Look;
 use crate::preview::session::Start;
 use crate::preview::state::{Output, Shown, State};
 use crate::preview::window::{self, Preview};
 use crate::sink::Target;
 
+use options::{Show, Window};
 use wings::Wings;
 
 /// Show a camera, a recording or the synthetic scene in portrait mode, live, and find a look
@@ -43,29 +46,16 @@ pub struct PreviewCommand {
     #[arg(long, value_name = "SINK")]
     to: Vec<Target>,
     #[command(flatten)]
-    window: options::Window,
+    window: Window,
     #[command(flatten)]
-    parts: options::Streaming,
-}
-
-/// What of a frame is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Show {
-    /// The picture
-    Picture,
-    /// Its depth, in colours
-    Depth,
-    /// Its circle of confusion
-    Coc,
-    /// The bins that it is split into
-    Bins,
+    parts: Streaming,
 }
 
 /// Runs the command; `given` is what was said of other things than the look.
 ///
 /// # Errors
 /// The options do not fit each other, there is no display, or there never was a frame.
-pub fn run(command: &PreviewCommand, global: &options::Global, given: Vec<(String, String)>) -> Result<(), CliError> {
+pub fn run(command: &PreviewCommand, global: &Global, given: Vec<(String, String)>) -> Result<(), CliError> {
     let mut parts = command.parts.clone();
     // Who looks for a look does so for longer than a recording takes.
     parts.frames.repeat = true;
@@ -79,11 +69,11 @@ pub fn run(command: &PreviewCommand, global: &options::Global, given: Vec<(Strin
 pub fn show(
     source: &str,
     to: &[Target],
-    window: &options::Window,
-    parts: &options::Streaming,
-    (global, given): (&options::Global, Vec<(String, String)>),
+    window: &Window,
+    parts: &Streaming,
+    (global, given): (&Global, Vec<(String, String)>),
 ) -> Result<(), CliError> {
-    let options::Streaming { frames, stream, output, computing, .. } = parts;
+    let Streaming { frames, stream, output, computing, .. } = parts;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
     let usage = |what: &str| CliError::Usage(what.to_string());
     let refuse = |what: &str| Err(usage(what));
@@ -137,7 +127,7 @@ pub fn show(
     }
 }
 
-fn first_state(look: Look, source: &str, window: &options::Window, mirror: bool) -> State {
+fn first_state(look: Look, source: &str, window: &Window, mirror: bool) -> State {
     let mut state = State::new(look, source.to_owned());
     state.shown = match window.show {
         Show::Picture => Shown::Picture,

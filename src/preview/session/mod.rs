@@ -1,6 +1,7 @@
 //! What goes on behind the window: a thread of its own opens sources, runs the pipeline, makes executors for new looks,
 //! and begins and ends outputs. None of it holds up the window.
 
+mod host;
 mod live;
 
 pub(super) use live::fitting;
@@ -10,18 +11,17 @@ use std::sync::Arc;
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 
-use live::Live;
+use host::Host;
 
 use super::backstage::{Backstage, Switch};
-use super::state::{Effect, Output, Source, Told};
+use super::state::{Effect, Output, Told};
 use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
 use crate::look::Look;
 use crate::optics::CocField;
 use crate::pipeline::{PipelineError, View, Wanted};
-use crate::recording::snapshot::{self, Snapshot};
-use crate::sink::switch::{Fate, Told as Written};
+use crate::sink::switch::Told as Written;
 use crate::stats::Report;
 
 /// Called when the window has something to hear, from any thread.
@@ -99,26 +99,9 @@ impl Session {
         let (orders, inbox) = mpsc::channel();
         let (told, heard) = mpsc::channel();
         let own = orders.clone();
-        let thread = thread::Builder::new().name("session".into()).spawn(move || {
-            let Start { backstage, look, source, outputs, keep_going, budget_ns, folder, wanted } = start;
-            let news = News { told, wake };
-            let host = Host {
-                backstage,
-                look,
-                source,
-                outputs,
-                keep_going,
-                budget_ns,
-                folder,
-                wanted,
-                news,
-                orders: own,
-                live: None,
-                runs: 0,
-                report: None,
-            };
-            host.run(&inbox)
-        })?;
+        let thread = thread::Builder::new()
+            .name("session".into())
+            .spawn(move || Host::new(start, News { told, wake }, own).run(&inbox))?;
         Ok(Self { orders, heard, thread })
     }
 
@@ -172,238 +155,5 @@ impl News {
     fn send(&self, heard: Heard) {
         let _ = self.told.send(heard);
         (self.wake)();
-    }
-}
-
-/// The session's own thread.
-struct Host {
-    backstage: Box<dyn Backstage>,
-    look: Look,
-    source: String,
-    outputs: Vec<Output>,
-    keep_going: bool,
-    budget_ns: Option<u64>,
-    folder: PathBuf,
-    wanted: Arc<Wanted>,
-    news: News,
-    orders: mpsc::Sender<Order>,
-    live: Option<Live>,
-    /// Runs begun.
-    runs: u64,
-    report: Option<Report>,
-}
-
-impl Host {
-    fn run(mut self, inbox: &mpsc::Receiver<Order>) -> Option<Report> {
-        self.tell_choices();
-        self.open();
-        while let Ok(order) = inbox.recv() {
-            let mut next = Some(order);
-            while let Some(order) = next.take() {
-                match order {
-                    // Of looks that wait, the last one counts.
-                    Order::Do(Effect::Look(mut look)) => {
-                        for order in inbox.try_iter() {
-                            match order {
-                                Order::Do(Effect::Look(newer)) => look = newer,
-                                other => {
-                                    next = Some(other);
-                                    break;
-                                }
-                            }
-                        }
-                        self.adopt(*look);
-                    }
-                    Order::Do(effect) => self.bring_about(effect),
-                    Order::Save(still) => self.save(&still),
-                    Order::Copy(switches) => self.copy(&switches),
-                    Order::Wrote(written) => self.wrote(&written),
-                    Order::Ended(run, ended) => self.ended(run, *ended),
-                    Order::Close => {
-                        self.stop();
-                        return self.report;
-                    }
-                }
-            }
-        }
-        self.stop();
-        self.report
-    }
-
-    fn bring_about(&mut self, effect: Effect) {
-        match effect {
-            Effect::Open(name) => {
-                self.source = name;
-                self.stop();
-                self.open();
-            }
-            Effect::Begin(output) => {
-                self.begin(output);
-                self.tell_outputs();
-            }
-            Effect::End(output) => {
-                self.outputs.retain(|other| *other != output);
-                if let Some(live) = &self.live {
-                    live.end(&output);
-                }
-                self.tell_outputs();
-            }
-            Effect::Control(name, value) => match self.backstage.set_control(&name, value) {
-                Ok(controls) => self.news.tell(Told::Controls(controls)),
-                Err(line) => self.news.note(line),
-            },
-            Effect::Refresh => self.tell_choices(),
-            Effect::SavePreset(name, look) => match self.backstage.save_preset(&name, &look) {
-                Ok(()) => {
-                    self.news.note(format!("saved as preset '{name}'"));
-                    self.news.tell(Told::Presets(self.backstage.presets(&self.look)));
-                }
-                Err(line) => self.news.note(line),
-            },
-            // These are the window's own, or come another way.
-            Effect::Look(_) | Effect::Snapshot | Effect::CopyCommand | Effect::FullScreen(_) | Effect::Close => {}
-        }
-    }
-
-    fn tell_choices(&mut self) {
-        let sources = self.backstage.sources();
-        let virtual_cameras = self.backstage.virtual_cameras();
-        self.news.tell(Told::Choices { sources, virtual_cameras });
-        self.news.tell(Told::Presets(self.backstage.presets(&self.look)));
-    }
-
-    fn tell_outputs(&self) {
-        self.news.tell(Told::Outputs(self.outputs.clone()));
-    }
-
-    /// Opens the source and begins a run of it.
-    fn open(&mut self) {
-        self.news.tell(Told::Source(Source::Opening));
-        let opened = match self.backstage.open(&self.source) {
-            Ok(opened) => opened,
-            Err(line) => return self.news.tell(Told::Source(Source::Lost(line))),
-        };
-        self.source.clone_from(&opened.name);
-        self.news.tell(Told::Controls(opened.controls.clone()));
-        opened.notes.iter().for_each(|line| self.news.note(line));
-        let first = self.runs == 0;
-        self.runs += 1;
-        let (orders, run) = (self.orders.clone(), self.runs);
-        let to_host = orders.clone();
-        let wrote = move |written| {
-            let _ = to_host.send(Order::Wrote(written));
-        };
-        let ended = move |ended| {
-            let _ = orders.send(Order::Ended(run, Box::new(ended)));
-        };
-        let settings = live::Settings {
-            look: &self.look,
-            keep_going: self.keep_going,
-            budget_ns: self.budget_ns,
-            wanted: Arc::clone(&self.wanted),
-        };
-        match Live::begin(opened, &settings, &mut *self.backstage, &self.news, wrote, ended) {
-            Ok((live, source)) => {
-                self.live = Some(live);
-                self.news.tell(Told::Source(source));
-                // A recording ends with its source; a virtual camera goes on with the next one.
-                let outputs = std::mem::take(&mut self.outputs);
-                outputs.into_iter().filter(|output| output.is_camera || first).for_each(|output| self.begin(output));
-                self.tell_outputs();
-            }
-            Err(line) => self.news.tell(Told::Source(Source::Lost(line))),
-        }
-    }
-
-    fn adopt(&mut self, look: Look) {
-        self.look = look;
-        if let Some(live) = &mut self.live
-            && let Err(line) = live.adopt(&self.look, &mut *self.backstage)
-        {
-            self.news.note(line);
-        }
-        // They change other looks than before.
-        self.news.tell(Told::Presets(self.backstage.presets(&self.look)));
-    }
-
-    fn begin(&mut self, mut output: Output) {
-        let Some(live) = &self.live else { return self.news.note("there is no source to write out") };
-        if output.name.is_empty() {
-            output.name = self.free_name().display().to_string();
-        }
-        match self.backstage.output(&output.name, live.size, live.period_ns) {
-            Ok(sink) => {
-                live.write_to(&output, sink);
-                self.outputs.push(output);
-            }
-            Err(line) => self.news.note(line),
-        }
-    }
-
-    /// A name for a recording that nothing has yet.
-    fn free_name(&self) -> PathBuf {
-        let name = |number: u32| self.folder.join(format!("bokehcam-{number}.mp4"));
-        (1..u32::MAX).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
-    }
-
-    fn copy(&self, switches: &[Switch]) {
-        let outputs: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
-        let command = self.backstage.command(&self.look, &self.source, &outputs, switches);
-        self.news.note(format!("Copied: {command}"));
-        self.news.send(Heard::Copy(command));
-    }
-
-    fn wrote(&mut self, Written { member, fate }: &Written) {
-        match fate {
-            Fate::Began => self.news.note(format!("writing to {member}")),
-            Fate::Completed { frames } => self.news.note(format!("{member}: complete, {frames} frames")),
-            Fate::Failed { why, .. } => {
-                self.news.note(why.clone());
-                self.outputs.retain(|output| output.name != *member);
-                self.tell_outputs();
-            }
-        }
-    }
-
-    /// A run came to its end by itself; one that was stopped is not waited for any more.
-    fn ended(&mut self, run: u64, ended: Result<Report, PipelineError>) {
-        let asked_for = run != self.runs || self.live.is_none();
-        let source = match &ended {
-            Ok(_) => Source::Ended,
-            Err(failed) => Source::Lost(failed.fault.to_string()),
-        };
-        self.report = Some(match ended {
-            Ok(report) => report,
-            Err(failed) => *failed.report,
-        });
-        if !asked_for {
-            if let Some(live) = self.live.take() {
-                live.join();
-            }
-            self.news.tell(Told::Source(source));
-        }
-    }
-
-    /// Ends the run, if there is one, and completes what it wrote.
-    fn stop(&mut self) {
-        if let Some(live) = self.live.take()
-            && let Some(report) = live.stop()
-        {
-            self.report = Some(report);
-        }
-    }
-
-    fn save(&self, still: &Still) {
-        let look = match &self.live {
-            Some(live) => live.effective(&self.look),
-            None => self.look.clone(),
-        };
-        let settings = look.flags_of_frame(&still.coc, still.quality);
-        let Still { picture, color, depth, .. } = still;
-        let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
-        match snapshot::save(&self.folder, "bokehcam", &snapshot) {
-            Ok(path) => self.news.note(format!("Saved {}", path.display())),
-            Err(error) => self.news.note(error.to_string()),
-        }
     }
 }

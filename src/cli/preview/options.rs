@@ -1,0 +1,50 @@
+//! What a window shows first, as it is written.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::super::values::between;
+
+/// What of a frame is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Show {
+    /// The picture
+    Picture,
+    /// Its depth, in colours
+    Depth,
+    /// Its circle of confusion
+    Coc,
+    /// The bins that it is split into
+    Bins,
+}
+
+/// What a window shows first; all of it can be changed there.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Window")]
+pub struct Window {
+    /// What of each frame is shown
+    #[arg(long, value_enum, value_name = "WHAT", default_value = "picture")]
+    pub show: Show,
+    /// Show the picture as it was before the blur, left of this fraction of its width
+    #[arg(long, value_name = "FRACTION", value_parser = between(0.0, 1.0))]
+    pub split: Option<f32>,
+    /// Fill the screen
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub full_screen: bool,
+    /// Show frame times, latency and drops
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+    pub instruments: bool,
+    /// Show the controls; --panel=false begins without
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = true,
+          default_missing_value = "true", action = clap::ArgAction::Set, hide_possible_values = true)]
+    pub panel: bool,
+    /// Size of text and controls, 1 as usual
+    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = between(0.75, 3.0))]
+    pub text_scale: f32,
+    /// Where snapshots and recordings go [default: the pictures folder]
+    #[arg(long, value_name = "DIR")]
+    pub save_to: Option<PathBuf>,
+}

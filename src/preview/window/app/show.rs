@@ -1,0 +1,130 @@
+//! What is done when the window is drawn: controls are laid out, what the person did with them is done, and the frame is
+//! shown.
+
+use std::time::{Duration, Instant};
+
+use winit::event_loop::ActiveEventLoop;
+use winit::window::Fullscreen;
+
+use super::App;
+use crate::compute::Place;
+use crate::preview::panel::Canvas;
+use crate::preview::present::{Area, Controls, Drawing, Image};
+use crate::preview::session::Still;
+use crate::preview::state::{Action, Effect, Source, State};
+
+impl App {
+    /// Lays the controls out and does what the person did to them.
+    pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
+        let size = self.picture_size();
+        let Some(gfx) = &mut self.gfx else { return };
+        let canvas = Canvas { area: gfx.area(size), size };
+        let input = gfx.input.take_egui_input(&gfx.window);
+        let mut actions = Vec::new();
+        let (panel, state) = (&mut self.panel, &self.state);
+        let output = self.ctx.run_ui(input, |ui| panel.show(ui, state, canvas, &mut actions));
+        gfx.input.handle_platform_output(&gfx.window, output.platform_output);
+        let primitives = self.ctx.tessellate(output.shapes, output.pixels_per_point);
+        let pixels_per_point = output.pixels_per_point;
+        gfx.presenter.set_controls(Controls { primitives, textures: output.textures_delta, pixels_per_point });
+        self.laid_out = Instant::now();
+        let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
+        self.layout_at = self.laid_out.checked_add(wait);
+        if !actions.is_empty() {
+            // They are shown with the next layout, which also answers what is asked of the state then.
+            self.layout_at = Some(self.laid_out);
+            actions.into_iter().for_each(|action| self.perform(action, events));
+            self.ask_for_redraw();
+        }
+    }
+
+    fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
+        for effect in self.state.apply(action) {
+            match effect {
+                Effect::Snapshot => self.snapshot(),
+                Effect::CopyCommand => self.session.copy(self.state.switches()),
+                Effect::FullScreen(on) => {
+                    if let Some(gfx) = &self.gfx {
+                        gfx.window.set_fullscreen(on.then_some(Fullscreen::Borderless(None)));
+                    }
+                }
+                Effect::Close => events.exit(),
+                Effect::Look(look) => {
+                    self.session.order(Effect::Look(look));
+                    self.look_changed();
+                }
+                other => self.session.order(other),
+            }
+        }
+        self.place();
+    }
+
+    /// Where pictures are needed from now on: only what stays on the GPU costs no way back.
+    pub(super) fn place(&self) {
+        let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
+        let used = self.state.frozen || self.snapshot_due || !self.state.outputs.is_empty();
+        self.wanted.set(match (drawn_on_gpu, used) {
+            (false, _) => Place::Memory,
+            (true, false) => Place::Device,
+            (true, true) => Place::Both,
+        });
+    }
+
+    /// Saves the frame that is shown, or the next one where this one is on the GPU alone.
+    pub(super) fn snapshot(&mut self) {
+        let Some(view) = &self.view else { return };
+        self.snapshot_due = !view.in_memory;
+        self.place();
+        if self.snapshot_due {
+            return;
+        }
+        self.session.save(Still {
+            picture: view.picture.clone(),
+            color: (**view.color.as_ref().unwrap_or(&view.picture)).clone(),
+            depth: view.depth.as_ref().map(|depth| (**depth).clone()),
+            coc: view.coc,
+            quality: view.trace.quality,
+        });
+    }
+
+    /// Shows the frame with the controls as they are.
+    pub(super) fn draw(&mut self, events: &ActiveEventLoop) {
+        let size = self.picture_size();
+        let Some(gfx) = self.gfx.as_mut().filter(|_| !self.hidden) else { return };
+        let shown = self.state.shown;
+        if let Some(view) = self.view.as_ref().filter(|_| self.is_new || self.drawn != shown) {
+            self.made.draw(shown, view, self.settings.as_ref());
+            self.drawn = shown;
+            self.state.legend = self.made.legend();
+        }
+        let made = self.state.legend.map(|_| self.made.image());
+        let State { mirror, split, source, .. } = &self.state;
+        let view = self.view.as_ref();
+        let in_memory = view.filter(|view| view.in_memory).map_or(&self.nothing, |view| &*view.picture);
+        let on_device = view.and_then(|view| view.on_device.as_deref()).filter(|there| gfx.presenter.takes(there));
+        let picture = on_device.map_or(Image::Memory(in_memory), Image::Device);
+        let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
+        let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
+        let drawing = Drawing {
+            area: if self.view.is_some() { gfx.area(size) } else { Area::default() },
+            picture: made.map_or(picture, Image::Memory),
+            before: before.zip(*split),
+            mirror: *mirror,
+            stale: self.state.silent_s.is_some() || !matches!(source, Source::Running(_) | Source::Opening),
+            background,
+        };
+        let began_ns = self.clock.now_ns();
+        gfx.window.pre_present_notify();
+        if let Err(error) = gfx.presenter.present(&drawing) {
+            self.failed = Some(error.into());
+            return events.exit();
+        }
+        let now_ns = self.clock.now_ns();
+        if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.is_new)) {
+            self.state.meters.presented(view, now_ns, now_ns - began_ns);
+        }
+        if let Some(input_at) = self.input_at.take() {
+            self.state.meters.reacted(input_at.elapsed().as_nanos() as u64);
+        }
+    }
+}
