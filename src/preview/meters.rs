@@ -71,6 +71,8 @@ pub struct Totals {
     pub latency: Histogram,
     /// From an input to the picture that shows what it did.
     pub reaction: Histogram,
+    /// Drawing the window.
+    pub present: Histogram,
 }
 
 /// The instruments' numbers: over the last [`FRAMES`] frames.
@@ -123,6 +125,7 @@ impl Meters {
     fn count(&mut self, trace: &Trace, now_ns: u64, latency_ns: u64, present_ns: u64) {
         self.totals.presented += 1;
         self.totals.latency.add(latency_ns);
+        self.totals.present.add(present_ns);
         if let (None, Some(begun_ns)) = (self.totals.first_frame_ns, self.begun_ns) {
             self.totals.first_frame_ns = Some(now_ns.saturating_sub(begun_ns));
         }

@@ -77,13 +77,20 @@ pub struct WindowUse {
     pub latency_ms: Option<Spread>,
     /// From an input to the picture that shows what it did.
     pub reaction_ms: Option<Spread>,
+    /// Drawing a frame and its controls, and handing them to the display.
+    pub present_ms: Option<Spread>,
 }
 
 impl WindowUse {
     /// Sums up what was measured.
-    pub fn new(presented: u64, first_frame_ns: Option<u64>, latency: &Histogram, reaction: &Histogram) -> Self {
-        let first_frame_ms = first_frame_ns.map(ms);
-        Self { presented, first_frame_ms, latency_ms: Spread::of(latency), reaction_ms: Spread::of(reaction) }
+    pub fn new(presented: u64, first_frame_ns: Option<u64>, [latency, reaction, present]: [&Histogram; 3]) -> Self {
+        Self {
+            presented,
+            first_frame_ms: first_frame_ns.map(ms),
+            latency_ms: Spread::of(latency),
+            reaction_ms: Spread::of(reaction),
+            present_ms: Spread::of(present),
+        }
     }
 }
 

@@ -14,4 +14,5 @@ mod window;
 mod keys;
 mod life;
 mod looks;
+mod pictures;
 mod size;

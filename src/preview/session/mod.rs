@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 use host::Host;
 
@@ -23,6 +24,9 @@ use crate::optics::CocField;
 use crate::pipeline::{PipelineError, View, Wanted};
 use crate::sink::switch::Told as Written;
 use crate::stats::Report;
+
+/// An end that takes longer is told.
+const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Called when the window has something to hear, from any thread.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
@@ -130,6 +134,15 @@ impl Session {
         let _ = self.orders.send(Order::Close);
         // What is still said is said to nobody.
         drop(self.heard);
+        let began = Instant::now();
+        let mut told = false;
+        while !self.thread.is_finished() {
+            thread::sleep(Duration::from_millis(20));
+            if !told && began.elapsed() > PATIENCE {
+                tracing::warn!("waiting for the source or an output to end; Ctrl-C twice aborts");
+                told = true;
+            }
+        }
         self.thread.join().ok().flatten()
     }
 }

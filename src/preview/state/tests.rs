@@ -10,6 +10,7 @@ fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<E
 fn radius_px(state: &State) -> f32 {
     match state.look.strength {
         Strength::AtInfinity(radius_px) => radius_px,
+        Strength::Percent(percent) => percent,
         Strength::Default | Strength::Lens(_) => 0.0,
     }
 }
@@ -217,11 +218,11 @@ fn the_wheel_gets_away_from_no_blur_and_back() {
     for _ in 0..200 {
         tweak::blur_by(&mut look, 0.8, 720);
     }
-    assert_eq!(look.strength, Strength::AtInfinity(0.0));
+    assert_eq!(look.strength, Strength::Percent(0.0));
     for _ in 0..200 {
         tweak::blur_by(&mut look, 1.25, 720);
     }
-    assert_eq!(look.strength, Strength::AtInfinity(crate::look::MAX_COC_PER_HEIGHT * 720.0));
+    assert_eq!(look.strength, Strength::Percent(crate::look::MAX_COC_PER_HEIGHT * 100.0));
     tweak::f_number_by(&mut look, 1.0);
     for (factor, f_number) in [(1.0, 1.8), (1e3, 0.7), (1e-6, 22.0)] {
         tweak::blur_by(&mut look, factor, 720);

@@ -8,7 +8,7 @@ use crate::pipeline::Trace;
 use crate::preview::state::sample;
 use crate::stats::Frames;
 
-const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 2.0, max_coc_px: 43.0 };
+const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 2.0, range_m: 0.0, max_coc_px: 43.0 };
 
 /// A view of `size` pixels, with a map of `map` pixels whose depth grows from left to right.
 fn view(size: (u32, u32), map: (u32, u32), coc: CocField) -> View {
@@ -22,6 +22,8 @@ fn view(size: (u32, u32), map: (u32, u32), coc: CocField) -> View {
     });
     View {
         picture: pictures.take(),
+        in_memory: true,
+        on_device: None,
         color: None,
         depth: Some(maps.take()),
         coc,

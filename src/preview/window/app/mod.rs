@@ -242,8 +242,8 @@ impl App {
 }
 
 fn window_use(state: &State) -> WindowUse {
-    let Totals { presented, first_frame_ns, latency, reaction } = state.meters.totals();
-    WindowUse::new(*presented, *first_frame_ns, latency, reaction)
+    let Totals { presented, first_frame_ns, latency, reaction, present } = state.meters.totals();
+    WindowUse::new(*presented, *first_frame_ns, [latency, reaction, present])
 }
 
 impl ApplicationHandler<()> for App {

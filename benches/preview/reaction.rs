@@ -1,0 +1,104 @@
+//! How soon the window answers a key: measured from outside, on the screen, while the pipeline is busy or stuck.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use x11rb::protocol::xproto::{ConnectionExt, ImageFormat};
+
+use super::Result;
+use super::screen::{Beside, Screen, until};
+use super::window::{PATIENCE, Window};
+
+/// Keys pressed in each case.
+const PRESSES: usize = 120;
+/// A corner where the instruments come and go, in pixels of the window.
+const CORNER: (i16, i16, u16, u16) = (60, 30, 60, 60);
+/// Columns and rows of the bars that are stuck behind: any picture that is never read.
+const STUCK: &str = "rgb/stuck.png";
+
+/// Measures and prints; `recording` has depth.
+pub fn measure(recording: &Path, scratch: &Path) -> Result<()> {
+    let stuck = scratch.join("stuck");
+    make_stuck(recording, &stuck)?;
+    let busy = ["--quality", "best", "--coc-at-infinity", "6%", "--max-coc", "60"];
+    let cases: [(&str, &Path, &[&str]); 3] = [
+        ("as usual", recording, &[]),
+        ("both cores busy with the blur", recording, &busy),
+        ("source stuck", &stuck, &[]),
+    ];
+    for (name, folder, more) in cases {
+        let screen = Screen::new();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+        command.arg("--quiet").arg("preview").arg(folder).args(more).args(["--backend", "cpu", "--panel=false"]);
+        command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY").stderr(Stdio::null());
+        command.env("XDG_STATE_HOME", scratch).env("XDG_CONFIG_HOME", scratch);
+        let program = Beside::start(&mut command);
+        let mut window = None;
+        until("the window", PATIENCE, || {
+            window = Window::of(&screen, program.0.id());
+            window.is_some()
+        });
+        let window = window.ok_or("no window")?;
+        until("its first picture", PATIENCE, || {
+            corner(&window).is_some_and(|bytes| bytes.iter().any(|byte| *byte > 40))
+        });
+        std::thread::sleep(Duration::from_secs(2));
+        let mut took_ms: Vec<f64> = (0..PRESSES).filter_map(|press| react(&window, press)).collect();
+        took_ms.sort_by(f64::total_cmp);
+        let at = |share: f64| took_ms.get(((took_ms.len() - 1) as f64 * share).round() as usize).copied();
+        let [p50, p99, max] = [0.5, 0.99, 1.0].map(|share| at(share).unwrap_or(f64::NAN));
+        println!("{name}: {} keys, p50 {p50:.0} ms, p99 {p99:.0} ms, longest {max:.0} ms", took_ms.len());
+    }
+    Ok(())
+}
+
+/// A copy of a recording in which the third picture is a pipe that nobody writes to.
+fn make_stuck(recording: &Path, folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder.join("rgb"))?;
+    fs::create_dir_all(folder.join("depth"))?;
+    for (list, name) in [("rgb.txt", "rgb"), ("depth.txt", "depth")] {
+        let text = fs::read_to_string(recording.join(list))?;
+        let mut lines: Vec<String> =
+            text.lines().filter(|line| !line.starts_with('#')).take(4).map(str::to_owned).collect();
+        for line in &lines {
+            let file = line.split_whitespace().nth(1).ok_or("a list without files")?;
+            fs::copy(recording.join(file), folder.join(file))?;
+        }
+        if name == "rgb" {
+            let time = lines[2].split_whitespace().next().unwrap_or_default().to_owned();
+            lines[2] = format!("{time} {STUCK}");
+        }
+        fs::write(folder.join(list), lines.join("\n") + "\n")?;
+    }
+    let made = Command::new("mkfifo").arg(folder.join(STUCK)).status()?;
+    if made.success() { Ok(()) } else { Err("mkfifo failed".into()) }
+}
+
+/// What is in the corner now.
+fn corner(window: &Window) -> Option<Vec<u8>> {
+    let (x, y, width, height) = CORNER;
+    let asked = window.screen.x.get_image(ImageFormat::Z_PIXMAP, window.id, x, y, width, height, u32::MAX).ok()?;
+    Some(asked.reply().ok()?.data)
+}
+
+fn brightness(bytes: &[u8]) -> f64 {
+    bytes.iter().map(|byte| f64::from(*byte)).sum::<f64>() / bytes.len().max(1) as f64
+}
+
+/// Presses the key of the instruments, and waits until they come or go. The first part of the time is the harness's own
+/// rest after a key, so that no answer seems quicker than that.
+fn react(window: &Window, press: usize) -> Option<f64> {
+    std::thread::sleep(Duration::from_millis(90 + 37 * (press as u64 % 7)));
+    let before = brightness(&corner(window)?);
+    let began = Instant::now();
+    window.key(&[], u32::from('i'));
+    while began.elapsed() < PATIENCE {
+        if (brightness(&corner(window)?) - before).abs() > 8.0 {
+            return Some(began.elapsed().as_secs_f64() * 1e3);
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    None
+}

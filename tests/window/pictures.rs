@@ -1,0 +1,58 @@
+//! The pictures of the window in the documentation. `scripts/screenshots` writes them where they belong.
+
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
+
+use bokehcam::frame::ColorImage;
+use image::codecs::jpeg::JpegEncoder;
+
+use super::picture::{distance, is_photograph};
+use super::program::{PORTRAIT, Program};
+use super::screen::Screen;
+
+/// Where they go: `BOKEHCAM_SCREENSHOTS`, else beside other pictures of tests.
+fn folder() -> PathBuf {
+    std::env::var_os("BOKEHCAM_SCREENSHOTS").map_or_else(|| env!("CARGO_TARGET_TMPDIR").into(), PathBuf::from)
+}
+
+fn save(image: &ColorImage, path: &Path) {
+    let file = std::fs::File::create(path).unwrap();
+    let mut encoder = JpegEncoder::new_with_quality(file, 88);
+    encoder.encode(&image.rgb, image.width, image.height, image::ExtendedColorType::Rgb8).unwrap();
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn pictures_for_the_docs() {
+    let look = ["--highlights", "12", "--coc-at-infinity", "3%", "--save-to", "."];
+    // What is written down there, and how it comes to be seen.
+    let scenes: [(&str, &[&str], &[char]); 4] = [
+        ("panel", &[], &[]),
+        ("split", &["--split", "0.52", "--panel=false"], &[]),
+        ("depth", &["--show", "depth", "--panel=false"], &[]),
+        ("instruments", &["--panel=false"], &['i']),
+    ];
+    std::fs::create_dir_all(folder()).unwrap();
+    let mut seen: Vec<ColorImage> = Vec::new();
+    for (name, more, keys) in scenes {
+        let screen = Screen::new();
+        let arguments: Vec<&str> = [PORTRAIT].iter().chain(&look).chain(more).copied().collect();
+        let mut program = Program::start(&screen, &arguments);
+        let window = program.window();
+        window.until("the first picture", |image| name == "depth" || is_photograph(image));
+        keys.iter().for_each(|key| window.key(&[], u32::from(*key)));
+        // Until notes are gone and the graph is full; the panel stays while the pointer is on it.
+        for step in 0..12 {
+            if name == "panel" {
+                window.point((0.9, 0.3 + 0.002 * f64::from(step)));
+            }
+            thread::sleep(Duration::from_millis(500));
+        }
+        let image = window.until("a picture", |_| true);
+        assert!(seen.iter().all(|other| distance(other, &image) > 2.0), "{name} shows what another picture shows");
+        save(&image, &folder().join(format!("{name}.jpg")));
+        seen.push(image);
+        program.close();
+    }
+}
