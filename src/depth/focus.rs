@@ -91,7 +91,11 @@ impl Focus {
     pub fn focus_m(&mut self, map: &DepthMap, time_ns: u64) -> f32 {
         let target_m = match self.rule {
             FocusRule::Metres(focus_m) => Some(focus_m),
-            FocusRule::Auto => self.subject.distance_m(map).map(|found_m| self.loyalty.choose_m(found_m, time_ns)),
+            FocusRule::Auto => {
+                let Self { subject, loyalty, .. } = self;
+                let found_m = subject.distance_m(map);
+                found_m.map(|found_m| loyalty.choose_m(found_m, |dioptres| subject.is_there(dioptres), time_ns))
+            }
             FocusRule::Point { x, y } => point_m(map, x, y, &mut self.window_m),
         };
         let Some(target_m) = target_m else {
@@ -121,7 +125,7 @@ impl EasedLens {
 /// Two distances this close together, in dioptres, are of one subject; and how fast it may move, in dioptres a second.
 const SAME: f32 = 0.12;
 const SPEED: f32 = 2.0;
-/// Another subject is turned to once it was there for so long: whoever passes by is not meant.
+/// While a subject is there, another one is turned to once it was there for so long: whoever passes by is not meant.
 const PATIENCE_NS: u64 = 400_000_000;
 
 /// Stays with a subject while others come and go, so that the lens does not hunt between two of them.
@@ -147,9 +151,11 @@ impl Seen {
 
 impl Loyalty {
     /// The distance to focus on where the nearest large subject is found at `found_m`.
-    fn choose_m(&mut self, found_m: f32, time_ns: u64) -> f32 {
+    fn choose_m(&mut self, found_m: f32, is_there: impl Fn(f32) -> bool, time_ns: u64) -> f32 {
         let found = Seen { dioptres: 1.0 / found_m, time_ns };
-        let Some(subject) = self.subject.filter(|subject| !subject.is_same(found)) else {
+        // One that is not where it was has moved, if by a leap.
+        let stays = |subject: &Seen| !subject.is_same(found) && is_there(subject.dioptres);
+        let Some(subject) = self.subject.filter(stays) else {
             (self.subject, self.rival) = (Some(found), None);
             return found_m;
         };
@@ -208,11 +214,12 @@ struct Subject {
     weight: [f32; CELLS],
     /// Sum of weight x disparity, so that the distance is finer than the cells.
     moment: [f32; CELLS],
+    total: f32,
 }
 
 impl Default for Subject {
     fn default() -> Self {
-        Self { weight: [0.0; CELLS], moment: [0.0; CELLS] }
+        Self { weight: [0.0; CELLS], moment: [0.0; CELLS], total: 0.0 }
     }
 }
 
@@ -232,6 +239,16 @@ impl Subject {
         Some(masses[peak] / moment)
     }
 
+    /// Whether something is left at this distance of a subject that was large enough, in the map that was looked at last.
+    fn is_there(&self, dioptres: f32) -> bool {
+        let mass: f32 = Self::window(Self::cell(dioptres)).map(|cell| self.weight[cell]).sum();
+        mass >= 0.5 * LARGE * self.total
+    }
+
+    fn cell(dioptres: f32) -> usize {
+        ((dioptres * (CELLS as f32 / NEAREST)) as usize).min(CELLS - 1)
+    }
+
     fn window(cell: usize) -> std::ops::Range<usize> {
         cell.saturating_sub(REACH)..(cell + REACH + 1).min(CELLS)
     }
@@ -247,7 +264,7 @@ impl Subject {
             for x in (0..width).step_by(width.div_ceil(LOOKS).max(1)) {
                 if DepthMap::is_known(row[x]) {
                     let disparity = 1.0 / row[x];
-                    let cell = ((disparity * (CELLS as f32 / NEAREST)) as usize).min(CELLS - 1);
+                    let cell = Self::cell(disparity);
                     let weight = centre_weight(x, width) * centre_weight(y, height);
                     self.weight[cell] += weight;
                     self.moment[cell] += weight * disparity;
@@ -255,6 +272,7 @@ impl Subject {
                 }
             }
         }
+        self.total = total;
         total
     }
 }
@@ -275,13 +293,21 @@ mod tests {
         DepthMap { width: 8, height: 8, metres: vec![metres; 64] }
     }
 
+    /// Somebody at 1 m over so many of 64 columns, and the room at 3 m.
+    fn beside(columns: usize) -> DepthMap {
+        let metres = (0..64 * 64).map(|k| if k % 64 < columns { 1.0 } else { 3.0 });
+        DepthMap { width: 64, height: 64, metres: metres.collect() }
+    }
+
     #[test]
     fn the_lens_does_not_hunt_between_two_subjects() {
         let mut focus = Focus::new(FocusRule::Auto);
+        let found = |columns| Subject::default().distance_m(&beside(columns)).unwrap();
+        assert!(found(16) < 1.1 && found(9) > 2.9, "large enough, and not");
         for frame in 0..300u64 {
-            // Every few frames the other one is found.
-            let at_m = if frame % 7 < 3 { 3.0 } else { 1.0 };
-            let focus_m = focus.focus_m(&flat(if frame == 0 { 1.0 } else { at_m }), frame * FRAME_NS);
+            // Now large enough, now not, for a few frames each.
+            let columns = if frame % 7 < 3 { 16 } else { 9 };
+            let focus_m = focus.focus_m(&beside(columns), frame * FRAME_NS);
             assert!((focus_m - 1.0).abs() < 0.02, "{frame}: {focus_m}");
         }
     }
@@ -289,8 +315,8 @@ mod tests {
     #[test]
     fn it_turns_to_a_subject_that_stays_and_follows_one_that_moves() {
         let mut focus = Focus::new(FocusRule::Auto);
-        focus.focus_m(&flat(1.0), 0);
-        let turned = (1..200u64).find(|&k| focus.focus_m(&flat(3.0), k * FRAME_NS) > 1.05).unwrap() * FRAME_NS;
+        focus.focus_m(&beside(16), 0);
+        let turned = (1..200u64).find(|&k| focus.focus_m(&beside(9), k * FRAME_NS) > 1.05).unwrap() * FRAME_NS;
         assert!((PATIENCE_NS..PATIENCE_NS + 200_000_000).contains(&turned), "{turned}");
         let settled_m = (200..300u64).map(|k| focus.focus_m(&flat(3.0), k * FRAME_NS)).last().unwrap();
         assert!((settled_m - 3.0).abs() < 0.03, "{settled_m}");

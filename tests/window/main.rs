@@ -9,6 +9,7 @@ mod input;
 mod picture;
 mod program;
 mod screen;
+mod wayland;
 mod window;
 
 mod keys;

@@ -72,8 +72,17 @@ pub fn show(preview: Preview) -> Result<Ended, WindowError> {
         events.run_app_on_demand(&mut app)
     };
     let ended = app.end();
-    ran.map_err(|error| WindowError::NoWindow(error.to_string()))?;
+    ran.map_err(|error| WindowError::NoWindow(plain(&error)))?;
     ended
+}
+
+/// What an error says, without the place in its library's source.
+fn plain(error: &impl std::fmt::Display) -> String {
+    let text = error.to_string();
+    match text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
+        Some((_, what)) => what.to_owned(),
+        None => text,
+    }
 }
 
 /// The event loop. Where a library that the display needs is missing, winit panics.
@@ -84,7 +93,7 @@ fn event_loop() -> Result<EventLoop<()>, WindowError> {
     std::panic::set_hook(hook);
     match made {
         Ok(Ok(events)) => Ok(events),
-        Ok(Err(error)) => Err(WindowError::NoWindow(error.to_string())),
+        Ok(Err(error)) => Err(WindowError::NoWindow(plain(&error))),
         Err(panic) => {
             let why = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
             Err(WindowError::NoWindow(why.unwrap_or("a library is missing").to_owned()))

@@ -18,7 +18,6 @@ use super::{Controls, Drawing, PresentError, Presenter};
 
 /// Presents without a GPU.
 pub struct Soft {
-    window: Arc<Window>,
     surface: Surface<Arc<Window>, Arc<Window>>,
     size: Option<(NonZeroU32, NonZeroU32)>,
     painter: Painter,
@@ -33,7 +32,7 @@ impl Soft {
         let context = Context::new(Arc::clone(&window)).map_err(fault)?;
         let surface = Surface::new(&context, Arc::clone(&window)).map_err(fault)?;
         let size = window.inner_size();
-        let mut soft = Self { window, surface, size: None, painter: Painter::new() };
+        let mut soft = Self { surface, size: None, painter: Painter::new() };
         soft.resize((size.width, size.height));
         Ok(soft)
     }
@@ -58,8 +57,11 @@ impl Presenter for Soft {
         self.surface.resize(width, height).map_err(fault)?;
         let mut buffer = self.surface.buffer_mut().map_err(fault)?;
         let age = buffer.age();
-        self.painter.paint(&mut buffer, age, drawing);
-        self.window.pre_present_notify();
+        // The memory may go on after the last pixel.
+        let pixels = width.get() as usize * height.get() as usize;
+        if let Some(pixels) = buffer.get_mut(..pixels) {
+            self.painter.paint(pixels, age, drawing);
+        }
         buffer.present().map_err(fault)
     }
 
