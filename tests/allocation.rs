@@ -55,6 +55,66 @@ fn a_frame_allocates_nothing() {
     two_eyes();
     rectification();
     hand_over();
+    #[cfg(feature = "window")]
+    window();
+}
+
+/// A frame in a window: its view, its painting at its own size and scaled, and the instruments.
+#[cfg(feature = "window")]
+fn window() {
+    use bokehcam::optics::{CocField, DepthCoc};
+    use bokehcam::pipeline::{Trace, View};
+    use bokehcam::preview::meters::Meters;
+    use bokehcam::preview::present::{Area, Drawing, Image, soft::Painter};
+    use bokehcam::preview::state::Shown;
+    use bokehcam::preview::views::Views;
+    use bokehcam::stats::Frames;
+
+    let (picture, depth) = (noise(160, 90), three_depths(160, 90));
+    let lens = DepthCoc { coc_at_infinity_px: 6.0, focus_m: 1.5, range_m: 0.0, max_coc_px: 12.0 };
+    let view = View {
+        picture: Pooled::detached(picture.clone()),
+        in_memory: true,
+        on_device: None,
+        color: Some(Pooled::detached(picture)),
+        depth: Some(Pooled::detached(depth)),
+        coc: CocField::Depth(lens),
+        stamp: Stamp { index: 0, time_ns: 0, captured_ns: None },
+        captured_ns: 0,
+        trace: Trace { quality: Some(Quality::Fast), ..Trace::default() },
+        frames: Frames::default(),
+    };
+    let settings = settings(EFFECTS[2]);
+    let (mut views, mut meters) = (Views::default(), Meters::default());
+    let mut painter = Painter::new();
+    painter.resize((320, 200));
+    let mut pixels = vec![0; 320 * 200];
+    let mut frame = |at: u64| {
+        for shown in [Shown::Depth, Shown::Coc, Shown::Bins] {
+            views.draw(shown, &view, Some(&settings));
+        }
+        let areas = [Area { x: 80, y: 55, width: 160, height: 90 }, Area { x: 0, y: 10, width: 320, height: 180 }];
+        for area in areas {
+            let before = view.color.as_deref().map(|color| (color, 0.4));
+            let (picture, background) = (Image::Memory(views.image()), [1, 2, 3]);
+            let drawing = Drawing {
+                area,
+                picture,
+                before,
+                mirror: at.is_multiple_of(2),
+                stale: at.is_multiple_of(3),
+                background,
+            };
+            painter.paint(&mut pixels, 1, &drawing);
+        }
+        meters.presented(&view, at * 33_000_000, 2_000_000);
+        meters.reacted(5_000_000);
+    };
+    // Both sizes, mirrored or not, stale or not.
+    (0..12).for_each(&mut frame);
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    (12..40).for_each(frame);
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "a window's frame");
 }
 
 /// Both pictures of a pair that is not rectified yet.

@@ -1,5 +1,6 @@
 //! The pictures of the window in the documentation. `scripts/screenshots` writes them where they belong.
 
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
@@ -37,15 +38,18 @@ fn pictures_for_the_docs() {
     let mut seen: Vec<ColorImage> = Vec::new();
     for (name, more, keys) in scenes {
         let screen = Screen::new();
-        let arguments: Vec<&str> = [PORTRAIT].iter().chain(&look).chain(more).copied().collect();
-        let mut program = Program::start(&screen, &arguments);
+        let home = tempfile::tempdir().unwrap();
+        // What is shown of it is its name, not where this project lies.
+        symlink(Path::new(PORTRAIT).parent().unwrap(), home.path().join("recordings")).unwrap();
+        let arguments: Vec<&str> = ["recordings/portrait"].iter().chain(&look).chain(more).copied().collect();
+        let mut program = Program::start_at(&screen, home, &arguments);
         let window = program.window();
         window.until("the first picture", |image| name == "depth" || is_photograph(image));
         keys.iter().for_each(|key| window.key(&[], u32::from(*key)));
         // Until notes are gone and the graph is full; the panel stays while the pointer is on it.
         for step in 0..12 {
             if name == "panel" {
-                window.point((0.9, 0.3 + 0.002 * f64::from(step)));
+                window.point((0.80 + 0.002 * f64::from(step), 0.04));
             }
             thread::sleep(Duration::from_millis(500));
         }

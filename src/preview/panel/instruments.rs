@@ -30,7 +30,7 @@ impl Cache {
         if now_s - self.at_s >= EVERY_S || self.summary == Summary::default() {
             (self.summary, self.at_s) = (state.meters.summary(), now_s);
         }
-        ctx.request_repaint_after(Duration::from_millis(100));
+        ctx.request_repaint_after(Duration::from_millis(200));
         let window = ctx.content_rect();
         let area = Area::new(Id::unique("instruments")).fixed_pos(window.min + vec2(GAP, GAP)).order(Order::Middle);
         area.interactable(false).fade_in(false).show(ctx, |ui| {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
+use std::time::Instant;
 
 use super::super::backstage::{Backstage, Opened};
 use super::super::state::{Output, Running, Source};
@@ -149,7 +150,9 @@ impl Live {
             let _ = self.changes.send(change(Executor::Keep));
         }
         if made_for != self.made_for {
+            let began = Instant::now();
             let bokeh = made_for.as_ref().map(|made_for| backstage.executor(made_for, self.size)).transpose()?;
+            tracing::debug!("an executor was made in {:?}", began.elapsed());
             let _ = self.changes.send(change(Executor::To(bokeh)));
             self.made_for = made_for;
         }

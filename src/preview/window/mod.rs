@@ -1,7 +1,7 @@
 //! The window: winit's events in, pictures and controls out.
 //!
 //! Its thread does nothing that can take long. A frame that comes is shown at once with the controls as they are;
-//! controls are laid out anew when something happened to them, and ten times a second while instruments are shown.
+//! controls are laid out anew when something happened to them, and five times a second while instruments are shown.
 
 mod app;
 mod gfx;

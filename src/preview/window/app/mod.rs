@@ -30,7 +30,7 @@ use crate::preview::views::Views;
 use crate::stats::WindowUse;
 
 /// Instruments are laid out anew this often.
-const INSTRUMENTS: Duration = Duration::from_millis(100);
+const INSTRUMENTS: Duration = Duration::from_millis(200);
 /// A stop from outside is seen after this time at the latest.
 const LOOK_UP: Duration = Duration::from_millis(250);
 /// After so long without a frame, and so many periods of the source, the person is told.
