@@ -1,0 +1,253 @@
+//! What goes on behind the preview's window: sources, looks and outputs come and go while frames go on.
+#![cfg(feature = "window")]
+#![allow(missing_docs)]
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use bokehcam::bokeh::{self, Backend, Bokeh, Effect};
+use bokehcam::capture::synthetic::{Format, Synthetic};
+use bokehcam::frame::ColorImage;
+use bokehcam::link::Receiver;
+use bokehcam::look::{Look, Strength};
+use bokehcam::optics::CocField;
+use bokehcam::pipeline::View;
+use bokehcam::preview::backstage::{Backstage, Choice, Control, Opened, Preset, Switch};
+use bokehcam::preview::session::{Heard, Session, Start};
+use bokehcam::preview::state::{Effect as Todo, Output, Source, Told};
+use bokehcam::sink::{Sink, SinkError};
+
+/// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
+struct Wings {
+    executors: Arc<AtomicUsize>,
+    written: Arc<Mutex<Vec<String>>>,
+}
+
+struct Film(Arc<Mutex<Vec<String>>>, String);
+
+impl Sink for Film {
+    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+        self.0.lock().unwrap().push(format!("{} {}", self.1, frame.width));
+        Ok(ControlFlow::Continue(()))
+    }
+    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+        self.0.lock().unwrap().push(format!("{} complete", self.1));
+        Ok(())
+    }
+    fn describe(&self) -> String {
+        self.1.clone()
+    }
+}
+
+impl Backstage for Wings {
+    fn sources(&mut self) -> Vec<Choice> {
+        vec![Choice { name: "32".into(), label: "A scene".into() }]
+    }
+    fn virtual_cameras(&mut self) -> Vec<Choice> {
+        Vec::new()
+    }
+    fn open(&mut self, name: &str) -> Result<Opened, String> {
+        let width =
+            name.split(' ').next().and_then(|width| width.parse().ok()).ok_or(format!("no such source: {name}"))?;
+        let frames = name.ends_with("no more").then_some(2);
+        let format = Format { size: (width, 18), fps: 60.0, frames, threads: 1, cycle: None };
+        let camera = Box::new(Synthetic::new(format).map_err(|error| error.to_string())?);
+        let (name, notes, controls) = (name.to_owned(), vec!["a note".to_owned()], Vec::new());
+        Ok(Opened { name, camera, depth: None, has_depth: true, measured: false, notes, controls })
+    }
+    fn set_control(&mut self, _: &str, _: i64) -> Result<Vec<Control>, String> {
+        Err("it has no controls".into())
+    }
+    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+        self.executors.fetch_add(1, Ordering::SeqCst);
+        bokeh::create(settings, size, Backend::Cpu, None, Some(1)).map_err(|error| error.to_string())
+    }
+    fn output(&mut self, name: &str, _: (u32, u32), _: u64) -> Result<Box<dyn Sink>, String> {
+        if name == "full" {
+            Err("the disk is full".into())
+        } else {
+            Ok(Box::new(Film(Arc::clone(&self.written), name.into())))
+        }
+    }
+    fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        format!("show {source} {outputs:?} {switches:?}")
+    }
+    fn presets(&mut self, look: &Look) -> Vec<Preset> {
+        vec![Preset { name: "same".into(), look: look.clone(), own: false }]
+    }
+    fn save_preset(&mut self, name: &str, _: &Look) -> Result<(), String> {
+        if name.is_empty() { Err("no name".into()) } else { Ok(()) }
+    }
+}
+
+/// A session as the window has it: what it said so far, and where its frames come from.
+struct Watched {
+    session: Session,
+    views: Option<Receiver<View>>,
+    told: Vec<Told>,
+    copied: Option<String>,
+    executors: Arc<AtomicUsize>,
+    written: Arc<Mutex<Vec<String>>>,
+}
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn look() -> Look {
+    Look { strength: Strength::AtInfinity(2.0), ..Look::plain(Some(Effect::Dof)) }
+}
+
+impl Watched {
+    fn begin(source: &str) -> Self {
+        let (executors, written) = (Arc::<AtomicUsize>::default(), Arc::<Mutex<Vec<String>>>::default());
+        let start = Start {
+            backstage: Box::new(Wings { executors: Arc::clone(&executors), written: Arc::clone(&written) }),
+            look: look(),
+            source: source.into(),
+            outputs: Vec::new(),
+            keep_going: false,
+            budget_ns: None,
+            folder: std::env::temp_dir(),
+            wanted: Arc::default(),
+        };
+        let session = Session::begin(start, Arc::new(|| {})).unwrap();
+        Self { session, views: None, told: Vec::new(), copied: None, executors, written }
+    }
+
+    fn hear(&mut self) {
+        while let Some(heard) = self.session.hear() {
+            match heard {
+                Heard::Told(told) => self.told.push(told),
+                Heard::Views(views) => self.views = Some(views),
+                Heard::Copy(text) => self.copied = Some(text),
+            }
+        }
+    }
+
+    /// Waits until something was said; what was said before it is forgotten.
+    #[track_caller]
+    fn until(&mut self, what: &str, is: impl Fn(&Told) -> bool) {
+        let began = Instant::now();
+        loop {
+            self.hear();
+            if let Some(at) = self.told.iter().position(&is) {
+                self.told.drain(..=at);
+                return;
+            }
+            assert!(began.elapsed() < PATIENCE, "never heard: {what}; {:?}", self.told);
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Waits for a frame.
+    #[track_caller]
+    fn frame(&mut self, what: &str, is: impl Fn(&View) -> bool) -> View {
+        let began = Instant::now();
+        loop {
+            self.hear();
+            if let Some(view) = self.views.as_mut().and_then(Receiver::try_recv).filter(&is) {
+                return view;
+            }
+            assert!(began.elapsed() < PATIENCE, "never seen: {what}");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+fn is_running(told: &Told, width: u32) -> bool {
+    matches!(told, Told::Source(Source::Running(running)) if running.size.0 == width)
+}
+
+fn radius_px(view: &View) -> f32 {
+    match view.coc {
+        CocField::Depth(coc) => coc.coc_at_infinity_px,
+        CocField::Uniform { radius_px } => -radius_px,
+        CocField::Ramp(_) => f32::NAN,
+    }
+}
+
+#[test]
+fn a_look_takes_effect_while_frames_go_on() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    watched.until("the note", |told| *told == Told::Note("a note".into()) || matches!(told, Told::Outputs(_)));
+    let first = watched.frame("a frame", |view| radius_px(view) == 2.0);
+    assert!(first.in_memory && first.color.is_some() && first.depth.is_some());
+    let made = watched.executors.load(Ordering::SeqCst);
+
+    let stronger = Look { strength: Strength::AtInfinity(5.0), ..look() };
+    watched.session.order(Todo::Look(Box::new(stronger.clone())));
+    watched.frame("more blur", |view| radius_px(view) == 5.0);
+    let near = Look { focus: bokehcam::depth::focus::FocusRule::Metres(0.7), ..stronger };
+    watched.session.order(Todo::Look(Box::new(near.clone())));
+    watched.frame("another focus", |view| matches!(view.coc, CocField::Depth(coc) if (coc.focus_m - 0.7).abs() < 0.02));
+    assert!(watched.executors.load(Ordering::SeqCst) <= made + 1, "another focus needs no other executor");
+
+    let even = Look { effect: Some(Effect::Blur), ..near.clone() };
+    watched.session.order(Todo::Look(Box::new(even)));
+    watched.frame("an even blur", |view| radius_px(view) == -5.0);
+    watched.session.order(Todo::Look(Box::new(Look { effect: None, ..near })));
+    watched.frame("no blur", |view| view.color.is_none());
+    let report = watched.session.close().unwrap();
+    assert!(report.frames.balance(), "{:?}", report.frames);
+}
+
+#[test]
+fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
+    let mut watched = Watched::begin("nothing");
+    watched.until("why", |told| *told == Told::Source(Source::Lost("no such source: nothing".into())));
+    watched.session.order(Todo::Begin(Output { name: "film".into(), is_camera: false }));
+    watched.until("nothing to write", |told| matches!(told, Told::Note(line) if line.contains("no source")));
+    watched.session.order(Todo::Open("32".into()));
+    watched.until("it runs", |told| is_running(told, 32));
+    watched.frame("a frame", |view| view.picture.width == 32);
+    watched.session.order(Todo::Open("48".into()));
+    watched.until("the other runs", |told| is_running(told, 48));
+    watched.frame("a frame of the other", |view| view.picture.width == 48);
+    watched.session.order(Todo::Open("24 then no more".into()));
+    watched.until("its end", |told| *told == Told::Source(Source::Ended));
+    watched.session.order(Todo::Open("24 then no more".into()));
+    watched.until("it runs again", |told| is_running(told, 24));
+    watched.until("and ends", |told| *told == Told::Source(Source::Ended));
+    let report = watched.session.close().unwrap();
+    assert!(report.frames.balance() && report.frames.captured == 2, "{:?}", report.frames);
+}
+
+#[test]
+fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    let output = |name: &str, is_camera| Output { name: name.into(), is_camera };
+    watched.session.order(Todo::Begin(output("full", false)));
+    watched.until("why not", |told| *told == Told::Note("the disk is full".into()));
+    watched.until("none is written", |told| *told == Told::Outputs(Vec::new()));
+    watched.session.order(Todo::Begin(output("film", false)));
+    watched.session.order(Todo::Begin(output("camera", true)));
+    watched.until("two", |told| *told == Told::Outputs(vec![output("film", false), output("camera", true)]));
+    watched.session.copy(vec![("split".into(), "0.5".into())]);
+    watched.until("the command", |told| matches!(told, Told::Note(line) if line.starts_with("Copied: show 32")));
+    watched.hear();
+    assert_eq!(watched.copied.as_deref(), Some(r#"show 32 ["film", "camera"] [("split", "0.5")]"#));
+    let has = |watched: &Watched, line: &str| watched.written.lock().unwrap().iter().any(|written| written == line);
+    let began = Instant::now();
+    while !has(&watched, "film 32") || !has(&watched, "camera 32") {
+        assert!(began.elapsed() < PATIENCE);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    watched.session.order(Todo::End(output("film", false)));
+    watched
+        .until("the film is complete", |told| matches!(told, Told::Note(line) if line.starts_with("film: complete")));
+    // A recording ends with its source, and a virtual camera goes on with the next one.
+    watched.session.order(Todo::Open("48".into()));
+    watched.until("the other runs", |told| is_running(told, 48));
+    watched.until("one", |told| *told == Told::Outputs(vec![output("camera", true)]));
+    while !has(&watched, "camera 48") {
+        assert!(began.elapsed() < 2 * PATIENCE);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let written = Arc::clone(&watched.written);
+    watched.session.close().unwrap();
+    let complete = written.lock().unwrap().iter().filter(|line| *line == "camera complete").count();
+    assert_eq!(complete, 2, "once for each source");
+}
