@@ -179,8 +179,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         frame,
         repeats,
     } = &mut timings;
-    // On the processor a finer level takes twice the time for half a decibel, and other programs need it, too.
-    let most = if about.backend == "cpu" { Quality::Balanced } else { Quality::Best };
+    let most = most(executor.as_deref());
     let live_ns = (pace == Pace::Realtime).then_some(info.period_ns);
     let (began_ns, cpu_ns) = (clock.now_ns(), clock::cpu_ns());
     let over = AtomicBool::new(false);
@@ -280,6 +279,13 @@ fn link<T>(pace: Pace) -> (Sender<T>, Receiver<T>) {
 /// The CPU executor's description begins with its name; any other is that of a GPU.
 fn backend(description: &str) -> &'static str {
     if description.starts_with("cpu") { "cpu" } else { "gpu" }
+}
+
+/// The finest level that an executor is given as the time allows.
+fn most(executor: Option<&dyn Bokeh>) -> Quality {
+    // On the processor a finer level takes twice the time for half a decibel, and other programs need it, too.
+    let on_cpu = executor.is_some_and(|executor| backend(&executor.describe()) == "cpu");
+    if on_cpu { Quality::Balanced } else { Quality::Best }
 }
 
 /// Hands a frame on; gives back whether there is anybody to take more.

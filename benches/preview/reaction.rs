@@ -15,7 +15,7 @@ use super::window::{PATIENCE, Window};
 const PRESSES: usize = 120;
 /// A corner where the instruments come and go, in pixels of the window.
 const CORNER: (i16, i16, u16, u16) = (60, 30, 60, 60);
-/// Columns and rows of the bars that are stuck behind: any picture that is never read.
+/// The picture that is never read.
 const STUCK: &str = "rgb/stuck.png";
 
 /// Measures and prints; `recording` has depth.
@@ -49,6 +49,9 @@ pub fn measure(recording: &Path, scratch: &Path) -> Result<()> {
         took_ms.sort_by(f64::total_cmp);
         let at = |share: f64| took_ms.get(((took_ms.len() - 1) as f64 * share).round() as usize).copied();
         let [p50, p99, max] = [0.5, 0.99, 1.0].map(|share| at(share).unwrap_or(f64::NAN));
+        if took_ms.len() < PRESSES {
+            return Err(format!("{name}: {} of {PRESSES} keys were never answered", PRESSES - took_ms.len()).into());
+        }
         println!("{name}: {} keys, p50 {p50:.0} ms, p99 {p99:.0} ms, longest {max:.0} ms", took_ms.len());
     }
     Ok(())

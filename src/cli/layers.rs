@@ -29,6 +29,15 @@ pub struct Setting {
     pub help: String,
 }
 
+/// What a command line says besides the look.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    /// What flags and the environment say of other things, by name and value.
+    pub switches: Vec<(String, String)>,
+    /// Settings of the look that come from elsewhere than flags and defaults: left unsaid, they come again.
+    pub behind: Vec<String>,
+}
+
 /// The settings of one command line that come from neither flags nor environment.
 #[derive(Debug, Default)]
 pub struct Layers {
@@ -75,16 +84,37 @@ impl Layers {
         Ok(layers)
     }
 
-    /// What was said of other things than the look by flags and the environment: for a command that does the same.
-    pub fn given(&self, matches: &ArgMatches) -> Vec<(String, String)> {
-        /// These are for one run.
-        const ONCE: [&str; 4] = ["preset", "report", "force", "mirror"];
+    /// What a command that does the same has to say besides the look.
+    pub fn given(&self, matches: &ArgMatches) -> Given {
+        /// These are for one run, or the window's, which says them itself.
+        const ONCE: [&str; 10] = [
+            "preset",
+            "report",
+            "force",
+            "mirror",
+            "show",
+            "split",
+            "full-screen",
+            "instruments",
+            "panel",
+            "text-scale",
+        ];
         let is_given = |setting: &Setting| {
             let name = setting.name.as_str();
             ["flag", "environment"].contains(&setting.origin) && !flags::NAMES.contains(&name) && !ONCE.contains(&name)
         };
-        let given = self.resolved(matches).into_iter().filter(is_given);
-        given.filter_map(|setting| Some((setting.name, setting.value?))).collect()
+        /// Each of these sets aside the others.
+        const STRENGTH: [&str; 4] = ["coc-at-infinity", "f-number", "focal-length", "sensor-width"];
+        let settings = self.resolved(matches);
+        let is_behind = |setting: &&Setting| {
+            flags::NAMES.contains(&setting.name.as_str()) && !["flag", "default"].contains(&setting.origin)
+        };
+        let mut behind: Vec<String> = settings.iter().filter(is_behind).map(|setting| setting.name.clone()).collect();
+        if behind.iter().any(|name| STRENGTH.contains(&name.as_str())) {
+            behind.extend(STRENGTH.map(str::to_owned));
+        }
+        let given = settings.into_iter().filter(is_given);
+        Given { switches: given.filter_map(|setting| Some((setting.name, setting.value?))).collect(), behind }
     }
 
     /// Adds what no layer before has or excludes.

@@ -12,6 +12,7 @@ use clap::Args;
 use super::config::{self, Executor};
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_report};
+use super::layers::Given;
 use super::options::{Global, Streaming};
 use super::source::SourceName;
 use super::{settings, sinks, terminal, values};
@@ -55,7 +56,7 @@ pub struct PreviewCommand {
 ///
 /// # Errors
 /// The options do not fit each other, there is no display, or there never was a frame.
-pub fn run(command: &PreviewCommand, global: &Global, given: Vec<(String, String)>) -> Result<(), CliError> {
+pub fn run(command: &PreviewCommand, global: &Global, given: Given) -> Result<(), CliError> {
     let mut parts = command.parts.clone();
     // Who looks for a look does so for longer than a recording takes.
     parts.frames.repeat = true;
@@ -71,7 +72,7 @@ pub fn show(
     to: &[Target],
     window: &Window,
     parts: &Streaming,
-    (global, given): (&Global, Vec<(String, String)>),
+    (global, given): (&Global, Given),
 ) -> Result<(), CliError> {
     let Streaming { frames, stream, output, computing, .. } = parts;
     refuse_overwrite(stream.report.as_deref(), output.force)?;
@@ -97,6 +98,7 @@ pub fn show(
     let executor = Executor::of(computing);
     let device = executor.device()?;
     let state = first_state(look.clone(), source, window, stream.mirror);
+    let closes = frames.frames.is_some() || !frames.repeat;
     let stop = terminal::stop_flag()?;
     let ended = window::show(Preview {
         state,
@@ -111,7 +113,7 @@ pub fn show(
             folder: window.save_to.clone().unwrap_or_else(pictures_folder),
         },
         device: device.clone(),
-        close_at_end: frames.frames.is_some() || !frames.repeat,
+        close_at_end: closes,
         memory: settings::state_folder().map(|folder| folder.join("window.toml")),
         stop,
     })?;
@@ -122,7 +124,7 @@ pub fn show(
         terminal::say(&report.to_string());
     }
     match ended.lost {
-        Some(why) if ended.report.is_none() => Err(CliError::NoFrames(why)),
+        Some(why) if ended.report.is_none() || closes => Err(CliError::NoFrames(why)),
         _ => Ok(()),
     }
 }

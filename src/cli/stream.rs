@@ -6,6 +6,7 @@ use super::config::{self, Executor};
 use super::depth;
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_report};
+use super::layers::Given;
 #[cfg(feature = "window")]
 use super::preview;
 use super::source::{Source, SourceName, Wanted};
@@ -54,7 +55,7 @@ const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, -
 ///
 /// # Errors
 /// The options do not fit the source, something would be overwritten, or a stage of the pipeline failed.
-pub fn run(command: &StreamCommand, global: &options::Global, given: Vec<(String, String)>) -> Result<(), CliError> {
+pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
     let options::Streaming { stream, output, .. } = parts;
     sinks::check(&command.to, stream, &command.source.devices())?;

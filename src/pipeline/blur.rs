@@ -90,7 +90,7 @@ impl Stage<'_> {
                     }
                     if let Some((new, quality)) = swap.take() {
                         executor = new;
-                        self.picker = self.picker.with(quality);
+                        self.picker = self.picker.with(quality, super::most(executor.as_deref()));
                     }
                 }
                 let Some(executor) = &mut executor else {

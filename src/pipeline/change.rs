@@ -7,6 +7,8 @@ use crate::bokeh::Bokeh;
 
 /// Another blur, from the next frame on. Every frame has the CoC and the executor of one and the same change.
 pub struct Change {
+    /// What its frames are known by ([`super::Trace::change`]); those before any change have 0.
+    pub number: u64,
     /// By how much frames are blurred.
     pub coc: CocRule,
     /// Whether depth is fitted to the pictures and steadied.

@@ -64,6 +64,8 @@ impl Stage<'_> {
                         return Err(error.into());
                     }
                 }
+            } else {
+                self.sink.pass_by();
             }
             let now_ns = self.clock.now_ns();
             self.times.sink.add(now_ns - began_ns);
@@ -82,8 +84,8 @@ impl Stage<'_> {
                 let item = View { picture, in_memory, on_device, color, depth, coc, stamp, captured_ns, trace, frames };
                 match view.send(item) {
                     Ok(displaced) => self.looked_at(displaced.is_none(), std::mem::replace(&mut viewed, kept)),
-                    // Nobody knows this frame's fate: it stays in flight.
-                    Err(link::Abandoned) => break,
+                    // Nobody knows the fate of this frame, nor of the one before: they stay in flight.
+                    Err(link::Abandoned) => return Ok(()),
                 }
             }
             let frames = self.tally.frames();

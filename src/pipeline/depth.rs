@@ -121,6 +121,7 @@ impl Stage<'_> {
         let mut coc = Coc::new(self.coc, self.refine);
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
+        let mut change = 0;
         loop {
             let Frame { ticket, stamp, mut trace, item: Shot { mut color, depth, right } } =
                 match from.recv_timeout(IDLE) {
@@ -133,8 +134,11 @@ impl Stage<'_> {
                         continue;
                     }
                 };
-            for Change { coc: rule, refine, quality, bokeh } in self.changes.iter().flat_map(mpsc::Receiver::try_iter) {
+            for Change { number, coc: rule, refine, quality, bokeh } in
+                self.changes.iter().flat_map(mpsc::Receiver::try_iter)
+            {
                 coc.follow(rule, refine);
+                change = number;
                 self.rate.iter_mut().for_each(Rate::forget);
                 if let Executor::To(executor) = bokeh {
                     let number = swap.map_or(1, |last| last.number + 1);
@@ -167,6 +171,7 @@ impl Stage<'_> {
                     continue;
                 }
             };
+            trace.change = change;
             trace.depth_ns = self.clock.now_ns() - began_ns;
             let frame = Frame { ticket, stamp, trace, item: Ready { color, depth, coc, swap: swap.clone() } };
             if !hand_on(&mut to, frame, self.tally) {

@@ -20,7 +20,6 @@ pub(super) struct Picker {
     deadline_ns: Option<u64>,
     /// Ages of the last frames when their blur began.
     ages: Window<AGES>,
-    most: Quality,
 }
 
 impl Picker {
@@ -29,14 +28,14 @@ impl Picker {
     pub(super) fn new(rule: QualityRule, most: Quality, budget_ns: u64, period_ns: Option<u64>) -> Self {
         let (rungs, governor) = Self::of(rule, most);
         let deadline_ns = period_ns.map(|period_ns| DEADLINE_PERIODS * period_ns * DEADLINE_TENTHS / 10);
-        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default(), most }
+        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default() }
     }
 
-    /// The same under another rule. What was learnt of the time that rungs take holds no more.
-    pub(super) fn with(&self, rule: QualityRule) -> Self {
-        let (rungs, governor) = Self::of(rule, self.most);
-        let &Self { budget_ns, deadline_ns, most, .. } = self;
-        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default(), most }
+    /// The same under another rule, for another executor. What was learnt of the time that rungs take holds no more.
+    pub(super) fn with(&self, rule: QualityRule, most: Quality) -> Self {
+        let (rungs, governor) = Self::of(rule, most);
+        let &Self { budget_ns, deadline_ns, .. } = self;
+        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default() }
     }
 
     fn of(rule: QualityRule, most: Quality) -> (&'static [Quality], Governor) {

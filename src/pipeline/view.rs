@@ -56,6 +56,8 @@ pub struct Trace {
     pub blur_ns: u64,
     /// Its passes.
     pub passes: PassTimes,
+    /// The number of the last change before it; 0 where there was none.
+    pub change: u64,
     /// The rung it was blurred at.
     pub quality: Option<Quality>,
 }

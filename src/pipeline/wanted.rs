@@ -1,6 +1,6 @@
 //! Where blurred pictures are wanted: in memory, on the GPU that blurs, or both.
 
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use crate::compute::Place;
 
@@ -8,22 +8,34 @@ const PLACES: [Place; 3] = [Place::Memory, Place::Device, Place::Both];
 
 /// A wish that may change while a run goes on; frames that are blurred already keep to the one before.
 #[derive(Debug, Default)]
-pub struct Wanted(AtomicU8);
+pub struct Wanted {
+    place: AtomicU8,
+    /// Whether somebody needs them in memory, wherever else they are wanted.
+    needed: AtomicBool,
+}
 
 impl Wanted {
     /// Where pictures are wanted.
     pub fn new(place: Place) -> Self {
-        Self(AtomicU8::new(place as u8))
+        Self { place: AtomicU8::new(place as u8), needed: AtomicBool::new(false) }
     }
 
     /// Where they are wanted from now on.
     pub fn set(&self, place: Place) {
-        self.0.store(place as u8, Ordering::Relaxed);
+        self.place.store(place as u8, Ordering::Relaxed);
+    }
+
+    /// Whether they are needed in memory from now on, besides.
+    pub fn need(&self, needed: bool) {
+        self.needed.store(needed, Ordering::Relaxed);
     }
 
     /// Where they are wanted now.
     pub fn place(&self) -> Place {
-        PLACES[usize::from(self.0.load(Ordering::Relaxed))]
+        match PLACES[usize::from(self.place.load(Ordering::Relaxed))] {
+            Place::Device if self.needed.load(Ordering::Relaxed) => Place::Both,
+            place => place,
+        }
     }
 }
 
@@ -38,6 +50,9 @@ mod tests {
         for place in PLACES {
             wanted.set(place);
             assert_eq!((wanted.place(), Wanted::new(place).place()), (place, place));
+            wanted.need(true);
+            assert_eq!(wanted.place(), if place == Place::Device { Place::Both } else { place });
+            wanted.need(false);
         }
     }
 }

@@ -162,7 +162,10 @@ pub const GROUPS: [Group; 5] = [
                 &[key(Key::ArrowLeft), key(Key::ArrowRight)],
                 "Left, Right",
                 "move the point of focus, turn the sharp band",
-                |state, context| look(state, "key arrows", |look| tweak::move_focus(look, STEP * way(context), 0.0)),
+                |state, context| {
+                    let to_the_right = if state.mirror { -way(context) } else { way(context) };
+                    look(state, "key arrows", |look| tweak::move_focus(look, STEP * to_the_right, 0.0))
+                },
             ),
             held(
                 &[key(Key::ArrowUp), key(Key::ArrowDown)],

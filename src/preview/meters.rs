@@ -159,8 +159,14 @@ impl Meters {
             let wave = 4.0 * (k as f64 / 9.0).sin() + 3.0 * (k as f64 / 2.3).sin();
             let blur_ms = 20.0 + wave + if k % 97 == 3 { 22.0 } else { 0.0 };
             let quality = Some(rungs[(k / 80) as usize % rungs.len()]);
-            let trace =
-                Trace { decode_ns: 4_100_000, depth_ns: 6_300_000, blur_ns: (blur_ms * 1e6) as u64, passes, quality };
+            let trace = Trace {
+                decode_ns: 4_100_000,
+                depth_ns: 6_300_000,
+                blur_ns: (blur_ms * 1e6) as u64,
+                passes,
+                quality,
+                change: 0,
+            };
             self.count(&trace, k * 33_400_000, 41_000_000 + k * 20_000, 1_900_000);
         }
         self.reacted(24_000_000);

@@ -62,6 +62,9 @@ pub trait Sink: Send {
         Ok(ControlFlow::Continue(false))
     }
 
+    /// A frame goes by that is not in memory, and so cannot be given.
+    fn pass_by(&mut self) {}
+
     /// Whether anything becomes of the frames it is given now; otherwise, where there is a viewer, only that counts.
     fn keeps(&self) -> bool {
         true

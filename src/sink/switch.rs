@@ -167,6 +167,10 @@ impl Sink for Switch {
         Ok(ControlFlow::Continue(shown))
     }
 
+    fn pass_by(&mut self) {
+        self.take_orders();
+    }
+
     fn keeps(&self) -> bool {
         !self.members.is_empty()
     }

@@ -102,7 +102,13 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
                 // Now and then frames pass through.
                 let executor = (k % 5 != 0).then(|| made(f32::from(k)));
                 let quality = QualityRule::Fixed(Quality::Fast);
-                Change { coc: uniform(f32::from(k)), refine: false, quality, bokeh: Executor::To(executor) }
+                Change {
+                    number: u64::from(k),
+                    coc: uniform(f32::from(k)),
+                    refine: false,
+                    quality,
+                    bokeh: Executor::To(executor),
+                }
             })
             .collect();
         let report = thread::scope(|scope| {

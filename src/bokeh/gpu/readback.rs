@@ -122,12 +122,17 @@ impl Ring {
         };
         device.device.poll(poll).map_err(|error| GpuError::Failed(format!("{}: {error}", device.name)))?;
         device.check()?;
-        match oldest.state.load(Ordering::Acquire) {
-            READY => {}
-            FAILED => {
-                return Err(GpuError::Failed(format!("{}: the picture could not be read back", device.name)).into());
+        loop {
+            match oldest.state.load(Ordering::Acquire) {
+                READY => break,
+                FAILED => {
+                    return Err(GpuError::Failed(format!("{}: the picture could not be read back", device.name)).into());
+                }
+                _ if !wait => return Ok(None),
+                // Another thread that uses the device has found it done, and is about to say so.
+                _ => std::thread::yield_now(),
             }
-            _ => return Ok(None),
+            device.check()?;
         }
         let Some(Pending { slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
         let Sent { mut job, on_device, in_memory, started, .. } = sent;

@@ -6,15 +6,16 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use super::super::config::Executor;
+use super::super::layers::Given;
 use super::super::options::{self, Streaming};
 use super::super::settings::SettingsFile;
 use super::super::source::{Source, SourceName, Wanted};
 use super::super::values::Effect;
-use super::super::{command_line, depth, presets};
+use super::super::{command_line, depth, presets, print};
 use crate::bokeh::{self, Backend, Bokeh};
 use crate::clock::Clock;
 use crate::compute::device::Device;
-use crate::look::Look;
+use crate::look::{Look, flags::Flag};
 use crate::preview::backstage::{Backstage, Choice, Control, Opened, Preset, Switch};
 use crate::sink::{self, Sink, Target};
 
@@ -33,6 +34,12 @@ pub(super) struct Wings {
     chosen: Option<PathBuf>,
     /// What was said of other things than the look.
     given: Vec<(String, String)>,
+    /// Settings of the look that the environment or a file has another value for than is usual.
+    behind: Vec<String>,
+    /// The settings file, as it was read last.
+    file: SettingsFile,
+    /// The source that was asked for at the start.
+    first: Option<Choice>,
     /// Controls that were set, by name.
     set: BTreeMap<String, i64>,
     /// The camera that was opened last, where its controls can be set.
@@ -46,12 +53,23 @@ impl Wings {
         executor: &Executor,
         device: Option<Arc<Device>>,
         chosen: Option<PathBuf>,
-        given: Vec<(String, String)>,
+        Given { switches: given, behind }: Given,
     ) -> Self {
         let mut parts = parts.clone();
         // Of depth the window may make use later.
         parts.blur.effect = Effect::Auto;
-        Self { parts, executor: executor.clone(), device, chosen, given, set: BTreeMap::new(), camera: None }
+        Self {
+            parts,
+            executor: executor.clone(),
+            device,
+            chosen,
+            given,
+            behind,
+            file: SettingsFile::default(),
+            first: None,
+            set: BTreeMap::new(),
+            camera: None,
+        }
     }
 
     fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
@@ -75,7 +93,14 @@ impl Wings {
 
 impl Backstage for Wings {
     fn sources(&mut self) -> Vec<Choice> {
+        self.file = SettingsFile::load(self.chosen.as_deref()).unwrap_or_else(|error| {
+            tracing::warn!("{error}");
+            SettingsFile::default()
+        });
         let mut sources = devices::cameras();
+        let is_other = |choice: &&Choice| choice.name != SYNTHETIC && !sources.contains(choice);
+        let first = self.first.iter().find(is_other).cloned();
+        sources.extend(first);
         sources.push(Choice { name: SYNTHETIC.into(), label: "Synthetic scene".into() });
         sources
     }
@@ -99,6 +124,7 @@ impl Backstage for Wings {
         };
         let (source, source_name) = self.open_source(&name)?;
         self.set.clear();
+        self.first.get_or_insert_with(|| Choice { name: name.clone(), label: name.clone() });
         self.camera = devices::camera_of(&source_name);
         let controls = self.camera.as_deref().map(devices::controls).unwrap_or_default();
         let (has_depth, measured) = (source.has_depth(), source.is_measured());
@@ -145,21 +171,26 @@ impl Backstage for Wings {
             let controls: Vec<String> = self.set.iter().map(|(name, value)| format!("{name}={value}")).collect();
             switches.push(("control".into(), controls.join(",")));
         }
-        command_line::equivalent(source, outputs, &look.flags(), &switches)
+        let usual = look.flags();
+        let says = |flag: &Flag| usual.contains(flag) || self.behind.iter().any(|name| name == flag.0);
+        let flags: Vec<Flag> = look.every_flag().into_iter().filter(says).collect();
+        let command = command_line::equivalent(source, outputs, &flags, &switches);
+        // Whoever reads it may be gone.
+        let _ = print(format!("{command}\n").as_bytes());
+        command
     }
 
     fn presets(&mut self, look: &Look) -> Vec<Preset> {
-        let file = SettingsFile::load(self.chosen.as_deref()).unwrap_or_else(|error| {
-            tracing::warn!("{error}");
-            SettingsFile::default()
-        });
-        let presets = presets::all_upon(&file, look, true).into_iter();
+        let presets = presets::all_upon(&self.file, look, true).into_iter();
         presets.map(|presets::Upon { name, look, own }| Preset { name, look, own }).collect()
     }
 
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
         let saved = presets::file_to_save(self.chosen.as_deref());
-        saved.and_then(|file| presets::save(&file, name, &look.every_flag())).map_err(|error| error.to_string())
+        let saved = saved.and_then(|file| presets::save(&file, name, &look.every_flag()));
+        saved.map_err(|error| error.to_string())?;
+        self.sources();
+        Ok(())
     }
 }
 

@@ -26,7 +26,7 @@ pub fn show(ctx: &Context, actions: &mut Vec<Action>) {
     let width = if columns == 2 { 660.0 } else { (window.width() - 2.0 * (GAP + PAD)).clamp(60.0, 340.0) };
     let drawn = area.fade_in(false).sense(Sense::click()).show(ctx, |ui| {
         let colors = Colors::here(ui);
-        ui.set_max_height(window.height() - 2.0 * GAP);
+        ui.set_max_height((window.height() - 2.0 * GAP).max(1.0));
         card(&colors).show(ui, |ui| {
             ui.set_width(width);
             ui.horizontal(|ui| {

@@ -43,6 +43,8 @@ pub struct Panel {
     sheet: sheet::Memory,
     instruments: instruments::Cache,
     notes: notes::Ages,
+    /// Whether a control had the focus, or a list was open, when the last pass ended.
+    was_in_hand: bool,
 }
 
 /// Where the picture is, for the gestures on it.
@@ -88,6 +90,7 @@ impl Panel {
         if state.help {
             help::show(&ctx, actions);
         }
+        self.was_in_hand = ctx.memory(|memory| memory.focused().is_some()) || egui::Popup::is_any_open(&ctx);
         self.settle(ui, &actions[first..]).into_iter().for_each(|settle| actions.push(settle));
     }
 
@@ -96,7 +99,9 @@ impl Panel {
         if ctx.text_edit_focused() {
             return;
         }
-        let focused = ctx.memory(|memory| memory.focused().is_some());
+        // Esc takes the focus away, or closes a list, before it comes here.
+        let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape)) && self.was_in_hand;
+        let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped;
         ui.input(|input| {
             actions.extend(input.events.iter().filter_map(|event| keys::action(event, state, height_px, focused)));
         });

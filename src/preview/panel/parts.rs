@@ -3,8 +3,8 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, CornerRadius, DragValue, FontId, Layout, Rect, Response, RichText, Role, Sense, Slider, Stroke,
-    StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+    Align, Align2, CornerRadius, DragValue, FontId, Layout, Rect, Response, RichText, Role, Sense, Slider,
+    SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
 };
 
 use super::theme::{Colors, ROW, medium};
@@ -37,19 +37,27 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
                 ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
                 ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
                 let decades = (range.end() - range.start()) / 300.0;
-                let drag = DragValue::new(value).range(range.clone()).speed(decades).max_decimals(digits);
-                let drag = drag.min_decimals(digits).prefix(before).suffix(after);
-                changed |= ui.add(drag).labelled_by(name.id).on_hover_text(hint).changed();
+                // What was chosen elsewhere may lie outside; it stays until somebody moves it.
+                let mut typed = *value;
+                let drag = DragValue::new(&mut typed).range(range.clone()).clamp_existing_to_range(false);
+                let drag = drag.speed(decades).max_decimals(digits).min_decimals(digits).prefix(before).suffix(after);
+                if ui.add(drag).labelled_by(name.id).on_hover_text(hint).changed() {
+                    (*value, changed) = (typed, true);
+                }
             });
             name
         });
         ui.spacing_mut().slider_width = ui.available_width();
         ui.spacing_mut().interact_size.y = 20.0;
         let least = if ratios { f64::from(*range.start()).max(1e-3) } else { 0.0 };
-        let slider = Slider::new(value, range).show_value(false).logarithmic(ratios).smallest_positive(least);
-        let slider = ui.add(slider).labelled_by(name.inner.id).on_hover_text(hint);
+        let mut slid = *value;
+        let slider = Slider::new(&mut slid, range).clamping(SliderClamping::Edits).show_value(false);
+        let slider =
+            ui.add(slider.logarithmic(ratios).smallest_positive(least)).labelled_by(name.inner.id).on_hover_text(hint);
         focus_ring(ui, &slider, slider.rect.shrink2(Vec2::new(0.0, 1.0)));
-        changed |= slider.changed();
+        if slider.changed() {
+            (*value, changed) = (slid, true);
+        }
     });
     changed
 }

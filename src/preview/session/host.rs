@@ -1,5 +1,6 @@
 //! The session's own thread.
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 
@@ -29,7 +30,14 @@ pub(super) struct Host {
     /// Runs begun.
     runs: u64,
     report: Option<Report>,
+    /// Whether there ever was a run.
+    began: bool,
+    /// The last looks that frames had, by the number of the change that brought each.
+    looks: VecDeque<(u64, Look)>,
 }
+
+/// Looks that are kept: a frame that is shown, if it is not held, is of one of the last.
+const KEPT_LOOKS: usize = 512;
 
 impl Host {
     /// A session that nothing was done of yet; `orders` is the way to it.
@@ -49,6 +57,8 @@ impl Host {
             live: None,
             runs: 0,
             report: None,
+            began: false,
+            looks: VecDeque::new(),
         }
     }
 
@@ -76,7 +86,7 @@ impl Host {
                     Order::Do(effect) => self.bring_about(effect),
                     Order::Save(still) => self.save(&still),
                     Order::Copy(switches) => self.copy(&switches),
-                    Order::Wrote(written) => self.wrote(&written),
+                    Order::Wrote(run, written) => self.wrote(run, &written),
                     Order::Ended(run, ended) => self.ended(run, *ended),
                     Order::Close => {
                         self.stop();
@@ -132,7 +142,17 @@ impl Host {
     }
 
     fn tell_outputs(&self) {
+        self.wanted.need(!self.outputs.is_empty());
         self.news.tell(Told::Outputs(self.outputs.clone()));
+    }
+
+    /// There is no source, and nothing is written any more; a virtual camera goes on with the next one.
+    fn without_source(&mut self, source: Source) {
+        if self.began {
+            self.outputs.retain(|output| output.is_camera);
+        }
+        self.tell_outputs();
+        self.news.tell(Told::Source(source));
     }
 
     /// Opens the source and begins a run of it.
@@ -140,17 +160,17 @@ impl Host {
         self.news.tell(Told::Source(Source::Opening));
         let opened = match self.backstage.open(&self.source) {
             Ok(opened) => opened,
-            Err(line) => return self.news.tell(Told::Source(Source::Lost(line))),
+            Err(line) => return self.without_source(Source::Lost(line)),
         };
         self.source.clone_from(&opened.name);
         self.news.tell(Told::Controls(opened.controls.clone()));
         opened.notes.iter().for_each(|line| self.news.note(line));
-        let first = self.runs == 0;
         self.runs += 1;
+        self.wanted.need(!self.outputs.is_empty());
         let (orders, run) = (self.orders.clone(), self.runs);
         let to_host = orders.clone();
         let wrote = move |written| {
-            let _ = to_host.send(Order::Wrote(written));
+            let _ = to_host.send(Order::Wrote(run, written));
         };
         let ended = move |ended| {
             let _ = orders.send(Order::Ended(run, Box::new(ended)));
@@ -163,23 +183,30 @@ impl Host {
         };
         match Live::begin(opened, &settings, &mut *self.backstage, &self.news, wrote, ended) {
             Ok((live, source)) => {
+                self.looks = VecDeque::from([(0, live.effective(&self.look))]);
                 self.live = Some(live);
                 self.news.tell(Told::Source(source));
                 // A recording ends with its source; a virtual camera goes on with the next one.
+                let first = !std::mem::replace(&mut self.began, true);
                 let outputs = std::mem::take(&mut self.outputs);
                 outputs.into_iter().filter(|output| output.is_camera || first).for_each(|output| self.begin(output));
                 self.tell_outputs();
             }
-            Err(line) => self.news.tell(Told::Source(Source::Lost(line))),
+            Err(line) => self.without_source(Source::Lost(line)),
         }
     }
 
     fn adopt(&mut self, look: Look) {
         self.look = look;
-        if let Some(live) = &mut self.live
-            && let Err(line) = live.adopt(&self.look, &mut *self.backstage)
-        {
-            self.news.note(line);
+        if let Some(live) = &mut self.live {
+            let number = self.looks.back().map_or(0, |(last, _)| last + 1);
+            self.looks.push_back((number, live.effective(&self.look)));
+            if self.looks.len() > KEPT_LOOKS {
+                self.looks.pop_front();
+            }
+            if let Err(line) = live.adopt(&self.look, number, &mut *self.backstage) {
+                self.news.note(line);
+            }
         }
         // They change other looks than before.
         self.news.tell(Told::Presets(self.backstage.presets(&self.look)));
@@ -192,6 +219,7 @@ impl Host {
         }
         match self.backstage.output(&output.name, live.size, live.period_ns) {
             Ok(sink) => {
+                self.wanted.need(true);
                 live.write_to(&output, sink);
                 self.outputs.push(output);
             }
@@ -207,19 +235,23 @@ impl Host {
 
     fn copy(&self, switches: &[Switch]) {
         let outputs: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
-        let command = self.backstage.command(&self.look, &self.source, &outputs, switches);
+        let look = self.live.as_ref().map_or_else(|| self.look.clone(), |live| live.effective(&self.look));
+        let command = self.backstage.command(&look, &self.source, &outputs, switches);
         self.news.note(format!("Copied: {command}"));
         self.news.send(Heard::Copy(command));
     }
 
-    fn wrote(&mut self, Written { member, fate }: &Written) {
+    fn wrote(&mut self, run: u64, Written { member, fate }: &Written) {
         match fate {
             Fate::Began => self.news.note(format!("writing to {member}")),
             Fate::Completed { frames } => self.news.note(format!("{member}: complete, {frames} frames")),
             Fate::Failed { why, .. } => {
                 self.news.note(why.clone());
-                self.outputs.retain(|output| output.name != *member);
-                self.tell_outputs();
+                // One of the same name may be written by the next run already.
+                if run == self.runs {
+                    self.outputs.retain(|output| output.name != *member);
+                    self.tell_outputs();
+                }
             }
         }
     }
@@ -239,7 +271,7 @@ impl Host {
             if let Some(live) = self.live.take() {
                 live.join();
             }
-            self.news.tell(Told::Source(source));
+            self.without_source(source);
         }
     }
 
@@ -253,10 +285,8 @@ impl Host {
     }
 
     fn save(&self, still: &Still) {
-        let look = match &self.live {
-            Some(live) => live.effective(&self.look),
-            None => self.look.clone(),
-        };
+        let its_own = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
+        let look = its_own.map_or(&self.look, |(_, look)| look);
         let settings = look.flags_of_frame(&still.coc, still.quality);
         let Still { picture, color, depth, .. } = still;
         let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };

@@ -57,7 +57,7 @@ impl Live {
         wrote: impl Fn(Written) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
-        let Opened { camera, depth, has_depth, measured, .. } = opened;
+        let Opened { name, camera, depth, has_depth, measured, .. } = opened;
         let info = camera.info();
         let look = fitting(settings.look, has_depth);
         let made_for = look.settings(info.size, ADAPTIVE);
@@ -105,6 +105,7 @@ impl Live {
         });
         let thread = thread.map_err(|error| format!("cannot start the pipeline's thread: {error}"))?;
         let source = Source::Running(Running {
+            name,
             label: info.name,
             size: info.size,
             period_ns: info.period_ns,
@@ -131,14 +132,15 @@ impl Live {
         fitting(look, self.has_depth)
     }
 
-    /// Frames have this look from now on.
+    /// Frames have this look from now on, and are known by this number.
     ///
     /// # Errors
     /// Its executor cannot be made: one line. The one before goes on.
-    pub(super) fn adopt(&mut self, look: &Look, backstage: &mut dyn Backstage) -> Result<(), String> {
+    pub(super) fn adopt(&mut self, look: &Look, number: u64, backstage: &mut dyn Backstage) -> Result<(), String> {
         let look = self.effective(look);
         let made_for = look.settings(self.size, ADAPTIVE);
-        let change = |bokeh| Change {
+        let change = |number, bokeh| Change {
+            number,
             coc: look.coc_rule(self.size),
             refine: look.refines(self.measured),
             quality: look.quality_rule(ADAPTIVE),
@@ -147,13 +149,14 @@ impl Live {
         // A run that has ended hears nothing.
         if self.effect() == look.effect {
             // At once what can be at once: the executor at hand cuts what it was not made for.
-            let _ = self.changes.send(change(Executor::Keep));
+            let number = if made_for == self.made_for { number } else { number - 1 };
+            let _ = self.changes.send(change(number, Executor::Keep));
         }
         if made_for != self.made_for {
             let began = Instant::now();
             let bokeh = made_for.as_ref().map(|made_for| backstage.executor(made_for, self.size)).transpose()?;
             tracing::debug!("an executor was made in {:?}", began.elapsed());
-            let _ = self.changes.send(change(Executor::To(bokeh)));
+            let _ = self.changes.send(change(number, Executor::To(bokeh)));
             self.made_for = made_for;
         }
         Ok(())

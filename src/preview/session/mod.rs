@@ -71,6 +71,8 @@ pub struct Still {
     pub depth: Option<DepthMap>,
     /// The radius of every pixel.
     pub coc: CocField,
+    /// The number of the last change before it.
+    pub change: u64,
     /// The rung that it was blurred at.
     pub quality: Option<Quality>,
 }
@@ -80,8 +82,8 @@ enum Order {
     Do(Effect),
     Save(Box<Still>),
     Copy(Vec<Switch>),
-    /// What became of an output.
-    Wrote(Written),
+    /// What became of an output of the run of this number.
+    Wrote(u64, Written),
     /// The run of this number ended.
     Ended(u64, Box<Result<Report, PipelineError>>),
     Close,

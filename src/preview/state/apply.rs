@@ -2,11 +2,13 @@
 
 use super::{Action, Effect, Output, Shown, Source, State, TEXT_SCALES};
 use crate::bokeh;
-use crate::look::Look;
+use crate::look::{Look, Strength};
 
 /// What is missing where a look or a view needs depth; also what to do.
 pub const NO_DEPTH: &str =
     "This source has no depth. A second camera beside it, a depth camera or a recording with depth gives it.";
+/// Why depth is not shown: nobody makes it.
+pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: choose Depth as the effect first.";
 /// What is missing where there is no virtual camera.
 pub const NO_VIRTUAL_CAMERA: &str = "There is no virtual camera yet: `bokehcam doctor` says how to make one.";
 
@@ -31,6 +33,7 @@ impl State {
                 name => return vec![Effect::SavePreset(name.to_owned(), Box::new(self.look.clone()))],
             },
             Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(NO_DEPTH),
+            Action::Show(Shown::Depth) if self.look.effect != Some(bokeh::Effect::Dof) => self.note(NOT_FOLLOWED),
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
             Action::Mirror(on) => self.mirror = on,
@@ -70,6 +73,17 @@ impl State {
 
     fn go_to(&mut self, look: Option<Look>) -> Vec<Effect> {
         let Some(look) = look else { return Vec::new() };
+        let mut look = self.fitting(look);
+        let follows = |look: &Look| look.effect == Some(bokeh::Effect::Dof);
+        if follows(&self.look) && !follows(&look) {
+            // Without depth a lens would need a distance, and there is no depth to be seen.
+            if matches!(look.strength, Strength::Lens(_)) {
+                look.strength = Strength::Default;
+            }
+            if self.shown == Shown::Depth {
+                self.shown = Shown::Picture;
+            }
+        }
         self.look = look;
         vec![Effect::Look(Box::new(self.look.clone()))]
     }

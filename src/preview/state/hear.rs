@@ -1,13 +1,15 @@
 //! What others tell, and what it makes of the state.
 
 use super::apply::NO_DEPTH;
-use super::{Shown, Source, State, Told};
+use super::{Effect, Shown, Source, State, Told};
+use crate::bokeh;
+use crate::look::Look;
 
 impl State {
-    /// Takes note of what others tell.
-    pub fn hear(&mut self, told: Told) {
+    /// Takes note of what others tell; gives back another look where the source calls for one.
+    pub fn hear(&mut self, told: Told) -> Option<Effect> {
         match told {
-            Told::Source(source) => self.source_is(source),
+            Told::Source(source) => return self.source_is(source),
             Told::Choices { sources, virtual_cameras } => {
                 (self.sources, self.virtual_cameras) = (sources, virtual_cameras);
             }
@@ -16,16 +18,40 @@ impl State {
             Told::Outputs(outputs) => self.outputs = outputs,
             Told::Note(text) => self.note(text),
         }
+        None
     }
 
-    fn source_is(&mut self, source: Source) {
-        if matches!(source, Source::Running(_)) {
+    fn source_is(&mut self, source: Source) -> Option<Effect> {
+        if let Source::Running(running) = &source {
             self.meters.restart();
+            self.source_name.clone_from(&running.name);
         }
         self.source = source;
         if self.shown == Shown::Depth && !self.may_have_depth() {
             self.shown = Shown::Picture;
             self.note(NO_DEPTH);
         }
+        let look = match &self.source {
+            // What was changed for a source without depth is changed back for one that has it.
+            Source::Running(running) if running.has_depth && self.fitted => {
+                self.fitted = false;
+                let follows = self.look.effect == Some(bokeh::Effect::TiltShift);
+                Look { effect: if follows { Some(bokeh::Effect::Dof) } else { self.look.effect }, ..self.look.clone() }
+            }
+            _ => self.fitting(self.look.clone()),
+        };
+        (look != self.look).then(|| {
+            self.look = look;
+            Effect::Look(Box::new(self.look.clone()))
+        })
+    }
+
+    /// A look as the source allows it: without depth, depth of field is that of a toy world.
+    pub(super) fn fitting(&mut self, mut look: Look) -> Look {
+        if look.effect == Some(bokeh::Effect::Dof) && !self.may_have_depth() {
+            look.effect = Some(bokeh::Effect::TiltShift);
+            self.fitted = true;
+        }
+        look
     }
 }

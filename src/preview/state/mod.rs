@@ -53,6 +53,8 @@ pub enum Source {
 /// A source whose frames come.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Running {
+    /// What the command line calls it.
+    pub name: String,
     /// What it calls itself.
     pub label: String,
     /// Width and height of its pictures.
@@ -141,6 +143,8 @@ pub struct State {
     pub meters: Meters,
     /// The looks before, and those that were undone.
     pub history: History,
+    /// Whether the effect is another than was chosen, because the source has no depth.
+    fitted: bool,
     /// Notes made.
     noted: u64,
 }
@@ -177,6 +181,7 @@ impl State {
             text_scale: 1.0,
             meters: Meters::default(),
             history: History::default(),
+            fitted: false,
             noted: 0,
         }
     }

@@ -35,6 +35,7 @@ pub fn blurred(radius_px: f32) -> Look {
 /// A source whose frames come.
 pub fn running(has_depth: bool) -> Source {
     Source::Running(Running {
+        name: "portrait".into(),
         label: "Desk camera".into(),
         size: (1280, 720),
         period_ns: 33_333_333,

@@ -31,14 +31,19 @@ pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
         // Below, blur is none to be seen; from there one gets back by a first step.
         Some(share) => {
             let share = if share < least && factor < 1.0 { 0.0 } else { share.max(least / 2.0) * factor };
-            look.strength = Strength::Percent(share.min(MAX_COC_PER_HEIGHT) * 100.0);
+            let most = amount(look, height_px).unwrap_or_default().max(MAX_COC_PER_HEIGHT);
+            look.strength = Strength::Percent(share.min(most) * 100.0);
         }
         None => f_number_by(look, 1.0 / factor),
     }
 }
 
-/// Makes the f-number `factor` times as large; the first time, a lens is put on.
+/// Makes the f-number `factor` times as large; the first time, a lens is put on. Only where the blur follows depth has a
+/// lens a distance.
 pub fn f_number_by(look: &mut Look, factor: f32) {
+    if look.effect != Some(bokeh::Effect::Dof) {
+        return;
+    }
     let lens = match look.strength {
         Strength::Lens(lens) => Lens { f_number: lens.f_number * factor, ..lens },
         Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => LENS,

@@ -48,14 +48,14 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let how = Number {
         label: "Focal range",
         hint: "Depth that stays sharp in front of and behind the focal plane",
-        range: FOCUS_RANGES_M,
+        range: *FOCUS_RANGES_M.start() / 2.0..=*FOCUS_RANGES_M.end() / 2.0,
         ratios: false,
         digits: 2,
         around: ["±", " m"],
     };
-    let mut half_m = sheet.look.focus_range_m;
+    let mut half_m = sheet.look.focus_range_m / 2.0;
     if number(ui, how, &mut half_m) {
-        sheet.look.focus_range_m = half_m;
+        sheet.look.focus_range_m = half_m * 2.0;
         sheet.changed(true, "focal range");
     }
     if chosen == 1 {

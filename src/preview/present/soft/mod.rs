@@ -18,6 +18,7 @@ use super::{Controls, Drawing, PresentError, Presenter};
 
 /// Presents without a GPU.
 pub struct Soft {
+    window: Arc<Window>,
     surface: Surface<Arc<Window>, Arc<Window>>,
     size: Option<(NonZeroU32, NonZeroU32)>,
     painter: Painter,
@@ -32,7 +33,7 @@ impl Soft {
         let context = Context::new(Arc::clone(&window)).map_err(fault)?;
         let surface = Surface::new(&context, Arc::clone(&window)).map_err(fault)?;
         let size = window.inner_size();
-        let mut soft = Self { surface, size: None, painter: Painter::new() };
+        let mut soft = Self { window, surface, size: None, painter: Painter::new() };
         soft.resize((size.width, size.height));
         Ok(soft)
     }
@@ -62,6 +63,7 @@ impl Presenter for Soft {
         if let Some(pixels) = buffer.get_mut(..pixels) {
             self.painter.paint(pixels, age, drawing);
         }
+        self.window.pre_present_notify();
         buffer.present().map_err(fault)
     }
 

@@ -36,6 +36,8 @@ const LOOK_UP: Duration = Duration::from_millis(250);
 /// After so long without a frame, and so many periods of the source, the person is told.
 const SILENCE: Duration = Duration::from_secs(2);
 const SILENT_PERIODS: u32 = 10;
+/// What a picture is like of which nothing is known yet.
+const USUAL_SIZE: (u32, u32) = (1280, 720);
 
 pub(super) struct App {
     state: State,
@@ -67,7 +69,9 @@ pub(super) struct App {
     laid_out: Instant,
     /// The oldest input whose effect is not on the screen yet.
     input_at: Option<Instant>,
-    hidden: bool,
+    /// Whether nothing of the window is to be seen, and whether it has no pixels.
+    covered: bool,
+    empty: bool,
     memory: Option<PathBuf>,
     remembered: Option<Memory>,
     close_at_end: bool,
@@ -114,7 +118,8 @@ impl App {
             layout_at: Some(Instant::now()),
             laid_out: Instant::now(),
             input_at: None,
-            hidden: false,
+            covered: false,
+            empty: false,
             memory,
             remembered,
             close_at_end,
@@ -142,12 +147,14 @@ impl App {
     /// Hears what the session has to say, and takes the newest frame.
     fn hear(&mut self, events: &ActiveEventLoop) {
         // Before the look: what comes after it rings again.
-        self.rung.store(false, Ordering::Release);
+        self.rung.swap(false, Ordering::AcqRel);
         let mut changed = false;
         while let Some(heard) = self.session.hear() {
             match heard {
                 Heard::Views(views) => {
                     self.heard_at = Instant::now();
+                    // It was of another source.
+                    self.snapshot_due = false;
                     self.views = Some(views);
                     self.state.meters.restart();
                 }
@@ -157,7 +164,9 @@ impl App {
                     }
                 }
                 Heard::Told(told) => {
-                    self.state.hear(told);
+                    if let Some(look) = self.state.hear(told) {
+                        self.session.order(look);
+                    }
                     changed = true;
                 }
             }
@@ -167,7 +176,7 @@ impl App {
             self.layout_at = Some(Instant::now());
             self.place();
             self.set_title();
-            if self.close_at_end && self.state.source == Source::Ended {
+            if self.close_at_end && matches!(self.state.source, Source::Ended | Source::Lost(_)) {
                 events.exit();
             }
         }
@@ -196,8 +205,8 @@ impl App {
 
     /// Whether frames come. A camera that is gone may come back by itself: only its silence tells.
     fn listen(&mut self) {
-        let silent = match (&self.state.source, &self.view) {
-            (Source::Running(running), Some(_)) => {
+        let silent = match &self.state.source {
+            Source::Running(running) => {
                 let patience = SILENCE.max(Duration::from_nanos(running.period_ns) * SILENT_PERIODS);
                 Some(self.heard_at.elapsed()).filter(|silent| *silent > patience)
             }
@@ -224,20 +233,30 @@ impl App {
     }
 
     fn ask_for_redraw(&self) {
-        if let Some(gfx) = self.gfx.as_ref().filter(|_| !self.hidden) {
+        if let Some(gfx) = self.gfx.as_ref().filter(|_| !self.is_hidden()) {
             gfx.window.request_redraw();
         }
     }
 
+    fn is_hidden(&self) -> bool {
+        self.covered || self.empty
+    }
+
     fn touched(&mut self) {
         let now = Instant::now();
-        self.input_at.get_or_insert(now);
+        if !self.is_hidden() {
+            self.input_at.get_or_insert(now);
+        }
         self.layout_at = Some(now);
         self.ask_for_redraw();
     }
 
     fn picture_size(&self) -> (u32, u32) {
-        self.view.as_ref().map_or(self.nothing.size(), |view| view.picture.size())
+        match (&self.view, &self.state.source) {
+            (Some(view), _) => view.picture.size(),
+            (None, Source::Running(running)) => running.size,
+            (None, _) => USUAL_SIZE,
+        }
     }
 }
 
@@ -281,12 +300,13 @@ impl ApplicationHandler<()> for App {
             }
             WindowEvent::CloseRequested => return events.exit(),
             WindowEvent::Occluded(hidden) => {
-                self.hidden = *hidden;
+                self.covered = *hidden;
+                self.input_at = None;
                 return self.ask_for_redraw();
             }
             WindowEvent::Resized(size) => {
                 gfx.presenter.resize((size.width, size.height));
-                self.hidden = size.width == 0 || size.height == 0;
+                self.empty = size.width == 0 || size.height == 0;
                 self.remembered = gfx.memory().or(self.remembered);
             }
             _ => {}
@@ -309,7 +329,9 @@ impl ApplicationHandler<()> for App {
         if self.layout_at.is_some_and(|at| at <= now) {
             self.ask_for_redraw();
         }
-        let layout_at = self.layout_at.filter(|_| !self.hidden).map_or(now + LOOK_UP, |at| at.min(now + LOOK_UP));
+        // What is due waits for the redraw that was asked for, which the display may hold back.
+        let layout_at = self.layout_at.filter(|at| !self.is_hidden() && *at > now);
+        let layout_at = layout_at.map_or(now + LOOK_UP, |at| at.min(now + LOOK_UP));
         events.set_control_flow(ControlFlow::WaitUntil(layout_at));
     }
 

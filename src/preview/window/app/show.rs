@@ -13,6 +13,9 @@ use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::Still;
 use crate::preview::state::{Action, Effect, Source, State};
 
+/// Why nothing is saved.
+const NO_PICTURE: &str = "There is no picture to save.";
+
 impl App {
     /// Lays the controls out and does what the person did to them.
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
@@ -72,7 +75,10 @@ impl App {
 
     /// Saves the frame that is shown, or the next one where this one is on the GPU alone.
     pub(super) fn snapshot(&mut self) {
-        let Some(view) = &self.view else { return };
+        let Some(view) = &self.view else { return self.state.note(NO_PICTURE) };
+        if !view.in_memory && !matches!(self.state.source, Source::Running(_)) {
+            return self.state.note(NO_PICTURE);
+        }
         self.snapshot_due = !view.in_memory;
         self.place();
         if self.snapshot_due {
@@ -83,6 +89,7 @@ impl App {
             color: (**view.color.as_ref().unwrap_or(&view.picture)).clone(),
             depth: view.depth.as_ref().map(|depth| (**depth).clone()),
             coc: view.coc,
+            change: view.trace.change,
             quality: view.trace.quality,
         });
     }
@@ -90,7 +97,8 @@ impl App {
     /// Shows the frame with the controls as they are.
     pub(super) fn draw(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
-        let Some(gfx) = self.gfx.as_mut().filter(|_| !self.hidden) else { return };
+        let hidden = self.is_hidden();
+        let Some(gfx) = self.gfx.as_mut().filter(|_| !hidden) else { return };
         let shown = self.state.shown;
         if let Some(view) = self.view.as_ref().filter(|_| self.is_new || self.drawn != shown) {
             self.made.draw(shown, view, self.settings.as_ref());
@@ -114,7 +122,6 @@ impl App {
             background,
         };
         let began_ns = self.clock.now_ns();
-        gfx.window.pre_present_notify();
         if let Err(error) = gfx.presenter.present(&drawing) {
             self.failed = Some(error.into());
             return events.exit();
