@@ -64,6 +64,7 @@ impl State {
     }
 
     fn set_look(&mut self, look: Look, stroke: Option<&'static str>) -> Vec<Effect> {
+        let look = self.fitting(look);
         if look == self.look {
             return Vec::new();
         }

@@ -1,7 +1,7 @@
 use super::sample::{blurred, look, running, state};
 use super::*;
 use crate::bokeh;
-use crate::look::Strength;
+use crate::look::{Look, Strength};
 
 fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<Effect> {
     state.apply(Action::Look { look: Box::new(blurred(radius_px)), stroke })
@@ -97,17 +97,21 @@ fn presets_are_looks_by_name() {
 #[test]
 fn what_needs_depth_says_so_where_there_is_none() {
     let mut state = state();
-    state.hear(Told::Source(running(false)));
+    // What follows depth becomes tilt-shift, and the session is told.
+    let toy = Look { effect: Some(bokeh::Effect::TiltShift), ..look() };
+    assert_eq!(state.hear(Told::Source(running(false))), Some(Effect::Look(Box::new(toy.clone()))));
     for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
         let before = state.notes.len();
         assert_eq!(state.apply(action), []);
         assert_eq!((state.notes.len(), &state.notes.last().unwrap().text[..]), (before + 1, NO_DEPTH));
     }
-    assert_eq!((state.shown, &state.look), (Shown::Picture, &look()));
+    assert_eq!((state.shown, &state.look), (Shown::Picture, &toy));
+    assert_eq!(state.apply(Action::Reset), [], "nor does the first look follow any");
     assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
     assert_eq!(state.look.effect, Some(bokeh::Effect::TiltShift));
-    // A view of depth goes back to the picture when the next source has none.
+    // It follows depth again where there is some; a view of it goes back to the picture when the next source has none.
     state.hear(Told::Source(running(true)));
+    assert_eq!(state.look.effect, Some(bokeh::Effect::Dof));
     state.apply(Action::Show(Shown::Depth));
     state.hear(Told::Source(running(false)));
     assert_eq!(state.shown, Shown::Picture);

@@ -132,8 +132,10 @@ impl App {
     pub fn end(self) -> Result<Ended, WindowError> {
         let Self { gfx, view, views, session, state, failed, .. } = self;
         // The window goes at once; outputs may take a while to be completed.
-        drop((gfx, view, views));
+        drop((gfx, view));
         let mut report = session.close();
+        // Only now: the frames on the way to a viewer that is gone would be nobody's.
+        drop(views);
         if let Some(report) = &mut report {
             report.window = Some(window_use(&state));
         }
