@@ -5,7 +5,6 @@
 mod common;
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use bokehcam::bokeh::{self, Effect, Job};
 use bokehcam::budget::Quality;
@@ -422,36 +421,4 @@ fn bytes(device: &Device, picture: &DevicePicture) -> Vec<u8> {
     let mut bytes = read(device, &buffer);
     bytes.truncate((picture.size().0 * picture.size().1 * 3) as usize);
     bytes
-}
-
-#[test]
-#[ignore = "measures time"]
-fn a_frame_costs_little() {
-    let (size, whole, context) = ((1280, 720), area(0, 0, 1280, 720), context());
-    let [picture, small, large] = [(1280, 720), (640, 360), (1920, 1080)].map(|(width, height)| noise(width, height));
-    let mut painter = painter(size, Some(controls(&context, size, 1.0)));
-    let mut pixels = vec![0; 1280 * 720];
-    // The best of many: what others do on the machine at the time does not count.
-    let mut best_ms = |painter: &mut Painter, drawing: &Drawing, controls: &dyn Fn() -> Option<Controls>| {
-        let time = |_| {
-            controls().into_iter().for_each(|controls| painter.set_controls(controls));
-            let began = Instant::now();
-            painter.paint(&mut pixels, 1, drawing);
-            began.elapsed().as_secs_f64() * 1e3
-        };
-        (0..40).map(time).fold(f64::INFINITY, f64::min)
-    };
-    let shown = drawing(&picture, whole);
-    let changing = || Some(controls(&context, size, 1.0));
-    for (what, most_ms, ms) in [
-        ("other controls", 8.0, best_ms(&mut painter, &shown, &changing)),
-        ("as it is", 1.0, best_ms(&mut painter, &shown, &|| None)),
-        ("mirrored", 1.5, best_ms(&mut painter, &Drawing { mirror: true, ..shown }, &|| None)),
-        ("stale", 1.5, best_ms(&mut painter, &Drawing { stale: true, ..shown }, &|| None)),
-        ("enlarged", 8.0, best_ms(&mut painter, &drawing(&small, whole), &|| None)),
-        ("shrunk", 16.0, best_ms(&mut painter, &drawing(&large, whole), &|| None)),
-    ] {
-        assert!(ms < most_ms, "{what}: {ms:.2} ms");
-        println!("{what}: {ms:.2} ms");
-    }
 }

@@ -9,6 +9,7 @@ mod common;
 #[path = "../../tests/window/input.rs"]
 #[allow(dead_code)]
 mod input;
+mod paint;
 #[path = "../../tests/window/picture.rs"]
 #[allow(dead_code)]
 mod picture;
@@ -68,6 +69,9 @@ struct Options {
     /// Measure instead how soon the window answers a key, from outside, while the pipeline is busy or stuck
     #[arg(long)]
     reaction: bool,
+    /// Measure instead what a frame of 1280x720 costs that is painted on the CPU
+    #[arg(long)]
+    paint: bool,
     /// Given by cargo
     #[arg(long, hide = true)]
     bench: bool,
@@ -91,6 +95,10 @@ fn main() -> ExitCode {
 }
 
 fn measure(options: &Options) -> Result<()> {
+    if options.paint {
+        paint::measure();
+        return Ok(());
+    }
     let scratch = tempfile::tempdir()?;
     let folder = match &options.folder {
         Some(folder) => folder.clone(),
