@@ -297,6 +297,22 @@ fn close(ours: &[u32], theirs: &[u32], (limit, but_one_in, worst): (u8, usize, u
 
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
+fn what_was_only_attempted_leaves_the_device_sound() {
+    let device = Device::open(false, None).unwrap();
+    let refused = wgpu::BufferDescriptor {
+        label: None,
+        size: 16,
+        // Both at once is never allowed.
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::STORAGE,
+        mapped_at_creation: false,
+    };
+    assert!(device.attempt(|| device.device.create_buffer(&refused)).is_err());
+    device.check().unwrap();
+    assert_eq!(device.attempt(|| 7).unwrap(), 7);
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
 fn both_presenters_show_the_same_pictures() {
     let device = device();
     let mut canvas = Canvas::new(Arc::clone(&device), FORMAT);

@@ -144,6 +144,19 @@ impl Device {
         }
     }
 
+    /// Does something whose refusal concerns nobody else: it is not what [`Device::check`] finds.
+    ///
+    /// # Errors
+    /// The device refused something of it.
+    pub fn attempt<T>(&self, work: impl FnOnce() -> T) -> Result<T, GpuError> {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let done = work();
+        match pollster::block_on(scope.pop()) {
+            Some(error) => Err(GpuError::Failed(format!("{}: {error}", self.name))),
+            None => Ok(done),
+        }
+    }
+
     /// The first thing that went wrong on the device, if anything did.
     ///
     /// # Errors

@@ -50,13 +50,15 @@ impl Gpu {
             alpha_mode: wgpu::CompositeAlphaMode::Auto,
             view_formats: Vec::new(),
         };
-        let canvas = Canvas::new(Arc::clone(&device), format);
-        device.check().map_err(fault)?;
-        let size = window.inner_size();
-        let mut gpu = Self { device, window, surface, config, configured: false, canvas };
-        gpu.resize((size.width, size.height));
-        gpu.device.check().map_err(fault)?;
-        Ok(gpu)
+        // Where it is refused, the CPU draws, and the device goes on blurring.
+        let begun = device.attempt(|| {
+            let canvas = Canvas::new(Arc::clone(&device), format);
+            let size = window.inner_size();
+            let mut gpu = Self { device: Arc::clone(&device), window, surface, config, configured: false, canvas };
+            gpu.resize((size.width, size.height));
+            gpu
+        });
+        begun.map_err(fault)
     }
 
     fn configure(&mut self) {
