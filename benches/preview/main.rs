@@ -1,8 +1,8 @@
 //! `cargo bench --bench preview -- [OPTIONS] [FOLDER]`: what a window costs beyond the same stream without one.
 //!
 //! The same recording, once as `bokehcam stream --to null` and once as `bokehcam preview`, in turns, each as a program of
-//! its own: the processor time of the whole program per delivered frame, and the difference. Needs an X server; where
-//! DISPLAY names none, one without a screen (Xvfb) is started.
+//! its own: the processor time of the whole program per delivered frame, and the difference. The windows are on an X
+//! server without a screen, as those of `tests/window` are.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -22,11 +22,11 @@ mod screen;
 mod window;
 
 use std::error::Error;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitCode, Stdio};
+use std::process::{Command, ExitCode, Stdio};
 
 use clap::Parser;
+use screen::Screen;
 use serde_json::Value;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -107,7 +107,7 @@ fn measure(options: &Options) -> Result<()> {
     if options.reaction {
         return reaction::measure(&folder, scratch.path());
     }
-    let screen = Server::new()?;
+    let screen = Screen::new();
     let mut runs = [Vec::new(), Vec::new()];
     let (mut shown, mut presented) = (Vec::new(), Vec::new());
     for round in 1..=options.rounds {
@@ -160,7 +160,7 @@ fn record(options: &Options, scratch: &Path) -> Result<PathBuf> {
     if status.success() { Ok(folder) } else { Err("the recording failed".into()) }
 }
 
-fn run(options: &Options, folder: &Path, window: bool, screen: &Server, scratch: &Path) -> Result<Value> {
+fn run(options: &Options, folder: &Path, window: bool, screen: &Screen, scratch: &Path) -> Result<Value> {
     let path = scratch.join("report.json");
     let mut command = bokehcam();
     if window {
@@ -183,34 +183,4 @@ fn run(options: &Options, folder: &Path, window: bool, screen: &Server, scratch:
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
-/// The X server that windows are on.
-struct Server {
-    display: String,
-    server: Option<Child>,
-}
-
-impl Server {
-    fn new() -> Result<Self> {
-        if let Some(display) = std::env::var_os("DISPLAY").and_then(|display| display.into_string().ok()) {
-            return Ok(Self { display, server: None });
-        }
-        let arguments = ["-displayfd", "1", "-screen", "0", "1600x1000x24", "-nolisten", "tcp"];
-        let server = Command::new("Xvfb").args(arguments).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
-        let mut server = server.map_err(|error| format!("Xvfb: {error}; scripts/setup window installs it"))?;
-        let mut number = String::new();
-        BufReader::new(server.stdout.take().ok_or("Xvfb says nothing")?).read_line(&mut number)?;
-        Ok(Self { display: format!(":{}", number.trim()), server: Some(server) })
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        if let Some(server) = &mut self.server {
-            // It may have ended already.
-            let _ = server.kill();
-            let _ = server.wait();
-        }
-    }
 }

@@ -92,6 +92,15 @@ impl Look {
         }
     }
 
+    /// The look as far as a source with depth or without allows it: without, depth of field is that of a toy world.
+    pub fn for_source(&self, has_depth: bool) -> Self {
+        let effect = match self.effect {
+            Some(bokeh::Effect::Dof) if !has_depth => Some(bokeh::Effect::TiltShift),
+            effect => effect,
+        };
+        Self { effect, ..self.clone() }
+    }
+
     /// The executor's settings for pictures of `size` pixels; none when frames pass through.
     /// `adaptive` says whether the quality may follow the time there is.
     pub fn settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {

@@ -59,7 +59,7 @@ impl Live {
     ) -> Result<(Self, Source), String> {
         let Opened { name, camera, depth, has_depth, measured, .. } = opened;
         let info = camera.info();
-        let look = fitting(settings.look, has_depth);
+        let look = settings.look.for_source(has_depth);
         let made_for = look.settings(info.size, ADAPTIVE);
         let bokeh = made_for.as_ref().map(|made_for| backstage.executor(made_for, info.size)).transpose()?;
         let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
@@ -129,7 +129,7 @@ impl Live {
 
     /// The look as far as the source allows it.
     pub(super) fn effective(&self, look: &Look) -> Look {
-        fitting(look, self.has_depth)
+        look.for_source(self.has_depth)
     }
 
     /// Frames have this look from now on, and are known by this number.
@@ -187,13 +187,4 @@ impl Live {
     pub(super) fn join(self) -> Option<Report> {
         self.thread.join().ok().flatten()
     }
-}
-
-/// The look as far as a source with depth or without allows it: without, the depth of field is that of a toy world.
-pub(in crate::preview) fn fitting(look: &Look, has_depth: bool) -> Look {
-    let mut look = look.clone();
-    if look.effect == Some(bokeh::Effect::Dof) && !has_depth {
-        look.effect = Some(bokeh::Effect::TiltShift);
-    }
-    look
 }

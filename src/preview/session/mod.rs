@@ -4,8 +4,6 @@
 mod host;
 mod live;
 
-pub(super) use live::fitting;
-
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc;

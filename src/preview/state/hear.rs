@@ -46,12 +46,10 @@ impl State {
         })
     }
 
-    /// A look as the source allows it: without depth, depth of field is that of a toy world.
-    pub(super) fn fitting(&mut self, mut look: Look) -> Look {
-        if look.effect == Some(bokeh::Effect::Dof) && !self.may_have_depth() {
-            look.effect = Some(bokeh::Effect::TiltShift);
-            self.fitted = true;
-        }
-        look
+    /// A look as the source allows it.
+    pub(super) fn fitting(&mut self, look: Look) -> Look {
+        let fitted = look.for_source(self.may_have_depth());
+        self.fitted |= fitted.effect != look.effect;
+        fitted
     }
 }

@@ -24,7 +24,7 @@ use crate::optics::CocField;
 use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
 use crate::preview::panel::Panel;
-use crate::preview::session::{Heard, Session, Wake, fitting};
+use crate::preview::session::{Heard, Session, Wake};
 use crate::preview::state::{Shown, Source, State};
 use crate::preview::views::Views;
 use crate::stats::WindowUse;
@@ -229,7 +229,7 @@ impl App {
 
     fn look_changed(&mut self) {
         self.settings = match &self.state.source {
-            Source::Running(running) => fitting(&self.state.look, running.has_depth).settings(running.size, true),
+            Source::Running(running) => self.state.look.for_source(running.has_depth).settings(running.size, true),
             _ => None,
         };
     }
