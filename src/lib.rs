@@ -18,7 +18,7 @@
 //! | 3 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
 //! | 2 | [`link`], [`budget`], [`stats`], [`recording`], [`scene`], `v4l2` |
 //! | 1 | [`compute`], [`calibration`] |
-//! | 0 | [`frame`], [`optics`], [`clock`] |
+//! | 0 | [`frame`], [`optics`], [`clock`], [`files`] |
 //!
 //! Words: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in
@@ -35,6 +35,7 @@ pub mod cli;
 pub mod clock;
 pub mod compute;
 pub mod depth;
+pub mod files;
 pub mod frame;
 pub mod link;
 pub mod look;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules of the crate by layer, the lowest first.
 const LAYERS: [&[&str]; 9] = [
-    &["frame", "optics", "clock"],
+    &["frame", "optics", "clock", "files"],
     &["compute", "calibration"],
     &["link", "budget", "stats", "recording", "scene", "v4l2"],
     &["capture", "depth", "bokeh", "sink"],
@@ -29,7 +29,7 @@ const DOORS: [(&str, &[&str]); 20] = [
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
     ("png", &["recording", "sink"]),
-    ("rustix", &["capture/synthetic", "clock", "link/bell", "v4l2"]),
+    ("rustix", &["capture/synthetic", "clock", "files", "link/bell", "v4l2"]),
     ("saphyr_parser", &["calibration"]),
     ("softbuffer", &["preview/present"]),
     ("strsim", &["v4l2"]),

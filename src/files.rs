@@ -1,0 +1,4 @@
+//! Files of users: written whole or not at all, and read within bounds.
+
+pub mod input;
+pub mod whole;
