@@ -12,6 +12,7 @@ use super::error::CliError;
 use super::files::write_whole;
 use super::options::Every;
 use super::settings::{self, PRESETS, SettingsFile, Values, check_name, excluded_by, parse_flags};
+use crate::files::input;
 use crate::look::{Look, flags::Flag, presets};
 
 /// A preset upon another look.
@@ -77,7 +78,7 @@ pub fn save(path: &Path, name: &str, flags: &[Flag]) -> Result<(), CliError> {
     check_name(name).map_err(CliError::Usage)?;
     // A link, as those who keep their settings elsewhere have it, stays one.
     let path = &path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let text = match fs::read_to_string(path) {
+    let text = match input::read_text(path, input::MOST_SETTINGS_BYTES) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
         read => read.map_err(CliError::io(path))?,
     };

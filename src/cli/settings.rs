@@ -14,6 +14,7 @@ use toml::de::{DeTable, DeValue};
 use super::error::CliError;
 use super::one_line;
 use super::options::Every;
+use crate::files::input;
 use crate::look::{flags, presets};
 
 /// Settings by their flags without the dashes, each value as it would follow its flag.
@@ -49,7 +50,7 @@ impl SettingsFile {
             (None, Some(user)) if user.is_file() => user,
             _ => return Ok(Self::default()),
         };
-        let text = std::fs::read_to_string(&path).map_err(CliError::io(&path))?;
+        let text = input::read_text(&path, input::MOST_SETTINGS_BYTES).map_err(CliError::io(&path))?;
         Self::parse(&path, &text)
     }
 

@@ -152,6 +152,14 @@ impl SourceName {
         )))
     }
 
+    /// The folder that frames come from.
+    pub fn folder(&self) -> Option<&Path> {
+        match self {
+            SourceName::Folder(folder) => Some(folder),
+            _ => None,
+        }
+    }
+
     /// Whether it is a recording.
     #[cfg(feature = "window")]
     pub fn is_folder(&self) -> bool {
