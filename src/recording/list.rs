@@ -69,13 +69,16 @@ pub(super) fn give_up_disorder<'a>(entries: impl Iterator<Item = &'a mut Entry>)
     let kept: Vec<_> = times.iter().zip(&is_kept).filter(|(_, is_kept)| **is_kept).map(|(&time, _)| time).collect();
     let age = most_of_an_age(&kept);
     for (entry, is_kept) in entries.into_iter().zip(is_kept) {
-        let fault = match is_kept {
-            false => LineFault::OutOfOrder,
-            true if entry.time_ns.is_some_and(|time| !age.contains(&time)) => LineFault::TooFar,
-            true => continue,
-        };
+        if is_kept && entry.time_ns.is_some_and(|time| age.contains(&time)) {
+            continue;
+        }
         entry.time_ns = None;
-        entry.source.file = Err(fault);
+        match &entry.source.file {
+            _ if !is_kept => entry.source.file = Err(LineFault::OutOfOrder),
+            Ok(_) => entry.source.file = Err(LineFault::TooFar),
+            // What is wrong with the file says more.
+            Err(_) => {}
+        }
     }
 }
 
