@@ -7,8 +7,9 @@ use clap::Args;
 
 use super::config::Executor;
 use super::error::CliError;
+use super::layers::Given;
 use super::source::{Source, SourceName, Wanted};
-use super::{options, terminal, values};
+use super::{options, terminal, unused, values};
 use crate::capture::{Brings, Captured, Shot};
 use crate::depth::Seen;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
@@ -26,6 +27,7 @@ Examples:
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
 pub struct RecordCommand {
     /// A camera, two cameras LEFT,RIGHT, a folder with a recording, or `synthetic`
+    #[arg(value_parser = SourceName::parser())]
     source: SourceName,
     /// Folder for the recording
     #[arg(long, value_name = "DIR")]
@@ -44,7 +46,7 @@ pub struct RecordCommand {
 ///
 /// # Errors
 /// The source cannot be read, or the recording exists (without `--force`) or cannot be written.
-pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliError> {
+pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let wanted = Wanted {
         frames: &command.frames,
         depth: &command.depth,
@@ -54,7 +56,20 @@ pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliE
         cycle: false,
         keep_going: false,
     };
-    let Source { mut camera, depth: mut source, rig } = Source::open(&command.source, &wanted)?;
+    let Source { mut camera, depth: mut source, rig, depth_from } = Source::open(&command.source, &wanted)?;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: command.source.kind(),
+            depth: depth_from,
+            uses_depth: true,
+            effect: None,
+            lens: false,
+            realtime: true,
+            cpu_only: false,
+            window: false,
+        },
+    );
     if rig.is_some_and(|rig| !rig.metric) {
         tracing::warn!("the distance of the two eyes is not known: the metres of this depth are those of assumed eyes");
     }

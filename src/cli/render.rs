@@ -6,17 +6,21 @@ use clap::Args;
 
 use super::config::{self, Executor};
 use super::error::CliError;
-use super::files::refuse_overwrite;
-use super::{debug, options, terminal};
-use crate::bokeh::{BokehError, Job};
+use super::files::{make_folder_of, refuse_overwrite};
+use super::layers::Given;
+use super::unused::{DepthFrom, From};
+use super::values::DepthChoice;
+use super::{debug, focus, log, options, terminal, unused, values};
+use crate::bokeh::{BokehError, Effect, Job};
 use crate::compute::Place;
 use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
-use crate::look::Look;
+use crate::look::{Look, Strength};
 use crate::optics::CocField;
 use crate::pipeline::CocRule;
-use crate::recording::{snapshot, still};
+use crate::recording::snapshot;
+use crate::recording::still::{self, MapFormat};
 
 /// Blur one still picture
 #[derive(Args, Debug)]
@@ -63,16 +67,18 @@ pub struct RenderCommand {
 ///
 /// # Errors
 /// A picture cannot be read or written, the options do not fit it, or the blur failed.
-pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliError> {
+pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
-    if command.blur.depth.is_elsewhere() {
-        let what = "--depth FOLDER or a depth camera are for `stream`: give a picture's depth with --depth-map";
+    if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
+        let what = "--depth FOLDER, stereo or a depth camera are for `stream`: give a picture's depth with --depth-map";
         return Err(CliError::Usage(what.to_string()));
     }
     let (color, depth) = read(command)?;
     let look = config::look(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
+    command.warn(&look, color.size(), depth.as_ref(), given);
     let executor = Executor::of(&command.computing);
+    make_folder_of(&command.out)?;
     let (result, by) = match &command.debug_dir {
         Some(dir) => debug::blurred(color, depth, &look, &executor, (dir, command.output.force))?,
         None => blurred(color, depth, &look, &executor)?,
@@ -82,6 +88,40 @@ pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliE
         terminal::say(&format!("{}: written ({by})", command.out.display()));
     }
     Ok(())
+}
+
+impl RenderCommand {
+    /// Says what has no effect, and what cannot be meant.
+    fn warn(&self, look: &Look, size: (u32, u32), depth: Option<&Depth>, given: &Given) {
+        let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
+        let in_units = self.depth_map.as_ref().is_some_and(in_units);
+        let uses_depth = look.effect == Some(Effect::Dof);
+        unused::warn(
+            &given.settings,
+            &unused::Run {
+                source: From::Picture,
+                depth: match depth {
+                    None => DepthFrom::Nothing,
+                    Some(Depth::Measured(_)) if in_units => DepthFrom::Units,
+                    Some(_) => DepthFrom::Metres,
+                },
+                uses_depth,
+                effect: look.effect,
+                lens: matches!(look.strength, Strength::Lens(_)),
+                realtime: false,
+                cpu_only: self.computing.backend == values::Backend::Cpu,
+                window: false,
+            },
+        );
+        match depth {
+            None if self.blur.takes_whatever_depth() => unused::warn_of_no_depth(From::Picture),
+            Some(_) if self.depth_map.is_some() && !uses_depth => {
+                log::warn("--depth-map has no effect: the effect does not use depth");
+            }
+            Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, size, map, in_units),
+            None => {}
+        }
+    }
 }
 
 /// A depth map for one picture.
@@ -98,14 +138,18 @@ fn read(command: &RenderCommand) -> Result<(ColorImage, Option<Depth>), CliError
     let read_depth =
         |file: &Path| still::read_depth(file, command.depth.file_scale(), Some(command.depth.depth_invalid));
     let given = command.depth_map.as_deref().map(read_depth).transpose()?.map(Depth::Measured);
-    match (&command.image, sources) {
+    let (color, depth) = match (&command.image, sources) {
         (None, Some((color, depth))) => {
             let kept = given.is_none() && depth.exists();
             let kept = kept.then(|| read_depth(&depth)).transpose()?.map(Depth::Final);
-            Ok((still::read_color(&color)?, given.or(kept)))
+            (still::read_color(&color)?, given.or(kept))
         }
-        (image, _) => Ok((still::read_color(image.as_deref().unwrap_or(Path::new("")))?, given)),
+        (image, _) => (still::read_color(image.as_deref().unwrap_or(Path::new("")))?, given),
+    };
+    if let (Some(Depth::Measured(map)), Some(file)) = (&depth, &command.depth_map) {
+        still::check_depth_size(file, map.size(), color.size())?;
     }
+    Ok((color, depth))
 }
 
 /// The blurred picture, and what blurred it.

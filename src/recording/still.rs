@@ -4,12 +4,13 @@
 
 use std::path::Path;
 
-use image::{DynamicImage, ImageError, RgbImage};
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageBuffer, ImageError, Luma, RgbImage, imageops};
 
 use super::decode::{self, DepthUnits, Scratch};
 use super::error::RecordingError;
 use super::fault::PictureFault;
-use super::{check_depth_scale, encode, pfm, whole};
+use super::{check_depth_scale, depth_covers, encode, pfm, whole};
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
 /// Reads a PNG or JPEG (told by the content) as 8-bit RGB, upright where it says how it was held. Grey is repeated,
@@ -30,7 +31,7 @@ pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
 }
 
 /// Reads a depth map in metres from a 16-bit grey PNG of `depth_scale` units per metre, where 0 and `invalid` mean
-/// unknown, or from a `.pfm` of metres, for which both are ignored. At most 8192 x 8192 pixels.
+/// unknown, upright where it says how it was held, or from a `.pfm` of metres, for which both are ignored. At most 8192 x 8192 pixels.
 ///
 /// # Errors
 /// The file is missing, of another kind (8-bit grey has too few steps for depth), too large, cut short or damaged;
@@ -43,7 +44,35 @@ pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result
     let (mut scratch, mut depth) = (Scratch::default(), DepthMap::default());
     let units = DepthUnits { scale: depth_scale, invalid };
     decode::depth(path, units, None, &mut scratch, &mut depth).map_err(RecordingError::picture(path))?;
-    Ok(depth)
+    Ok(upright(depth, scratch.orientation()))
+}
+
+/// Whether the depth map `path` of `depth` pixels (columns, rows) is that of a picture of `color` pixels, seen alike.
+///
+/// # Errors
+/// It is larger, or of another aspect.
+pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Result<(), RecordingError> {
+    match depth_covers(depth, color) {
+        true => Ok(()),
+        false => Err(RecordingError::picture(path)(PictureFault::DepthSize { found: depth, color })),
+    }
+}
+
+/// A map turned as its file says.
+fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
+    let DepthMap { width, height, metres } = map;
+    let image: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(width, height, metres).unwrap_or_default();
+    let image = match orientation {
+        Orientation::NoTransforms => image,
+        Orientation::Rotate90 => imageops::rotate90(&image),
+        Orientation::Rotate180 => imageops::rotate180(&image),
+        Orientation::Rotate270 => imageops::rotate270(&image),
+        Orientation::FlipHorizontal => imageops::flip_horizontal(&image),
+        Orientation::FlipVertical => imageops::flip_vertical(&image),
+        Orientation::Rotate90FlipH => imageops::flip_horizontal(&imageops::rotate90(&image)),
+        Orientation::Rotate270FlipH => imageops::flip_horizontal(&imageops::rotate270(&image)),
+    };
+    DepthMap { width: image.width(), height: image.height(), metres: image.into_raw() }
 }
 
 /// Reads a disparity map in pixels from a `.pfm`, where what is not finite or not above 0 is unknown, or from a 16-bit
