@@ -145,11 +145,14 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     make_folder_of(&command.out)?;
     match geometry.filter(|_| command.metres) {
         Some(Geometry { rig, .. }) => {
-            let depth = depth_of(&disparity, &rig);
+            let depth = disparity.depth(|px| rig.depth_m(px));
             note_what_is_too_far(&command.out, &depth, &note)?;
             still::write_depth(&command.out, &depth, defaults::DEPTH_SCALE, force)?;
         }
-        None => still::write_disparity(&command.out, &disparity, force)?,
+        None => {
+            let rig = geometry.map(|geometry| geometry.rig);
+            still::write_disparity(&command.out, &disparity, rig, force)?;
+        }
     }
     if let Some(file) = &command.preview {
         make_folder_of(file)?;
@@ -251,12 +254,6 @@ fn luma_of(color: &ColorImage) -> GrayImage {
     let mut luma = GrayImage::default();
     luma.set_luma_of(color);
     luma
-}
-
-/// Metres; 0 where the disparity is unknown.
-fn depth_of(disparity: &DisparityMap, rig: &StereoRig) -> DepthMap {
-    let metres = |&px: &f32| if DepthMap::is_known(px) { rig.depth_m(px) } else { 0.0 };
-    DepthMap { width: disparity.width, height: disparity.height, metres: disparity.px.iter().map(metres).collect() }
 }
 
 /// Tells how much of the depth a PNG cannot hold.
