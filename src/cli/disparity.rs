@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum, value_parser};
 use super::config::Executor;
 use super::disparity_preview::preview;
 use super::error::CliError;
-use super::files::refuse_overwrite;
+use super::files::{refuse_overwrite, refuse_source};
 use super::values::{Backend, above_zero, between};
 use super::{defaults, options, terminal};
 use crate::depth::DepthError;
@@ -166,6 +166,10 @@ impl DepthCommand {
         }
         if self.preview.as_ref() == Some(&self.out) {
             return usage("--preview and --out name one file; each needs its own");
+        }
+        for read in [&self.left, &self.right].into_iter().chain(&self.calib) {
+            refuse_source("--out", &self.out, read)?;
+            self.preview.as_ref().map_or(Ok(()), |preview| refuse_source("--preview", preview, read))?;
         }
         refuse_overwrite([self.out.as_path()].into_iter().chain(self.preview.as_deref()), self.output.force)
     }

@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::error::CliError;
+use crate::files::place;
 use crate::stats::Report;
 
 /// # Errors
@@ -14,6 +15,22 @@ pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bo
         Some(path) => Err(CliError::Exists(path.to_owned())),
         None => Ok(()),
     }
+}
+
+/// # Errors
+/// [`CliError::Usage`] when `target`, which the option `what` names, is `source`, lies in it, or holds it.
+pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), CliError> {
+    if !place::overlap(target, source) {
+        return Ok(());
+    }
+    let [to, from] = [target, source].map(place::resolved);
+    let how = match (to == from, to.starts_with(&from)) {
+        (true, _) => "this is",
+        (_, true) => "this lies in",
+        _ => "this holds",
+    };
+    let (target, source) = (target.display(), source.display());
+    Err(CliError::Usage(format!("{what} {target}: {how} {source}, which is read; choose another place")))
 }
 
 /// Writes a file under another name in the same folder, and then gives it its own; what was there gives its permissions.

@@ -6,14 +6,15 @@ use clap::Args;
 
 use super::config::{self, Executor};
 use super::error::CliError;
-use super::files::refuse_overwrite;
+use super::files::{refuse_overwrite, refuse_source};
 use super::{debug, options, terminal};
 use crate::bokeh::{BokehError, Job};
 use crate::compute::Place;
 use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
+use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
-use crate::look::Look;
+use crate::look::{ApertureName, Look};
 use crate::optics::CocField;
 use crate::pipeline::CocRule;
 use crate::recording::{snapshot, still};
@@ -66,6 +67,16 @@ pub struct RenderCommand {
 pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
+    let sources = sources(command);
+    for source in &sources {
+        refuse_source("--out", &command.out, source)?;
+        // Its files are called as they must be.
+        if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
+            && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
+        {
+            refuse_source("--debug-dir", dir, source)?;
+        }
+    }
     if command.blur.depth.is_elsewhere() {
         let what = "--depth FOLDER or a depth camera are for `stream`: give a picture's depth with --depth-map";
         return Err(CliError::Usage(what.to_string()));
@@ -82,6 +93,19 @@ pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliE
         terminal::say(&format!("{}: written ({by})", command.out.display()));
     }
     Ok(())
+}
+
+/// The pictures that are read.
+fn sources(command: &RenderCommand) -> Vec<PathBuf> {
+    let beside = command.like.iter().flat_map(|like| {
+        let (color, depth) = snapshot::sources(like);
+        [like.clone(), color, depth]
+    });
+    let aperture = match &command.aperture.aperture {
+        ApertureName::Image(file) => Some(file),
+        _ => None,
+    };
+    [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(beside).collect()
 }
 
 /// A depth map for one picture.
