@@ -9,7 +9,7 @@ use super::calib::{self, Eyes};
 use super::config::Executor;
 use super::disparity_preview::preview;
 use super::error::CliError;
-use super::files::{make_folder_of, refuse_overwrite};
+use super::files::{make_folder_of, refuse_overwrite, refuse_source};
 use super::values::{Backend, above_zero, between};
 use super::{defaults, options, terminal};
 use crate::calibration::rectifier::Rectifier;
@@ -185,6 +185,10 @@ impl DepthCommand {
         }
         if self.preview.as_ref() == Some(&self.out) {
             return usage("--preview and --out name one file; each needs its own");
+        }
+        for read in [&self.left, &self.right].into_iter().chain(&self.calib) {
+            refuse_source("--out", &self.out, read)?;
+            self.preview.as_ref().map_or(Ok(()), |preview| refuse_source("--preview", preview, read))?;
         }
         refuse_overwrite([self.out.as_path()].into_iter().chain(self.preview.as_deref()), self.output.force)
     }

@@ -7,12 +7,12 @@ use clap::Args;
 
 use super::config::Executor;
 use super::error::CliError;
+use super::files::refuse_source;
 use super::layers::Given;
 use super::source::{Source, SourceName, Wanted};
 use super::{options, terminal, unused, values};
 use crate::capture::{Brings, Captured, Shot};
 use crate::depth::Seen;
-use crate::files::place;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::recording::tum::{Writer, WriterOptions, Written};
 
@@ -58,7 +58,9 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
         cycle: false,
         keep_going: false,
     };
-    refuse_own_source(command)?;
+    if let Some(folder) = command.source.folder() {
+        refuse_source("--to", &command.to, folder)?;
+    }
     let Source { mut camera, depth: mut source, rig, depth_from } = Source::open(&command.source, &wanted)?;
     unused::warn(
         &given.settings,
@@ -143,18 +145,6 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             }
             Err(fault)
         }
-    }
-}
-
-/// Refuses to write over what is read.
-fn refuse_own_source(command: &RecordCommand) -> Result<(), CliError> {
-    match command.source.folder() {
-        Some(folder) if place::overlap(folder, &command.to) => Err(CliError::Usage(format!(
-            "--to {}: this is the source {}, lies in it or holds it; a recording needs a folder of its own",
-            command.to.display(),
-            folder.display()
-        ))),
-        _ => Ok(()),
     }
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::config::{self, Executor};
 use super::error::CliError;
-use super::files::{make_folder_of, refuse_overwrite};
+use super::files::{make_folder_of, refuse_overwrite, refuse_source};
 use super::layers::Given;
 use super::unused::{DepthFrom, From};
 use super::values::DepthChoice;
@@ -14,9 +14,10 @@ use super::{debug, focus, log, options, stereo, terminal, unused, values};
 use crate::bokeh::{BokehError, Effect, Job};
 use crate::compute::Place;
 use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
+use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
-use crate::look::{Look, Strength};
+use crate::look::{ApertureName, Look, Strength};
 use crate::optics::{CocField, StereoRig};
 use crate::pipeline::CocRule;
 use crate::recording::still::{self, MapFormat, PhotoFormat};
@@ -70,6 +71,16 @@ pub struct RenderCommand {
 pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
+    let sources = sources(command);
+    for source in &sources {
+        refuse_source("--out", &command.out, source)?;
+        // Its files are called as they must be.
+        if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
+            && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
+        {
+            refuse_source("--debug-dir", dir, source)?;
+        }
+    }
     if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
         let what = "--depth FOLDER, stereo or a depth camera are for `stream`: give a picture's depth with --depth-map";
         return Err(CliError::Usage(what.to_string()));
@@ -130,6 +141,19 @@ impl RenderCommand {
             None => {}
         }
     }
+}
+
+/// The pictures that are read.
+fn sources(command: &RenderCommand) -> Vec<PathBuf> {
+    let beside = command.like.iter().flat_map(|like| {
+        let (color, depth) = snapshot::sources(like);
+        [like.clone(), color, depth]
+    });
+    let aperture = match &command.aperture.aperture {
+        ApertureName::Image(file) => Some(file),
+        _ => None,
+    };
+    [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(beside).collect()
 }
 
 /// A depth map for one picture.

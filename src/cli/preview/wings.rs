@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::super::config::Executor;
 use super::super::layers::Given;
@@ -152,10 +153,17 @@ impl Backstage for Wings {
         made.map_err(|error| error.to_string())
     }
 
-    fn output(&mut self, name: &str, size: (u32, u32), period_ns: u64) -> Result<Box<dyn Sink>, String> {
+    fn output(
+        &mut self,
+        name: &str,
+        size: (u32, u32),
+        period_ns: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn Sink>, String> {
         let out_size = self.parts.stream.out_size.map(|size| (size.width, size.height));
         let force = self.parts.output.force;
-        let options = sink::Options { force, out_size, ..sink::Options::new(size, period_ns) };
+        let stop = Arc::clone(stop);
+        let options = sink::Options { force, out_size, stop, ..sink::Options::new(size, period_ns) };
         let target = Target::from_str(name).map_err(|error| error.to_string())?;
         target.open(&options).map_err(|error| error.to_string())
     }
