@@ -109,6 +109,13 @@ Examples:
 
 /// Runs the program. What goes wrong becomes one line on stderr and an exit code: 1 at run time, 2 in the arguments.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    terminal::tell_of_panics();
+    let code = outcome(args);
+    terminal::flush();
+    code
+}
+
+fn outcome(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args: Vec<OsString> = args.into_iter().collect();
     let Parsed { cli, matches, file, layers } = match parse(&args) {
         Ok(parsed) => parsed,

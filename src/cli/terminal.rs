@@ -1,8 +1,11 @@
-//! What the user sees while a command runs: log lines, one-line messages, progress.
+//! What the user sees while a command runs: log lines, one-line messages, progress. All of it goes to standard error
+//! through [`print`].
+
+mod screen;
 
 use std::io::{self, IsTerminal, Write};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracing_subscriber::EnvFilter;
@@ -10,6 +13,37 @@ use tracing_subscriber::EnvFilter;
 use super::error::CliError;
 use super::options::Global;
 use super::values::LogFormat;
+use screen::{Count, Screen};
+
+static SCREEN: OnceLock<Screen> = OnceLock::new();
+
+fn screen() -> &'static Screen {
+    SCREEN.get_or_init(|| Screen::new(io::stderr()))
+}
+
+/// Prints whole lines, with their ends: never waits for the terminal.
+fn print(lines: &[u8]) {
+    screen().print(lines);
+}
+
+/// Waits until everything is printed, but not for a terminal that takes nothing.
+pub fn flush() {
+    SCREEN.get().into_iter().for_each(Screen::flush);
+}
+
+/// Where log lines are written to, each at once.
+struct Log;
+
+impl Write for Log {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        print(line);
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
 
 /// Sends log lines to stderr: warnings, or as `-v`, `-q` and `RUST_LOG` say.
 pub fn start_log(global: &Global) {
@@ -21,7 +55,7 @@ pub fn start_log(global: &Global) {
         (_, _) => "bokehcam=debug,info",
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(|| Log);
     let log = log.with_ansi(io::stderr().is_terminal());
     // A second log in one process changes nothing.
     let _ = match global.log_format {
@@ -30,9 +64,25 @@ pub fn start_log(global: &Global) {
     };
 }
 
-/// One line on stderr; a closed stderr is no reason to fail.
+/// One line on stderr.
 pub fn say(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+    print(format!("{line}\n").as_bytes());
+}
+
+/// Tells of a panic as of anything else: a thread that panics must not wait for the terminal, and its neighbours for it.
+pub fn tell_of_panics() {
+    std::panic::set_hook(Box::new(|panic| {
+        if crate::compute::catches() {
+            return;
+        }
+        let thread = std::thread::current();
+        let backtrace = std::backtrace::Backtrace::capture();
+        let told = format!("thread '{}' {panic}", thread.name().unwrap_or("unnamed"));
+        match backtrace.status() {
+            std::backtrace::BacktraceStatus::Captured => say(&format!("{told}\n{backtrace}")),
+            _ => say(&told),
+        }
+    }));
 }
 
 /// The first Ctrl-C (or a termination signal) sets the flag, so that the file in hand is finished; the second ends
@@ -56,29 +106,32 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
 }
 
 /// A bar of delivered frames on stderr; silent when that is no terminal.
-pub struct Progress(ProgressBar);
+pub struct Progress(Option<(&'static Screen, Arc<Count>)>);
 
 impl Progress {
     /// A bar for `frames` frames, or a counter when their number is not known.
     pub fn new(frames: Option<u64>, global: &Global) -> Self {
+        if global.quiet || !io::stderr().is_terminal() {
+            return Self(None);
+        }
         let template = match frames {
             Some(_) => "{wide_bar} {pos}/{len} frames, {per_sec}, {eta} left",
             None => "{spinner} {pos} frames, {per_sec}, {elapsed}",
         };
-        let target = if global.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = ProgressBar::with_draw_target(frames, target);
+        let bar = ProgressBar::with_draw_target(frames, ProgressDrawTarget::stderr());
         bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Self(bar)
+        let screen = screen();
+        Self(Some((screen, screen.begin(bar))))
     }
 
     /// So many frames are delivered.
     pub fn delivered(&self, frames: u64) {
-        self.0.set_position(frames);
+        self.0.iter().for_each(|(_, count)| count.set(frames));
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.0.iter().for_each(|(screen, count)| screen.end(count));
     }
 }
