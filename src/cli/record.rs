@@ -7,11 +7,12 @@ use clap::Args;
 
 use super::config::Executor;
 use super::error::CliError;
+use super::files::refuse_source;
+use super::layers::Given;
 use super::source::{Source, SourceName, Wanted};
-use super::{options, terminal, values};
+use super::{options, terminal, unused, values};
 use crate::capture::{Brings, Captured, Shot};
 use crate::depth::Seen;
-use crate::files::place;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::recording::tum::{Writer, WriterOptions, Written};
 
@@ -28,6 +29,7 @@ Examples:
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
 pub struct RecordCommand {
     /// A camera, two cameras LEFT,RIGHT, a folder with a recording, or `synthetic`
+    #[arg(value_parser = SourceName::parser())]
     source: SourceName,
     /// Folder for the recording
     #[arg(long, value_name = "DIR")]
@@ -46,7 +48,7 @@ pub struct RecordCommand {
 ///
 /// # Errors
 /// The source cannot be read, or the recording exists (without `--force`) or cannot be written.
-pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliError> {
+pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let wanted = Wanted {
         frames: &command.frames,
         depth: &command.depth,
@@ -56,8 +58,23 @@ pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliE
         cycle: false,
         keep_going: false,
     };
-    refuse_own_source(command)?;
-    let Source { mut camera, depth: mut source, rig } = Source::open(&command.source, &wanted)?;
+    if let Some(folder) = command.source.folder() {
+        refuse_source("--to", &command.to, folder)?;
+    }
+    let Source { mut camera, depth: mut source, rig, depth_from } = Source::open(&command.source, &wanted)?;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: command.source.kind(),
+            depth: depth_from,
+            uses_depth: true,
+            effect: None,
+            lens: false,
+            realtime: true,
+            cpu_only: false,
+            window: false,
+        },
+    );
     if rig.is_some_and(|rig| !rig.metric) {
         tracing::warn!("the distance of the two eyes is not known: the metres of this depth are those of assumed eyes");
     }
@@ -128,18 +145,6 @@ pub fn run(command: &RecordCommand, global: &options::Global) -> Result<(), CliE
             }
             Err(fault)
         }
-    }
-}
-
-/// Refuses to write over what is read.
-fn refuse_own_source(command: &RecordCommand) -> Result<(), CliError> {
-    match command.source.folder() {
-        Some(folder) if place::overlap(folder, &command.to) => Err(CliError::Usage(format!(
-            "--to {}: this is the source {}, lies in it or holds it; a recording needs a folder of its own",
-            command.to.display(),
-            folder.display()
-        ))),
-        _ => Ok(()),
     }
 }
 

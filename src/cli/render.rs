@@ -6,17 +6,21 @@ use clap::Args;
 
 use super::config::{self, Executor};
 use super::error::CliError;
-use super::files::refuse_overwrite;
-use super::{debug, options, stereo, terminal};
-use crate::bokeh::{BokehError, Job};
+use super::files::{make_folder_of, refuse_overwrite, refuse_source};
+use super::layers::Given;
+use super::unused::{DepthFrom, From};
+use super::values::DepthChoice;
+use super::{debug, focus, log, options, stereo, terminal, unused, values};
+use crate::bokeh::{BokehError, Effect, Job};
 use crate::compute::Place;
 use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
+use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
-use crate::look::Look;
+use crate::look::{ApertureName, Look, Strength};
 use crate::optics::{CocField, StereoRig};
 use crate::pipeline::CocRule;
-use crate::recording::still::{self, PhotoFormat};
+use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::recording::{Extras, snapshot};
 
 /// Blur one still picture
@@ -64,16 +68,28 @@ pub struct RenderCommand {
 ///
 /// # Errors
 /// A picture cannot be read or written, the options do not fit it, or the blur failed.
-pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliError> {
+pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
-    if command.blur.depth.is_elsewhere() {
-        let what = "--depth FOLDER or a depth camera are for `stream`: give a picture's depth with --depth-map";
+    let sources = sources(command);
+    for source in &sources {
+        refuse_source("--out", &command.out, source)?;
+        // Its files are called as they must be.
+        if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
+            && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
+        {
+            refuse_source("--debug-dir", dir, source)?;
+        }
+    }
+    if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
+        let what = "--depth FOLDER, stereo or a depth camera are for `stream`: give a picture's depth with --depth-map";
         return Err(CliError::Usage(what.to_string()));
     }
     let (color, extras, depth) = read(command)?;
     let look = config::look(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
+    command.warn(&look, color.size(), depth.as_ref(), given);
     let executor = Executor::of(&command.computing);
+    make_folder_of(&command.out)?;
     let (result, by) = match &command.debug_dir {
         Some(dir) => debug::blurred(color, depth, &look, &executor, (dir, command.output.force))?,
         None => blurred(color, depth, &look, &executor)?,
@@ -93,6 +109,53 @@ pub fn run(command: &RenderCommand, global: &options::Global) -> Result<(), CliE
     Ok(())
 }
 
+impl RenderCommand {
+    /// Says what has no effect, and what cannot be meant.
+    fn warn(&self, look: &Look, size: (u32, u32), depth: Option<&Depth>, given: &Given) {
+        let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
+        let in_units = self.depth_map.as_ref().is_some_and(in_units);
+        let uses_depth = look.effect == Some(Effect::Dof);
+        unused::warn(
+            &given.settings,
+            &unused::Run {
+                source: From::Picture,
+                depth: match depth {
+                    None => DepthFrom::Nothing,
+                    Some(Depth::Measured(_)) if in_units => DepthFrom::Units,
+                    Some(_) => DepthFrom::Metres,
+                },
+                uses_depth,
+                effect: look.effect,
+                lens: matches!(look.strength, Strength::Lens(_)),
+                realtime: false,
+                cpu_only: self.computing.backend == values::Backend::Cpu,
+                window: false,
+            },
+        );
+        match depth {
+            None if self.blur.takes_whatever_depth() => unused::warn_of_no_depth(From::Picture),
+            Some(_) if self.depth_map.is_some() && !uses_depth => {
+                log::warn("--depth-map has no effect: the effect does not use depth");
+            }
+            Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, size, map, in_units),
+            None => {}
+        }
+    }
+}
+
+/// The pictures that are read.
+fn sources(command: &RenderCommand) -> Vec<PathBuf> {
+    let beside = command.like.iter().flat_map(|like| {
+        let (color, depth) = snapshot::sources(like);
+        [like.clone(), color, depth]
+    });
+    let aperture = match &command.aperture.aperture {
+        ApertureName::Image(file) => Some(file),
+        _ => None,
+    };
+    [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(beside).collect()
+}
+
 /// A depth map for one picture.
 pub enum Depth {
     /// As it was measured: with holes, and noise.
@@ -105,18 +168,22 @@ pub enum Depth {
 fn read(command: &RenderCommand) -> Result<(ColorImage, Extras, Option<Depth>), CliError> {
     let sources = command.like.as_ref().map(|like| snapshot::sources(like));
     let given = command.depth_map.as_deref().map(|file| read_depth(file, command)).transpose()?.map(Depth::Measured);
-    match (&command.image, sources) {
+    let (color, extras, depth) = match (&command.image, sources) {
         (None, Some((color, depth))) => {
             let kept = given.is_none() && depth.exists();
             let kept = kept.then(|| read_depth(&depth, command)).transpose()?.map(Depth::Final);
             let (color, extras) = still::read_photo(&color)?;
-            Ok((color, extras, given.or(kept)))
+            (color, extras, given.or(kept))
         }
         (image, _) => {
             let (color, extras) = still::read_photo(image.as_deref().unwrap_or(Path::new("")))?;
-            Ok((color, extras, given))
+            (color, extras, given)
         }
+    };
+    if let (Some(Depth::Measured(map)), Some(file)) = (&depth, &command.depth_map) {
+        still::check_depth_size(file, map.size(), color.size())?;
     }
+    Ok((color, extras, depth))
 }
 
 /// Depth from a file, in metres, or where the file has disparity without distances in those of assumed eyes.

@@ -113,8 +113,8 @@ pub enum RecordingError {
     },
     /// No depth map lies near any colour picture in time.
     #[error(
-        "{}: no depth map lies within {} ms of any colour picture; raise the pairing tolerance, \
-         or remove depth.txt to use the colour alone", dir.display(), *tolerance_ns as f64 / 1e6
+        "{}: no depth map lies within {} ms of any colour picture: are the lists of one recording, with times of one \
+         clock? Correct the times, or remove depth.txt to use the colour alone", dir.display(), *tolerance_ns as f64 / 1e6
     )]
     NoPairs {
         /// The folder.

@@ -183,6 +183,11 @@ impl Recording {
         self.period_ns
     }
 
+    /// Whether its depth is in units that [`Options::depth_scale`] states.
+    pub fn has_depth_in_units(&self) -> bool {
+        matches!(self.depth, Some(DepthForm::Units(_)))
+    }
+
     /// Whether the frames have depth.
     pub fn has_depth(&self) -> bool {
         self.depth.is_some()

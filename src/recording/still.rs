@@ -6,14 +6,15 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use image::{DynamicImage, RgbImage};
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageBuffer, Luma, RgbImage, imageops};
 
 use super::decode::{self, DepthUnits, Scratch};
 use super::error::RecordingError;
 use super::extras::Extras;
 use super::fault::PictureFault;
 use super::unit::{self, Meaning};
-use super::{check_depth_scale, coded, encode, pfm, tum};
+use super::{check_depth_scale, coded, depth_covers, encode, pfm, tum};
 use crate::files::whole;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 use crate::optics::StereoRig;
@@ -56,8 +57,8 @@ pub enum Map {
 
 /// Reads a map from a 16-bit grey PNG, where 0 and `invalid` mean unknown, or from a `.pfm`. Which it is, and of which
 /// units, is what the file says, as those of [`write_depth`] and [`write_disparity`] do. What says nothing is depth, in
-/// metres in a `.pfm` and in 1/5000 m in a PNG. `depth_scale`, in units of a PNG per metre, goes before both. At most
-/// 8192 x 8192 pixels.
+/// metres in a `.pfm` and in 1/5000 m in a PNG. `depth_scale`, in units of a PNG per metre, goes before both. Upright
+/// where a PNG says how it was held. At most 8192 x 8192 pixels.
 ///
 /// # Errors
 /// The file is missing, of another kind (8-bit grey has too few steps for depth), too large, cut short or damaged;
@@ -86,10 +87,11 @@ pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> 
             (None, Some(Meaning::Depth { per_m })) => per_m,
             (None, None) => tum::DEPTH_SCALE,
         };
+        let turned = info.as_ref().map(|info| Extras::of_png(info).take_orientation());
         let (mut scratch, mut depth) = (Scratch::default(), DepthMap::default());
         let units = DepthUnits { scale, invalid };
         decode::depth(path, units, None, &mut scratch, &mut depth).map_err(fault())?;
-        (depth, text)
+        (upright(depth, turned.unwrap_or(Orientation::NoTransforms)), text)
     };
     Ok(match says {
         Some(Meaning::Disparity { rig }) => {
@@ -97,6 +99,34 @@ pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> 
         }
         _ => Map::Depth(map),
     })
+}
+
+/// Whether the depth map `path` of `depth` pixels (columns, rows) is that of a picture of `color` pixels, seen alike.
+///
+/// # Errors
+/// It is larger, or of another aspect.
+pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Result<(), RecordingError> {
+    match depth_covers(depth, color) {
+        true => Ok(()),
+        false => Err(RecordingError::picture(path)(PictureFault::DepthSize { found: depth, color })),
+    }
+}
+
+/// A map turned as its file says.
+fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
+    let DepthMap { width, height, metres } = map;
+    let image: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(width, height, metres).unwrap_or_default();
+    let image = match orientation {
+        Orientation::NoTransforms => image,
+        Orientation::Rotate90 => imageops::rotate90(&image),
+        Orientation::Rotate180 => imageops::rotate180(&image),
+        Orientation::Rotate270 => imageops::rotate270(&image),
+        Orientation::FlipHorizontal => imageops::flip_horizontal(&image),
+        Orientation::FlipVertical => imageops::flip_vertical(&image),
+        Orientation::Rotate90FlipH => imageops::flip_horizontal(&imageops::rotate90(&image)),
+        Orientation::Rotate270FlipH => imageops::flip_horizontal(&imageops::rotate270(&image)),
+    };
+    DepthMap { width: image.width(), height: image.height(), metres: image.into_raw() }
 }
 
 /// Reads a depth map in metres, as [`read_map`]. Disparity becomes depth where the file says which eyes see it.
