@@ -6,10 +6,10 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use indicatif::ProgressBar;
 
 /// Lines that may wait.
@@ -23,7 +23,7 @@ const GLANCE: Duration = Duration::from_millis(2);
 
 /// Prints lines and one bar on a thread of its own.
 pub struct Screen {
-    to: Option<Sender<Entry>>,
+    to: Option<SyncSender<Entry>>,
     shared: Arc<Shared>,
 }
 
@@ -66,7 +66,7 @@ impl Screen {
     /// Prints to `out`. Where the system has no thread for that, nothing is queued, and who prints waits.
     pub fn new(out: impl Write + Send + 'static) -> Self {
         let shared = Arc::new(Shared::default());
-        let (to, from) = bounded(ROOM);
+        let (to, from) = sync_channel(ROOM);
         let printer = Printer { out, bar: None, shared: Arc::clone(&shared) };
         let thread = thread::Builder::new().name("terminal".into()).spawn(move || printer.run(&from));
         Self { to: thread.is_ok().then_some(to), shared }
@@ -145,7 +145,7 @@ impl<W: Write> Printer<W> {
             }
             self.shared.prints.fetch_add(1, Ordering::Relaxed);
             self.take(next.ok());
-            if from.is_empty() {
+            if self.shared.done.load(Ordering::Relaxed) == self.shared.sent.load(Ordering::Relaxed) {
                 self.own_up();
             }
             self.shared.prints.fetch_add(1, Ordering::Relaxed);
