@@ -63,11 +63,12 @@ struct Shared {
 }
 
 impl Screen {
-    /// Prints to `out`. Where the system has no thread for that, nothing is queued, and who prints waits.
-    pub fn new(out: impl Write + Send + 'static) -> Self {
+    /// Prints to `out`; `missing` is the line that tells how many lines found no room. Where the system has no thread for
+    /// that, nothing is queued, and who prints waits.
+    pub fn new(out: impl Write + Send + 'static, missing: fn(u64) -> String) -> Self {
         let shared = Arc::new(Shared::default());
         let (to, from) = sync_channel(ROOM);
-        let printer = Printer { out, bar: None, shared: Arc::clone(&shared) };
+        let printer = Printer { out, missing, bar: None, shared: Arc::clone(&shared) };
         let thread = thread::Builder::new().name("terminal".into()).spawn(move || printer.run(&from));
         Self { to: thread.is_ok().then_some(to), shared }
     }
@@ -129,6 +130,7 @@ impl Screen {
 /// What the thread has.
 struct Printer<W> {
     out: W,
+    missing: fn(u64) -> String,
     bar: Option<(ProgressBar, Arc<Count>)>,
     shared: Arc<Shared>,
 }
@@ -145,7 +147,7 @@ impl<W: Write> Printer<W> {
             }
             self.shared.prints.fetch_add(1, Ordering::Relaxed);
             self.take(next.ok());
-            if self.shared.done.load(Ordering::Relaxed) == self.shared.sent.load(Ordering::Relaxed) {
+            if self.shared.done.load(Ordering::Acquire) == self.shared.sent.load(Ordering::Acquire) {
                 self.own_up();
             }
             self.shared.prints.fetch_add(1, Ordering::Relaxed);
@@ -189,7 +191,7 @@ impl<W: Write> Printer<W> {
     fn own_up(&mut self) {
         let lost = self.shared.lost.swap(0, Ordering::Relaxed);
         if lost > 0 {
-            self.print(format!("{lost} lines are missing: the terminal took none for too long\n").as_bytes());
+            self.print((self.missing)(lost).as_bytes());
         }
     }
 }
@@ -231,7 +233,7 @@ mod tests {
     #[test]
     fn nobody_waits_for_a_terminal_that_takes_nothing() {
         let terminal = Stopped::default();
-        let screen = Screen::new(terminal.clone());
+        let screen = Screen::new(terminal.clone(), |lines| format!("{lines} lines are missing\n"));
         let count = screen.begin(ProgressBar::hidden());
         let lines = 2 * ROOM;
         for line in 0..lines {
@@ -259,7 +261,7 @@ mod tests {
     fn all_is_printed_in_order_once_it_is_flushed() {
         let terminal = Stopped::default();
         terminal.go_on();
-        let screen = Screen::new(terminal.clone());
+        let screen = Screen::new(terminal.clone(), |lines| format!("{lines} lines are missing\n"));
         let count = screen.begin(ProgressBar::hidden());
         (0..500).for_each(|line| screen.print(format!("{line}\n").as_bytes()));
         screen.end(&count);
