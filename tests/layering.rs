@@ -32,7 +32,7 @@ const DOORS: [(&str, &[&str]); 20] = [
     ("rustix", &["capture/synthetic", "clock", "files", "link/bell", "sink/ffmpeg", "sink/pipe", "v4l2"]),
     ("saphyr_parser", &["calibration"]),
     ("softbuffer", &["preview/present"]),
-    ("strsim", &["v4l2"]),
+    ("strsim", &["cli", "v4l2"]),
     ("toml_edit", &["cli"]),
     ("v4l", &["v4l2"]),
     ("wgpu", &["bokeh/gpu", "compute/device", "depth/stereo/gpu", "preview/present"]),

@@ -227,8 +227,8 @@ fn pictures_of_an_earlier_run_stay_until_the_new_are_whole() {
     fs::write(home.at("out/notes.txt"), "mine").unwrap();
     let before = tree(&home.at("out"));
 
-    let mut again = home.command("", &format!("stream long {BLUR} --to out/ --force")).stderr(Stdio::piped()).spawn();
-    let again = again.as_mut().map(|child| child.id()).map(|_| again).unwrap().unwrap();
+    let again = home.command("", &format!("stream long {BLUR} --to out/ --force")).stderr(Stdio::piped()).spawn();
+    let again = again.unwrap();
     until("a new picture", || home.at("out/.bokehcam.part/000003.png").exists());
     let ran = terminate(again);
     assert!(ran.code == Some(0) && ran.said.contains("out.incomplete"), "{ran:?}");

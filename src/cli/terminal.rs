@@ -1,39 +1,16 @@
-//! What the user sees while a command runs: log lines, one-line messages, progress.
+//! What the user sees while a command runs, and how it is ended.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use tracing_subscriber::EnvFilter;
 
 use super::error::CliError;
+use super::log;
+pub use super::log::say;
 use super::options::Global;
-use super::values::LogFormat;
-
-/// Sends log lines to stderr: warnings, or as `-v`, `-q` and `RUST_LOG` say.
-pub fn start_log(global: &Global) {
-    let level = match (global.quiet, global.verbose) {
-        (true, _) => "error",
-        // What others grumble about is seldom for who uses this.
-        (_, 0) => "bokehcam=warn,error",
-        (_, 1) => "bokehcam=info,warn",
-        (_, _) => "bokehcam=debug,info",
-    };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
-    let log = log.with_ansi(io::stderr().is_terminal());
-    // A second log in one process changes nothing.
-    let _ = match global.log_format {
-        LogFormat::Text => log.try_init(),
-        LogFormat::Json => log.json().try_init(),
-    };
-}
-
-/// One line on stderr; a closed stderr is no reason to fail.
-pub fn say(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
-}
+use super::screen::{Count, Screen};
 
 /// The first Ctrl-C (or a termination signal) sets the flag, so that the file in hand is finished; the second ends
 /// the program at once.
@@ -56,29 +33,32 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
 }
 
 /// A bar of delivered frames on stderr; silent when that is no terminal.
-pub struct Progress(ProgressBar);
+pub struct Progress(Option<(&'static Screen, Arc<Count>)>);
 
 impl Progress {
     /// A bar for `frames` frames, or a counter when their number is not known.
     pub fn new(frames: Option<u64>, global: &Global) -> Self {
+        if global.quiet || !io::stderr().is_terminal() {
+            return Self(None);
+        }
         let template = match frames {
             Some(_) => "{wide_bar} {pos}/{len} frames, {per_sec}, {eta} left",
             None => "{spinner} {pos} frames, {per_sec}, {elapsed}",
         };
-        let target = if global.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = ProgressBar::with_draw_target(frames, target);
+        let bar = ProgressBar::with_draw_target(frames, ProgressDrawTarget::stderr());
         bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Self(bar)
+        let screen = log::screen();
+        Self(Some((screen, screen.begin(bar))))
     }
 
     /// So many frames are delivered.
     pub fn delivered(&self, frames: u64) {
-        self.0.set_position(frames);
+        self.0.iter().for_each(|(_, count)| count.set(frames));
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.0.iter().for_each(|(screen, count)| screen.end(count));
     }
 }

@@ -80,6 +80,16 @@ impl Part {
         sync_folder(&self.path)
     }
 
+    /// As [`Part::commit`] without replacing, and without waiting for the disk: who calls this syncs the file system later.
+    ///
+    /// # Errors
+    /// As for [`Part::commit`].
+    pub fn commit_unsynced(mut self) -> io::Result<()> {
+        rename(&self.part, &self.path, false)?;
+        self.open = false;
+        Ok(())
+    }
+
     /// Keeps what is not whole as `NAME.incomplete`, or `NAME.incomplete.2` and on where that is taken; gives the name.
     ///
     /// # Errors

@@ -11,8 +11,9 @@ use super::super::layers::Given;
 use super::super::options::{self, Streaming};
 use super::super::settings::SettingsFile;
 use super::super::source::{Source, SourceName, Wanted};
+use super::super::unused::From;
 use super::super::values::Effect;
-use super::super::{command_line, depth, presets, print};
+use super::super::{command_line, depth, presets, print, save};
 use crate::bokeh::{self, Backend, Bokeh};
 use crate::clock::Clock;
 use crate::compute::device::Device;
@@ -54,7 +55,7 @@ impl Wings {
         executor: &Executor,
         device: Option<Arc<Device>>,
         chosen: Option<PathBuf>,
-        Given { switches: given, behind }: Given,
+        Given { switches: given, behind, .. }: Given,
     ) -> Self {
         let mut parts = parts.clone();
         // Of depth the window may make use later.
@@ -76,7 +77,8 @@ impl Wings {
     fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
         let Streaming { frames, blur, depth, stereo, stream, .. } = &self.parts;
-        let frames = options::Source { repeat: frames.repeat && source_name.is_folder(), ..frames.clone() };
+        let frames =
+            options::Source { repeat: frames.repeat && source_name.kind() == From::Recording, ..frames.clone() };
         let wanted = Wanted {
             frames: &frames,
             depth,
@@ -144,9 +146,11 @@ impl Backstage for Wings {
     }
 
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
-        let made = match &self.device {
-            Some(device) => bokeh::create_on(settings, size, Arc::clone(device)),
-            None => bokeh::create(settings, size, Backend::Cpu, None, self.executor.threads()),
+        let threads = self.executor.threads();
+        // One that failed stays so.
+        let made = match self.device.as_ref().filter(|device| device.check().is_ok()) {
+            Some(device) => bokeh::create_on(settings, size, Arc::clone(device), threads),
+            None => bokeh::create(settings, size, Backend::Cpu, None, threads),
         };
         made.map_err(|error| error.to_string())
     }
@@ -194,7 +198,7 @@ impl Backstage for Wings {
     }
 
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
-        let saved = presets::file_to_save(self.chosen.as_deref());
+        let saved = save::file_to_save(self.chosen.as_deref());
         let saved = saved.and_then(|file| presets::save(&file, name, &look.every_flag()));
         saved.map_err(|error| error.to_string())?;
         self.sources();
