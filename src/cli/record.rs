@@ -56,7 +56,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
         cycle: false,
         keep_going: false,
     };
-    let Source { mut camera, depth: mut source, rig, depth_from } = Source::open(&command.source, &wanted)?;
+    let Source { mut camera, depth: mut source, rig, depth_from, .. } = Source::open(&command.source, &wanted)?;
     unused::warn(
         &given.settings,
         &unused::Run {
