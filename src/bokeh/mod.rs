@@ -134,10 +134,10 @@ impl Settings {
     /// # Errors
     /// [`BokehError::TooWide`].
     pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
-        let (radius_px, most_px) = (self.far_max_px.max(self.near_max_px), self.most_radius_px(size));
-        if radius_px <= most_px {
-            return Ok(());
-        }
+        let most_px = self.most_radius_px(size);
+        // Not a number is beyond any.
+        let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&most_px).is_none_or(|order| order.is_gt());
+        let Some(radius_px) = [self.far_max_px, self.near_max_px].into_iter().find(is_beyond) else { return Ok(()) };
         let by_method = (self.effect, self.method) == (Effect::Dof, Method::Gather);
         Err(BokehError::TooWide { radius_px, most_px, size, by_method })
     }
