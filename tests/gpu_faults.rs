@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
-use bokehcam::bokeh::{self, Bokeh, Effect, Job};
+use bokehcam::bokeh::{self, Bokeh, BokehError, Effect, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::device::Device;
 use bokehcam::compute::{Backend, Place};
@@ -124,8 +124,11 @@ fn a_destroyed_device_is_followed_by_the_cpu() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn frames_are_blurred_whatever_becomes_of_the_device() {
-    let device = device().with_patience(Duration::from_secs(1));
-    match bokeh::create_on(&settings(Effect::Dof), SIZE, Arc::new(device), Some(1)) {
+    let made = Device::open(false, None).map_err(BokehError::from).and_then(|device| {
+        let device = device.with_patience(Duration::from_secs(1));
+        bokeh::create_on(&settings(Effect::Dof), SIZE, Arc::new(device), Some(1))
+    });
+    match made {
         Ok(mut bokeh) => {
             blur(&mut *bokeh, |_| {});
             println!("ran on {}: {}", bokeh.backend(), bokeh.describe());
