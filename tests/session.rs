@@ -92,7 +92,7 @@ struct Watched {
     written: Arc<Mutex<Vec<String>>>,
 }
 
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(120);
 
 fn look() -> Look {
     Look { strength: Strength::AtInfinity(2.0), ..Look::plain(Some(Effect::Dof)) }
