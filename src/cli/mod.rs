@@ -21,6 +21,8 @@ mod error;
 mod files;
 mod layers;
 mod options;
+#[doc(hidden)]
+pub mod parsers;
 mod presets;
 #[cfg(feature = "window")]
 mod preview;
