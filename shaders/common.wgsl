@@ -7,6 +7,8 @@ override ANY_COLOR: f32;            // no colour is brighter
 override COVERAGE_FLOOR: f32;       // less coverage than this has no colour of its own
 override FAR_WEIGHT: f32;           // weight of far cells in the local radius
 override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the hindmost is looked for
+override OCTAVES_FROM_PX: f32;      // from this radius on, nodes of the bank lie evenly in each octave
+override OCTAVE_SHIFT: u32;         // bits of a float below those that tell the node within its octave
 
 const MAX_BINS = 13;
 
@@ -25,7 +27,7 @@ struct Frame {
     coc: vec4<f32>,             // uniform: radius; ramp: normal, offset, half band; depth: c_inf, sharp from and to, max
     ramp: vec2<f32>,            // slope, max
     expansion: f32,             // 0: highlights stay as they are
-    steps_per_px: f32,          // nodes of the bank per pixel of radius
+    steps_per_px: f32,          // nodes of the bank per pixel of radius, below OCTAVES_FROM_PX
     unhidden: vec2<f32>,        // what counts as lying behind the near bins: CoC of the step, slope
     nearest_px: f32,            // no filled CoC is below this
     unused: f32,
@@ -85,7 +87,13 @@ fn share_at(front: vec2<f32>, behind: vec2<f32>, coc_px: f32) -> f32 {
 
 // The node of the bank nearest to a radius.
 fn node_at(radius_px: f32, steps_per_px: f32, nodes: u32) -> u32 {
-    return min(u32(radius_px * steps_per_px + 0.5), nodes - 1u);
+    var node = u32(radius_px * steps_per_px + 0.5);
+    if radius_px >= OCTAVES_FROM_PX {
+        // The bits of a float are linear within each octave.
+        let above = bitcast<u32>(radius_px) - bitcast<u32>(OCTAVES_FROM_PX) + (1u << (OCTAVE_SHIFT - 1u));
+        node = u32(OCTAVES_FROM_PX * steps_per_px) + (above >> OCTAVE_SHIFT);
+    }
+    return min(node, nodes - 1u);
 }
 
 // A pixel of the scene: light, and CoC as a signed square root, whose steps are fine where bins hand over.

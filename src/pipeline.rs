@@ -2,7 +2,8 @@
 //!
 //! Three named threads and the caller's, joined by three links; all end because their input ended. Stop is one flag
 //! that only capture reads: what is under way then drains, and the output is completed. A stage that fails drops both
-//! its ends, so that its neighbours end as well: quietly, since only the cause is an error.
+//! its ends, so that its neighbours end as well: quietly, since only the cause is an error. The output is completed
+//! then, too: its frames are whole.
 
 mod blur;
 mod capture;
@@ -37,7 +38,7 @@ use crate::link::demand::Demand;
 use crate::link::pool::Pool;
 use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
 use crate::optics::{CocField, DepthCoc, Lens};
-use crate::sink::Sink;
+use crate::sink::{Ending, Sink};
 use crate::stats::{About, Cause, Report, Tally, Ticket, Timings};
 
 /// Whether frames wait for the program, or the program for frames.
@@ -148,10 +149,11 @@ struct Frame<T> {
     item: T,
 }
 
-/// Runs the pipeline to the end of its frames, its sink, or the stop flag, and completes the output.
+/// Runs the pipeline to the end of its frames, its sink, or the stop flag, and completes the output, whatever came between.
 ///
 /// # Errors
-/// The fault of the stage that failed; a panic is one. The output was then given up. The error carries the report.
+/// The fault of the stage that failed; a panic is one. The output then has the frames until there. The error carries the
+/// report.
 pub fn run(run: Run) -> Result<Report, PipelineError> {
     let Run { camera, depth: source, bokeh: executor, mut sink, pace, clock, .. } = run;
     let info = camera.info();
@@ -259,7 +261,12 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         let delivered = guard("sink", &over, move || deliver.run(from_blur));
         upstream.into_iter().map(join).chain([delivered]).collect::<Result<(), Fault>>()
     });
-    let ended = ended.and_then(|()| guard("sink", &over, move || Ok(sink.finish()?)));
+    // A source that has an end of its own was broken off before it.
+    let is_cut = run.stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
+    let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
+    let finished = guard("sink", &over, move || Ok(sink.finish(ending)?));
+    // What came first is the cause.
+    let ended = ended.and(finished);
     about.elapsed_ns = clock.now_ns() - began_ns;
     about.cpu_ns = clock::cpu_ns() - cpu_ns;
     let report = Report::new(tally.frames(), &timings, about);

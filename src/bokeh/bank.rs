@@ -7,15 +7,24 @@ use super::Rank;
 use super::aperture::Mask;
 use super::low_rank::Decomposition;
 
-/// Filters are tabulated at every `1 / STEPS_PER_PX` of a pixel of radius.
+/// Filters are tabulated at every `1 / STEPS_PER_PX` of a pixel of radius, up to twice [`OCTAVES_FROM_PX`].
 pub const STEPS_PER_PX: f32 = 16.0;
+
+/// From this radius on each octave has as many nodes, so that a step is the same share of the radius: what a table takes
+/// grows with the largest radius, and not with its square. A power of two.
+pub const OCTAVES_FROM_PX: f32 = 16.0;
+
+/// Nodes of an octave: the step of [`STEPS_PER_PX`] goes on in the first one.
+const NODES_PER_OCTAVE: usize = (OCTAVES_FROM_PX * STEPS_PER_PX) as usize;
+/// Bits of a float below those that tell the node within its octave.
+pub const OCTAVE_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - NODES_PER_OCTAVE.ilog2();
 
 /// Cells a side of the mask that a bank is made from.
 pub const MASK_CELLS: usize = 128;
 
 /// The separable filters of one aperture, for radii from 0 to a maximum.
 ///
-/// The filter of node `k` has the radius `k / STEPS_PER_PX`; `out(p) = sum_t sum_j vertical_t(j) sum_i horizontal_t(i)
+/// The filter of node `k` has the radius [`node_radius_px`]; `out(p) = sum_t sum_j vertical_t(j) sum_i horizontal_t(i)
 /// in(p + (i, j))`, and its taps sum to 1 at every node.
 #[derive(Clone, Debug)]
 pub struct Bank {
@@ -64,8 +73,8 @@ impl Bank {
             profile.iter_mut().for_each(|x| *x *= svd.sigma[t] / total);
         }
 
-        let nodes = (max_radius_px.max(0.0) * STEPS_PER_PX).ceil() as usize + 1;
-        let reach_at = |node: usize| (node as f64 / f64::from(STEPS_PER_PX) * mask.extent - 0.5).ceil().max(0.0);
+        let nodes = nodes_up_to(max_radius_px.max(0.0));
+        let reach_at = |node: usize| (f64::from(node_radius_px(node)) * mask.extent - 0.5).ceil().max(0.0);
         let reach = reach_at(nodes - 1) as usize;
         let symmetry = mask.symmetry();
         let mut bank = Self {
@@ -78,7 +87,7 @@ impl Bank {
             vertical: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
         };
         for node in 0..nodes {
-            let radius_px = (node as f64 / f64::from(STEPS_PER_PX) * mask.extent).max(1e-6);
+            let radius_px = (f64::from(node_radius_px(node)) * mask.extent).max(1e-6);
             for j in -(reach as i64)..=reach as i64 {
                 let (left, right) = ((j as f64 - 0.5) / radius_px, (j as f64 + 0.5) / radius_px);
                 for t in 0..terms {
@@ -98,13 +107,13 @@ impl Bank {
 
     /// The largest radius tabulated, in pixels.
     pub fn max_radius_px(&self) -> f32 {
-        (self.nodes - 1) as f32 / STEPS_PER_PX
+        node_radius_px(self.nodes - 1)
     }
 
     /// The node nearest to a radius.
     #[inline(always)]
     pub fn node(&self, radius_px: f32) -> usize {
-        ((radius_px * STEPS_PER_PX + 0.5) as usize).min(self.nodes - 1)
+        nearest_node(radius_px).min(self.nodes - 1)
     }
 
     /// The 2-D kernel of a node: `(2 r + 1)^2` taps with `r = node_reach[node]`, row-major; `turned` is the aperture
@@ -120,6 +129,30 @@ impl Bank {
             .map(|tap| tap as f32)
             .collect()
     }
+}
+
+/// The radius of a node, in pixels.
+pub fn node_radius_px(node: usize) -> f32 {
+    match node.checked_sub(NODES_PER_OCTAVE) {
+        None => node as f32 / STEPS_PER_PX,
+        Some(above) => f32::from_bits(OCTAVES_FROM_PX.to_bits() + ((above as u32) << OCTAVE_SHIFT)),
+    }
+}
+
+/// The node nearest to a radius, in pixels, >= 0. The bits of a float are linear within each octave.
+#[inline(always)]
+fn nearest_node(radius_px: f32) -> usize {
+    if radius_px < OCTAVES_FROM_PX {
+        return (radius_px * STEPS_PER_PX + 0.5) as usize;
+    }
+    let above = radius_px.to_bits() - OCTAVES_FROM_PX.to_bits() + (1 << (OCTAVE_SHIFT - 1));
+    NODES_PER_OCTAVE + (above >> OCTAVE_SHIFT) as usize
+}
+
+/// How many nodes reach a radius.
+fn nodes_up_to(radius_px: f32) -> usize {
+    let node = nearest_node(radius_px);
+    node + 1 + usize::from(node_radius_px(node) < radius_px)
 }
 
 /// The cumulative profile at `x` in [-1, 1], linear between its nodes, constant outside.
@@ -186,6 +219,35 @@ mod tests {
                 assert!((f64::from(*a) - b).abs() < 1e-4 * peak, "node {node}: {a} against {b}");
             }
         }
+    }
+
+    #[test]
+    fn nodes_are_a_sixteenth_of_a_pixel_apart_and_then_a_share_of_the_radius() {
+        assert_eq!(node_radius_px(161), 10.0625);
+        let mut before_px = -1.0 / STEPS_PER_PX;
+        for node in 0..3000 {
+            let radius_px = node_radius_px(node);
+            let step_px = radius_px - before_px;
+            let most_px = (radius_px / OCTAVES_FROM_PX).max(1.0) / STEPS_PER_PX;
+            assert!(step_px > most_px / 2.01 && step_px <= most_px, "{radius_px}: {step_px}");
+            for aside_px in [-0.49 * step_px, 0.0, 0.24 * step_px] {
+                assert_eq!(nearest_node((radius_px + aside_px).max(0.0)), node, "{radius_px} {aside_px}");
+            }
+            assert_eq!(nodes_up_to(radius_px), node + 1);
+            assert_eq!(nodes_up_to(radius_px + 0.2 * step_px), node + 2);
+            before_px = radius_px;
+        }
+    }
+
+    /// What a table takes grows with the radius.
+    #[test]
+    fn a_table_of_a_wide_blur_is_no_more_than_in_proportion() {
+        let taps = |radius_px| {
+            let mask = Aperture::default().mask(MASK_CELLS, 0.2);
+            Bank::new(&mask, Rank::Terms(2), radius_px).horizontal.len() as f32
+        };
+        let (narrow, wide) = (taps(64.0), taps(1024.0));
+        assert!(wide < 16.0 * narrow * 2.5, "{narrow} to {wide}");
     }
 
     #[test]

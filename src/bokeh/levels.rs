@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::aperture::Mask;
 use super::bank::Bank;
 use super::low_rank::Decomposition;
-use super::rung::{MOST_RADIUS_PX, Rung, SCALES, rung};
+use super::plan::Compositing;
+use super::rung::{MOST_FULL_RADIUS_PX, MOST_RADIUS_PX, Rung, SCALES, rung};
 use super::{Effect, Rank, Settings};
 use crate::budget::Quality;
 
@@ -30,9 +31,8 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// The levels of some settings: all of them where these are adaptive, else the one. With `full_scale`, every bin
-    /// stays at full scale.
-    pub fn new(settings: &Settings, mask: &Mask, full_scale: bool) -> Self {
+    /// The levels of some settings: all of them where these are adaptive, else the one.
+    pub fn new(settings: &Settings, mask: &Mask, compositing: Compositing) -> Self {
         let most_px = settings.far_max_px.max(settings.near_max_px);
         let coarsest = SCALES[SCALES.len() - 1] as f32;
         let svd = Decomposition::of(mask);
@@ -44,7 +44,8 @@ impl Levels {
             let terms = if settings.effect == Effect::Blur { rung.even_rank } else { rung.rank };
             let rank = settings.rank.unwrap_or(Rank::Terms(terms));
             let bank_px = match settings.effect {
-                _ if full_scale => most_px,
+                _ if compositing == Compositing::Gather => most_px,
+                _ if settings.rank == Some(Rank::Full) => most_px.min((most_px / coarsest).max(MOST_FULL_RADIUS_PX)),
                 Effect::Blur => most_px / rung.even_scale(most_px) as f32,
                 _ => most_px.min((most_px / coarsest).max(MOST_RADIUS_PX)),
             };

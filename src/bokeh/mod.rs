@@ -104,6 +104,44 @@ pub struct Settings {
     pub near_max_px: f32,
 }
 
+/// Largest radius of [`Method::Gather`], in pixels: it filters at full scale.
+const MOST_GATHERED_PX: f32 = 512.0;
+/// The same with [`Rank::Full`], when it gathers in two dimensions: kernels grow with the square of the radius.
+const MOST_EXACT_PX: f32 = 128.0;
+
+impl Settings {
+    /// The largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their diagonal,
+    /// or less where the method bears no more.
+    pub fn most_radius_px(&self, size: (u32, u32)) -> f32 {
+        let diagonal_px = (size.0 as f32).hypot(size.1 as f32).ceil();
+        diagonal_px.min(match (self.effect, self.method, self.rank) {
+            (Effect::Dof, Method::Gather, Some(Rank::Full)) => MOST_EXACT_PX,
+            (Effect::Dof, Method::Gather, _) => MOST_GATHERED_PX,
+            _ => f32::INFINITY,
+        })
+    }
+
+    /// These settings, with radii cut to what pictures of `size` bear.
+    fn within(&self, size: (u32, u32)) -> Self {
+        let most_px = self.most_radius_px(size);
+        let cut = |radius_px: f32| radius_px.max(0.0).min(most_px);
+        Self { far_max_px: cut(self.far_max_px), near_max_px: cut(self.near_max_px), ..self.clone() }
+    }
+
+    /// Whether pictures of `size` (width, height) can be blurred so.
+    ///
+    /// # Errors
+    /// [`BokehError::TooWide`].
+    pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
+        let (radius_px, most_px) = (self.far_max_px.max(self.near_max_px), self.most_radius_px(size));
+        if radius_px <= most_px {
+            return Ok(());
+        }
+        let by_method = (self.effect, self.method) == (Effect::Dof, Method::Gather);
+        Err(BokehError::TooWide { radius_px, most_px, size, by_method })
+    }
+}
+
 /// One frame to blur. The executor owns the buffers until the frame is [`Finished`].
 pub struct Job {
     /// Chosen by the caller; comes back in [`Finished`].
@@ -191,6 +229,21 @@ pub enum BokehError {
         /// Width and height of the frame.
         got: (u32, u32),
     },
+    /// The blur is wider than the pictures, or than the method bears.
+    #[error(
+        "a blur radius of {radius_px} px is too large: {} at most {most_px} px; lower --max-coc or --coc-at-infinity",
+        if *by_method { "--method gather bears".to_owned() } else { format!("for pictures of {}x{}, use", size.0, size.1) }
+    )]
+    TooWide {
+        /// Largest radius of the settings, in pixels.
+        radius_px: f32,
+        /// [`Settings::most_radius_px`].
+        most_px: f32,
+        /// Width and height of the pictures.
+        size: (u32, u32),
+        /// Whether the method is what sets the limit.
+        by_method: bool,
+    },
     /// No GPU, or it refused or was lost.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -212,7 +265,7 @@ pub enum Probe {
 /// `adapter` is part of a GPU adapter's name; `threads` is for the CPU executor, all cores when `None`.
 ///
 /// # Errors
-/// A GPU was asked for and there is none that fits, or it failed.
+/// The blur is too wide ([`Settings::check`]); a GPU was asked for and there is none that fits, or it failed.
 pub fn create(
     settings: &Settings,
     size: (u32, u32),
@@ -220,6 +273,7 @@ pub fn create(
     adapter: Option<&str>,
     threads: Option<usize>,
 ) -> Result<Box<dyn Bokeh>, BokehError> {
+    settings.check(size)?;
     let plan = plan::Plan::new(settings, size.0, size.1);
     #[cfg(feature = "gpu")]
     if backend != Backend::Cpu {
@@ -239,9 +293,10 @@ pub fn create(
 /// The executor for pictures of `size` (width, height) on a device that is open already.
 ///
 /// # Errors
-/// The device is too small for such pictures, or failed.
+/// The blur is too wide ([`Settings::check`]), the device is too small for such pictures, or it failed.
 #[cfg(feature = "gpu")]
 pub fn create_on(settings: &Settings, size: (u32, u32), device: Arc<Device>) -> Result<Box<dyn Bokeh>, BokehError> {
+    settings.check(size)?;
     let plan = plan::Plan::new(settings, size.0, size.1);
     Ok(Box::new(gpu::GpuBokeh::on(&plan, device)?))
 }

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use super::bank::{Bank, MASK_CELLS};
 use super::levels::Levels;
-use super::rung::Rung;
+use super::rung::{MOST_FULL_RADIUS_PX, Rung, scale_within};
 pub use super::share::Share;
 use super::split::{Counts, MAX_PIECES, Piece};
 use super::{Effect, Method, Rank, Settings};
@@ -108,7 +108,7 @@ pub struct Plan {
     /// Whether the rank is full and the method the paper's: an exact 2-D gather.
     pub exact: bool,
     effect: Effect,
-    /// Whether every bin stays at full scale.
+    /// Whether bins stay at full scale as far as [`MOST_FULL_RADIUS_PX`] allows.
     full_scale: bool,
     /// Largest radius in the bin in focus.
     focus_px: f32,
@@ -119,16 +119,17 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Plans frames of `width` x `height` pixels, at the settings' quality to begin with.
+    /// Plans frames of `width` x `height` pixels, at the settings' quality to begin with. Radii are cut to
+    /// [`Settings::most_radius_px`].
     pub fn new(settings: &Settings, width: u32, height: u32) -> Self {
+        let settings = &settings.within((width, height));
         let compositing = match (settings.effect, settings.method) {
             (Effect::Dof, Method::Layered) => Compositing::Layers,
             (Effect::Dof, Method::Gather) => Compositing::Gather,
             (Effect::Blur | Effect::TiltShift, _) => Compositing::Select,
         };
-        let full_scale = compositing == Compositing::Gather || settings.rank == Some(Rank::Full);
         let mask = settings.aperture.mask(MASK_CELLS, settings.rim);
-        let levels = Arc::new(Levels::new(settings, &mask, full_scale));
+        let levels = Arc::new(Levels::new(settings, &mask, compositing));
         let level = levels.nearest(settings.quality);
         let mut plan = Self {
             width: width as usize,
@@ -144,7 +145,7 @@ impl Plan {
             exact: compositing == Compositing::Gather && settings.rank == Some(Rank::Full),
             levels,
             effect: settings.effect,
-            full_scale,
+            full_scale: settings.rank == Some(Rank::Full),
             focus_px: settings.far_max_px.max(settings.near_max_px),
             max_px: [settings.far_max_px, settings.near_max_px],
             counts: Counts::default(),
@@ -209,7 +210,8 @@ impl Plan {
         let beyond = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
             let scale = match self.compositing {
-                _ if self.full_scale => 1,
+                Compositing::Gather => 1,
+                _ if self.full_scale => scale_within(content.1, MOST_FULL_RADIUS_PX),
                 // One radius everywhere.
                 Compositing::Select if content.0 == content.1 => self.rung.even_scale(content.0),
                 _ => self.rung.scale(content.0, content.1),

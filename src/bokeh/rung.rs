@@ -7,6 +7,9 @@ use crate::budget::Quality;
 pub const SCALES: [usize; 4] = [1, 2, 4, 8];
 /// A bin is reduced until no radius has more bin pixels than this: the cost of a filter does not grow with the blur.
 pub const MOST_RADIUS_PX: f32 = 14.0;
+/// With every term that an aperture has, a bin stays at full scale up to this radius: what its filters take in memory
+/// does not grow with the blur.
+pub const MOST_FULL_RADIUS_PX: f32 = 128.0;
 
 /// What a quality level trades.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +60,12 @@ pub fn rung(quality: Quality) -> Rung {
     }
 }
 
+/// The finest scale at which a radius has at most so many bin pixels, or the coarsest there is.
+pub fn scale_within(radius_px: f32, most_px: f32) -> usize {
+    let fits = SCALES.into_iter().find(|&scale| radius_px <= most_px * scale as f32);
+    fits.unwrap_or(SCALES[SCALES.len() - 1])
+}
+
 impl Rung {
     /// Bins of a side that may be at full scale.
     pub fn fine_bins(&self) -> usize {
@@ -66,13 +75,11 @@ impl Rung {
     /// The coarsest scale at which radii from `low_px` on keep their shape and those up to `high_px` stay cheap.
     pub fn scale(&self, low_px: f32, high_px: f32) -> usize {
         let fits = SCALES.into_iter().zip(self.scale_from_px).rev().find(|&(_, from_px)| low_px >= from_px);
-        let cheap = SCALES.into_iter().find(|&scale| high_px <= MOST_RADIUS_PX * scale as f32);
-        fits.map_or(1, |(scale, _)| scale).max(cheap.unwrap_or(SCALES[SCALES.len() - 1]))
+        fits.map_or(1, |(scale, _)| scale).max(scale_within(high_px, MOST_RADIUS_PX))
     }
 
     /// The scale for a picture that is blurred by one radius all over.
     pub fn even_scale(&self, radius_px: f32) -> usize {
-        let fits = SCALES.into_iter().find(|&scale| radius_px <= self.even_radius_px * scale as f32);
-        fits.unwrap_or(SCALES[SCALES.len() - 1])
+        scale_within(radius_px, self.even_radius_px)
     }
 }

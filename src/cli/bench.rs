@@ -8,14 +8,15 @@ use serde::Serialize;
 
 use super::config::{self, Executor};
 use super::error::CliError;
-use super::values::{self, OrAuto, Size, above_zero};
-use super::{defaults, options, print, render};
+use super::layers::Given;
+use super::values::{self, DepthChoice, OrAuto, Size, between};
+use super::{defaults, options, print, render, unused};
 use crate::bokeh::{Bokeh, Job, PassTimes};
 use crate::budget::Quality;
 use crate::compute::{Place, team::cores};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
-use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Strength};
+use crate::look::{COC_AT_INFINITY_PER_HEIGHT, MOST_RADIUS_PX, Strength};
 use crate::optics::CocField;
 use crate::scene::{Scene, View};
 
@@ -37,7 +38,7 @@ pub struct BenchCommand {
     #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = defaults::BENCHED_SIZES)]
     sizes: Vec<Size>,
     /// Blur radii at infinity, in pixels [default: height / 45]
-    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = above_zero)]
+    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = between(0.0, MOST_RADIUS_PX))]
     coc: Vec<f32>,
     /// Quality levels
     #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
@@ -100,7 +101,26 @@ struct Measured {
 ///
 /// # Errors
 /// The options do not fit each other, there is no such executor, or it failed.
-pub fn run(command: &BenchCommand) -> Result<(), CliError> {
+pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
+    if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
+        let what = "--depth is for `stream`: the scene that is measured has its own depth; leave it out, or use none";
+        return Err(CliError::Usage(what.to_string()));
+    }
+    let options = options::Blur { coc_at_infinity: Some(Strength::Default), ..command.blur.clone() };
+    let look = config::look(&options, &command.aperture, OrAuto::Auto, true)?;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: unused::From::Bench,
+            depth: unused::DepthFrom::Metres,
+            uses_depth: true,
+            effect: look.effect,
+            lens: false,
+            realtime: false,
+            cpu_only: command.backend == values::Backend::Cpu,
+            window: false,
+        },
+    );
     if !command.json {
         print(b"size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n")?;
     }
@@ -132,9 +152,6 @@ fn measure(
     quality: Quality,
     executor: &Executor,
 ) -> Result<Measured, CliError> {
-    if command.blur.depth.is_elsewhere() {
-        return Err(CliError::Usage("--depth FOLDER or a depth camera are for `stream`".to_string()));
-    }
     let options = options::Blur { coc_at_infinity: Some(Strength::AtInfinity(coc_px)), ..command.blur.clone() };
     let look = config::look(&options, &command.aperture, OrAuto::This(quality), true)?;
     let size = color.size();

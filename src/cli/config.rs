@@ -154,12 +154,13 @@ impl Executor {
     /// The CPU executor, which can be looked into.
     ///
     /// # Errors
-    /// A GPU was asked for.
+    /// A GPU was asked for, or the blur is too wide.
     pub fn create_open(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<CpuBokeh, CliError> {
         if self.backend == Backend::Gpu || self.adapter.is_some() {
             let text = "--debug-dir looks into the CPU executor: leave --backend gpu and --adapter out";
             return Err(CliError::Usage(text.to_string()));
         }
+        settings.check(size)?;
         Ok(CpuBokeh::new(Plan::new(settings, size.0, size.1), self.threads))
     }
 }

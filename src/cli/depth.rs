@@ -2,7 +2,8 @@
 
 use super::error::CliError;
 use super::options;
-use super::source::Source;
+use super::source::{Source, depth_of};
+use super::unused::DepthFrom;
 use super::values::{DepthChoice, Effect};
 use crate::capture::Brings;
 use crate::clock::Clock;
@@ -34,7 +35,7 @@ pub fn beside(
     if source.camera.info().brings == Brings::Depth {
         return usage("the source knows its depth: leave --depth out");
     }
-    let opened: Box<dyn DepthSource> = match &blur.depth {
+    let (opened, depth_from): (Box<dyn DepthSource>, _) = match &blur.depth {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
             let options = Options {
@@ -44,11 +45,12 @@ pub fn beside(
                 ..Options::default()
             };
             let recording = Recording::open(folder, &options)?;
-            Box::new(Beside::new(recording, &folder.display().to_string())?)
+            let depth_from = depth_of(&recording);
+            (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
-        DepthChoice::Device(name) => device(name, depth, clock)?,
+        DepthChoice::Device(name) => (device(name, depth, clock)?, DepthFrom::Units),
     };
-    Ok(Source { depth: Some(opened), ..source })
+    Ok(Source { depth: Some(opened), depth_from, ..source })
 }
 
 #[cfg(feature = "camera")]

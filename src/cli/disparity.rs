@@ -5,12 +5,14 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum, value_parser};
 
+use super::calib::{self, Eyes};
 use super::config::Executor;
 use super::disparity_preview::preview;
 use super::error::CliError;
-use super::files::refuse_overwrite;
+use super::files::{make_folder_of, refuse_overwrite, refuse_source};
 use super::values::{Backend, above_zero, between};
 use super::{defaults, options, terminal};
+use crate::calibration::rectifier::Rectifier;
 use crate::depth::DepthError;
 use crate::depth::stereo::check::{Verdict, check};
 use crate::depth::stereo::{self, MatchError, Pair, Settings};
@@ -22,7 +24,7 @@ use crate::recording::still::{self, MapFormat};
 /// Find the disparity of a rectified stereo pair, or its depth
 ///
 /// The disparity belongs to the left picture: its pixel x is seen at x - disparity in the right one. Both pictures are
-/// rectified: the same point is in the same row.
+/// rectified (the same point is in the same row), or the calibration tells how to rectify them first.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -42,9 +44,11 @@ pub struct DepthCommand {
     #[arg(id = "pair_max_disparity", long = "max-disparity", value_name = "PX",
           value_parser = value_parser!(u32).range(1..=i64::from(Settings::MOST_DISPARITIES)))]
     max_disparity: Option<u32>,
-    /// Range and geometry from a calib.txt of Middlebury or ETH3D, or the geometry from one of KITTI
-    #[arg(id = "pair_calib", long = "calib", value_name = "FILE")]
-    calib: Option<PathBuf>,
+    /// Calibration of the two eyes: OpenCV's, Kalibr's or EuRoC's, by which the pictures are rectified first, or the
+    /// calib.txt of a rectified pair from Middlebury, ETH3D or KITTI; may be given more than once, or as a list with
+    /// commas, for one in two files
+    #[arg(id = "pair_calib", long = "calib", value_name = "FILE", value_delimiter = ',')]
+    calib: Vec<PathBuf>,
     /// Focal length in pixels, with --baseline-m
     #[arg(id = "pair_focal_px", long = "focal-px", value_name = "PX", value_parser = above_zero,
           conflicts_with = "pair_calib", requires = "pair_baseline_m")]
@@ -55,7 +59,7 @@ pub struct DepthCommand {
     baseline_m: Option<f32>,
     /// Column of the right principal point less that of the left, in pixels [default: 0]
     #[arg(id = "pair_doffs_px", long = "doffs-px", value_name = "PX", value_parser = between(-10_000.0, 10_000.0),
-          allow_negative_numbers = true, conflicts_with = "pair_calib", requires = "pair_focal_px")]
+          conflicts_with = "pair_calib", requires = "pair_focal_px")]
     doffs_px: Option<f32>,
     /// Write depth in metres instead: .pfm, or .png of 5000 units per metre (TUM); 0 = unknown
     #[arg(long)]
@@ -99,13 +103,19 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
             terminal::say(&format!("note: {text}"));
         }
     };
-    let color = still::read_color(&command.left)?;
-    let (left, right) = (luma_of(&color), luma_of(&still::read_color(&command.right)?));
-    let size = left.size();
+    let mut color = still::read_color(&command.left)?;
+    let mut right = luma_of(&still::read_color(&command.right)?);
+    let size = color.size();
     if right.size() != size {
         return Err(DepthError::from(MatchError::Sizes { left: size, right: right.size() }).into());
     }
-    let geometry = command.geometry(size, &note)?;
+    let (geometry, rectifier) = command.geometry(size, &note)?;
+    if let Some(rectifier) = &rectifier {
+        rectifier.left(&std::mem::take(&mut color), &mut color);
+        rectifier.right(&std::mem::take(&mut right), &mut right);
+        note("the pictures are rectified by the calibration: the result is that of the rectified left picture".into());
+    }
+    let left = luma_of(&color);
     let disparities = command.disparities(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
     let effort = match command.effort {
         Effort::Fast => stereo::Effort::Fast,
@@ -120,23 +130,32 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     let took_ms = start.elapsed().as_secs_f64() * 1e3;
 
     match check(&left, &right, disparities).map_err(DepthError::from)?.verdict() {
-        Verdict::RowsOff { px } => note(format!(
-            "the pair is not rectified: rows are off by up to {px:.1} px, and the disparity is wrong; rectify it first"
+        verdict @ Verdict::RowsOff { .. } => note(format!(
+            "{verdict}, and the disparity is wrong; {}",
+            match rectifier {
+                Some(_) => "the calibration is not that of these cameras as they stood: calibrate them again",
+                None => "rectify it with the --calib FILE of raw cameras",
+            }
         )),
         verdict @ Verdict::Swapped => note(verdict.to_string()),
         Verdict::Rectified | Verdict::Unclear { .. } => {}
     }
 
     let force = command.output.force;
+    make_folder_of(&command.out)?;
     match geometry.filter(|_| command.metres) {
         Some(Geometry { rig, .. }) => {
-            let depth = depth_of(&disparity, &rig);
+            let depth = disparity.depth(|px| rig.depth_m(px));
             note_what_is_too_far(&command.out, &depth, &note)?;
             still::write_depth(&command.out, &depth, defaults::DEPTH_SCALE, force)?;
         }
-        None => still::write_disparity(&command.out, &disparity, force)?,
+        None => {
+            let rig = geometry.map(|geometry| geometry.rig);
+            still::write_disparity(&command.out, &disparity, rig, force)?;
+        }
     }
     if let Some(file) = &command.preview {
+        make_folder_of(file)?;
         still::write_color(file, &preview(&disparity), force)?;
     }
     if !global.quiet {
@@ -154,7 +173,7 @@ impl DepthCommand {
     /// What needs no picture to be refused.
     fn check(&self) -> Result<(), CliError> {
         let usage = |text: &str| Err(CliError::Usage(text.to_string()));
-        if self.metres && self.calib.is_none() && self.focal_px.is_none() {
+        if self.metres && self.calib.is_empty() && self.focal_px.is_none() {
             return usage("--metres needs the geometry of the eyes: give --calib FILE, or --focal-px and --baseline-m");
         }
         if still::map_format(&self.out).is_err() {
@@ -167,24 +186,39 @@ impl DepthCommand {
         if self.preview.as_ref() == Some(&self.out) {
             return usage("--preview and --out name one file; each needs its own");
         }
+        for read in [&self.left, &self.right].into_iter().chain(&self.calib) {
+            refuse_source("--out", &self.out, read)?;
+            self.preview.as_ref().map_or(Ok(()), |preview| refuse_source("--preview", preview, read))?;
+        }
         refuse_overwrite([self.out.as_path()].into_iter().chain(self.preview.as_deref()), self.output.force)
     }
 
-    /// How the eyes stand, where that is given, for pictures of `size`.
-    fn geometry(&self, size: (u32, u32), note: &dyn Fn(String)) -> Result<Option<Geometry>, CliError> {
-        let Some(file) = &self.calib else {
+    /// How the eyes stand, where that is given, for pictures of `size`, and what rectifies these where that is needed.
+    fn geometry(
+        &self,
+        size: (u32, u32),
+        note: &dyn Fn(String),
+    ) -> Result<(Option<Geometry>, Option<Rectifier>), CliError> {
+        let of_rig = |rig| Geometry { rig, size: None, disparities: None };
+        if self.calib.is_empty() {
             let doffs_px = self.doffs_px.unwrap_or(0.0);
             let rig = |(focal_px, baseline_m)| StereoRig { focal_px, baseline_m, doffs_px, metric: true };
-            let plain = self.focal_px.zip(self.baseline_m).map(rig);
-            return Ok(plain.map(|rig| Geometry { rig, size: None, disparities: None }));
-        };
-        let stated = Geometry::read(file, &self.left)?;
-        let fitted = stated.fitted(file, size)?;
-        if let Some((width, height)) = stated.size.filter(|_| fitted != stated) {
-            let file = file.display();
-            note(format!("{file} is for pictures of {width}x{height}: scaled to {}x{}", size.0, size.1));
+            return Ok((self.focal_px.zip(self.baseline_m).map(rig).map(of_rig), None));
         }
-        Ok(Some(fitted))
+        match calib::read(&self.calib, &self.left, size)? {
+            Eyes::Rectified { geometry, made_for } => {
+                if let Some((width, height)) = made_for.filter(|&made_for| made_for != size) {
+                    let file = self.calib[0].display();
+                    note(format!("{file} is for pictures of {width}x{height}: scaled to {}x{}", size.0, size.1));
+                }
+                Ok((Some(geometry), None))
+            }
+            Eyes::Raw(calibration) => {
+                let rectifier = Rectifier::new(&calibration, size)?;
+                calibration.notes(size).into_iter().for_each(note);
+                Ok((Some(of_rig(rectifier.rig())), Some(rectifier)))
+            }
+        }
     }
 
     /// How many disparities are tried on pictures of `width` columns, of which the calibration may have `stated` some.
@@ -224,12 +258,6 @@ fn luma_of(color: &ColorImage) -> GrayImage {
     let mut luma = GrayImage::default();
     luma.set_luma_of(color);
     luma
-}
-
-/// Metres; 0 where the disparity is unknown.
-fn depth_of(disparity: &DisparityMap, rig: &StereoRig) -> DepthMap {
-    let metres = |&px: &f32| if DepthMap::is_known(px) { rig.depth_m(px) } else { 0.0 };
-    DepthMap { width: disparity.width, height: disparity.height, metres: disparity.px.iter().map(metres).collect() }
 }
 
 /// Tells how much of the depth a PNG cannot hold.

@@ -47,6 +47,10 @@ pub enum CliError {
     #[error("{0}")]
     #[cfg(feature = "window")]
     NoFrames(String),
+    /// An output of a preview failed.
+    #[error("{0}")]
+    #[cfg(feature = "window")]
+    Unwritten(String),
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),
@@ -116,12 +120,14 @@ impl CliError {
         move |source| CliError::Io { path, source }
     }
 
+    /// Whether the caller has to write something differently.
+    pub fn is_wrong_argument(&self) -> bool {
+        matches!(self, CliError::Usage(_) | CliError::Settings { .. } | CliError::Bokeh(BokehError::TooWide { .. }))
+    }
+
     /// 2 for what the caller has to write differently, else 1.
     pub fn exit_code(&self) -> ExitCode {
-        match self {
-            CliError::Usage(_) | CliError::Settings { .. } => ExitCode::from(2),
-            _ => ExitCode::FAILURE,
-        }
+        if self.is_wrong_argument() { ExitCode::from(2) } else { ExitCode::FAILURE }
     }
 
     /// Whether the reader of our output went away, which is no failure of ours.

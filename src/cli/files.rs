@@ -1,10 +1,12 @@
 //! Files that appear whole or not at all.
 
-use std::fs::{self, File};
-use std::io::Write;
+use std::fs;
 use std::path::Path;
 
 use super::error::CliError;
+use super::print;
+use crate::files::{place, whole};
+use crate::sink::Target;
 use crate::stats::Report;
 
 /// # Errors
@@ -16,34 +18,67 @@ pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bo
     }
 }
 
-/// Writes a file under another name in the same folder, and then gives it its own; what was there gives its permissions.
+/// # Errors
+/// [`CliError::Usage`] when `target`, which the option `what` names, is `source`, lies in it, or holds it.
+pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), CliError> {
+    if !place::overlap(target, source) {
+        return Ok(());
+    }
+    let [to, from] = [target, source].map(place::resolved);
+    let how = match (to == from, to.starts_with(&from)) {
+        (true, _) => "this is",
+        (_, true) => "this lies in",
+        _ => "this holds",
+    };
+    let (target, source) = (target.display(), source.display());
+    Err(CliError::Usage(format!("{what} {target}: {how} {source}, which is read; choose another place")))
+}
+
+/// Writes a file whole, in place of what is there.
 ///
 /// # Errors
 /// [`CliError::Io`] when the folder cannot be written.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(format!(".{}.part", std::process::id()));
-    let part = Path::new(&part);
-    let written = File::create(part).and_then(|mut file| {
-        if let Ok(there) = fs::metadata(path) {
-            file.set_permissions(there.permissions())?;
-        }
-        file.write_all(bytes)?;
-        file.sync_all()
-    });
-    written.and_then(|()| fs::rename(part, path)).map_err(|error| {
-        // The first failure is the one to tell.
-        let _ = fs::remove_file(part);
-        CliError::io(path)(error)
-    })
+    whole::write(path, bytes, true).map_err(CliError::io(path))
 }
 
-/// Writes the report of a run as JSON.
+/// Makes the folder that `path` is to be in.
+///
+/// # Errors
+/// [`CliError::Io`] when it cannot be made.
+pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        Some(folder) => fs::create_dir_all(folder).map_err(CliError::io(folder)),
+        None => Ok(()),
+    }
+}
+
+/// Where a report goes that is to be printed.
+const STDOUT: &str = "-";
+
+/// Whether a report can be written to `path`, before there is any.
+///
+/// # Errors
+/// It exists, and may not be overwritten; or it is standard output, where the frames go.
+pub fn check_report(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(), CliError> {
+    match path {
+        Some(path) if path != STDOUT => refuse_overwrite([path], force),
+        Some(_) if targets.contains(&Target::Stdout) => Err(CliError::Usage(
+            "--report - and --to -: standard output takes one of them; name a file for the other".to_string(),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Writes the report of a run as JSON, to standard output where `path` is `-`.
 ///
 /// # Errors
 /// As for [`write_whole`].
 pub fn write_report(path: &Path, report: &Report) -> Result<(), CliError> {
     let mut json = Vec::new();
     report.write_json(&mut json).map_err(CliError::io(path))?;
-    write_whole(path, &json)
+    match path == STDOUT {
+        true => print(&json),
+        false => write_whole(path, &json),
+    }
 }

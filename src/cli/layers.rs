@@ -10,14 +10,15 @@ use clap::builder::Resettable;
 use clap::parser::{RawValues, ValueSource};
 use clap::{Arg, ArgMatches, Command};
 
+use super::arguments::one_line;
 use super::error::CliError;
+use super::leaf;
 use super::settings::{SettingsFile, Values, all_settings, excluded_by, on_settings, parse_flags};
-use super::{leaf, one_line};
 use crate::look::flags;
 use crate::recording::snapshot;
 
 /// One setting, resolved.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Its flag without the dashes.
     pub name: String,
@@ -36,6 +37,8 @@ pub struct Given {
     pub switches: Vec<(String, String)>,
     /// Settings of the look that come from elsewhere than flags and defaults: left unsaid, they come again.
     pub behind: Vec<String>,
+    /// All that flags, the environment and the preset say; of the preset what is unlike the defaults.
+    pub settings: Vec<Setting>,
 }
 
 /// The settings of one command line that come from neither flags nor environment.
@@ -113,8 +116,15 @@ impl Layers {
         if behind.iter().any(|name| STRENGTH.contains(&name.as_str())) {
             behind.extend(STRENGTH.map(str::to_owned));
         }
+        let is_said = |setting: &&Setting| match setting.origin {
+            "flag" | "environment" => true,
+            "preset" => !is_usual(setting),
+            _ => false,
+        };
+        let said = settings.iter().filter(is_said).cloned().collect();
         let given = settings.into_iter().filter(is_given);
-        Given { switches: given.filter_map(|setting| Some((setting.name, setting.value?))).collect(), behind }
+        let switches = given.filter_map(|setting| Some((setting.name, setting.value?))).collect();
+        Given { switches, behind, settings: said }
     }
 
     /// Adds what no layer before has or excludes.
@@ -147,7 +157,7 @@ impl Layers {
             let listed = |values: RawValues| {
                 values.map(|value| value.to_string_lossy().into_owned()).collect::<Vec<_>>().join(",")
             };
-            let value = given.get_raw(arg.get_id().as_str()).map(listed);
+            let value = given.try_get_raw(arg.get_id().as_str()).ok().flatten().map(listed);
             let origin = match source_of(given, arg) {
                 Some(ValueSource::CommandLine) => "flag",
                 Some(ValueSource::EnvVariable) => "environment",
@@ -158,6 +168,14 @@ impl Layers {
         };
         all_settings().get_arguments().filter_map(describe).collect()
     }
+}
+
+/// Whether a setting has the value that it has where nothing is said.
+fn is_usual(setting: &Setting) -> bool {
+    let every = all_settings();
+    let arg = every.get_arguments().find(|arg| arg.get_long() == Some(&setting.name));
+    let default = arg.and_then(|arg| arg.get_default_values().first()).map(|value| value.to_string_lossy());
+    setting.value.as_deref() == Some(default.as_deref().unwrap_or("auto"))
 }
 
 /// Those of `names` that are in `taken` or excluded by it, and the others.

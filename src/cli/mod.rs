@@ -3,7 +3,9 @@
 mod aperture;
 mod aperture_plot;
 mod aperture_sheet;
+mod arguments;
 mod bench;
+mod calib;
 #[cfg(feature = "camera")]
 mod calibration;
 mod command_line;
@@ -17,9 +19,13 @@ mod disparity;
 mod disparity_preview;
 mod doctor;
 mod dump;
+mod environment;
 mod error;
 mod files;
+mod focus;
 mod layers;
+mod log;
+mod near;
 mod options;
 #[doc(hidden)]
 pub mod parsers;
@@ -29,19 +35,22 @@ mod preview;
 mod quality;
 mod record;
 mod render;
+mod save;
 mod settings;
 mod sinks;
 mod source;
+mod source_name;
 mod stereo;
 mod stream;
 mod terminal;
+mod unused;
 mod values;
 
 use std::ffi::OsString;
 use std::io::{self, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use error::CliError;
@@ -91,7 +100,7 @@ Examples:
         shell: clap_complete::Shell,
     },
     /// Show the settings
-    #[command(subcommand, after_help = "Example:\n  bokehcam config dump")]
+    #[command(subcommand, after_help = "Examples:\n  bokehcam config dump\n  bokehcam config save --rim 0.1")]
     Config(ConfigCommand),
 }
 
@@ -101,9 +110,19 @@ enum ConfigCommand {
     #[command(after_help = "\
 Examples:
   bokehcam config dump
-  bokehcam config dump --aperture polygon:6 > ~/.config/bokehcam/config.toml")]
+  bokehcam config dump --preset cinematic --rim 0.3")]
     Dump {
         /// Settings to print with these values.
+        #[command(flatten)]
+        every: Box<options::Every>,
+    },
+    /// Save the settings given as flags in the settings file, whose other settings and comments stay
+    #[command(after_help = "\
+Examples:
+  bokehcam config save --aperture polygon:6 --rim 0.1
+  bokehcam config save --preset cinematic --config other.toml")]
+    Save {
+        /// Settings to save.
         #[command(flatten)]
         every: Box<options::Every>,
     },
@@ -111,13 +130,28 @@ Examples:
 
 /// Runs the program. What goes wrong becomes one line on stderr and an exit code: 1 at run time, 2 in the arguments.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let args: Vec<OsString> = args.into_iter().collect();
-    let Parsed { cli, matches, file, layers } = match parse(&args) {
+    let args = arguments::joined(args);
+    log::write_as(arguments::log_format(&args));
+    let code = run_to_end(&args);
+    log::flush();
+    code
+}
+
+fn run_to_end(args: &[OsString]) -> ExitCode {
+    let fail = |error: &CliError| {
+        log::error(&match error.is_wrong_argument() {
+            true => environment::with_origin(&error.to_string(), args),
+            false => error.to_string(),
+        });
+        error.exit_code()
+    };
+    let Parsed { cli, matches, file, layers } = match parse(args) {
         Ok(parsed) => parsed,
         Err(Refusal::Settings(error)) => return fail(&error),
-        Err(Refusal::Arguments(error)) => return refuse(&error),
+        Err(Refusal::Arguments(error)) => return arguments::refuse(&error, args),
     };
-    terminal::start_log(&cli.global);
+    log::start(&cli.global);
+    environment::warn_of_unknown();
     match perform(cli, &matches, &file, &layers) {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever read our output has seen enough.
@@ -131,11 +165,11 @@ fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers)
         #[cfg(feature = "window")]
         Command::Preview(command) => preview::run(&command, &cli.global, layers.given(matches)),
         Command::Stream(command) => stream::run(&command, &cli.global, layers.given(matches)),
-        Command::Render(command) => render::run(&command, &cli.global),
+        Command::Render(command) => render::run(&command, &cli.global, &layers.given(matches)),
         Command::Depth(command) => disparity::run(&command, &cli.global),
-        Command::Record(command) => record::run(&command, &cli.global),
+        Command::Record(command) => record::run(&command, &cli.global, &layers.given(matches)),
         Command::Aperture(command) => aperture::run(&command, &cli.global),
-        Command::Bench(command) => bench::run(&command),
+        Command::Bench(command) => bench::run(&command, &layers.given(matches)),
         Command::Devices(command) => devices::run(&command),
         Command::Doctor(command) => doctor::run(&command),
         Command::Completions { shell } => {
@@ -145,6 +179,9 @@ fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers)
         }
         Command::Config(ConfigCommand::Dump { .. }) => {
             print(dump::as_toml(&layers.resolved(matches), &file.presets).as_bytes())
+        }
+        Command::Config(ConfigCommand::Save { .. }) => {
+            save::run(cli.global.config.as_deref(), &layers.resolved(matches))
         }
     }
 }
@@ -173,10 +210,22 @@ fn parse(args: &[OsString]) -> Result<Parsed, Refusal> {
     // Once without the settings file, to learn its name and the preset's; then again with their values as defaults.
     let given = command.clone().try_get_matches_from(args)?;
     let chosen = Cli::from_arg_matches(&given)?.global.config;
-    let file = SettingsFile::load(chosen.as_deref()).map_err(Refusal::Settings)?;
+    let file = settings_for(&given, chosen.as_deref()).map_err(Refusal::Settings)?;
     let layers = Layers::of(&file, &given).map_err(Refusal::Settings)?;
     let matches = layers.as_defaults(command).try_get_matches_from(args)?;
     Ok(Parsed { cli: Cli::from_arg_matches(&matches)?, matches, file, layers })
+}
+
+/// The settings file, as the command needs it.
+fn settings_for(given: &ArgMatches, chosen: Option<&Path>) -> Result<SettingsFile, CliError> {
+    let config = given.subcommand_matches("config").and_then(ArgMatches::subcommand_name);
+    match (config, chosen) {
+        // It will be made.
+        (Some("save"), Some(path)) if path.symlink_metadata().is_err() => return Ok(SettingsFile::default()),
+        (Some("dump"), _) => save::refuse_redirect(chosen)?,
+        _ => {}
+    }
+    SettingsFile::load(chosen)
 }
 
 /// The matches of the innermost command.
@@ -186,51 +235,11 @@ fn leaf(matches: &ArgMatches) -> &ArgMatches {
 
 fn print(bytes: &[u8]) -> Result<(), CliError> {
     let mut stdout = io::stdout().lock();
-    stdout.write_all(bytes).and_then(|()| stdout.flush()).map_err(CliError::io("standard output".as_ref()))
-}
-
-fn fail(error: &CliError) -> ExitCode {
-    terminal::say(&format!("error: {error}"));
-    error.exit_code()
-}
-
-fn refuse(error: &clap::Error) -> ExitCode {
-    match error.kind() {
-        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-            // A reader that is gone needs no help.
-            let _ = error.print();
-            ExitCode::SUCCESS
-        }
-        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            let _ = error.print();
-            ExitCode::from(2)
-        }
-        _ => {
-            terminal::say(&format!("error: {}", one_line(error)));
-            ExitCode::from(2)
-        }
-    }
-}
-
-/// What clap says in paragraphs, in one line and without the usage.
-fn one_line(error: &clap::Error) -> String {
-    let text = error.render().to_string();
-    let told = text
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.is_empty() && !line.starts_with("Usage:") && !line.starts_with("For more information"));
-    let mut sentence = String::new();
-    for line in told {
-        let joint = match sentence.chars().last() {
-            None => "",
-            Some(':') => " ",
-            Some(_) if line.starts_with('[') => " ",
-            Some(_) => "; ",
-        };
-        sentence.push_str(joint);
-        sentence.push_str(line.strip_prefix("error: ").unwrap_or(line));
-    }
-    sentence
+    let text = String::from_utf8_lossy(bytes);
+    stdout
+        .write_all(log::printable(&text, &['\n', '\t']).as_bytes())
+        .and_then(|()| stdout.flush())
+        .map_err(CliError::io("standard output".as_ref()))
 }
 
 #[cfg(test)]

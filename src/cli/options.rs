@@ -1,10 +1,14 @@
 //! The options that commands share, in groups: what can be written on the command line, in the environment or in
 //! the settings file, before it means anything.
 
+mod groups;
+
 use std::path::PathBuf;
 
-use clap::builder::TypedValueParser;
+use clap::builder::{BoolishValueParser, TypedValueParser};
 use clap::{Args, value_parser};
+
+pub use groups::{Every, Streaming};
 
 use super::defaults;
 #[cfg(feature = "window")]
@@ -18,7 +22,7 @@ use crate::bokeh::Rank;
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
 use crate::depth::stereo::Settings;
-use crate::look::{ApertureName, Strength, Tilt};
+use crate::look::{ApertureName, MOST_RADIUS_PX, Strength, Tilt};
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
 
@@ -52,7 +56,8 @@ pub struct Source {
     pub end: Option<f64>,
     /// Begin again at the end; only with --frames or Ctrl-C does it end
     #[arg(long = "loop", value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub repeat: bool,
     /// Stop after this many frames
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
@@ -103,11 +108,13 @@ impl Depth {
 pub struct Stereo {
     /// Each picture of the source shows both eyes beside each other: the left half is the left eye's
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub side_by_side: bool,
     /// The pictures are a rectified pair already: the same point is in the same row
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub rectified: bool,
     /// Calibration of the two eyes; may be given more than once, or as a list with commas, for one in two files
     #[arg(long, value_name = "FILE", value_delimiter = ',')]
@@ -123,7 +130,7 @@ pub struct Stereo {
     #[arg(long, value_name = "M", value_parser = above_zero, conflicts_with = "calib")]
     pub baseline_m: Option<f32>,
     /// Column of its right principal point less that of the left, in pixels [default: 0]
-    #[arg(long, value_name = "PX", value_parser = between(-10_000.0, 10_000.0), allow_negative_numbers = true,
+    #[arg(long, value_name = "PX", value_parser = between(-10_000.0, 10_000.0),
           conflicts_with = "calib")]
     pub doffs_px: Option<f32>,
 }
@@ -171,11 +178,18 @@ pub struct Blur {
     #[arg(long, value_name = "MM", value_parser = above_zero)]
     pub sensor_width: Option<f32>,
     /// Largest blur radius, in pixels [default: auto, which is 0.06 x height]
-    #[arg(long, value_name = "PX", value_parser = OrAuto::parser(not_negative))]
+    #[arg(long, value_name = "PX", value_parser = OrAuto::parser(between(0.0, MOST_RADIUS_PX)))]
     pub max_coc: Option<OrAuto<f32>>,
     /// Sharp band of tilt-shift: CENTER_Y[:BAND[:ANGLE_DEG]], the first two as fractions of the height
     #[arg(long, value_name = "BAND", default_value_t = defaults::TILT)]
     pub tilt: Tilt,
+}
+
+impl Blur {
+    /// Whether there was to be depth if the source has any, and else none.
+    pub fn takes_whatever_depth(&self) -> bool {
+        self.effect == Effect::Auto && self.depth == DepthChoice::Auto
+    }
 }
 
 /// The lens opening.
@@ -186,8 +200,7 @@ pub struct Aperture {
     #[arg(long, value_name = "SHAPE", default_value = defaults::APERTURE)]
     pub aperture: ApertureName,
     /// Radial intensity: -1 soap bubbles, 0 flat, 1 bright in the middle
-    #[arg(long, value_name = "I", default_value_t = defaults::INTENSITY, value_parser = between(-1.0, 1.0),
-          allow_negative_numbers = true)]
+    #[arg(long, value_name = "I", default_value_t = defaults::INTENSITY, value_parser = between(-1.0, 1.0))]
     pub intensity: f32,
     /// Width of the soft rim, as a fraction of the radius
     #[arg(long, value_name = "W", default_value_t = defaults::RIM, value_parser = between(0.0, 1.0))]
@@ -235,17 +248,20 @@ pub struct Stream {
     pub out_size: Option<Size>,
     /// Close the source's camera while nobody watches the virtual one
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub on_demand: bool,
     /// Mirror the picture, as a mirror does
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub mirror: bool,
     /// Count frames that fail and go on, instead of ending
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub keep_going: bool,
-    /// Write what happened to every frame, and how long it took, to this JSON file
+    /// Write what happened to every frame, and how long it took, to this JSON file; - is standard output
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
 }
@@ -256,70 +272,9 @@ pub struct Stream {
 pub struct Output {
     /// Overwrite what exists
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub force: bool,
-}
-
-/// What is needed to blur a stream, wherever it goes.
-#[derive(Args, Clone, Debug)]
-pub struct Streaming {
-    /// Which frames.
-    #[command(flatten)]
-    pub frames: Source,
-    /// The blur.
-    #[command(flatten)]
-    pub blur: Blur,
-    /// Depth pictures.
-    #[command(flatten)]
-    pub depth: Depth,
-    /// Two eyes.
-    #[command(flatten)]
-    pub stereo: Stereo,
-    /// The lens opening.
-    #[command(flatten)]
-    pub aperture: Aperture,
-    /// The executor.
-    #[command(flatten)]
-    pub computing: Computing,
-    /// The stream.
-    #[command(flatten)]
-    pub stream: Stream,
-    /// Overwriting.
-    #[command(flatten)]
-    pub output: Output,
-}
-
-/// Every setting: the keys of the settings file and of the environment.
-#[derive(Args, Debug)]
-pub struct Every {
-    /// Which frames.
-    #[command(flatten)]
-    pub source: Source,
-    /// Depth pictures.
-    #[command(flatten)]
-    pub depth: Depth,
-    /// Two eyes.
-    #[command(flatten)]
-    pub stereo: Stereo,
-    /// The blur.
-    #[command(flatten)]
-    pub blur: Blur,
-    /// The lens opening.
-    #[command(flatten)]
-    pub aperture: Aperture,
-    /// The executor.
-    #[command(flatten)]
-    pub computing: Computing,
-    /// The stream.
-    #[command(flatten)]
-    pub stream: Stream,
-    /// The window.
-    #[cfg(feature = "window")]
-    #[command(flatten)]
-    pub window: Window,
-    /// Overwriting.
-    #[command(flatten)]
-    pub output: Output,
 }
 
 #[cfg(feature = "camera")]

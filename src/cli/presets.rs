@@ -1,17 +1,15 @@
 //! Presets: the looks that they make of another one, and saving one's own.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::FromArgMatches;
-use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+use toml_edit::{DocumentMut, Item, Table, TableLike};
 
 use super::config;
-use super::dump::toml_number;
 use super::error::CliError;
-use super::files::write_whole;
 use super::options::Every;
-use super::settings::{self, PRESETS, SettingsFile, Values, check_name, excluded_by, parse_flags};
+use super::save;
+use super::settings::{PRESETS, SettingsFile, Values, check_name, excluded_by, parse_flags};
 use crate::look::{Look, flags::Flag, presets};
 
 /// A preset upon another look.
@@ -52,19 +50,9 @@ fn upon(file: &SettingsFile, preset: &str, base: &Look) -> Values {
 
 /// The look that settings make.
 fn look_of(values: Values, has_depth: bool) -> Result<Look, CliError> {
-    let refuse = |error: clap::Error| CliError::Usage(super::one_line(&error));
+    let refuse = |error: clap::Error| CliError::Usage(super::arguments::one_line(&error));
     let every = parse_flags(&values).and_then(|matches| Every::from_arg_matches(&matches)).map_err(refuse)?;
     config::look(&every.blur, &every.aperture, every.computing.quality, has_depth)
-}
-
-/// The file that presets are saved in: the one that was chosen, else the user's.
-///
-/// # Errors
-/// None was chosen, and there is no home.
-pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
-    let nowhere =
-        || CliError::Usage("there is no home to keep settings in: name a file with --config FILE".to_string());
-    chosen.map(Path::to_owned).or_else(settings::user_file).ok_or_else(nowhere)
 }
 
 /// Saves settings ([`Look::every_flag`], so that the preset depends on nothing else) as the preset `name` in the file
@@ -75,29 +63,11 @@ pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
 /// The name cannot be one; the file is no settings file, or cannot be read or written.
 pub fn save(path: &Path, name: &str, flags: &[Flag]) -> Result<(), CliError> {
     check_name(name).map_err(CliError::Usage)?;
-    // A link, as those who keep their settings elsewhere have it, stays one.
-    let path = &path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let text = match fs::read_to_string(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-        read => read.map_err(CliError::io(path))?,
-    };
-    SettingsFile::parse(path, &text)?;
-    let edited = with_preset(&text, name, flags).ok_or_else(|| CliError::Settings {
-        path: path.clone(),
-        line: 1,
-        what: "no preset can be added to it".to_string(),
-    })?;
-    // What cannot be read back is not written.
-    SettingsFile::parse(path, &edited)?;
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(CliError::io(folder))?;
-    }
-    write_whole(path, edited.as_bytes())
+    save::edit(path, |document| with_preset(document, name, flags))
 }
 
-/// The text of a settings file with a preset more.
-fn with_preset(text: &str, name: &str, flags: &[Flag]) -> Option<String> {
-    let mut document: DocumentMut = text.parse().ok()?;
+/// Puts a preset into a settings file.
+fn with_preset(document: &mut DocumentMut, name: &str, flags: &[Flag]) -> Option<()> {
     let mut tables = Table::new();
     tables.set_implicit(true);
     let presets = document.entry(PRESETS).or_insert(Item::Table(tables)).as_table_like_mut()?;
@@ -107,21 +77,14 @@ fn with_preset(text: &str, name: &str, flags: &[Flag]) -> Option<String> {
     let preset: &mut dyn TableLike = presets.get_mut(name)?.as_table_like_mut()?;
     let gone: Vec<String> = preset.iter().map(|(key, _)| key.to_owned()).collect();
     gone.iter().filter(|key| !flags.iter().any(|(flag, _)| flag == key)).for_each(|key| drop(preset.remove(key)));
-    for (flag, text) in flags {
-        let mut value = toml_number(text).unwrap_or_else(|| Value::from(text.as_str()));
-        match preset.get_mut(flag).and_then(Item::as_value_mut) {
-            Some(old) => {
-                *value.decor_mut() = old.decor().clone();
-                *old = value;
-            }
-            None => drop(preset.insert(flag, Item::Value(value))),
-        }
-    }
-    Some(document.to_string())
+    flags.iter().for_each(|(flag, text)| save::set(preset, flag, text));
+    Some(())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::bokeh::aperture::Shape;
     use crate::bokeh::{Effect, Rank};

@@ -11,9 +11,11 @@ use clap::error::ErrorKind;
 use clap::{Arg, ArgMatches, Args, Command};
 use toml::de::{DeTable, DeValue};
 
+use super::arguments::one_line;
+use super::environment::variable;
 use super::error::CliError;
-use super::one_line;
 use super::options::Every;
+use crate::files::input;
 use crate::look::{flags, presets};
 
 /// Settings by their flags without the dashes, each value as it would follow its flag.
@@ -31,11 +33,9 @@ pub struct SettingsFile {
 /// The table of the file that the presets are in.
 pub const PRESETS: &str = "presets";
 
-/// Gives every setting its environment variable: `BOKEHCAM_` and the flag's name in capitals.
+/// Gives every setting its environment variable.
 pub fn with_environment(command: Command) -> Command {
-    on_settings(command, &|arg, name| {
-        arg.env(format!("BOKEHCAM_{}", name.replace('-', "_").to_uppercase())).hide_env(true)
-    })
+    on_settings(command, &|arg, name| arg.env(variable(name)).hide_env(true))
 }
 
 impl SettingsFile {
@@ -49,7 +49,7 @@ impl SettingsFile {
             (None, Some(user)) if user.is_file() => user,
             _ => return Ok(Self::default()),
         };
-        let text = std::fs::read_to_string(&path).map_err(CliError::io(&path))?;
+        let text = input::read_text(&path, input::MOST_SETTINGS_BYTES).map_err(CliError::io(&path))?;
         Self::parse(&path, &text)
     }
 
@@ -198,7 +198,7 @@ fn is_setting(name: &str) -> bool {
 }
 
 /// The setting whose name clap would suggest.
-fn nearest_setting(name: &str) -> Option<String> {
+pub fn nearest_setting(name: &str) -> Option<String> {
     let error = all_settings().try_get_matches_from([format!("--{name}")]).err()?;
     let suggested = error.get(clap::error::ContextKind::SuggestedArg)?;
     (error.kind() == ErrorKind::UnknownArgument).then(|| suggested.to_string().trim_start_matches('-').to_owned())

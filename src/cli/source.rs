@@ -1,13 +1,14 @@
 //! From SOURCE to a camera and its depth.
 
-use std::fmt;
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
 use std::sync::Arc;
 
 use super::config::Executor;
 use super::error::CliError;
+#[cfg(feature = "camera")]
+use super::source_name::Named;
+pub use super::source_name::SourceName;
 use super::stereo;
+use super::unused::DepthFrom;
 use super::values::{DepthChoice, Effect};
 use super::{defaults, options};
 use crate::capture::replay::{Part, Replay};
@@ -29,147 +30,6 @@ use crate::scene::Scene;
 #[cfg(feature = "camera")]
 use crate::v4l2::{layout::Content, live::Wish};
 
-/// A camera: how it was called, and the node that this means now.
-#[cfg(feature = "camera")]
-#[derive(Clone, Debug, PartialEq)]
-pub struct Named {
-    /// As it is written.
-    name: String,
-    node: PathBuf,
-}
-
-/// Where frames come from, as it is written.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SourceName {
-    /// The moving scene with known depth.
-    Synthetic,
-    /// A folder with a recording.
-    Folder(PathBuf),
-    /// A camera.
-    #[cfg(feature = "camera")]
-    Camera(Named),
-    /// Two cameras, the left one first.
-    #[cfg(feature = "camera")]
-    Cameras([Named; 2]),
-}
-
-impl FromStr for SourceName {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match Path::new(text) {
-            _ if text == "synthetic" => Ok(SourceName::Synthetic),
-            folder if folder.is_dir() => Ok(SourceName::Folder(folder.to_owned())),
-            file if file.is_file() => Err(format!("it is no folder: use {}", sources())),
-            _ => camera(text),
-        }
-    }
-}
-
-/// As it is written.
-impl fmt::Display for SourceName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            SourceName::Synthetic => f.write_str("synthetic"),
-            SourceName::Folder(folder) => folder.display().fmt(f),
-            #[cfg(feature = "camera")]
-            SourceName::Camera(camera) => f.write_str(&camera.name),
-            #[cfg(feature = "camera")]
-            SourceName::Cameras([left, right]) => write!(f, "{},{}", left.name, right.name),
-        }
-    }
-}
-
-/// What can be a source.
-fn sources() -> &'static str {
-    match cfg!(feature = "camera") {
-        true => "a camera, two cameras LEFT,RIGHT, a folder with a recording, or synthetic",
-        false => "a folder with a recording, or synthetic",
-    }
-}
-
-#[cfg(feature = "camera")]
-fn camera(text: &str) -> Result<SourceName, String> {
-    let named = |name: &str| {
-        let node = crate::v4l2::node::resolve(name)?;
-        Ok(Named { name: name.to_owned(), node })
-    };
-    let refuse = |error: crate::v4l2::node::NodeError| Err(format!("{error}; use {}", sources()));
-    // A camera's own name may have commas, too.
-    let alone = match named(text) {
-        Ok(camera) => return Ok(SourceName::Camera(camera)),
-        Err(error) => error,
-    };
-    let halves = |(at, _): (usize, &str)| (&text[..at], &text[at + 1..]);
-    let pairs = || text.match_indices(',').map(halves);
-    for (left, right) in pairs() {
-        if let (Ok(left), Ok(right)) = (named(left), named(right)) {
-            let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
-            if same(&left.node, &right.node) {
-                return Err(format!("the left and the right eye are one camera, {}", left.node.display()));
-            }
-            return Ok(SourceName::Cameras([left, right]));
-        }
-    }
-    match pairs().next() {
-        None => refuse(alone),
-        Some((left, right)) => refuse(named(left).and_then(|_| named(right)).err().unwrap_or(alone)),
-    }
-}
-
-#[cfg(not(feature = "camera"))]
-fn camera(text: &str) -> Result<SourceName, String> {
-    let what = if text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
-        "this build leaves cameras out (feature `camera`)"
-    } else {
-        "there is no such folder, and this build leaves cameras out (feature `camera`)"
-    };
-    Err(format!("{what}: use {}", sources()))
-}
-
-#[cfg(feature = "camera")]
-impl Named {
-    /// Its device node.
-    #[cfg(feature = "window")]
-    pub fn node(&self) -> &Path {
-        &self.node
-    }
-}
-
-impl SourceName {
-    /// Whether the options that choose a part of a recording apply.
-    fn check(&self, source: &options::Source) -> Result<(), CliError> {
-        let what = match self {
-            SourceName::Folder(_) => return Ok(()),
-            SourceName::Synthetic => "synthetic",
-            #[cfg(feature = "camera")]
-            SourceName::Camera(_) | SourceName::Cameras(_) => "a camera",
-        };
-        if source.start.is_none() && source.end.is_none() && !source.repeat {
-            return Ok(());
-        }
-        Err(CliError::Usage(format!(
-            "--start, --end and --loop are for recordings: {what} never ends, give it --frames"
-        )))
-    }
-
-    /// Whether it is a recording.
-    #[cfg(feature = "window")]
-    pub fn is_folder(&self) -> bool {
-        matches!(self, SourceName::Folder(_))
-    }
-
-    /// The devices that frames come from.
-    pub fn devices(&self) -> Vec<&Path> {
-        match self {
-            SourceName::Synthetic | SourceName::Folder(_) => Vec::new(),
-            #[cfg(feature = "camera")]
-            SourceName::Camera(camera) => vec![&camera.node],
-            #[cfg(feature = "camera")]
-            SourceName::Cameras(cameras) => cameras.iter().map(|camera| camera.node.as_path()).collect(),
-        }
-    }
-}
-
 /// An opened source.
 pub struct Source {
     /// Gives the frames.
@@ -178,6 +38,8 @@ pub struct Source {
     pub depth: Option<Box<dyn DepthSource>>,
     /// The eyes that depth comes from, where it comes from two.
     pub rig: Option<StereoRig>,
+    /// What depth comes from.
+    pub depth_from: DepthFrom,
 }
 
 /// How a source is wanted.
@@ -216,6 +78,17 @@ impl Source {
             source.camera = Box::new(SideBySide::new(source.camera).map_err(usage)?);
         }
         let info = source.camera.info();
+        let depth_from = if info.brings == Brings::Depth { DepthFrom::Metres } else { source.depth_from };
+        if stereo.side_by_side
+            && source.depth.is_some()
+            && matches!(wanted.choice(), DepthChoice::Auto | DepthChoice::Recorded)
+        {
+            return Err(CliError::Usage(format!(
+                "--side-by-side: the depth of {} is that of whole pictures, not of their left halves; add --depth stereo \
+                 or --depth none",
+                info.name
+            )));
+        }
         if info.brings != Brings::RightEye {
             if wanted.choice() == &DepthChoice::Stereo {
                 return Err(CliError::Usage(format!(
@@ -231,9 +104,10 @@ impl Source {
             if let Some(blur) = wanted.blur {
                 stereo::check_focus(&rig, blur)?;
             }
-            return Ok(Self { camera: source.camera, depth: Some(Box::new(depth)), rig: Some(rig) });
+            let (depth, depth_from) = (Some(Box::new(depth) as Box<dyn DepthSource>), DepthFrom::Eyes);
+            return Ok(Self { camera: source.camera, depth, rig: Some(rig), depth_from });
         }
-        Ok(Self { camera: source.camera, depth: source.depth, rig: None })
+        Ok(Self { camera: source.camera, depth: source.depth, rig: None, depth_from })
     }
 
     /// Whether its frames have depth.
@@ -279,6 +153,7 @@ impl Wanted<'_> {
 struct Opened {
     camera: Box<dyn Camera>,
     depth: Option<Box<dyn DepthSource>>,
+    depth_from: DepthFrom,
     /// What it says of its two eyes.
     pair: Pair,
     /// The disparities that occur in it.
@@ -288,7 +163,8 @@ struct Opened {
 impl Opened {
     fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, CliError> {
         let Wanted { frames, depth, .. } = *wanted;
-        let of = |camera| Self { camera, depth: None, pair: Pair::Unstated, disparities: None };
+        let depth_from = DepthFrom::Nothing;
+        let of = |camera| Self { camera, depth: None, depth_from, pair: Pair::Unstated, disparities: None };
         match name {
             SourceName::Synthetic => {
                 let size = frames.size.unwrap_or(defaults::SIZE);
@@ -325,11 +201,18 @@ impl Opened {
                     camera = camera.with_right_eye();
                 }
                 let disparities = recording.disparities();
+                let depth_from = depth_of(&recording);
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
                 };
-                Ok(Self { depth, pair: pair.unwrap_or(Pair::Unstated), disparities, ..of(Box::new(camera)) })
+                Ok(Self {
+                    depth,
+                    depth_from,
+                    pair: pair.unwrap_or(Pair::Unstated),
+                    disparities,
+                    ..of(Box::new(camera))
+                })
             }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {
@@ -343,6 +226,15 @@ impl Opened {
                 Ok(of(Box::new(eyes)))
             }
         }
+    }
+}
+
+/// What the depth of a recording is.
+pub fn depth_of(recording: &Recording) -> DepthFrom {
+    match recording.has_depth() {
+        false => DepthFrom::Nothing,
+        true if recording.has_depth_in_units() => DepthFrom::Units,
+        true => DepthFrom::Metres,
     }
 }
 

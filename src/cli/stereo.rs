@@ -1,11 +1,11 @@
 //! From the options about two eyes to depth from them.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use super::calib::{self, Eyes};
 use super::config::Executor;
 use super::error::CliError;
 use super::options;
-use crate::calibration;
 use crate::calibration::rectification::Rectification;
 use crate::calibration::rectifier::Rectifier;
 use crate::capture::SourceInfo;
@@ -56,7 +56,7 @@ impl options::Stereo {
     }
 
     /// What the two eyes are: what the options state, else what the source says. Nothing is guessed.
-    fn state(&self, pair: &Pair, size: (u32, u32)) -> Result<Stated, CliError> {
+    fn state(&self, pair: &Pair, source_name: &str, size: (u32, u32)) -> Result<Stated, CliError> {
         if let Some(rig) = self.rig()? {
             return match (self.rectified, pair) {
                 (true, _) | (false, Pair::Rectified(_)) => Ok(Stated::Rectified(rig)),
@@ -67,8 +67,13 @@ impl options::Stereo {
                 )),
             };
         }
-        let files: Vec<&Path> = self.calib.iter().map(PathBuf::as_path).collect();
-        let read = if files.is_empty() { None } else { Some(Pair::Raw(Box::new(calibration::load(&files)?))) };
+        let read = match self.calib.is_empty() {
+            true => None,
+            false => Some(match calib::read(&self.calib, Path::new(source_name), size)? {
+                Eyes::Rectified { geometry, .. } => Pair::Rectified(geometry.rig),
+                Eyes::Raw(calibration) => Pair::Raw(calibration),
+            }),
+        };
         match read.as_ref().unwrap_or(pair) {
             Pair::Rectified(rig) => Ok(Stated::Rectified(*rig)),
             Pair::Raw(calibration) => {
@@ -102,7 +107,7 @@ pub fn open(
     options: &options::Stereo,
     executor: &Executor,
 ) -> Result<StereoDepth, CliError> {
-    let stated = options.state(pair, info.size)?;
+    let stated = options.state(pair, &info.name, info.size)?;
     let disparities = options.max_disparity.unwrap_or_else(|| settled(disparities, info.size.0));
     let matcher = executor.matcher(disparities, Effort::Full, info.size)?;
     let (depth, how) = match stated {
@@ -127,17 +132,21 @@ pub fn open(
 /// # Errors
 /// The focus or the lens needs metres, and `rig` has none.
 pub fn check_focus(rig: &StereoRig, blur: &options::Blur) -> Result<(), CliError> {
-    let needs = match (blur.focus, blur.f_number) {
-        _ if rig.metric => return Ok(()),
-        (FocusRule::Metres(metres), _) => format!("--focus {metres}"),
-        _ if blur.focus_range > 0.0 => format!("--focus-range {}", blur.focus_range),
-        (_, Some(f_number)) => format!("--f-number {f_number}"),
-        _ => return Ok(()),
-    };
+    let Some(needs) = needs_metres(blur).filter(|_| !rig.metric) else { return Ok(()) };
     Err(CliError::Usage(format!(
         "{needs} needs distances, and these two eyes tell none: give --calib FILE, or --focal-px and --baseline-m; \
          --focus auto or X,Y and --coc-at-infinity need none"
     )))
+}
+
+/// The setting that needs distances, if there is one.
+pub fn needs_metres(blur: &options::Blur) -> Option<String> {
+    match (blur.focus, blur.f_number) {
+        (FocusRule::Metres(metres), _) => Some(format!("--focus {metres}")),
+        _ if blur.focus_range > 0.0 => Some(format!("--focus-range {}", blur.focus_range)),
+        (_, Some(f_number)) => Some(format!("--f-number {f_number}")),
+        _ => None,
+    }
 }
 
 /// Disparities to try: as many as are known to occur, else those of a tenth of the picture's width.

@@ -1,18 +1,22 @@
 //! `stream`: a source, blurred, into a sink.
 
+use std::sync::Arc;
+
 use clap::Args;
 
 use super::config::{self, Executor};
 use super::depth;
 use super::error::CliError;
-use super::files::{refuse_overwrite, write_report};
+use super::files::{check_report, write_report};
 use super::layers::Given;
 #[cfg(feature = "window")]
 use super::preview;
 use super::source::{Source, SourceName, Wanted};
-use super::{options, sinks, terminal, values};
+use super::{options, sinks, terminal, unused, values};
+use crate::bokeh::Effect;
 use crate::clock::Clock;
 use crate::link::demand::Demand;
+use crate::look::Strength;
 use crate::pipeline::{self, Pace, Run};
 use crate::sink::{self, Target};
 
@@ -33,6 +37,7 @@ Examples:
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
     /// folder with a recording, or `synthetic`
+    #[arg(value_parser = SourceName::parser())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]
     to: Vec<Target>,
@@ -58,15 +63,13 @@ const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, -
 pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
     let options::Streaming { stream, output, .. } = parts;
-    sinks::check(&command.to, stream, &command.source.devices())?;
+    sinks::check(&command.to, parts, &command.source)?;
     #[cfg(feature = "window")]
     if command.to.contains(&Target::Window) {
         let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
         return preview::show(&command.source.to_string(), &others, &command.window, parts, (global, given));
     }
-    #[cfg(not(feature = "window"))]
-    let _ = given;
-    refuse_overwrite(stream.report.as_deref(), output.force)?;
+    check_report(stream.report.as_deref(), output.force, &command.to)?;
     if stream.pace == Some(values::Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
@@ -93,27 +96,40 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     };
     let look = config::look(&parts.blur, &parts.aperture, parts.computing.quality, source.has_depth())?;
     let adaptive = pace == Pace::Realtime;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: command.source.kind(),
+            depth: source.depth_from,
+            uses_depth: look.effect == Some(Effect::Dof),
+            effect: look.effect,
+            lens: matches!(look.strength, Strength::Lens(_)),
+            realtime: adaptive,
+            cpu_only: parts.computing.backend == values::Backend::Cpu,
+            window: false,
+        },
+    );
     let bokeh = look.settings(info.size, adaptive).map(|settings| executor.create(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
     let demand = stream.on_demand.then(Demand::new);
+    let stop = terminal::stop_flag()?;
     let sink_options = sink::Options {
+        frames: info.frames,
         force: output.force,
         out_size: stream.out_size.map(|size| (size.width, size.height)),
         demand: demand.clone(),
+        stop: Arc::clone(&stop),
         ..sink::Options::new(info.size, info.period_ns)
     };
+    sinks::try_report(stream.report.as_deref())?;
     let sink = sinks::open(&command.to, &sink_options)?;
 
     if info.live && !global.quiet {
         terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
-        if parts.blur.effect == values::Effect::Auto && !source.has_depth() {
-            terminal::say(
-                "there is no depth, so the whole picture is blurred: --depth NAME takes a depth camera's, --effect \
-                 tilt-shift keeps a band sharp",
-            );
-        }
     }
-    let stop = terminal::stop_flag()?;
+    if parts.blur.takes_whatever_depth() && !source.has_depth() {
+        unused::warn_of_no_depth(command.source.kind());
+    }
     let bar = terminal::Progress::new(info.frames, global);
     let ended = pipeline::run(Run {
         camera: source.camera,
@@ -140,11 +156,16 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         Ok(report) => (Box::new(report), Ok(())),
         Err(failed) => (failed.report, Err(failed.fault.into())),
     };
-    if let Some(path) = &stream.report {
-        write_report(path, &report)?;
-    }
+    let written = stream.report.as_ref().map_or(Ok(()), |path| write_report(path, &report));
     if !global.quiet {
         terminal::say(&report.to_string());
     }
-    ended
+    match (ended, written) {
+        // What ended the run is the error to tell.
+        (Err(ended), Err(unwritten)) => {
+            terminal::say(&format!("the report is not written: {unwritten}"));
+            Err(ended)
+        }
+        (ended, written) => ended.and(written),
+    }
 }

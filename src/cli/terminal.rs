@@ -1,39 +1,14 @@
-//! What the user sees while a command runs: log lines, one-line messages, progress.
+//! What the user sees while a command runs, and how it is ended.
 
-use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use tracing_subscriber::EnvFilter;
 
 use super::error::CliError;
+use super::log;
+pub use super::log::say;
 use super::options::Global;
-use super::values::LogFormat;
-
-/// Sends log lines to stderr: warnings, or as `-v`, `-q` and `RUST_LOG` say.
-pub fn start_log(global: &Global) {
-    let level = match (global.quiet, global.verbose) {
-        (true, _) => "error",
-        // What others grumble about is seldom for who uses this.
-        (_, 0) => "bokehcam=warn,error",
-        (_, 1) => "bokehcam=info,warn",
-        (_, _) => "bokehcam=debug,info",
-    };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
-    let log = log.with_ansi(io::stderr().is_terminal());
-    // A second log in one process changes nothing.
-    let _ = match global.log_format {
-        LogFormat::Text => log.try_init(),
-        LogFormat::Json => log.json().try_init(),
-    };
-}
-
-/// One line on stderr; a closed stderr is no reason to fail.
-pub fn say(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
-}
 
 /// The first Ctrl-C (or a termination signal) sets the flag, so that the file in hand is finished; the second ends
 /// the program at once.
@@ -67,6 +42,7 @@ impl Progress {
         };
         let target = if global.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(frames, target);
+        log::bar_is_shown(!bar.is_hidden());
         bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self(bar)
     }
@@ -80,5 +56,6 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+        log::bar_is_shown(false);
     }
 }

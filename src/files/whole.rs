@@ -6,6 +6,7 @@
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -61,12 +62,32 @@ impl Part {
     ///
     /// # Errors
     /// [`ErrorKind::AlreadyExists`] without `replace`, or what the system says. The part is then removed.
-    pub fn commit(self, replace: bool) -> io::Result<()> {
+    pub fn commit(mut self, replace: bool) -> io::Result<()> {
+        self.try_commit(replace)
+    }
+
+    /// As [`Part::commit`], but a part that could not be given its name can still be [kept](Self::keep_incomplete).
+    ///
+    /// # Errors
+    /// As for [`Part::commit`].
+    pub fn try_commit(&mut self, replace: bool) -> io::Result<()> {
         if replace && let Ok(there) = fs::metadata(&self.path) {
             self.file.set_permissions(there.permissions())?;
         }
-        let path = self.path.clone();
-        self.rename(&path, replace)
+        self.file.sync_all()?;
+        rename(&self.part, &self.path, replace)?;
+        self.open = false;
+        sync_folder(&self.path)
+    }
+
+    /// As [`Part::commit`] without replacing, and without waiting for the disk: who calls this syncs the file system later.
+    ///
+    /// # Errors
+    /// As for [`Part::commit`].
+    pub fn commit_unsynced(mut self) -> io::Result<()> {
+        rename(&self.part, &self.path, false)?;
+        self.open = false;
+        Ok(())
     }
 
     /// Keeps what is not whole as `NAME.incomplete`, or `NAME.incomplete.2` and on where that is taken; gives the name.
@@ -74,18 +95,10 @@ impl Part {
     /// # Errors
     /// What the system says. The part is then left where it is.
     pub fn keep_incomplete(mut self) -> io::Result<PathBuf> {
-        // Whatever happens from here on, what is there is more than nothing.
+        // Whatever happens from here on, what is there is more than nothing; so is what is not synced.
         self.open = false;
-        let kept = keep_incomplete(&self.part, &self.path)?;
-        self.file.sync_all()?;
-        Ok(kept)
-    }
-
-    fn rename(mut self, to: &Path, replace: bool) -> io::Result<()> {
-        self.file.sync_all()?;
-        rename(&self.part, to, replace)?;
-        self.open = false;
-        sync_folder(to)
+        let _ = self.file.sync_all();
+        keep_incomplete(&self.part, &self.path)
     }
 }
 
@@ -149,20 +162,33 @@ pub fn keep_incomplete(part: &Path, path: &Path) -> io::Result<PathBuf> {
 /// The folder cannot be read.
 pub fn left_behind(path: &Path) -> io::Result<Vec<PathBuf>> {
     let (folder, name) = split(path)?;
+    let all = all_left_behind(folder)?.into_iter();
+    Ok(all.filter(|(_, of)| of == name).map(|(part, _)| part).collect())
+}
+
+/// All parts in a folder whose process is gone, each with the name that it would have had in the end.
+///
+/// # Errors
+/// The folder cannot be read.
+pub fn all_left_behind(folder: &Path) -> io::Result<Vec<(PathBuf, OsString)>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
-        let is_part = is_part_of(&entry.file_name(), name) && entry.file_type()?.is_file();
+        let name = entry.file_name();
+        let Some(of) = name_of_part(&name).filter(|_| entry.file_type().is_ok_and(|kind| kind.is_file())) else {
+            continue;
+        };
         let is_free = |file: File| flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok();
-        if is_part && super::input::open(&entry.path()).is_ok_and(is_free) {
-            found.push(entry.path());
+        if super::input::open(&entry.path()).is_ok_and(is_free) {
+            found.push((entry.path(), of.to_owned()));
         }
     }
     found.sort();
     Ok(found)
 }
 
-fn sync_folder(path: &Path) -> io::Result<()> {
+/// Sees to it that a file's name is safely on the disk.
+pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     let (folder, _) = split(path)?;
     // Not every file system syncs folders; the file itself is on the disk.
     let _ = File::open(folder)?.sync_all();
@@ -184,15 +210,15 @@ fn part_name(name: &OsStr) -> OsString {
     part
 }
 
-fn is_part_of(part: &OsStr, name: &OsStr) -> bool {
-    let part = part.as_encoded_bytes().strip_prefix(b".");
-    let numbers = part.and_then(|part| part.strip_prefix(name.as_encoded_bytes())?.strip_prefix(b"."));
-    let numbers = numbers.and_then(|rest| rest.strip_suffix(SUFFIX.as_bytes()));
-    numbers.is_some_and(|numbers| {
-        let mut parts = numbers.split(|&byte| byte == b'-');
-        let is_number = |part: Option<&[u8]>| part.is_some_and(|p| !p.is_empty() && p.iter().all(u8::is_ascii_digit));
-        is_number(parts.next()) && is_number(parts.next()) && parts.next().is_none()
-    })
+/// The name in the end, if this is that of a part.
+fn name_of_part(part: &OsStr) -> Option<&OsStr> {
+    let part = part.as_bytes().strip_prefix(b".")?.strip_suffix(SUFFIX.as_bytes())?;
+    let (name, numbers) = part.split_at(part.iter().rposition(|&byte| byte == b'.')?);
+    let mut numbers = numbers[1..].split(|&byte| byte == b'-');
+    let is_number = |part: Option<&[u8]>| part.is_some_and(|p| !p.is_empty() && p.iter().all(u8::is_ascii_digit));
+    let is_part =
+        !name.is_empty() && is_number(numbers.next()) && is_number(numbers.next()) && numbers.next().is_none();
+    is_part.then(|| OsStr::from_bytes(name))
 }
 
 #[cfg(test)]

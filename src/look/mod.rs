@@ -27,6 +27,9 @@ pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
 /// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
 pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
 
+/// No CoC radius is larger, in pixels: pictures have sides up to 16384 px. What a picture bears is its diagonal.
+pub const MOST_RADIUS_PX: f32 = 20_000.0;
+
 /// Whether depth is refined before the blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refine {

@@ -27,7 +27,8 @@ impl Gather {
         let (bank, pixels) = (&plan.bank, plan.width * plan.height);
         Self {
             kernels: if plan.exact {
-                (0..bank.nodes).map(|node| [bank.kernel(node, false), bank.kernel(node, true)]).collect()
+                let turned = |node| if bank.even { Vec::new() } else { bank.kernel(node, true) };
+                (0..bank.nodes).map(|node| [bank.kernel(node, false), turned(node)]).collect()
             } else {
                 Vec::new()
             },
@@ -94,7 +95,7 @@ struct Exact<'a> {
     pub source: &'a Rows<4>,
     /// Columns and rows.
     pub size: (usize, usize),
-    /// Kernels by node, `(2 r + 1)^2` taps each, far and turned.
+    /// Kernels by node, `(2 r + 1)^2` taps each, far and turned; turned ones only where that makes a difference.
     pub kernels: &'a [[Vec<f32>; 2]],
     /// The bank (for the nodes).
     pub bank: &'a Bank,
@@ -114,7 +115,7 @@ impl WithSimd for Exact<'_> {
         for x in 0..width {
             let node = self.bank.node(self.coc[x].abs());
             let reach = self.bank.node_reach[node] as usize;
-            let kernel = &self.kernels[node][usize::from(self.coc[x] < 0.0)];
+            let kernel = &self.kernels[node][usize::from(self.coc[x] < 0.0 && !self.bank.even)];
             let side = 2 * reach + 1;
             let mut sums = [simd.splat_f32s(0.0); 3];
             let mut tails = [0.0f32; 3];

@@ -76,6 +76,14 @@ pub fn works(plan: &Plan) -> usize {
     3 + MAX_BINS * plan.levels.most_terms().div_ceil(4)
 }
 
+/// Bytes of the largest buffer of filters or kernels.
+pub fn filter_bytes(plan: &Plan) -> u64 {
+    let of_bank = |bank: &Bank| (bank.horizontal.len() / bank.terms * bank.terms.div_ceil(4) * 16) as u64;
+    let of_node = |&reach: &u32| u64::from(2 * reach + 1).pow(2) * 4;
+    let kernels = if plan.exact { plan.bank.node_reach.iter().map(of_node).sum() } else { 0 };
+    plan.levels.banks.iter().map(|bank| of_bank(bank)).fold(kernels, u64::max)
+}
+
 impl Buffers {
     /// Allocates everything and uploads what never changes.
     pub fn new(device: &Device, plan: &Plan, capacity: &Capacity) -> Self {

@@ -60,7 +60,7 @@ impl GpuBokeh {
         let most = device.device.limits().max_storage_buffer_binding_size;
         let capacity = Capacity::of(plan);
         let rows = capacity.rows * plan.levels.most_terms().min(4);
-        let largest = capacity.pixels.max(rows).max(1) as u64 * 8;
+        let largest = (capacity.pixels.max(rows).max(1) as u64 * 8).max(buffers::filter_bytes(plan));
         if largest > most {
             return Err(GpuError::Failed(format!(
                 "{}: pictures of {} x {} need buffers of {largest} bytes and it allows {most}; use --backend cpu",

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
 use crate::bokeh::plan::{ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HINDMOST_COVERAGE, SEGMENT};
 use crate::compute::device::Shader;
 
@@ -48,13 +49,15 @@ pub const ALL: [Shader; 12] =
     [UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, KNOW, PULL, PUSH, FILL, COMPOSITE];
 
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 6] = [
+pub const CONSTANTS: [(&str, f64); 8] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("ANY_COLOR", ANY_COLOR as f64),
     ("COVERAGE_FLOOR", COVERAGE_FLOOR as f64),
     ("FAR_WEIGHT", FAR_WEIGHT as f64),
     ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
+    ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
+    ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
 ];
 
 /// `Frame` of `common.wgsl`, where each field is explained.

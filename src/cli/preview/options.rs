@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::BoolishValueParser;
 use clap::{Args, ValueEnum};
 
 use super::super::values::between;
@@ -31,15 +32,18 @@ pub struct Window {
     pub split: Option<f32>,
     /// Fill the screen
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub full_screen: bool,
     /// Show frame times, latency and drops
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
-          default_missing_value = "true", hide_default_value = true, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
     pub instruments: bool,
     /// Show the controls; --panel=false begins without
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = true,
-          default_missing_value = "true", action = clap::ArgAction::Set, hide_possible_values = true)]
+          default_missing_value = "true", value_parser = BoolishValueParser::new(),
+          action = clap::ArgAction::Set, hide_possible_values = true)]
     pub panel: bool,
     /// Size of text and controls, 1 as usual
     #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = between(0.75, 3.0))]

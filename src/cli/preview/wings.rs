@@ -4,14 +4,16 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::super::config::Executor;
 use super::super::layers::Given;
 use super::super::options::{self, Streaming};
 use super::super::settings::SettingsFile;
 use super::super::source::{Source, SourceName, Wanted};
+use super::super::unused::From;
 use super::super::values::Effect;
-use super::super::{command_line, depth, presets, print};
+use super::super::{command_line, depth, presets, print, save};
 use crate::bokeh::{self, Backend, Bokeh};
 use crate::clock::Clock;
 use crate::compute::device::Device;
@@ -53,7 +55,7 @@ impl Wings {
         executor: &Executor,
         device: Option<Arc<Device>>,
         chosen: Option<PathBuf>,
-        Given { switches: given, behind }: Given,
+        Given { switches: given, behind, .. }: Given,
     ) -> Self {
         let mut parts = parts.clone();
         // Of depth the window may make use later.
@@ -75,7 +77,8 @@ impl Wings {
     fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
         let Streaming { frames, blur, depth, stereo, stream, .. } = &self.parts;
-        let frames = options::Source { repeat: frames.repeat && source_name.is_folder(), ..frames.clone() };
+        let frames =
+            options::Source { repeat: frames.repeat && source_name.kind() == From::Recording, ..frames.clone() };
         let wanted = Wanted {
             frames: &frames,
             depth,
@@ -150,10 +153,17 @@ impl Backstage for Wings {
         made.map_err(|error| error.to_string())
     }
 
-    fn output(&mut self, name: &str, size: (u32, u32), period_ns: u64) -> Result<Box<dyn Sink>, String> {
+    fn output(
+        &mut self,
+        name: &str,
+        size: (u32, u32),
+        period_ns: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn Sink>, String> {
         let out_size = self.parts.stream.out_size.map(|size| (size.width, size.height));
         let force = self.parts.output.force;
-        let options = sink::Options { force, out_size, ..sink::Options::new(size, period_ns) };
+        let stop = Arc::clone(stop);
+        let options = sink::Options { force, out_size, stop, ..sink::Options::new(size, period_ns) };
         let target = Target::from_str(name).map_err(|error| error.to_string())?;
         target.open(&options).map_err(|error| error.to_string())
     }
@@ -186,7 +196,7 @@ impl Backstage for Wings {
     }
 
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
-        let saved = presets::file_to_save(self.chosen.as_deref());
+        let saved = save::file_to_save(self.chosen.as_deref());
         let saved = saved.and_then(|file| presets::save(&file, name, &look.every_flag()));
         saved.map_err(|error| error.to_string())?;
         self.sources();

@@ -77,11 +77,7 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Rectified => write!(f, "the pair is rectified"),
-            Self::RowsOff { px } => write!(
-                f,
-                "the pair is not rectified: rows are off by up to {px:.1} px; give the calibration of the cameras \
-                 with --calib FILE"
-            ),
+            Self::RowsOff { px } => write!(f, "the pair is not rectified: rows are off by up to {px:.1} px"),
             Self::Swapped => write!(f, "left and right are exchanged: disparities are negative; exchange the pictures"),
             Self::Unclear { matches } => write!(
                 f,

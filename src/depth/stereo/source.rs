@@ -73,12 +73,25 @@ impl StereoDepth {
     }
 }
 
-/// Whether a pair is what it was said to be; said where it is not. Gives whether it could be told.
-fn first_look(source_name: &str, left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<bool, MatchError> {
+/// Whether a pair is what it was said to be, or what its calibration made of it; said where it is not. Gives whether it
+/// could be told.
+fn first_look(
+    (source_name, calibrated): (&str, bool),
+    left: &GrayImage,
+    right: &GrayImage,
+    disparities: u32,
+) -> Result<bool, MatchError> {
     let verdict = check(left, right, disparities)?.verdict();
     match verdict {
         Verdict::Rectified => tracing::info!("{source_name}: {verdict}"),
-        Verdict::RowsOff { .. } | Verdict::Swapped => tracing::warn!("{source_name}: {verdict}"),
+        Verdict::RowsOff { .. } if calibrated => tracing::warn!(
+            "{source_name}: {verdict}, although it was rectified: the calibration is not that of these cameras as they \
+             stand now; calibrate them again"
+        ),
+        Verdict::RowsOff { .. } => {
+            tracing::warn!("{source_name}: {verdict}; rectify it with --calib FILE, and without --rectified");
+        }
+        Verdict::Swapped => tracing::warn!("{source_name}: {verdict}"),
         Verdict::Unclear { .. } => {
             tracing::debug!("{source_name}: {verdict}");
             return Ok(false);
@@ -108,7 +121,7 @@ impl DepthSource for StereoDepth {
             None => right,
         };
         if self.looks > 0 {
-            let told = first_look(&self.source_name, &self.left, right, self.disparities)?;
+            let told = first_look((&self.source_name, self.rectifier.is_some()), &self.left, right, self.disparities)?;
             self.looks = if told { 0 } else { self.looks - 1 };
         }
         let pair = Pair { left: &self.left, color: Some(seen.color), right };

@@ -1,0 +1,195 @@
+//! What frames come from, as it is written.
+
+use std::ffi::OsStr;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::builder::{OsStringValueParser, TypedValueParser};
+
+use super::error::CliError;
+use super::unused::From;
+use super::{near, options};
+
+/// A camera: how it was called, and the node that this means now.
+#[cfg(feature = "camera")]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Named {
+    /// As it is written.
+    pub name: String,
+    node: PathBuf,
+}
+
+/// Where frames come from, as it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SourceName {
+    /// The moving scene with known depth.
+    Synthetic,
+    /// A folder with a recording.
+    Folder(PathBuf),
+    /// A camera.
+    #[cfg(feature = "camera")]
+    Camera(Named),
+    /// Two cameras, the left one first.
+    #[cfg(feature = "camera")]
+    Cameras([Named; 2]),
+}
+
+impl FromStr for SourceName {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::from_os(text.as_ref())
+    }
+}
+
+/// Whether a text is meant as a path, and not as the name of a camera.
+fn looks_like_a_path(text: &str) -> bool {
+    text.contains('/') && !text.starts_with("/dev/")
+}
+
+/// As it is written.
+impl fmt::Display for SourceName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SourceName::Synthetic => f.write_str("synthetic"),
+            SourceName::Folder(folder) => folder.display().fmt(f),
+            #[cfg(feature = "camera")]
+            SourceName::Camera(camera) => f.write_str(&camera.name),
+            #[cfg(feature = "camera")]
+            SourceName::Cameras([left, right]) => write!(f, "{},{}", left.name, right.name),
+        }
+    }
+}
+
+/// What can be a source.
+fn sources() -> &'static str {
+    match cfg!(feature = "camera") {
+        true => "a camera, two cameras LEFT,RIGHT, a folder with a recording, or synthetic",
+        false => "a folder with a recording, or synthetic",
+    }
+}
+
+/// What is said where there is no folder of a name that looks like one's.
+fn no_folder(text: &str) -> String {
+    let hint =
+        near::folder(Path::new(text)).map_or(String::new(), |near| format!(", did you mean {}?", near.display()));
+    format!("there is no such folder{hint}; use {}", sources())
+}
+
+#[cfg(feature = "camera")]
+fn camera(text: &str) -> Result<SourceName, String> {
+    let named = |name: &str| {
+        let node = crate::v4l2::node::resolve(name)?;
+        Ok(Named { name: name.to_owned(), node })
+    };
+    let refuse = |error: crate::v4l2::node::NodeError| match near::folder(Path::new(text)) {
+        Some(near) => Err(format!("{error}; or did you mean the folder {}? Use {}", near.display(), sources())),
+        None => Err(format!("{error}; use {}", sources())),
+    };
+    // A camera's own name may have commas, too.
+    let alone = match named(text) {
+        Ok(camera) => return Ok(SourceName::Camera(camera)),
+        Err(error) => error,
+    };
+    let halves = |(at, _): (usize, &str)| (&text[..at], &text[at + 1..]);
+    let pairs = || text.match_indices(',').map(halves);
+    for (left, right) in pairs() {
+        if let (Ok(left), Ok(right)) = (named(left), named(right)) {
+            let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
+            if same(&left.node, &right.node) {
+                return Err(format!("the left and the right eye are one camera, {}", left.node.display()));
+            }
+            return Ok(SourceName::Cameras([left, right]));
+        }
+    }
+    match pairs().next() {
+        None => refuse(alone),
+        Some((left, right)) => refuse(named(left).and_then(|_| named(right)).err().unwrap_or(alone)),
+    }
+}
+
+#[cfg(not(feature = "camera"))]
+fn camera(text: &str) -> Result<SourceName, String> {
+    let what = if text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
+        "this build leaves cameras out (feature `camera`)"
+    } else {
+        "there is no such folder, and this build leaves cameras out (feature `camera`)"
+    };
+    Err(format!("{what}: use {}", sources()))
+}
+
+#[cfg(feature = "camera")]
+impl Named {
+    /// Its device node.
+    #[cfg(feature = "window")]
+    pub fn node(&self) -> &Path {
+        &self.node
+    }
+}
+
+impl SourceName {
+    /// A parser of sources. A folder's name need not be text.
+    pub fn parser() -> impl TypedValueParser<Value = Self> {
+        OsStringValueParser::new().try_map(|name| Self::from_os(&name))
+    }
+
+    fn from_os(name: &OsStr) -> Result<Self, String> {
+        let path = Path::new(name);
+        match name.to_str() {
+            Some("synthetic") => Ok(SourceName::Synthetic),
+            _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
+            _ if path.is_file() => Err(format!("it is no folder: use {}", sources())),
+            Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
+            Some(text) => camera(text),
+            None => Err(no_folder(&path.display().to_string())),
+        }
+    }
+
+    /// What it is, as far as settings depend on it.
+    pub fn kind(&self) -> From {
+        match self {
+            SourceName::Synthetic => From::Synthetic,
+            SourceName::Folder(_) => From::Recording,
+            #[cfg(feature = "camera")]
+            SourceName::Camera(_) | SourceName::Cameras(_) => From::Camera,
+        }
+    }
+
+    /// Whether the options that choose a part of a recording apply.
+    ///
+    /// # Errors
+    /// One is given, and it is no recording.
+    pub fn check(&self, source: &options::Source) -> Result<(), CliError> {
+        let what = match self {
+            SourceName::Folder(_) => return Ok(()),
+            SourceName::Synthetic => "synthetic",
+            #[cfg(feature = "camera")]
+            SourceName::Camera(_) | SourceName::Cameras(_) => "a camera",
+        };
+        if source.start.is_none() && source.end.is_none() && !source.repeat {
+            return Ok(());
+        }
+        Err(CliError::Usage(format!(
+            "--start, --end and --loop are for recordings: {what} never ends, give it --frames"
+        )))
+    }
+
+    /// The folder that frames come from.
+    pub fn folder(&self) -> Option<&Path> {
+        match self {
+            SourceName::Folder(folder) => Some(folder),
+            _ => None,
+        }
+    }
+
+    /// The devices that frames come from.
+    pub fn devices(&self) -> Vec<&Path> {
+        match self {
+            SourceName::Synthetic | SourceName::Folder(_) => Vec::new(),
+            #[cfg(feature = "camera")]
+            SourceName::Camera(camera) => vec![&camera.node],
+            #[cfg(feature = "camera")]
+            SourceName::Cameras(cameras) => cameras.iter().map(|camera| camera.node.as_path()).collect(),
+        }
+    }
+}

@@ -1,0 +1,367 @@
+//! Folders whose files belong together, such as the pictures of one run: what was there stays until all of the new is whole.
+//!
+//! A list of its own in the folder, [`LIST`], says which files were written by us, one name a line: others are never
+//! touched. Into an empty folder files are written as they come, each whole. Where there is something already, they go into
+//! a hidden folder within, which is renamed when they are whole: from then on the swap is done, or done with by who opens
+//! the folder next. While it is open the folder is locked.
+
+mod list;
+
+use std::fs::{self, File};
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{FlockOperation, flock, syncfs};
+
+use self::list::List;
+pub use self::list::adopt;
+use super::whole::{self, Part};
+
+/// What the list of our own files is called.
+pub const LIST: &str = ".bokehcam";
+/// Where files wait that will replace others.
+pub const PART: &str = ".bokehcam.part";
+const WHOLE: &str = ".bokehcam.whole";
+
+/// Why a folder cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// It has something in it, and nothing may be replaced.
+    #[error("the folder {} is not empty; choose another or write into it with --force", path.display())]
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file has a name that is to be written, and is none of ours.
+    #[error("{} was not written by bokehcam, and stays: move it away, or choose another folder", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another program, or this one twice.
+    #[error("the folder {} is being written by another run: choose another", path.display())]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// It was removed while it was written.
+    #[error("the folder {} was removed meanwhile", path.display())]
+    Gone {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The system refused.
+    #[error("cannot write {}: {cause}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// What it said.
+        cause: io::Error,
+    },
+}
+
+impl FolderError {
+    fn write(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        |cause| Self::Write { path: path.to_owned(), cause }
+    }
+}
+
+/// Which files will be written.
+pub struct Set<'a> {
+    /// Folders within the folder that have files of the set.
+    pub subfolders: &'a [&'a str],
+    /// Whether the set may have a file of this name, such as `000000.png` or `rgb/000000.png`.
+    pub has: &'a dyn Fn(&str) -> bool,
+}
+
+/// A folder that is being written. Dropping it is as [`Folder::cut`].
+#[derive(Debug)]
+pub struct Folder {
+    /// Its name without a slash at the end.
+    path: PathBuf,
+    /// Where files go meanwhile, if not into the folder itself.
+    beside: Option<PathBuf>,
+    list: List,
+    /// Keeps others out as long as it is open.
+    lock: File,
+    ended: bool,
+}
+
+impl Folder {
+    /// Opens the folder for a set of files, and makes it where it is missing. What runs that were killed left behind in
+    /// it is kept as `NAME.incomplete`, which is logged.
+    ///
+    /// # Errors
+    /// It has something in it and `replace` is not set, or has a file of the set that is none of ours; it is being
+    /// written, or cannot be.
+    pub fn open(path: &Path, replace: bool, set: &Set) -> Result<Self, FolderError> {
+        let path: PathBuf = path.components().collect();
+        let write = || FolderError::write(&path);
+        fs::create_dir_all(&path).map_err(write())?;
+        let lock = File::open(&path).map_err(write())?;
+        if flock(&lock, FlockOperation::NonBlockingLockExclusive) == Err(rustix::io::Errno::WOULDBLOCK) {
+            return Err(FolderError::Busy { path });
+        }
+        recover(&path, set)?;
+        let mut names = fs::read_dir(&path).map_err(write())?.map(|entry| entry.map(|entry| entry.file_name()));
+        let others = names.find(|name| name.as_ref().map_or(true, |name| name != LIST)).transpose().map_err(write())?;
+        let beside = match others {
+            None => None,
+            Some(_) if !replace => return Err(FolderError::NotEmpty { path }),
+            Some(_) => {
+                refuse_foreign(&path, set)?;
+                let part = path.join(PART);
+                fs::create_dir(&part).map_err(FolderError::write(&part))?;
+                Some(part)
+            }
+        };
+        let list = List::create(beside.as_ref().unwrap_or(&path))?;
+        Ok(Self { path, beside, list, lock, ended: false })
+    }
+
+    /// The folder's name in the end.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Files that are in it.
+    pub fn files(&self) -> u64 {
+        self.list.len()
+    }
+
+    /// Whether files that were there go when the new ones are whole.
+    pub fn replaces(&self) -> bool {
+        self.beside.is_some()
+    }
+
+    /// Starts the file of this name, whose subfolder is made where it is missing. [`Folder::put`] takes it.
+    ///
+    /// # Errors
+    /// The folder is gone, or cannot be written.
+    pub fn begin(&self, name: &str) -> Result<Part, FolderError> {
+        self.check_there()?;
+        let path = self.place().join(name);
+        if let Some((subfolder, _)) = name.rsplit_once('/') {
+            make_subfolder(&self.place().join(subfolder))?;
+        }
+        Part::create(&path).map_err(FolderError::write(&path))
+    }
+
+    /// Takes a file that is whole.
+    ///
+    /// # Errors
+    /// Something of its name has appeared, or it cannot be written; the folder is then as it was.
+    pub fn put(&mut self, part: Part) -> Result<(), FolderError> {
+        let path = part.path().to_owned();
+        let name = path.strip_prefix(self.place()).ok().and_then(Path::to_str).unwrap_or_default().to_owned();
+        part.commit_unsynced().map_err(|cause| match cause.kind() {
+            ErrorKind::AlreadyExists => FolderError::Foreign { path: path.clone() },
+            _ => FolderError::Write { path: path.clone(), cause },
+        })?;
+        self.list.add(&name).inspect_err(|_| {
+            // What the list does not have would be nobody's; the list's error is the one to tell.
+            let _ = fs::remove_file(&path);
+        })
+    }
+
+    /// All is whole: it takes the place of the files that an earlier run wrote, as far as the list has them. Gives their
+    /// number.
+    ///
+    /// # Errors
+    /// Something foreign has appeared, which stays, and what was written is kept as `NAME.incomplete`; or the files could
+    /// not be moved, which is then done when the folder is opened again.
+    pub fn finish(mut self) -> Result<u64, FolderError> {
+        self.check_there()?;
+        self.sync()?;
+        self.ended = true;
+        let Some(part) = self.beside.take() else {
+            self.tidy_up();
+            return Ok(0);
+        };
+        let checked = list::read(&part).and_then(|new| {
+            let old = list::read(&self.path)?;
+            new.iter().filter(|name| !old.contains(*name)).try_for_each(|name| {
+                let path = self.path.join(name);
+                if path.symlink_metadata().is_ok() { Err(FolderError::Foreign { path }) } else { Ok(()) }
+            })
+        });
+        if let Err(error) = checked {
+            keep(&part, &self.path)?;
+            return Err(error);
+        }
+        let whole = self.path.join(WHOLE);
+        // From here on the new files are the ones that count.
+        whole::rename(&part, &whole, false).map_err(FolderError::write(&whole))?;
+        swap(&self.path)
+    }
+
+    /// The files are not all that there should be: what was there stays, and the new files are kept as
+    /// `NAME.incomplete`, whose name is given. Into an empty folder they were written themselves, and stay.
+    ///
+    /// # Errors
+    /// They cannot be renamed, and stay in a hidden folder within.
+    pub fn cut(mut self) -> Result<Option<PathBuf>, FolderError> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Result<Option<PathBuf>, FolderError> {
+        self.ended = true;
+        self.check_there()?;
+        self.sync()?;
+        match self.beside.take() {
+            Some(part) if self.list.len() > 0 => keep(&part, &self.path).map(Some),
+            Some(part) => fs::remove_dir_all(&part).map(|()| None).map_err(FolderError::write(&part)),
+            None => {
+                self.tidy_up();
+                Ok(None)
+            }
+        }
+    }
+
+    /// All files at once: to wait for the disk after each would be longer than a camera waits.
+    fn sync(&self) -> Result<(), FolderError> {
+        syncfs(&self.lock).map_err(|error| FolderError::write(&self.path)(error.into()))
+    }
+
+    fn check_there(&self) -> Result<(), FolderError> {
+        let state = self.lock.metadata().map_err(FolderError::write(&self.path))?;
+        if state.nlink() == 0 { Err(FolderError::Gone { path: self.path.clone() }) } else { Ok(()) }
+    }
+
+    fn place(&self) -> &Path {
+        self.beside.as_ref().unwrap_or(&self.path)
+    }
+
+    /// A list of nothing says nothing.
+    fn tidy_up(&self) {
+        if self.list.len() == 0 {
+            let _ = fs::remove_file(self.path.join(LIST));
+        }
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if !self.ended
+            && let Err(error) = self.end()
+        {
+            tracing::warn!("{error}");
+        }
+    }
+}
+
+/// Refuses files of the set that the list does not have.
+fn refuse_foreign(path: &Path, set: &Set) -> Result<(), FolderError> {
+    let ours = list::read(path)?;
+    for subfolder in [""].iter().chain(set.subfolders) {
+        let folder = path.join(subfolder);
+        match fs::symlink_metadata(&folder) {
+            Err(error) if error.kind() == ErrorKind::NotFound => continue,
+            Ok(there) if !subfolder.is_empty() && !there.is_dir() => return Err(FolderError::Foreign { path: folder }),
+            _ => {}
+        }
+        for entry in fs::read_dir(&folder).map_err(FolderError::write(&folder))? {
+            let name = entry.map_err(FolderError::write(&folder))?.file_name();
+            let Some(name) = name.to_str() else { continue };
+            let name = if subfolder.is_empty() { name.to_owned() } else { format!("{subfolder}/{name}") };
+            if (set.has)(&name) && !ours.contains(&name) {
+                return Err(FolderError::Foreign { path: path.join(name) });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Ends what a run that was killed began.
+fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
+    if is_folder(&path.join(WHOLE)) {
+        swap(path)?;
+    }
+    let part = path.join(PART);
+    if is_folder(&part) {
+        if list::read(&part)?.is_empty() {
+            fs::remove_dir_all(&part).map_err(FolderError::write(&part))?;
+        } else {
+            let kept = keep(&part, path)?;
+            tracing::warn!("{}: what an earlier run left unfinished is kept as {}", path.display(), kept.display());
+        }
+    }
+    for folder in [""].iter().chain(set.subfolders).map(|subfolder| path.join(subfolder)) {
+        // Where there is none, nothing is left behind.
+        for (part, name) in whole::all_left_behind(&folder).unwrap_or_default() {
+            let file = folder.join(name);
+            let name = file.strip_prefix(path).ok().and_then(Path::to_str);
+            if name.is_some_and(|name| (set.has)(name)) {
+                // One file that is not whole, of many that are.
+                fs::remove_file(&part).map_err(FolderError::write(&part))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Moves whole files to where they belong, after the old ones are gone, the last ones first. May have been broken off
+/// anywhere before. Gives the number of files that went.
+fn swap(path: &Path) -> Result<u64, FolderError> {
+    let whole = path.join(WHOLE);
+    let (old, new) = (list::read(path)?, list::read(&whole)?);
+    let mut gone = 0;
+    for name in old.iter().rev() {
+        let is_moved = new.contains(name) && !whole.join(name).exists();
+        let file = path.join(name);
+        if is_moved || !is_file(path, name) {
+            continue;
+        }
+        fs::remove_file(&file).map_err(FolderError::write(&file))?;
+        gone += 1;
+    }
+    for name in new.iter() {
+        let (from, to) = (whole.join(name), path.join(name));
+        if let Some((subfolder, _)) = name.rsplit_once('/') {
+            make_subfolder(&path.join(subfolder))?;
+        }
+        match whole::rename(&from, &to, false) {
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(FolderError::Foreign { path: to }),
+            renamed => renamed.map_err(FolderError::write(&to))?,
+        }
+    }
+    let list = path.join(LIST);
+    whole::rename(&whole.join(LIST), &list, true).map_err(FolderError::write(&list))?;
+    fs::remove_dir_all(&whole).map_err(FolderError::write(&whole))?;
+    for name in old.iter().filter_map(|name| Some(name.rsplit_once('/')?.0)) {
+        // It goes with its last file.
+        let _ = fs::remove_dir(path.join(name));
+    }
+    whole::sync_folder(&list).map_err(FolderError::write(path))?;
+    Ok(gone)
+}
+
+/// Whether `name` is a file in the folder `path`, and no link leads there.
+fn is_file(path: &Path, name: &str) -> bool {
+    let folder_is_own = name.rsplit_once('/').is_none_or(|(subfolder, _)| is_folder(&path.join(subfolder)));
+    folder_is_own && fs::symlink_metadata(path.join(name)).is_ok_and(|there| there.is_file())
+}
+
+fn is_folder(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|there| there.is_dir())
+}
+
+fn make_subfolder(path: &Path) -> Result<(), FolderError> {
+    match fs::create_dir(path) {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists && is_folder(path) => Ok(()),
+        made => made.map_err(FolderError::write(path)),
+    }
+}
+
+/// Keeps files beside the folder; within it, where that is another file system or must not be written.
+fn keep(part: &Path, path: &Path) -> Result<PathBuf, FolderError> {
+    let path = if path.file_name().is_some() { path.to_owned() } else { fs::canonicalize(path).unwrap_or(path.into()) };
+    let within = path.join(path.file_name().unwrap_or("files".as_ref()));
+    let kept = whole::keep_incomplete(part, &path).or_else(|_| whole::keep_incomplete(part, &within));
+    kept.map_err(FolderError::write(part))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,113 @@
+//! The list of files that we wrote into a folder.
+
+use std::collections::HashSet;
+use std::fs::{self, File};
+use std::io::{ErrorKind, Write};
+use std::path::{Component, Path, PathBuf};
+
+use super::{FolderError, LIST};
+use crate::files::{input, whole};
+
+/// A list that grows.
+#[derive(Debug)]
+pub(super) struct List {
+    path: PathBuf,
+    file: File,
+    bytes: u64,
+    len: u64,
+}
+
+impl List {
+    /// Begins the list of `folder`; what was there has no files any more.
+    pub(super) fn create(folder: &Path) -> Result<Self, FolderError> {
+        let path = folder.join(LIST);
+        let removed = match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
+        };
+        let file = removed.and_then(|()| File::create_new(&path)).map_err(FolderError::write(&path))?;
+        Ok(Self { path, file, bytes: 0, len: 0 })
+    }
+
+    /// Names in it.
+    pub(super) fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Adds a name. Where that fails, the list stays as it was.
+    pub(super) fn add(&mut self, name: &str) -> Result<(), FolderError> {
+        let line = format!("{name}\n");
+        if let Err(cause) = self.file.write_all(line.as_bytes()) {
+            // A part of a name is that of another file; the first error is the one to tell.
+            let _ = self.file.set_len(self.bytes);
+            return Err(FolderError::Write { path: self.path.clone(), cause });
+        }
+        self.bytes += line.len() as u64;
+        self.len += 1;
+        Ok(())
+    }
+}
+
+/// Names as they were written.
+#[derive(Debug, Default)]
+pub(super) struct Names {
+    ordered: Vec<String>,
+    all: HashSet<String>,
+}
+
+impl Names {
+    pub(super) fn contains(&self, name: &str) -> bool {
+        self.all.contains(name)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.ordered.is_empty()
+    }
+
+    pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = &String> {
+        self.ordered.iter()
+    }
+}
+
+/// The names in the list of `folder`; none where there is no list. What does not lie within the folder, at most one
+/// folder down, is passed over.
+pub(super) fn read(folder: &Path) -> Result<Names, FolderError> {
+    let path = folder.join(LIST);
+    // Never through a link: it would be the list of another folder.
+    if !fs::symlink_metadata(&path).is_ok_and(|there| there.is_file()) {
+        return Ok(Names::default());
+    }
+    let text = input::read_text(&path, input::MOST_TEXT_BYTES).map_err(FolderError::write(&path))?;
+    let ordered: Vec<String> = text.lines().filter(|name| lies_within(name)).map(str::to_owned).collect();
+    let all = ordered.iter().cloned().collect();
+    Ok(Names { ordered, all })
+}
+
+/// Enters files that are there into the list of `folder`, which is made where it is missing: files that a run may
+/// replace, because something else says that they belong to what it replaces. What does not lie within the folder, at
+/// most one folder down, is passed over.
+///
+/// # Errors
+/// The list cannot be read or written.
+pub fn adopt(folder: &Path, names: impl IntoIterator<Item = String>) -> Result<(), FolderError> {
+    let known = read(folder)?;
+    let mut seen = HashSet::new();
+    let new = names.into_iter().filter(|name| lies_within(name) && !known.contains(name));
+    let lines: String = new.filter(|name| seen.insert(name.clone())).map(|name| name + "\n").collect();
+    if lines.is_empty() {
+        return Ok(());
+    }
+    let path = folder.join(LIST);
+    let all = known.ordered.iter().map(|name| format!("{name}\n")).collect::<String>() + &lines;
+    whole::write(&path, all.as_bytes(), true).map_err(FolderError::write(&path))
+}
+
+fn lies_within(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    let is_plain = |part: Option<Component>| part.is_none_or(|part| matches!(part, Component::Normal(_)));
+    !name.is_empty()
+        && !name.starts_with('.')
+        && is_plain(parts.next())
+        && is_plain(parts.next())
+        && parts.next().is_none()
+}
