@@ -3,15 +3,16 @@
 use std::ffi::OsString;
 use std::path::Path;
 
+use super::arguments::{joined, one_line};
 use super::settings::SettingsFile;
-use super::{CliError, Command, ConfigCommand, Refusal, dump, one_line};
+use super::{CliError, Command, ConfigCommand, Refusal, dump};
 
 /// The settings that a command line stands for, as `config dump` prints them; nothing for other commands.
 ///
 /// # Errors
 /// It is refused: the message.
 pub fn arguments(args: &[OsString]) -> Result<String, String> {
-    let parsed = super::parse(args).map_err(|refusal| match refusal {
+    let parsed = super::parse(&joined(args.iter().cloned())).map_err(|refusal| match refusal {
         Refusal::Arguments(error) => one_line(&error),
         Refusal::Settings(error) => error.to_string(),
     })?;
