@@ -270,7 +270,7 @@ pub struct Stream {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Output")]
 pub struct Output {
-    /// Overwrite what exists
+    /// Overwrite what exists, once what replaces it is whole; of a folder, only files that bokehcam wrote
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]
