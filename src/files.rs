@@ -2,4 +2,5 @@
 
 pub mod folder;
 pub mod input;
+pub mod place;
 pub mod whole;

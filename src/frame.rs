@@ -88,7 +88,7 @@ pub fn luma_of(rgb: &[u8], luma: &mut [u8]) {
 }
 
 /// Disparity of the left picture of a rectified pair: `height` x `width` pixels, row-major; what is left column `x` is
-/// seen by the right eye in column `x - disparity`. 0 or a non-finite value means unknown.
+/// seen by the right eye in column `x - disparity`. What means unknown is as for a [`DepthMap`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DisparityMap {
     /// Columns.
@@ -100,6 +100,12 @@ pub struct DisparityMap {
 }
 
 impl DisparityMap {
+    /// Its depth, where `depth_m` gives the metres of a disparity; 0 where that is unknown.
+    pub fn depth(&self, depth_m: impl Fn(f32) -> f32) -> DepthMap {
+        let metres = |&px: &f32| if DepthMap::is_known(px) { depth_m(px) } else { 0.0 };
+        DepthMap { width: self.width, height: self.height, metres: self.px.iter().map(metres).collect() }
+    }
+
     /// Gives the map another size, keeping its memory where that suffices. The content is unspecified after.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
@@ -112,7 +118,8 @@ impl DisparityMap {
     }
 }
 
-/// Depth along the optical axis: `height` x `width` metres, row-major; 0 or a non-finite value means unknown.
+/// Depth along the optical axis: `height` x `width` metres, row-major. What is not between [`DepthMap::LEAST_M`] and
+/// [`DepthMap::MOST_M`] means unknown: 0, as it is written here, what is not finite, and what no lens and no light reaches.
 /// It covers the same view as its colour picture, and may have fewer pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DepthMap {
@@ -125,6 +132,11 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
+    /// The least depth: no scene is nearer, and its reciprocal, squared, still is a number.
+    pub const LEAST_M: f32 = 1e-6;
+    /// The largest depth: what is infinitely far in files that have to write a number is nearer than this.
+    pub const MOST_M: f32 = 1e12;
+
     /// A map with every depth unknown.
     pub fn new(width: u32, height: u32) -> Self {
         let mut map = Self::default();
@@ -147,6 +159,6 @@ impl DepthMap {
     #[inline]
     pub fn is_known(metres: f32) -> bool {
         // Both comparisons are false for NaN; without a branch, so that loops over maps become vector code.
-        (metres > 0.0) & (metres < f32::INFINITY)
+        (metres >= Self::LEAST_M) & (metres <= Self::MOST_M)
     }
 }

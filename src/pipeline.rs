@@ -2,7 +2,8 @@
 //!
 //! Three named threads and the caller's, joined by three links; all end because their input ended. Stop is one flag
 //! that only capture reads: what is under way then drains, and the output is completed. A stage that fails drops both
-//! its ends, so that its neighbours end as well: quietly, since only the cause is an error.
+//! its ends, so that its neighbours end as well: quietly, since only the cause is an error. The output is completed
+//! then, too: its frames are whole.
 
 mod blur;
 mod capture;
@@ -37,7 +38,7 @@ use crate::link::demand::Demand;
 use crate::link::pool::Pool;
 use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
 use crate::optics::{CocField, DepthCoc, Lens};
-use crate::sink::Sink;
+use crate::sink::{Ending, Sink};
 use crate::stats::{About, Cause, Report, Tally, Ticket, Timings};
 
 /// Whether frames wait for the program, or the program for frames.
@@ -148,15 +149,16 @@ struct Frame<T> {
     item: T,
 }
 
-/// Runs the pipeline to the end of its frames, its sink, or the stop flag, and completes the output.
+/// Runs the pipeline to the end of its frames, its sink, or the stop flag, and completes the output, whatever came between.
 ///
 /// # Errors
-/// The fault of the stage that failed; a panic is one. The output was then given up. The error carries the report.
+/// The fault of the stage that failed; a panic is one. The output then has the frames until there. The error carries the
+/// report.
 pub fn run(run: Run) -> Result<Report, PipelineError> {
     let Run { camera, depth: source, bokeh: executor, mut sink, pace, clock, .. } = run;
     let info = camera.info();
     let mut about = About {
-        backend: executor.as_ref().map_or("none", |executor| backend(&executor.describe())).into(),
+        backend: executor.as_ref().map_or("none", |executor| executor.backend()).into(),
         adapter: executor.as_ref().map_or_else(|| "none".into(), |executor| executor.describe()),
         source: info.name.clone(),
         sink: sink.describe(),
@@ -230,6 +232,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         executor,
         late: live_ns.map(quality::LateRule::new),
         picker: quality::Picker::new(run.quality, most, run.budget_ns, live_ns),
+        rule: run.quality,
+        about: &mut about,
         outs: &outs,
         wanted: run.wanted.filter(|_| !run.mirror),
         viewed: places.viewed,
@@ -259,7 +263,12 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         let delivered = guard("sink", &over, move || deliver.run(from_blur));
         upstream.into_iter().map(join).chain([delivered]).collect::<Result<(), Fault>>()
     });
-    let ended = ended.and_then(|()| guard("sink", &over, move || Ok(sink.finish()?)));
+    // A source that has an end of its own was broken off before it.
+    let is_cut = run.stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
+    let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
+    let finished = guard("sink", &over, move || Ok(sink.finish(ending)?));
+    // What came first is the cause.
+    let ended = ended.and(finished);
     about.elapsed_ns = clock.now_ns() - began_ns;
     about.cpu_ns = clock::cpu_ns() - cpu_ns;
     let report = Report::new(tally.frames(), &timings, about);
@@ -276,16 +285,11 @@ fn link<T>(pace: Pace) -> (Sender<T>, Receiver<T>) {
     }
 }
 
-/// The CPU executor's description begins with its name; any other is that of a GPU.
-fn backend(description: &str) -> &'static str {
-    if description.starts_with("cpu") { "cpu" } else { "gpu" }
-}
-
 /// The finest level that an executor is given as the time allows.
 fn most(executor: Option<&dyn Bokeh>) -> Quality {
     // On the processor a finer level takes twice the time for half a decibel, and other programs need it, too.
-    let on_cpu = executor.is_some_and(|executor| backend(&executor.describe()) == "cpu");
-    if on_cpu { Quality::Balanced } else { Quality::Best }
+    let on_gpu = executor.is_none_or(|executor| executor.backend() == "gpu");
+    if on_gpu { Quality::Best } else { Quality::Balanced }
 }
 
 /// Hands a frame on; gives back whether there is anybody to take more.

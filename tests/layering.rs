@@ -29,7 +29,7 @@ const DOORS: [(&str, &[&str]); 20] = [
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
     ("png", &["recording", "sink"]),
-    ("rustix", &["capture/synthetic", "clock", "files", "link/bell", "v4l2"]),
+    ("rustix", &["capture/synthetic", "clock", "files", "link/bell", "sink/ffmpeg", "sink/pipe", "v4l2"]),
     ("saphyr_parser", &["calibration"]),
     ("softbuffer", &["preview/present"]),
     ("strsim", &["cli", "v4l2"]),

@@ -3,7 +3,7 @@
 #![allow(missing_docs)]
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ use bokehcam::pipeline::View;
 use bokehcam::preview::backstage::{Backstage, Choice, Control, Opened, Preset, Switch};
 use bokehcam::preview::session::{Heard, Session, Start};
 use bokehcam::preview::state::{Effect as Todo, Output, Source, Told};
-use bokehcam::sink::{Sink, SinkError};
+use bokehcam::sink::{Ending, Sink, SinkError};
 
 /// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
 struct Wings {
@@ -28,11 +28,11 @@ struct Wings {
 struct Film(Arc<Mutex<Vec<String>>>, String);
 
 impl Sink for Film {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         self.0.lock().unwrap().push(format!("{} {}", self.1, frame.width));
         Ok(ControlFlow::Continue(()))
     }
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         self.0.lock().unwrap().push(format!("{} complete", self.1));
         Ok(())
     }
@@ -64,7 +64,7 @@ impl Backstage for Wings {
         self.executors.fetch_add(1, Ordering::SeqCst);
         bokeh::create(settings, size, Backend::Cpu, None, Some(1)).map_err(|error| error.to_string())
     }
-    fn output(&mut self, name: &str, _: (u32, u32), _: u64) -> Result<Box<dyn Sink>, String> {
+    fn output(&mut self, name: &str, _: (u32, u32), _: u64, _: &Arc<AtomicBool>) -> Result<Box<dyn Sink>, String> {
         if name == "full" {
             Err("the disk is full".into())
         } else {
@@ -189,7 +189,7 @@ fn a_look_takes_effect_while_frames_go_on() {
     watched.frame("an even blur", |view| radius_px(view) == -5.0);
     watched.session.order(Todo::Look(Box::new(Look { effect: None, ..near })));
     watched.frame("no blur", |view| view.color.is_none());
-    let report = watched.session.close().unwrap();
+    let report = watched.session.close().report.unwrap();
     assert!(report.frames.balance(), "{:?}", report.frames);
 }
 
@@ -210,7 +210,7 @@ fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     watched.session.order(Todo::Open("24 then no more".into()));
     watched.until("it runs again", |told| is_running(told, 24));
     watched.until("and ends", |told| *told == Told::Source(Source::Ended));
-    let report = watched.session.close().unwrap();
+    let report = watched.session.close().report.unwrap();
     assert!(report.frames.balance() && report.frames.captured == 2, "{:?}", report.frames);
 }
 
@@ -247,7 +247,7 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
         std::thread::sleep(Duration::from_millis(5));
     }
     let written = Arc::clone(&watched.written);
-    watched.session.close().unwrap();
+    watched.session.close().report.unwrap();
     let complete = written.lock().unwrap().iter().filter(|line| *line == "camera complete").count();
     assert_eq!(complete, 2, "once for each source");
 }

@@ -10,7 +10,7 @@ use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo
 use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::recording::{Recording, Scratch};
-use bokehcam::sink::{Sink, SinkError};
+use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::stats::Cause;
 
 /// From frame to frame.
@@ -153,7 +153,7 @@ impl Stamping {
 }
 
 impl Sink for Stamping {
-    fn put(&mut self, picture: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, picture: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         let now_ns = self.clock.now_ns() - self.stamps.epoch_ns.load(Ordering::Relaxed);
         let ticket = picture.rgb.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         let age_ns = now_ns.saturating_sub(ticket * PERIOD_NS);
@@ -163,7 +163,7 @@ impl Sink for Stamping {
         Ok(ControlFlow::Continue(()))
     }
 
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         Ok(())
     }
 

@@ -1,14 +1,12 @@
 //! YAML as calibrations are written in, with the line of every entry for what is wrong there.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use saphyr_parser::{Event, Parser, ScanError};
 
 use super::error::{CalibrationError, Fault};
+use crate::files::input;
 
-/// Calibrations have a few kilobytes.
-const MOST_BYTES: u64 = 1 << 20;
 /// Calibrations are nested three deep.
 const MOST_NESTED: usize = 32;
 
@@ -41,10 +39,8 @@ impl File {
     /// Reads the file `path`.
     pub fn open(path: &Path) -> Result<Self, CalibrationError> {
         let fail = |source| CalibrationError::Io { path: path.to_owned(), source };
-        if std::fs::metadata(path).map_err(fail)?.len() > MOST_BYTES {
-            return Err(fail(io::Error::other("too large for a calibration; name the calibration's file")));
-        }
-        Self::parse(path, &String::from_utf8_lossy(&std::fs::read(path).map_err(fail)?))
+        let bytes = input::read(path, input::MOST_CALIBRATION_BYTES).map_err(fail)?;
+        Self::parse(path, &String::from_utf8_lossy(&bytes))
     }
 
     /// Reads `text`, the content of `path`.

@@ -92,7 +92,9 @@ impl Replay {
         let lap_len = self.lap.len() as u64;
         let index = self.lap.start + (self.position % lap_len) as usize;
         let in_lap_ns = self.recording.time_ns(index) - self.recording.time_ns(self.lap.start);
-        Some(Stamp { index, time_ns: self.position / lap_len * self.lap_ns + in_lap_ns, captured_ns: None })
+        // Ten years played again for centuries: the end of time is an end.
+        let time_ns = (self.position / lap_len).checked_mul(self.lap_ns)?.checked_add(in_lap_ns)?;
+        Some(Stamp { index, time_ns, captured_ns: None })
     }
 }
 

@@ -7,7 +7,7 @@ use clap::{Args, value_parser};
 use serde::Serialize;
 
 use super::error::CliError;
-use super::files::{refuse_overwrite, write_whole};
+use super::files::{refuse_overwrite, refuse_source, write_whole};
 use super::options::{Global, Output};
 use super::values::between;
 use super::{aperture_plot, aperture_sheet, defaults, terminal};
@@ -118,6 +118,11 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
     }
     let (table_path, plot_path) = (command.out.join("aperture.json"), command.out.join("errors.svg"));
     let all = outputs.iter().chain([&table_path, &plot_path]);
+    for name in &command.apertures {
+        if let ApertureName::Image(read) = name {
+            all.clone().try_for_each(|file| refuse_source("--out", file, read))?;
+        }
+    }
     refuse_overwrite(all.map(PathBuf::as_path), command.output.force)?;
 
     let mut analyses = Vec::new();

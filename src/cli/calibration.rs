@@ -8,6 +8,7 @@ use toml::Spanned;
 
 use super::error::CliError;
 use crate::depth::registration::{Calibration, CalibrationError, Pinhole, Registration};
+use crate::files::input;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -48,7 +49,7 @@ impl Camera {
 /// # Errors
 /// It cannot be read, has a wrong or a missing key, or numbers that cannot be.
 pub fn load(path: &Path) -> Result<Registration, CliError> {
-    parse(path, &std::fs::read_to_string(path).map_err(CliError::io(path))?)
+    parse(path, &input::read_text(path, input::MOST_CALIBRATION_BYTES).map_err(CliError::io(path))?)
 }
 
 fn parse(path: &Path, text: &str) -> Result<Registration, CliError> {

@@ -9,7 +9,7 @@ use super::calib::{self, Eyes};
 use super::config::Executor;
 use super::disparity_preview::preview;
 use super::error::CliError;
-use super::files::{make_folder_of, refuse_overwrite};
+use super::files::{make_folder_of, refuse_overwrite, refuse_source};
 use super::values::{Backend, above_zero, between};
 use super::{defaults, options, terminal};
 use crate::calibration::rectifier::Rectifier;
@@ -145,11 +145,14 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     make_folder_of(&command.out)?;
     match geometry.filter(|_| command.metres) {
         Some(Geometry { rig, .. }) => {
-            let depth = depth_of(&disparity, &rig);
+            let depth = disparity.depth(|px| rig.depth_m(px));
             note_what_is_too_far(&command.out, &depth, &note)?;
             still::write_depth(&command.out, &depth, defaults::DEPTH_SCALE, force)?;
         }
-        None => still::write_disparity(&command.out, &disparity, force)?,
+        None => {
+            let rig = geometry.map(|geometry| geometry.rig);
+            still::write_disparity(&command.out, &disparity, rig, force)?;
+        }
     }
     if let Some(file) = &command.preview {
         make_folder_of(file)?;
@@ -182,6 +185,10 @@ impl DepthCommand {
         }
         if self.preview.as_ref() == Some(&self.out) {
             return usage("--preview and --out name one file; each needs its own");
+        }
+        for read in [&self.left, &self.right].into_iter().chain(&self.calib) {
+            refuse_source("--out", &self.out, read)?;
+            self.preview.as_ref().map_or(Ok(()), |preview| refuse_source("--preview", preview, read))?;
         }
         refuse_overwrite([self.out.as_path()].into_iter().chain(self.preview.as_deref()), self.output.force)
     }
@@ -251,12 +258,6 @@ fn luma_of(color: &ColorImage) -> GrayImage {
     let mut luma = GrayImage::default();
     luma.set_luma_of(color);
     luma
-}
-
-/// Metres; 0 where the disparity is unknown.
-fn depth_of(disparity: &DisparityMap, rig: &StereoRig) -> DepthMap {
-    let metres = |&px: &f32| if DepthMap::is_known(px) { rig.depth_m(px) } else { 0.0 };
-    DepthMap { width: disparity.width, height: disparity.height, metres: disparity.px.iter().map(metres).collect() }
 }
 
 /// Tells how much of the depth a PNG cannot hold.

@@ -47,6 +47,10 @@ pub enum CliError {
     #[error("{0}")]
     #[cfg(feature = "window")]
     NoFrames(String),
+    /// An output of a preview failed.
+    #[error("{0}")]
+    #[cfg(feature = "window")]
+    Unwritten(String),
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::print;
-use crate::files::whole;
+use crate::files::{place, whole};
 use crate::sink::Target;
 use crate::stats::Report;
 
@@ -16,6 +16,22 @@ pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bo
         Some(path) => Err(CliError::Exists(path.to_owned())),
         None => Ok(()),
     }
+}
+
+/// # Errors
+/// [`CliError::Usage`] when `target`, which the option `what` names, is `source`, lies in it, or holds it.
+pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), CliError> {
+    if !place::overlap(target, source) {
+        return Ok(());
+    }
+    let [to, from] = [target, source].map(place::resolved);
+    let how = match (to == from, to.starts_with(&from)) {
+        (true, _) => "this is",
+        (_, true) => "this lies in",
+        _ => "this holds",
+    };
+    let (target, source) = (target.display(), source.display());
+    Err(CliError::Usage(format!("{what} {target}: {how} {source}, which is read; choose another place")))
 }
 
 /// Writes a file whole, in place of what is there.

@@ -86,7 +86,7 @@ pub fn show(
     }
     if !source.is_empty() {
         let name = SourceName::from_str(source).map_err(|error| CliError::Usage(format!("{source}: {error}")))?;
-        sinks::check(to, stream, &name.devices())?;
+        sinks::check(to, parts, &name)?;
         unused::warn_by_source(&given.settings, name.kind());
     }
     let outputs = to.iter().map(|target| match target.path() {
@@ -95,6 +95,7 @@ pub fn show(
     });
     let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
     // As if there were depth: what the source lacks is seen when it is open.
+    sinks::try_report(stream.report.as_deref())?;
     let look = config::look(&parts.blur, &parts.aperture, computing.quality, true)?;
     let executor = Executor::of(computing);
     let device = executor.device()?;
@@ -118,15 +119,16 @@ pub fn show(
         memory: settings::state_folder().map(|folder| folder.join("window.toml")),
         stop,
     })?;
-    if let (Some(path), Some(report)) = (&stream.report, &ended.report) {
-        write_report(path, report)?;
-    }
+    let written = match (&stream.report, &ended.report) {
+        (Some(path), Some(report)) => write_report(path, report),
+        _ => Ok(()),
+    };
     if let Some(report) = ended.report.as_ref().filter(|_| !global.quiet) {
         terminal::say(&report.to_string());
     }
     match ended.lost {
         Some(why) if ended.report.is_none() || closes => Err(CliError::NoFrames(why)),
-        _ => Ok(()),
+        _ => ended.unwritten.map_or(written, |why| Err(CliError::Unwritten(why))),
     }
 }
 

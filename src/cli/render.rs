@@ -6,21 +6,22 @@ use clap::Args;
 
 use super::config::{self, Executor};
 use super::error::CliError;
-use super::files::{make_folder_of, refuse_overwrite};
+use super::files::{make_folder_of, refuse_overwrite, refuse_source};
 use super::layers::Given;
 use super::unused::{DepthFrom, From};
 use super::values::DepthChoice;
-use super::{debug, focus, log, options, terminal, unused, values};
+use super::{debug, focus, log, options, stereo, terminal, unused, values};
 use crate::bokeh::{BokehError, Effect, Job};
 use crate::compute::Place;
 use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
+use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
-use crate::look::{Look, Strength};
-use crate::optics::CocField;
+use crate::look::{ApertureName, Look, Strength};
+use crate::optics::{CocField, StereoRig};
 use crate::pipeline::CocRule;
-use crate::recording::snapshot;
-use crate::recording::still::{self, MapFormat};
+use crate::recording::still::{self, MapFormat, PhotoFormat};
+use crate::recording::{Extras, snapshot};
 
 /// Blur one still picture
 #[derive(Args, Debug)]
@@ -37,7 +38,7 @@ pub struct RenderCommand {
     /// The picture, PNG or JPEG [default: the one that the snapshot of --like was made of]
     #[arg(required_unless_present = "like")]
     image: Option<PathBuf>,
-    /// Its depth: 16-bit grey PNG, or PFM in metres
+    /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity that `depth` wrote
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
     /// Take the settings of a snapshot of the preview; flags go before them. Without IMAGE, its NAME-color.png and, without
@@ -70,11 +71,21 @@ pub struct RenderCommand {
 pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
     let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
     refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
+    let sources = sources(command);
+    for source in &sources {
+        refuse_source("--out", &command.out, source)?;
+        // Its files are called as they must be.
+        if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
+            && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
+        {
+            refuse_source("--debug-dir", dir, source)?;
+        }
+    }
     if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
         let what = "--depth FOLDER, stereo or a depth camera are for `stream`: give a picture's depth with --depth-map";
         return Err(CliError::Usage(what.to_string()));
     }
-    let (color, depth) = read(command)?;
+    let (color, extras, depth) = read(command)?;
     let look = config::look(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
     command.warn(&look, color.size(), depth.as_ref(), given);
     let executor = Executor::of(&command.computing);
@@ -83,8 +94,16 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
         Some(dir) => debug::blurred(color, depth, &look, &executor, (dir, command.output.force))?,
         None => blurred(color, depth, &look, &executor)?,
     };
-    still::write_color(&command.out, &result, command.output.force)?;
+    // Its thumbnail would show what the blur hides.
+    let mut extras = extras.without_thumbnail();
+    if still::photo_format(&command.out)? == PhotoFormat::Jpeg {
+        extras = extras.for_jpeg();
+    }
+    still::write_photo(&command.out, &result, &extras, command.output.force)?;
     if !global.quiet {
+        if !extras.left_behind.is_empty() {
+            terminal::say(&format!("note: not in {}: {}", command.out.display(), extras.left_behind.join(", ")));
+        }
         terminal::say(&format!("{}: written ({by})", command.out.display()));
     }
     Ok(())
@@ -124,6 +143,19 @@ impl RenderCommand {
     }
 }
 
+/// The pictures that are read.
+fn sources(command: &RenderCommand) -> Vec<PathBuf> {
+    let beside = command.like.iter().flat_map(|like| {
+        let (color, depth) = snapshot::sources(like);
+        [like.clone(), color, depth]
+    });
+    let aperture = match &command.aperture.aperture {
+        ApertureName::Image(file) => Some(file),
+        _ => None,
+    };
+    [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(beside).collect()
+}
+
 /// A depth map for one picture.
 pub enum Depth {
     /// As it was measured: with holes, and noise.
@@ -132,24 +164,53 @@ pub enum Depth {
     Final(DepthMap),
 }
 
-/// The picture, and its depth if there is any.
-fn read(command: &RenderCommand) -> Result<(ColorImage, Option<Depth>), CliError> {
+/// The picture, what goes with it, and its depth if there is any.
+fn read(command: &RenderCommand) -> Result<(ColorImage, Extras, Option<Depth>), CliError> {
     let sources = command.like.as_ref().map(|like| snapshot::sources(like));
-    let read_depth =
-        |file: &Path| still::read_depth(file, command.depth.file_scale(), Some(command.depth.depth_invalid));
-    let given = command.depth_map.as_deref().map(read_depth).transpose()?.map(Depth::Measured);
-    let (color, depth) = match (&command.image, sources) {
+    let given = command.depth_map.as_deref().map(|file| read_depth(file, command)).transpose()?.map(Depth::Measured);
+    let (color, extras, depth) = match (&command.image, sources) {
         (None, Some((color, depth))) => {
             let kept = given.is_none() && depth.exists();
-            let kept = kept.then(|| read_depth(&depth)).transpose()?.map(Depth::Final);
-            (still::read_color(&color)?, given.or(kept))
+            let kept = kept.then(|| read_depth(&depth, command)).transpose()?.map(Depth::Final);
+            let (color, extras) = still::read_photo(&color)?;
+            (color, extras, given.or(kept))
         }
-        (image, _) => (still::read_color(image.as_deref().unwrap_or(Path::new("")))?, given),
+        (image, _) => {
+            let (color, extras) = still::read_photo(image.as_deref().unwrap_or(Path::new("")))?;
+            (color, extras, given)
+        }
     };
     if let (Some(Depth::Measured(map)), Some(file)) = (&depth, &command.depth_map) {
         still::check_depth_size(file, map.size(), color.size())?;
     }
-    Ok((color, depth))
+    Ok((color, extras, depth))
+}
+
+/// Depth from a file, in metres, or where the file has disparity without distances in those of assumed eyes.
+fn read_depth(file: &Path, command: &RenderCommand) -> Result<DepthMap, CliError> {
+    let name = file.display();
+    let options::Depth { depth_scale, depth_invalid, .. } = command.depth;
+    let (map, rig) = match still::read_map(file, depth_scale, Some(depth_invalid))? {
+        still::Map::Depth(map) => return Ok(map),
+        still::Map::Disparity(map, rig) => (map, rig),
+    };
+    if depth_scale.is_some() {
+        tracing::warn!("{name}: holds disparity, to which --depth-scale does not apply");
+    }
+    let rig = match (rig, stereo::needs_metres(&command.blur)) {
+        (Some(rig), _) => rig,
+        (None, None) => {
+            tracing::warn!("{name}: holds disparity without distances: what is near and far is known, and not how far");
+            StereoRig::assumed(map.width)
+        }
+        (None, Some(needs)) => {
+            return Err(CliError::Usage(format!(
+                "{needs} needs distances, and {name} holds disparity without any: write it with `depth --metres`; --focus \
+                 auto or X,Y and --coc-at-infinity need none"
+            )));
+        }
+    };
+    Ok(map.depth(|px| rig.depth_m(px)))
 }
 
 /// The blurred picture, and what blurred it.

@@ -60,7 +60,7 @@ pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
 pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) -> Result<(), CliError> {
     // A link, as those who keep their settings elsewhere have it, stays one.
     let path = &target(path)?;
-    let text = match input::read_text(path, input::MOST_TEXT_BYTES) {
+    let text = match input::read_text(path, input::MOST_SETTINGS_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
         read => read.map_err(CliError::io(path))?,
     };

@@ -15,6 +15,7 @@ use super::arguments::one_line;
 use super::environment::variable;
 use super::error::CliError;
 use super::options::Every;
+use crate::files::input;
 use crate::look::{flags, presets};
 
 /// Settings by their flags without the dashes, each value as it would follow its flag.
@@ -48,7 +49,7 @@ impl SettingsFile {
             (None, Some(user)) if user.is_file() => user,
             _ => return Ok(Self::default()),
         };
-        let text = std::fs::read_to_string(&path).map_err(CliError::io(&path))?;
+        let text = input::read_text(&path, input::MOST_SETTINGS_BYTES).map_err(CliError::io(&path))?;
         Self::parse(&path, &text)
     }
 

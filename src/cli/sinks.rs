@@ -3,21 +3,48 @@
 use std::path::Path;
 
 use super::error::CliError;
-use super::options;
+use super::files::refuse_source;
+use super::options::Streaming;
+use super::source::SourceName;
+use super::values::DepthChoice;
+use crate::files::{place, whole};
 use crate::sink::{Options, Sink, Target, Tee};
 
-/// Whether what was asked of the sinks fits together; `devices` are those that frames come from.
+/// Whether what was asked of the sinks fits together, and leaves `source` alone.
 ///
 /// # Errors
-/// Two sinks write to one place, one writes to the source, or an option needs a virtual camera where there is none.
-pub fn check(targets: &[Target], stream: &options::Stream, devices: &[&Path]) -> Result<(), CliError> {
+/// Two of them, or one and the report, write to one place; one writes to what is read; an option needs a virtual camera
+/// where there is none.
+pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Result<(), CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
+    let Streaming { stream, blur, .. } = parts;
+    let devices = source.devices();
+    let depth = match &blur.depth {
+        DepthChoice::Folder(folder) => Some(folder.as_path()),
+        _ => None,
+    };
     for (at, target) in targets.iter().enumerate() {
+        for read in source.folder().into_iter().chain(depth) {
+            let path = target.path().filter(|_| !target.is_camera());
+            path.map_or(Ok(()), |path| refuse_source("--to", path, read))?;
+        }
         if targets[..at].iter().any(|other| other.collides_with(target)) {
             return usage(format!("--to {target}: given twice; each sink needs a place of its own"));
         }
         if devices.iter().any(|device| target.is_device(device)) {
             return usage(format!("--to {target}: this is the source itself; take a virtual camera of its own"));
+        }
+    }
+    if let Some(report) = &stream.report {
+        let is_there =
+            |target: &&Target| target.path().is_some_and(|path| place::resolved(path) == place::resolved(report));
+        if let Some(target) = targets.iter().find(is_there) {
+            return usage(format!("--report {}: --to {target} goes there, too; name another file", report.display()));
+        }
+        let is_json = report.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
+        let replaces = !is_json && report.exists();
+        for read in source.folder().into_iter().chain(depth).filter(|_| replaces) {
+            refuse_source("--report", report, read)?;
         }
     }
     let has_camera = targets.iter().any(Target::is_camera);
@@ -32,6 +59,18 @@ pub fn check(targets: &[Target], stream: &options::Stream, devices: &[&Path]) ->
             size.height,
             size.width + 1
         )),
+        _ => Ok(()),
+    }
+}
+
+/// Whether the report of a run can be written, before there is one.
+///
+/// # Errors
+/// Its folder cannot be written.
+pub fn try_report(path: Option<&Path>) -> Result<(), CliError> {
+    match path {
+        // It may be a pipe, and is not opened twice.
+        Some(path) if path != "-" => whole::Part::create(path).map(drop).map_err(CliError::io(path)),
         _ => Ok(()),
     }
 }

@@ -174,6 +174,14 @@ impl SourceName {
         )))
     }
 
+    /// The folder that frames come from.
+    pub fn folder(&self) -> Option<&Path> {
+        match self {
+            SourceName::Folder(folder) => Some(folder),
+            _ => None,
+        }
+    }
+
     /// The devices that frames come from.
     pub fn devices(&self) -> Vec<&Path> {
         match self {

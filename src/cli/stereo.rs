@@ -132,17 +132,21 @@ pub fn open(
 /// # Errors
 /// The focus or the lens needs metres, and `rig` has none.
 pub fn check_focus(rig: &StereoRig, blur: &options::Blur) -> Result<(), CliError> {
-    let needs = match (blur.focus, blur.f_number) {
-        _ if rig.metric => return Ok(()),
-        (FocusRule::Metres(metres), _) => format!("--focus {metres}"),
-        _ if blur.focus_range > 0.0 => format!("--focus-range {}", blur.focus_range),
-        (_, Some(f_number)) => format!("--f-number {f_number}"),
-        _ => return Ok(()),
-    };
+    let Some(needs) = needs_metres(blur).filter(|_| !rig.metric) else { return Ok(()) };
     Err(CliError::Usage(format!(
         "{needs} needs distances, and these two eyes tell none: give --calib FILE, or --focal-px and --baseline-m; \
          --focus auto or X,Y and --coc-at-infinity need none"
     )))
+}
+
+/// The setting that needs distances, if there is one.
+pub fn needs_metres(blur: &options::Blur) -> Option<String> {
+    match (blur.focus, blur.f_number) {
+        (FocusRule::Metres(metres), _) => Some(format!("--focus {metres}")),
+        _ if blur.focus_range > 0.0 => Some(format!("--focus-range {}", blur.focus_range)),
+        (_, Some(f_number)) => Some(format!("--f-number {f_number}")),
+        _ => None,
+    }
 }
 
 /// Disparities to try: as many as are known to occur, else those of a tenth of the picture's width.

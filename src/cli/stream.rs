@@ -1,5 +1,7 @@
 //! `stream`: a source, blurred, into a sink.
 
+use std::sync::Arc;
+
 use clap::Args;
 
 use super::config::{self, Executor};
@@ -62,7 +64,7 @@ const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, -
 pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> Result<(), CliError> {
     let StreamCommand { parts, .. } = command;
     let options::Streaming { stream, output, .. } = parts;
-    sinks::check(&command.to, stream, &command.source.devices())?;
+    sinks::check(&command.to, parts, &command.source)?;
     #[cfg(feature = "window")]
     if command.to.contains(&Target::Window) {
         let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
@@ -114,12 +116,16 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     let bokeh = look.settings(info.size, adaptive).map(|settings| executor.create(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
     let demand = stream.on_demand.then(Demand::new);
+    let stop = terminal::stop_flag()?;
     let sink_options = sink::Options {
+        frames: info.frames,
         force: output.force,
         out_size: stream.out_size.map(|size| (size.width, size.height)),
         demand: demand.clone(),
+        stop: Arc::clone(&stop),
         ..sink::Options::new(info.size, info.period_ns)
     };
+    sinks::try_report(stream.report.as_deref())?;
     let sink = sinks::open(&command.to, &sink_options)?;
 
     if info.live && !global.quiet {
@@ -128,7 +134,6 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     if parts.blur.takes_whatever_depth() && !source.has_depth() {
         unused::warn_of_no_depth(command.source.kind());
     }
-    let stop = terminal::stop_flag()?;
     let bar = terminal::Progress::new(info.frames, global);
     let ended = pipeline::run(Run {
         camera: source.camera,
@@ -155,11 +160,16 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         Ok(report) => (Box::new(report), Ok(())),
         Err(failed) => (failed.report, Err(failed.fault.into())),
     };
-    if let Some(path) = &stream.report {
-        write_report(path, &report)?;
-    }
+    let written = stream.report.as_ref().map_or(Ok(()), |path| write_report(path, &report));
     if !global.quiet {
         terminal::say(&report.to_string());
     }
-    ended
+    match (ended, written) {
+        // What ended the run is the error to tell.
+        (Err(ended), Err(unwritten)) => {
+            terminal::say(&format!("the report is not written: {unwritten}"));
+            Err(ended)
+        }
+        (ended, written) => ended.and(written),
+    }
 }

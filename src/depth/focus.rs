@@ -29,7 +29,7 @@ impl FromStr for FocusRule {
         let within = |text: &str, most: f32| text.trim().parse().ok().filter(|number| (0.0..=most).contains(number));
         let rule = match text.split_once(',') {
             None if text == "auto" => Some(Self::Auto),
-            None => within(text, f32::MAX).filter(|metres| *metres > 0.0).map(Self::Metres),
+            None => within(text, f32::MAX).filter(|&metres| DepthMap::is_known(metres)).map(Self::Metres),
             Some((x, y)) => within(x, 1.0).zip(within(y, 1.0)).map(|(x, y)| Self::Point { x, y }),
         };
         rule.ok_or_else(|| "use METRES above 0, auto, or X,Y as fractions of width and height (0 to 1)".to_string())

@@ -12,14 +12,16 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{FlockOperation, flock};
+use rustix::fs::{FlockOperation, flock, syncfs};
 
 use self::list::List;
+pub use self::list::adopt;
 use super::whole::{self, Part};
 
 /// What the list of our own files is called.
 pub const LIST: &str = ".bokehcam";
-const PART: &str = ".bokehcam.part";
+/// Where files wait that will replace others.
+pub const PART: &str = ".bokehcam.part";
 const WHOLE: &str = ".bokehcam.whole";
 
 /// Why a folder cannot be written.
@@ -153,7 +155,7 @@ impl Folder {
     pub fn put(&mut self, part: Part) -> Result<(), FolderError> {
         let path = part.path().to_owned();
         let name = path.strip_prefix(self.place()).ok().and_then(Path::to_str).unwrap_or_default().to_owned();
-        part.commit(false).map_err(|cause| match cause.kind() {
+        part.commit_unsynced().map_err(|cause| match cause.kind() {
             ErrorKind::AlreadyExists => FolderError::Foreign { path: path.clone() },
             _ => FolderError::Write { path: path.clone(), cause },
         })?;
@@ -171,7 +173,7 @@ impl Folder {
     /// not be moved, which is then done when the folder is opened again.
     pub fn finish(mut self) -> Result<u64, FolderError> {
         self.check_there()?;
-        self.list.sync()?;
+        self.sync()?;
         self.ended = true;
         let Some(part) = self.beside.take() else {
             self.tidy_up();
@@ -206,7 +208,7 @@ impl Folder {
     fn end(&mut self) -> Result<Option<PathBuf>, FolderError> {
         self.ended = true;
         self.check_there()?;
-        self.list.sync()?;
+        self.sync()?;
         match self.beside.take() {
             Some(part) if self.list.len() > 0 => keep(&part, &self.path).map(Some),
             Some(part) => fs::remove_dir_all(&part).map(|()| None).map_err(FolderError::write(&part)),
@@ -215,6 +217,11 @@ impl Folder {
                 Ok(None)
             }
         }
+    }
+
+    /// All files at once: to wait for the disk after each would be longer than a camera waits.
+    fn sync(&self) -> Result<(), FolderError> {
+        syncfs(&self.lock).map_err(|error| FolderError::write(&self.path)(error.into()))
     }
 
     fn check_there(&self) -> Result<(), FolderError> {

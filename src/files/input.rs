@@ -7,8 +7,14 @@ use std::path::Path;
 
 use rustix::fs::OFlags;
 
-/// Most bytes of a text that people or their tools write: a list, a calibration, settings.
+/// Most bytes of a text that people or their tools write, such as a list.
 pub const MOST_TEXT_BYTES: u64 = 64 << 20;
+
+/// Most bytes of a calibration: they have a few thousand.
+pub const MOST_CALIBRATION_BYTES: u64 = 1 << 20;
+
+/// Most bytes of a settings file: every setting in a thousand presets.
+pub const MOST_SETTINGS_BYTES: u64 = 1 << 20;
 
 /// Opens a regular file for reading, links followed. Never waits, as opening a pipe would.
 ///

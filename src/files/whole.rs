@@ -62,12 +62,32 @@ impl Part {
     ///
     /// # Errors
     /// [`ErrorKind::AlreadyExists`] without `replace`, or what the system says. The part is then removed.
-    pub fn commit(self, replace: bool) -> io::Result<()> {
+    pub fn commit(mut self, replace: bool) -> io::Result<()> {
+        self.try_commit(replace)
+    }
+
+    /// As [`Part::commit`], but a part that could not be given its name can still be [kept](Self::keep_incomplete).
+    ///
+    /// # Errors
+    /// As for [`Part::commit`].
+    pub fn try_commit(&mut self, replace: bool) -> io::Result<()> {
         if replace && let Ok(there) = fs::metadata(&self.path) {
             self.file.set_permissions(there.permissions())?;
         }
-        let path = self.path.clone();
-        self.rename(&path, replace)
+        self.file.sync_all()?;
+        rename(&self.part, &self.path, replace)?;
+        self.open = false;
+        sync_folder(&self.path)
+    }
+
+    /// As [`Part::commit`] without replacing, and without waiting for the disk: who calls this syncs the file system later.
+    ///
+    /// # Errors
+    /// As for [`Part::commit`].
+    pub fn commit_unsynced(mut self) -> io::Result<()> {
+        rename(&self.part, &self.path, false)?;
+        self.open = false;
+        Ok(())
     }
 
     /// Keeps what is not whole as `NAME.incomplete`, or `NAME.incomplete.2` and on where that is taken; gives the name.
@@ -75,18 +95,10 @@ impl Part {
     /// # Errors
     /// What the system says. The part is then left where it is.
     pub fn keep_incomplete(mut self) -> io::Result<PathBuf> {
-        // Whatever happens from here on, what is there is more than nothing.
+        // Whatever happens from here on, what is there is more than nothing; so is what is not synced.
         self.open = false;
-        let kept = keep_incomplete(&self.part, &self.path)?;
-        self.file.sync_all()?;
-        Ok(kept)
-    }
-
-    fn rename(mut self, to: &Path, replace: bool) -> io::Result<()> {
-        self.file.sync_all()?;
-        rename(&self.part, to, replace)?;
-        self.open = false;
-        sync_folder(to)
+        let _ = self.file.sync_all();
+        keep_incomplete(&self.part, &self.path)
     }
 }
 

@@ -56,7 +56,7 @@ impl Stage<'_> {
             }
             let began_ns = self.clock.now_ns();
             if frame.in_memory {
-                match self.sink.put(&frame.picture) {
+                match self.sink.put(&frame.picture, stamp.time_ns) {
                     Ok(flow) if flow.is_break() => break,
                     Ok(_) => {}
                     Err(error) => {

@@ -1,5 +1,8 @@
 //! What the window asks for by name; who starts the preview knows how to get it.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use crate::bokeh::{self, Bokeh};
 use crate::capture::Camera;
 use crate::depth::DepthSource;
@@ -90,11 +93,18 @@ pub trait Backstage: Send {
     /// There is no such GPU.
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String>;
 
-    /// Opens an output: a virtual camera or a file, for pictures of `size` pixels every `period_ns`.
+    /// Opens an output: a virtual camera or a file, for pictures of `size` pixels every `period_ns`, which end once `stop`
+    /// is set.
     ///
     /// # Errors
     /// It cannot be opened.
-    fn output(&mut self, name: &str, size: (u32, u32), period_ns: u64) -> Result<Box<dyn Sink>, String>;
+    fn output(
+        &mut self,
+        name: &str,
+        size: (u32, u32),
+        period_ns: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn Sink>, String>;
 
     /// The command that shows `source` in this look: `bokehcam preview ...` with the window's `switches`, or
     /// `bokehcam stream ...` into `outputs`.

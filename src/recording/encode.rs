@@ -2,8 +2,10 @@
 
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder, ImageResult};
+use image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
 
+use super::extras::Extras;
+use super::unit::{self, Meaning};
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
 /// High enough that the blur, not the file format, decides what is seen.
@@ -17,61 +19,85 @@ pub(super) const DISPARITY_SCALE: f32 = 256.0;
 
 /// Appends `image` to `file` as PNG, with the fast compression that keeps up with a camera.
 pub(super) fn color_png(image: &ColorImage, file: &mut Vec<u8>) -> ImageResult<()> {
-    PngEncoder::new_with_quality(file, CompressionType::Fast, FILTER).write_image(
-        &image.rgb,
-        image.width,
-        image.height,
-        ExtendedColorType::Rgb8,
-    )
+    photo_png(image, &Extras::default(), file)
 }
 
-/// Appends `image` to `file` as JPEG.
-pub(super) fn color_jpeg(image: &ColorImage, file: &mut Vec<u8>) -> ImageResult<()> {
-    JpegEncoder::new_with_quality(file, JPEG_QUALITY).write_image(
-        &image.rgb,
-        image.width,
-        image.height,
-        ExtendedColorType::Rgb8,
-    )
+/// The same, with what goes with the picture.
+pub(super) fn photo_png(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>) -> ImageResult<()> {
+    write_image(PngEncoder::new_with_quality(file, CompressionType::Fast, FILTER), image, extras)
 }
 
-/// Appends `depth` to `file` as 16-bit grey PNG of `depth_scale` units per metre; `units` is working memory.
+/// Appends `image` to `file` as JPEG, with what goes with it.
+pub(super) fn photo_jpeg(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>) -> ImageResult<()> {
+    write_image(JpegEncoder::new_with_quality(file, JPEG_QUALITY), image, extras)
+}
+
+fn write_image(mut encoder: impl ImageEncoder, image: &ColorImage, extras: &Extras) -> ImageResult<()> {
+    if let Some(profile) = &extras.icc_profile {
+        encoder.set_icc_profile(profile.clone()).map_err(ImageError::Unsupported)?;
+    }
+    if let Some(exif) = &extras.exif {
+        encoder.set_exif_metadata(exif.clone()).map_err(ImageError::Unsupported)?;
+    }
+    encoder.write_image(&image.rgb, image.width, image.height, ExtendedColorType::Rgb8)
+}
+
+/// Appends `depth` to `file` as 16-bit grey PNG of `depth_scale` units per metre; `units` is working memory. With `says`
+/// the file says so.
 pub(super) fn depth_png(
     depth: &DepthMap,
     depth_scale: f32,
+    says: Option<Meaning>,
     units: &mut Vec<u8>,
     file: &mut Vec<u8>,
-) -> ImageResult<()> {
-    wide_png(depth.size(), &depth.metres, depth_scale, units, file)
+) -> Result<(), png::EncodingError> {
+    wide_png(depth.size(), &depth.metres, depth_scale, says, units, file)
 }
 
-/// Appends `disparity` to `file` as 16-bit grey PNG of [`DISPARITY_SCALE`] units per pixel.
-pub(super) fn disparity_png(disparity: &DisparityMap, file: &mut Vec<u8>) -> ImageResult<()> {
-    wide_png(disparity.size(), &disparity.px, DISPARITY_SCALE, &mut Vec::new(), file)
+/// Appends `disparity` to `file` as 16-bit grey PNG of [`DISPARITY_SCALE`] units per pixel, which says so.
+pub(super) fn disparity_png(
+    disparity: &DisparityMap,
+    says: Meaning,
+    file: &mut Vec<u8>,
+) -> Result<(), png::EncodingError> {
+    wide_png(disparity.size(), &disparity.px, DISPARITY_SCALE, Some(says), &mut Vec::new(), file)
 }
 
 fn wide_png(
     (width, height): (u32, u32),
     values: &[f32],
     scale: f32,
+    says: Option<Meaning>,
     units: &mut Vec<u8>,
     file: &mut Vec<u8>,
-) -> ImageResult<()> {
+) -> Result<(), png::EncodingError> {
     units.clear();
-    units.extend(values.iter().flat_map(|&value| in_units(value, scale).to_ne_bytes()));
-    PngEncoder::new_with_quality(file, CompressionType::Fast, FILTER).write_image(
-        units,
-        width,
-        height,
-        ExtendedColorType::L16,
-    )
+    units.extend(values.iter().flat_map(|&value| in_units(value, scale).to_be_bytes()));
+    let mut encoder = png::Encoder::new(file, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    encoder.set_compression(png::Compression::Fast);
+    encoder.set_filter(png::Filter::Paeth);
+    if let Some(meaning) = says {
+        encoder.add_text_chunk(unit::KEYWORD.to_owned(), meaning.text())?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(units)?;
+    writer.finish()
 }
 
 /// The nearest unit, 1 to 65535, or 0 for unknown. What lies beyond the range becomes unknown rather than a wrong
 /// value; what is known and less than one unit stays known.
 fn in_units(value: f32, scale: f32) -> u16 {
     let units = (value * scale).round();
-    if DepthMap::is_known(value) && units <= f32::from(u16::MAX) { units.max(1.0) as u16 } else { 0 }
+    if DepthMap::is_known(value) && value <= most(scale) { units.clamp(1.0, MOST_UNITS) as u16 } else { 0 }
+}
+
+const MOST_UNITS: f32 = u16::MAX as f32;
+
+/// The largest value that is written at `scale` units.
+pub(super) fn most(scale: f32) -> f32 {
+    (MOST_UNITS + 0.499) / scale
 }
 
 #[cfg(test)]
@@ -84,7 +110,7 @@ mod tests {
         assert_eq!(in_units(1.00011, 5000.0), 5001);
         assert_eq!(in_units(13.107, 5000.0), 65535);
         assert_eq!(in_units(1e-6, 5000.0), 1);
-        for unknown in [0.0, -1.0, f32::NAN, f32::INFINITY, 13.2, 1e30] {
+        for unknown in [0.0, -1.0, f32::NAN, f32::INFINITY, 13.2, 1e11, 1e-9] {
             assert_eq!(in_units(unknown, 5000.0), 0, "{unknown} m");
         }
     }

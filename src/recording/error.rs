@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::fault::{GeometryFault, LineFault, PictureFault};
 use crate::calibration::CalibrationError;
+use crate::files::folder::FolderError;
 
 /// Why a recording or a picture could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -35,6 +36,14 @@ pub enum RecordingError {
     EmptyList {
         /// The list.
         list: PathBuf,
+    },
+    /// A list has more entries than any recording.
+    #[error("{}: the list has more than {most} lines; split the recording", list.display())]
+    LongList {
+        /// The list.
+        list: PathBuf,
+        /// How many are read.
+        most: usize,
     },
     /// A folder that is a list of its own has no picture.
     #[error("{}: no picture here has a number as its name, such as 000000.png; restore the pictures", folder.display())]
@@ -187,6 +196,9 @@ pub enum RecordingError {
         /// The folder.
         dir: PathBuf,
     },
+    /// The folder of the output cannot be written.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
     /// The operating system refused.
     #[error("cannot {action} {}: {cause}", path.display())]
     Io {

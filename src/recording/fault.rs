@@ -28,6 +28,9 @@ pub enum LineFault {
     /// The time repeats, or goes back.
     #[error("the time is out of order or repeated; sort the list by time, and name each time once")]
     OutOfOrder,
+    /// The time is from another age.
+    #[error("the time is more than ten years after the first one of the list; correct or remove the line")]
+    TooFar,
     /// The path leaves the folder of the recording.
     #[error("{} points outside the recording; name a file inside its folder", .0.display())]
     Outside(PathBuf),
@@ -104,10 +107,12 @@ pub enum PictureFault {
         height: u32,
     },
     /// The file is larger than any picture that is read here.
-    #[error("the file has {bytes} bytes, more than any picture read here; convert it")]
+    #[error("the file has {bytes} bytes, and at most {most_bytes} are read; convert it")]
     FileSize {
         /// Size of the file.
         bytes: u64,
+        /// Size of the largest that is read.
+        most_bytes: u64,
     },
     /// The picture has no pixel.
     #[error("the picture has no pixel ({width}x{height}); export it again")]
@@ -166,6 +171,12 @@ pub enum PictureFault {
     /// A picture that does not say how it was made.
     #[error("no snapshot: it has no settings of bokehcam in it; name one, or give the settings themselves")]
     NoSettings,
+    /// 256 steps, and no telling which end is near.
+    #[error(
+        "an 8-bit grey picture has too few steps for depth; export it with 16 bits: dark is near there, and 0 unknown. \
+         Where white is near (inverse depth, as networks and phones make it) turn it into depth first, 1 / value"
+    )]
+    CoarseDepth,
     /// A picture that holds something else than depth.
     #[error("{0} is not depth; export depth as a 16-bit grey PNG")]
     NotDepth(&'static str),

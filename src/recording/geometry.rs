@@ -1,11 +1,11 @@
 //! What the `calib.txt` of a rectified pair says: in the form of Middlebury and ETH3D, or in that of KITTI.
 
-use std::fs;
 use std::path::Path;
 
 use super::error::RecordingError;
 use super::fault::GeometryFault;
 use super::{kitti, middlebury};
+use crate::files::input;
 use crate::optics::StereoRig;
 
 /// A difference of the two focal lengths, as a share of one, that rounding explains.
@@ -42,7 +42,8 @@ impl Geometry {
     }
 
     pub(super) fn read_as(file: &Path, parse: impl Fn(&str) -> Result<Self, Wrong>) -> Result<Self, RecordingError> {
-        let text = fs::read_to_string(file).map_err(RecordingError::io("read the calibration", file))?;
+        let text = input::read_text(file, input::MOST_CALIBRATION_BYTES)
+            .map_err(RecordingError::io("read the calibration", file))?;
         parse(&text).map_err(|(line, fault)| RecordingError::Geometry { file: file.to_owned(), line, fault })
     }
 

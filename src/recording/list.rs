@@ -1,11 +1,15 @@
 //! Lists of pictures: which was taken when.
 
-use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use super::contents::{Place, Source};
 use super::error::RecordingError;
 use super::fault::LineFault;
+use super::timeline::MOST_LENGTH_NS;
+use crate::files::input;
+
+/// Most lines of a list: nine hours at 30 frames per second.
+const MOST_ENTRIES: usize = 1_000_000;
 
 /// Faulty text is quoted in messages up to this length.
 const QUOTED_CHARS: usize = 40;
@@ -31,14 +35,18 @@ impl Entry {
 /// Reads the list `list` in `dir`, each line of which `parse` understands.
 ///
 /// # Errors
-/// It cannot be read, or has no line.
+/// It cannot be read, has no line, or has more than [`MOST_ENTRIES`].
 pub(super) fn read<T>(
     dir: &Path,
     list: &'static str,
     parse: impl Fn(Place, Result<&str, LineFault>) -> T,
 ) -> Result<Vec<T>, RecordingError> {
     let path = dir.join(list);
-    let bytes = fs::read(&path).map_err(RecordingError::io("read the list", &path))?;
+    let bytes = input::read(&path, input::MOST_TEXT_BYTES).map_err(RecordingError::io("read the list", &path))?;
+    // Each takes far more memory than its line takes on the disk.
+    if lines(&bytes).nth(MOST_ENTRIES).is_some() {
+        return Err(RecordingError::LongList { list: path, most: MOST_ENTRIES });
+    }
     let entries: Vec<T> = lines(&bytes).map(|(line, text)| parse(Place { list, line }, text)).collect();
     if entries.is_empty() { Err(RecordingError::EmptyList { list: path }) } else { Ok(entries) }
 }
@@ -56,11 +64,17 @@ pub(super) fn refuse_faults<'a>(
 pub(super) fn give_up_disorder<'a>(entries: impl Iterator<Item = &'a mut Entry>) {
     let entries: Vec<_> = entries.filter(|entry| entry.time_ns.is_some()).collect();
     let times: Vec<_> = entries.iter().filter_map(|entry| entry.time_ns).collect();
-    for (entry, is_kept) in entries.into_iter().zip(longest_increase(&times)) {
-        if !is_kept {
-            entry.time_ns = None;
-            entry.source.file = Err(LineFault::OutOfOrder);
-        }
+    let is_kept = longest_increase(&times);
+    let mut kept = times.iter().zip(&is_kept).filter(|(_, is_kept)| **is_kept);
+    let last_ns = kept.next().map_or(0, |(first_ns, _)| first_ns.saturating_add(MOST_LENGTH_NS));
+    for (entry, is_kept) in entries.into_iter().zip(is_kept) {
+        let fault = match is_kept {
+            false => LineFault::OutOfOrder,
+            true if entry.time_ns > Some(last_ns) => LineFault::TooFar,
+            true => continue,
+        };
+        entry.time_ns = None;
+        entry.source.file = Err(fault);
     }
 }
 

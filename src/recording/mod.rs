@@ -8,11 +8,13 @@ pub mod snapshot;
 pub mod still;
 pub mod tum;
 
+mod coded;
 mod contents;
 mod decode;
 mod encode;
 mod error;
 mod euroc;
+mod extras;
 mod fault;
 mod kitti;
 mod list;
@@ -20,12 +22,14 @@ mod middlebury;
 mod pair;
 mod pfm;
 mod timeline;
-mod whole;
+mod unit;
 
+use std::collections::HashSet;
 use std::path::Path;
 
 pub use decode::Scratch;
 pub use error::RecordingError;
+pub use extras::Extras;
 pub use fault::{GeometryFault, LineFault, PictureFault};
 
 use crate::calibration::StereoCalibration;
@@ -36,7 +40,8 @@ use contents::{DepthForm, Folder, Layout, Source};
 /// The layouts that are read, in the order in which they are looked for.
 const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT];
 
-/// Pictures with more columns or rows are refused from their header, before memory is taken for them.
+/// Pictures with more columns or rows are refused from their header, before memory is taken for them. Reading the largest
+/// takes at most four times the 192 MiB that its RGB has.
 const MAX_SIDE_PX: u32 = 8192;
 
 /// How to read a recording.
@@ -210,7 +215,9 @@ impl Recording {
     pub fn read_color(&self, index: usize, scratch: &mut Scratch, into: &mut ColorImage) -> Result<(), RecordingError> {
         let source = &self.frame(index)?.color;
         let path = self.folder.locate(source)?;
-        decode::color(&path, Some(self.size), scratch, into).map_err(|fault| source.wrong(&self.folder.dir, fault))
+        decode::color(&path, Some(self.size), scratch, into)
+            .map(drop)
+            .map_err(|fault| source.wrong(&self.folder.dir, fault))
     }
 
     /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture
@@ -258,14 +265,20 @@ fn looked_for() -> String {
 
 /// The size of the first colour picture that has a readable header; if none has, what is wrong with the first.
 fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> Result<(u32, u32), RecordingError> {
-    let mut scratch = Scratch::default();
     let mut first_error = None;
+    let mut unreadable = HashSet::new();
     for source in colors {
-        let header = folder
-            .locate(source)
-            .and_then(|path| decode::header(&path, &mut scratch).map_err(|fault| source.wrong(&folder.dir, fault)));
-        match header {
-            Ok((size, _)) => return Ok(size),
+        let size = folder.locate(source).and_then(|path| {
+            if unreadable.contains(&path) {
+                return Ok(None);
+            }
+            let header = decode::header(&path).map_err(|fault| source.wrong(&folder.dir, fault));
+            unreadable.insert(path);
+            header.map(|(size, _)| Some(size))
+        });
+        match size {
+            Ok(Some(size)) => return Ok(size),
+            Ok(None) => {}
             Err(error) => first_error = first_error.or(Some(error)),
         }
     }

@@ -3,10 +3,12 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::decode::{self, Scratch};
+use super::coded::check_size;
+use super::decode::Scratch;
 use super::depth_covers;
 use super::fault::PictureFault;
-use crate::frame::{DepthMap, DisparityMap};
+use super::unit::Meaning;
+use crate::frame::DepthMap;
 use crate::optics::StereoRig;
 
 /// Whether the name says that the file is a PFM.
@@ -14,18 +16,12 @@ pub(super) fn is_named(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"))
 }
 
-/// Reads metres; what is not a depth becomes 0.
-pub(super) fn read(path: &Path) -> Result<DepthMap, PictureFault> {
+/// Reads metres, or what else the file says that it holds; what is unknown becomes 0.
+pub(super) fn read(path: &Path) -> Result<(DepthMap, Option<Meaning>), PictureFault> {
     let mut map = DepthMap::default();
-    (map.width, map.height) = parse(Scratch::default().read_file(path)?, &mut map.metres)?;
-    Ok(map)
-}
-
-/// Reads disparities in pixels; what is unknown becomes 0.
-pub(super) fn read_disparity(path: &Path) -> Result<DisparityMap, PictureFault> {
-    let mut map = DisparityMap::default();
-    (map.width, map.height) = parse(Scratch::default().read_file(path)?, &mut map.px)?;
-    Ok(map)
+    let ((width, height), says) = parse(Scratch::default().read_pfm(path)?, &mut map.metres)?;
+    (map.width, map.height) = (width, height);
+    Ok((map, says))
 }
 
 /// Reads disparities that `rig` turns into metres. They cover a colour picture of `color` pixels, for which `rig` is.
@@ -36,7 +32,7 @@ pub(super) fn read_disparity_as_depth(
     scratch: &mut Scratch,
     into: &mut DepthMap,
 ) -> Result<(), PictureFault> {
-    let found = parse(scratch.read_file(path)?, &mut into.metres)?;
+    let (found, _) = parse(scratch.read_pfm(path)?, &mut into.metres)?;
     if !depth_covers(found, color) {
         return Err(PictureFault::DepthSize { found, color });
     }
@@ -48,8 +44,8 @@ pub(super) fn read_disparity_as_depth(
     Ok(())
 }
 
-/// Columns and rows, and the values, top row first; what is not a finite number above 0 becomes 0.
-fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<(u32, u32), PictureFault> {
+/// Columns and rows, what the file says that it holds, and the values, top row first; what is unknown becomes 0.
+fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Meaning>), PictureFault> {
     let mut rest = bytes;
     let magic = word(&mut rest)?;
     if magic != "Pf" {
@@ -61,9 +57,10 @@ fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<(u32, u32), PictureFault
     }
     let width = number(word(&mut rest)?)?;
     let height = number(word(&mut rest)?)?;
-    decode::check_size(width, height)?;
+    check_size(width, height)?;
     // Only the sign is used: negative means that the low byte comes first.
-    let scale: f32 = number(word(&mut rest)?)?;
+    let written = word(&mut rest)?;
+    let scale: f32 = number(written)?;
     let row_bytes = width as usize * 4;
     let data = rest.get(..row_bytes * height as usize).ok_or(PictureFault::Truncated)?;
 
@@ -72,7 +69,7 @@ fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<(u32, u32), PictureFault
     let read = rows.flat_map(|row| row.as_chunks().0).map(|&bytes| from_bytes(bytes));
     values.clear();
     values.extend(read.map(|value| if DepthMap::is_known(value) { value } else { 0.0 }));
-    Ok((width, height))
+    Ok(((width, height), Meaning::of_pfm_scale(written)))
 }
 
 /// The next word of the header. Exactly one white space ends it, since pixels may follow.
@@ -89,10 +86,10 @@ fn number<T: std::str::FromStr>(word: &str) -> Result<T, PictureFault> {
     word.parse().map_err(|_| PictureFault::Damaged(format!("{short:?} in its header is not a number")))
 }
 
-/// Appends `values` (`height` x `width`, row-major, any unit) to `file`.
-pub(super) fn write(width: u32, height: u32, values: &[f32], file: &mut Vec<u8>) {
+/// Appends `values` (`height` x `width`, row-major), which mean what it says, to `file`.
+pub(super) fn write(width: u32, height: u32, values: &[f32], says: Meaning, file: &mut Vec<u8>) {
     // Writing to memory does not fail.
-    let _ = write!(file, "Pf\n{width} {height}\n-1\n");
+    let _ = write!(file, "Pf\n{width} {height}\n{}\n", says.pfm_scale());
     for row in values.chunks_exact(width.max(1) as usize).rev() {
         file.extend(row.iter().flat_map(|value| value.to_le_bytes()));
     }

@@ -4,10 +4,10 @@
 //! before the blur, `NAME-depth.pfm` its depth as the blur had it, in metres.
 
 use std::fs::{self, File};
-use std::io::{self, Cursor, ErrorKind, Write};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use super::decode::Scratch;
+use super::coded;
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::still::{write_color, write_depth};
@@ -96,17 +96,8 @@ fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
 
 /// The text under our keyword.
 fn text(path: &Path) -> Result<String, PictureFault> {
-    let mut scratch = Scratch::default();
-    let file = scratch.read_file(path)?;
-    if !file.starts_with(b"\x89PNG\r\n\x1a\n") {
-        return Err(PictureFault::Format("PNG"));
-    }
-    let fault = |error: png::DecodingError| match error {
-        png::DecodingError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
-        other => PictureFault::Damaged(other.to_string()),
-    };
-    let reader = png::Decoder::new(Cursor::new(file)).read_info().map_err(fault)?;
-    let info = reader.info();
+    let info = coded::png_info(path)?;
+    let fault = coded::png_fault;
     if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == KEYWORD) {
         return chunk.get_text().map_err(fault);
     }

@@ -2,16 +2,22 @@
 //!
 //! What is written appears whole or not at all, and replaces nothing unless `force` says so.
 
+use std::fmt::Display;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageBuffer, ImageError, Luma, RgbImage, imageops};
+use image::{DynamicImage, ImageBuffer, Luma, RgbImage, imageops};
 
 use super::decode::{self, DepthUnits, Scratch};
 use super::error::RecordingError;
+use super::extras::Extras;
 use super::fault::PictureFault;
-use super::{check_depth_scale, depth_covers, encode, pfm, whole};
+use super::unit::{self, Meaning};
+use super::{check_depth_scale, coded, depth_covers, encode, pfm, tum};
+use crate::files::whole;
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
+use crate::optics::StereoRig;
 
 /// Reads a PNG or JPEG (told by the content) as 8-bit RGB, upright where it says how it was held. Grey is repeated,
 /// transparency ignored, 16 bits rounded to 8. At most 8192 x 8192 pixels.
@@ -19,32 +25,80 @@ use crate::frame::{ColorImage, DepthMap, DisparityMap};
 /// # Errors
 /// The file is missing, no PNG or JPEG, too large, cut short or damaged.
 pub fn read_color(path: &Path) -> Result<ColorImage, RecordingError> {
-    let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
-    decode::color(path, None, &mut scratch, &mut image).map_err(RecordingError::picture(path))?;
+    read_photo(path).map(|(image, _)| image)
+}
 
-    let orientation = scratch.orientation();
+/// The same, with what the file has besides its pixels. Its EXIF says that the picture is upright.
+///
+/// # Errors
+/// As [`read_color`].
+pub fn read_photo(path: &Path) -> Result<(ColorImage, Extras), RecordingError> {
+    let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
+    let read = decode::color(path, None, &mut scratch, &mut image);
+    let mut extras = read.map_err(RecordingError::picture(path))?;
+    drop(scratch);
+
     let (width, height) = image.size();
     let rgb = RgbImage::from_raw(width, height, image.rgb).unwrap_or_default();
     let mut upright = DynamicImage::ImageRgb8(rgb);
-    upright.apply_orientation(orientation);
-    Ok(ColorImage { width: upright.width(), height: upright.height(), rgb: upright.into_bytes() })
+    upright.apply_orientation(extras.take_orientation());
+    let (width, height) = (upright.width(), upright.height());
+    Ok((ColorImage { width, height, rgb: upright.into_bytes() }, extras))
 }
 
-/// Reads a depth map in metres from a 16-bit grey PNG of `depth_scale` units per metre, where 0 and `invalid` mean
-/// unknown, upright where it says how it was held, or from a `.pfm` of metres, for which both are ignored. At most 8192 x 8192 pixels.
+/// What a map file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Map {
+    /// Metres.
+    Depth(DepthMap),
+    /// Pixels, where the file says so.
+    Disparity(DisparityMap, Option<StereoRig>),
+}
+
+/// Reads a map from a 16-bit grey PNG, where 0 and `invalid` mean unknown, or from a `.pfm`. Which it is, and of which
+/// units, is what the file says, as those of [`write_depth`] and [`write_disparity`] do. What says nothing is depth, in
+/// metres in a `.pfm` and in 1/5000 m in a PNG. `depth_scale`, in units of a PNG per metre, goes before both. Upright
+/// where a PNG says how it was held. At most 8192 x 8192 pixels.
 ///
 /// # Errors
 /// The file is missing, of another kind (8-bit grey has too few steps for depth), too large, cut short or damaged;
 /// the scale is not a number > 0.
-pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result<DepthMap, RecordingError> {
-    check_depth_scale(depth_scale)?;
-    if pfm::is_named(path) {
-        return pfm::read(path).map_err(RecordingError::picture(path));
-    }
-    let (mut scratch, mut depth) = (Scratch::default(), DepthMap::default());
-    let units = DepthUnits { scale: depth_scale, invalid };
-    decode::depth(path, units, None, &mut scratch, &mut depth).map_err(RecordingError::picture(path))?;
-    Ok(upright(depth, scratch.orientation()))
+pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> Result<Map, RecordingError> {
+    let fault = || RecordingError::picture(path);
+    depth_scale.map_or(Ok(()), check_depth_scale)?;
+    let (map, says) = if pfm::is_named(path) {
+        pfm::read(path).map_err(fault())?
+    } else {
+        let info = coded::png_info(path).ok();
+        let text = info.as_ref().and_then(|info| {
+            let chunk = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == unit::KEYWORD)?;
+            Meaning::of_text(&chunk.text)
+        });
+        let scale = match (depth_scale, text) {
+            (_, Some(Meaning::Disparity { .. })) => encode::DISPARITY_SCALE,
+            (Some(given), Some(Meaning::Depth { per_m })) if given != per_m => {
+                let file = path.display();
+                tracing::warn!(
+                    "{file}: says that it has {per_m} units per metre, and is read with {given}, as asked for"
+                );
+                given
+            }
+            (Some(given), _) => given,
+            (None, Some(Meaning::Depth { per_m })) => per_m,
+            (None, None) => tum::DEPTH_SCALE,
+        };
+        let turned = info.as_ref().map(|info| Extras::of_png(info).take_orientation());
+        let (mut scratch, mut depth) = (Scratch::default(), DepthMap::default());
+        let units = DepthUnits { scale, invalid };
+        decode::depth(path, units, None, &mut scratch, &mut depth).map_err(fault())?;
+        (upright(depth, turned.unwrap_or(Orientation::NoTransforms)), text)
+    };
+    Ok(match says {
+        Some(Meaning::Disparity { rig }) => {
+            Map::Disparity(DisparityMap { width: map.width, height: map.height, px: map.metres }, rig)
+        }
+        _ => Map::Depth(map),
+    })
 }
 
 /// Whether the depth map `path` of `depth` pixels (columns, rows) is that of a picture of `color` pixels, seen alike.
@@ -75,18 +129,33 @@ fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
     DepthMap { width: image.width(), height: image.height(), metres: image.into_raw() }
 }
 
-/// Reads a disparity map in pixels from a `.pfm`, where what is not finite or not above 0 is unknown, or from a 16-bit
-/// grey PNG of 256 units per pixel, where 0 is unknown (KITTI). At most 8192 x 8192 pixels.
+/// Reads a depth map in metres, as [`read_map`]. Disparity becomes depth where the file says which eyes see it.
+///
+/// # Errors
+/// As for [`read_map`]; the file holds disparity and does not say of which eyes.
+pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result<DepthMap, RecordingError> {
+    match read_map(path, Some(depth_scale), invalid)? {
+        Map::Depth(map) => Ok(map),
+        Map::Disparity(map, Some(rig)) => Ok(map.depth(|px| rig.depth_m(px))),
+        Map::Disparity(_, None) => Err(RecordingError::picture(path)(PictureFault::NotDepth("disparity"))),
+    }
+}
+
+/// Reads a disparity map in pixels from a `.pfm`, or from a 16-bit grey PNG of 256 units per pixel, where 0 is unknown
+/// (KITTI). At most 8192 x 8192 pixels.
 ///
 /// # Errors
 /// As [`read_depth`].
 pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
-    if pfm::is_named(path) {
-        return pfm::read_disparity(path).map_err(RecordingError::picture(path));
-    }
-    let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
-    let units = DepthUnits { scale: encode::DISPARITY_SCALE, invalid: None };
-    decode::depth(path, units, None, &mut scratch, &mut map).map_err(RecordingError::picture(path))?;
+    let map = match pfm::is_named(path) {
+        true => pfm::read(path).map(|(map, _)| map),
+        false => {
+            let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
+            let units = DepthUnits { scale: encode::DISPARITY_SCALE, invalid: None };
+            decode::depth(path, units, None, &mut scratch, &mut map).map(|()| map)
+        }
+    };
+    let map = map.map_err(RecordingError::picture(path))?;
     Ok(DisparityMap { width: map.width, height: map.height, px: map.metres })
 }
 
@@ -104,49 +173,84 @@ pub fn read_grey(path: &Path) -> Result<(u32, u32, Vec<f32>), RecordingError> {
 /// # Errors
 /// Another extension; the file exists and `force` is not set; it cannot be written.
 pub fn write_color(path: &Path, image: &ColorImage, force: bool) -> Result<(), RecordingError> {
-    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    write_photo(path, image, &Extras::default(), force)
+}
+
+/// The same, with what goes with the picture.
+///
+/// # Errors
+/// As [`write_color`].
+pub fn write_photo(path: &Path, image: &ColorImage, extras: &Extras, force: bool) -> Result<(), RecordingError> {
     let mut file = Vec::new();
-    let encoded = match extension.to_str() {
-        Some("png") => encode::color_png(image, &mut file),
-        Some("jpg" | "jpeg") => encode::color_jpeg(image, &mut file),
-        _ => return Err(RecordingError::picture(path)(PictureFault::Extension("`.png` or `.jpg`"))),
+    let encoded = match photo_format(path)? {
+        PhotoFormat::Png => encode::photo_png(image, extras, &mut file),
+        PhotoFormat::Jpeg => encode::photo_jpeg(image, extras, &mut file),
     };
     write(path, encoded, &file, force)
 }
 
+/// What pictures are written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhotoFormat {
+    /// Without loss.
+    Png,
+    /// Smaller.
+    Jpeg,
+}
+
+/// The format of a picture of this name.
+///
+/// # Errors
+/// It ends with something else than `.png`, `.jpg` or `.jpeg`.
+pub fn photo_format(path: &Path) -> Result<PhotoFormat, RecordingError> {
+    match path.extension().unwrap_or_default().to_ascii_lowercase().to_str() {
+        Some("png") => Ok(PhotoFormat::Png),
+        Some("jpg" | "jpeg") => Ok(PhotoFormat::Jpeg),
+        _ => Err(RecordingError::picture(path)(PictureFault::Extension("`.png` or `.jpg`"))),
+    }
+}
+
 /// Writes a 16-bit grey `.png` of `depth_scale` units per metre, where 0 is unknown and so is what lies beyond 65535
-/// units; or a `.pfm` of metres as they are.
+/// units; or a `.pfm` of metres as they are. Both say so.
 ///
 /// # Errors
 /// As [`write_color`]; the scale is not a number > 0.
 pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool) -> Result<(), RecordingError> {
     check_depth_scale(depth_scale)?;
+    let says = Meaning::Depth { per_m: depth_scale };
     let mut file = Vec::new();
     let encoded = match map_format(path)? {
         MapFormat::Pfm => {
-            pfm::write(depth.width, depth.height, &depth.metres, &mut file);
+            pfm::write(depth.width, depth.height, &depth.metres, says, &mut file);
             Ok(())
         }
-        MapFormat::Png => encode::depth_png(depth, depth_scale, &mut Vec::new(), &mut file),
+        MapFormat::Png => encode::depth_png(depth, depth_scale, Some(says), &mut Vec::new(), &mut file),
     };
     write(path, encoded, &file, force)
 }
 
 /// Writes a 16-bit grey `.png` of 256 units per pixel, where 0 is unknown and so is what lies beyond 65535 units
-/// (KITTI); or a `.pfm` of pixels, where infinity is unknown (Middlebury).
+/// (KITTI); or a `.pfm` of pixels, where infinity is unknown (Middlebury). Both say so; the `.png` says, too, how the eyes
+/// stand that see it, where they are given.
 ///
 /// # Errors
 /// As [`write_color`].
-pub fn write_disparity(path: &Path, disparity: &DisparityMap, force: bool) -> Result<(), RecordingError> {
+pub fn write_disparity(
+    path: &Path,
+    disparity: &DisparityMap,
+    rig: Option<StereoRig>,
+    force: bool,
+) -> Result<(), RecordingError> {
+    let says = Meaning::Disparity { rig };
     let mut file = Vec::new();
     let encoded = match map_format(path)? {
         MapFormat::Pfm => {
             let or_infinity = |&px: &f32| if DepthMap::is_known(px) { px } else { f32::INFINITY };
             let px: Vec<f32> = disparity.px.iter().map(or_infinity).collect();
-            pfm::write(disparity.width, disparity.height, &px, &mut file);
+            pfm::write(disparity.width, disparity.height, &px, says, &mut file);
             Ok(())
         }
-        MapFormat::Png => encode::disparity_png(disparity, &mut file),
+        MapFormat::Png => encode::disparity_png(disparity, says, &mut file),
     };
     write(path, encoded, &file, force)
 }
@@ -174,10 +278,10 @@ pub fn map_format(path: &Path) -> Result<MapFormat, RecordingError> {
     }
 }
 
-fn write(path: &Path, encoded: Result<(), ImageError>, file: &[u8], force: bool) -> Result<(), RecordingError> {
+fn write<E: Display>(path: &Path, encoded: Result<(), E>, file: &[u8], force: bool) -> Result<(), RecordingError> {
     encoded.map_err(|error| RecordingError::picture(path)(PictureFault::Encoding(error.to_string())))?;
-    if !force && path.symlink_metadata().is_ok() {
-        return Err(RecordingError::Exists { path: path.to_owned() });
-    }
-    whole::write(path, file)
+    whole::write(path, file, force).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists if !force => RecordingError::Exists { path: path.to_owned() },
+        _ => RecordingError::io("write", path)(error),
+    })
 }

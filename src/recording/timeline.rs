@@ -3,6 +3,10 @@
 /// Taken where a recording does not tell: 30 frames per second.
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;
 
+/// Ten years. No recording is longer, so that what is reckoned with its times and periods stays far from the end of
+/// the numbers.
+pub(super) const MOST_LENGTH_NS: u64 = 10 * 366 * 24 * 3600 * 1_000_000_000;
+
 /// Median distance of strictly increasing times.
 pub(super) fn median_period_ns(times_ns: impl Iterator<Item = u64> + Clone) -> u64 {
     let mut periods_ns: Vec<u64> = times_ns.clone().skip(1).zip(times_ns).map(|(next, time)| next - time).collect();
@@ -10,7 +14,7 @@ pub(super) fn median_period_ns(times_ns: impl Iterator<Item = u64> + Clone) -> u
     if periods_ns.is_empty() { DEFAULT_PERIOD_NS } else { *periods_ns.select_nth_unstable(middle).1 }
 }
 
-/// A time for every frame, in nanoseconds after the first, strictly increasing. Frames whose time is unknown are
+/// A time for every frame, in nanoseconds after the first, strictly increasing, hardly beyond [`MOST_LENGTH_NS`]. Frames whose time is unknown are
 /// spread evenly between their neighbours, or follow one period apart at the ends. The known times increase strictly.
 pub(super) fn fill(times_ns: &[Option<u64>]) -> Vec<u64> {
     let known: Vec<(usize, u64)> =
@@ -32,9 +36,10 @@ pub(super) fn fill(times_ns: &[Option<u64>]) -> Vec<u64> {
     let mut least_ns = 0;
     (0..times_ns.len())
         .map(|index| {
+            let time_ns = u64::try_from(estimate_ns(index) - start_ns).unwrap_or(u64::MAX);
             // More frames than nanoseconds between two times push the later ones on.
-            let time_ns = u64::try_from(estimate_ns(index) - start_ns).unwrap_or(u64::MAX).max(least_ns);
-            least_ns = time_ns.saturating_add(1);
+            let time_ns = time_ns.min(MOST_LENGTH_NS).max(least_ns);
+            least_ns = time_ns + 1;
             time_ns
         })
         .collect()
@@ -60,7 +65,8 @@ mod tests {
     #[test]
     fn times_increase_even_where_there_is_no_room() {
         assert_eq!(fill(&[Some(7), None, None, Some(8), Some(9)]), [0, 1, 2, 3, 4]);
-        assert_eq!(fill(&[Some(0), Some(u64::MAX), None]), [0, u64::MAX, u64::MAX]);
+        assert_eq!(fill(&[Some(0), Some(u64::MAX), None]), [0, MOST_LENGTH_NS, MOST_LENGTH_NS + 1]);
+        assert_eq!(fill(&[Some(0), Some(MOST_LENGTH_NS), None]), [0, MOST_LENGTH_NS, MOST_LENGTH_NS + 1]);
     }
 
     #[test]

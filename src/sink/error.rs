@@ -1,6 +1,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::files::folder::FolderError;
 #[cfg(feature = "camera")]
 use crate::v4l2::loopback::LoopbackError;
 
@@ -28,11 +29,24 @@ pub enum SinkError {
         /// The file.
         path: PathBuf,
     },
-    /// The output folder has something in it.
-    #[error("the folder {} is not empty; choose another or write into it with --force", path.display())]
-    NotEmpty {
-        /// The folder.
-        path: PathBuf,
+    /// The folder cannot be written.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// It failed, but what it had is kept.
+    #[error("{error}; what there was until then is kept as {}", kept.display())]
+    Kept {
+        /// Why it failed.
+        error: Box<SinkError>,
+        /// The file or folder.
+        kept: PathBuf,
+    },
+    /// A defect of this program.
+    #[error("{sink}: panicked: {what}; please report this")]
+    Panic {
+        /// Where frames went.
+        sink: String,
+        /// What it said.
+        what: String,
     },
     /// The file system refused.
     #[error("cannot write {}: {cause}", path.display())]

@@ -1,6 +1,5 @@
 //! A folder of numbered PNG files.
 
-use std::fs;
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -8,14 +7,17 @@ use std::path::{Path, PathBuf};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::staged::Staged;
-use super::{Options, Sink, SinkError};
+use super::{Ending, Options, Sink, SinkError};
+use crate::files::folder::{Folder, Set};
+use crate::files::whole::Part;
 use crate::frame::ColorImage;
 
-/// `DIR/000000.png` and on, numbered in the order in which frames come out. Each file appears whole.
+/// `DIR/000000.png` and on, numbered in the order in which frames come out. Each file appears whole; those of an earlier
+/// run stay until all of the new are there.
 pub struct PngFolder {
-    folder: PathBuf,
-    force: bool,
+    path: PathBuf,
+    /// `None` once it has ended.
+    folder: Option<Folder>,
     next: u64,
 }
 
@@ -23,44 +25,37 @@ impl PngFolder {
     /// Makes the folder where it is missing.
     ///
     /// # Errors
-    /// It has something in it and `force` is not set, or cannot be made.
-    pub fn create(folder: &Path, options: &Options) -> Result<Self, SinkError> {
-        fs::create_dir_all(folder).map_err(SinkError::write(folder))?;
-        let mut entries = fs::read_dir(folder).map_err(SinkError::write(folder))?;
-        if !options.force && entries.next().is_some() {
-            return Err(SinkError::NotEmpty { path: folder.to_owned() });
-        }
-        Ok(Self { folder: folder.to_owned(), force: options.force, next: 0 })
+    /// It has something in it and `force` is not set, has a file of somebody else's that is called like a frame to come, or
+    /// cannot be made.
+    pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
+        let has = |name: &str| number(name).is_some_and(|number| options.frames.is_none_or(|frames| number < frames));
+        let folder = Folder::open(path, options.force, &Set { subfolders: &[], has: &has })?;
+        Ok(Self { path: path.to_owned(), folder: Some(folder), next: 0 })
     }
 
-    fn encode(frame: &ColorImage, staged: &Staged) -> Result<(), SinkError> {
-        let file = fs::File::create(staged.part()).map_err(SinkError::write(staged.path()))?;
-        let mut buffered = BufWriter::with_capacity(1 << 16, file);
-        PngEncoder::new_with_quality(&mut buffered, CompressionType::Fast, FilterType::Sub)
-            .write_image(&frame.rgb, frame.width, frame.height, ExtendedColorType::Rgb8)
-            .map_err(|error| match error {
-                image::ImageError::IoError(cause) => SinkError::Write { path: staged.path().to_owned(), cause },
-                other => SinkError::Png { path: staged.path().to_owned(), message: other.to_string() },
-            })?;
-        buffered.flush().map_err(SinkError::write(staged.path()))
-    }
-
-    /// Removes the tail of an earlier, longer sequence, which would read as part of this one.
-    fn remove_older(&self) -> Result<(), SinkError> {
-        let unreadable = || SinkError::write(&self.folder);
-        for entry in fs::read_dir(&self.folder).map_err(unreadable())? {
-            let path = entry.map_err(unreadable())?.path();
-            if number(&path).is_some_and(|number| number >= self.next) {
-                fs::remove_file(&path).map_err(SinkError::write(&path))?;
-            }
-        }
+    fn add(&mut self, frame: &ColorImage) -> Result<(), SinkError> {
+        let Some(folder) = &mut self.folder else { return Ok(()) };
+        let part = folder.begin(&file_name(self.next))?;
+        encode(frame, &part)?;
+        folder.put(part)?;
+        self.next += 1;
         Ok(())
     }
 }
 
+fn encode(frame: &ColorImage, part: &Part) -> Result<(), SinkError> {
+    let mut buffered = BufWriter::with_capacity(1 << 16, part.file());
+    PngEncoder::new_with_quality(&mut buffered, CompressionType::Fast, FilterType::Sub)
+        .write_image(&frame.rgb, frame.width, frame.height, ExtendedColorType::Rgb8)
+        .map_err(|error| match error {
+            image::ImageError::IoError(cause) => SinkError::Write { path: part.path().to_owned(), cause },
+            other => SinkError::Png { path: part.path().to_owned(), message: other.to_string() },
+        })?;
+    buffered.flush().map_err(SinkError::write(part.path()))
+}
+
 /// The number of a file that this sink would name so.
-fn number(path: &Path) -> Option<u64> {
-    let name = path.file_name()?.to_str()?;
+fn number(name: &str) -> Option<u64> {
     let number = name.strip_suffix(".png")?.parse().ok()?;
     (name == file_name(number)).then_some(number)
 }
@@ -70,19 +65,37 @@ fn file_name(number: u64) -> String {
 }
 
 impl Sink for PngFolder {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
-        let staged = Staged::new(&self.folder.join(file_name(self.next)), self.force)?;
-        Self::encode(frame, &staged)?;
-        staged.commit()?;
-        self.next += 1;
-        Ok(ControlFlow::Continue(()))
+    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        let Err(error) = self.add(frame) else { return Ok(ControlFlow::Continue(())) };
+        // What could not be kept stays hidden within; the first error is the one to tell.
+        let kept = self.folder.take().and_then(|folder| folder.cut().ok().flatten());
+        Err(match kept {
+            Some(kept) => SinkError::Kept { error: Box::new(error), kept },
+            None => error,
+        })
     }
 
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
-        if self.force { self.remove_older() } else { Ok(()) }
+    fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
+        let Some(folder) = self.folder.take() else { return Ok(()) };
+        let path = self.path.display();
+        match ending {
+            Ending::Whole => match folder.finish()? {
+                0 => {}
+                gone => tracing::warn!("{path}: {gone} files of an earlier run are replaced by {}", self.next),
+            },
+            Ending::Cut => {
+                if let Some(kept) = folder.cut()? {
+                    tracing::warn!(
+                        "{path} stays as it was: the new files were cut short, and are kept as {}",
+                        kept.display()
+                    );
+                }
+            }
+        }
+        Ok(())
     }
 
     fn describe(&self) -> String {
-        format!("PNG files in {}", self.folder.display())
+        format!("PNG files in {}", self.path.display())
     }
 }

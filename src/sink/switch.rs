@@ -6,7 +6,7 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use super::{Sink, SinkError};
+use super::{Ending, Sink, SinkError};
 use crate::frame::ColorImage;
 
 /// A sink of members that others add and remove by its [`Switchboard`]. One that fails, or whose reader has gone, is
@@ -90,7 +90,7 @@ impl Switch {
                 Asked::Remove(name) => name,
             };
             if let Some(at) = self.members.iter().position(|member| member.life.name == *name) {
-                self.take_out(at, None);
+                self.take_out(at, Ok(Ending::Whole));
             }
             if let Asked::Add(member) = asked {
                 member.life.tell(Fate::Began);
@@ -105,32 +105,32 @@ impl Switch {
         while at < self.members.len() {
             match give(&mut self.members[at]) {
                 Ok(ControlFlow::Continue(_)) => at += 1,
-                Ok(ControlFlow::Break(())) => self.take_out(at, None),
-                Err(error) => self.take_out(at, Some(error)),
+                Ok(ControlFlow::Break(())) => self.take_out(at, Ok(Ending::Whole)),
+                Err(error) => self.take_out(at, Err(error)),
             }
         }
     }
 
-    /// Completes a member, or gives it up, on a thread of its own.
-    fn take_out(&mut self, at: usize, failed: Option<SinkError>) {
+    /// Completes a member, or drops one that has failed, on a thread of its own.
+    fn take_out(&mut self, at: usize, ending: Result<Ending, SinkError>) {
         let Member { sink, life } = self.members.remove(at);
-        let end = move || match failed {
-            Some(error) => {
+        let end = move || match ending {
+            Err(error) => {
                 drop(sink);
                 life.failed(&error.to_string());
                 Ok(())
             }
-            None => life.ended(sink.finish()),
+            Ok(ending) => life.ended(sink.finish(ending)),
         };
         // Where there can be no thread, both are dropped, which tells that the member was given up.
         self.ending.extend(thread::Builder::new().name("output".into()).spawn(end));
     }
 
     /// Takes all members out at once, and waits for them: the slowest one says how long that takes.
-    fn end(&mut self) -> Result<(), SinkError> {
+    fn end(&mut self, ending: Ending) -> Result<(), SinkError> {
         self.take_orders();
         while !self.members.is_empty() {
-            self.take_out(0, None);
+            self.take_out(0, Ok(ending));
         }
         // One that panicked was told of when it fell.
         let ended: Vec<_> = self.ending.drain(..).flat_map(JoinHandle::join).collect();
@@ -139,11 +139,11 @@ impl Switch {
 }
 
 impl Sink for Switch {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.take_orders();
         self.silent = Duration::ZERO;
         self.each(|member| {
-            let flow = member.sink.put(frame)?;
+            let flow = member.sink.put(frame, time_ns)?;
             member.life.frames += u64::from(flow.is_continue());
             Ok(flow)
         });
@@ -177,8 +177,8 @@ impl Sink for Switch {
 
     /// Completes all members and waits for those that were taken out; the first error in that is returned, after all
     /// were told.
-    fn finish(mut self: Box<Self>) -> Result<(), SinkError> {
-        self.end()
+    fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
+        self.end(ending)
     }
 
     fn describe(&self) -> String {
@@ -189,7 +189,7 @@ impl Sink for Switch {
 impl Drop for Switch {
     fn drop(&mut self) {
         // The errors were told.
-        let _ = self.end();
+        let _ = self.end(Ending::Cut);
     }
 }
 

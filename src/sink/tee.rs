@@ -1,62 +1,107 @@
 //! Several sinks as one.
 
 use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
-use super::{Sink, SinkError};
+use super::{Ending, Sink, SinkError};
 use crate::frame::ColorImage;
 
-/// Gives every frame to each of its sinks, in turn. One whose reader has gone is completed and left out from then on;
-/// when all are, so has this one's.
+/// Gives every frame to each of its sinks, in turn. One whose reader has gone is completed and left out from then on; when
+/// all are, so has this one's. One that fails is left out, too, which is logged, and is an error in the end; a live one ends
+/// the run.
 pub struct Tee {
-    sinks: Vec<Box<dyn Sink>>,
+    sinks: Vec<Named>,
     name: String,
+    /// Of the first one that failed.
+    failed: Option<SinkError>,
 }
+
+/// A sink, and what it calls itself.
+type Named = (String, Box<dyn Sink>);
+
+type Flow = Result<ControlFlow<(), bool>, SinkError>;
 
 impl Tee {
     /// One sink of several.
     pub fn new(sinks: Vec<Box<dyn Sink>>) -> Self {
         let names: Vec<String> = sinks.iter().map(|sink| sink.describe()).collect();
-        Self { sinks, name: names.join(", ") }
+        let name = names.join(", ");
+        Self { sinks: names.into_iter().zip(sinks).collect(), name, failed: None }
     }
 
     /// `Continue` says whether any of them showed something.
-    fn each(
-        &mut self,
-        mut give: impl FnMut(&mut dyn Sink) -> Result<ControlFlow<(), bool>, SinkError>,
-    ) -> Result<ControlFlow<(), bool>, SinkError> {
+    fn each(&mut self, mut give: impl FnMut(&mut dyn Sink) -> Flow) -> Flow {
         let (mut at, mut any) = (0, false);
         while at < self.sinks.len() {
-            match give(&mut *self.sinks[at])? {
-                ControlFlow::Continue(shown) => {
+            let (name, sink) = &mut self.sinks[at];
+            let is_live = sink.hold().is_some();
+            match guarded(name, || give(&mut **sink)) {
+                Ok(ControlFlow::Continue(shown)) => {
                     any |= shown;
                     at += 1;
                 }
-                ControlFlow::Break(()) => self.sinks.remove(at).finish()?,
+                Ok(ControlFlow::Break(())) => {
+                    if let Err(error) = end(self.sinks.remove(at), Ending::Whole) {
+                        self.leave_out(error);
+                    }
+                }
+                Err(error) => {
+                    // It has failed: what it had, it has kept.
+                    drop(self.sinks.remove(at));
+                    if is_live {
+                        return Err(error);
+                    }
+                    self.leave_out(error);
+                }
             }
         }
-        Ok(if self.sinks.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(any) })
+        match self.failed.take_if(|_| self.sinks.is_empty()) {
+            Some(error) => Err(error),
+            None if self.sinks.is_empty() => Ok(ControlFlow::Break(())),
+            None => Ok(ControlFlow::Continue(any)),
+        }
+    }
+
+    fn leave_out(&mut self, error: SinkError) {
+        if !self.sinks.is_empty() {
+            tracing::error!("{error}; going on without it");
+        }
+        self.failed.get_or_insert(error);
     }
 }
 
+fn end((name, sink): Named, ending: Ending) -> Result<(), SinkError> {
+    guarded(&name, || sink.finish(ending))
+}
+
+/// Makes an error of a panic: the others are whole.
+fn guarded<T>(name: &str, call: impl FnOnce() -> Result<T, SinkError>) -> Result<T, SinkError> {
+    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
+        Err(SinkError::Panic { sink: name.into(), what: text.unwrap_or("no reason given").into() })
+    })
+}
+
 impl Sink for Tee {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
-        let flow = self.each(|sink| Ok(sink.put(frame)?.map_continue(|()| true)))?;
+    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        let flow = self.each(|sink| Ok(sink.put(frame, time_ns)?.map_continue(|()| true)))?;
         Ok(flow.map_continue(|_| ()))
     }
 
     fn hold(&self) -> Option<Duration> {
-        self.sinks.iter().filter_map(|sink| sink.hold()).min()
+        self.sinks.iter().filter_map(|(_, sink)| sink.hold()).min()
     }
 
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         self.each(|sink| sink.repeat())
     }
 
-    /// Completes them all, also after one could not be: the first error is told.
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
-        let ended: Vec<_> = self.sinks.into_iter().map(|sink| sink.finish()).collect();
-        ended.into_iter().collect()
+    /// Completes them all, also after one could not be: the first error of all is told.
+    fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
+        let Self { sinks, failed, .. } = *self;
+        let ended: Vec<_> = sinks.into_iter().map(|sink| end(sink, ending)).collect();
+        failed.map(Err).into_iter().chain(ended).collect()
     }
 
     fn describe(&self) -> String {
@@ -92,7 +137,7 @@ mod tests {
     }
 
     impl Sink for Witness {
-        fn put(&mut self, _: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+        fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
             self.note("put");
             self.wants -= 1;
             Ok(if self.wants == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
@@ -107,7 +152,7 @@ mod tests {
             Ok(ControlFlow::Continue(self.hold_ms.is_some()))
         }
 
-        fn finish(self: Box<Self>) -> Result<(), SinkError> {
+        fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
             self.note("finish");
             self.end()
         }
@@ -130,11 +175,11 @@ mod tests {
         let mut tee = tee(&log, [("a", None, 1, false), ("b", Some(50), 2, false)]);
         assert_eq!((tee.describe().as_str(), tee.hold()), ("a, b", Some(Duration::from_millis(50))));
         let frame = ColorImage::new(2, 2);
-        assert!(tee.put(&frame).unwrap().is_continue());
+        assert!(tee.put(&frame, 0).unwrap().is_continue());
         assert_eq!(tee.repeat().unwrap(), ControlFlow::Continue(true));
-        assert!(tee.put(&frame).unwrap().is_break());
+        assert!(tee.put(&frame, 0).unwrap().is_break());
         assert_eq!(tee.hold(), None);
-        tee.finish().unwrap();
+        tee.finish(Ending::Whole).unwrap();
         assert_eq!(*log.lock().unwrap(), ["a put", "a finish", "b put", "b repeat", "b put", "b finish"]);
     }
 
@@ -143,7 +188,7 @@ mod tests {
         let log = Arc::default();
         let broken = tee(&log, [("a", Some(200), 9, true), ("b", Some(100), 9, true)]);
         assert_eq!(broken.hold(), Some(Duration::from_millis(100)));
-        assert_eq!(broken.finish().unwrap_err().to_string(), "cannot write a: full");
+        assert_eq!(broken.finish(Ending::Whole).unwrap_err().to_string(), "cannot write a: full");
         assert_eq!(*log.lock().unwrap(), ["a finish", "b finish"]);
     }
 }

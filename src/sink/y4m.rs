@@ -1,16 +1,23 @@
 //! YUV4MPEG2: uncompressed video that players and encoders read from a file or a pipe.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Write};
+use std::io::{ErrorKind, Write};
 use std::ops::ControlFlow;
-use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use super::output::Output;
+use super::pipe::Pipe;
 use super::rate::frame_rate;
-use super::staged::Staged;
+use super::steady::{Place, Steady};
 use super::yuv::{Converter, Matrix};
-use super::{Options, Sink, SinkError, check_size};
+use super::{Ending, Options, Sink, SinkError, check_size};
 use crate::frame::ColorImage;
+
+/// A picture that stands for longer makes a file no longer than that.
+const LONGEST_STILL: Duration = Duration::from_secs(10);
+/// And a stream: by as much, whoever watches it is behind from then on.
+const LONGEST_STILL_LIVE: Duration = Duration::from_secs(1);
 
 /// A y4m stream into anything that takes bytes: 4:2:0, limited range, BT.709 from 720 rows on, else BT.601.
 pub struct Y4m<W: Write> {
@@ -18,31 +25,73 @@ pub struct Y4m<W: Write> {
     name: PathBuf,
     size: (u32, u32),
     converter: Converter,
-    /// Header of the stream where it is not written yet, header of the frame, planes.
-    bytes: Vec<u8>,
+    steady: Steady,
+    /// Header of the stream, until it is written.
+    header: Vec<u8>,
+    /// The last picture, with its header.
+    picture: Vec<u8>,
+    /// Bytes of the whole pictures that were written, and their header.
+    whole_bytes: u64,
 }
 
 impl<W: Write> Y4m<W> {
     /// A stream into `to`, which `name` stands for in messages. The header goes out with the first frame.
     pub fn new(to: W, name: &Path, options: &Options) -> Self {
+        Self::of(to, name, options, LONGEST_STILL_LIVE)
+    }
+
+    fn of(to: W, name: &Path, options: &Options, longest_still: Duration) -> Self {
         let (width, height) = options.size;
         let (rate, scale) = frame_rate(options.period_ns);
         let header = format!("YUV4MPEG2 W{width} H{height} F{rate}:{scale} Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n");
-        let converter = Converter::new(Matrix::for_height(height));
-        Self { to, name: name.to_owned(), size: options.size, converter, bytes: header.into_bytes() }
+        Self {
+            to,
+            name: name.to_owned(),
+            size: options.size,
+            converter: Converter::new(Matrix::for_height(height)),
+            steady: Steady::new((rate, scale), longest_still),
+            header: header.into_bytes(),
+            picture: Vec::new(),
+            whole_bytes: 0,
+        }
     }
 
-    /// Writes one frame.
+    /// Writes a frame that was taken at `time_ns`: where it is due, after the one before was repeated.
     ///
     /// # Errors
     /// The frame has another size, or writing failed.
-    pub fn write(&mut self, frame: &ColorImage) -> Result<(), SinkError> {
+    pub fn write(&mut self, frame: &ColorImage, time_ns: u64) -> Result<(), SinkError> {
         check_size(self.size, frame)?;
-        self.bytes.extend_from_slice(b"FRAME\n");
-        self.converter.append(frame, &mut self.bytes);
-        let written = self.to.write_all(&self.bytes);
-        self.bytes.clear();
-        written.map_err(SinkError::write(&self.name))
+        let missing = match self.steady.place(time_ns) {
+            Place::Taken => return Ok(()),
+            Place::After(missing) => missing,
+            Place::AfterGap(missing, gap) => {
+                let (name, most_s) = (self.name.display(), self.steady.longest_still().as_secs());
+                tracing::warn!("{name}: there was no picture for {} s, which are {most_s} s of video", gap.as_secs());
+                missing
+            }
+        };
+        for _ in 0..missing {
+            self.flush_picture()?;
+        }
+        self.picture.clear();
+        self.picture.extend_from_slice(b"FRAME\n");
+        self.converter.append(frame, &mut self.picture);
+        self.flush_picture()
+    }
+
+    fn flush_picture(&mut self) -> Result<(), SinkError> {
+        self.flush_header()?;
+        self.to.write_all(&self.picture).map_err(SinkError::write(&self.name))?;
+        self.whole_bytes += self.picture.len() as u64;
+        Ok(())
+    }
+
+    fn flush_header(&mut self) -> Result<(), SinkError> {
+        self.to.write_all(&self.header).map_err(SinkError::write(&self.name))?;
+        self.whole_bytes += self.header.len() as u64;
+        self.header.clear();
+        Ok(())
     }
 
     /// Writes the header if no frame has done so, and gives the writer back.
@@ -50,36 +99,57 @@ impl<W: Write> Y4m<W> {
     /// # Errors
     /// Writing failed.
     pub fn into_inner(mut self) -> Result<W, SinkError> {
-        self.to.write_all(&self.bytes).and_then(|()| self.to.flush()).map_err(SinkError::write(&self.name))?;
+        self.complete()?;
         Ok(self.to)
+    }
+
+    fn complete(&mut self) -> Result<(), SinkError> {
+        if self.steady.surplus > 0 {
+            let (name, surplus) = (self.name.display(), self.steady.surplus);
+            tracing::warn!("{name}: {surplus} frames came faster than its rate, and are left out");
+        }
+        self.flush_header()?;
+        self.to.flush().map_err(SinkError::write(&self.name))
     }
 }
 
-impl Y4m<File> {
+impl Y4m<Pipe> {
     /// A stream on standard output, past the standard library's line buffer.
     ///
     /// # Errors
     /// Standard output is closed.
     pub fn stdout(options: &Options) -> Result<Self, SinkError> {
         let name = Path::new("standard output");
-        let stdout = io::stdout().as_fd().try_clone_to_owned().map_err(SinkError::write(name))?;
-        Ok(Self::new(File::from(stdout), name, options))
+        let stdout = Pipe::stdout(&options.stop).map_err(SinkError::write(name))?;
+        Ok(Self::new(stdout, name, options))
     }
+}
+
+/// Whether this only says that nobody reads any more, and if so, in what way.
+fn left(error: &SinkError) -> Option<ErrorKind> {
+    let SinkError::Write { cause, .. } = error else { return None };
+    Some(cause.kind()).filter(|kind| matches!(kind, ErrorKind::BrokenPipe | ErrorKind::TimedOut))
 }
 
 /// A stream whose reader may go at any time, which ends the run but is no fault.
 impl<W: Write + Send> Sink for Y4m<W> {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
-        match self.write(frame) {
-            Err(SinkError::Write { cause, .. }) if cause.kind() == ErrorKind::BrokenPipe => Ok(ControlFlow::Break(())),
+    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        match self.write(frame, time_ns) {
+            Err(error) if left(&error) == Some(ErrorKind::TimedOut) => {
+                tracing::warn!("{}: its reader does not read, and the last picture is not whole", self.name.display());
+                // Nor may the header be, and nothing can follow.
+                self.header.clear();
+                Ok(ControlFlow::Break(()))
+            }
+            Err(error) if left(&error).is_some() => Ok(ControlFlow::Break(())),
             written => written.map(ControlFlow::Continue),
         }
     }
 
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
-        match self.into_inner() {
-            Err(SinkError::Write { cause, .. }) if cause.kind() == ErrorKind::BrokenPipe => Ok(()),
-            done => done.map(drop),
+    fn finish(mut self: Box<Self>, _: Ending) -> Result<(), SinkError> {
+        match self.complete() {
+            Err(error) if left(&error).is_some() => Ok(()),
+            done => done,
         }
     }
 
@@ -91,7 +161,7 @@ impl<W: Write + Send> Sink for Y4m<W> {
 /// A y4m file.
 pub struct Y4mFile {
     stream: Y4m<File>,
-    staged: Staged,
+    output: Output,
 }
 
 impl Y4mFile {
@@ -100,23 +170,41 @@ impl Y4mFile {
     /// # Errors
     /// It exists and `force` is not set, or cannot be written.
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
-        let staged = Staged::new(path, options.force)?;
-        let file = File::create(staged.part()).map_err(SinkError::write(path))?;
-        Ok(Self { stream: Y4m::new(file, path, options), staged })
+        let output = Output::create(path, options.force)?;
+        let file = output.file().and_then(File::try_clone).map_err(SinkError::write(path))?;
+        Ok(Self { stream: Y4m::of(file, path, options, LONGEST_STILL), output })
+    }
+
+    /// Keeps the whole pictures alone.
+    fn failed(&mut self, error: SinkError) -> SinkError {
+        // If it cannot be cut, players pass over what is not whole.
+        let _ = self.stream.to.set_len(self.stream.whole_bytes);
+        self.output.failed(error)
     }
 }
 
 impl Sink for Y4mFile {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
-        self.stream.write(frame).map(ControlFlow::Continue)
+    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        match self.stream.write(frame, time_ns) {
+            Ok(()) => {
+                self.output.frames += 1;
+                Ok(ControlFlow::Continue(()))
+            }
+            Err(error) => Err(self.failed(error)),
+        }
     }
 
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
-        self.stream.into_inner()?;
-        self.staged.commit()
+    fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
+        if self.output.has_ended() {
+            return Ok(());
+        }
+        match self.stream.complete() {
+            Ok(()) => self.output.complete(ending),
+            Err(error) => Err(self.failed(error)),
+        }
     }
 
     fn describe(&self) -> String {
-        format!("y4m file {}", self.staged.path().display())
+        format!("y4m file {}", self.output.path().display())
     }
 }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use bokehcam::frame::ColorImage;
-use bokehcam::sink::{Options, Target};
+use bokehcam::sink::{Ending, Options, Target};
 use bokehcam::v4l2::FourCc;
 use bokehcam::v4l2::node::nodes;
 
@@ -142,17 +142,17 @@ fn a_hundred_writers_come_and_go() {
                 .unwrap()
                 .open(&options)
                 .unwrap_or_else(|error| panic!("{version}, {turn}: {error}"));
-            let _ = sink.put(&picture).unwrap();
+            let _ = sink.put(&picture, 0).unwrap();
             let mut reader = open(VIRTUAL, wish((64, 48), 30.0, yuyv()));
             let code = 2 * turn + 20;
             let seen = |image: ColorImage| image.rgb.iter().all(|seen| seen.abs_diff(code) <= 2);
             // What was written before may come first.
             until("the reader sees it", Duration::from_secs(5), || {
-                let _ = sink.put(&picture).unwrap();
+                let _ = sink.put(&picture, 0).unwrap();
                 frame_now(&mut reader).is_some_and(seen)
             });
             drop(reader);
-            sink.finish().unwrap();
+            sink.finish(Ending::Whole).unwrap();
             let node = nodes().into_iter().find(|node| node.path.to_str() == Some(VIRTUAL)).unwrap();
             assert!(node.outputs, "{version}, {turn}: it takes no more writers");
         }

@@ -13,7 +13,7 @@ use bokehcam::frame::ColorImage;
 use bokehcam::link;
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{Change, CocRule, Executor, Pace, QualityRule, Run, View, run};
-use bokehcam::sink::{Sink, SinkError};
+use bokehcam::sink::{Ending, Sink, SinkError};
 
 use super::fakes::{FakeSink, Received, SIZE, Trouble, fake_camera, simple};
 
@@ -63,13 +63,13 @@ impl Bokeh for Made {
 struct Nobody;
 
 impl Sink for Nobody {
-    fn put(&mut self, _: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         Ok(ControlFlow::Continue(()))
     }
     fn keeps(&self) -> bool {
         false
     }
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         Ok(())
     }
     fn describe(&self) -> String {

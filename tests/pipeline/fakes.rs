@@ -18,7 +18,7 @@ use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{CocAtInfinity, CocRule, Pace, PipelineError, Progress, QualityRule, Run, run};
-use bokehcam::sink::{Sink, SinkError};
+use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::stats::Report;
 
 pub const SIZE: (u32, u32) = (6, 4);
@@ -196,7 +196,8 @@ impl Bokeh for FakeBokeh {
 #[derive(Clone, Default)]
 pub struct Received {
     pub pictures: Arc<Mutex<Vec<Vec<u8>>>>,
-    pub finished: Arc<AtomicBool>,
+    pub times_ns: Arc<Mutex<Vec<u64>>>,
+    pub ending: Arc<Mutex<Option<Ending>>>,
 }
 
 impl Received {
@@ -206,8 +207,9 @@ impl Received {
     pub fn numbers(&self) -> Vec<usize> {
         self.pictures.lock().unwrap().iter().map(|rgb| u16::from_le_bytes(*rgb.last_chunk().unwrap()).into()).collect()
     }
-    pub fn is_finished(&self) -> bool {
-        self.finished.load(Ordering::SeqCst)
+    /// How it was finished, if it was.
+    pub fn ending(&self) -> Option<Ending> {
+        *self.ending.lock().unwrap()
     }
 }
 
@@ -232,10 +234,11 @@ impl Sink for FakeSink {
             return Ok(ControlFlow::Break(()));
         }
         self.received.pictures.lock().unwrap().push(frame.rgb.clone());
+        self.received.times_ns.lock().unwrap().push(time_ns);
         Ok(ControlFlow::Continue(()))
     }
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
-        self.received.finished.store(true, Ordering::SeqCst);
+    fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
+        *self.received.ending.lock().unwrap() = Some(ending);
         if self.finish_fails { Err(exists()) } else { Ok(()) }
     }
     fn describe(&self) -> String {
@@ -341,9 +344,7 @@ impl Setup {
         assert_eq!(report.frames.delivered, received.count());
         assert!(received.numbers().is_sorted_by(|a, b| a < b), "frames keep their order");
         assert_eq!(last.get().map_or(0, |progress| progress.delivered), received.count());
-        if result.is_ok() {
-            assert!(received.is_finished());
-        }
+        assert!(received.ending().is_some(), "the output is completed, whatever happens");
         (result, received)
     }
 }
@@ -352,13 +353,13 @@ impl Setup {
 pub struct GatedSink(pub Arc<AtomicUsize>, pub usize);
 
 impl Sink for GatedSink {
-    fn put(&mut self, _: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         while self.0.load(Ordering::SeqCst) < self.1 {
             sleep(Duration::from_millis(1));
         }
         Ok(ControlFlow::Continue(()))
     }
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         Ok(())
     }
     fn describe(&self) -> String {

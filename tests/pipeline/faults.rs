@@ -4,7 +4,7 @@ use std::fs;
 use std::sync::atomic::AtomicBool;
 
 use bokehcam::pipeline::{Fault, Pace, run};
-use bokehcam::sink::{Options, Target};
+use bokehcam::sink::{Ending, Options, Sink, Target, Tee};
 
 use crate::fakes::*;
 
@@ -35,7 +35,7 @@ fn the_fault_of_a_stage_is_the_error_of_the_run() {
                     continue;
                 };
                 assert!(expected(&error.fault), "{stage} at {frame}: {error}");
-                assert!(!received.is_finished(), "the output is given up");
+                assert_eq!(received.ending(), Some(Ending::Cut), "{stage} at {frame}");
                 if pace == Pace::Asap {
                     assert!(error.report.frames.captured < 500, "{stage} at {frame} ended the run");
                     assert!(received.count() <= frame as u64);
@@ -61,7 +61,7 @@ fn a_panic_is_the_error_of_its_stage() {
         let (result, received) = setup.run();
         let text = result.unwrap_err().to_string();
         assert_eq!(text, format!("the {stage} stage panicked: out of order at frame 5; please report this"));
-        assert!(!received.is_finished());
+        assert_eq!(received.ending(), Some(Ending::Cut), "{stage}");
     }
 }
 
@@ -85,6 +85,7 @@ fn a_reader_that_goes_ends_the_run_cleanly() {
     let (result, received) = Setup { closes_at: 6, ..Setup::new(300, Pace::Asap) }.run();
     let frames = result.unwrap().frames;
     assert_eq!((frames.delivered, received.count(), frames.dropped.total()), (6, 6, 0));
+    assert_eq!(received.ending(), Some(Ending::Whole), "as far as anybody wanted it");
     assert!(frames.captured < 300 && frames.in_flight > 0, "what was under way stays in flight: {frames:?}");
 }
 
@@ -95,7 +96,7 @@ fn stop_finishes_what_is_in_hand() {
         let frames = result.unwrap().frames;
         assert_eq!(frames.in_flight, 0);
         assert!(frames.delivered >= 8 && frames.captured < 5000, "{frames:?}");
-        assert!(received.is_finished());
+        assert_eq!(received.ending(), Some(Ending::Cut), "the source had an end of its own");
     }
 }
 
@@ -112,20 +113,70 @@ fn stop_before_the_first_frame_still_makes_a_whole_file() {
 }
 
 #[test]
-fn a_failed_run_leaves_no_file() {
+fn a_failed_run_leaves_the_frames_that_were_good() {
     let folder = tempfile::tempdir().unwrap();
     let options = Options::new(SIZE, PERIOD_NS);
     let stop = AtomicBool::new(false);
     let failing = || FakeCamera { trouble: Trouble::fails_at(5), ..fake_camera(9) };
-    let sink = Target::Y4m(folder.path().join("clip.y4m")).open(&options).unwrap();
-    assert!(run(simple(Box::new(failing()), sink, &stop, Pace::Asap)).is_err());
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    let name = folder.path().join("clip.y4m");
+    let sink = Target::Y4m(name.clone()).open(&options).unwrap();
+    let failed = run(simple(Box::new(failing()), sink, &stop, Pace::Asap)).unwrap_err();
+    let frame = b"FRAME\n";
+    let written = fs::read(&name).unwrap();
+    let frames = written.windows(frame.len()).filter(|bytes| bytes == frame).count();
+    assert_eq!((frames as u64, failed.report.frames.delivered), (5, 5));
 
-    let sink = Target::Folder(folder.path().join("out")).open(&options).unwrap();
+    let out = folder.path().join("out");
+    let sink = Target::Folder(out.clone()).open(&options).unwrap();
     assert!(run(simple(Box::new(failing()), sink, &stop, Pace::Asap)).is_err());
-    let names: Vec<_> = fs::read_dir(folder.path().join("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert!(names.len() <= 5 && names.iter().all(|name| !name.to_string_lossy().contains("part")), "{names:?}");
-    for name in names {
-        assert!(image::open(folder.path().join("out").join(&name)).is_ok(), "each picture is whole");
+    for number in 0..5 {
+        assert!(image::open(out.join(format!("{number:06}.png"))).is_ok(), "each picture is whole");
     }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn a_failed_run_replaces_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = folder.path().join("clip.y4m");
+    fs::write(&name, "old").unwrap();
+    let options = Options { force: true, ..Options::new(SIZE, PERIOD_NS) };
+    let stop = AtomicBool::new(false);
+    let failing = FakeCamera { trouble: Trouble::fails_at(5), ..fake_camera(9) };
+    let sink = Target::Y4m(name.clone()).open(&options).unwrap();
+    assert!(run(simple(Box::new(failing), sink, &stop, Pace::Asap)).is_err());
+    assert_eq!(fs::read(&name).unwrap(), b"old");
+    assert!(fs::metadata(folder.path().join("clip.y4m.incomplete")).unwrap().len() > 0);
+
+    let sink = Target::Y4m(name.clone()).open(&options).unwrap();
+    run(simple(Box::new(fake_camera(9)), sink, &stop, Pace::Asap)).unwrap();
+    assert!(fs::read(&name).unwrap().starts_with(b"YUV4MPEG2"));
+}
+
+#[test]
+fn of_several_sinks_the_good_ones_go_on_to_the_end() {
+    let fake = |received: &Received, trouble| FakeSink {
+        received: received.clone(),
+        trouble,
+        closes_at: NEVER,
+        finish_fails: false,
+    };
+    let stop = AtomicBool::new(false);
+    for trouble in [Trouble::fails_at(2), Trouble::panics_at(2)] {
+        let (good, bad) = (Received::default(), Received::default());
+        let sinks: Vec<Box<dyn Sink>> = vec![Box::new(fake(&bad, trouble)), Box::new(fake(&good, Trouble::default()))];
+        let failed = run(simple(Box::new(fake_camera(9)), Box::new(Tee::new(sinks)), &stop, Pace::Asap)).unwrap_err();
+        assert!(matches!(failed.fault, Fault::Sink(_)), "{failed}");
+        assert_eq!((bad.count(), good.count(), failed.report.frames.delivered), (2, 9, 9));
+        assert_eq!((bad.ending(), good.ending()), (None, Some(Ending::Whole)));
+    }
+}
+
+#[test]
+fn sinks_are_told_when_frames_were_taken() {
+    let (result, received) = Setup::new(20, Pace::Asap).run();
+    result.unwrap();
+    let times_ns = received.times_ns.lock().unwrap();
+    let expected: Vec<u64> = (0..20).map(|frame| frame * PERIOD_NS).collect();
+    assert_eq!(*times_ns, expected);
 }

@@ -11,7 +11,7 @@ use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::pipeline::{Pace, QualityRule, Run, run};
-use bokehcam::sink::{Sink, SinkError};
+use bokehcam::sink::{Ending, Sink, SinkError};
 
 use crate::fakes::{PERIOD_NS, SIZE, dof};
 
@@ -69,7 +69,7 @@ impl Screen {
 }
 
 impl Sink for Screen {
-    fn put(&mut self, _: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         // What was under way when the last one left comes to nobody.
         Ok(if self.watch.is_some() { self.show() } else { ControlFlow::Continue(()) })
     }
@@ -83,7 +83,7 @@ impl Sink for Screen {
         Ok(self.show().map_continue(|()| true))
     }
 
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 mod accounting;
 mod changes;
 mod fakes;
+mod fallback;
 mod faults;
 mod frames;
 mod live;

@@ -19,7 +19,7 @@ fn with_pair() -> Scene {
     let mut truth = DisparityMap { width: SIZE.0, height: SIZE.1, px: vec![4.0; 24 * 16] };
     truth.px[0] = 0.0;
     truth.px[1] = 10.0;
-    write_disparity(&scene.path("disp0.pfm"), &truth, false).unwrap();
+    write_disparity(&scene.path("disp0.pfm"), &truth, None, false).unwrap();
     scene
 }
 
@@ -61,7 +61,7 @@ fn a_calibration_of_another_size_is_scaled_or_refused() {
     scene.color("im0.png", (12, 8), 7);
     save_grey(&scene.path("im1.png"), (12, 8), 9);
     let half = DisparityMap { width: 6, height: 4, px: vec![1.0; 24] };
-    write_disparity(&scene.path("disp0.pfm"), &half, true).unwrap();
+    write_disparity(&scene.path("disp0.pfm"), &half, None, true).unwrap();
     let recording = scene.open().unwrap();
     let Some(Pair::Rectified(rig)) = recording.pair() else { panic!("{:?}", recording.pair()) };
     assert_eq!((rig.focal_px, rig.doffs_px, recording.disparities()), (50.0, 1.0, Some(16)));
@@ -88,7 +88,7 @@ fn what_is_wrong_is_told() {
     save_grey(&scene.path("im1.png"), (23, 16), 9);
     assert_says(right_of(&scene.open().unwrap(), 0), &["im1.png: the right picture is 23x16"]);
     let tall = DisparityMap { width: 24, height: 17, px: vec![1.0; 24 * 17] };
-    write_disparity(&scene.path("disp0.pfm"), &tall, true).unwrap();
+    write_disparity(&scene.path("disp0.pfm"), &tall, None, true).unwrap();
     assert_says(depth_of(&scene.open().unwrap(), 0), &["disp0.pfm: the depth map is 24x17", "24x16"]);
     fs::write(scene.path("disp0.pfm"), "Pf\n24 16\n-1\n").unwrap();
     assert_says(depth_of(&scene.open().unwrap(), 0), &["disp0.pfm: the file ends before"]);

@@ -124,8 +124,8 @@ fn disparity_survives_png_within_half_a_unit_and_pfm_exactly() {
     let disparity = DisparityMap { width: 7, height: 5, px };
     let [png, pfm] = ["d.png", "d.pfm"].map(|name| dir.path().join(name));
     for path in [&png, &pfm] {
-        write_disparity(path, &disparity, false).unwrap();
-        assert_says(write_disparity(path, &disparity, false), &["already there"]);
+        write_disparity(path, &disparity, None, false).unwrap();
+        assert_says(write_disparity(path, &disparity, None, false), &["already there"]);
     }
     assert_eq!(read_disparity(&pfm).unwrap(), disparity);
     let read = read_disparity(&png).unwrap();
@@ -137,7 +137,7 @@ fn disparity_survives_png_within_half_a_unit_and_pfm_exactly() {
     // The first value is the bottom row's.
     let first = "Pf\n7 5\n-1\n".len();
     assert_eq!(fs::read(&pfm).unwrap()[first..first + 4], f32::INFINITY.to_le_bytes());
-    assert_says(write_disparity(&dir.path().join("d.jpg"), &disparity, false), &["`.png` or `.pfm`"]);
+    assert_says(write_disparity(&dir.path().join("d.jpg"), &disparity, None, false), &["`.png` or `.pfm`"]);
 }
 
 fn read_pfm(dir: &Path, content: &[u8]) -> Result<DepthMap, bokehcam::recording::RecordingError> {

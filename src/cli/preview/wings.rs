@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::super::config::Executor;
 use super::super::layers::Given;
@@ -145,17 +146,26 @@ impl Backstage for Wings {
     }
 
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
-        let made = match &self.device {
-            Some(device) => bokeh::create_on(settings, size, Arc::clone(device)),
-            None => bokeh::create(settings, size, Backend::Cpu, None, self.executor.threads()),
+        let threads = self.executor.threads();
+        // One that failed stays so.
+        let made = match self.device.as_ref().filter(|device| device.check().is_ok()) {
+            Some(device) => bokeh::create_on(settings, size, Arc::clone(device), threads),
+            None => bokeh::create(settings, size, Backend::Cpu, None, threads),
         };
         made.map_err(|error| error.to_string())
     }
 
-    fn output(&mut self, name: &str, size: (u32, u32), period_ns: u64) -> Result<Box<dyn Sink>, String> {
+    fn output(
+        &mut self,
+        name: &str,
+        size: (u32, u32),
+        period_ns: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn Sink>, String> {
         let out_size = self.parts.stream.out_size.map(|size| (size.width, size.height));
         let force = self.parts.output.force;
-        let options = sink::Options { force, out_size, ..sink::Options::new(size, period_ns) };
+        let stop = Arc::clone(stop);
+        let options = sink::Options { force, out_size, stop, ..sink::Options::new(size, period_ns) };
         let target = Target::from_str(name).map_err(|error| error.to_string())?;
         target.open(&options).map_err(|error| error.to_string())
     }

@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
 use super::{FolderError, LIST};
-use crate::files::input;
+use crate::files::{input, whole};
 
 /// A list that grows.
 #[derive(Debug)]
@@ -46,10 +46,6 @@ impl List {
         self.len += 1;
         Ok(())
     }
-
-    pub(super) fn sync(&self) -> Result<(), FolderError> {
-        self.file.sync_all().map_err(FolderError::write(&self.path))
-    }
 }
 
 /// Names as they were written.
@@ -85,6 +81,25 @@ pub(super) fn read(folder: &Path) -> Result<Names, FolderError> {
     let ordered: Vec<String> = text.lines().filter(|name| lies_within(name)).map(str::to_owned).collect();
     let all = ordered.iter().cloned().collect();
     Ok(Names { ordered, all })
+}
+
+/// Enters files that are there into the list of `folder`, which is made where it is missing: files that a run may
+/// replace, because something else says that they belong to what it replaces. What does not lie within the folder, at
+/// most one folder down, is passed over.
+///
+/// # Errors
+/// The list cannot be read or written.
+pub fn adopt(folder: &Path, names: impl IntoIterator<Item = String>) -> Result<(), FolderError> {
+    let known = read(folder)?;
+    let mut seen = HashSet::new();
+    let new = names.into_iter().filter(|name| lies_within(name) && !known.contains(name));
+    let lines: String = new.filter(|name| seen.insert(name.clone())).map(|name| name + "\n").collect();
+    if lines.is_empty() {
+        return Ok(());
+    }
+    let path = folder.join(LIST);
+    let all = known.ordered.iter().map(|name| format!("{name}\n")).collect::<String>() + &lines;
+    whole::write(&path, all.as_bytes(), true).map_err(FolderError::write(&path))
 }
 
 fn lies_within(name: &str) -> bool {

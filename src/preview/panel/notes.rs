@@ -24,6 +24,7 @@ impl Ages {
     /// Draws notes, and the state of the source where there are no frames.
     pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) {
         let mut up = GAP + banner(ctx, state, actions);
+        up += trouble(ctx, state, up, actions);
         let now_s = ctx.input(|input| input.time);
         self.seen.retain(|(number, _)| state.notes.iter().any(|note| note.number == *number));
         for note in &state.notes {
@@ -61,6 +62,25 @@ impl Ages {
             up += drawn.response.rect.height() + 6.0;
         }
     }
+}
+
+/// What went wrong with an output, until it was read. Its height.
+fn trouble(ctx: &Context, state: &State, up: f32, actions: &mut Vec<Action>) -> f32 {
+    let Some(why) = &state.trouble else { return 0.0 };
+    let area = Area::new(Id::unique("trouble")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -up)).order(Order::Middle);
+    let drawn = area.fade_in(false).show(ctx, |ui| {
+        let colors = Colors::here(ui);
+        ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 460.0));
+        card(&colors).show(ui, |ui| {
+            ui.label(RichText::new("An output failed").family(medium()).size(16.0));
+            ui.add(Label::new(RichText::new(why).color(colors.text)).wrap());
+            ui.add_space(2.0);
+            if ui.button("I see").clicked() {
+                actions.push(Action::Dismiss);
+            }
+        });
+    });
+    drawn.response.rect.height() + 6.0
 }
 
 /// What there is to know of a source without frames, with a way out: at the bottom, clear of the picture's middle. Its

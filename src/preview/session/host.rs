@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 
 use super::live::{self, Live};
-use super::{Heard, News, Order, Start, Still};
+use super::{Closed, Heard, News, Order, Start, Still};
 use crate::look::Look;
 use crate::pipeline::{PipelineError, Wanted};
 use crate::preview::backstage::{Backstage, Switch};
 use crate::preview::state::{Effect, Output, Source, Told};
 use crate::recording::snapshot::{self, Snapshot};
+use crate::sink;
 use crate::sink::switch::{Fate, Told as Written};
 use crate::stats::Report;
 
@@ -30,11 +31,17 @@ pub(super) struct Host {
     /// Runs begun.
     runs: u64,
     report: Option<Report>,
+    /// Why the first of the outputs failed that did.
+    failed: Option<String>,
     /// Whether there ever was a run.
     began: bool,
     /// The last looks that frames had, by the number of the change that brought each.
     looks: VecDeque<(u64, Look)>,
 }
+
+/// What a recording without a name of its own is called, before its number and after it.
+const RECORDING: &str = "bokehcam-";
+const VIDEO: &str = ".mp4";
 
 /// Looks that are kept: a frame that is shown, if it is not held, is of one of the last.
 const KEPT_LOOKS: usize = 512;
@@ -57,14 +64,16 @@ impl Host {
             live: None,
             runs: 0,
             report: None,
+            failed: None,
             began: false,
             looks: VecDeque::new(),
         }
     }
 
-    /// Does what is ordered until it is to close; gives back the report of the last run.
-    pub fn run(mut self, inbox: &mpsc::Receiver<Order>) -> Option<Report> {
+    /// Does what is ordered until it is to close.
+    pub fn run(mut self, inbox: &mpsc::Receiver<Order>) -> Closed {
         self.tell_choices();
+        self.recover();
         self.open();
         while let Ok(order) = inbox.recv() {
             let mut next = Some(order);
@@ -88,15 +97,29 @@ impl Host {
                     Order::Copy(switches) => self.copy(&switches),
                     Order::Wrote(run, written) => self.wrote(run, &written),
                     Order::Ended(run, ended) => self.ended(run, *ended),
-                    Order::Close => {
-                        self.stop();
-                        return self.report;
-                    }
+                    Order::Close => return self.close(inbox),
                 }
             }
         }
+        self.close(inbox)
+    }
+
+    fn close(mut self, inbox: &mpsc::Receiver<Order>) -> Closed {
         self.stop();
-        self.report
+        for order in inbox.try_iter() {
+            if let Order::Wrote(run, written) = order {
+                self.wrote(run, &written);
+            }
+        }
+        Closed { report: self.report, failed: self.failed }
+    }
+
+    /// Keeps what a window that was killed recorded.
+    fn recover(&self) {
+        let is_ours = |name: &str| name.starts_with(RECORDING) && name.ends_with(VIDEO);
+        for kept in sink::recover_all(&self.folder, is_ours) {
+            self.news.note(format!("An earlier recording was broken off: it is kept as {}", kept.display()));
+        }
     }
 
     fn bring_about(&mut self, effect: Effect) {
@@ -217,7 +240,7 @@ impl Host {
         if output.name.is_empty() {
             output.name = self.free_name().display().to_string();
         }
-        match self.backstage.output(&output.name, live.size, live.period_ns) {
+        match self.backstage.output(&output.name, live.size, live.period_ns, &live.stop) {
             Ok(sink) => {
                 self.wanted.need(true);
                 live.write_to(&output, sink);
@@ -229,7 +252,7 @@ impl Host {
 
     /// A name for a recording that nothing has yet.
     fn free_name(&self) -> PathBuf {
-        let name = |number: u32| self.folder.join(format!("bokehcam-{number}.mp4"));
+        let name = |number: u32| self.folder.join(format!("{RECORDING}{number}{VIDEO}"));
         (1..u32::MAX).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
     }
 
@@ -246,7 +269,9 @@ impl Host {
             Fate::Began => self.news.note(format!("writing to {member}")),
             Fate::Completed { frames } => self.news.note(format!("{member}: complete, {frames} frames")),
             Fate::Failed { why, .. } => {
-                self.news.note(why.clone());
+                tracing::error!("{why}");
+                self.failed.get_or_insert_with(|| why.clone());
+                self.news.tell(Told::Trouble(why.clone()));
                 // One of the same name may be written by the next run already.
                 if run == self.runs {
                     self.outputs.retain(|output| output.name != *member);

@@ -37,7 +37,7 @@ pub(super) struct Live {
     made_for: Option<bokeh::Settings>,
     changes: mpsc::Sender<Change>,
     board: Switchboard,
-    stop: Arc<AtomicBool>,
+    pub stop: Arc<AtomicBool>,
     thread: JoinHandle<Option<Report>>,
 }
 

@@ -75,6 +75,15 @@ pub struct Still {
     pub quality: Option<Quality>,
 }
 
+/// What is left of a session.
+#[derive(Debug, Default)]
+pub struct Closed {
+    /// The report of the last run, if there was one.
+    pub report: Option<Report>,
+    /// Why the first of the outputs failed that did: one line.
+    pub failed: Option<String>,
+}
+
 /// What a session is to do.
 enum Order {
     Do(Effect),
@@ -91,7 +100,7 @@ enum Order {
 pub struct Session {
     orders: mpsc::Sender<Order>,
     heard: mpsc::Receiver<Heard>,
-    thread: JoinHandle<Option<Report>>,
+    thread: JoinHandle<Closed>,
 }
 
 impl Session {
@@ -129,8 +138,8 @@ impl Session {
         self.heard.try_recv().ok()
     }
 
-    /// Ends the run and completes all outputs; gives back the report of the last run, if there was one.
-    pub fn close(self) -> Option<Report> {
+    /// Ends the run and completes all outputs.
+    pub fn close(self) -> Closed {
         let _ = self.orders.send(Order::Close);
         // What is still said is said to nobody.
         drop(self.heard);
@@ -143,7 +152,7 @@ impl Session {
                 told = true;
             }
         }
-        self.thread.join().ok().flatten()
+        self.thread.join().unwrap_or_default()
     }
 }
 

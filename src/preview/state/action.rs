@@ -64,6 +64,8 @@ pub enum Action {
     CopyCommand,
     /// Closes the window.
     Close,
+    /// What went wrong is known.
+    Dismiss,
 }
 
 /// What others have to do after an action.
@@ -113,4 +115,6 @@ pub enum Told {
     Outputs(Vec<Output>),
     /// A line for the person.
     Note(String),
+    /// A line that stays until it was read: an output failed.
+    Trouble(String),
 }

@@ -59,6 +59,7 @@ impl State {
             Action::Refresh => return vec![Effect::Refresh],
             Action::CopyCommand => return vec![Effect::CopyCommand],
             Action::Close => return vec![Effect::Close],
+            Action::Dismiss => self.trouble = None,
         }
         Vec::new()
     }

@@ -17,6 +17,7 @@ impl State {
             Told::Controls(controls) => self.controls = controls,
             Told::Outputs(outputs) => self.outputs = outputs,
             Told::Note(text) => self.note(text),
+            Told::Trouble(text) => self.trouble = Some(text),
         }
         None
     }

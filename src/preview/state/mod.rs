@@ -137,6 +137,8 @@ pub struct State {
     pub legend: Option<Legend>,
     /// Lines for the person, the newest last, and no more than a few.
     pub notes: Vec<Note>,
+    /// What went wrong with an output, until the person knows.
+    pub trouble: Option<String>,
     /// How large text and controls are, in [`TEXT_SCALES`]; 1 is usual.
     pub text_scale: f32,
     /// What was measured.
@@ -178,6 +180,7 @@ impl State {
             focus_m: None,
             legend: None,
             notes: Vec::new(),
+            trouble: None,
             text_scale: 1.0,
             meters: Meters::default(),
             history: History::default(),

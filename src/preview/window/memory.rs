@@ -5,6 +5,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::files::input;
+
 /// The window, in points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
@@ -20,7 +22,7 @@ const MOST: f64 = 16_384.0;
 impl Memory {
     /// What the file remembers; nothing where it is missing or says nothing sensible: it is no setting.
     pub fn read(path: &Path) -> Option<Self> {
-        let memory: Self = toml::from_str(&fs::read_to_string(path).ok()?).ok()?;
+        let memory: Self = toml::from_str(&input::read_text(path, input::MOST_SETTINGS_BYTES).ok()?).ok()?;
         let sides = LEAST..=MOST;
         (sides.contains(&memory.width) && sides.contains(&memory.height)).then_some(memory)
     }

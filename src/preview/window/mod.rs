@@ -43,6 +43,8 @@ pub struct Ended {
     pub report: Option<Report>,
     /// Why there were no frames (any more), where that was so when the window closed.
     pub lost: Option<String>,
+    /// Why an output failed, if one did.
+    pub unwritten: Option<String>,
 }
 
 /// Why there is no window.

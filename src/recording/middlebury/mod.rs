@@ -6,7 +6,7 @@ pub(super) mod calib;
 use std::path::Path;
 
 use super::contents::{Contents, DepthForm, Folder, Layout, Listed, Source};
-use super::decode::{self, Scratch};
+use super::decode;
 use super::error::RecordingError;
 use super::geometry::Geometry;
 use super::{Options, Pair, Unpaired};
@@ -52,7 +52,7 @@ fn open(folder: &Folder, _: &Options) -> Result<Contents, RecordingError> {
 fn rig(folder: &Folder, color: &Source, file: &Path) -> Result<(StereoRig, Option<u32>), RecordingError> {
     let stated = Geometry::read_as(file, calib::parse)?;
     let path = folder.locate(color)?;
-    let (size, _) = decode::header(&path, &mut Scratch::default()).map_err(|fault| color.wrong(&folder.dir, fault))?;
+    let (size, _) = decode::header(&path).map_err(|fault| color.wrong(&folder.dir, fault))?;
     let fitted = stated.fitted(file, size)?;
     if fitted != stated {
         tracing::warn!("{}: made for pictures of another size, and scaled to {}x{}", file.display(), size.0, size.1);

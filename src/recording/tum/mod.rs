@@ -5,13 +5,15 @@
 //! comment. `associations.txt` is a ready pairing and used where it exists; else `rgb.txt` is paired with
 //! `depth.txt` by nearest time, as the benchmark's own tool does it; `rgb.txt` alone is a recording without depth.
 
+mod growing;
 mod list;
+mod listed;
 mod open;
 mod time;
 mod writer;
 
 use super::contents::Layout;
-pub use writer::{Writer, WriterOptions};
+pub use writer::{Writer, WriterOptions, Written};
 
 /// Lists of colour pictures and depth maps.
 pub(super) const LAYOUT: Layout =

@@ -1,14 +1,17 @@
 //! From the lists to frames.
 
-use std::collections::HashSet;
-use std::path::Path;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
 
 use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
 use crate::recording::contents::{Contents, DepthForm, Folder, Listed, Source};
-use crate::recording::decode::{self, DepthUnits, Kind, Scratch};
+use crate::recording::decode::{self, DepthUnits, Kind};
 use crate::recording::error::RecordingError;
 use crate::recording::list::{Entry, give_up_disorder, refuse_faults};
 use crate::recording::{Options, Unpaired, pair};
+
+/// Pictures that are looked at before the columns of the associations are given up.
+const MOST_PICTURES: usize = 1000;
 
 /// Whether `dir` has a list of this layout.
 pub(super) fn is_in(dir: &Path) -> bool {
@@ -90,14 +93,17 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
         }
     }
 
-    let mut scratch = Scratch::default();
+    let mut kinds = HashMap::new();
     for pair in pairs {
-        let [first, second] = pair.each_ref().map(|entry| kind(folder, &entry.source, &mut scratch));
+        let [first, second] = pair.each_ref().map(|entry| kind(folder, &entry.source, &mut kinds));
         match (first, second) {
             (first, second) if first == second => {}
             (Some(Kind::Color), _) | (_, Some(Kind::Depth)) => return Ok(true),
             (Some(Kind::Depth), _) | (_, Some(Kind::Color)) => return Ok(false),
             _ => {}
+        }
+        if kinds.len() > MOST_PICTURES {
+            break;
         }
     }
     // Broken lines say more about what is wrong than unreadable columns do.
@@ -105,7 +111,8 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
     Err(RecordingError::Columns { list: folder.dir.join(ASSOCIATIONS) })
 }
 
-fn kind(folder: &Folder, source: &Source, scratch: &mut Scratch) -> Option<Kind> {
+/// What a picture is, if it can be read; each is looked at once.
+fn kind(folder: &Folder, source: &Source, kinds: &mut HashMap<PathBuf, Option<Kind>>) -> Option<Kind> {
     let path = folder.locate(source).ok()?;
-    decode::header(&path, scratch).ok().map(|(_, kind)| kind)
+    *kinds.entry(path).or_insert_with_key(|path| decode::header(path).ok().map(|(_, kind)| kind))
 }

@@ -1,25 +1,28 @@
 //! Writing a recording.
 
-use std::fs;
-use std::io::ErrorKind;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use super::growing::GrowingList;
 use super::time::Seconds;
-use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST};
+use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, listed};
+use crate::files::folder::{self, Folder, FolderError, Set};
 use crate::frame::{ColorImage, DepthMap};
 use crate::recording::error::RecordingError;
-use crate::recording::whole::WholeList;
 use crate::recording::{MAX_SIDE_PX, check_depth_scale, depth_covers, encode};
 
 const COLOR_FOLDER: &str = "rgb";
 const DEPTH_FOLDER: &str = "depth";
+
+/// What a recording has in its folder.
+const SET: Set = Set { subfolders: &[COLOR_FOLDER, DEPTH_FOLDER], has: &is_ours };
 
 /// How to write a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WriterOptions {
     /// Units of the depth pictures per metre, > 0. A depth beyond 65535 units is written as unknown.
     pub depth_scale: f32,
-    /// Whether a recording that is already in the folder may be replaced.
+    /// Whether a recording that is already in the folder may be replaced, once the new one is whole.
     pub overwrite: bool,
 }
 
@@ -33,46 +36,70 @@ impl Default for WriterOptions {
 /// Writes a recording frame by frame, with the memory of one frame.
 ///
 /// The pictures are `rgb/000000.png` (8-bit RGB) and `depth/000000.png` (16-bit grey, 0 = unknown) and so on. The
-/// lists appear when [`Writer::finish`] has made them whole; until then they are `rgb.txt.part` and
-/// `depth.txt.part`, and the folder is not a recording.
+/// lists come last; until then the folder is not a recording. What an earlier recording named in its lists stays until
+/// the new one is whole, and nothing else in the folder is ever touched. [`Writer::finish`] or [`Writer::cut`] ends it;
+/// without one of them there are no lists.
 pub struct Writer {
     dir: PathBuf,
     depth_scale: f32,
-    color: WholeList,
+    color: GrowingList,
     /// Begins with the first depth map: a recording without depth has no list of it.
-    depth: Option<WholeList>,
+    depth: Option<GrowingList>,
+    /// After the lists, so that it is closed after them.
+    folder: Folder,
     count: usize,
     last_ns: Option<u64>,
     size: Option<(u32, u32)>,
+    /// Known depths of all frames, and of these the ones that were too far for the file.
+    depths: (u64, u64),
     units: Vec<u8>,
     file: Vec<u8>,
 }
 
+/// What became of a recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// Where it is.
+    pub dir: PathBuf,
+    /// Its frames.
+    pub frames: usize,
+    /// Files of an earlier recording that went.
+    pub replaced: u64,
+    /// Depths that were known, in all frames.
+    pub depths: u64,
+    /// Depths beyond what the file holds, written as unknown.
+    pub too_far: u64,
+}
+
 impl Writer {
-    /// Starts a recording in the folder `dir`, which is created where needed.
+    /// Starts a recording in the folder `dir`, which is created where needed. A recording there that a killed process
+    /// began gets its lists, as far as it came.
     ///
     /// # Errors
-    /// The folder holds a recording (finished or not) that may not be overwritten; it cannot be written; the depth
-    /// scale is not a number > 0.
+    /// The folder has something in it, which may not be overwritten, or pictures of the names of a recording that no list
+    /// names; it is being written by others, or cannot be; the depth scale is not a number > 0.
     pub fn create(dir: &Path, options: &WriterOptions) -> Result<Self, RecordingError> {
         check_depth_scale(options.depth_scale)?;
-        if !options.overwrite {
-            refuse_existing(dir)?;
+        GrowingList::rescue(dir, &[DEPTH_LIST, COLOR_LIST])?;
+        if options.overwrite {
+            folder::adopt(dir, listed::pictures(dir).chain(listed::lists(dir)))?;
         }
-        let color_folder = dir.join(COLOR_FOLDER);
-        fs::create_dir_all(&color_folder).map_err(RecordingError::io("create the folder", &color_folder))?;
-        remove_recording(dir)?;
-
-        let mut color = WholeList::create(dir.join(COLOR_LIST))?;
-        color.line(format_args!("# colour pictures, 8-bit RGB PNG\n# timestamp filename"))?;
+        let folder = Folder::open(dir, options.overwrite, &SET).map_err(|error| match error {
+            FolderError::NotEmpty { path } => RecordingError::Exists { path },
+            other => other.into(),
+        })?;
+        let color =
+            GrowingList::create(&folder, COLOR_LIST, "# colour pictures, 8-bit RGB PNG\n# timestamp filename\n")?;
         Ok(Self {
             dir: dir.to_owned(),
             depth_scale: options.depth_scale,
             color,
             depth: None,
+            folder,
             count: 0,
             last_ns: None,
             size: None,
+            depths: (0, 0),
             units: Vec::new(),
             file: Vec::new(),
         })
@@ -82,22 +109,23 @@ impl Writer {
     /// left unpaired by readers.
     ///
     /// # Errors
-    /// The frame does not fit the recording, which stays as it was: the time is not after the last one, the colour
-    /// picture differs in size from the first, the depth map does not cover it. Or a file cannot be written.
+    /// The frame does not fit the recording: the time is not after the last one, the colour picture differs in size from
+    /// the first, the depth map does not cover it. Or a file cannot be written. The recording stays as it was.
     pub fn add(&mut self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), RecordingError> {
         self.check(time_ns, color, depth)
             .map_err(|reason| RecordingError::Unrecordable { index: self.count, reason })?;
 
         let file_name = format!("{:06}.png", self.count);
+        let mut depths = self.depths;
         if let Some(depth) = depth {
             self.file.clear();
-            encode::depth_png(depth, self.depth_scale, &mut self.units, &mut self.file)
+            encode::depth_png(depth, self.depth_scale, None, &mut self.units, &mut self.file)
                 .map_err(|e| self.encoding(e))?;
-            if self.depth.is_none() {
-                let folder = self.dir.join(DEPTH_FOLDER);
-                fs::create_dir_all(&folder).map_err(RecordingError::io("create the folder", &folder))?;
-            }
             self.write_picture(DEPTH_FOLDER, &file_name)?;
+            let known = || depth.metres.iter().filter(|&&metres| DepthMap::is_known(metres));
+            let most_m = self.most_m();
+            depths.0 += known().count() as u64;
+            depths.1 += known().filter(|&&metres| metres > most_m).count() as u64;
         }
         self.file.clear();
         encode::color_png(color, &mut self.file).map_err(|e| self.encoding(e))?;
@@ -107,29 +135,71 @@ impl Writer {
         if depth.is_some() {
             let list = match &mut self.depth {
                 Some(list) => list,
-                none => none.insert(start_depth_list(&self.dir, self.depth_scale)?),
+                none => none.insert(GrowingList::create(&self.folder, DEPTH_LIST, &depth_head(self.depth_scale))?),
             };
             list.line(format_args!("{time} {DEPTH_FOLDER}/{file_name}"))?;
         }
-        self.color.line(format_args!("{time} {COLOR_FOLDER}/{file_name}"))?;
-        (self.count, self.last_ns, self.size) = (self.count + 1, Some(time_ns), Some(color.size()));
+        if let Err(error) = self.color.line(format_args!("{time} {COLOR_FOLDER}/{file_name}")) {
+            if let (Some(list), Some(_)) = (&mut self.depth, depth) {
+                list.take_back();
+            }
+            return Err(error);
+        }
+        (self.count, self.last_ns, self.size, self.depths) =
+            (self.count + 1, Some(time_ns), Some(color.size()), depths);
         Ok(())
     }
 
-    /// Completes the recording: its lists appear.
+    /// Frames so far.
+    pub fn frames(&self) -> usize {
+        self.count
+    }
+
+    /// The largest depth that is written, in metres.
+    pub fn most_m(&self) -> f32 {
+        encode::most(self.depth_scale)
+    }
+
+    /// Completes the recording: its lists appear, and what it replaces goes.
     ///
     /// # Errors
     /// No frame was added (an empty recording cannot be read), or a list cannot be written.
-    pub fn finish(self) -> Result<(), RecordingError> {
+    pub fn finish(self) -> Result<Written, RecordingError> {
+        let mut written = self.written();
+        let folder = self.with_lists()?;
+        written.replaced = folder.finish()?;
+        Ok(written)
+    }
+
+    /// Ends a recording that is not all that it should be: what it would have replaced stays, and it is kept beside as
+    /// `NAME.incomplete`. Where it replaces nothing, it is where it should be. Both can be read.
+    ///
+    /// # Errors
+    /// As for [`Writer::finish`].
+    pub fn cut(self) -> Result<Written, RecordingError> {
+        let mut written = self.written();
+        let folder = self.with_lists()?;
+        written.dir = folder.cut()?.unwrap_or(written.dir);
+        Ok(written)
+    }
+
+    fn written(&self) -> Written {
+        let (depths, too_far) = self.depths;
+        Written { dir: self.dir.clone(), frames: self.count, replaced: 0, depths, too_far }
+    }
+
+    /// The folder, with its lists.
+    fn with_lists(self) -> Result<Folder, RecordingError> {
+        let mut folder = self.folder;
         if self.count == 0 {
-            self.color.abandon();
             return Err(RecordingError::NothingRecorded { dir: self.dir });
         }
         // The colour list comes last: with it, the folder becomes a recording.
         if let Some(depth) = self.depth {
-            depth.finish()?;
+            depth.put(&mut folder)?;
         }
-        self.color.finish()
+        self.color.put(&mut folder)?;
+        Ok(folder)
     }
 
     fn check(&self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), String> {
@@ -163,68 +233,25 @@ impl Writer {
         Ok(())
     }
 
-    fn encoding(&self, error: image::ImageError) -> RecordingError {
+    fn encoding(&self, error: impl std::fmt::Display) -> RecordingError {
         RecordingError::Unrecordable { index: self.count, reason: error.to_string() }
     }
 
-    fn write_picture(&self, folder: &str, file_name: &str) -> Result<(), RecordingError> {
-        let path = self.dir.join(folder).join(file_name);
-        fs::write(&path, &self.file).map_err(RecordingError::io("write", &path))
+    fn write_picture(&mut self, folder: &str, file_name: &str) -> Result<(), RecordingError> {
+        let part = self.folder.begin(&format!("{folder}/{file_name}"))?;
+        part.file().write_all(&self.file).map_err(RecordingError::io("write", part.path()))?;
+        Ok(self.folder.put(part)?)
     }
 }
 
-fn start_depth_list(dir: &Path, depth_scale: f32) -> Result<WholeList, RecordingError> {
-    let mut list = WholeList::create(dir.join(DEPTH_LIST))?;
-    list.line(format_args!("# depth maps, 16-bit PNG, {depth_scale} units per metre, 0 = unknown"))?;
-    list.line(format_args!("# timestamp filename"))?;
-    Ok(list)
+fn depth_head(depth_scale: f32) -> String {
+    format!("# depth maps, 16-bit PNG, {depth_scale} units per metre, 0 = unknown\n# timestamp filename\n")
 }
 
-/// The files that a recording, finished or not, has in its folder besides the pictures.
-fn lists(dir: &Path) -> impl Iterator<Item = PathBuf> {
-    let lists = [COLOR_LIST, DEPTH_LIST, ASSOCIATIONS].map(|name| dir.join(name));
-    let parts = lists.clone().map(|list| WholeList::part_of(&list));
-    lists.into_iter().chain(parts)
-}
-
-/// The numbered pictures in `folder`, which may be missing.
-fn pictures(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
-    let is_ours = |path: &PathBuf| {
-        path.extension().is_some_and(|extension| extension == "png")
-            && path.file_stem().is_some_and(|stem| stem.as_encoded_bytes().iter().all(u8::is_ascii_digit))
-    };
-    match fs::read_dir(folder) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(Vec::new()),
-        entries => entries
-            .and_then(|entries| {
-                entries.map(|entry| Ok(entry?.path())).filter(|p| p.as_ref().map_or(true, is_ours)).collect()
-            })
-            .map_err(RecordingError::io("list", folder)),
-    }
-}
-
-fn refuse_existing(dir: &Path) -> Result<(), RecordingError> {
-    if let Some(path) = lists(dir).find(|list| list.exists()) {
-        return Err(RecordingError::Exists { path });
-    }
-    for folder in [COLOR_FOLDER, DEPTH_FOLDER] {
-        if let Some(path) = pictures(&dir.join(folder))?.pop() {
-            return Err(RecordingError::Exists { path });
-        }
-    }
-    Ok(())
-}
-
-/// Removes an earlier recording, lists first: the folder stops being a recording before it stops being whole.
-fn remove_recording(dir: &Path) -> Result<(), RecordingError> {
-    let pictures = [COLOR_FOLDER, DEPTH_FOLDER].map(|folder| pictures(&dir.join(folder)));
-    for path in lists(dir).chain(pictures.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten()) {
-        match fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                return Err(RecordingError::io("remove", &path)(error));
-            }
-            _ => {}
-        }
-    }
-    Ok(())
+/// Whether a recording may have a file of this name.
+fn is_ours(name: &str) -> bool {
+    let folders = [COLOR_FOLDER, DEPTH_FOLDER];
+    let number = folders.iter().find_map(|folder| name.strip_prefix(folder)?.strip_prefix('/')?.strip_suffix(".png"));
+    let is_number = |number: &str| number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit());
+    [COLOR_LIST, DEPTH_LIST, ASSOCIATIONS].contains(&name) || number.is_some_and(is_number)
 }

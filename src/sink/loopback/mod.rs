@@ -14,7 +14,7 @@ use std::time::Duration;
 use self::encode::Encoder;
 use self::watch::Watcher;
 use super::rate::frame_rate;
-use super::{Options, Sink, SinkError, card};
+use super::{Ending, Options, Sink, SinkError, card};
 use crate::frame::ColorImage;
 use crate::frame::fit::Fit;
 use crate::link::demand::Demand;
@@ -103,7 +103,7 @@ fn watch(path: &Path, output: &Output, demand: Demand) -> Result<Watcher, SinkEr
 }
 
 impl Sink for Loopback {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         if frame.size() == self.output.size() {
             self.encoder.encode(frame, &mut self.bytes);
         } else {
@@ -133,7 +133,7 @@ impl Sink for Loopback {
         Ok(ControlFlow::Continue(true))
     }
 
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         Ok(())
     }
 

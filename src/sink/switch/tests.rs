@@ -26,7 +26,7 @@ fn full(name: &str) -> SinkError {
 }
 
 impl Sink for Fake {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         let mut got = self.got.lock().unwrap();
         if self.fails_at == Some(got.len()) {
             return Err(full(self.name));
@@ -47,7 +47,7 @@ impl Sink for Fake {
         Ok(ControlFlow::Continue(self.hold.is_some()))
     }
 
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         thread::sleep(self.finish_takes);
         assert!(!self.finish_panics, "as it should");
         if self.finish_fails { Err(full(self.name)) } else { Ok(()) }
@@ -68,7 +68,7 @@ fn put(switch: &mut Switch, numbers: std::ops::Range<u8>) {
     for number in numbers {
         let mut frame = ColorImage::new(2, 2);
         frame.rgb.fill(number);
-        assert!(switch.put(&frame).unwrap().is_continue());
+        assert!(switch.put(&frame, number.into()).unwrap().is_continue());
     }
 }
 
@@ -107,7 +107,7 @@ fn members_come_and_go_and_each_gets_the_frames_of_its_time() {
     board.remove("early");
     board.remove("nobody");
     put(&mut switch, 5..7);
-    switch.finish().unwrap();
+    switch.finish(Ending::Whole).unwrap();
     assert_eq!(got.map(|got| got.lock().unwrap().clone()), [vec![2, 3, 4], vec![4, 5, 6]]);
     let expected = [began("early"), completed("early", 3), began("late"), completed("late", 3)];
     assert_eq!(all(&told), expected);
@@ -124,7 +124,7 @@ fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() 
     put(&mut switch, 0..5);
     assert_eq!(switch.members.len(), 1);
     // A member that failed while it ran is its own affair, not the run's.
-    switch.finish().unwrap();
+    switch.finish(Ending::Whole).unwrap();
     assert_eq!(*got.lock().unwrap(), [0, 1, 2, 3, 4]);
     let [a, b, c] = [failed("a", 1, "cannot write a: full"), completed("b", 5), completed("c", 2)];
     assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);
@@ -141,7 +141,7 @@ fn a_member_that_takes_long_to_complete_does_not_hold_frames_up() {
     put(&mut switch, 1..100);
     assert!(began_at.elapsed() < slow / 2, "{:?}", began_at.elapsed());
     assert_eq!(all(&told), [began("slow")]);
-    switch.finish().unwrap();
+    switch.finish(Ending::Whole).unwrap();
     assert!(began_at.elapsed() >= slow, "the end waits for it");
     assert_eq!(all(&told), [completed("slow", 1)]);
 }
@@ -154,7 +154,7 @@ fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
     let slow = Duration::from_millis(50);
     board.add("c", Box::new(Fake { finish_takes: slow, ..Fake::default() })).unwrap();
     put(&mut switch, 0..2);
-    assert_eq!(switch.finish().unwrap_err().to_string(), "cannot write b: full");
+    assert_eq!(switch.finish(Ending::Whole).unwrap_err().to_string(), "cannot write b: full");
     let [a, b, c] = [failed("a", 2, "it was given up"), failed("b", 2, "cannot write b: full"), completed("c", 2)];
     assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);
     // Whoever comes too late learns it, in both ways.
@@ -180,7 +180,7 @@ fn a_name_that_is_taken_goes_to_the_newer_member() {
         put(&mut switch, 0..2);
     }
     assert_eq!(switch.members.len(), 1);
-    switch.finish().unwrap();
+    switch.finish(Ending::Whole).unwrap();
     let told: Vec<_> = all(&told).into_iter().filter(|told| *told == completed("a", 2)).collect();
     assert_eq!(told.len(), 2);
 }
@@ -206,6 +206,6 @@ fn without_pictures_orders_are_taken_and_live_members_repeat_when_they_are_due()
     assert_eq!(shown.iter().filter(|shown| **shown).count(), 4);
     board.remove("file");
     assert_eq!(switch.repeat().unwrap(), ControlFlow::Continue(false));
-    switch.finish().unwrap();
+    switch.finish(Ending::Whole).unwrap();
     assert_eq!(all(&told), [completed("file", 1), began("live"), completed("live", 1)]);
 }

@@ -24,7 +24,7 @@ use crate::optics::CocField;
 use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
 use crate::preview::panel::Panel;
-use crate::preview::session::{Heard, Session, Wake};
+use crate::preview::session::{Closed, Heard, Session, Wake};
 use crate::preview::state::{Shown, Source, State};
 use crate::preview::views::Views;
 use crate::stats::WindowUse;
@@ -133,7 +133,7 @@ impl App {
         let Self { gfx, view, views, session, state, failed, .. } = self;
         // The window goes at once; outputs may take a while to be completed.
         drop((gfx, view));
-        let mut report = session.close();
+        let Closed { mut report, failed: unwritten } = session.close();
         // Only now: the frames on the way to a viewer that is gone would be nobody's.
         drop(views);
         if let Some(report) = &mut report {
@@ -143,7 +143,7 @@ impl App {
             Source::Lost(why) => Some(why),
             _ => None,
         };
-        failed.map_or(Ok(Ended { report, lost }), Err)
+        failed.map_or(Ok(Ended { report, lost, unwritten }), Err)
     }
 
     /// Hears what the session has to say, and takes the newest frame.

@@ -1,0 +1,356 @@
+//! Picture files as they are coded: recognised by their first bytes, bounded by their header, and unpacked row by row.
+//!
+//! What a file may cost is known before it is unpacked: at most [`MAX_SIDE_PX`] columns and rows, and beside the pixels
+//! that are asked for one row of a PNG, or of a JPEG the file (up to [`MAX_JPEG_BYTES`]) twice and 6 bytes a pixel.
+
+use std::fs::File;
+use std::io::{BufReader, Cursor, ErrorKind, Read, Seek};
+use std::path::Path;
+
+use image::codecs::jpeg::JpegDecoder;
+use image::{ColorType, ImageDecoder, ImageError};
+
+use super::MAX_SIDE_PX;
+use super::extras::Extras;
+use super::fault::PictureFault;
+use crate::files::input;
+
+/// Far more than a photograph of 8192 x 8192 pixels takes.
+const MAX_JPEG_BYTES: u64 = 96 << 20;
+
+/// The same, of a float map.
+const MAX_PFM_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + 4096;
+
+/// Memory that a PNG's texts and profiles may take, which are not shown.
+const MAX_METADATA_BYTES: usize = 64 << 20;
+
+/// Segments that a JPEG may have before its frame; cameras write some tens.
+const MAX_JPEG_SEGMENTS: usize = 1000;
+
+/// Formats that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Png,
+    Jpeg,
+    Pfm,
+}
+
+/// What a pixel is stored in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Samples {
+    /// 1 is grey, 3 colour; one more is transparency.
+    pub(super) channels: usize,
+    /// Whether samples have 16 bits, high byte first, or 8.
+    pub(super) are_wide: bool,
+}
+
+impl Samples {
+    pub(super) fn has_color(self) -> bool {
+        self.channels >= 3
+    }
+
+    pub(super) fn has_alpha(self) -> bool {
+        self.channels.is_multiple_of(2)
+    }
+
+    /// 16-bit grey.
+    pub(super) fn is_depth(self) -> bool {
+        self.are_wide && self.channels == 1
+    }
+
+    pub(super) fn bytes_per_pixel(self) -> usize {
+        self.channels * (1 + usize::from(self.are_wide))
+    }
+}
+
+/// A picture whose header has been read.
+pub(super) enum Coded<'a> {
+    /// Unpacked straight from the disk.
+    Png(Box<png::Reader<BufReader<File>>>),
+    /// In memory.
+    Jpeg(Box<JpegDecoder<Cursor<&'a [u8]>>>),
+}
+
+/// Where a run of pixels goes: the number of its first one in the picture, row by row, and the distance to the next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    pub(super) first: usize,
+    pub(super) step: usize,
+}
+
+impl<'a> Coded<'a> {
+    /// Opens a PNG or JPEG; `memory` takes the file where it has to be read as a whole.
+    pub(super) fn open(path: &Path, memory: &'a mut Vec<u8>) -> Result<Self, PictureFault> {
+        let (mut file, format) = recognised(path)?;
+        let coded = match format {
+            Some(Format::Png) => Self::Png(Box::new(png_decoder(file)?.read_info().map_err(png_fault)?)),
+            Some(Format::Jpeg) => {
+                let ((width, height), _) = jpeg_header(&mut BufReader::new(&mut file))?;
+                check_size(width, height)?;
+                read_from_start(file, MAX_JPEG_BYTES, memory)?;
+                // The decoder would fill up what is missing with grey.
+                if !jpeg_is_whole(memory) {
+                    return Err(PictureFault::Truncated);
+                }
+                Self::Jpeg(Box::new(JpegDecoder::new(Cursor::new(memory.as_slice())).map_err(jpeg_fault)?))
+            }
+            _ => return Err(PictureFault::Format("PNG or JPEG")),
+        };
+        let (width, height) = coded.size();
+        check_size(width, height)?;
+        Ok(coded)
+    }
+
+    /// Columns and rows.
+    pub(super) fn size(&self) -> (u32, u32) {
+        match self {
+            Self::Png(reader) => reader.info().size(),
+            Self::Jpeg(decoder) => decoder.dimensions(),
+        }
+    }
+
+    pub(super) fn samples(&self) -> Samples {
+        match self {
+            Self::Png(reader) => {
+                let (color, depth) = reader.output_color_type();
+                Samples { channels: color.samples(), are_wide: depth == png::BitDepth::Sixteen }
+            }
+            Self::Jpeg(decoder) => {
+                Samples { channels: usize::from(decoder.color_type().channel_count()), are_wide: false }
+            }
+        }
+    }
+
+    /// Unpacks 8-bit RGB as it is stored; nothing else has a shorter way than [`Coded::runs`].
+    pub(super) fn rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<Extras, PictureFault> {
+        match self {
+            Self::Jpeg(mut decoder) if decoder.color_type() == ColorType::Rgb8 => {
+                let extras = Extras::of_jpeg(&mut decoder);
+                decoder.read_image(into).map_err(jpeg_fault)?;
+                Ok(extras)
+            }
+            other => other.runs(memory, |run, row| {
+                if run.step == 1 {
+                    into[3 * run.first..][..row.len()].copy_from_slice(row);
+                } else {
+                    let pixels = into.as_chunks_mut::<3>().0[run.first..].iter_mut().step_by(run.step);
+                    pixels.zip(row.as_chunks::<3>().0).for_each(|(pixel, read)| *pixel = *read);
+                }
+            }),
+        }
+    }
+
+    /// Unpacks the picture, run by run of [`Samples`]; `memory` is working memory.
+    pub(super) fn runs(
+        mut self,
+        memory: &mut Vec<u8>,
+        mut each: impl FnMut(Run, &[u8]),
+    ) -> Result<Extras, PictureFault> {
+        let bytes_per_pixel = self.samples().bytes_per_pixel();
+        let (width, height) = self.size();
+        let (width, height) = (width as usize, height as usize);
+        match self {
+            Self::Png(ref mut reader) => {
+                memory.resize(width * bytes_per_pixel, 0);
+                for (run, pixels) in png_runs(width, height, reader.info().interlaced) {
+                    reader.read_row(memory).map_err(png_fault)?.ok_or(PictureFault::Truncated)?;
+                    each(run, &memory[..pixels * bytes_per_pixel]);
+                }
+                // Past the last row the coded data is checked.
+                reader.read_row(memory).map_err(png_fault)?;
+                // What follows may describe the picture; without it the pixels are none the worse.
+                let _ = reader.finish();
+                Ok(Extras::of_png(reader.info()))
+            }
+            Self::Jpeg(mut decoder) => {
+                let extras = Extras::of_jpeg(&mut decoder);
+                memory.resize(width * height * bytes_per_pixel, 0);
+                decoder.read_image(memory).map_err(jpeg_fault)?;
+                each(Run { first: 0, step: 1 }, memory);
+                Ok(extras)
+            }
+        }
+    }
+}
+
+/// Columns and rows, and the samples, of a PNG or JPEG. No more than its header is read.
+pub(super) fn header(path: &Path) -> Result<((u32, u32), Samples), PictureFault> {
+    let (file, format) = recognised(path)?;
+    let (size, samples) = match format {
+        Some(Format::Png) => {
+            let mut decoder = png_decoder(file)?;
+            let info = decoder.read_header_info().map_err(png_fault)?;
+            let channels = if info.color_type == png::ColorType::Indexed { 3 } else { info.color_type.samples() };
+            (info.size(), Samples { channels, are_wide: info.bit_depth == png::BitDepth::Sixteen })
+        }
+        Some(Format::Jpeg) => jpeg_header(&mut BufReader::new(file))?,
+        _ => return Err(PictureFault::Format("PNG or JPEG")),
+    };
+    check_size(size.0, size.1)?;
+    Ok((size, samples))
+}
+
+/// The content of a PFM.
+pub(super) fn read_pfm<'a>(path: &Path, memory: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
+    match recognised(path)? {
+        (file, Some(Format::Pfm)) => read_from_start(file, MAX_PFM_BYTES, memory),
+        _ => Err(PictureFault::Format("grey PFM")),
+    }
+}
+
+/// What a PNG has before its pixels, and what its writer put behind them.
+pub(super) fn png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
+    let (file, format) = recognised(path)?;
+    if format != Some(Format::Png) {
+        return Err(PictureFault::Format("PNG"));
+    }
+    Ok(png_decoder(file)?.read_info().map_err(png_fault)?.info().clone())
+}
+
+/// Opens a regular file, from its beginning, and tells its format.
+fn recognised(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
+    let mut file = input::open(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => PictureFault::Missing,
+        ErrorKind::InvalidInput => PictureFault::NotAFile,
+        _ => PictureFault::Io(error),
+    })?;
+    let mut start = [0; 8];
+    let mut length = 0;
+    while let read @ 1.. = file.read(&mut start[length..])? {
+        length += read;
+    }
+    file.rewind()?;
+    let format = match &start {
+        b"\x89PNG\r\n\x1a\n" => Format::Png,
+        [0xFF, 0xD8, 0xFF, ..] => Format::Jpeg,
+        [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace() => Format::Pfm,
+        _ if length < start.len() => return Err(PictureFault::Truncated),
+        _ => return Ok((file, None)),
+    };
+    Ok((file, Some(format)))
+}
+
+fn read_from_start(file: File, most_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
+    let bytes = file.metadata()?.len();
+    if bytes > most_bytes {
+        return Err(PictureFault::FileSize { bytes, most_bytes });
+    }
+    memory.clear();
+    file.take(most_bytes).read_to_end(memory)?;
+    Ok(memory)
+}
+
+pub(super) fn check_size(width: u32, height: u32) -> Result<(), PictureFault> {
+    if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
+        Err(PictureFault::TooLarge { width, height })
+    } else if width == 0 || height == 0 {
+        Err(PictureFault::NoPixel { width, height })
+    } else {
+        Ok(())
+    }
+}
+
+fn png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, PictureFault> {
+    let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), png::Limits { bytes: MAX_METADATA_BYTES });
+    // Palettes and fewer than 8 bits become plain samples.
+    decoder.set_transformations(png::Transformations::EXPAND);
+    // Before memory is taken for a row.
+    let (width, height) = decoder.read_header_info().map_err(png_fault)?.size();
+    check_size(width, height)?;
+    Ok(decoder)
+}
+
+/// Where the rows of a PNG go, in the order in which they are stored, and how many pixels each has.
+fn png_runs(width: usize, height: usize, is_interlaced: bool) -> impl Iterator<Item = (Run, usize)> {
+    /// First column, distance of columns, first row, distance of rows.
+    const WHOLE: [[usize; 4]; 1] = [[0, 1, 0, 1]];
+    const ADAM7: [[usize; 4]; 7] =
+        [[0, 8, 0, 8], [4, 8, 0, 8], [0, 4, 4, 8], [2, 4, 0, 4], [0, 2, 2, 4], [1, 2, 0, 2], [0, 1, 1, 2]];
+    let passes: &[[usize; 4]] = if is_interlaced { &ADAM7 } else { &WHOLE };
+    // A pass without a column has no row, either.
+    passes.iter().filter(move |pass| pass[0] < width).flat_map(move |&[column, step, row, row_step]| {
+        let pixels = (width - column).div_ceil(step);
+        (row..height).step_by(row_step).map(move |row| (Run { first: row * width + column, step }, pixels))
+    })
+}
+
+/// Columns and rows, and the samples, that the frame of a JPEG claims; `file` stands at its beginning.
+fn jpeg_header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u32), Samples), PictureFault> {
+    fn read<const N: usize>(file: &mut impl Read) -> Result<[u8; N], PictureFault> {
+        let mut bytes = [0; N];
+        file.read_exact(&mut bytes).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => PictureFault::Truncated,
+            _ => PictureFault::Io(error),
+        })?;
+        Ok(bytes)
+    }
+    let [mut high, mut marker] = read(file)?;
+    for _ in 0..MAX_JPEG_SEGMENTS {
+        // Any number of FF may pad a marker; other bytes between segments are passed over.
+        while high != 0xFF || matches!(marker, 0 | 0xFF) {
+            (high, [marker]) = (marker, read(file)?);
+        }
+        match marker {
+            // Neither a beginning nor a restart has a length.
+            0x01 | 0xD0..=0xD8 => {}
+            // A frame, and not one of the tables with numbers among those of frames.
+            0xC0..=0xCF if !matches!(marker, 0xC4 | 0xC8 | 0xCC) => {
+                let [_, _, _, y, y_low, x, x_low, components] = read(file)?;
+                let size = [[x, x_low], [y, y_low]].map(|bytes| u32::from(u16::from_be_bytes(bytes)));
+                // What has four channels is shown in three.
+                let channels = if components == 1 { 1 } else { 3 };
+                return Ok((size.into(), Samples { channels, are_wide: false }));
+            }
+            0xD9 | 0xDA => return Err(PictureFault::Damaged("no frame before its data".into())),
+            _ => {
+                let length = i64::from(u16::from_be_bytes(read(file)?));
+                file.seek_relative((length - 2).max(0))?;
+            }
+        }
+        [high, marker] = read(file)?;
+    }
+    Err(PictureFault::Damaged(format!("more than {MAX_JPEG_SEGMENTS} segments before its frame")))
+}
+
+/// Whether the markers of a JPEG lead to its end marker.
+fn jpeg_is_whole(bytes: &[u8]) -> bool {
+    const START: u8 = 0xD8;
+    const END: u8 = 0xD9;
+    let mut rest = bytes;
+    loop {
+        // Coded data has its FF bytes stuffed with 00 or is split by restart markers; FF may also pad a marker.
+        let Some(at) = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xD0..=0xD7 | 0xFF))
+        else {
+            return false;
+        };
+        let (marker, after) = (rest[at + 1], &rest[at + 2..]);
+        rest = match marker {
+            END => return true,
+            START | 0x01 => after,
+            // A segment says its length, so that what looks like a marker inside it is passed over.
+            _ => {
+                let Some(&[high, low]) = after.first_chunk() else { return false };
+                let Some(next) = after.get(usize::from(u16::from_be_bytes([high, low]))..) else { return false };
+                next
+            }
+        };
+    }
+}
+
+pub(super) fn png_fault(error: png::DecodingError) -> PictureFault {
+    match error {
+        png::DecodingError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
+        other => damaged(&other),
+    }
+}
+
+fn jpeg_fault(error: ImageError) -> PictureFault {
+    match error {
+        ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => PictureFault::Truncated,
+        other => damaged(&other),
+    }
+}
+
+fn damaged(error: &dyn std::error::Error) -> PictureFault {
+    PictureFault::Damaged(error.to_string().replace('\n', " "))
+}

@@ -1,0 +1,41 @@
+//! Which files of a folder belong to the recording in it: those that its lists name.
+
+use std::fs;
+use std::path::Path;
+
+use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
+use crate::recording::list::Entry;
+
+const LISTS: [&str; 3] = [COLOR_LIST, DEPTH_LIST, ASSOCIATIONS];
+
+/// The lists that are there.
+pub(super) fn lists(dir: &Path) -> impl Iterator<Item = String> {
+    LISTS.into_iter().filter(|list| is_file(&dir.join(list))).map(str::to_owned)
+}
+
+/// The PNG and JPEG pictures that the lists name and that are there, at most one folder down. What is wrong with a list
+/// does no harm: what it does not name stays.
+pub(super) fn pictures(dir: &Path) -> impl Iterator<Item = String> {
+    let entries = |list: &'static str| -> Vec<Entry> {
+        if !is_file(&dir.join(list)) {
+            return Vec::new();
+        }
+        match list {
+            ASSOCIATIONS => list::read_pairs(dir, list).unwrap_or_default().into_iter().flatten().collect(),
+            list => list::read(dir, list).unwrap_or_default(),
+        }
+    };
+    let named = LISTS.into_iter().flat_map(entries).filter_map(|entry| entry.source.file.ok());
+    let named = named.filter(|file| is_picture(file) && file.components().count() <= 2 && is_file(&dir.join(file)));
+    named.filter_map(|file| Some(file.components().as_path().to_str()?.to_owned())).collect::<Vec<_>>().into_iter()
+}
+
+fn is_picture(file: &Path) -> bool {
+    let is = |known: &str| file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(known));
+    ["png", "jpg", "jpeg"].into_iter().any(is)
+}
+
+/// Whether this is a file and not a link to one.
+fn is_file(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|there| there.is_file())
+}

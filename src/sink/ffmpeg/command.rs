@@ -1,0 +1,128 @@
+//! How ffmpeg is called.
+
+use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use super::container::Container;
+use super::process::output_within;
+use crate::sink::yuv::Matrix;
+
+const PROGRAM: &str = "ffmpeg";
+
+/// What a file name's ending asks for.
+pub(super) struct Format {
+    pub container: Container,
+    muxer: &'static [&'static str],
+    encoder: &'static [&'static str],
+    /// Times are kept to this.
+    time_base: &'static str,
+}
+
+/// All are written in pieces of a second, so that what is there can be played whatever happens.
+impl Format {
+    pub(super) fn of(path: &Path) -> Self {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        let matroska = |muxer, encoder| Self { container: Container::Matroska, muxer, encoder, time_base: "1:1000" };
+        match extension.as_deref() {
+            Some("webm") => matroska(&["-cluster_time_limit", "1000", "-f", "webm"], VP9),
+            Some("mkv") => matroska(&["-cluster_time_limit", "1000", "-f", "matroska"], H264),
+            _ => Self { container: Container::Mp4, muxer: FRAGMENTS, encoder: H264, time_base: "1:90000" },
+        }
+    }
+}
+
+const FRAGMENTS: &[&str] =
+    &["-movflags", "+frag_keyframe+delay_moov+default_base_moof", "-frag_duration", "1000000", "-f", "mp4"];
+
+/// Visually lossless, at several times the speed of the default preset.
+const H264: &[&str] = &["-c:v", "libx264", "-preset", "veryfast", "-crf", "18"];
+
+const VP9: &[&str] =
+    &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-deadline", "realtime", "-cpu-used", "5", "-row-mt", "1"];
+
+/// Encodes what comes on its standard input into `part`.
+pub(super) fn encode(format: &Format, part: &Path, height: u32) -> Command {
+    let color = match Matrix::for_height(height) {
+        Matrix::Bt601 => "smpte170m",
+        Matrix::Bt709 => "bt709",
+    };
+    // Tagged on the frames, for filters, and on the stream, for the muxer. 4:2:0 encoders refuse odd sizes.
+    let filters = format!(
+        "crop=trunc(iw/2)*2:trunc(ih/2)*2,\
+         setparams=range=tv:colorspace={color}:color_primaries={color}:color_trc={color}"
+    );
+    let mut command = begin();
+    command
+        .args(["-f", "matroska", "-i", "pipe:0"])
+        .args(["-vf", &filters, "-pix_fmt", "yuv420p", "-color_range", "tv"])
+        .args(["-colorspace", color, "-color_primaries", color, "-color_trc", color])
+        .args([keeps_times(), "vfr", "-enc_time_base", format.time_base])
+        .args(format.encoder)
+        .args(["-flush_packets", "1"])
+        .args(format.muxer)
+        .arg(file(part))
+        .stdin(Stdio::piped());
+    command
+}
+
+/// Copies `from` to `to` as an mp4 with its index in front, so that a player can start before it has the whole file.
+pub(super) fn index_in_front(from: &Path, to: &Path) -> Command {
+    let mut command = begin();
+    command.arg("-i").arg(file(from)).args(["-c", "copy", "-movflags", "+faststart", "-f", "mp4"]).arg(file(to));
+    command.stdin(Stdio::null());
+    command
+}
+
+fn begin() -> Command {
+    let mut command = Command::new(PROGRAM);
+    command
+        .args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        // Ctrl-C on a terminal goes to the whole group, and ffmpeg must live to see the last frame.
+        .process_group(0);
+    command
+}
+
+/// Named as a file, so that neither a dash nor a colon in it means anything.
+fn file(path: &Path) -> OsString {
+    let mut name = OsString::from("file:");
+    name.push(path);
+    name
+}
+
+/// What the option is called by which frames keep their times: another since version 5.1, which later ones only know.
+fn keeps_times() -> &'static str {
+    let said = output_within(Command::new(PROGRAM).arg("-version"), Duration::from_secs(2));
+    if said.as_deref().and_then(version).is_some_and(|version| version < (5, 1)) { "-vsync" } else { "-fps_mode" }
+}
+
+/// `ffmpeg version 5.1.9-0+deb12u1 Copyright ...`
+fn version(said: &str) -> Option<(u32, u32)> {
+    let number = said.strip_prefix("ffmpeg version ")?.split_whitespace().next()?.trim_start_matches('n');
+    let mut parts = number.split(|c: char| !c.is_ascii_digit());
+    Some((parts.next()?.parse().ok()?, parts.next().and_then(|minor| minor.parse().ok()).unwrap_or(0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_are_read_as_builds_state_them() {
+        for (said, expected) in [
+            ("ffmpeg version 5.1.9-0+deb12u1 Copyright (c) 2000-2026", Some((5, 1))),
+            ("ffmpeg version n6.0-10-g1 Copyright", Some((6, 0))),
+            ("ffmpeg version 4.4.2-0ubuntu0.22.04.1 Copyright", Some((4, 4))),
+            ("ffmpeg version 7.1 Copyright", Some((7, 1))),
+            ("ffmpeg version 8", Some((8, 0))),
+            ("ffmpeg version N-109542-g0a7c6b4 Copyright", None),
+            ("something else", None),
+        ] {
+            assert_eq!(version(said), expected, "{said}");
+        }
+    }
+}

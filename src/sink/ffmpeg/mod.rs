@@ -1,0 +1,149 @@
+//! Compressed video through the ffmpeg program: frames with their times into its standard input.
+
+mod command;
+mod container;
+mod process;
+mod raw;
+
+use std::io::{self, ErrorKind};
+use std::ops::ControlFlow;
+use std::os::fd::OwnedFd;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use self::command::Format;
+use self::container::Container;
+use self::process::{Ended, Process};
+use self::raw::RawVideo;
+use super::output::Output;
+use super::pipe::Pipe;
+use super::{Ending, Options, Sink, SinkError, check_size};
+use crate::files::whole::Part;
+use crate::frame::ColorImage;
+
+/// A file encoded by a child process: H.264 in `.mp4` and `.mkv`, VP9 in `.webm`, at the times of its frames.
+pub struct Ffmpeg {
+    // Dropped in this order: the process before the file that it writes.
+    input: Option<RawVideo<Pipe>>,
+    process: Process,
+    format: Format,
+    output: Output,
+    size: (u32, u32),
+    stop: Arc<AtomicBool>,
+}
+
+impl Ffmpeg {
+    /// Starts ffmpeg, found through `PATH`, to write `path`.
+    ///
+    /// # Errors
+    /// The file exists and `force` is not set, or ffmpeg is missing or cannot be started.
+    pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
+        let output = Output::create(path, options.force)?;
+        let format = Format::of(path);
+        let mut command = command::encode(&format, output.part(), options.size.1);
+        let mut process = Process::start(&mut command, &options.stop).map_err(|cause| match cause.kind() {
+            ErrorKind::NotFound => SinkError::NoFfmpeg { path: path.to_owned() },
+            _ => SinkError::Write { path: path.to_owned(), cause },
+        })?;
+        let mut life = process.life();
+        let pipe = match process.stdin() {
+            Some(stdin) => Pipe::own(OwnedFd::from(stdin), move |blocked| !life.hangs(blocked)),
+            None => Err(ErrorKind::BrokenPipe.into()),
+        };
+        let input = RawVideo::new(pipe.map_err(SinkError::write(path))?, options.size, options.period_ns);
+        Ok(Self { input: Some(input), process, format, output, size: options.size, stop: Arc::clone(&options.stop) })
+    }
+
+    /// Waits for the end of the process, if it does not hang; the file must be whole then.
+    fn end(&mut self, hangs: bool) -> Result<(), SinkError> {
+        self.input = None;
+        let ended = if hangs { Ok(self.process.end()) } else { self.process.wait() };
+        check(ended, self.output.path(), self.output.part(), self.format.container)
+    }
+
+    /// Moves the index to the front, if there is room for it.
+    fn tidy_up(&mut self) {
+        if self.format.container != Container::Mp4 {
+            return;
+        }
+        let tidied = Part::create(self.output.path()).map_err(SinkError::write(self.output.path())).and_then(|part| {
+            let command = command::index_in_front(self.output.part(), part.part());
+            run(command, &self.stop, self.output.path(), part.part()).map(|()| part)
+        });
+        match tidied {
+            Ok(part) => self.output.replace(part),
+            Err(error) => tracing::info!("{}: its index stays in pieces: {error}", self.output.path().display()),
+        }
+    }
+}
+
+/// Runs ffmpeg to write `part`, which must then be a whole mp4.
+fn run(mut command: Command, stop: &Arc<AtomicBool>, path: &Path, part: &Path) -> Result<(), SinkError> {
+    let ended = Process::start(&mut command, stop).and_then(|mut process| process.wait());
+    check(ended, path, part, Container::Mp4)
+}
+
+/// What ffmpeg says when frames are missing from a file, though it may end as if all were well.
+const LOSSES: [&str; 5] =
+    ["av_interleaved_write_frame", "Error writing", "Error muxing", "No space left", "Input/output error"];
+
+fn check(ended: io::Result<Ended>, path: &Path, part: &Path, container: Container) -> Result<(), SinkError> {
+    let Ended { status, said } = ended.map_err(SinkError::write(path))?;
+    let path = path.to_owned();
+    let failed = |status: &str| SinkError::Ffmpeg { path: path.clone(), status: status.into(), said: said.clone() };
+    match status {
+        None => return Err(failed("it hung, and was killed")),
+        Some(status) if !status.success() => return Err(failed(&status.to_string())),
+        Some(_) if LOSSES.iter().any(|loss| said.contains(loss)) => return Err(failed("frames are missing")),
+        Some(_) => {}
+    }
+    match container.check(part).map_err(SinkError::write(&path))? {
+        Ok(()) => Ok(()),
+        Err(missing) => Err(failed(missing)),
+    }
+}
+
+impl Sink for Ffmpeg {
+    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        check_size(self.size, frame)?;
+        let Some(input) = &mut self.input else { return Ok(ControlFlow::Break(())) };
+        let Err(cause) = input.write(frame, time_ns) else {
+            self.output.frames += 1;
+            return Ok(ControlFlow::Continue(()));
+        };
+        let path = self.output.path().to_owned();
+        let error = match cause.kind() {
+            // ffmpeg closes its input only by ending: how it ended tells more than the broken pipe.
+            ErrorKind::BrokenPipe | ErrorKind::TimedOut => match self.end(cause.kind() == ErrorKind::TimedOut) {
+                Ok(()) => SinkError::Ffmpeg { path, status: "ended early".into(), said: String::new() },
+                Err(error) => error,
+            },
+            _ => SinkError::Write { path, cause },
+        };
+        Err(self.output.failed(error))
+    }
+
+    fn finish(mut self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
+        if self.output.has_ended() {
+            return Ok(());
+        }
+        if self.output.frames == 0 {
+            tracing::warn!("{}: there was no frame, so there is no file", self.output.path().display());
+            self.output.give_up();
+            return Ok(());
+        }
+        match self.end(false) {
+            Ok(()) => {
+                self.tidy_up();
+                self.output.complete(ending)
+            }
+            Err(error) => Err(self.output.failed(error)),
+        }
+    }
+
+    fn describe(&self) -> String {
+        format!("ffmpeg to {}", self.output.path().display())
+    }
+}

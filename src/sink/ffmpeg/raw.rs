@@ -1,0 +1,136 @@
+//! Uncompressed video with times, as ffmpeg reads it: a Matroska stream without an end, of one frame a cluster.
+//!
+//! Elements are those of RFC 9559; the codec is `V_UNCOMPRESSED`, I420.
+
+use std::io::{self, Write};
+
+use crate::frame::ColorImage;
+use crate::sink::yuv::{Converter, Matrix};
+
+/// Times are in microseconds.
+const TICK_NS: u64 = 1000;
+/// What comes sooner after another frame, encoders would take for the same one.
+const LEAST_TICKS: u64 = 1000;
+
+/// A stream of raw frames.
+pub(super) struct RawVideo<W: Write> {
+    to: W,
+    converter: Converter,
+    /// Time of the first frame.
+    first_ns: Option<u64>,
+    /// Ticks since then, of the last one.
+    last: Option<u64>,
+    /// What is written next.
+    bytes: Vec<u8>,
+}
+
+impl<W: Write> RawVideo<W> {
+    /// A stream into `to` of frames of `size` that mostly come every `period_ns`. The header goes out with the first frame.
+    pub(super) fn new(to: W, size: (u32, u32), period_ns: u64) -> Self {
+        let matrix = Matrix::for_height(size.1);
+        let bytes = header(size, period_ns, matrix);
+        Self { to, converter: Converter::new(matrix), first_ns: None, last: None, bytes }
+    }
+
+    /// Writes a frame that was taken at `time_ns`.
+    pub(super) fn write(&mut self, frame: &ColorImage, time_ns: u64) -> io::Result<()> {
+        let first_ns = *self.first_ns.get_or_insert(time_ns);
+        let at = (time_ns.saturating_sub(first_ns) + TICK_NS / 2) / TICK_NS;
+        let at = self.last.map_or(at, |last| at.max(last + LEAST_TICKS));
+        self.last = Some(at);
+        let (width, height) = (frame.width as usize, frame.height as usize);
+        let picture_bytes = width * height + 2 * width.div_ceil(2) * height.div_ceil(2);
+        let time = element(TIMESTAMP, &at.to_be_bytes());
+        // Track 1, at the time of the cluster, a key frame.
+        let block = [0x81, 0, 0, 0x80];
+        let block_bytes = block.len() + picture_bytes;
+        begin(CLUSTER, time.len() + SIMPLE_BLOCK.len() + SIZE_BYTES + block_bytes, &mut self.bytes);
+        self.bytes.extend_from_slice(&time);
+        begin(SIMPLE_BLOCK, block_bytes, &mut self.bytes);
+        self.bytes.extend_from_slice(&block);
+        self.converter.append(frame, &mut self.bytes);
+        let written = self.to.write_all(&self.bytes);
+        self.bytes.clear();
+        written
+    }
+}
+
+const SEGMENT: &[u8] = &[0x18, 0x53, 0x80, 0x67];
+const CLUSTER: &[u8] = &[0x1f, 0x43, 0xb6, 0x75];
+const TIMESTAMP: &[u8] = &[0xe7];
+const SIMPLE_BLOCK: &[u8] = &[0xa3];
+/// Sizes are written as eight bytes, of which the first one says so.
+const SIZE_BYTES: usize = 8;
+const UNKNOWN_SIZE: [u8; SIZE_BYTES] = [0x01, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff];
+
+fn begin(id: &[u8], bytes: usize, to: &mut Vec<u8>) {
+    to.extend_from_slice(id);
+    to.extend_from_slice(&(bytes as u64 | 1 << 56).to_be_bytes());
+}
+
+fn element(id: &[u8], content: &[u8]) -> Vec<u8> {
+    let mut element = Vec::with_capacity(id.len() + SIZE_BYTES + content.len());
+    begin(id, content.len(), &mut element);
+    element.extend_from_slice(content);
+    element
+}
+
+fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8> {
+    let number = |id: &[u8], value: u64| element(id, &value.to_be_bytes());
+    let within = |id: &[u8], parts: &[Vec<u8>]| element(id, &parts.concat());
+    // As ITU-T H.273 numbers them; limited range, chroma in the middle of its four pixels.
+    let color = match matrix {
+        Matrix::Bt601 => 6,
+        Matrix::Bt709 => 1,
+    };
+    let colour = within(
+        &[0x55, 0xb0],
+        &[
+            number(&[0x55, 0xb1], color),
+            number(&[0x55, 0xb7], 2),
+            number(&[0x55, 0xb8], 2),
+            number(&[0x55, 0xb9], 1),
+            number(&[0x55, 0xba], color),
+            number(&[0x55, 0xbb], color),
+        ],
+    );
+    let video = within(
+        &[0xe0],
+        &[number(&[0xb0], width.into()), number(&[0xba], height.into()), element(&[0x2e, 0xb5, 0x24], b"I420"), colour],
+    );
+    let track = within(
+        &[0xae],
+        &[
+            number(&[0xd7], 1),
+            number(&[0x73, 0xc5], 1),
+            // Video, without lacing.
+            number(&[0x83], 1),
+            number(&[0x9c], 0),
+            element(&[0x86], b"V_UNCOMPRESSED"),
+            number(&[0x23, 0xe3, 0x83], period_ns),
+            video,
+        ],
+    );
+    let mut header = within(
+        &[0x1a, 0x45, 0xdf, 0xa3],
+        &[
+            // Versions, longest identifiers and sizes, kind of document and its versions.
+            number(&[0x42, 0x86], 1),
+            number(&[0x42, 0xf7], 1),
+            number(&[0x42, 0xf2], 4),
+            number(&[0x42, 0xf3], 8),
+            element(&[0x42, 0x82], b"matroska"),
+            number(&[0x42, 0x87], 4),
+            number(&[0x42, 0x85], 2),
+        ],
+    );
+    header.extend_from_slice(SEGMENT);
+    header.extend_from_slice(&UNKNOWN_SIZE);
+    let by = |id: &[u8]| element(id, b"bokehcam");
+    header.extend(within(
+        &[0x15, 0x49, 0xa9, 0x66],
+        &[number(&[0x2a, 0xd7, 0xb1], TICK_NS), by(&[0x4d, 0x80]), by(&[0x57, 0x41])],
+    ));
+    header.extend(element(&[0x16, 0x54, 0xae, 0x6b], &track));
+    header
+}

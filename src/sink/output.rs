@@ -1,0 +1,147 @@
+//! A file that a sink writes, and what becomes of it at the end.
+
+use std::fs::{self, File};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use super::{Ending, SinkError};
+use crate::files::whole::{self, Part};
+
+/// A file under construction that holds frames. What has frames is never removed: where it cannot have its name, it is
+/// kept as `NAME.incomplete`.
+#[derive(Debug)]
+pub(super) struct Output {
+    path: PathBuf,
+    force: bool,
+    /// `None` once it has ended.
+    part: Option<Part>,
+    /// Frames that are in it.
+    pub frames: u64,
+}
+
+impl Output {
+    /// Prepares to write `path`; missing folders above it are made. What a run that was killed left of it is kept, which is
+    /// logged.
+    pub(super) fn create(path: &Path, force: bool) -> Result<Self, SinkError> {
+        if !force && path.symlink_metadata().is_ok() {
+            return Err(SinkError::Exists { path: path.to_owned() });
+        }
+        if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            fs::create_dir_all(folder).map_err(SinkError::write(folder))?;
+        }
+        for kept in recover(path)? {
+            tracing::warn!("{}: what an earlier run left unfinished is kept as {}", path.display(), kept.display());
+        }
+        let part = Part::create(path).map_err(SinkError::write(path))?;
+        Ok(Self { path: path.to_owned(), force, part: Some(part), frames: 0 })
+    }
+
+    /// The name in the end.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether it has its name, or was kept or removed.
+    pub(super) fn has_ended(&self) -> bool {
+        self.part.is_none()
+    }
+
+    /// The name meanwhile.
+    pub(super) fn part(&self) -> &Path {
+        self.part.as_ref().map_or(&self.path, Part::part)
+    }
+
+    /// The open file.
+    pub(super) fn file(&self) -> io::Result<&File> {
+        self.part.as_ref().map(Part::file).ok_or_else(|| ErrorKind::NotFound.into())
+    }
+
+    /// Another file has the same frames in a better form.
+    pub(super) fn replace(&mut self, part: Part) {
+        // The one before is removed.
+        self.part = Some(part);
+    }
+
+    /// The file is complete: gives it its name. One that was cut short replaces nothing.
+    pub(super) fn complete(&mut self, ending: Ending) -> Result<(), SinkError> {
+        let Some(mut part) = self.part.take() else { return Ok(()) };
+        let replace = self.force && ending == Ending::Whole;
+        let Err(cause) = part.try_commit(replace) else { return Ok(()) };
+        let is_there = cause.kind() == ErrorKind::AlreadyExists;
+        if is_there && self.force {
+            let (kept, path) = (keep(part), self.path.display());
+            tracing::warn!(
+                "{path} stays as it was: what was to replace it was cut short, and is kept as {}",
+                kept.display()
+            );
+            return Ok(());
+        }
+        let path = self.path.clone();
+        let error = if is_there { SinkError::Exists { path } } else { SinkError::Write { path, cause } };
+        Err(self.kept(part, error))
+    }
+
+    /// Nothing can be written any more: keeps what there is, and adds to the error where.
+    pub(super) fn failed(&mut self, error: SinkError) -> SinkError {
+        match self.part.take() {
+            Some(part) => self.kept(part, error),
+            None => error,
+        }
+    }
+
+    /// Removes the file.
+    pub(super) fn give_up(&mut self) {
+        self.part = None;
+    }
+
+    fn kept(&self, part: Part, error: SinkError) -> SinkError {
+        // An encoder may have taken frames and written none.
+        let has_frames = self.frames > 0 && part.file().metadata().is_ok_and(|file| file.len() > 0);
+        if !has_frames {
+            return error;
+        }
+        SinkError::Kept { error: Box::new(error), kept: keep(part) }
+    }
+}
+
+impl Drop for Output {
+    fn drop(&mut self) {
+        if let Some(part) = self.part.take().filter(|_| self.frames > 0) {
+            tracing::warn!("{}: what there is of it is kept as {}", self.path.display(), keep(part).display());
+        }
+    }
+}
+
+/// Where the part is in the end.
+fn keep(part: Part) -> PathBuf {
+    let hidden = part.part().to_owned();
+    part.keep_incomplete().unwrap_or(hidden)
+}
+
+/// Keeps what runs that were killed left of `path`; gives the names.
+fn recover(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
+    let left = whole::left_behind(path).map_err(SinkError::write(path))?;
+    let kept = left.into_iter().map(|part| keep_or_remove(&part, path));
+    kept.filter_map(Result::transpose).collect::<Result<_, _>>().map_err(SinkError::write(path))
+}
+
+fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
+    let done = match part.metadata().map(|part| part.len()) {
+        Ok(0) => fs::remove_file(part).map(|()| None),
+        Ok(_) => whole::keep_incomplete(part, path).map(Some),
+        Err(error) => Err(error),
+    };
+    match done {
+        // Somebody else was here at the same time.
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        done => done,
+    }
+}
+
+/// Keeps the videos that runs that were killed left in a folder, each as `NAME.incomplete`; gives the names. Those whose name
+/// is none of `is_ours` are left alone, and so is what cannot be renamed.
+pub fn recover_all(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Vec<PathBuf> {
+    let left = whole::all_left_behind(folder).unwrap_or_default().into_iter();
+    let ours = left.filter(|(_, name)| name.to_str().is_some_and(&is_ours));
+    ours.filter_map(|(part, name)| keep_or_remove(&part, &folder.join(name)).ok().flatten()).collect()
+}

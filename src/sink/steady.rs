@@ -1,0 +1,131 @@
+//! One constant rate from frames that come when they do.
+
+use std::time::Duration;
+
+/// Where a frame goes in a stream of constant rate, such that the stream takes as long as the frames did.
+#[derive(Debug)]
+pub(super) struct Steady {
+    /// Pictures per second, as a fraction.
+    rate: (u64, u64),
+    longest_still: Duration,
+    first_ns: Option<u64>,
+    /// Of the time since the first frame, so much was left out.
+    left_out_ns: u64,
+    /// Pictures written.
+    written: u64,
+    /// Frames that were one too many.
+    pub surplus: u64,
+}
+
+/// Where a frame belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// It comes after the last picture was written so many times again.
+    After(u64),
+    /// A long gap was made shorter: as before, and so long it was.
+    AfterGap(u64, Duration),
+    /// Its place is taken: it comes too soon after the one before.
+    Taken,
+}
+
+/// A picture may be off by this share of a period before one is repeated or left out: unevenness is no drift.
+const MOST_OFF: f64 = 0.75;
+
+impl Steady {
+    /// A stream of `rate`; a picture that stands longer than `longest_still` does not make it longer than that.
+    pub(super) fn new(rate: (u64, u64), longest_still: Duration) -> Self {
+        Self { rate, longest_still, first_ns: None, left_out_ns: 0, written: 0, surplus: 0 }
+    }
+
+    /// No picture stands longer.
+    pub(super) fn longest_still(&self) -> Duration {
+        self.longest_still
+    }
+
+    /// Where the frame of `time_ns` goes.
+    pub(super) fn place(&mut self, time_ns: u64) -> Place {
+        let first_ns = *self.first_ns.get_or_insert(time_ns);
+        let per_ns = self.rate.0 as f64 / (self.rate.1 as f64 * 1e9);
+        let since_ns = time_ns.saturating_sub(first_ns).saturating_sub(self.left_out_ns);
+        let ahead = since_ns as f64 * per_ns - self.written as f64;
+        if ahead < -MOST_OFF {
+            self.surplus += 1;
+            return Place::Taken;
+        }
+        let missing = (ahead + 1.0 - MOST_OFF).floor().max(0.0) as u64;
+        let most = (self.longest_still.as_nanos() as f64 * per_ns).ceil() as u64;
+        self.written += missing.min(most) + 1;
+        if missing <= most {
+            return Place::After(missing);
+        }
+        self.left_out_ns += ((missing - most) as f64 / per_ns) as u64;
+        Place::AfterGap(most, Duration::from_nanos((missing as f64 / per_ns) as u64))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND_NS: u64 = 1_000_000_000;
+
+    /// Pictures written in all, after frames at these times; each place is checked to be within a period of its time.
+    fn written(rate: (u64, u64), times_ns: impl Iterator<Item = u64>) -> u64 {
+        let mut steady = Steady::new(rate, Duration::from_secs(10));
+        let (mut written, mut first_ns) = (0u64, None);
+        for time_ns in times_ns {
+            let first_ns = *first_ns.get_or_insert(time_ns);
+            match steady.place(time_ns) {
+                Place::After(missing) => {
+                    written += missing + 1;
+                    let shown_ns = (written - 1) * SECOND_NS * rate.1 / rate.0;
+                    let off_ns = shown_ns.abs_diff(time_ns - first_ns);
+                    assert!(off_ns < SECOND_NS * rate.1 / rate.0, "{time_ns}: off by {off_ns}");
+                }
+                Place::AfterGap(..) => panic!("{time_ns}"),
+                Place::Taken => {}
+            }
+        }
+        written
+    }
+
+    #[test]
+    fn frames_that_come_evenly_are_written_once_each() {
+        for (rate, period_ns) in [((30, 1), 33_333_333), ((30_000, 1001), 33_366_667), ((25, 2), 80_000_000)] {
+            assert_eq!(written(rate, (0..3000).map(|k| 77 + k * period_ns)), 3000);
+            // And where they come a little early or late.
+            let uneven = |k: u64| 1_000_000_000 + k * period_ns + (k * 7 % 5) * period_ns / 10;
+            assert_eq!(written(rate, (0..3000).map(uneven)), 3000);
+        }
+    }
+
+    #[test]
+    fn the_stream_takes_as_long_as_the_frames_did() {
+        // Every other one, two of three, half the rate in the dark, twice as many, and now and then none for a while.
+        let every = |kept: fn(&u64) -> bool| (0..300u64).filter(kept).map(|k| k * 40_000_000).collect::<Vec<_>>();
+        for times_ns in [
+            every(|k| k % 2 == 0),
+            every(|k| k % 3 != 1),
+            every(|k| *k < 100 || k % 2 == 0),
+            every(|k| k % 100 < 30),
+            (0..600u64).map(|k| k * 20_000_000).collect(),
+        ] {
+            let last_ns = *times_ns.last().unwrap();
+            let pictures = written((25, 1), times_ns.into_iter());
+            assert!((pictures * 40_000_000).abs_diff(last_ns + 40_000_000) <= 40_000_000, "{pictures} for {last_ns}");
+        }
+    }
+
+    #[test]
+    fn a_long_gap_is_cut_and_what_follows_goes_on() {
+        let mut steady = Steady::new((10, 1), Duration::from_secs(2));
+        assert_eq!(steady.place(5 * SECOND_NS), Place::After(0));
+        assert_eq!(steady.place(7 * SECOND_NS), Place::After(19));
+        let hour = Duration::from_secs(3600);
+        let Place::AfterGap(20, gap) = steady.place(3607 * SECOND_NS + SECOND_NS / 10) else { panic!("{steady:?}") };
+        assert!(gap.abs_diff(hour) < Duration::from_millis(1), "{gap:?}");
+        assert_eq!(steady.place(3607 * SECOND_NS + SECOND_NS / 5), Place::After(0));
+        assert_eq!(steady.place(3607 * SECOND_NS + SECOND_NS / 5 + 1), Place::Taken);
+        assert_eq!(steady.surplus, 1);
+    }
+}

@@ -1,0 +1,137 @@
+//! Sinks by their names.
+
+use std::fmt;
+use std::fs;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+#[cfg(feature = "camera")]
+use super::Loopback;
+use super::{Ffmpeg, Null, Options, PngFolder, Sink, SinkError, Y4m, Y4mFile};
+use crate::files::place;
+
+/// A sink as named on the command line (`--to`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// `null`
+    Null,
+    /// `-`: y4m on standard output.
+    Stdout,
+    /// `FILE.y4m`
+    Y4m(PathBuf),
+    /// `FILE.mp4`, `FILE.mkv` or `FILE.webm`, through ffmpeg.
+    Video(PathBuf),
+    /// `/dev/videoN`, or another name of a device: a virtual camera.
+    Device(PathBuf),
+    /// `window`: seen on the screen.
+    Window,
+    /// `DIR/`, or any other name without an extension: numbered PNG files.
+    Folder(PathBuf),
+}
+
+impl FromStr for Target {
+    type Err = SinkError;
+
+    fn from_str(name: &str) -> Result<Self, SinkError> {
+        let path = PathBuf::from(name);
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match (name, extension.as_deref()) {
+            ("", _) => Err(SinkError::Target { name: name.into() }),
+            ("null", _) => Ok(Self::Null),
+            ("-", _) => Ok(Self::Stdout),
+            ("window", _) => Ok(Self::Window),
+            _ if is_device(&path) => Ok(Self::Device(path)),
+            _ if name.ends_with('/') => Ok(Self::Folder(path)),
+            (_, Some("y4m")) => Ok(Self::Y4m(path)),
+            (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
+            (_, None) => Ok(Self::Folder(path)),
+            _ if path.is_dir() => Ok(Self::Folder(path)),
+            _ => Err(SinkError::Target { name: name.into() }),
+        }
+    }
+}
+
+/// Whether a name is that of a device, or of one that is not there yet.
+fn is_device(path: &Path) -> bool {
+    let number = path.to_str().and_then(|name| name.strip_prefix("/dev/video"));
+    number.is_some_and(|number| number.bytes().all(|digit| digit.is_ascii_digit()))
+        || fs::metadata(path).is_ok_and(|node| node.file_type().is_char_device())
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => f.write_str("null"),
+            Self::Stdout => f.write_str("-"),
+            Self::Window => f.write_str("window"),
+            Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => path.display().fmt(f),
+        }
+    }
+}
+
+impl Target {
+    /// Opens the sink.
+    ///
+    /// # Errors
+    /// Something of that name exists and `force` is not set, the place cannot be written, or ffmpeg is missing. A
+    /// window is no sink: it is opened by who starts the run.
+    pub fn open(&self, options: &Options) -> Result<Box<dyn Sink>, SinkError> {
+        Ok(match self {
+            Self::Null => Box::new(Null),
+            Self::Stdout => Box::new(Y4m::stdout(options)?),
+            Self::Y4m(path) => Box::new(Y4mFile::create(path, options)?),
+            Self::Video(path) => Box::new(Ffmpeg::create(path, options)?),
+            #[cfg(feature = "camera")]
+            Self::Device(path) => Box::new(Loopback::open(path, options)?),
+            #[cfg(not(feature = "camera"))]
+            Self::Device(path) => return Err(SinkError::NoCamera { path: path.clone() }),
+            Self::Window => return Err(SinkError::Window),
+            Self::Folder(path) => Box::new(PngFolder::create(path, options)?),
+        })
+    }
+
+    /// Whether frames are seen as they come, and none later.
+    pub fn is_live(&self) -> bool {
+        matches!(self, Self::Device(_) | Self::Window)
+    }
+
+    /// Whether this is a device: a virtual camera.
+    pub fn is_camera(&self) -> bool {
+        matches!(self, Self::Device(_))
+    }
+
+    /// Whether both write to the same place.
+    pub fn collides_with(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Null, Self::Null) => false,
+            (Self::Stdout, Self::Stdout) | (Self::Window, Self::Window) => true,
+            _ => match (self.path(), other.path()) {
+                (Some(own), Some(others)) => same_place(own, others),
+                _ => false,
+            },
+        }
+    }
+
+    /// Whether this is the device node `path`, by whatever name.
+    pub fn is_device(&self, path: &Path) -> bool {
+        matches!(self, Self::Device(own) if same_place(own, path))
+    }
+
+    /// The file, folder or device that this writes to, if it is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Null | Self::Stdout | Self::Window => None,
+            Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => Some(path),
+        }
+    }
+}
+
+/// Whether two names lead to one file or device, be it there or not yet.
+fn same_place(one: &Path, other: &Path) -> bool {
+    let device = |path: &Path| fs::metadata(path).ok().filter(|node| node.file_type().is_char_device());
+    match (device(one), device(other)) {
+        (Some(one), Some(other)) => one.rdev() == other.rdev(),
+        _ => place::resolved(one) == place::resolved(other),
+    }
+}

@@ -1,0 +1,368 @@
+//! What becomes of a user's files when something goes wrong, seen from outside the program.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::recording::tum::{Writer, WriterOptions};
+
+/// A folder of its own for each test, and the program in it, with no settings of whoever runs the tests.
+struct Home(tempfile::TempDir);
+
+impl Home {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// By way of a shell, whose limits (`ulimit`) the program has.
+    fn command(&self, limits: &str, args: &str) -> Command {
+        let mut command = Command::new("sh");
+        let program = env!("CARGO_BIN_EXE_bokehcam");
+        command.args(["-c", &format!("{limits} exec '{program}' {args}")]);
+        for (name, _) in std::env::vars_os() {
+            if name.to_string_lossy().starts_with("BOKEHCAM_") {
+                command.env_remove(name);
+            }
+        }
+        command.env("XDG_CONFIG_HOME", self.at("config")).env_remove("RUST_LOG").current_dir(self.0.path());
+        command.stdin(Stdio::null());
+        command
+    }
+
+    fn run(&self, args: &str) -> Ran {
+        self.command("", args).output().unwrap().into()
+    }
+
+    /// As on a disk where no file has room for more than so much.
+    fn run_on_full_disk(&self, most_kb: u32, args: &str) -> Ran {
+        // A signal would end it; ignored, writing fails as on a full disk.
+        self.command(&format!("trap '' XFSZ; ulimit -f {};", most_kb * 2), args).output().unwrap().into()
+    }
+
+    /// A recording of `frames` noisy pictures, `period_s` apart.
+    fn record(&self, name: &str, frames: u64, period_s: f64) {
+        let mut writer = Writer::create(&self.at(name), &WriterOptions::default()).unwrap();
+        for frame in 0..frames {
+            let mut color = ColorImage::new(64, 48);
+            let mut state = frame as u32 + 1;
+            color.rgb.iter_mut().for_each(|byte| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                *byte = (state >> 24) as u8;
+            });
+            let depth = DepthMap { width: 64, height: 48, metres: vec![2.0; 64 * 48] };
+            writer.add((frame as f64 * period_s * 1e9) as u64, &color, Some(&depth)).unwrap();
+        }
+        writer.finish().unwrap();
+    }
+
+    fn damage(&self, picture: &str) {
+        let bytes = fs::read(self.at(picture)).unwrap();
+        fs::write(self.at(picture), &bytes[..bytes.len() / 2]).unwrap();
+    }
+
+    /// Puts a program of our own in place of ffmpeg.
+    fn fake_ffmpeg(&self, script: &str) -> String {
+        fs::create_dir_all(self.at("bin")).unwrap();
+        let program = self.at("bin/ffmpeg");
+        // The file is its last argument, with a prefix.
+        let text = format!("#!/bin/sh\nfor last; do :; done\nout=${{last#file:}}\n{script}\n");
+        fs::write(&program, text).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        format!("PATH='{}':$PATH;", self.at("bin").display())
+    }
+}
+
+#[derive(Debug)]
+struct Ran {
+    code: Option<i32>,
+    said: String,
+}
+
+impl From<Output> for Ran {
+    fn from(output: Output) -> Self {
+        Self { code: output.status.code(), said: String::from_utf8(output.stderr).unwrap() }
+    }
+}
+
+impl Ran {
+    /// It failed with one line that says so.
+    #[track_caller]
+    fn failed(&self, code: i32, what: &str) {
+        assert!(self.code == Some(code) && self.said.contains(what), "{self:?}");
+        assert_eq!(self.said.lines().filter(|line| line.starts_with("error: ")).count(), 1, "{}", self.said);
+    }
+}
+
+/// All files and links under a folder, with what is in them.
+fn tree(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut all = Vec::new();
+    for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        match entry.is_dir() && !entry.is_symlink() {
+            true => all.extend(tree(&entry)),
+            false => all.push((entry.clone(), fs::read(&entry).unwrap_or_default())),
+        }
+    }
+    all.sort();
+    all
+}
+
+fn frames(y4m: &Path) -> usize {
+    fs::read(y4m).unwrap().windows(6).filter(|bytes| bytes == b"FRAME\n").count()
+}
+
+fn pngs(folder: &Path) -> usize {
+    let is_png = |path: PathBuf| path.extension().is_some_and(|extension| extension == "png");
+    fs::read_dir(folder).unwrap().filter(|entry| is_png(entry.as_ref().unwrap().path())).count()
+}
+
+const LONG: Duration = Duration::from_secs(120);
+
+#[track_caller]
+fn until(what: &str, mut is: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !is() {
+        assert!(began.elapsed() < LONG, "never: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Ends a program by a signal; it must end by itself then.
+fn terminate(mut child: Child) -> Ran {
+    assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
+    until("the end", || child.try_wait().unwrap().is_some());
+    let code = child.wait().unwrap().code();
+    let mut said = String::new();
+    child.stderr.take().map(|mut stderr| stderr.read_to_string(&mut said).unwrap());
+    Ran { code, said }
+}
+
+const BLUR: &str = "--effect none";
+
+#[test]
+fn a_source_is_never_a_target() {
+    let home = Home::new();
+    home.record("self", 3, 0.1);
+    std::os::unix::fs::symlink(home.at("self"), home.at("link")).unwrap();
+    fs::create_dir(home.at("other")).unwrap();
+    let before = tree(home.0.path());
+    for args in [
+        "stream self --to self/rgb/ --force",
+        "stream self --to self/ --force",
+        "stream link --to self/rgb/ --force",
+        "stream self --to link/rgb/ --force",
+        "stream self --to . --force",
+        "stream self --to self/new/",
+        "stream self --to self/clip.y4m",
+        "stream self --to null --to other/../link/clip.mkv",
+        "stream self --to null --report self/rgb.txt --force",
+        "render self/rgb/000000.png --effect blur --out self/rgb/000000.png --force",
+        "render self/rgb/000000.png --effect blur --out link/rgb/000000.png --force",
+        "render self/rgb/000000.png --depth-map self/depth/000000.png --out self/depth/000000.png --force",
+        "render self/rgb/000000.png --effect blur --out new.png --debug-dir self/rgb --force",
+        "depth self/rgb/000000.png self/rgb/000001.png --out self/rgb/000001.png --force",
+        "depth self/rgb/000000.png self/rgb/000001.png --out d.pfm --preview link/rgb/000000.png --force",
+    ] {
+        home.run(args).failed(2, "which is read; choose another place");
+        assert!(tree(home.0.path()) == before, "{args}: something was touched");
+    }
+    let report = home.run(&format!("stream self {BLUR} --to other/new/ --report self/report.json -q"));
+    assert_eq!(report.code, Some(0), "a report may lie beside what it is about: {report:?}");
+}
+
+#[test]
+fn a_report_and_a_sink_never_share_a_place() {
+    let home = Home::new();
+    home.record("self", 3, 0.1);
+    for (to, report) in [("x.y4m", "x.y4m"), ("x.y4m", "./self/../x.y4m"), ("x.mkv", "x.mkv")] {
+        home.run(&format!("stream self --to {to} --report {report}")).failed(2, "goes there, too");
+    }
+    home.run(&format!("stream self {BLUR} --to x.y4m --report nowhere/r.json")).failed(1, "nowhere/r.json");
+    assert!(!home.at("x.y4m").exists(), "it is known before the run");
+}
+
+#[test]
+fn what_was_good_before_a_fault_is_there() {
+    let home = Home::new();
+    home.record("self", 9, 0.1);
+    home.damage("self/rgb/000005.png");
+    home.run(&format!("stream self {BLUR} --to x.y4m --to out/ --report r.json")).failed(1, "000005.png");
+    assert_eq!((frames(&home.at("x.y4m")), pngs(&home.at("out"))), (5, 5));
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(home.at("r.json")).unwrap()).unwrap();
+    assert_eq!(report["frames"]["delivered"], 5);
+    // What is there already stays.
+    let before = tree(&home.at("out"));
+    home.run(&format!("stream self {BLUR} --to x.y4m --to out/ --force -q")).failed(1, "000005.png");
+    assert!(tree(&home.at("out")) == before);
+    assert_eq!((frames(&home.at("x.y4m.incomplete")), pngs(&home.at("out.incomplete"))), (5, 5));
+}
+
+#[test]
+fn on_a_full_disk_the_whole_frames_are_kept_and_other_sinks_go_on() {
+    let home = Home::new();
+    home.record("self", 60, 0.1);
+    let frame_bytes = 6 + 64 * 48 * 3 / 2;
+    home.run_on_full_disk(100, &format!("stream self {BLUR} --to x.y4m --to out/")).failed(1, "x.y4m.incomplete");
+    let kept = fs::read(home.at("x.y4m.incomplete")).unwrap();
+    let header = kept.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+    assert!((kept.len() - header).is_multiple_of(frame_bytes), "no half picture");
+    assert_eq!((kept.len() - header) / frame_bytes, (102_400 - header) / frame_bytes);
+    assert_eq!(pngs(&home.at("out")), 60);
+    assert!(!home.at("x.y4m").exists());
+}
+
+#[test]
+fn pictures_of_an_earlier_run_stay_until_the_new_are_whole() {
+    let home = Home::new();
+    home.record("self", 4, 0.1);
+    home.record("long", 4000, 0.1);
+    assert_eq!(home.run(&format!("stream self {BLUR} --to out/ -q")).code, Some(0));
+    fs::write(home.at("out/notes.txt"), "mine").unwrap();
+    let before = tree(&home.at("out"));
+
+    let again = home.command("", &format!("stream long {BLUR} --to out/ --force")).stderr(Stdio::piped()).spawn();
+    let again = again.unwrap();
+    until("a new picture", || home.at("out/.bokehcam.part/000003.png").exists());
+    let ran = terminate(again);
+    assert!(ran.code == Some(0) && ran.said.contains("out.incomplete"), "{ran:?}");
+    assert!(tree(&home.at("out")) == before, "{:?}", fs::read_dir(home.at("out")).unwrap().collect::<Vec<_>>());
+    assert!(pngs(&home.at("out.incomplete")) >= 4);
+
+    let ran = home.run(&format!("stream self {BLUR} --frames 2 --to out/ --force"));
+    assert!(ran.code == Some(0) && ran.said.contains("4 files of an earlier run are replaced by 2"), "{ran:?}");
+    assert_eq!((pngs(&home.at("out")), fs::read(home.at("out/notes.txt")).unwrap()), (2, b"mine".to_vec()));
+    fs::write(home.at("out/000003.png"), "mine").unwrap();
+    home.run(&format!("stream self {BLUR} --to out/ --force")).failed(1, "000003.png was not written by bokehcam");
+    assert_eq!(fs::read(home.at("out/000003.png")).unwrap(), b"mine");
+}
+
+#[test]
+fn a_report_that_fails_does_not_hide_why_the_run_ended() {
+    let home = Home::new();
+    home.record("self", 4, 0.5);
+    home.damage("self/rgb/000003.png");
+    fs::create_dir(home.at("reports")).unwrap();
+    let args = format!("stream self {BLUR} --pace realtime --to out/ --report reports/r.json");
+    let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
+    until("a picture", || home.at("out/000000.png").exists());
+    fs::remove_dir_all(home.at("reports")).unwrap();
+    let ran = Ran::from(child.wait_with_output().unwrap());
+    ran.failed(1, "000003.png");
+    assert!(ran.said.contains("the report is not written"), "{}", ran.said);
+}
+
+#[test]
+fn a_folder_that_is_removed_ends_the_run() {
+    let home = Home::new();
+    home.record("self", 4000, 0.05);
+    let args = format!("stream self {BLUR} --pace realtime --to out/");
+    let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
+    until("a picture", || home.at("out/000001.png").exists());
+    fs::rename(home.at("out"), home.at("away")).unwrap();
+    fs::remove_dir_all(home.at("away")).unwrap();
+    Ran::from(child.wait_with_output().unwrap()).failed(1, "out");
+    assert!(!home.at("out").exists());
+}
+
+#[test]
+fn a_reader_that_never_reads_does_not_keep_the_program() {
+    let home = Home::new();
+    home.record("self", 4000, 0.01);
+    for pace in ["asap", "realtime"] {
+        let args = format!("stream self {BLUR} --pace {pace} --to - --report {pace}.json");
+        let mut child = home.command("", &args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut stdout = BufReader::new(child.stdout.take().unwrap());
+        // The first line says that it runs; what follows fills the pipe.
+        stdout.read_line(&mut String::new()).unwrap_or_default();
+        std::thread::sleep(Duration::from_millis(300));
+        let ran = terminate(child);
+        assert_eq!(ran.code, Some(0), "{}", ran.said);
+        let report: serde_json::Value =
+            serde_json::from_slice(&fs::read(home.at(&format!("{pace}.json"))).unwrap()).unwrap();
+        let count = |name: &str| report["frames"][name].as_u64().unwrap();
+        let dropped: u64 = report["frames"]["dropped"].as_object().unwrap().values().map(|n| n.as_u64().unwrap()).sum();
+        assert_eq!(count("captured"), count("delivered") + dropped + count("in_flight"), "{report}");
+    }
+}
+
+#[test]
+fn an_encoder_that_says_all_is_well_is_not_believed() {
+    let home = Home::new();
+    home.record("self", 9, 0.1);
+    for (script, what) in [
+        ("cat > /dev/null; head -c 500 /dev/zero > \"$out\"", "x.mp4.incomplete"),
+        ("cat > /dev/null", "is missing"),
+        ("head -c 20000 > /dev/null; echo half > \"$out\"; exit 3", "exit status: 3"),
+        (
+            "cat > /dev/null; echo half > \"$out\"; echo 'Error writing trailer: No space left on device' >&2",
+            "No space",
+        ),
+    ] {
+        let path = home.fake_ffmpeg(script);
+        let ran = Ran::from(home.command(&path, &format!("stream self {BLUR} --to x.mp4")).output().unwrap());
+        ran.failed(1, what);
+        assert!(!home.at("x.mp4").exists(), "{script}");
+        assert!(ran.said.contains("captured") || ran.said.contains("delivered"), "the account is there: {}", ran.said);
+    }
+}
+
+#[test]
+fn an_encoder_that_hangs_does_not_keep_the_program() {
+    let home = Home::new();
+    home.record("self", 4000, 0.01);
+    // It takes nothing, or all and never ends.
+    for script in ["echo half > \"$out\"; sleep 1000", "echo half > \"$out\"; cat > /dev/null; sleep 1000"] {
+        let path = home.fake_ffmpeg(&format!("[ \"$1\" = -version ] && exit\n{script}"));
+        let args = format!("stream self {BLUR} --to out/ --to x.mkv");
+        let child = home.command(&path, &args).stderr(Stdio::piped()).spawn().unwrap();
+        until("a picture", || home.at("out").exists() && pngs(&home.at("out")) > 3);
+        let ran = terminate(child);
+        ran.failed(1, "it hung, and was killed");
+        assert!(ran.said.contains("x.mkv.incomplete"), "{}", ran.said);
+        fs::remove_dir_all(home.at("out")).unwrap();
+    }
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_video_on_a_full_disk_is_an_error_and_kept() {
+    let home = Home::new();
+    home.record("self", 200, 0.1);
+    for name in ["x.mp4", "x.mkv", "x.webm"] {
+        home.run_on_full_disk(200, &format!("stream self {BLUR} --to {name}")).failed(1, &format!("{name}.incomplete"));
+        assert!(!home.at(name).exists());
+        let probe = Command::new("ffprobe")
+            .args(["-v", "quiet", "-count_frames", "-of", "csv=p=0", "-show_entries", "stream=nb_read_frames"])
+            .arg(home.at(&format!("{name}.incomplete")))
+            .output()
+            .unwrap();
+        let frames: u32 = String::from_utf8(probe.stdout).unwrap().trim().trim_end_matches(',').parse().unwrap();
+        assert!(frames >= 5, "{name}: {frames} can be played");
+    }
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
+fn a_video_of_a_loaded_machine_is_as_long_as_the_take() {
+    let home = Home::new();
+    // So many frames a second that some are dropped anywhere.
+    home.record("self", 3000, 0.001);
+    for name in ["x.mp4", "x.mkv", "x.y4m"] {
+        assert_eq!(home.run(&format!("stream self {BLUR} --pace realtime --to {name} -q")).code, Some(0));
+        let probe = Command::new("ffprobe")
+            .args(["-v", "error", "-of", "csv=p=0", "-show_entries", "format=duration"])
+            .arg(home.at(name))
+            .output()
+            .unwrap();
+        let duration_s: f64 = String::from_utf8(probe.stdout).unwrap().trim().parse().unwrap();
+        // Its first and its last frames may be among those that were dropped.
+        assert!((2.0..=3.1).contains(&duration_s), "{name}: {duration_s} s");
+    }
+}

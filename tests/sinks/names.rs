@@ -1,0 +1,58 @@
+//! Sinks by their names.
+
+use std::fs;
+use std::path::Path;
+
+use bokehcam::sink::{SinkError, Target};
+
+use crate::{open, options};
+
+#[test]
+fn names_become_sinks() {
+    for (name, target) in [
+        ("null", Target::Null),
+        ("-", Target::Stdout),
+        ("window", Target::Window),
+        ("./window", Target::Folder("./window".into())),
+        ("window/", Target::Folder("window/".into())),
+        ("out/", Target::Folder("out/".into())),
+        ("clip.mp4/", Target::Folder("clip.mp4/".into())),
+        ("out", Target::Folder("out".into())),
+        ("a/b.Y4M", Target::Y4m("a/b.Y4M".into())),
+        ("b.mp4", Target::Video("b.mp4".into())),
+        ("b.mkv", Target::Video("b.mkv".into())),
+        ("b.webm", Target::Video("b.webm".into())),
+        ("/dev/video10", Target::Device("/dev/video10".into())),
+        ("/dev/null", Target::Device("/dev/null".into())),
+        ("/dev/shm/out", Target::Folder("/dev/shm/out".into())),
+        ("/dev/video10.mp4", Target::Video("/dev/video10.mp4".into())),
+    ] {
+        assert_eq!(name.parse::<Target>().unwrap(), target);
+    }
+    for name in ["", "clip.avi", "a.png"] {
+        let error = name.parse::<Target>().unwrap_err().to_string();
+        assert!(error.contains(&format!("'{name}'")) && error.contains("FILE.y4m"), "{error}");
+    }
+}
+
+#[test]
+fn a_device_has_many_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("camera");
+    std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+    let target: Target = link.to_str().unwrap().parse().unwrap();
+    assert_eq!(target, Target::Device(link.clone()));
+    assert!(target.is_device(Path::new("/dev/null")) && !target.is_device(Path::new("/dev/zero")));
+    assert!(target.collides_with(&Target::Device("/dev/null".into())));
+    assert!(!target.collides_with(&Target::Null) && !Target::Null.collides_with(&Target::Null));
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    for name in ["file/clip.y4m", "file/out/"] {
+        let error = open(&folder.path().join(name), &options((6, 4))).err().unwrap().to_string();
+        assert!(error.starts_with("cannot write ") && error.contains("file"), "{error}");
+    }
+}
