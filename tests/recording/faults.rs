@@ -39,7 +39,7 @@ fn an_empty_list_is_named() {
 fn streams_that_never_meet_are_told() {
     let scene = Scene::with_pairs(2);
     scene.write("depth.txt", "9.0 depth/0.png\n");
-    assert_says(scene.open(), &["no depth map lies within 20 ms", "tolerance"]);
+    assert_says(scene.open(), &["no depth map lies within 20 ms", "of one clock"]);
 }
 
 /// Lines that are wrong, and what is said of them.
