@@ -7,7 +7,7 @@
 //! | `play` | one run of one of them, and what is counted |
 //! | `claims` | the machines, and what is claimed of the governor on each |
 //!
-//! Exit code 1 where a claim is broken; `tests/governor.rs` holds them on fewer seeds.
+//! Exit code 1 where a claim is broken; `tests/governor.rs` holds all that need no rival.
 
 mod claims;
 #[path = "../common/mod.rs"]
