@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::process::Command;
-use std::time::Duration;
 
 use bokehcam::v4l2::Device;
 use bokehcam::v4l2::controls::{self, Value};

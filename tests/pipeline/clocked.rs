@@ -16,7 +16,7 @@ use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::{Change, CocAtInfinity, CocRule, Executor, Pace, QualityRule, Run, run};
-use bokehcam::sink::{Sink, SinkError};
+use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::stats::{Cause, Report};
 
 use crate::fakes::{SIZE, simple};
@@ -122,11 +122,11 @@ impl Bokeh for Recorder {
 struct Slow(Clock);
 
 impl Sink for Slow {
-    fn put(&mut self, _: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
         self.0.advance_ns(SINK_NS);
         Ok(ControlFlow::Continue(()))
     }
-    fn finish(self: Box<Self>) -> Result<(), SinkError> {
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         Ok(())
     }
     fn describe(&self) -> String {
