@@ -133,7 +133,7 @@ pub struct DepthMap {
 
 impl DepthMap {
     /// The least depth: no scene is nearer, and its reciprocal, squared, still is a number.
-    pub const LEAST_M: f32 = 1e-6;
+    pub const LEAST_M: f32 = 1e-7;
     /// The largest depth: what is infinitely far in files that have to write a number is nearer than this.
     pub const MOST_M: f32 = 1e12;
 

@@ -158,7 +158,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let Run { camera, depth: source, bokeh: executor, mut sink, pace, clock, .. } = run;
     let info = camera.info();
     let mut about = About {
-        backend: executor.as_ref().map_or("none", |executor| backend(&executor.describe())).into(),
+        backend: executor.as_ref().map_or("none", |executor| executor.backend()).into(),
         adapter: executor.as_ref().map_or_else(|| "none".into(), |executor| executor.describe()),
         source: info.name.clone(),
         sink: sink.describe(),
@@ -232,6 +232,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         executor,
         late: live_ns.map(quality::LateRule::new),
         picker: quality::Picker::new(run.quality, most, run.budget_ns, live_ns),
+        rule: run.quality,
+        about: &mut about,
         outs: &outs,
         wanted: run.wanted.filter(|_| !run.mirror),
         viewed: places.viewed,
@@ -283,16 +285,11 @@ fn link<T>(pace: Pace) -> (Sender<T>, Receiver<T>) {
     }
 }
 
-/// The CPU executor's description begins with its name; any other is that of a GPU.
-fn backend(description: &str) -> &'static str {
-    if description.starts_with("cpu") { "cpu" } else { "gpu" }
-}
-
 /// The finest level that an executor is given as the time allows.
 fn most(executor: Option<&dyn Bokeh>) -> Quality {
     // On the processor a finer level takes twice the time for half a decibel, and other programs need it, too.
-    let on_cpu = executor.is_some_and(|executor| backend(&executor.describe()) == "cpu");
-    if on_cpu { Quality::Balanced } else { Quality::Best }
+    let on_gpu = executor.is_none_or(|executor| executor.backend() == "gpu");
+    if on_gpu { Quality::Best } else { Quality::Balanced }
 }
 
 /// Hands a frame on; gives back whether there is anybody to take more.

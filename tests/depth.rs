@@ -2,7 +2,8 @@
 
 use bokehcam::depth::fill::Filler;
 use bokehcam::depth::focus::{Focus, FocusRule};
-use bokehcam::frame::DepthMap;
+use bokehcam::depth::refine::Refiner;
+use bokehcam::frame::{ColorImage, DepthMap};
 
 const WALL_M: f32 = 3.0;
 const PERSON_M: f32 = 1.2;
@@ -167,4 +168,34 @@ fn the_focus_moves_like_a_lens() {
 fn nothing_to_focus_on_gives_a_usable_distance() {
     let focus_m = Focus::new(FocusRule::Auto).focus_m(&DepthMap::new(12, 9), 0);
     assert!(focus_m > 0.0 && focus_m.is_finite());
+}
+
+/// Numbers that are no distances, among those that are, end in no number that is none.
+#[test]
+fn depths_of_no_scene_are_unknown() {
+    let odd = [1e-38, 1e-45, f32::MIN_POSITIVE, 9e-8, 3e38, f32::MAX, 2e12, f32::NAN, f32::INFINITY, -0.0];
+    let (size, color) = ((60, 45), ColorImage::new(120, 90));
+    for rare in [1, 2, 7] {
+        for value in odd {
+            assert!(!DepthMap::is_known(value));
+            let strange = map(size.0, size.1, |x, y| if (x + y * size.0) % rare == 0 { value } else { 1.0 + x as f32 });
+            for rule in [FocusRule::Auto, FocusRule::Point { x: 0.5, y: 0.5 }] {
+                let focus_m = Focus::new(rule).focus_m(&strange, 0);
+                assert!((0.5..100.0).contains(&focus_m), "{value} in every {rare}th: focus {focus_m}");
+                let (mut filled, mut refined) = (strange.clone(), strange.clone());
+                Filler::new().fill_by(&mut filled, &color);
+                let mut refiner = Refiner::new();
+                refiner.focus_at(focus_m);
+                refiner.refine(&mut refined, &color, 0);
+                for made in [filled, refined] {
+                    let is_sound = |&metres: &f32| metres == 0.0 || (0.9..100.0).contains(&metres);
+                    assert!(made.metres.iter().all(|z_m| rare == 1 || is_sound(z_m)), "{value} in every {rare}th");
+                }
+            }
+        }
+    }
+    assert!(DepthMap::is_known(DepthMap::LEAST_M) && DepthMap::is_known(DepthMap::MOST_M));
+    for text in ["1e-38", "3e38"] {
+        assert!(text.parse::<FocusRule>().is_err());
+    }
 }

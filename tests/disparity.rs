@@ -44,6 +44,11 @@ impl Desk {
 
     /// Runs `depth left.png right.png` on the CPU with `more`, in the folder.
     fn run(&self, more: &[&str]) -> Ran {
+        self.run_any(&[&["depth", "left.png", "right.png", "--backend", "cpu"], more].concat())
+    }
+
+    /// Runs any command.
+    fn run_any(&self, args: &[&str]) -> Ran {
         let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
         for (name, _) in std::env::vars_os() {
             if name.to_string_lossy().starts_with("BOKEHCAM_") {
@@ -51,7 +56,7 @@ impl Desk {
             }
         }
         command.current_dir(self.dir.path()).env("XDG_CONFIG_HOME", self.dir.path()).env_remove("RUST_LOG");
-        command.args(["depth", "left.png", "right.png", "--backend", "cpu"]).args(more).stdin(Stdio::null());
+        command.args(args).stdin(Stdio::null());
         let output = command.output().unwrap();
         assert!(output.stdout.is_empty(), "results go to files");
         Ran { code: output.status.code().unwrap(), stderr: String::from_utf8(output.stderr).unwrap() }
@@ -102,6 +107,38 @@ fn a_wall_has_the_disparity_that_it_was_given() {
     let wide = image::open(desk.path("d.png")).unwrap().into_luma16();
     let units: Vec<f32> = wide.as_raw().iter().map(|&units| f32::from(units)).collect();
     assert!((median(&units) / 256.0 - WALL_PX as f32).abs() < 0.5);
+}
+
+/// What one command writes the other one reads for what it is.
+#[test]
+fn render_takes_disparity_for_what_it_is() {
+    let desk = Desk::new();
+    let geometry = ["--focal-px", "100", "--baseline-m", "0.08"];
+    // 100 px x 0.08 m / 8 px
+    for (out, more) in [("d.png", &geometry[..]), ("plain.png", &[]), ("plain.pfm", &geometry)] {
+        desk.assert_written(&[&["--out", out][..], more].concat());
+    }
+    desk.assert_written(&[&["--out", "z.png", "--metres"][..], &geometry].concat());
+    let render = |depth: &str, more: &[&str]| {
+        let args = ["render", "left.png", "--depth-map", depth, "--backend", "cpu", "--out", "blurred.png", "--force"];
+        desk.run_any(&[&args[..], more].concat())
+    };
+    let blurred = || fs::read(desk.path("blurred.png")).unwrap();
+    let by_metres = render("z.png", &["--focus", "1", "--refine", "off"]);
+    assert_eq!((by_metres.code, by_metres.stderr.lines().count()), (0, 1), "{}", by_metres.stderr);
+    let from_metres = image::load_from_memory(&blurred()).unwrap().into_rgb8();
+    let by_disparity = render("d.png", &["--focus", "1", "--refine", "off"]);
+    assert_eq!((by_disparity.code, by_disparity.stderr.lines().count()), (0, 1), "{}", by_disparity.stderr);
+    let from_disparity = image::load_from_memory(&blurred()).unwrap().into_rgb8();
+    let off: f64 = from_metres.iter().zip(from_disparity.iter()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+    assert!(off / (from_metres.len() as f64) < 1.0, "the same distances, the same blur");
+    for file in ["plain.png", "plain.pfm"] {
+        let ran = render(file, &["--focus", "auto"]);
+        assert!(ran.code == 0 && ran.stderr.contains("holds disparity without distances"), "{}", ran.stderr);
+        let ran = render(file, &["--focus", "2"]);
+        assert!(ran.code == 2 && ran.stderr.contains("--focus 2 needs distances"), "{}", ran.stderr);
+        assert!(ran.stderr.contains(file) && ran.stderr.contains("depth --metres"), "{}", ran.stderr);
+    }
 }
 
 #[test]
@@ -204,7 +241,7 @@ fn what_does_not_fit_is_refused_in_one_line() {
         fs::write(desk.path("c.txt"), calib).unwrap();
         desk.assert_refused(&["--out", "d.pfm", "--calib", "c.txt"], 1, says);
     }
-    desk.assert_refused(&["--out", "d.pfm", "--calib", "none.txt"], 1, "cannot read the calibration none.txt");
+    desk.assert_refused(&["--out", "d.pfm", "--calib", "none.txt"], 1, "none.txt: No such file");
     desk.save("right.png", (160, 65), 0);
     desk.assert_refused(&["--out", "d.pfm"], 1, "the left picture is 160x64, and the right one 160x65");
     fs::remove_file(desk.path("right.png")).unwrap();

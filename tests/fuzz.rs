@@ -13,8 +13,22 @@ const MUTATIONS: u64 = 200;
 
 /// Bytes that mean something to some parser.
 const TELLING: [&[u8]; 16] = [
-    b"\n", b" ", b"-", b"\"", b"1e400", b"nan", b"4294967296", b"18446744073709551615", b"../", b"\x1b[2J", b"\xff\xfe",
-    b"\xff\xd8", b"\0\0\0\0", b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"[[",
+    b"\n",
+    b" ",
+    b"-",
+    b"\"",
+    b"1e400",
+    b"nan",
+    b"4294967296",
+    b"18446744073709551615",
+    b"../",
+    b"\x1b[2J",
+    b"\xff\xfe",
+    b"\xff\xd8",
+    b"\0\0\0\0",
+    b"\xff\xff\xff\xff",
+    b"\x7f\xff\xff\xff",
+    b"[[",
 ];
 
 /// Numbers that look random, the same everywhere (SplitMix64).

@@ -55,7 +55,9 @@ fn one(words: &mut &[&str], allowed: &[&str]) -> bool {
 #[test]
 fn licence_expressions_are_understood() {
     let allowed = ["MIT", "Zlib", "Apache-2.0 WITH LLVM-exception"];
-    for met in ["MIT", "GPL-2.0 OR MIT", "MIT/Apache-2.0", "(GPL-2.0 OR MIT) AND Zlib", "Apache-2.0 WITH LLVM-exception"] {
+    for met in
+        ["MIT", "GPL-2.0 OR MIT", "MIT/Apache-2.0", "(GPL-2.0 OR MIT) AND Zlib", "Apache-2.0 WITH LLVM-exception"]
+    {
         assert!(is_met(met, &allowed), "{met}");
     }
     for not in ["", "GPL-2.0", "MIT AND GPL-2.0", "(GPL-2.0 OR MIT) AND ISC", "Apache-2.0", "MIT Zlib"] {
@@ -77,7 +79,8 @@ fn dependencies_are_under_licences_and_from_sources_that_are_allowed() {
     let version = String::from_utf8(version).unwrap();
     let host = version.lines().find_map(|line| line.strip_prefix("host: ")).unwrap();
     // Those that were fetched to build this test.
-    let arguments = ["metadata", "--format-version=1", "--locked", "--offline", "--all-features", "--filter-platform", host];
+    let arguments =
+        ["metadata", "--format-version=1", "--locked", "--offline", "--all-features", "--filter-platform", host];
     let output = Command::new(env!("CARGO")).args(arguments).current_dir(here).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -6,9 +6,11 @@
 //! | `stages` | the camera, the executor that may be slowed down, the sink that stamps |
 //! | `loader` | the other process |
 //! | `verdict` | what is measured, and against what |
+//! | `footprint` | what the process holds |
 
 #[path = "../common/mod.rs"]
 mod common;
+mod footprint;
 mod loader;
 mod stages;
 mod verdict;
@@ -28,8 +30,10 @@ use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::pipeline::{self, CocAtInfinity, CocRule, Pace, QualityRule, Run};
 use bokehcam::recording::{Options as Reading, Recording};
+use bokehcam::stats::Report;
 use clap::Parser;
 
+use footprint::Footprint;
 use loader::Loader;
 use stages::{Looped, PERIOD_NS, Slowed, Stamping, Stamps};
 use verdict::verdict;
@@ -46,6 +50,7 @@ use verdict::verdict;
 Examples:
   cargo bench --bench soak -- --minutes 10 --loader
   cargo bench --bench soak -- --minutes 2 --slow 3
+  cargo bench --bench soak -- --starts 1000 --minutes 90
   cargo bench --bench soak -- --minutes 1 --quality balanced somewhere/rgbd"
 )]
 struct Options {
@@ -55,6 +60,9 @@ struct Options {
     /// How long to run
     #[arg(long, value_name = "M", default_value_t = 1.0)]
     minutes: f64,
+    /// Before that, start and stop so many times, and tell what the process holds then
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    starts: u32,
     /// Let the blur take this many times as long, busy all the while
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     slow: f64,
@@ -118,6 +126,48 @@ fn main() -> ExitCode {
 
 /// Runs it; tells whether the criteria are met.
 fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
+    let begun = options.starts == 0 || starts(options)?;
+    let frames = (options.minutes * 60e9 / PERIOD_NS as f64).round().max(2.0) as u64;
+    let loader = options.loader.then(Loader::start).transpose()?;
+    let (report, shown) = replay(options, frames)?;
+    drop(loader);
+    if let Some(path) = &options.series {
+        let line = |&(at_ns, age_ns): &(u64, u64)| format!("{:.3},{:.3}\n", at_ns as f64 / 1e6, age_ns as f64 / 1e6);
+        std::fs::write(path, shown.iter().map(line).collect::<String>())?;
+    }
+    println!(
+        "{}, {:.1} minutes{}{}",
+        report.source,
+        options.minutes,
+        if options.loader { ", one core busy for 10 s of every 20" } else { "" },
+        if options.slow > 1.0 { format!(", blur {} times slower", options.slow) } else { String::new() }
+    );
+    println!("{report}\n");
+    Ok(verdict(&shown, &report) && begun)
+}
+
+/// Starts and stops; tells whether the process holds no more in the end than after a tenth of it.
+fn starts(options: &Options) -> Result<bool, Box<dyn Error>> {
+    const FRAMES: u64 = 4;
+    let (mut warm, mut frames) = (Footprint::now()?, 0);
+    for start in 0..options.starts {
+        frames += replay(options, FRAMES)?.0.frames.captured;
+        if start == options.starts / 10 {
+            warm = Footprint::now()?;
+        }
+    }
+    let end = Footprint::now()?;
+    let flat = end.is_as_flat_as(&warm);
+    println!(
+        "{} starts and stops, {frames} frames: {warm}, in the end {end}: {}\n",
+        options.starts,
+        verdict::word(flat)
+    );
+    Ok(flat)
+}
+
+/// Frames of the recording in real time: the report, and when each came out how old.
+fn replay(options: &Options, frames: u64) -> Result<(Report, Vec<(u64, u64)>), Box<dyn Error>> {
     let name = options.folder.display().to_string();
     let reading = Reading { depth_scale: options.depth_scale, ..Reading::default() };
     let recording = Arc::new(Recording::open(&options.folder, &reading)?);
@@ -144,9 +194,7 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
     let backend = if options.gpu { Backend::Auto } else { Backend::Cpu };
     let executor = bokeh::create(&settings, size, backend, None, None)?;
     let clock = Clock::system();
-    let frames = (options.minutes * 60e9 / PERIOD_NS as f64).round().max(2.0) as u64;
     let stamps = Stamps::with_room_for(frames as usize);
-    let loader = options.loader.then(Loader::start).transpose()?;
     let stop = AtomicBool::new(false);
     let report = pipeline::run(Run {
         depth: Some(Box::new(Recorded::new(Arc::clone(&recording), &name)?) as Box<dyn DepthSource>),
@@ -168,20 +216,5 @@ fn run(options: &Options) -> Result<bool, Box<dyn Error>> {
         stop: &stop,
         progress: &|_| {},
     })?;
-    drop(loader);
-    let shown = stamps.take();
-    if let Some(path) = &options.series {
-        let line = |&(at_ns, age_ns): &(u64, u64)| format!("{:.3},{:.3}\n", at_ns as f64 / 1e6, age_ns as f64 / 1e6);
-        std::fs::write(path, shown.iter().map(line).collect::<String>())?;
-    }
-    println!(
-        "{name}, {}x{}, {:.1} minutes{}{}",
-        size.0,
-        size.1,
-        options.minutes,
-        if options.loader { ", one core busy for 10 s of every 20" } else { "" },
-        if options.slow > 1.0 { format!(", blur {} times slower", options.slow) } else { String::new() }
-    );
-    println!("{report}\n");
-    Ok(verdict(&shown, &report))
+    Ok((report, stamps.take()))
 }

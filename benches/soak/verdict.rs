@@ -61,7 +61,8 @@ pub fn verdict(shown: &[(u64, u64)], report: &Report) -> bool {
     met
 }
 
-fn word(fine: bool) -> &'static str {
+/// How a criterion is told of.
+pub fn word(fine: bool) -> &'static str {
     if fine { "met" } else { "MISSED" }
 }
 

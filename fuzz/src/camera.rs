@@ -92,7 +92,8 @@ fn format(numbers: &mut Numbers) -> sys::v4l2_format {
         #[allow(unsafe_code)]
         let mut pix: sys::v4l2_pix_format_mplane = unsafe { std::mem::zeroed() };
         (pix.width, pix.height, pix.pixelformat, pix.field) = (width, height, fourcc, (field % 3).into());
-        (pix.colorspace, pix.quantization, pix.xfer_func, pix.num_planes) = (colorspace, quantization, transfer, planes);
+        (pix.colorspace, pix.quantization, pix.xfer_func, pix.num_planes) =
+            (colorspace, quantization, transfer, planes);
         pix.__bindgen_anon_1.ycbcr_enc = encoding;
         // A copy, as the structure is packed.
         let mut each = pix.plane_fmt;

@@ -30,7 +30,9 @@ pub fn command_line(data: &[u8]) {
             }
         }
         // Help and version are no refusals.
-        Err(_) if all.iter().any(|argument| ["-h", "--help", "-V", "--version", "help"].iter().any(|h| argument == h)) => {}
+        Err(_)
+            if all.iter().any(|argument| ["-h", "--help", "-V", "--version", "help"].iter().any(|h| argument == h)) => {
+        }
         Err(message) => assert_one_line(message),
     }
 }

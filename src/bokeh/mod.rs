@@ -6,9 +6,11 @@
 pub mod aperture;
 pub mod bank;
 pub mod cpu;
+pub mod fallback;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod levels;
+mod limit;
 pub mod low_rank;
 pub mod plan;
 pub mod rung;
@@ -102,44 +104,6 @@ pub struct Settings {
     pub far_max_px: f32,
     /// Largest CoC radius in front of the focal plane, in pixels (0 when nothing can be there).
     pub near_max_px: f32,
-}
-
-/// Largest radius of [`Method::Gather`], in pixels: it filters at full scale.
-const MOST_GATHERED_PX: f32 = 512.0;
-/// The same with [`Rank::Full`], when it gathers in two dimensions: kernels grow with the square of the radius.
-const MOST_EXACT_PX: f32 = 128.0;
-
-impl Settings {
-    /// The largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their diagonal,
-    /// or less where the method bears no more.
-    pub fn most_radius_px(&self, size: (u32, u32)) -> f32 {
-        let diagonal_px = (size.0 as f32).hypot(size.1 as f32).ceil();
-        diagonal_px.min(match (self.effect, self.method, self.rank) {
-            (Effect::Dof, Method::Gather, Some(Rank::Full)) => MOST_EXACT_PX,
-            (Effect::Dof, Method::Gather, _) => MOST_GATHERED_PX,
-            _ => f32::INFINITY,
-        })
-    }
-
-    /// These settings, with radii cut to what pictures of `size` bear.
-    fn within(&self, size: (u32, u32)) -> Self {
-        let most_px = self.most_radius_px(size);
-        let cut = |radius_px: f32| radius_px.max(0.0).min(most_px);
-        Self { far_max_px: cut(self.far_max_px), near_max_px: cut(self.near_max_px), ..self.clone() }
-    }
-
-    /// Whether pictures of `size` (width, height) can be blurred so.
-    ///
-    /// # Errors
-    /// [`BokehError::TooWide`].
-    pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
-        let (radius_px, most_px) = (self.far_max_px.max(self.near_max_px), self.most_radius_px(size));
-        if radius_px <= most_px {
-            return Ok(());
-        }
-        let by_method = (self.effect, self.method) == (Effect::Dof, Method::Gather);
-        Err(BokehError::TooWide { radius_px, most_px, size, by_method })
-    }
 }
 
 /// One frame to blur. The executor owns the buffers until the frame is [`Finished`].
@@ -265,7 +229,8 @@ pub enum Probe {
 /// `adapter` is part of a GPU adapter's name; `threads` is for the CPU executor, all cores when `None`.
 ///
 /// # Errors
-/// The blur is too wide ([`Settings::check`]); a GPU was asked for and there is none that fits, or it failed.
+/// The blur is too wide ([`Settings::check`]); a GPU was asked for and there is none that fits, or it failed. One that
+/// fails later is no error: the CPU goes on.
 pub fn create(
     settings: &Settings,
     size: (u32, u32),
@@ -278,7 +243,7 @@ pub fn create(
     #[cfg(feature = "gpu")]
     if backend != Backend::Cpu {
         match gpu::GpuBokeh::new(&plan, backend == Backend::Auto, adapter) {
-            Ok(gpu) => return Ok(Box::new(gpu)),
+            Ok(gpu) => return Ok(with_fallback(gpu, plan, threads)),
             Err(error) if backend == Backend::Gpu || adapter.is_some() => return Err(error),
             Err(error) => tracing::info!("blurring on the CPU: {error}"),
         }
@@ -290,15 +255,27 @@ pub fn create(
     Ok(Box::new(cpu::CpuBokeh::new(plan, threads)))
 }
 
-/// The executor for pictures of `size` (width, height) on a device that is open already.
+/// The executor for pictures of `size` (width, height) on a device that is open already; `threads` as for [`create`].
 ///
 /// # Errors
 /// The blur is too wide ([`Settings::check`]), the device is too small for such pictures, or it failed.
 #[cfg(feature = "gpu")]
-pub fn create_on(settings: &Settings, size: (u32, u32), device: Arc<Device>) -> Result<Box<dyn Bokeh>, BokehError> {
+pub fn create_on(
+    settings: &Settings,
+    size: (u32, u32),
+    device: Arc<Device>,
+    threads: Option<usize>,
+) -> Result<Box<dyn Bokeh>, BokehError> {
     settings.check(size)?;
     let plan = plan::Plan::new(settings, size.0, size.1);
-    Ok(Box::new(gpu::GpuBokeh::on(&plan, device)?))
+    let gpu = gpu::GpuBokeh::on(&plan, device)?;
+    Ok(with_fallback(gpu, plan, threads))
+}
+
+#[cfg(feature = "gpu")]
+fn with_fallback(gpu: gpu::GpuBokeh, plan: plan::Plan, threads: Option<usize>) -> Box<dyn Bokeh> {
+    let cpu = move || Box::new(cpu::CpuBokeh::new(plan, threads)) as Box<dyn Bokeh>;
+    Box::new(fallback::Fallback::new(Box::new(gpu), Box::new(cpu)))
 }
 
 /// An executor of the plan.
@@ -309,8 +286,14 @@ pub trait Bokeh: Send {
     /// Starts one frame.
     ///
     /// # Errors
-    /// The frame does not fit the plan, or the device failed; the frame is then gone.
+    /// The frame does not fit the plan, or the device failed; the frame is then gone, unless [`Bokeh::take_back`] has it.
     fn submit(&mut self, job: Job) -> Result<(), BokehError>;
+
+    /// Gives back the oldest frame in flight, or one that was just refused, as it was submitted: after an error, so that
+    /// another executor can blur it. Nothing where all is collected, or the frame is gone.
+    fn take_back(&mut self) -> Option<Job> {
+        None
+    }
 
     /// The oldest finished frame, if there is one; with `wait`, blocks until there is (or nothing is in flight).
     ///
@@ -323,6 +306,11 @@ pub trait Bokeh: Send {
 
     /// Frames that may be in flight at once.
     fn capacity(&self) -> usize;
+
+    /// What runs it, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
+    fn backend(&self) -> &'static str {
+        if self.describe().starts_with("cpu") { "cpu" } else { "gpu" }
+    }
 
     /// One line for the report, such as `cpu, 2 threads, AVX-512` or the adapter's name.
     fn describe(&self) -> String;

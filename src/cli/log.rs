@@ -1,14 +1,12 @@
 //! Everything that goes to stderr: log lines, messages, errors; as text, or as one JSON object a line.
 //!
-//! A thread of its own writes. Nobody who has something to say waits for a terminal that is not read: lines wait, and
-//! beyond [`MOST_WAITING`] of them are lost, which is said.
+//! All of it goes through one [`Screen`].
 
 use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
+
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::json;
 use tracing_subscriber::EnvFilter;
@@ -17,20 +15,19 @@ use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
 
 use super::options::Global;
+use super::screen::Screen;
 use super::values::LogFormat;
-
-/// Lines that may wait for the terminal.
-const MOST_WAITING: usize = 1024;
-/// So long the end of the program waits until all is written.
-const LAST_WORDS: Duration = Duration::from_secs(1);
-/// What begins a line where a progress bar may stand.
-const CLEAR_LINE: &str = "\r\x1b[2K";
 
 /// How messages are written; text until [`start`] says otherwise.
 static JSON: AtomicBool = AtomicBool::new(false);
 static QUIET: AtomicBool = AtomicBool::new(false);
-/// Whether a progress bar stands in the last line of the terminal.
-static BAR: AtomicBool = AtomicBool::new(false);
+
+/// The way to stderr.
+pub fn screen() -> &'static Screen {
+    static SCREEN: OnceLock<Screen> = OnceLock::new();
+    let missing = |lines: u64| line("WARN", &format!("{lines} lines are missing: the terminal took none for too long"));
+    SCREEN.get_or_init(|| Screen::new(io::stderr(), missing))
+}
 
 /// Chooses how messages are written: also for what is wrong before the arguments are understood.
 pub fn write_as(format: LogFormat) {
@@ -59,11 +56,6 @@ pub fn start(global: &Global) {
     };
 }
 
-/// Says whether a progress bar stands in the last line.
-pub fn bar_is_shown(shown: bool) {
-    BAR.store(shown, Ordering::Relaxed);
-}
-
 /// A message of one or more lines.
 pub fn say(text: &str) {
     message("INFO", text);
@@ -89,24 +81,41 @@ pub fn error(what: &str) {
 }
 
 fn message(level: &str, text: &str) {
+    screen().print(line(level, text).as_bytes());
+}
+
+/// A message with its end, as text or JSON.
+fn line(level: &str, text: &str) -> String {
     if !JSON.load(Ordering::Relaxed) {
-        return lines().send(format!("{}\n", printable(text, &['\n'])));
+        return format!("{}\n", printable(text, &['\n']));
     }
     let mut timestamp = String::new();
     // Without a clock there is no time to tell.
     let _ = SystemTime.format_time(&mut Writer::new(&mut timestamp));
     // As the log's own lines are.
     let object = json!({"timestamp": timestamp, "level": level, "fields": {"message": text}, "target": "bokehcam"});
-    lines().send(format!("{object}\n"));
+    format!("{object}\n")
 }
 
-/// Waits until everything that was said is written, but not for ever.
+/// Waits until everything that was said is written, but not for a terminal that takes nothing.
 pub fn flush() {
-    let began = Instant::now();
-    let lines = lines();
-    while lines.waiting.load(Ordering::Acquire) > 0 && began.elapsed() < LAST_WORDS {
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    screen().flush();
+}
+
+/// Tells of a panic as of anything else: a thread that panics must not wait for the terminal, and its neighbours for it.
+pub fn tell_of_panics() {
+    std::panic::set_hook(Box::new(|panic| {
+        if crate::compute::catches() {
+            return;
+        }
+        let thread = std::thread::current();
+        let backtrace = std::backtrace::Backtrace::capture();
+        let told = format!("thread '{}' {panic}", thread.name().unwrap_or("unnamed"));
+        match backtrace.status() {
+            std::backtrace::BacktraceStatus::Captured => message("ERROR", &format!("{told}\n{backtrace}")),
+            _ => message("ERROR", &told),
+        }
+    }));
 }
 
 /// `text` with control characters, and those that turn the direction of writing, as a program would spell them; but
@@ -122,56 +131,6 @@ pub fn printable<'a>(text: &'a str, keep: &[char]) -> Cow<'a, str> {
         if acts(c) { spelt.extend(c.escape_default()) } else { spelt.push(c) }
     }
     spelt.into()
-}
-
-/// What waits for the terminal.
-struct Lines {
-    /// None where there is no thread to write.
-    sender: Option<SyncSender<String>>,
-    waiting: AtomicU64,
-    lost: AtomicU64,
-}
-
-fn lines() -> &'static Lines {
-    static LINES: OnceLock<Lines> = OnceLock::new();
-    LINES.get_or_init(|| {
-        let (sender, receiver) = sync_channel(MOST_WAITING);
-        let thread = std::thread::Builder::new().name("log".into()).spawn(|| write_all(receiver));
-        let sender = thread.is_ok().then_some(sender);
-        Lines { sender, waiting: AtomicU64::new(0), lost: AtomicU64::new(0) }
-    })
-}
-
-fn write_all(lines_in: Receiver<String>) {
-    for line in lines_in {
-        let lines = lines();
-        write(&line);
-        match lines.lost.swap(0, Ordering::Relaxed) {
-            0 => {}
-            lost => write(&format!("{lost} lines were lost here: nobody read them\n")),
-        }
-        lines.waiting.fetch_sub(1, Ordering::Release);
-    }
-}
-
-/// In one piece. A closed stderr is no reason to fail.
-fn write(line: &str) {
-    let mut stderr = io::stderr();
-    let _ = match BAR.load(Ordering::Relaxed) {
-        true => stderr.write_all(format!("{CLEAR_LINE}{line}").as_bytes()),
-        false => stderr.write_all(line.as_bytes()),
-    };
-}
-
-impl Lines {
-    fn send(&self, line: String) {
-        let Some(sender) = &self.sender else { return write(&line) };
-        self.waiting.fetch_add(1, Ordering::Relaxed);
-        if sender.try_send(line).is_err() {
-            self.waiting.fetch_sub(1, Ordering::Relaxed);
-            self.lost.fetch_add(1, Ordering::Relaxed);
-        }
-    }
 }
 
 /// Makes a line of each event of the log.
@@ -204,7 +163,7 @@ impl Drop for LogLine {
         let text = String::from_utf8_lossy(&self.0);
         // The log's own colours begin with an escape; those of others' texts it spells itself.
         let line = printable(text.trim_end_matches('\n'), &['\x1b']);
-        lines().send(format!("{line}\n"));
+        screen().print(format!("{line}\n").as_bytes());
     }
 }
 

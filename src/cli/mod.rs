@@ -36,6 +36,7 @@ mod quality;
 mod record;
 mod render;
 mod save;
+mod screen;
 mod settings;
 mod sinks;
 mod source;
@@ -131,6 +132,7 @@ Examples:
 /// Runs the program. What goes wrong becomes one line on stderr and an exit code: 1 at run time, 2 in the arguments.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args = arguments::joined(args);
+    log::tell_of_panics();
     log::write_as(arguments::log_format(&args));
     let code = run_to_end(&args);
     log::flush();

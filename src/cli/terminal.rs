@@ -1,5 +1,6 @@
 //! What the user sees while a command runs, and how it is ended.
 
+use std::io::{self, IsTerminal};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,6 +10,7 @@ use super::error::CliError;
 use super::log;
 pub use super::log::say;
 use super::options::Global;
+use super::screen::{Count, Screen};
 
 /// The first Ctrl-C (or a termination signal) sets the flag, so that the file in hand is finished; the second ends
 /// the program at once.
@@ -31,31 +33,32 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
 }
 
 /// A bar of delivered frames on stderr; silent when that is no terminal.
-pub struct Progress(ProgressBar);
+pub struct Progress(Option<(&'static Screen, Arc<Count>)>);
 
 impl Progress {
     /// A bar for `frames` frames, or a counter when their number is not known.
     pub fn new(frames: Option<u64>, global: &Global) -> Self {
+        if global.quiet || !io::stderr().is_terminal() {
+            return Self(None);
+        }
         let template = match frames {
             Some(_) => "{wide_bar} {pos}/{len} frames, {per_sec}, {eta} left",
             None => "{spinner} {pos} frames, {per_sec}, {elapsed}",
         };
-        let target = if global.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = ProgressBar::with_draw_target(frames, target);
-        log::bar_is_shown(!bar.is_hidden());
+        let bar = ProgressBar::with_draw_target(frames, ProgressDrawTarget::stderr());
         bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Self(bar)
+        let screen = log::screen();
+        Self(Some((screen, screen.begin(bar))))
     }
 
     /// So many frames are delivered.
     pub fn delivered(&self, frames: u64) {
-        self.0.set_position(frames);
+        self.0.iter().for_each(|(_, count)| count.set(frames));
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
-        log::bar_is_shown(false);
+        self.0.iter().for_each(|(screen, count)| screen.end(count));
     }
 }

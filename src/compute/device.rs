@@ -1,8 +1,9 @@
 //! Which adapter, and the device on it.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use super::GpuError;
+use super::{GpuError, catching};
 
 /// A pass: the name of its entry point and file, and its source.
 #[derive(Clone, Copy, Debug)]
@@ -12,6 +13,10 @@ pub struct Shader {
     /// Whole source, shared parts included.
     pub source: &'static str,
 }
+
+/// Longest that a device may take over what it was given; one in software is slow, but does not hang.
+const PATIENCE: Duration = Duration::from_secs(10);
+const PATIENCE_WITH_SOFTWARE: Duration = Duration::from_secs(60);
 
 /// A device and its queue.
 pub struct Device {
@@ -27,6 +32,7 @@ pub struct Device {
     pub name: String,
     /// Whether passes can be timed.
     pub timestamps: bool,
+    patience: Duration,
     fault: Arc<Mutex<Option<String>>>,
 }
 
@@ -75,21 +81,20 @@ impl Device {
         let fault = Arc::new(Mutex::new(None));
         let report = |fault: &Arc<Mutex<Option<String>>>| {
             let fault = Arc::clone(fault);
-            move |message: String| {
-                if let Ok(mut fault) = fault.lock() {
-                    fault.get_or_insert(message);
-                }
-            }
+            move |message: String| note(&fault, message)
         };
         let (on_error, on_loss) = (report(&fault), report(&fault));
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| on_error(error.to_string())));
-        device.set_device_lost_callback(move |reason, message| {
-            // Dropping the device is the ordinary end.
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                on_loss(format!("device lost: {message}"));
-            }
-        });
-        Ok(Self { instance, adapter, device, queue, name, timestamps, fault })
+        // At the ordinary end, by dropping it, nobody is left to ask.
+        device.set_device_lost_callback(move |_, message| on_loss(format!("device lost: {message}")));
+        let patience = if infos[best].device_type == wgpu::DeviceType::Cpu { PATIENCE_WITH_SOFTWARE } else { PATIENCE };
+        Ok(Self { instance, adapter, device, queue, name, timestamps, patience, fault })
+    }
+
+    /// The same, which may take this long over what it is given.
+    #[must_use]
+    pub fn with_patience(self, patience: Duration) -> Self {
+        Self { patience, ..self }
     }
 
     /// A pass with its `override` constants.
@@ -157,16 +162,65 @@ impl Device {
         }
     }
 
+    /// Lets what the device has done be known: calls back who waits for it. With `until`, waits for that.
+    ///
+    /// # Errors
+    /// The device failed, or took too long.
+    pub fn poll(&self, until: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
+        self.check()?;
+        let poll = match until {
+            Some(_) => wgpu::PollType::Wait { submission_index: until, timeout: Some(self.patience) },
+            None => wgpu::PollType::Poll,
+        };
+        // A device that is lost meanwhile makes it panic.
+        match catching(|| self.device.poll(poll)) {
+            Some(Ok(_)) => {}
+            Some(Err(wgpu::PollError::Timeout)) => self.give_up(),
+            Some(Err(error)) => note(&self.fault, error.to_string()),
+            None => note(&self.fault, "device lost".to_owned()),
+        }
+        self.check()
+    }
+
+    /// Waits until `done` after what it waits for was submitted.
+    ///
+    /// # Errors
+    /// As for [`Device::poll`].
+    pub fn wait_for(&self, done: impl Fn() -> bool) -> Result<(), GpuError> {
+        let began = Instant::now();
+        // Another thread that uses the device has found it done, and is about to say so.
+        while !done() {
+            self.check()?;
+            if began.elapsed() > self.patience {
+                self.give_up();
+            }
+            std::thread::yield_now();
+        }
+        Ok(())
+    }
+
+    /// The device hangs.
+    fn give_up(&self) {
+        // Freeing it would wait for what never comes.
+        std::mem::forget((self.instance.clone(), self.device.clone(), self.queue.clone()));
+        note(&self.fault, format!("no answer for {:.0} s", self.patience.as_secs_f64()));
+    }
+
     /// The first thing that went wrong on the device, if anything did.
     ///
     /// # Errors
     /// That thing.
     pub fn check(&self) -> Result<(), GpuError> {
-        match self.fault.lock().ok().and_then(|fault| fault.clone()) {
+        match self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone() {
             Some(message) => Err(GpuError::Failed(format!("{}: {message}", self.name))),
             None => Ok(()),
         }
     }
+}
+
+/// Keeps the first fault.
+fn note(fault: &Mutex<Option<String>>, message: String) {
+    fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
 }
 
 /// An 8-bit sRGB picture in a device's memory: the bytes of a [`crate::frame::ColorImage`].

@@ -6,6 +6,9 @@ pub mod device;
 pub mod simd;
 pub mod team;
 
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 #[cfg(feature = "gpu")]
 pub use device::DevicePicture;
 
@@ -61,4 +64,22 @@ impl GpuError {
         let wanted = "at all: this build leaves the GPU out (feature `gpu`)".to_owned();
         Self::NoAdapter { wanted, found: "none".to_owned() }
     }
+}
+
+thread_local! {
+    static CATCHES: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Does what makes an error known by a panic; nothing is given back then. What it used must be done with.
+pub fn catching<T>(work: impl FnOnce() -> T) -> Option<T> {
+    let before = CATCHES.replace(true);
+    let done = catch_unwind(AssertUnwindSafe(work));
+    CATCHES.set(before);
+    // What was thrown may throw again when it is dropped.
+    done.map_err(std::mem::forget).ok()
+}
+
+/// Whether this thread's panics are errors that are told of otherwise.
+pub fn catches() -> bool {
+    CATCHES.get()
 }

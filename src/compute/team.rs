@@ -1,8 +1,8 @@
 //! A fixed team of threads that share out the parts of one pass at a time.
 //!
 //! A pass is over when every part is done; a member that sleeps through it is not waited for. Nothing is allocated
-//! and no lock is taken. This is the one file with `unsafe`: the threads outlive the borrow of the work they are
-//! handed, and `run` is what guarantees that they never use it afterwards.
+//! and no lock is taken. It needs `unsafe` because the threads outlive the borrow of the work they are handed; `run` is
+//! what guarantees that they never use it afterwards, whatever panics.
 #![allow(unsafe_code)]
 
 use std::cell::UnsafeCell;
@@ -191,7 +191,9 @@ impl Shared {
                 (pass.work)(member, part);
             }
         });
-        if catch_unwind(work).is_err() {
+        if let Err(thrown) = catch_unwind(work) {
+            // Dropping it may panic, and then a member would never leave, or `run` while members are at work.
+            std::mem::forget(thrown);
             self.panicked.store(true, Ordering::Relaxed);
         }
     }
@@ -236,8 +238,11 @@ impl<'a, T> Shelf<'a, T> {
     /// When it is taken a second time, or beyond the end.
     #[allow(clippy::mut_from_ref)]
     pub fn part(&self, index: usize) -> &mut [T] {
-        let start = index * self.each;
-        assert!(start < self.length && !self.taken[index].swap(true, Ordering::Relaxed), "each part is taken once");
+        // A product that wraps would be the start of another part.
+        let start = index.checked_mul(self.each).filter(|&start| start < self.length);
+        let Some(start) = start.filter(|_| !self.taken[index].swap(true, Ordering::Relaxed)) else {
+            panic!("each part is taken once");
+        };
         let length = self.each.min(self.length - start);
         // SAFETY: inside the allocation, which `'a` keeps borrowed; parts do not overlap and each is handed out once.
         unsafe { std::slice::from_raw_parts_mut(self.base.add(start), length) }
@@ -253,7 +258,7 @@ mod tests {
         for threads in [1, 2, 5] {
             let mut team = Team::new("test", threads);
             for parts in [0, 1, 2, 7, 100] {
-                for _ in 0..200 {
+                for _ in 0..if cfg!(miri) { 5 } else { 200 } {
                     let done: Vec<AtomicUsize> = (0..parts).map(|_| AtomicUsize::new(0)).collect();
                     team.run(parts, &|part| {
                         done[part].fetch_add(1, Ordering::Relaxed);
@@ -274,6 +279,58 @@ mod tests {
             sum.fetch_add(part, Ordering::Relaxed);
         });
         assert_eq!(sum.load(Ordering::Relaxed), 45);
+    }
+
+    /// What panics again when it is dropped.
+    struct Bomb;
+
+    impl Drop for Bomb {
+        fn drop(&mut self) {
+            if !thread::panicking() {
+                panic!("dropping it panics");
+            }
+        }
+    }
+
+    #[test]
+    fn nobody_leaves_a_pass_while_members_work_whatever_is_thrown() {
+        for caller_throws in [true, false] {
+            let mut team = Team::new("test", 2);
+            let caller = thread::current().id();
+            let (both, done) = (AtomicUsize::new(0), AtomicBool::new(false));
+            let result = catch_unwind(AssertUnwindSafe(|| {
+                team.run(2, &|_| {
+                    // One part each.
+                    both.fetch_add(1, Ordering::Relaxed);
+                    while both.load(Ordering::Relaxed) < 2 {
+                        thread::yield_now();
+                    }
+                    if (thread::current().id() == caller) == caller_throws {
+                        std::panic::panic_any(Bomb);
+                    }
+                    thread::sleep(std::time::Duration::from_millis(50));
+                    done.store(true, Ordering::Relaxed);
+                });
+            }));
+            assert!(done.load(Ordering::Relaxed), "the pass is over for all");
+            assert!(result.is_err());
+            let sum = AtomicUsize::new(0);
+            team.run(10, &|part| {
+                sum.fetch_add(part, Ordering::Relaxed);
+            });
+            assert_eq!(sum.load(Ordering::Relaxed), 45, "the team lives on");
+        }
+    }
+
+    #[test]
+    fn parts_beyond_any_address_are_not_handed_out() {
+        let mut data = [0u8; 4];
+        let mut flags: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
+        let shelf = Shelf::new(&mut data, 1 << (usize::BITS - 1), &mut flags);
+        assert_eq!(shelf.part(0).len(), 4);
+        // Twice this size wraps to 0.
+        let second = catch_unwind(AssertUnwindSafe(|| shelf.part(2).len())).unwrap_err();
+        assert_eq!(second.downcast_ref::<&str>(), Some(&"each part is taken once"));
     }
 
     #[test]

@@ -80,11 +80,11 @@ impl Bell {
 }
 
 /// The kernel's list of the threads that sleep on a word.
-#[cfg(not(loom))]
+#[cfg(not(any(loom, miri)))]
 #[derive(Debug)]
 struct Sleepers;
 
-#[cfg(not(loom))]
+#[cfg(not(any(loom, miri)))]
 impl Sleepers {
     fn new() -> Self {
         Self
@@ -106,6 +106,36 @@ impl Sleepers {
         use rustix::thread::futex::{Flags, wake};
         // Fails only for a word that is not there.
         let _ = wake(word, Flags::PRIVATE, i32::MAX as u32);
+    }
+}
+
+/// The same by the C library's `syscall`, the one way that Miri knows: rustix looks for that symbol at run time.
+#[cfg(miri)]
+#[derive(Debug)]
+struct Sleepers;
+
+#[cfg(miri)]
+#[allow(unsafe_code)]
+impl Sleepers {
+    fn new() -> Self {
+        Self
+    }
+
+    fn sleep(&self, word: &AtomicU32, expected: u32, patience: Option<Duration>) {
+        let patience = patience.map(|patience| libc::timespec {
+            tv_sec: patience.as_secs().try_into().unwrap_or(i64::MAX),
+            tv_nsec: patience.subsec_nanos().into(),
+        });
+        let until = patience.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
+        let wait = libc::FUTEX_WAIT | libc::FUTEX_PRIVATE_FLAG;
+        // SAFETY: `futex` with these arguments reads the word and the time, which live until it returns.
+        unsafe { libc::syscall(libc::SYS_futex, word.as_ptr(), wait, expected, until) };
+    }
+
+    fn wake(&self, word: &AtomicU32) {
+        let wake = libc::FUTEX_WAKE | libc::FUTEX_PRIVATE_FLAG;
+        // SAFETY: with these arguments only the word's address counts.
+        unsafe { libc::syscall(libc::SYS_futex, word.as_ptr(), wake, i32::MAX) };
     }
 }
 

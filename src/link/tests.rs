@@ -20,7 +20,7 @@ impl Stalls {
 
 #[test]
 fn every_item_of_a_live_link_is_read_or_comes_back() {
-    const ITEMS: u64 = 200_000;
+    const ITEMS: u64 = if cfg!(miri) { 300 } else { 200_000 };
     let (mut sender, mut receiver) = live();
     let reader = thread::spawn(move || {
         let mut stalls = Stalls(7);
@@ -52,13 +52,14 @@ fn every_item_of_a_live_link_is_read_or_comes_back() {
 
 #[test]
 fn a_lossless_link_delivers_everything_in_order() {
+    const ITEMS: u32 = if cfg!(miri) { 100 } else { 20_000 };
     let (mut sender, mut receiver) = lossless();
     let reader = thread::spawn(move || std::iter::from_fn(|| receiver.recv()).collect::<Vec<u32>>());
-    for item in 0..20_000 {
+    for item in 0..ITEMS {
         assert_eq!(sender.send(item), Ok(None));
     }
     drop(sender);
-    assert!(reader.join().unwrap().into_iter().eq(0..20_000));
+    assert!(reader.join().unwrap().into_iter().eq(0..ITEMS));
 }
 
 #[test]

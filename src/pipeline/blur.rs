@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::depth::Ready;
 use super::quality::{LateRule, Picker};
 use super::wanted::Wanted;
-use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, Trace, hand_on};
+use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, QualityRule, Trace, hand_on};
 use crate::bokeh::{Bokeh, Finished, Job, PassTimes};
 use crate::budget::Quality;
 use crate::clock::Clock;
@@ -15,7 +15,7 @@ use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Receiver, Sender};
 use crate::optics::CocField;
-use crate::stats::{Cause, Histogram, PassHistograms, RungCounts, Tally, Ticket};
+use crate::stats::{About, Cause, Histogram, PassHistograms, RungCounts, Tally, Ticket};
 
 /// A blurred picture, and what it was made of.
 pub(super) struct Blurred {
@@ -38,6 +38,10 @@ pub(super) struct Stage<'a> {
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     pub picker: Picker,
+    /// At which rung the executor blurs.
+    pub rule: QualityRule,
+    /// Told when the executor goes over to another backend.
+    pub about: &'a mut About,
     /// Where pictures are wanted; in memory where nobody says.
     pub wanted: Option<Arc<Wanted>>,
     /// Whether somebody looks at what the pictures were made of.
@@ -66,6 +70,7 @@ struct Pending {
 impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Ready>>, mut to: Sender<Frame<Blurred>>) -> Ended {
         let mut executor = self.executor.take();
+        let mut backend = executor.as_deref().map(Bokeh::backend);
         let mut pending = VecDeque::with_capacity(MOST_IN_FLIGHT);
         let mut swapped = 0;
         loop {
@@ -90,6 +95,8 @@ impl Stage<'_> {
                     }
                     if let Some((new, quality)) = swap.take() {
                         executor = new;
+                        backend = executor.as_deref().map(Bokeh::backend);
+                        self.rule = quality;
                         self.picker = self.picker.with(quality, super::most(executor.as_deref()));
                     }
                 }
@@ -104,10 +111,14 @@ impl Stage<'_> {
                 }
                 wait = pending.len() >= executor.capacity().max(1);
             }
-            if let Some(executor) = &mut executor
-                && !self.collect(&mut **executor, &mut pending, wait, &mut to)?
-            {
-                return Ok(());
+            if let Some(executor) = &mut executor {
+                if !self.collect(&mut **executor, &mut pending, wait, &mut to)? {
+                    return Ok(());
+                }
+                if backend.replace(executor.backend()) != Some(executor.backend()) {
+                    (self.about.backend, self.about.adapter) = (executor.backend().into(), executor.describe());
+                    self.picker = self.picker.with(self.rule, super::most(Some(&**executor)));
+                }
             }
         }
     }

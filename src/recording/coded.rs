@@ -13,6 +13,7 @@ use image::{ColorType, ImageDecoder, ImageError};
 use super::MAX_SIDE_PX;
 use super::extras::Extras;
 use super::fault::PictureFault;
+use super::jpeg;
 use crate::files::input;
 
 /// Far more than a photograph of 8192 x 8192 pixels takes.
@@ -23,9 +24,6 @@ const MAX_PFM_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + 4096;
 
 /// Memory that a PNG's texts and profiles may take, which are not shown.
 const MAX_METADATA_BYTES: usize = 64 << 20;
-
-/// Segments that a JPEG may have before its frame; cameras write some tens.
-const MAX_JPEG_SEGMENTS: usize = 1000;
 
 /// Formats that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,11 +83,11 @@ impl<'a> Coded<'a> {
         let coded = match format {
             Some(Format::Png) => Self::Png(Box::new(png_decoder(file)?.read_info().map_err(png_fault)?)),
             Some(Format::Jpeg) => {
-                let ((width, height), _) = jpeg_header(&mut BufReader::new(&mut file))?;
+                let ((width, height), _) = jpeg::header(&mut BufReader::new(&mut file))?;
                 check_size(width, height)?;
                 read_from_start(file, MAX_JPEG_BYTES, memory)?;
                 // The decoder would fill up what is missing with grey.
-                if !jpeg_is_whole(memory) {
+                if !jpeg::is_whole(memory) {
                     return Err(PictureFault::Truncated);
                 }
                 Self::Jpeg(Box::new(JpegDecoder::new(Cursor::new(memory.as_slice())).map_err(jpeg_fault)?))
@@ -183,7 +181,7 @@ pub(super) fn header(path: &Path) -> Result<((u32, u32), Samples), PictureFault>
             let channels = if info.color_type == png::ColorType::Indexed { 3 } else { info.color_type.samples() };
             (info.size(), Samples { channels, are_wide: info.bit_depth == png::BitDepth::Sixteen })
         }
-        Some(Format::Jpeg) => jpeg_header(&mut BufReader::new(file))?,
+        Some(Format::Jpeg) => jpeg::header(&mut BufReader::new(file))?,
         _ => return Err(PictureFault::Format("PNG or JPEG")),
     };
     check_size(size.0, size.1)?;
@@ -198,7 +196,7 @@ pub(super) fn read_pfm<'a>(path: &Path, memory: &'a mut Vec<u8>) -> Result<&'a [
     }
 }
 
-/// What a PNG has before its pixels, and what its writer put behind them.
+/// What a PNG has before its pixels.
 pub(super) fn png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
     let (file, format) = recognised(path)?;
     if format != Some(Format::Png) {
@@ -230,12 +228,13 @@ fn recognised(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
     Ok((file, Some(format)))
 }
 
-fn read_from_start(file: File, most_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
+fn read_from_start(mut file: File, most_bytes: u64, memory: &mut Vec<u8>) -> Result<&[u8], PictureFault> {
     let bytes = file.metadata()?.len();
     if bytes > most_bytes {
         return Err(PictureFault::FileSize { bytes, most_bytes });
     }
     memory.clear();
+    file.rewind()?;
     file.take(most_bytes).read_to_end(memory)?;
     Ok(memory)
 }
@@ -272,69 +271,6 @@ fn png_runs(width: usize, height: usize, is_interlaced: bool) -> impl Iterator<I
         let pixels = (width - column).div_ceil(step);
         (row..height).step_by(row_step).map(move |row| (Run { first: row * width + column, step }, pixels))
     })
-}
-
-/// Columns and rows, and the samples, that the frame of a JPEG claims; `file` stands at its beginning.
-fn jpeg_header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u32), Samples), PictureFault> {
-    fn read<const N: usize>(file: &mut impl Read) -> Result<[u8; N], PictureFault> {
-        let mut bytes = [0; N];
-        file.read_exact(&mut bytes).map_err(|error| match error.kind() {
-            ErrorKind::UnexpectedEof => PictureFault::Truncated,
-            _ => PictureFault::Io(error),
-        })?;
-        Ok(bytes)
-    }
-    let [mut high, mut marker] = read(file)?;
-    for _ in 0..MAX_JPEG_SEGMENTS {
-        // Any number of FF may pad a marker; other bytes between segments are passed over.
-        while high != 0xFF || matches!(marker, 0 | 0xFF) {
-            (high, [marker]) = (marker, read(file)?);
-        }
-        match marker {
-            // Neither a beginning nor a restart has a length.
-            0x01 | 0xD0..=0xD8 => {}
-            // A frame, and not one of the tables with numbers among those of frames.
-            0xC0..=0xCF if !matches!(marker, 0xC4 | 0xC8 | 0xCC) => {
-                let [_, _, _, y, y_low, x, x_low, components] = read(file)?;
-                let size = [[x, x_low], [y, y_low]].map(|bytes| u32::from(u16::from_be_bytes(bytes)));
-                // What has four channels is shown in three.
-                let channels = if components == 1 { 1 } else { 3 };
-                return Ok((size.into(), Samples { channels, are_wide: false }));
-            }
-            0xD9 | 0xDA => return Err(PictureFault::Damaged("no frame before its data".into())),
-            _ => {
-                let length = i64::from(u16::from_be_bytes(read(file)?));
-                file.seek_relative((length - 2).max(0))?;
-            }
-        }
-        [high, marker] = read(file)?;
-    }
-    Err(PictureFault::Damaged(format!("more than {MAX_JPEG_SEGMENTS} segments before its frame")))
-}
-
-/// Whether the markers of a JPEG lead to its end marker.
-fn jpeg_is_whole(bytes: &[u8]) -> bool {
-    const START: u8 = 0xD8;
-    const END: u8 = 0xD9;
-    let mut rest = bytes;
-    loop {
-        // Coded data has its FF bytes stuffed with 00 or is split by restart markers; FF may also pad a marker.
-        let Some(at) = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xD0..=0xD7 | 0xFF))
-        else {
-            return false;
-        };
-        let (marker, after) = (rest[at + 1], &rest[at + 2..]);
-        rest = match marker {
-            END => return true,
-            START | 0x01 => after,
-            // A segment says its length, so that what looks like a marker inside it is passed over.
-            _ => {
-                let Some(&[high, low]) = after.first_chunk() else { return false };
-                let Some(next) = after.get(usize::from(u16::from_be_bytes([high, low]))..) else { return false };
-                next
-            }
-        };
-    }
 }
 
 pub(super) fn png_fault(error: png::DecodingError) -> PictureFault {

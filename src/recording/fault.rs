@@ -29,7 +29,7 @@ pub enum LineFault {
     #[error("the time is out of order or repeated; sort the list by time, and name each time once")]
     OutOfOrder,
     /// The time is from another age.
-    #[error("the time is more than ten years after the first one of the list; correct or remove the line")]
+    #[error("the time is more than ten years from most of the others; correct or remove the line")]
     TooFar,
     /// The path leaves the folder of the recording.
     #[error("{} points outside the recording; name a file inside its folder", .0.display())]

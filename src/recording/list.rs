@@ -1,5 +1,6 @@
 //! Lists of pictures: which was taken when.
 
+use std::ops::RangeInclusive;
 use std::path::{Component, Path, PathBuf};
 
 use super::contents::{Place, Source};
@@ -65,17 +66,30 @@ pub(super) fn give_up_disorder<'a>(entries: impl Iterator<Item = &'a mut Entry>)
     let entries: Vec<_> = entries.filter(|entry| entry.time_ns.is_some()).collect();
     let times: Vec<_> = entries.iter().filter_map(|entry| entry.time_ns).collect();
     let is_kept = longest_increase(&times);
-    let mut kept = times.iter().zip(&is_kept).filter(|(_, is_kept)| **is_kept);
-    let last_ns = kept.next().map_or(0, |(first_ns, _)| first_ns.saturating_add(MOST_LENGTH_NS));
+    let kept: Vec<_> = times.iter().zip(&is_kept).filter(|(_, is_kept)| **is_kept).map(|(&time, _)| time).collect();
+    let age = most_of_an_age(&kept);
     for (entry, is_kept) in entries.into_iter().zip(is_kept) {
-        let fault = match is_kept {
-            false => LineFault::OutOfOrder,
-            true if entry.time_ns > Some(last_ns) => LineFault::TooFar,
-            true => continue,
-        };
+        if is_kept && entry.time_ns.is_some_and(|time| age.contains(&time)) {
+            continue;
+        }
         entry.time_ns = None;
-        entry.source.file = Err(fault);
+        match &entry.source.file {
+            _ if !is_kept => entry.source.file = Err(LineFault::OutOfOrder),
+            Ok(_) => entry.source.file = Err(LineFault::TooFar),
+            // What is wrong with the file says more.
+            Err(_) => {}
+        }
     }
+}
+
+/// From when to when the most of some increasing times lie that are no further apart than a recording is long.
+fn most_of_an_age(times: &[u64]) -> RangeInclusive<u64> {
+    let within = |&first_ns: &u64| first_ns..=first_ns.saturating_add(MOST_LENGTH_NS);
+    let count = |age: &RangeInclusive<u64>| {
+        times.partition_point(|time| time <= age.end()) - times.partition_point(|time| time < age.start())
+    };
+    // Of equal ones the first.
+    times.iter().map(within).rev().max_by_key(count).unwrap_or(0..=0)
 }
 
 /// Marks a longest strictly increasing subsequence (patience sorting, from the end).
@@ -138,6 +152,15 @@ mod tests {
         assert_eq!(kept(&[1, 99, 2, 3, 4]), [1, 2, 3, 4]);
         assert_eq!(kept(&[5, 6, 0, 7, 8]), [5, 6, 7, 8]);
         assert_eq!(kept(&[3, 2, 1]), [3]);
+    }
+
+    #[test]
+    fn a_date_of_another_age_costs_only_itself() {
+        assert_eq!(most_of_an_age(&[]), 0..=0);
+        assert_eq!(most_of_an_age(&[7, 8]), 7..=7 + MOST_LENGTH_NS);
+        let now_ns = 5 * MOST_LENGTH_NS;
+        assert_eq!(most_of_an_age(&[0, now_ns, now_ns + 9, u64::MAX]), now_ns..=now_ns + MOST_LENGTH_NS);
+        assert_eq!(most_of_an_age(&[0, u64::MAX]), 0..=MOST_LENGTH_NS);
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod error;
 mod euroc;
 mod extras;
 mod fault;
+mod jpeg;
 mod kitti;
 mod list;
 mod middlebury;

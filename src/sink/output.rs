@@ -107,7 +107,8 @@ impl Output {
 impl Drop for Output {
     fn drop(&mut self) {
         if let Some(part) = self.part.take().filter(|_| self.frames > 0) {
-            tracing::warn!("{}: what there is of it is kept as {}", self.path.display(), keep(part).display());
+            let kept = keep(part);
+            tracing::warn!("{}: what there is of it is kept as {}", self.path.display(), kept.display());
         }
     }
 }

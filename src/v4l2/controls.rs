@@ -230,13 +230,21 @@ fn items(device: &Device, control: &Control) -> Vec<Item> {
     (control.minimum..=control.maximum.min(control.minimum.saturating_add(MOST_ITEMS))).filter_map(item).collect()
 }
 
+/// Bytes that a text of this largest length takes; nothing where no text is so long.
+fn room(maximum: i64) -> Option<usize> {
+    /// More than any text has; a driver's mistake must not take all memory.
+    const MOST_BYTES: usize = 1 << 16;
+    usize::try_from(maximum).ok().filter(|&bytes| bytes < MOST_BYTES).map(|bytes| bytes + 1)
+}
+
 fn read(device: &Device, control: &Control) -> io::Result<Option<Value>> {
     let mut exchanged: sys::v4l2_ext_control = zeroed();
     exchanged.id = control.id;
     match control.kind {
         Kind::Button | Kind::Compound => return Ok(None),
         Kind::String => {
-            let mut bytes = vec![0u8; usize::try_from(control.maximum).unwrap_or_default() + 1];
+            let Some(room) = room(control.maximum) else { return Ok(None) };
+            let mut bytes = vec![0u8; room];
             exchanged.size = bytes.len() as u32;
             exchanged.__bindgen_anon_1.string = bytes.as_mut_ptr().cast();
             exchange(device, vidioc::VIDIOC_G_EXT_CTRLS as Request, &mut exchanged)?;
@@ -304,6 +312,12 @@ mod tests {
         ] {
             assert_eq!(variable(label), name);
         }
+    }
+
+    #[test]
+    fn the_room_for_a_text_is_bounded() {
+        assert_eq!([0, 31].map(room), [Some(1), Some(32)]);
+        assert_eq!([-1, 1 << 40, i64::MAX].map(room), [None; 3]);
     }
 
     #[test]

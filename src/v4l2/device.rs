@@ -24,12 +24,55 @@ macro_rules! ioctls {
         $(
             $(#[$doc])*
             pub fn $name(&self, argument: &mut $type) -> io::Result<()> {
-                // SAFETY: the type is the one that the request's number was made of, and it holds no pointer.
+                if !argument.is_flat() {
+                    return Err(io::ErrorKind::InvalidInput.into());
+                }
+                // SAFETY: the type is the one that the request's number was made of, and the driver follows no pointer
+                // in it: `is_flat` says so.
                 #[allow(unsafe_code)]
                 unsafe { self.ioctl(vidioc::$request as Request, argument) }
             }
         )*
     };
+}
+
+/// What a driver is given whose answer lies all in it.
+trait Flat {
+    /// Whether the driver follows no pointer in this value.
+    fn is_flat(&self) -> bool {
+        true
+    }
+}
+
+macro_rules! flat {
+    ($($type:ty),* $(,)?) => { $(impl Flat for $type {})* };
+}
+
+// None of these has a pointer in any member of any union.
+flat!(
+    i32,
+    sys::v4l2_capability,
+    sys::v4l2_control,
+    sys::v4l2_fmtdesc,
+    sys::v4l2_frmivalenum,
+    sys::v4l2_frmsizeenum,
+    sys::v4l2_query_ext_ctrl,
+    sys::v4l2_querymenu,
+    sys::v4l2_requestbuffers,
+    sys::v4l2_streamparm,
+);
+
+impl Flat for sys::v4l2_format {
+    /// The format of an overlay points to clips and a bitmap; those of queues of pictures are numbers.
+    fn is_flat(&self) -> bool {
+        let pictures = [
+            sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE,
+            sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE,
+            sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT,
+            sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT_MPLANE,
+        ];
+        pictures.contains(&self.type_)
+    }
 }
 
 impl Device {
@@ -159,5 +202,23 @@ plain!(
 impl AsFd for Device {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_driver_is_given_a_pointer_out_of_a_format() {
+        let device = Device::open("/dev/null".as_ref()).unwrap();
+        let asked = |type_| {
+            let mut format = sys::v4l2_format { type_, ..zeroed() };
+            device.try_format(&mut format).unwrap_err()
+        };
+        let overlay = asked(sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OVERLAY);
+        assert_eq!((overlay.kind(), overlay.raw_os_error()), (io::ErrorKind::InvalidInput, None), "by us");
+        let capture = asked(sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE);
+        assert!(capture.raw_os_error().is_some(), "by the driver: {capture}");
     }
 }

@@ -2,7 +2,9 @@
 
 mod accounting;
 mod changes;
+mod clocked;
 mod fakes;
+mod fallback;
 mod faults;
 mod frames;
 mod live;

@@ -3,6 +3,8 @@
 use std::fs;
 use std::os::unix::fs::symlink;
 
+use bokehcam::capture::Camera;
+use bokehcam::capture::replay::{Part, Replay};
 use bokehcam::frame::ColorImage;
 use bokehcam::recording::{Options, Recording, RecordingError, Scratch};
 
@@ -37,7 +39,7 @@ fn an_empty_list_is_named() {
 fn streams_that_never_meet_are_told() {
     let scene = Scene::with_pairs(2);
     scene.write("depth.txt", "9.0 depth/0.png\n");
-    assert_says(scene.open(), &["no depth map lies within 20 ms", "tolerance"]);
+    assert_says(scene.open(), &["no depth map lies within 20 ms", "of one clock"]);
 }
 
 /// Lines that are wrong, and what is said of them.
@@ -116,6 +118,24 @@ fn wrong_lines_of_the_associations_are_told_where_they_are() {
     assert!(color_of(&recording, 2).is_ok());
     assert_says(depth_of(&recording, 2), &["associations.txt:3: ", "points outside"]);
     assert!(depth_of(&recording, 3).is_ok());
+}
+
+/// Times count in 64 bits of nanoseconds; what is reckoned with them stays far from their end.
+#[test]
+fn a_time_of_another_age_is_a_fault() {
+    let scene = Scene::with_pairs(3);
+    scene.remove("depth.txt");
+    scene.write("rgb.txt", "0 rgb/0.png\n18446744073.7 rgb/1.png\n18446744073.709551615 rgb/2.png\n");
+    assert_says(scene.open(), &["rgb.txt:1: ", "more than ten years from most"]);
+    let recording = scene.open_keep_going();
+    let readable: Vec<_> = (0..3).map(|index| color_of(&recording, index).is_ok()).collect();
+    assert_eq!(readable, [false, true, true]);
+
+    scene.write("rgb.txt", "0 rgb/0.png\n157680000 rgb/1.png\n315360000 rgb/2.png\n");
+    let whole = Part { looped: true, ..Part::default() };
+    let mut replay = Replay::new(std::sync::Arc::new(scene.open().unwrap()), "old", &whole).unwrap();
+    let frames = replay.skip(u64::MAX);
+    assert!((100..200).contains(&frames), "{frames}: round and round, to the end of time");
 }
 
 #[test]
@@ -247,7 +267,7 @@ fn a_bomb_is_refused_from_its_header() {
 fn depth_is_16_bit_grey_or_refused() {
     let scene = Scene::with_pairs(3);
     save_grey(&scene.path("depth/1.png"), SIZE, 7);
-    assert_depth_fault(&scene, "an 8-bit grey picture is not depth");
+    assert_depth_fault(&scene, "an 8-bit grey picture has too few steps for depth");
     scene.color("depth/1.png", SIZE, 0);
     assert_depth_fault(&scene, "a colour picture is not depth");
 }

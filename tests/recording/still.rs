@@ -4,13 +4,15 @@ use std::fs;
 use std::path::Path;
 
 use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
+use bokehcam::optics::StereoRig;
 use bokehcam::recording::still::{
-    read_color, read_depth, read_disparity, read_grey, write_color, write_depth, write_disparity,
+    Map, read_color, read_depth, read_disparity, read_grey, read_map, read_photo, write_color, write_depth,
+    write_disparity, write_photo,
 };
 use image::{DynamicImage, GrayAlphaImage, ImageBuffer, Luma, Rgb, RgbaImage};
 use tempfile::TempDir;
 
-use super::{SIZE, assert_says, png_that_claims, save_grey};
+use super::{SIZE, assert_says, crc32, png_that_claims, save_grey};
 
 fn gradient() -> ColorImage {
     let mut image = ColorImage::new(SIZE.0, SIZE.1);
@@ -135,7 +137,7 @@ fn disparity_survives_png_within_half_a_unit_and_pfm_exactly() {
     let raw = image::open(&png).unwrap().into_luma16();
     assert_eq!((raw.get_pixel(0, 0)[0], raw.get_pixel(1, 0)[0]), (0, 1874));
     // The first value is the bottom row's.
-    let first = "Pf\n7 5\n-1\n".len();
+    let first = "Pf\n7 5\n-100e-2\n".len();
     assert_eq!(fs::read(&pfm).unwrap()[first..first + 4], f32::INFINITY.to_le_bytes());
     assert_says(write_disparity(&dir.path().join("d.jpg"), &disparity, None, false), &["`.png` or `.pfm`"]);
 }
@@ -186,7 +188,10 @@ fn wrong_pictures_are_told_with_their_name() {
     assert_says(read_color(&path), &["picture.png: its header claims 100000x100000"]);
     assert_says(read_grey(&path), &["claims 100000x100000"]);
     save_grey(&path, SIZE, 9);
-    assert_says(read_depth(&path, 5000.0, None), &["picture.png: an 8-bit grey picture is not depth", "16-bit grey"]);
+    assert_says(
+        read_depth(&path, 5000.0, None),
+        &["picture.png: an 8-bit grey picture has too few steps", "dark is near there", "Where white is near"],
+    );
 }
 
 #[test]
@@ -224,4 +229,147 @@ fn a_turned_photograph_is_read_upright() {
     let upright = read_color(&path).unwrap();
     assert_eq!(upright.size(), (16, 32));
     assert!(upright.rgb[0] > 250 && upright.rgb[16 * 31 * 3] < 5);
+}
+
+#[test]
+fn a_map_says_what_it_holds() {
+    let dir = TempDir::new().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let depth = DepthMap { width: 2, height: 1, metres: vec![0.5, 4.0] };
+    for name in ["z.png", "z.pfm"] {
+        write_depth(&path(name), &depth, 1000.0, false).unwrap();
+        assert_eq!(read_map(&path(name), None, None).unwrap(), Map::Depth(depth.clone()), "{name}");
+    }
+    // Who says otherwise has it so.
+    let Map::Depth(other) = read_map(&path("z.png"), Some(500.0), None).unwrap() else { panic!("it is depth") };
+    assert_eq!(other.metres, [1.0, 8.0]);
+
+    let disparity = DisparityMap { width: 2, height: 1, px: vec![10.0, 40.0] };
+    let rig = StereoRig { focal_px: 200.0, baseline_m: 0.1, doffs_px: 0.0, metric: true };
+    for (name, rig, read) in [("d.png", Some(rig), Some(rig)), ("e.png", None, None), ("d.pfm", Some(rig), None)] {
+        write_disparity(&path(name), &disparity, rig, false).unwrap();
+        assert_eq!(read_map(&path(name), None, None).unwrap(), Map::Disparity(disparity.clone(), read), "{name}");
+        assert_eq!(read_disparity(&path(name)).unwrap(), disparity);
+        match read {
+            Some(_) => assert_eq!(read_depth(&path(name), 5000.0, None).unwrap().metres, [2.0, 0.5]),
+            None => assert_says(read_depth(&path(name), 5000.0, None), &[name, "disparity is not depth"]),
+        }
+    }
+    // What others write says nothing, and is taken for metres.
+    let other = [&b"Pf\n1 1\n-1.0\n"[..], &3.0_f32.to_le_bytes()].concat();
+    assert_eq!(read_pfm(dir.path(), &other).unwrap().metres, [3.0]);
+}
+
+/// A file of these chunks, each with its checksum.
+fn png(chunks: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    for (name, data) in chunks {
+        let chunk = [&name[..], data].concat();
+        file.extend((data.len() as u32).to_be_bytes());
+        file.extend(&chunk);
+        file.extend(crc32(&chunk).to_be_bytes());
+    }
+    file
+}
+
+/// Not compressed, in the format of the compressed.
+fn stored(data: &[u8]) -> Vec<u8> {
+    let (mut a, mut b) = (1_u32, 0_u32);
+    for &byte in data {
+        a = (a + u32::from(byte)) % 65521;
+        b = (b + a) % 65521;
+    }
+    let length = data.len() as u16;
+    [&[0x78, 1, 1][..], &length.to_le_bytes(), &(!length).to_le_bytes(), data, &(b << 16 | a).to_be_bytes()].concat()
+}
+
+/// Rows of an interlaced picture come in seven passes over all of it, of which a small one has fewer.
+#[test]
+fn an_interlaced_picture_is_put_together() {
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("interlaced.png");
+    for (width, height) in [(11_u32, 9_u32), (5, 3), (1, 1), (1, 6), (3, 1)] {
+        let value = |x: u32, y: u32| (1 + x + 100 * y) as u16;
+        let mut rows = Vec::new();
+        for [x, dx, y, dy] in
+            [[0, 8, 0, 8], [4, 8, 0, 8], [0, 4, 4, 8], [2, 4, 0, 4], [0, 2, 2, 4], [1, 2, 0, 2], [0, 1, 1, 2]]
+        {
+            for y in (y..height).step_by(dy as usize).filter(|_| x < width) {
+                rows.push(0);
+                rows.extend((x..width).step_by(dx as usize).flat_map(|x| value(x, y).to_be_bytes()));
+            }
+        }
+        let header = [&width.to_be_bytes()[..], &height.to_be_bytes(), &[16, 0, 0, 0, 1]].concat();
+        fs::write(&path, png(&[(b"IHDR", header), (b"IDAT", stored(&rows)), (b"IEND", Vec::new())])).unwrap();
+        let depth = read_depth(&path, 1.0, None).unwrap();
+        let expected: Vec<f32> = (0..height).flat_map(|y| (0..width).map(move |x| f32::from(value(x, y)))).collect();
+        assert_eq!((depth.size(), depth.metres), ((width, height), expected));
+        let rgb = read_color(&path).unwrap().rgb;
+        let last = (f64::from(value(width - 1, height - 1)) / 257.0).round() as u8;
+        assert_eq!(rgb[rgb.len() - 3..], [last; 3]);
+    }
+}
+
+/// EXIF of a camera held upright (orientation 6), with a name of the camera and a thumbnail.
+fn exif() -> Vec<u8> {
+    let entry = |tag: u16, kind: u16, count: u32, value: [u8; 4]| {
+        [&tag.to_be_bytes()[..], &kind.to_be_bytes(), &count.to_be_bytes(), &value].concat()
+    };
+    let mut exif = b"MM\0\x2a\0\0\0\x08\0\x02".to_vec();
+    exif.extend(entry(0x0110, 2, 4, *b"CAM\0"));
+    exif.extend(entry(0x0112, 3, 1, [0, 6, 0, 0]));
+    exif.extend(38_u32.to_be_bytes());
+    exif.extend(2_u16.to_be_bytes());
+    exif.extend(entry(0x0201, 4, 1, 68_u32.to_be_bytes()));
+    exif.extend(entry(0x0202, 4, 1, 5_u32.to_be_bytes()));
+    exif.extend([0; 4]);
+    assert_eq!(exif.len(), 68);
+    exif.extend(b"THUMB");
+    exif
+}
+
+#[test]
+fn profile_and_exif_go_with_the_picture() {
+    let dir = TempDir::new().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let mut profile = vec![7; 200];
+    profile[16..20].copy_from_slice(b"RGB ");
+    let exif = exif();
+    let mut image = ColorImage::new(32, 16);
+    image.rgb[..48].fill(255);
+    let extras = bokehcam::recording::Extras {
+        icc_profile: Some(profile.clone()),
+        exif: Some(exif.clone()),
+        ..Default::default()
+    };
+    write_photo(&path("in.png"), &image, &extras, false).unwrap();
+    write_photo(&path("in.jpg"), &image, &extras, false).unwrap();
+    for (from, to) in [("in.png", "a.png"), ("in.png", "a.jpg"), ("in.jpg", "b.png"), ("in.jpg", "b.jpg")] {
+        let (upright, extras) = read_photo(&path(from)).unwrap();
+        assert_eq!((upright.size(), extras.icc_profile.as_ref()), ((16, 32), Some(&profile)), "{from}");
+        write_photo(&path(to), &upright, &extras.without_thumbnail().for_jpeg(), false).unwrap();
+        // Turned once, and not again.
+        let (again, extras) = read_photo(&path(to)).unwrap();
+        assert_eq!((again.size(), extras.icc_profile, extras.left_behind.len()), ((16, 32), Some(profile.clone()), 0));
+        let kept = extras.exif.unwrap();
+        let camera = |exif: &[u8]| exif.windows(3).any(|part| part == b"CAM");
+        assert!(camera(&kept) && !kept.windows(5).any(|part| part == b"THUMB"), "{to}");
+        assert_eq!(kept[30..32], [0, 1], "it says that it is upright");
+    }
+
+    // What RGB of 8 bits cannot hold is named.
+    let wide = ImageBuffer::<image::Rgba<u16>, _>::from_pixel(2, 2, [1, 2, 3, 4].into());
+    DynamicImage::from(wide).save(path("wide.png")).unwrap();
+    assert_eq!(read_photo(&path("wide.png")).unwrap().1.left_behind, ["transparency", "16 bits a channel"]);
+    assert!(read_photo(&path("in.png")).unwrap().1.left_behind.is_empty());
+}
+
+#[test]
+fn exif_that_leads_nowhere_is_left_behind() {
+    let whole = exif();
+    for length in 0..whole.len() {
+        let cut = bokehcam::recording::Extras { exif: Some(whole[..length].to_vec()), ..Default::default() };
+        let kept = cut.without_thumbnail();
+        assert!(kept.exif.is_none_or(|exif| !exif.windows(5).any(|part| part == b"THUMB")));
+    }
 }

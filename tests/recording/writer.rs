@@ -87,12 +87,8 @@ fn the_lists_appear_only_when_whole() {
     let mut writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
     writer.add(5, &color, Some(&depth)).unwrap();
     assert_says(Recording::open(dir.path(), &Options::default()), &["not a recording"]);
-    // An interrupted recording is rescued by renaming its lists.
-    drop(writer);
-    for list in ["rgb.txt", "depth.txt"] {
-        assert!(!dir.path().join(list).exists());
-        fs::rename(dir.path().join(format!("{list}.part")), dir.path().join(list)).unwrap();
-    }
+    let written = writer.cut().unwrap();
+    assert_eq!((written.dir.as_path(), written.frames, written.replaced), (dir.path(), 1, 0));
     let recording = Recording::open(dir.path(), &Options::default()).unwrap();
     assert_eq!(color_of(&recording, 0).unwrap(), color);
 }
@@ -104,22 +100,25 @@ fn an_existing_recording_is_kept_unless_asked() {
     let mut writer = Writer::create(dir.path(), &WriterOptions::default()).unwrap();
     writer.add(0, &color, Some(&depth)).unwrap();
     writer.add(1, &color, Some(&depth)).unwrap();
-    // An unfinished one counts too.
-    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["rgb.txt.part", "already there"]);
+    // While it is written nobody else writes it.
+    let overwrite = WriterOptions { overwrite: true, ..WriterOptions::default() };
+    assert_says(Writer::create(dir.path(), &overwrite).map(drop), &["is being written by another run"]);
     writer.finish().unwrap();
-    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["rgb.txt", "already there"]);
-    // And so do pictures without lists.
-    fs::remove_file(dir.path().join("rgb.txt")).unwrap();
-    fs::remove_file(dir.path().join("depth.txt")).unwrap();
-    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &[".png", "already there"]);
+    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["already there"]);
+    // And so are pictures without lists.
+    for list in ["rgb.txt", "depth.txt"] {
+        fs::remove_file(dir.path().join(list)).unwrap();
+    }
+    assert_says(Writer::create(dir.path(), &WriterOptions::default()).map(drop), &["already there"]);
 
     fs::write(dir.path().join("associations.txt"), "0 rgb/000000.png 0 depth/000000.png\n").unwrap();
     fs::write(dir.path().join("notes.txt"), "kept").unwrap();
-    let overwrite = WriterOptions { overwrite: true, ..WriterOptions::default() };
     let mut writer = Writer::create(dir.path(), &overwrite).unwrap();
     let other = frame(9).0;
     writer.add(7, &other, None).unwrap();
-    writer.finish().unwrap();
+    assert!(dir.path().join("rgb/000001.png").exists(), "what was there stays until the new is whole");
+    let written = writer.finish().unwrap();
+    assert_eq!((written.replaced, written.frames), (5, 1));
     let recording = Recording::open(dir.path(), &Options::default()).unwrap();
     assert_eq!((recording.len(), recording.has_depth()), (1, false));
     assert_eq!(color_of(&recording, 0).unwrap(), other);

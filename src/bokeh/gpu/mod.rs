@@ -37,6 +37,8 @@ pub struct GpuBokeh {
     layout: Layout,
     passes: Passes,
     ring: Ring,
+    /// A frame that the device did not take, until it is given back.
+    refused: Option<Job>,
     /// Results that stay on the device, once any is wanted there.
     results: Option<Pool<DevicePicture>>,
     queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
@@ -87,8 +89,8 @@ impl GpuBokeh {
             (set, resolved)
         });
         device.check()?;
-        let (plan, layout, results) = (plan.clone(), Layout::new(), None);
-        Ok(Self { plan, device, buffers, depth, capacity, layout, passes, ring, results, queries })
+        let (plan, layout, refused, results) = (plan.clone(), Layout::new(), None, None);
+        Ok(Self { plan, device, buffers, depth, capacity, layout, passes, ring, refused, results, queries })
     }
 
     /// Where a result is left on the device, if it shall be and there is room.
@@ -148,7 +150,10 @@ impl Bokeh for GpuBokeh {
         if matches!(job.coc, CocField::Depth(_)) && job.depth.is_none() {
             return Err(BokehError::NoDepth);
         }
-        self.device.check()?;
+        if let Err(error) = self.device.check() {
+            self.refused = Some(job);
+            return Err(error.into());
+        }
         let Some(mut slot) = self.ring.take() else {
             return Err(GpuError::Failed(format!("more than {CAPACITY} frames submitted and not collected")).into());
         };
@@ -194,6 +199,10 @@ impl Bokeh for GpuBokeh {
 
     fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
         self.ring.pop(&self.device, wait)
+    }
+
+    fn take_back(&mut self) -> Option<Job> {
+        self.ring.give_up().or_else(|| self.refused.take())
     }
 
     fn in_flight(&self) -> usize {

@@ -65,10 +65,10 @@ impl GpuBokeh {
         });
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &back, 0, u64::from(count) * 4);
-        self.device.queue.submit([encoder.finish()]);
+        let submission = self.device.queue.submit([encoder.finish()]);
         back.map_async(wgpu::MapMode::Read, .., |_| {});
         let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", self.device.name));
-        device.poll(wgpu::PollType::Wait { submission_index: None, timeout: None }).map_err(|error| fault(&error))?;
+        self.device.poll(Some(submission))?;
         let mapped = back.get_mapped_range(..).map_err(|error| fault(&error))?;
         self.device.check()?;
         Ok(bytemuck::pod_collect_to_vec(&mapped[..]))

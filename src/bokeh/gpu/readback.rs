@@ -88,6 +88,11 @@ impl Ring {
         self.pending.len()
     }
 
+    /// Gives back the oldest frame in flight as it was submitted; what the device makes of it is dropped.
+    pub fn give_up(&mut self) -> Option<Job> {
+        self.pending.pop_front().map(|pending| pending.sent.job)
+    }
+
     /// Starts the way back of a frame that was submitted.
     pub fn push(&mut self, device: &Device, slot: Slot, sent: Sent) {
         let state = Arc::new(AtomicU8::new(PENDING));
@@ -115,28 +120,20 @@ impl Ring {
     /// The device failed.
     pub fn pop(&mut self, device: &Device, wait: bool) -> Result<Option<Finished>, BokehError> {
         let Some(oldest) = self.pending.front() else { return Ok(None) };
-        let poll = if wait {
-            wgpu::PollType::Wait { submission_index: Some(oldest.sent.submission.clone()), timeout: None }
-        } else {
-            wgpu::PollType::Poll
-        };
-        device.device.poll(poll).map_err(|error| GpuError::Failed(format!("{}: {error}", device.name)))?;
-        device.check()?;
-        loop {
-            match oldest.state.load(Ordering::Acquire) {
-                READY => break,
-                FAILED => {
-                    return Err(GpuError::Failed(format!("{}: the picture could not be read back", device.name)).into());
-                }
-                _ if !wait => return Ok(None),
-                // Another thread that uses the device has found it done, and is about to say so.
-                _ => std::thread::yield_now(),
-            }
-            device.check()?;
+        device.poll(wait.then(|| oldest.sent.submission.clone()))?;
+        if wait {
+            device.wait_for(|| oldest.state.load(Ordering::Acquire) != PENDING)?;
         }
-        let Some(Pending { slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
-        let Sent { mut job, on_device, in_memory, started, .. } = sent;
-        let mut slot = slot;
+        match oldest.state.load(Ordering::Acquire) {
+            PENDING => return Ok(None),
+            FAILED => {
+                return Err(GpuError::Failed(format!("{}: the picture could not be read back", device.name)).into());
+            }
+            _ => {}
+        }
+        let Some(Pending { slot, sent, .. }) = self.pending.front_mut() else { return Ok(None) };
+        let Sent { job, in_memory, started, .. } = sent;
+        let (in_memory, started) = (*in_memory, *started);
         let fault = |error: wgpu::MapRangeError| GpuError::Failed(error.to_string());
         if in_memory {
             {
@@ -171,6 +168,9 @@ impl Ring {
             times.add("gpu", began.elapsed());
         }
         self.last = Some(Instant::now());
+        // Only now, so that the frame can be given back after an error.
+        let Some(Pending { mut slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
+        let Sent { job, on_device, .. } = sent;
         slot.passes.clear();
         self.free.push(slot);
         let Job { ticket, color, depth, out, .. } = job;

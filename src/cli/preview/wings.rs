@@ -146,9 +146,11 @@ impl Backstage for Wings {
     }
 
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
-        let made = match &self.device {
-            Some(device) => bokeh::create_on(settings, size, Arc::clone(device)),
-            None => bokeh::create(settings, size, Backend::Cpu, None, self.executor.threads()),
+        let threads = self.executor.threads();
+        // One that failed stays so.
+        let made = match self.device.as_ref().filter(|device| device.check().is_ok()) {
+            Some(device) => bokeh::create_on(settings, size, Arc::clone(device), threads),
+            None => bokeh::create(settings, size, Backend::Cpu, None, threads),
         };
         made.map_err(|error| error.to_string())
     }

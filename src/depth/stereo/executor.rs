@@ -77,11 +77,56 @@ impl Executors {
         #[cfg(feature = "gpu")]
         if let Some((device, must)) = &self.gpu {
             match GpuExecutor::new(device, size, disparities) {
-                Ok(executor) => return Ok(Box::new(executor)),
+                Ok(gpu) => {
+                    let threads = self.threads;
+                    let cpu = move || Box::new(CpuExecutor::new(size, disparities, threads)) as Box<dyn Executor>;
+                    return Ok(Box::new(Fallback::new(Box::new(gpu), cpu)));
+                }
                 Err(error) if *must => return Err(error),
                 Err(error) => tracing::info!("matching on the CPU: {error}"),
             }
         }
         Ok(Box::new(CpuExecutor::new(size, disparities, self.threads)))
+    }
+}
+
+/// One executor, and another one from the first fault of the GPU on.
+struct Fallback {
+    now: Box<dyn Executor>,
+    /// What makes the other one, until it is needed.
+    other: Option<MakesExecutor>,
+}
+
+type MakesExecutor = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
+
+impl Fallback {
+    fn new(first: Box<dyn Executor>, other: impl FnOnce() -> Box<dyn Executor> + Send + 'static) -> Self {
+        Self { now: first, other: Some(Box::new(other)) }
+    }
+}
+
+impl Executor for Fallback {
+    fn describe(&self) -> String {
+        self.now.describe()
+    }
+
+    fn winners(
+        &mut self,
+        eyes: [&[u8]; 2],
+        likely: Option<&[u16]>,
+        team: &mut Team,
+        out: &mut [u16],
+    ) -> Result<(), GpuError> {
+        match (self.now.winners(eyes, likely, team, out), self.other.take()) {
+            (Err(error), Some(other)) => {
+                tracing::warn!("{error}; the CPU matches from here on");
+                self.now = other();
+                self.now.winners(eyes, likely, team, out)
+            }
+            (found, other) => {
+                self.other = other;
+                found
+            }
+        }
     }
 }

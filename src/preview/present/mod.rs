@@ -3,6 +3,7 @@
 //! `gpu` draws with the device that blurs, so that a picture blurred there is shown without a way back; `soft` draws
 //! on the CPU into memory shared with the display server, where there is no GPU.
 
+mod fallback;
 pub mod gpu;
 pub mod soft;
 mod split;
@@ -75,6 +76,7 @@ impl Tone {
 }
 
 /// Controls that changed, as egui gives them.
+#[derive(Clone)]
 pub struct Controls {
     /// What to paint.
     pub primitives: Vec<egui::ClippedPrimitive>,
@@ -119,16 +121,20 @@ pub trait Presenter {
 pub struct PresentError(pub String);
 
 /// What shows pictures in `window`: with the GPU where there is a `device`, otherwise, or where the device cannot draw to
-/// the window, on the CPU.
+/// the window or once it fails, on the CPU.
 ///
 /// # Errors
 /// Neither can draw to it.
 pub fn create(window: Arc<Window>, device: Option<Arc<Device>>) -> Result<Box<dyn Presenter>, PresentError> {
     if let Some(device) = device {
         match gpu::Gpu::new(Arc::clone(&window), device) {
-            Ok(gpu) => return Ok(Box::new(gpu)),
+            Ok(gpu) => return Ok(Box::new(fallback::Fallback::new(Box::new(gpu), |painter| soft(window, painter)))),
             Err(error) => tracing::info!("drawing on the CPU: {error}"),
         }
     }
-    Ok(Box::new(soft::Soft::new(window)?))
+    soft(window, soft::Painter::new())
+}
+
+fn soft(window: Arc<Window>, painter: soft::Painter) -> Result<Box<dyn Presenter>, PresentError> {
+    Ok(Box::new(soft::Soft::new(window, painter)?))
 }

@@ -12,7 +12,7 @@ use crate::v4l2::device::{Device, own_caps, zeroed};
 use crate::v4l2::layout::{Layout, LayoutError};
 use crate::v4l2::modes::{Interval, QueueKind, modes};
 use crate::v4l2::node::{LOOPBACK_DRIVER, text};
-use crate::v4l2::queue::{DeviceKernel, Queue};
+use crate::v4l2::queue::{DeviceKernel, Queue, Writer};
 use crate::v4l2::{controls, node};
 
 /// A control and what to set it to, as they are written.
@@ -74,7 +74,8 @@ impl Session {
         }
         let least_bytes: Vec<usize> =
             (0..agreed.layout.planes().len()).map(|plane| agreed.layout.needed_bytes(plane)).collect();
-        let kernel = DeviceKernel::new(device, agreed.choice.queue);
+        let writer = if is_loopback(&capability) { Writer::Program } else { Writer::Driver };
+        let kernel = DeviceKernel::new(device, agreed.choice.queue, writer);
         let refused = |error| OpenError::queue(path, error);
         let mut queue =
             Queue::new(kernel, &least_bytes, agreed.interval.period_ns(), clock.clone()).map_err(refused)?;
@@ -84,13 +85,17 @@ impl Session {
 
     /// Whether frames come from another program, not from a camera.
     pub fn is_loopback(&self) -> bool {
-        text(&self.capability.driver) == LOOPBACK_DRIVER
+        is_loopback(&self.capability)
     }
 
     /// The device.
     pub fn device(&self) -> &Device {
         self.queue.kernel().device()
     }
+}
+
+fn is_loopback(capability: &sys::v4l2_capability) -> bool {
+    text(&capability.driver) == LOOPBACK_DRIVER
 }
 
 /// What the device is, if it is a camera.

@@ -24,6 +24,10 @@ pub trait Kernel {
     fn query(&mut self, index: u32) -> io::Result<Described>;
     /// Maps a plane of a buffer.
     fn map(&mut self, span: Span) -> io::Result<Self::Memory>;
+    /// Makes sure that the first `bytes` of a plane, whose buffer was dequeued, stay as they are until it is queued.
+    fn settle(&mut self, memory: &mut Self::Memory, bytes: usize) {
+        let _ = (memory, bytes);
+    }
     /// Gives a buffer to the driver.
     fn queue(&mut self, index: u32) -> io::Result<()>;
     /// Takes the oldest filled buffer; [`io::ErrorKind::WouldBlock`] when there is none.
@@ -72,6 +76,16 @@ pub struct Described {
 pub struct DeviceKernel {
     device: Device,
     kind: QueueKind,
+    writer: Writer,
+}
+
+/// Who fills a device's buffers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Writer {
+    /// A driver, which leaves a buffer alone from when it is dequeued until it is queued again, as V4L2 demands.
+    Driver,
+    /// Another program through v4l2loopback, which goes round its buffers whatever its readers hold.
+    Program,
 }
 
 /// A part of a device's memory, readable.
@@ -79,6 +93,8 @@ pub struct DeviceKernel {
 pub struct Mapping {
     address: *mut std::ffi::c_void,
     length_bytes: usize,
+    /// What is read instead, where the memory may change meanwhile.
+    copy: Option<Vec<u8>>,
 }
 
 // SAFETY: the memory belongs to the process, not to a thread.
@@ -93,8 +109,8 @@ struct Buffer {
 
 impl DeviceKernel {
     /// The queue of `kind` of a device.
-    pub fn new(device: Device, kind: QueueKind) -> Self {
-        Self { device, kind }
+    pub fn new(device: Device, kind: QueueKind, writer: Writer) -> Self {
+        Self { device, kind, writer }
     }
 
     /// The device.
@@ -171,7 +187,12 @@ impl Kernel for DeviceKernel {
         let address = unsafe {
             mmap(std::ptr::null_mut(), length_bytes, ProtFlags::READ, MapFlags::SHARED, self.device.as_fd(), offset)?
         };
-        Ok(Mapping { address, length_bytes })
+        let copy = (self.writer == Writer::Program).then(|| vec![0; length_bytes]);
+        Ok(Mapping { address, length_bytes, copy })
+    }
+
+    fn settle(&mut self, memory: &mut Mapping, bytes: usize) {
+        memory.settle(bytes);
     }
 
     fn queue(&mut self, index: u32) -> io::Result<()> {
@@ -223,10 +244,36 @@ impl Kernel for DeviceKernel {
     }
 }
 
+impl Mapping {
+    /// Copies the first `bytes`, where they may change. What is written meanwhile may tear the picture, but nothing
+    /// changes under who reads it.
+    fn settle(&mut self, bytes: usize) {
+        let Some(copy) = &mut self.copy else { return };
+        let bytes = bytes.min(self.length_bytes);
+        let (words, rest) = copy[..bytes].as_chunks_mut::<{ size_of::<u64>() }>();
+        let (address, rest_at) = (self.address.cast::<u64>(), words.len() * size_of::<u64>());
+        for (k, word) in words.iter_mut().enumerate() {
+            // SAFETY: within the mapping, which begins at a page. Volatile, as others write to it.
+            #[allow(unsafe_code)]
+            let value = unsafe { address.add(k).read_volatile() };
+            *word = value.to_ne_bytes();
+        }
+        for (k, byte) in rest.iter_mut().enumerate() {
+            // SAFETY: as above.
+            #[allow(unsafe_code)]
+            let value = unsafe { self.address.cast::<u8>().add(rest_at + k).read_volatile() };
+            *byte = value;
+        }
+    }
+}
+
 impl AsRef<[u8]> for Mapping {
     fn as_ref(&self) -> &[u8] {
-        // SAFETY: the mapping is readable, of this length, and stays until this value is dropped. The driver writes to
-        // it only while it has the buffer, and the queue reads no buffer then.
+        if let Some(copy) = &self.copy {
+            return copy;
+        }
+        // SAFETY: the mapping is readable, of this length, and stays until this value is dropped. A driver writes to it
+        // only while it has the buffer, and the queue reads no buffer then; where others write, `copy` is read instead.
         #[allow(unsafe_code)]
         unsafe {
             std::slice::from_raw_parts(self.address.cast::<u8>(), self.length_bytes)
@@ -242,5 +289,29 @@ impl Drop for Mapping {
         if let Err(error) = unmapped {
             tracing::debug!("a camera's buffer cannot be unmapped: {error}");
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Seek, Write};
+
+    use super::*;
+
+    #[test]
+    fn what_is_read_of_another_programs_buffer_stays_as_it_was() {
+        let bytes: Vec<u8> = (0..1003).map(|k| k as u8).collect();
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(&bytes).unwrap();
+        let device = Device::open(file.path()).unwrap();
+        let mut kernel = DeviceKernel::new(device, QueueKind::SinglePlanar, Writer::Program);
+        let mut memory = kernel.map(Span { offset: 0, length_bytes: bytes.len() }).unwrap();
+        kernel.settle(&mut memory, bytes.len());
+        // The writer comes round again.
+        file.rewind().unwrap();
+        file.write_all(&vec![0xff; bytes.len()]).unwrap();
+        assert_eq!(memory.as_ref(), bytes);
+        kernel.settle(&mut memory, 5);
+        assert_eq!((&memory.as_ref()[..5], &memory.as_ref()[5..]), (&[0xff; 5][..], &bytes[5..]));
     }
 }

@@ -14,7 +14,7 @@ use std::io;
 use std::ops::Deref;
 use std::time::Duration;
 
-pub use kernel::{Described, DeviceKernel, Kernel, Mapping, Span, Wake};
+pub use kernel::{Described, DeviceKernel, Kernel, Mapping, Span, Wake, Writer};
 pub use sequence::Sequence;
 
 use crate::clock::Clock;
@@ -279,6 +279,10 @@ impl<K: Kernel> Queue<K> {
             return Ok(());
         }
         self.pass_over_current();
+        let Self { kernel, slots, .. } = self;
+        for (memory, part) in slots[index].memory.iter_mut().zip(frame.parts) {
+            kernel.settle(memory, part.end);
+        }
         self.current = Some(frame);
         Ok(())
     }

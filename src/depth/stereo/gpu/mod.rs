@@ -176,9 +176,7 @@ impl Executor for GpuExecutor {
             times.map();
         }
         let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", device.name));
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
-        device.device.poll(wait).map_err(|error| fault(&error))?;
-        device.check()?;
+        device.poll(Some(submission))?;
         {
             let bytes = self.back.get_mapped_range(..).map_err(|error| fault(&error))?;
             for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {

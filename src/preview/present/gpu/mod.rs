@@ -15,7 +15,8 @@ use crate::compute::device::{Device, DevicePicture};
 pub struct Gpu {
     device: Arc<Device>,
     window: Arc<Window>,
-    surface: wgpu::Surface<'static>,
+    /// There until it is dropped.
+    surface: Option<wgpu::Surface<'static>>,
     config: wgpu::SurfaceConfiguration,
     /// Whether the surface is configured; a window without pixels has none.
     configured: bool,
@@ -28,7 +29,7 @@ impl Gpu {
     /// # Errors
     /// The device cannot draw to it.
     pub fn new(window: Arc<Window>, device: Arc<Device>) -> Result<Self, PresentError> {
-        let surface = surface(&window, &device)?;
+        let surface = new_surface(&window, &device)?;
         let able = surface.get_capabilities(&device.adapter);
         // Pictures and controls are encoded already.
         let plain = |format: &wgpu::TextureFormat| {
@@ -54,6 +55,7 @@ impl Gpu {
         let begun = device.attempt(|| {
             let canvas = Canvas::new(Arc::clone(&device), format);
             let size = window.inner_size();
+            let surface = Some(surface);
             let mut gpu = Self { device: Arc::clone(&device), window, surface, config, configured: false, canvas };
             gpu.resize((size.width, size.height));
             gpu
@@ -63,8 +65,8 @@ impl Gpu {
 
     fn configure(&mut self) {
         self.configured = self.config.width > 0 && self.config.height > 0;
-        if self.configured {
-            self.surface.configure(&self.device.device, &self.config);
+        if let Some(surface) = self.surface.as_ref().filter(|_| self.configured) {
+            surface.configure(&self.device.device, &self.config);
         }
     }
 
@@ -73,12 +75,14 @@ impl Gpu {
         use wgpu::CurrentSurfaceTexture as Current;
         // Once more after what is wrong with the surface was put right.
         for _ in 0..2 {
-            match self.surface.get_current_texture() {
+            let Some(surface) = &self.surface else { return Ok(None) };
+            match surface.get_current_texture() {
                 Current::Success(texture) | Current::Suboptimal(texture) => return Ok(Some(texture)),
                 Current::Timeout | Current::Occluded => return Ok(None),
                 Current::Outdated => self.configure(),
                 Current::Lost => {
-                    self.surface = surface(&self.window, &self.device)?;
+                    self.device.check().map_err(fault)?;
+                    self.surface = Some(new_surface(&self.window, &self.device)?);
                     self.configure();
                 }
                 Current::Validation => self.device.check().map_err(fault)?,
@@ -92,7 +96,16 @@ fn fault(error: impl std::fmt::Display) -> PresentError {
     PresentError(error.to_string())
 }
 
-fn surface(window: &Arc<Window>, device: &Device) -> Result<wgpu::Surface<'static>, PresentError> {
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        // Freeing one whose device hangs would wait for what never comes.
+        if self.device.check().is_err() {
+            std::mem::forget(self.surface.take());
+        }
+    }
+}
+
+fn new_surface(window: &Arc<Window>, device: &Device) -> Result<wgpu::Surface<'static>, PresentError> {
     let surface = device.instance.create_surface(Arc::clone(window)).map_err(fault)?;
     if !device.adapter.is_surface_supported(&surface) {
         return Err(PresentError(format!("{} cannot draw to windows of this display", device.name)));
@@ -115,6 +128,7 @@ impl Presenter for Gpu {
     }
 
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
+        self.device.check().map_err(fault)?;
         if !self.configured {
             return Ok(());
         }

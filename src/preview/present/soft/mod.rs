@@ -25,15 +25,15 @@ pub struct Soft {
 }
 
 impl Soft {
-    /// For this window.
+    /// For this window, by a painter that may know controls already.
     ///
     /// # Errors
     /// The display server takes no pictures from memory.
-    pub fn new(window: Arc<Window>) -> Result<Self, PresentError> {
+    pub fn new(window: Arc<Window>, painter: Painter) -> Result<Self, PresentError> {
         let context = Context::new(Arc::clone(&window)).map_err(fault)?;
         let surface = Surface::new(&context, Arc::clone(&window)).map_err(fault)?;
         let size = window.inner_size();
-        let mut soft = Self { window, surface, size: None, painter: Painter::new() };
+        let mut soft = Self { window, surface, size: None, painter };
         soft.resize((size.width, size.height));
         Ok(soft)
     }

@@ -16,6 +16,9 @@ use crate::preview::state::{Action, Effect, Source, State};
 /// Why nothing is saved.
 const NO_PICTURE: &str = "There is no picture to save.";
 
+/// What is said when another presenter took over.
+const GPU_FAILED: &str = "The GPU failed: the CPU takes over, more slowly.";
+
 impl App {
     /// Lays the controls out and does what the person did to them.
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
@@ -122,9 +125,14 @@ impl App {
             background,
         };
         let began_ns = self.clock.now_ns();
+        let drawn_on_gpu = gfx.presenter.has_device();
         if let Err(error) = gfx.presenter.present(&drawing) {
             self.failed = Some(error.into());
             return events.exit();
+        }
+        if drawn_on_gpu && !gfx.presenter.has_device() {
+            self.place();
+            self.state.note(GPU_FAILED);
         }
         let now_ns = self.clock.now_ns();
         if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.is_new)) {

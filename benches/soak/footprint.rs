@@ -1,0 +1,45 @@
+//! What a process holds of the system.
+
+use std::fmt;
+use std::fs;
+use std::io;
+
+/// By this share may memory grow: allocators keep some.
+const GROWTH: f64 = 0.05;
+
+/// Descriptors, threads and memory.
+pub struct Footprint {
+    descriptors: usize,
+    threads: usize,
+    resident_kb: u64,
+}
+
+impl Footprint {
+    /// What this process holds now.
+    ///
+    /// # Errors
+    /// There is no /proc.
+    pub fn now() -> io::Result<Self> {
+        let status = fs::read_to_string("/proc/self/status")?;
+        let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+        Ok(Self {
+            descriptors: fs::read_dir("/proc/self/fd")?.count(),
+            threads: fs::read_dir("/proc/self/task")?.count(),
+            resident_kb: resident.and_then(|kb| kb.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(0),
+        })
+    }
+
+    /// Whether it is no more than before.
+    pub fn is_as_flat_as(&self, before: &Self) -> bool {
+        self.descriptors <= before.descriptors
+            && self.threads <= before.threads
+            && self.resident_kb as f64 <= before.resident_kb as f64 * (1.0 + GROWTH)
+    }
+}
+
+impl fmt::Display for Footprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { descriptors, threads, resident_kb } = self;
+        write!(f, "{descriptors} descriptors, {threads} threads, {:.1} MB", *resident_kb as f64 / 1024.0)
+    }
+}

@@ -1,0 +1,241 @@
+//! The blur goes on when the GPU does not: on the CPU, from the oldest frame in flight on.
+
+use std::collections::VecDeque;
+
+use super::{Bokeh, BokehError, Finished, Job};
+use crate::compute::GpuError;
+
+/// What makes an executor.
+pub type Makes = Box<dyn FnOnce() -> Box<dyn Bokeh> + Send>;
+
+/// Runs one executor, and another one from the first fault of the GPU on. No frame is lost: those that the first had in
+/// flight are blurred anew.
+pub struct Fallback {
+    now: Box<dyn Bokeh>,
+    /// What makes the other one, until it is needed.
+    other: Option<Makes>,
+    /// What ran before, and why it does no more.
+    before: Option<String>,
+    /// Frames that wait for room.
+    waiting: VecDeque<Job>,
+}
+
+impl Fallback {
+    /// Runs `first`, and what `other` makes once `first` fails.
+    pub fn new(first: Box<dyn Bokeh>, other: Makes) -> Self {
+        Self { now: first, other: Some(other), before: None, waiting: VecDeque::new() }
+    }
+
+    /// Goes over to the other executor, if there still is one.
+    fn fall(&mut self, error: GpuError) -> Result<(), BokehError> {
+        let Some(other) = self.other.take() else { return Err(error.into()) };
+        tracing::warn!("{error}; the CPU blurs from here on");
+        let mut waiting: VecDeque<Job> = std::iter::from_fn(|| self.now.take_back()).collect();
+        waiting.append(&mut self.waiting);
+        self.waiting = waiting;
+        self.before = Some(format!("{error}"));
+        // The first goes, and with it what it has of the GPU's memory, before the other one comes.
+        self.now = Box::new(Nothing);
+        self.now = other();
+        Ok(())
+    }
+
+    /// Begins what waits, as far as there is room.
+    fn feed(&mut self) -> Result<(), BokehError> {
+        while self.now.in_flight() < self.now.capacity()
+            && let Some(job) = self.waiting.pop_front()
+        {
+            match self.now.submit(job) {
+                Err(BokehError::Gpu(error)) => self.fall(error)?,
+                done => done?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Bokeh for Fallback {
+    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
+        self.waiting.push_back(job);
+        self.feed()
+    }
+
+    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+        loop {
+            self.feed()?;
+            match self.now.collect(wait) {
+                Err(BokehError::Gpu(error)) => self.fall(error)?,
+                done => return done,
+            }
+        }
+    }
+
+    fn take_back(&mut self) -> Option<Job> {
+        self.now.take_back().or_else(|| self.waiting.pop_front())
+    }
+
+    fn in_flight(&self) -> usize {
+        self.now.in_flight() + self.waiting.len()
+    }
+
+    fn capacity(&self) -> usize {
+        self.now.capacity()
+    }
+
+    fn backend(&self) -> &'static str {
+        match (&self.before, self.now.backend()) {
+            (Some(_), "cpu") => "gpu, then cpu",
+            (_, now) => now,
+        }
+    }
+
+    fn describe(&self) -> String {
+        match &self.before {
+            Some(before) => format!("{before}; then {}", self.now.describe()),
+            None => self.now.describe(),
+        }
+    }
+}
+
+/// In place of the first executor while the other one is made.
+struct Nothing;
+
+impl Bokeh for Nothing {
+    fn submit(&mut self, _: Job) -> Result<(), BokehError> {
+        Ok(())
+    }
+
+    fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {
+        Ok(None)
+    }
+
+    fn in_flight(&self) -> usize {
+        0
+    }
+
+    fn capacity(&self) -> usize {
+        0
+    }
+
+    fn describe(&self) -> String {
+        String::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bokeh::PassTimes;
+    use crate::budget::Quality;
+    use crate::compute::Place;
+    use crate::frame::ColorImage;
+    use crate::link::pool::Pool;
+    use crate::optics::CocField;
+
+    /// Writes its mark into the pictures; fails at the step `fails_at`, where submitting and collecting are steps.
+    struct Marks {
+        mark: u8,
+        capacity: usize,
+        jobs: VecDeque<Job>,
+        fails_at: u32,
+        steps: u32,
+    }
+
+    impl Marks {
+        fn new(mark: u8, capacity: usize, fails_at: u32) -> Self {
+            Self { mark, capacity, jobs: VecDeque::new(), fails_at, steps: 0 }
+        }
+
+        fn step(&mut self) -> Result<(), BokehError> {
+            self.steps += 1;
+            if self.steps < self.fails_at { Ok(()) } else { Err(GpuError::Failed("it is lost".to_owned()).into()) }
+        }
+    }
+
+    impl Bokeh for Marks {
+        fn submit(&mut self, job: Job) -> Result<(), BokehError> {
+            assert!(self.jobs.len() < self.capacity);
+            if matches!(job.coc, CocField::Depth(_)) {
+                return Err(BokehError::NoDepth);
+            }
+            self.jobs.push_back(job);
+            self.step()
+        }
+
+        fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {
+            if self.jobs.is_empty() {
+                return Ok(None);
+            }
+            self.step()?;
+            let Some(Job { ticket, color, depth, mut out, .. }) = self.jobs.pop_front() else { return Ok(None) };
+            out.rgb.fill(self.mark);
+            Ok(Some(Finished { ticket, out, in_memory: true, on_device: None, color, depth, times: PassTimes::new() }))
+        }
+
+        fn take_back(&mut self) -> Option<Job> {
+            self.jobs.pop_front()
+        }
+
+        fn in_flight(&self) -> usize {
+            self.jobs.len()
+        }
+
+        fn capacity(&self) -> usize {
+            self.capacity
+        }
+
+        fn describe(&self) -> String {
+            if self.capacity > 1 { "a GPU" } else { "cpu, marks" }.to_owned()
+        }
+    }
+
+    fn job(ticket: u64, pool: &Pool<ColorImage>, coc: CocField) -> Job {
+        let quality = Quality::Balanced;
+        Job { ticket, color: pool.take(), depth: None, coc, quality, place: Place::Memory, out: pool.take() }
+    }
+
+    const UNIFORM: CocField = CocField::Uniform { radius_px: 1.0 };
+
+    #[test]
+    fn every_frame_is_blurred_once_and_in_order_wherever_the_gpu_fails() {
+        const FRAMES: u64 = 10;
+        for fails_at in 1..=2 * FRAMES as u32 + 1 {
+            // As many as may be out at once, and no more.
+            let pool = Pool::new(2 * 4, || ColorImage::new(2, 2));
+            let other = Box::new(|| Box::new(Marks::new(2, 1, u32::MAX)) as Box<dyn Bokeh>);
+            let mut bokeh = Fallback::new(Box::new(Marks::new(1, 3, fails_at)), other);
+            assert_eq!((bokeh.backend(), bokeh.describe().as_str()), ("gpu", "a GPU"));
+            let (mut submitted, mut marks) = (0, Vec::new());
+            while (marks.len() as u64) < FRAMES {
+                if submitted < FRAMES && bokeh.in_flight() < bokeh.capacity() {
+                    bokeh.submit(job(submitted, &pool, UNIFORM)).unwrap();
+                    submitted += 1;
+                } else {
+                    let finished = bokeh.collect(true).unwrap().expect("something is in flight");
+                    assert_eq!(finished.ticket, marks.len() as u64);
+                    marks.push(finished.out.rgb[0]);
+                }
+            }
+            assert_eq!((bokeh.in_flight(), pool.free()), (0, 8), "nothing is left behind");
+            assert!(marks.is_sorted(), "first the GPU, then the CPU: {marks:?}");
+            let failed = fails_at <= 2 * FRAMES as u32;
+            assert_eq!(marks.contains(&2), failed, "{fails_at}");
+            let ran = if failed { ("gpu, then cpu", "GPU: it is lost; then cpu, marks") } else { ("gpu", "a GPU") };
+            assert_eq!((bokeh.backend(), bokeh.describe().as_str()), ran);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_frame_is_not_the_gpus_fault() {
+        let pool = Pool::new(2, || ColorImage::new(2, 2));
+        let other = Box::new(|| -> Box<dyn Bokeh> { panic!("nobody asks for it") });
+        let mut bokeh = Fallback::new(Box::new(Marks::new(1, 3, u32::MAX)), other);
+        let coc = CocField::Depth(crate::optics::DepthCoc {
+            coc_at_infinity_px: 1.0,
+            focus_m: 1.0,
+            range_m: 0.0,
+            max_coc_px: 1.0,
+        });
+        assert!(matches!(bokeh.submit(job(0, &pool, coc)), Err(BokehError::NoDepth)));
+    }
+}

@@ -1,0 +1,80 @@
+//! The markers of a JPEG.
+
+use std::io::{BufReader, ErrorKind, Read, Seek};
+
+use super::coded::Samples;
+use super::fault::PictureFault;
+
+/// Segments that a file may have before its frame; cameras write some tens.
+const MAX_SEGMENTS: usize = 1000;
+
+/// Bytes outside of segments that are passed over before the frame.
+const MAX_STRAY_BYTES: usize = 1 << 16;
+
+/// Columns and rows, and the samples, that the frame of a JPEG claims; `file` stands at its beginning.
+pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u32), Samples), PictureFault> {
+    fn read<const N: usize>(file: &mut impl Read) -> Result<[u8; N], PictureFault> {
+        let mut bytes = [0; N];
+        file.read_exact(&mut bytes).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => PictureFault::Truncated,
+            _ => PictureFault::Io(error),
+        })?;
+        Ok(bytes)
+    }
+    let [mut high, mut marker] = read(file)?;
+    let mut stray_bytes = 0;
+    for _ in 0..MAX_SEGMENTS {
+        // Any FF may pad a marker; other bytes between segments are passed over.
+        while high != 0xFF || matches!(marker, 0 | 0xFF) {
+            (high, [marker]) = (marker, read(file)?);
+            stray_bytes += 1;
+            if stray_bytes > MAX_STRAY_BYTES {
+                return Err(PictureFault::Damaged("no frame where one should be".into()));
+            }
+        }
+        match marker {
+            // Neither a beginning nor a restart has a length.
+            0x01 | 0xD0..=0xD8 => {}
+            // A frame, and not one of the tables with numbers among those of frames.
+            0xC0..=0xCF if !matches!(marker, 0xC4 | 0xC8 | 0xCC) => {
+                let [_, _, _, y, y_low, x, x_low, components] = read(file)?;
+                let size = [[x, x_low], [y, y_low]].map(|bytes| u32::from(u16::from_be_bytes(bytes)));
+                // What has four channels is shown in three.
+                let channels = if components == 1 { 1 } else { 3 };
+                return Ok((size.into(), Samples { channels, are_wide: false }));
+            }
+            0xD9 | 0xDA => return Err(PictureFault::Damaged("no frame before its data".into())),
+            _ => {
+                let length = i64::from(u16::from_be_bytes(read(file)?));
+                file.seek_relative((length - 2).max(0))?;
+            }
+        }
+        [high, marker] = read(file)?;
+    }
+    Err(PictureFault::Damaged(format!("more than {MAX_SEGMENTS} segments before its frame")))
+}
+
+/// Whether the markers of a JPEG lead to its end marker.
+pub(super) fn is_whole(bytes: &[u8]) -> bool {
+    const START: u8 = 0xD8;
+    const END: u8 = 0xD9;
+    let mut rest = bytes;
+    loop {
+        // Coded data has its FF bytes stuffed with 00 or is split by restart markers; FF may also pad a marker.
+        let Some(at) = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xD0..=0xD7 | 0xFF))
+        else {
+            return false;
+        };
+        let (marker, after) = (rest[at + 1], &rest[at + 2..]);
+        rest = match marker {
+            END => return true,
+            START | 0x01 => after,
+            // A segment says its length, so that what looks like a marker inside it is passed over.
+            _ => {
+                let Some(&[high, low]) = after.first_chunk() else { return false };
+                let Some(next) = after.get(usize::from(u16::from_be_bytes([high, low]))..) else { return false };
+                next
+            }
+        };
+    }
+}

@@ -1,0 +1,224 @@
+//! A GPU that is lost, hangs or has no more memory in the middle of a run: the CPU goes on, and no frame is missing.
+//! The faults come from a Vulkan layer (tests/gpu_faults/layer.c), which is compiled for it; a test under the layer runs
+//! in a process of its own.
+#![cfg(feature = "gpu")]
+#![allow(missing_docs)]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::Arc;
+use std::time::Duration;
+
+use bokehcam::bokeh::cpu::CpuBokeh;
+use bokehcam::bokeh::plan::Plan;
+use bokehcam::bokeh::{self, Bokeh, BokehError, Effect, Job};
+use bokehcam::budget::Quality;
+use bokehcam::compute::device::Device;
+use bokehcam::compute::{Backend, Place};
+use bokehcam::depth::stereo::{self, Effort, Pair};
+use bokehcam::frame::{ColorImage, DisparityMap, GrayImage};
+use bokehcam::link::pool::Pooled;
+use common::{coc, noise, settings, three_depths};
+use tempfile::TempDir;
+
+const SIZE: (u32, u32) = (96, 64);
+/// The executors may differ by so much.
+const CODES: u8 = 4;
+const FRAMES: u64 = 8;
+
+fn device() -> Device {
+    Device::open(false, None).expect("a Vulkan adapter, software included")
+}
+
+/// The layer, ready to be loaded.
+fn layer() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/gpu_faults/layer.c");
+    let library = folder.path().join("layer.so");
+    let mut compiler = Command::new("cc");
+    compiler.args(["-shared", "-fPIC", "-O1", "-o"]).arg(&library).arg(source);
+    assert!(compiler.status().expect("a C compiler").success());
+    let manifest = serde_json::json!({
+        "file_format_version": "1.1.2",
+        "layer": {
+            "name": "VK_LAYER_bokehcam_faults",
+            "type": "GLOBAL",
+            "library_path": library,
+            "api_version": "1.3.0",
+            "implementation_version": "1",
+            "description": "faults",
+        },
+    });
+    fs::write(folder.path().join("layer.json"), manifest.to_string()).unwrap();
+    folder
+}
+
+fn under(layer: &TempDir, fault: &str, command: &mut Command) -> Output {
+    command.env("VK_LAYER_PATH", layer.path()).env("VK_INSTANCE_LAYERS", "VK_LAYER_bokehcam_faults");
+    command.env("FAULT", fault).output().unwrap()
+}
+
+/// Runs a test of this file in a process of its own, under the layer; gives back what it told.
+fn test_under(layer: &TempDir, fault: &str, test: &str) -> String {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    let output = under(layer, fault, command.args(["--ignored", "--exact", test, "--nocapture"]));
+    let told = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{fault}: {told}");
+    told
+}
+
+fn job(ticket: u64) -> Job {
+    Job {
+        ticket,
+        color: Pooled::detached(noise(SIZE.0, SIZE.1)),
+        depth: Some(Pooled::detached(three_depths(SIZE.0, SIZE.1))),
+        coc: coc(Effect::Dof, SIZE.1),
+        quality: Quality::Balanced,
+        place: Place::Memory,
+        out: Pooled::detached(ColorImage::default()),
+    }
+}
+
+/// Blurs frames, each of which is what the CPU makes of it; `before` is called before each.
+fn blur(bokeh: &mut dyn Bokeh, mut before: impl FnMut(u64)) {
+    let mut expected = ColorImage::default();
+    let Job { color, depth, coc, .. } = job(0);
+    let mut cpu = CpuBokeh::new(Plan::new(&settings(Effect::Dof), SIZE.0, SIZE.1), Some(1));
+    cpu.blur(&color, depth.as_deref(), &coc, &mut expected).unwrap();
+    let (mut submitted, mut collected) = (0, 0);
+    while collected < FRAMES {
+        if submitted < FRAMES && bokeh.in_flight() < bokeh.capacity() {
+            before(submitted);
+            bokeh.submit(job(submitted)).expect("the frame is taken");
+            submitted += 1;
+            continue;
+        }
+        let finished = bokeh.collect(true).expect("the frame is blurred").expect("a frame is in flight");
+        assert_eq!((finished.ticket, finished.in_memory), (collected, true));
+        let worst = finished.out.rgb.iter().zip(&expected.rgb).map(|(&a, &b)| a.abs_diff(b)).max();
+        assert!(finished.out.size() == SIZE && worst <= Some(CODES), "frame {collected}: {worst:?}");
+        collected += 1;
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_destroyed_device_is_followed_by_the_cpu() {
+    for gone_before in [0, 1, 2, 3, 5] {
+        let device = Arc::new(device());
+        let mut bokeh = bokeh::create_on(&settings(Effect::Dof), SIZE, Arc::clone(&device), Some(1)).unwrap();
+        blur(&mut *bokeh, |frame| {
+            if frame == gone_before {
+                device.device.destroy();
+            }
+        });
+        assert_eq!(bokeh.backend(), "gpu, then cpu");
+        assert!(bokeh.describe().contains("then cpu, 1 threads"), "{}", bokeh.describe());
+    }
+}
+
+/// Under the layer, the faults are its.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn frames_are_blurred_whatever_becomes_of_the_device() {
+    let made = Device::open(false, None).map_err(BokehError::from).and_then(|device| {
+        let device = device.with_patience(Duration::from_secs(1));
+        bokeh::create_on(&settings(Effect::Dof), SIZE, Arc::new(device), Some(1))
+    });
+    match made {
+        Ok(mut bokeh) => {
+            blur(&mut *bokeh, |_| {});
+            println!("ran on {}: {}", bokeh.backend(), bokeh.describe());
+        }
+        Err(error) => println!("not made: {error}"),
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_gpu_that_is_lost_or_hangs_is_followed_by_the_cpu() {
+    let layer = layer();
+    for (fault, reason) in [
+        ("submit:3", "device lost"),
+        ("wait:1", "device lost"),
+        ("wait:4", "device lost"),
+        ("hang:2", "no answer for 1 s"),
+    ] {
+        let told = test_under(&layer, fault, "frames_are_blurred_whatever_becomes_of_the_device");
+        let ran = told.lines().find(|line| line.starts_with("ran on")).unwrap_or_else(|| panic!("{fault}: {told}"));
+        assert!(ran.starts_with("ran on gpu, then cpu: ") && ran.to_lowercase().contains(reason), "{fault}: {ran}");
+    }
+    let told = test_under(&layer, "submit:1000000", "frames_are_blurred_whatever_becomes_of_the_device");
+    assert!(told.contains("ran on gpu: "), "a layer that does nothing: {told}");
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn memory_that_ends_is_followed_by_the_cpu_or_said_at_the_start() {
+    let layer = layer();
+    for allocation in 1..=6 {
+        let fault = format!("memory:{allocation}");
+        let told = test_under(&layer, &fault, "frames_are_blurred_whatever_becomes_of_the_device");
+        let outcome = ["ran on gpu: ", "ran on gpu, then cpu: ", "not made: GPU: "];
+        assert!(outcome.iter().any(|outcome| told.contains(outcome)), "{fault}: {told}");
+    }
+}
+
+/// Under the layer, the faults are its.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn pairs_are_matched_whatever_becomes_of_the_device() {
+    let (width, height) = SIZE;
+    let eye = |shift: u32| {
+        let picture = noise(width + 8, height);
+        let luma = |x: u32, y: u32| picture.rgb[3 * (y * (width + 8) + x + shift) as usize];
+        GrayImage { width, height, luma: (0..width * height).map(|k| luma(k % width, k / width)).collect() }
+    };
+    let (left, right) = (eye(0), eye(5));
+    let settings = stereo::Settings { size: SIZE, disparities: 16, effort: Effort::Full, threads: 1 };
+    let matched = |backend, rounds| {
+        let mut matcher = stereo::create(&settings, backend, None).unwrap();
+        let mut map = DisparityMap::default();
+        for _ in 0..rounds {
+            matcher.disparity(Pair { left: &left, color: None, right: &right }, &mut map).expect("a match");
+        }
+        (map.px, matcher.describe())
+    };
+    let (on_cpu, _) = matched(Backend::Cpu, 4);
+    let (found, ran) = matched(Backend::Gpu, 4);
+    assert!(found == on_cpu, "to the bit");
+    println!("ran on {ran}");
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn matching_goes_on_after_the_gpu() {
+    let layer = layer();
+    for fault in ["submit:2", "wait:3"] {
+        let told = test_under(&layer, fault, "pairs_are_matched_whatever_becomes_of_the_device");
+        assert!(told.contains("ran on cpu"), "{fault}: {told}");
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_run_ends_whole_and_says_in_one_line_what_happened() {
+    let (layer, folder) = (layer(), tempfile::tempdir().unwrap());
+    let report = folder.path().join("report.json");
+    let recording = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    command.env("XDG_CONFIG_HOME", folder.path()).env_remove("RUST_LOG").arg("stream").arg(recording);
+    command.args(["--backend", "gpu", "--pace", "asap", "--to", "null", "--report"]).arg(&report);
+    let output = under(&layer, "wait:6", &mut command);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert_eq!(told.matches("the CPU blurs from here on").count(), 1, "{told}");
+    assert!(!told.contains("panicked"), "{told}");
+    let report: serde_json::Value = serde_json::from_str(&fs::read_to_string(report).unwrap()).unwrap();
+    assert_eq!((&report["frames"]["captured"], &report["frames"]["delivered"]), (&24.into(), &24.into()), "{report}");
+    assert_eq!(report["backend"], "gpu, then cpu");
+    assert!(report["adapter"].as_str().unwrap().contains("; then cpu, "), "{report}");
+}

@@ -1,0 +1,192 @@
+/* A Vulkan layer under which a GPU fails as hardware does. FAULT is KIND:N, and the Nth call that it strikes and all
+ * after that fail:
+ *   submit     the device is lost when work is submitted
+ *   wait       the device is lost while its work is waited for
+ *   hang       work is never done: waiting for it takes as long as was asked for
+ *   memory     there is no more memory
+ * Needs no header of Vulkan's: what is used of it is declared here, as its specification has it. */
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define SHOWN __attribute__((visibility("default")))
+enum { SUCCESS = 0, TIMEOUT = 2, OUT_OF_DEVICE_MEMORY = -2, DEVICE_LOST = -4 };
+enum { INSTANCE_LINK = 47, DEVICE_LINK = 48 };
+
+typedef int32_t Result;
+typedef void (*Function)(void);
+typedef Function (*GetProc)(void *object, const char *name);
+
+/* The loader's chain of layers. */
+struct link {
+    struct link *next;
+    GetProc instance_proc, device_proc;
+};
+struct chain {
+    int32_t type;
+    struct chain *next;
+    int32_t kind;
+    struct link *link;
+};
+struct interface {
+    int32_t type;
+    void *next;
+    uint32_t version;
+    GetProc instance_proc, device_proc, physical_proc;
+};
+
+static GetProc next_of_instance, next_of_device;
+
+/* Whether the calls of this kind fail from now on. */
+static int strikes(const char *kind) {
+    static int calls, struck;
+    const char *fault = getenv("FAULT");
+    size_t length = strlen(kind);
+    if (!fault || strncmp(fault, kind, length) || fault[length] != ':')
+        return 0;
+    if (++calls >= atoi(fault + length + 1))
+        struck = 1;
+    return struck;
+}
+
+/* Whether the device is lost already, by whatever call. */
+static int lost;
+static Result lose(void) {
+    lost = 1;
+    return DEVICE_LOST;
+}
+
+static Result (*submit)(void *, uint32_t, const void *, uint64_t);
+static Result our_submit(void *queue, uint32_t count, const void *work, uint64_t fence) {
+    return lost || strikes("submit") ? lose() : submit(queue, count, work, fence);
+}
+
+static Result (*submit2)(void *, uint32_t, const void *, uint64_t);
+static Result our_submit2(void *queue, uint32_t count, const void *work, uint64_t fence) {
+    return lost || strikes("submit") ? lose() : submit2(queue, count, work, fence);
+}
+
+static int hangs;
+static Result hang(uint64_t timeout_ns) {
+    hangs = 1;
+    uint64_t left_us = timeout_ns / 1000;
+    for (; left_us > 100000; left_us -= 100000)
+        usleep(100000);
+    usleep((useconds_t)left_us);
+    return TIMEOUT;
+}
+
+static Result (*wait_semaphores)(void *, const void *, uint64_t);
+static Result our_wait_semaphores(void *device, const void *which, uint64_t timeout_ns) {
+    if (lost || strikes("wait"))
+        return lose();
+    return strikes("hang") ? hang(timeout_ns) : wait_semaphores(device, which, timeout_ns);
+}
+
+static Result (*wait_fences)(void *, uint32_t, const uint64_t *, uint32_t, uint64_t);
+static Result our_wait_fences(void *device, uint32_t count, const uint64_t *which, uint32_t all, uint64_t timeout_ns) {
+    if (lost || strikes("wait"))
+        return lose();
+    return strikes("hang") ? hang(timeout_ns) : wait_fences(device, count, which, all, timeout_ns);
+}
+
+static Result (*counter)(void *, uint64_t, uint64_t *);
+static Result our_counter(void *device, uint64_t semaphore, uint64_t *value) {
+    static uint64_t done;
+    if (lost)
+        return DEVICE_LOST;
+    if (!hangs) {
+        Result result = counter(device, semaphore, value);
+        done = *value;
+        return result;
+    }
+    *value = done;
+    return SUCCESS;
+}
+
+static Result (*idle)(void *);
+static Result our_idle(void *device) {
+    while (hangs)
+        sleep(1);
+    return lost ? DEVICE_LOST : idle(device);
+}
+
+static Result (*allocate)(void *, const void *, const void *, uint64_t *);
+static Result our_allocate(void *device, const void *what, const void *allocator, uint64_t *memory) {
+    return strikes("memory") ? OUT_OF_DEVICE_MEMORY : allocate(device, what, allocator, memory);
+}
+
+static Function of_device(void *device, const char *name) {
+    const struct {
+        const char *name;
+        void *next;
+        Function ours;
+    } taken[] = {
+        {"vkQueueSubmit", &submit, (Function)our_submit},
+        {"vkQueueSubmit2", &submit2, (Function)our_submit2},
+        {"vkQueueSubmit2KHR", &submit2, (Function)our_submit2},
+        {"vkWaitSemaphores", &wait_semaphores, (Function)our_wait_semaphores},
+        {"vkWaitSemaphoresKHR", &wait_semaphores, (Function)our_wait_semaphores},
+        {"vkWaitForFences", &wait_fences, (Function)our_wait_fences},
+        {"vkGetSemaphoreCounterValue", &counter, (Function)our_counter},
+        {"vkGetSemaphoreCounterValueKHR", &counter, (Function)our_counter},
+        {"vkDeviceWaitIdle", &idle, (Function)our_idle},
+        {"vkAllocateMemory", &allocate, (Function)our_allocate},
+    };
+    Function next = next_of_device(device, name);
+    for (size_t k = 0; next && k < sizeof taken / sizeof *taken; k++)
+        if (!strcmp(name, taken[k].name)) {
+            memcpy(taken[k].next, &next, sizeof next);
+            return taken[k].ours;
+        }
+    return next;
+}
+
+/* Ours in the chain; the next layer finds its own there. */
+static struct link *take_link(const void *info, int32_t type) {
+    struct chain *chain = ((const struct chain *)info)->next;
+    while (chain->type != type || chain->kind != 0)
+        chain = chain->next;
+    struct link *link = chain->link;
+    chain->link = link->next;
+    return link;
+}
+
+static Result create_instance(const void *info, const void *allocator, void **instance) {
+    struct link *link = take_link(info, INSTANCE_LINK);
+    next_of_instance = link->instance_proc;
+    Result (*next)(const void *, const void *, void **) = (void *)next_of_instance(NULL, "vkCreateInstance");
+    return next(info, allocator, instance);
+}
+
+static void *the_instance;
+static Result create_device(void *adapter, const void *info, const void *allocator, void **device) {
+    struct link *link = take_link(info, DEVICE_LINK);
+    next_of_device = link->device_proc;
+    Result (*next)(void *, const void *, const void *, void **) =
+        (void *)link->instance_proc(the_instance, "vkCreateDevice");
+    return next(adapter, info, allocator, device);
+}
+
+static Function of_instance(void *instance, const char *name) {
+    if (instance)
+        the_instance = instance;
+    if (!strcmp(name, "vkGetInstanceProcAddr"))
+        return (Function)of_instance;
+    if (!strcmp(name, "vkGetDeviceProcAddr"))
+        return (Function)of_device;
+    if (!strcmp(name, "vkCreateInstance"))
+        return (Function)create_instance;
+    if (!strcmp(name, "vkCreateDevice"))
+        return (Function)create_device;
+    return next_of_instance ? next_of_instance(instance, name) : NULL;
+}
+
+SHOWN Result vkNegotiateLoaderLayerInterfaceVersion(struct interface *interface) {
+    interface->version = 2;
+    interface->instance_proc = of_instance;
+    interface->device_proc = of_device;
+    interface->physical_proc = NULL;
+    return SUCCESS;
+}

@@ -1,0 +1,231 @@
+//! What files of others may cost: memory stays within what is stated, whatever they claim, and nothing but files is read.
+#![allow(missing_docs, unsafe_code)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::fs::{self, File};
+use std::io::Write;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard};
+
+use bokehcam::frame::ColorImage;
+use bokehcam::recording::still::{read_color, read_depth, read_grey, write_color};
+use bokehcam::recording::{Options, Recording, RecordingError};
+use bokehcam::{calibration, recording::geometry::Geometry};
+use tempfile::TempDir;
+
+/// Counts what is taken, and the most that was taken at once.
+struct Counting;
+
+static TAKEN: AtomicUsize = AtomicUsize::new(0);
+static MOST: AtomicUsize = AtomicUsize::new(0);
+
+fn took(bytes: usize) {
+    let taken = TAKEN.fetch_add(bytes, Ordering::Relaxed) + bytes;
+    MOST.fetch_max(taken, Ordering::Relaxed);
+}
+
+// SAFETY: every call goes to the system's allocator as it is; counting touches nothing of it.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        took(layout.size());
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        TAKEN.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(memory, layout) }
+    }
+
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        took(size);
+        TAKEN.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.realloc(memory, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// Tests come one after the other, for what another one takes would be counted with its own.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+/// The most bytes that `work` took at once.
+fn most_bytes<T>(work: impl FnOnce() -> T) -> (usize, T) {
+    let before = TAKEN.load(Ordering::Relaxed);
+    MOST.store(before, Ordering::Relaxed);
+    let result = work();
+    (MOST.load(Ordering::Relaxed).saturating_sub(before), result)
+}
+
+const MIB: usize = 1 << 20;
+
+#[track_caller]
+fn assert_says<T>(result: Result<T, impl ToString>, says: &str) {
+    let said = result.err().expect("an error").to_string();
+    assert!(said.contains(says) && !said.contains('\n'), "{said}");
+}
+
+/// A picture of one value in `channels` of 16 bits, small on the disk.
+fn save_wide(path: &Path, side_px: u32, color: png::ColorType) {
+    let mut encoder = png::Encoder::new(File::create(path).unwrap(), side_px, side_px);
+    encoder.set_color(color);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header().unwrap();
+    let mut rows = writer.stream_writer().unwrap();
+    let row = vec![0x40; side_px as usize * color.samples() * 2];
+    (0..side_px).for_each(|_| rows.write_all(&row).unwrap());
+    rows.finish().unwrap();
+}
+
+#[test]
+fn a_picture_takes_what_its_pixels_take() {
+    let _alone = alone();
+    let dir = TempDir::new().unwrap();
+    let path = dir.path().join("wide.png");
+    let side_px = 2048;
+    let rgb_bytes = 3 * side_px as usize * side_px as usize;
+    save_wide(&path, side_px, png::ColorType::Rgba);
+    assert!(fs::metadata(&path).unwrap().len() < 2 * MIB as u64);
+    let (most, image) = most_bytes(|| read_color(&path).unwrap());
+    assert!(image.rgb.iter().all(|&byte| byte == 0x40));
+    assert!(most < rgb_bytes + MIB, "{most} bytes for {rgb_bytes}");
+    let (most, grey) = most_bytes(|| read_grey(&path).unwrap());
+    assert!(most < 4 * grey.2.len() + MIB, "{most} bytes");
+    save_wide(&path, side_px, png::ColorType::Grayscale);
+    let (most, map) = most_bytes(|| read_depth(&path, 5000.0, None).unwrap());
+    assert!(most < 4 * map.metres.len() + MIB, "{most} bytes");
+
+    let path = dir.path().join("photo.jpg");
+    write_color(&path, &ColorImage::new(side_px, side_px), false).unwrap();
+    let (most, _) = most_bytes(|| read_color(&path).unwrap());
+    assert!(most < 4 * rgb_bytes, "{most} bytes for {rgb_bytes}");
+}
+
+#[test]
+fn a_file_is_known_by_its_first_bytes() {
+    let _alone = alone();
+    let dir = TempDir::new().unwrap();
+    let begin = |name: &str, start: &[u8]| {
+        let path = dir.path().join(name);
+        let mut file = File::create(&path).unwrap();
+        file.write_all(start).unwrap();
+        // Sparse: it takes no room on the disk.
+        file.set_len(1 << 30).unwrap();
+        path
+    };
+    for (name, start, says) in [
+        ("zeros.png", &b""[..], "not a PNG or JPEG file"),
+        ("zeros.jpg", b"\xff\xd8\xff\xe0\0\x04", "no frame where one should be"),
+        ("png.png", b"\x89PNG\r\n\x1a\n", "damaged"),
+        ("zeros.pfm", b"", "not a grey PFM file"),
+        ("large.pfm", b"Pf\n4 4\n-1\n", "the file has 1073741824 bytes"),
+    ] {
+        let path = begin(name, start);
+        let (most, read) = match name.ends_with("pfm") {
+            true => most_bytes(|| read_depth(&path, 1.0, None).map(drop)),
+            false => most_bytes(|| read_color(&path).map(drop)),
+        };
+        let said = read.unwrap_err().to_string();
+        assert!(said.contains(says), "{said}");
+        assert!(most < MIB, "{name}: {most} bytes");
+    }
+}
+
+fn recording(lists: &[(&str, &str)]) -> TempDir {
+    let dir = TempDir::new().unwrap();
+    for (name, text) in lists {
+        fs::write(dir.path().join(name), text).unwrap();
+    }
+    dir
+}
+
+fn open(dir: &TempDir) -> Result<Recording, RecordingError> {
+    Recording::open(dir.path(), &Options { keep_going: true, ..Options::default() })
+}
+
+#[test]
+fn lists_have_a_length_that_recordings_have() {
+    let _alone = alone();
+    let dir = recording(&[]);
+    let list = File::create(dir.path().join("associations.txt")).unwrap();
+    list.set_len(100 << 20).unwrap();
+    let (most, refused) = most_bytes(|| open(&dir));
+    assert_says(refused, "too large");
+    assert!(most < MIB, "{most} bytes");
+
+    let lines = "x\n".repeat(3 * MIB);
+    for list in ["associations.txt", "rgb.txt"] {
+        let dir = recording(&[(list, &lines)]);
+        let (most, refused) = most_bytes(|| open(&dir));
+        assert_says(refused, "more than 1000000 lines");
+        assert!(most < 8 * MIB, "{most} bytes");
+    }
+}
+
+/// Only headers are read, and what cannot be read once is not tried again.
+#[test]
+fn a_file_that_many_lines_name_is_looked_at_once() {
+    let _alone = alone();
+    let lines: String = (0..50_000).map(|line| format!("{line} a.png {line} a.png\n")).collect();
+    let dir = recording(&[("associations.txt", &lines)]);
+    let file = File::create(dir.path().join("a.png")).unwrap();
+    (&file).write_all(b"\x89PNG\r\n\x1a\n").unwrap();
+    file.set_len(50 << 20).unwrap();
+    let (most, refused) = most_bytes(|| open(&dir));
+    assert_says(refused, "cannot tell colour from depth");
+    assert!(most < 50 * MIB, "{most} bytes");
+    let dir = recording(&[("rgb.txt", &lines.replace(" a.png\n", "\n").replace("a.png 1", "a.png"))]);
+    assert!(open(&dir).is_err());
+}
+
+/// A pipe would be waited for, and a device never ends.
+#[test]
+fn only_files_are_read() {
+    let _alone = alone();
+    let dir = TempDir::new().unwrap();
+    let pipe = dir.path().join("pipe");
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
+    for (target, what) in [(pipe.as_path(), "a pipe"), (Path::new("/dev/zero"), "a device")] {
+        let folder = TempDir::new().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["rgb.txt", "left.yaml", "photo.png", "map.pfm", "calib.txt"] {
+            symlink(target, at(name)).unwrap();
+        }
+        assert_says(open(&folder), what);
+        assert_says(calibration::load(&[&at("left.yaml")]), what);
+        assert_says(Geometry::read(&at("calib.txt"), &at("photo.png")), what);
+        assert_says(read_color(&at("photo.png")), "not a regular file");
+        assert_says(read_depth(&at("map.pfm"), 1.0, None), "not a regular file");
+    }
+}
+
+#[test]
+fn settings_are_a_file_of_a_sensible_size() {
+    let _alone = alone();
+    let dir = TempDir::new().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let presets: String = (0..60_000).map(|n| format!("[presets.p{n}]\nrim = 0.1\n")).collect();
+    fs::write(at("long.toml"), presets).unwrap();
+    rustix::fs::mkfifoat(rustix::fs::CWD, at("pipe.toml"), rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
+    symlink("/dev/zero", at("zeros.toml")).unwrap();
+    for (file, says) in
+        [("long.toml", "it is too large"), ("pipe.toml", "it is a pipe"), ("zeros.toml", "it is a device")]
+    {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+        command.env_clear().env("XDG_CONFIG_HOME", dir.path()).current_dir(dir.path()).stdin(Stdio::null());
+        let output = command.args(["config", "dump", "--config", file]).output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && stderr.lines().count() == 1, "{stderr}");
+        assert!(stderr.contains(file) && stderr.contains(says), "{stderr}");
+    }
+}

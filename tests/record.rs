@@ -1,0 +1,280 @@
+//! `record` never costs a recording: neither its source, nor the old one in its place, nor what it has when it is cut short.
+#![allow(missing_docs)]
+
+use std::fs;
+use std::io::Read;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::recording::tum::{Writer, WriterOptions};
+use bokehcam::recording::{Options, Recording, Scratch};
+use tempfile::TempDir;
+
+/// What a folder holds: names and content, links not followed, without our own list of files.
+fn all(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    fn add(dir: &Path, below: &Path, found: &mut Vec<(String, Vec<u8>)>) {
+        for entry in fs::read_dir(below).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() && !path.is_symlink() {
+                add(dir, &path, found);
+            } else if !path.ends_with(".bokehcam") {
+                let name = path.strip_prefix(dir).unwrap().to_str().unwrap().to_owned();
+                found.push((name, fs::read(&path).unwrap_or_default()));
+            }
+        }
+    }
+    let mut found = Vec::new();
+    add(dir, dir, &mut found);
+    found.sort();
+    found
+}
+
+fn names(dir: &Path) -> Vec<String> {
+    all(dir).into_iter().map(|(name, _)| name).collect()
+}
+
+struct Ran {
+    code: Option<i32>,
+    stderr: String,
+}
+
+fn program(home: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    command.env_clear().env("XDG_CONFIG_HOME", home).env("PATH", std::env::var_os("PATH").unwrap());
+    command.args(args).current_dir(home).stdin(Stdio::null());
+    command
+}
+
+fn run(home: &Path, args: &[&str]) -> Ran {
+    let output = program(home, args).output().unwrap();
+    Ran { code: output.status.code(), stderr: String::from_utf8(output.stderr).unwrap() }
+}
+
+/// A recording of `frames` frames as `dir`, all of `shade`, with depth.
+fn recording(dir: &Path, frames: u64, shade: u8, metres: f32) {
+    let mut writer = Writer::create(dir, &WriterOptions::default()).unwrap();
+    let color = ColorImage { width: 24, height: 16, rgb: vec![shade; 24 * 16 * 3] };
+    let depth = DepthMap { width: 24, height: 16, metres: vec![metres; 24 * 16] };
+    (0..frames).for_each(|frame| writer.add(frame * 100_000_000, &color, Some(&depth)).unwrap());
+    writer.finish().unwrap();
+}
+
+/// Frames that can be read, and the first byte of the first.
+fn read(dir: &Path) -> (usize, u8) {
+    let recording = Recording::open(dir, &Options::default()).unwrap();
+    let (mut scratch, mut image, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
+    for frame in (0..recording.len()).rev() {
+        recording.read_color(frame, &mut scratch, &mut image).unwrap();
+        recording.read_depth(frame, &mut scratch, &mut depth).unwrap();
+    }
+    (recording.len(), image.rgb[0])
+}
+
+#[test]
+fn a_source_is_never_the_target() {
+    let home = TempDir::new().unwrap();
+    let take = home.path().join("take");
+    recording(&take, 3, 50, 1.0);
+    symlink(&take, home.path().join("link")).unwrap();
+    let before = all(home.path());
+    for target in ["take", "./take/", "link", "take/rgb", "take/new", "link/new", "."] {
+        let ran = run(home.path(), &["record", "take", "--to", target, "--force"]);
+        assert_eq!((ran.code, ran.stderr.lines().count()), (Some(2), 1), "{target}: {}", ran.stderr);
+        assert!(ran.stderr.contains(&format!("--to {target}: this ")), "{}", ran.stderr);
+    }
+    assert_eq!(all(home.path()), before);
+}
+
+#[test]
+fn a_source_that_fails_leaves_the_old_recording() {
+    let home = TempDir::new().unwrap();
+    let at = |name: &str| home.path().join(name);
+    recording(&at("source"), 4, 50, 1.0);
+    recording(&at("old"), 2, 200, 2.0);
+    let before = all(&at("old"));
+
+    // At its first frame: nothing was recorded, and nothing is left.
+    let first = fs::read(at("source/rgb/000000.png")).unwrap();
+    fs::write(at("source/rgb/000000.png"), &first[..first.len() - 20]).unwrap();
+    let ran = run(home.path(), &["record", "source", "--to", "old", "--force"]);
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.stderr.contains("000000.png: ") && ran.stderr.contains("error: "), "{}", ran.stderr);
+    assert_eq!((all(&at("old")), at("old.incomplete").exists()), (before.clone(), false));
+
+    // Later: what was recorded until then is kept beside.
+    fs::write(at("source/rgb/000000.png"), first).unwrap();
+    fs::write(at("source/rgb/000003.png"), "").unwrap();
+    let ran = run(home.path(), &["record", "source", "--to", "old", "--force"]);
+    assert_eq!(ran.code, Some(1));
+    assert!(
+        ran.stderr.contains("old: as it was") && ran.stderr.contains("3 frames are in old.incomplete"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!((all(&at("old")), read(&at("old.incomplete"))), (before, (3, 50)));
+
+    // Where nothing is replaced it has its own name.
+    let ran = run(home.path(), &["record", "source", "--to", "new"]);
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.stderr.contains("new: cut short; the 3 frames until then can be read"), "{}", ran.stderr);
+    assert_eq!(read(&at("new")), (3, 50));
+}
+
+#[test]
+fn only_what_the_old_lists_name_goes() {
+    let home = TempDir::new().unwrap();
+    let at = |name: &str| home.path().join(name);
+    recording(&at("source"), 2, 50, 1.0);
+    // As others write them: by time, with lists and files of their own.
+    recording(&at("old"), 3, 200, 2.0);
+    fs::remove_file(at("old/.bokehcam")).unwrap();
+    fs::rename(at("old/rgb/000002.png"), at("old/rgb/0.2.png")).unwrap();
+    let lists = fs::read_to_string(at("old/rgb.txt")).unwrap();
+    fs::write(at("old/rgb.txt"), lists.replace("000002", "0.2") + "9.0 notes.txt\n9.1 ../outside.png\n").unwrap();
+    let foreign = ["old/rgb/1234.png", "old/notes.txt", "old/groundtruth.txt", "outside.png"];
+    foreign.iter().for_each(|name| fs::write(at(name), "mine").unwrap());
+
+    let ran = run(home.path(), &["record", "source", "--to", "old"]);
+    assert!(ran.code == Some(1) && ran.stderr.contains("--force"), "{}", ran.stderr);
+    assert_eq!(read_sloppily(&at("old")), 3);
+    let ran = run(home.path(), &["record", "source", "--to", "old", "--force"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    // Three pictures, three maps, two lists.
+    assert!(ran.stderr.contains("2 frames recorded") && ran.stderr.contains("in place of 8 files"), "{}", ran.stderr);
+    assert_eq!(read(&at("old")), (2, 50));
+    let ours = ["depth.txt", "depth/000000.png", "depth/000001.png", "rgb.txt", "rgb/000000.png", "rgb/000001.png"];
+    let mut expected: Vec<_> =
+        ours.iter().chain(&["groundtruth.txt", "notes.txt", "rgb/1234.png"]).map(|s| s.to_string()).collect();
+    expected.sort();
+    assert_eq!(names(&at("old")), expected);
+    assert!(foreign.iter().all(|name| fs::read(at(name)).unwrap() == b"mine"));
+
+    // A picture that would be in the way is nobody's to take.
+    fs::write(at("old/rgb/000002.png"), "mine").unwrap();
+    recording(&at("longer"), 3, 70, 1.0);
+    let ran = run(home.path(), &["record", "longer", "--to", "old", "--force"]);
+    assert!(ran.code == Some(1) && ran.stderr.contains("old/rgb/000002.png was not written by"), "{}", ran.stderr);
+    assert_eq!(read(&at("old")), (2, 50));
+}
+
+/// Frames of a recording whose lists have faults.
+fn read_sloppily(dir: &Path) -> usize {
+    let recording = Recording::open(dir, &Options { keep_going: true, ..Options::default() }).unwrap();
+    let (mut scratch, mut image) = (Scratch::default(), ColorImage::default());
+    (0..recording.len()).filter(|&frame| recording.read_color(frame, &mut scratch, &mut image).is_ok()).count()
+}
+
+/// Runs `record` until it has some frames in `place`, and sends it `signal`.
+fn interrupted(home: &Path, args: &[&str], place: PathBuf, signal: &str) -> Ran {
+    let mut child = program(home, args).stderr(Stdio::piped()).spawn().unwrap();
+    while fs::read_dir(&place).map_or(0, |entries| entries.count()) < 4 {
+        assert!(child.try_wait().unwrap().is_none(), "it ends only when told to");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
+    let mut stderr = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+    Ran { code: child.wait().unwrap().code(), stderr }
+}
+
+#[test]
+fn a_recording_that_is_cut_short_is_readable() {
+    let home = TempDir::new().unwrap();
+    let at = |name: &str| home.path().join(name);
+    recording(&at("old"), 2, 200, 2.0);
+    let before = all(&at("old"));
+    let endless = ["record", "synthetic", "--size", "64x48", "--to", "old", "--force"];
+    let long = [&endless[..], &["--frames", "1000000"]].concat();
+
+    let ran = interrupted(home.path(), &long, at("old/.bokehcam.part/rgb"), "-INT");
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stderr.contains("old: as it was") && ran.stderr.contains("are in old.incomplete"), "{}", ran.stderr);
+    assert_eq!(all(&at("old")), before);
+    assert!(read(&at("old.incomplete")).0 >= 3);
+
+    // Killed: the next one keeps what there is.
+    interrupted(home.path(), &long, at("old/.bokehcam.part/rgb"), "-KILL");
+    let once = [&endless[..], &["--frames", "1"]].concat();
+    let ran = run(home.path(), &once);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stderr.contains("is kept as old.incomplete.2"), "{}", ran.stderr);
+    assert!(read(&at("old.incomplete.2")).0 >= 2);
+    assert_eq!(read(&at("old")).0, 1);
+
+    // Without an end of its own it ends where it is told to.
+    let ran = interrupted(home.path(), &endless, at("old/.bokehcam.part/rgb"), "-INT");
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stderr.contains("in place of 4 files"), "{}", ran.stderr);
+    assert!(read(&at("old")).0 >= 3);
+    assert!(!names(&at("old")).iter().any(|name| name.contains("part")));
+}
+
+#[test]
+fn a_killed_recording_gets_its_lists() {
+    let home = TempDir::new().unwrap();
+    let at = |name: &str| home.path().join(name);
+    let args = ["record", "synthetic", "--size", "64x48", "--to", "new"];
+    interrupted(home.path(), &args, at("new/rgb"), "-KILL");
+    let ran = run(home.path(), &args);
+    assert!(ran.code == Some(1) && ran.stderr.contains("rgb.txt: completed, as far as"), "{}", ran.stderr);
+    assert!(read(&at("new")).0 >= 2);
+    assert!(!names(&at("new")).iter().any(|name| name.ends_with(".part")), "{:?}", names(&at("new")));
+}
+
+/// No file may be larger than a limit, as on a disk that is full.
+#[test]
+fn a_full_disk_leaves_no_half_picture() {
+    let home = TempDir::new().unwrap();
+    let at = |name: &str| home.path().join(name);
+    recording(&at("source"), 3, 50, 1.0);
+    // One that is hard to compress.
+    let mut state = 1_u32;
+    let mut noise = image::RgbImage::new(24, 16);
+    noise.iter_mut().for_each(|byte| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        *byte = (state >> 24) as u8;
+    });
+    noise.save(at("source/rgb/000002.png")).unwrap();
+    for (target, kept) in [("new", "new"), ("old", "old.incomplete")] {
+        if target != kept {
+            recording(&at(target), 1, 200, 2.0);
+        }
+        let line = format!(
+            "trap '' XFSZ; ulimit -f 1; exec {} record source --to {target} --force",
+            env!("CARGO_BIN_EXE_bokehcam")
+        );
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &line]).current_dir(home.path()).env("XDG_CONFIG_HOME", home.path());
+        let output = shell.output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert!(stderr.contains("rgb/000002.png") && stderr.contains("large"), "{stderr}");
+        assert_eq!(read(&at(kept)), (2, 50), "{stderr}");
+        assert!(
+            !names(&at(kept)).iter().any(|name| name.contains("part") || name == "rgb/000002.png"),
+            "{:?}",
+            names(&at(kept))
+        );
+    }
+    assert_eq!(read(&at("old")), (1, 200));
+}
+
+#[test]
+fn depth_that_a_wrong_scale_makes_is_doubted() {
+    let home = TempDir::new().unwrap();
+    let at = |name: &str| home.path().join(name);
+    recording(&at("source"), 2, 50, 1.5);
+    for (scale, says) in [("5", "all depth is 1500.0 m away or more"), ("1e7", "all depth is nearer than 0.8 mm")] {
+        let ran = run(home.path(), &["record", "source", "--depth-scale", scale, "--to", "new", "--force"]);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        assert_eq!(ran.stderr.matches(says).count(), 1, "{}", ran.stderr);
+        assert_eq!(ran.stderr.matches("--depth-scale").count(), 1, "{}", ran.stderr);
+        assert_eq!(ran.stderr.contains("100.0 % of the depth lies beyond 13.1 m"), scale == "5", "{}", ran.stderr);
+    }
+    let ran = run(home.path(), &["record", "source", "--to", "new", "--force", "-v"]);
+    assert!(ran.code == Some(0) && !ran.stderr.contains("depth-scale"), "{}", ran.stderr);
+}
