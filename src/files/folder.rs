@@ -183,7 +183,7 @@ impl Folder {
         };
         let checked = list::read(&part).and_then(|new| {
             let old = list::read(&self.path)?;
-            new.iter().filter(|name| !old.contains(*name)).try_for_each(|name| {
+            new.iter().filter(|name| !old.contains(name)).try_for_each(|name| {
                 let path = self.path.join(name);
                 if path.symlink_metadata().is_ok() { Err(FolderError::Foreign { path }) } else { Ok(()) }
             })
