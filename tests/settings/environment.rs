@@ -25,7 +25,8 @@ fn switches_are_whatever_people_write() {
     for (value, expected) in [("1", true), ("yes", true), ("true", true), ("0", false), ("no", false), ("false", false)]
     {
         let home = Home::new().with_photo();
-        let args = ["render", "photo.png", "--out", "photo.png", "--effect", "none"];
+        std::fs::write(home.path("there.png"), "").unwrap();
+        let args = ["render", "photo.png", "--out", "there.png", "--effect", "none"];
         let ran: Ran = home.command(&args).env("BOKEHCAM_FORCE", value).output().unwrap().into();
         assert_eq!(ran.code == 0, expected, "{value}: {}", ran.stderr);
     }

@@ -3,7 +3,7 @@ use clap::{Args, Command, FromArgMatches};
 use super::*;
 use crate::bokeh::Effect;
 use crate::bokeh::aperture::{Aperture, Shape};
-use crate::frame::ColorImage;
+use crate::frame::{ColorImage, DepthMap};
 use crate::look::{Refine, Tilt, flags};
 use crate::optics::{CocField, Lens};
 use crate::pipeline::CocRule;
@@ -109,7 +109,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
     for number in [0.1, 1.0 / 3.0, 1e-7, 0.3 - 0.1, 1e-40, 0.999_999_94] {
         add(&|look| look.rim = number);
         add(&|look| look.aperture.intensity = -number);
-        add(&|look| look.focus = FocusRule::Metres(number));
+        add(&|look| look.focus = FocusRule::Metres(number.max(DepthMap::LEAST_M)));
         add(&|look| look.focus = FocusRule::Point { x: number, y: 1.0 - number });
         add(&|look| look.strength = Strength::Percent(number));
         add(&|look| look.tilt = Tilt { center_y: number, band: 0.0, angle_deg: -360.0 * number });
