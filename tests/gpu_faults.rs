@@ -212,7 +212,7 @@ fn a_run_ends_whole_and_says_in_one_line_what_happened() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
     command.env("XDG_CONFIG_HOME", folder.path()).env_remove("RUST_LOG").arg("stream").arg(recording);
     command.args(["--backend", "gpu", "--pace", "asap", "--to", "null", "--report"]).arg(&report);
-    let output = under(&layer, "wait:6", &mut command);
+    let output = under(&layer, "submit:6", &mut command);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
     assert_eq!(told.matches("the CPU blurs from here on").count(), 1, "{told}");

@@ -5,16 +5,19 @@ use std::path::Path;
 
 use super::arguments::{joined, one_line};
 use super::settings::SettingsFile;
-use super::{CliError, Command, ConfigCommand, Refusal, dump};
+use super::{CliError, Command, ConfigCommand, Refusal, dump, log};
 
 /// The settings that a command line stands for, as `config dump` prints them; nothing for other commands.
 ///
 /// # Errors
-/// It is refused: the message.
+/// It is refused: the message, as it is printed.
 pub fn arguments(args: &[OsString]) -> Result<String, String> {
-    let parsed = super::parse(&joined(args.iter().cloned())).map_err(|refusal| match refusal {
-        Refusal::Arguments(error) => one_line(&error),
-        Refusal::Settings(error) => error.to_string(),
+    let parsed = super::parse(&joined(args.iter().cloned())).map_err(|refusal| {
+        let message = match refusal {
+            Refusal::Arguments(error) => one_line(&error),
+            Refusal::Settings(error) => error.to_string(),
+        };
+        log::printable(&message, &[]).into_owned()
     })?;
     Ok(match parsed.cli.command {
         Command::Config(ConfigCommand::Dump { .. }) => {
