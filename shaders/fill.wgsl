@@ -4,6 +4,7 @@
 @group(0) @binding(1) var<storage, read> pyramid: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> scene: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read_write> ranges: array<vec2<f32>>;
+@group(0) @binding(4) var<storage, read> known: array<f32>;
 
 @compute @workgroup_size(16, 16)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
@@ -18,8 +19,10 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
     let inside = min(id.xy, frame.size - 1u);
     let own = scene_unpacked(scene[inside.y * frame.size.x + inside.x], frame.most_px);
     let hidden = 1.0 - step_at(frame.unhidden, own.w);
-    if all(id.xy < frame.size) && hidden > 0.0 {
-        let value = mix(own, pyramid[id.y / 2u * ((frame.size.x + 1u) / 2u) + id.x / 2u], hidden);
+    let behind = inside.y / 2u * ((frame.size.x + 1u) / 2u) + inside.x / 2u;
+    // Where something near touches every pixel nothing is known, and nothing lies behind.
+    if all(id.xy < frame.size) && hidden > 0.0 && known[behind] > 0.5 {
+        let value = mix(own, pyramid[behind], hidden);
         let filled = scene_packed(value.rgb, max(value.w, frame.nearest_px), frame.most_px);
         scene[id.y * frame.size.x + id.x] = filled;
         range_add(scene_unpacked(filled, frame.most_px).w);

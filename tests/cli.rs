@@ -44,7 +44,7 @@ fn dumped(dump: &str, name: &str) -> (String, String) {
     (value.to_string(), origin.to_string())
 }
 
-const COMMANDS: [&[&str]; 11] = [
+const COMMANDS: [&[&str]; 12] = [
     &["stream"],
     &["render"],
     &["depth"],
@@ -56,6 +56,7 @@ const COMMANDS: [&[&str]; 11] = [
     &["completions"],
     &["config"],
     &["config", "dump"],
+    &["config", "save"],
 ];
 
 #[test]

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
-use bokehcam::bokeh::{self, Bokeh, Effect, Job};
+use bokehcam::bokeh::{self, Bokeh, BokehError, Effect, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::device::Device;
 use bokehcam::compute::{Backend, Place};
@@ -124,8 +124,11 @@ fn a_destroyed_device_is_followed_by_the_cpu() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn frames_are_blurred_whatever_becomes_of_the_device() {
-    let device = device().with_patience(Duration::from_secs(1));
-    match bokeh::create_on(&settings(Effect::Dof), SIZE, Arc::new(device), Some(1)) {
+    let made = Device::open(false, None).map_err(BokehError::from).and_then(|device| {
+        let device = device.with_patience(Duration::from_secs(1));
+        bokeh::create_on(&settings(Effect::Dof), SIZE, Arc::new(device), Some(1))
+    });
+    match made {
         Ok(mut bokeh) => {
             blur(&mut *bokeh, |_| {});
             println!("ran on {}: {}", bokeh.backend(), bokeh.describe());
@@ -209,7 +212,7 @@ fn a_run_ends_whole_and_says_in_one_line_what_happened() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
     command.env("XDG_CONFIG_HOME", folder.path()).env_remove("RUST_LOG").arg("stream").arg(recording);
     command.args(["--backend", "gpu", "--pace", "asap", "--to", "null", "--report"]).arg(&report);
-    let output = under(&layer, "wait:6", &mut command);
+    let output = under(&layer, "submit:6", &mut command);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
     assert_eq!(told.matches("the CPU blurs from here on").count(), 1, "{told}");

@@ -64,7 +64,7 @@ fn rows_are_measured_to_parts_of_a_pixel() {
         assert!(found.matches > 40 && (found.vertical_px - down_px).abs() < 0.12, "{down_px}: {found:?}");
         let Verdict::RowsOff { px } = found.verdict() else { panic!("{down_px}: {found:?}") };
         assert!((px - down_px.abs()).abs() < 0.4, "{px} of {down_px}");
-        assert!(found.verdict().to_string().contains("--calib"));
+        assert!(found.verdict().to_string().contains("rows are off by up to"));
     }
 }
 

@@ -134,6 +134,19 @@ fn the_comparison_methods_agree() {
     }
 }
 
+/// Beyond 16 px the radii of the filters lie evenly in each octave, and no longer in each pixel.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn wide_radii_agree() {
+    let (image, map) = (noise(64, 48), three_depths(64, 48));
+    let field = CocField::Depth(DepthCoc { coc_at_infinity_px: 37.3, focus_m: 1.0, range_m: 0.0, max_coc_px: 51.7 });
+    for (method, rank) in [(Method::Gather, Rank::Terms(2)), (Method::Layered, Rank::Full)] {
+        let (far_max_px, near_max_px) = (37.3, 51.7);
+        let settings = Settings { method, rank: Some(rank), far_max_px, near_max_px, ..settings(Effect::Dof) };
+        same(&settings, &image, &map, &field, &format!("wide {method:?} {rank:?}"));
+    }
+}
+
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_range_of_focus_agrees() {

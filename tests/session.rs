@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -29,10 +30,16 @@ struct Film(Arc<Mutex<Vec<String>>>, String);
 
 impl Sink for Film {
     fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        if self.1 == "fills up" {
+            return Err(SinkError::Exists { path: "the disk is full now".into() });
+        }
         self.0.lock().unwrap().push(format!("{} {}", self.1, frame.width));
         Ok(ControlFlow::Continue(()))
     }
     fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
+        if self.1 == "no end" {
+            return Err(SinkError::Exists { path: "the disk is full at the end".into() });
+        }
         self.0.lock().unwrap().push(format!("{} complete", self.1));
         Ok(())
     }
@@ -92,7 +99,7 @@ struct Watched {
     written: Arc<Mutex<Vec<String>>>,
 }
 
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(120);
 
 fn look() -> Look {
     Look { strength: Strength::AtInfinity(2.0), ..Look::plain(Some(Effect::Dof)) }
@@ -100,6 +107,10 @@ fn look() -> Look {
 
 impl Watched {
     fn begin(source: &str) -> Self {
+        Self::begin_in(source, &std::env::temp_dir())
+    }
+
+    fn begin_in(source: &str, folder: &Path) -> Self {
         let (executors, written) = (Arc::<AtomicUsize>::default(), Arc::<Mutex<Vec<String>>>::default());
         let start = Start {
             backstage: Box::new(Wings { executors: Arc::clone(&executors), written: Arc::clone(&written) }),
@@ -108,7 +119,7 @@ impl Watched {
             outputs: Vec::new(),
             keep_going: false,
             budget_ns: None,
-            folder: std::env::temp_dir(),
+            folder: folder.to_owned(),
             wanted: Arc::default(),
         };
         let session = Session::begin(start, Arc::new(|| {})).unwrap();
@@ -250,4 +261,39 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     watched.session.close().report.unwrap();
     let complete = written.lock().unwrap().iter().filter(|line| *line == "camera complete").count();
     assert_eq!(complete, 2, "once for each source");
+}
+
+#[test]
+fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
+    for (name, why) in [("fills up", "full now"), ("no end", "full at the end")] {
+        let mut watched = Watched::begin("32");
+        watched.until("it runs", |told| is_running(told, 32));
+        watched.session.order(Todo::Begin(Output { name: name.into(), is_camera: false }));
+        if name == "fills up" {
+            watched.until("why", |told| matches!(told, Told::Trouble(line) if line.contains(why)));
+            watched.until("none is written", |told| *told == Told::Outputs(Vec::new()));
+        } else {
+            watched.until("it is written", |told| matches!(told, Told::Outputs(outputs) if outputs.len() == 1));
+            watched.frame("a frame", |_| true);
+        }
+        let closed = watched.session.close();
+        assert!(closed.failed.as_ref().is_some_and(|line| line.contains(why)), "{closed:?}");
+        assert!(closed.report.unwrap().frames.balance());
+    }
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    assert_eq!(watched.session.close().failed, None);
+}
+
+#[test]
+fn a_recording_that_was_broken_off_is_found_at_the_next_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at(".bokehcam-3.mp4.77-0.part"), "take").unwrap();
+    std::fs::write(at(".holiday.mp4.77-0.part"), "mine").unwrap();
+    let mut watched = Watched::begin_in("32", folder.path());
+    watched.until("it is told", |told| matches!(told, Told::Note(line) if line.contains("bokehcam-3.mp4.incomplete")));
+    watched.session.close();
+    assert_eq!(std::fs::read(at("bokehcam-3.mp4.incomplete")).unwrap(), b"take");
+    assert_eq!(std::fs::read(at(".holiday.mp4.77-0.part")).unwrap(), b"mine");
 }

@@ -48,20 +48,26 @@ fn open_terminal(name: &Path) -> File {
 /// Writes until nothing more is taken.
 fn fill(name: &Path) {
     let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits() as i32;
-    fill_up(OpenOptions::new().write(true).custom_flags(flags).open(name).unwrap());
+    let mut terminal = OpenOptions::new().write(true).custom_flags(flags).open(name).unwrap();
+    // The kernel makes room once more, in its own time.
+    while fill_up(&mut terminal) > 0 {
+        thread::sleep(Duration::from_millis(100));
+    }
 }
 
-fn fill_up(mut file: impl Write) {
+fn fill_up(mut file: impl Write) -> usize {
+    let mut written = 0;
     for size in [4096, 1] {
         let blanks = vec![b' '; size];
         loop {
             match file.write(&blanks) {
-                Ok(_) => {}
+                Ok(bytes) => written += bytes,
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                 Err(error) => panic!("{error}"),
             }
         }
     }
+    written
 }
 
 /// Waits for the end; ends what hangs.

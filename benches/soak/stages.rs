@@ -27,7 +27,10 @@ pub struct Stamps {
 
 impl Stamps {
     pub fn with_room_for(frames: usize) -> Self {
-        Self { shown: Arc::new(Mutex::new(Vec::with_capacity(frames))), ..Self::default() }
+        // Written to, so that the system gives the memory now and not as frames come.
+        let mut shown = vec![(1, 1); frames];
+        shown.clear();
+        Self { shown: Arc::new(Mutex::new(shown)), ..Self::default() }
     }
 
     pub fn take(&self) -> Vec<(u64, u64)> {

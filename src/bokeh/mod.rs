@@ -10,6 +10,7 @@ pub mod fallback;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod levels;
+mod limit;
 pub mod low_rank;
 pub mod plan;
 pub mod rung;
@@ -103,44 +104,6 @@ pub struct Settings {
     pub far_max_px: f32,
     /// Largest CoC radius in front of the focal plane, in pixels (0 when nothing can be there).
     pub near_max_px: f32,
-}
-
-/// Largest radius of [`Method::Gather`], in pixels: it filters at full scale.
-const MOST_GATHERED_PX: f32 = 512.0;
-/// The same with [`Rank::Full`], when it gathers in two dimensions: kernels grow with the square of the radius.
-const MOST_EXACT_PX: f32 = 128.0;
-
-impl Settings {
-    /// The largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their diagonal,
-    /// or less where the method bears no more.
-    pub fn most_radius_px(&self, size: (u32, u32)) -> f32 {
-        let diagonal_px = (size.0 as f32).hypot(size.1 as f32).ceil();
-        diagonal_px.min(match (self.effect, self.method, self.rank) {
-            (Effect::Dof, Method::Gather, Some(Rank::Full)) => MOST_EXACT_PX,
-            (Effect::Dof, Method::Gather, _) => MOST_GATHERED_PX,
-            _ => f32::INFINITY,
-        })
-    }
-
-    /// These settings, with radii cut to what pictures of `size` bear.
-    fn within(&self, size: (u32, u32)) -> Self {
-        let most_px = self.most_radius_px(size);
-        let cut = |radius_px: f32| radius_px.max(0.0).min(most_px);
-        Self { far_max_px: cut(self.far_max_px), near_max_px: cut(self.near_max_px), ..self.clone() }
-    }
-
-    /// Whether pictures of `size` (width, height) can be blurred so.
-    ///
-    /// # Errors
-    /// [`BokehError::TooWide`].
-    pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
-        let (radius_px, most_px) = (self.far_max_px.max(self.near_max_px), self.most_radius_px(size));
-        if radius_px <= most_px {
-            return Ok(());
-        }
-        let by_method = (self.effect, self.method) == (Effect::Dof, Method::Gather);
-        Err(BokehError::TooWide { radius_px, most_px, size, by_method })
-    }
 }
 
 /// One frame to blur. The executor owns the buffers until the frame is [`Finished`].

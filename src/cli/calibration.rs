@@ -52,7 +52,11 @@ pub fn load(path: &Path) -> Result<Registration, CliError> {
     parse(path, &input::read_text(path, input::MOST_CALIBRATION_BYTES).map_err(CliError::io(path))?)
 }
 
-fn parse(path: &Path, text: &str) -> Result<Registration, CliError> {
+/// Reads the text of the calibration file `path`.
+///
+/// # Errors
+/// As [`load`], but for the reading.
+pub fn parse(path: &Path, text: &str) -> Result<Registration, CliError> {
     let refuse = |at: usize, what: String| CliError::Settings {
         path: path.to_owned(),
         line: text[..at.min(text.len())].matches('\n').count() + 1,

@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use super::options;
-use super::source::{Source, depth_of};
+use super::source::{Source, depth_of, first_depth};
 use super::unused::DepthFrom;
 use super::values::{DepthChoice, Effect};
 use crate::capture::Brings;
@@ -35,6 +35,7 @@ pub fn beside(
     if source.camera.info().brings == Brings::Depth {
         return usage("the source knows its depth: leave --depth out");
     }
+    let mut first = None;
     let (opened, depth_from): (Box<dyn DepthSource>, _) = match &blur.depth {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
@@ -46,11 +47,12 @@ pub fn beside(
             };
             let recording = Recording::open(folder, &options)?;
             let depth_from = depth_of(&recording);
+            first = first_depth(&recording, blur);
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Device(name) => (device(name, depth, clock)?, DepthFrom::Units),
     };
-    Ok(Source { depth: Some(opened), depth_from, ..source })
+    Ok(Source { depth: Some(opened), depth_from, first_depth: first, ..source })
 }
 
 #[cfg(feature = "camera")]

@@ -27,6 +27,8 @@ mod layers;
 mod log;
 mod near;
 mod options;
+#[doc(hidden)]
+pub mod parsers;
 mod presets;
 #[cfg(feature = "window")]
 mod preview;

@@ -5,8 +5,8 @@ mod groups;
 
 use std::path::PathBuf;
 
-use clap::builder::{BoolishValueParser, TypedValueParser};
-use clap::{Args, value_parser};
+use clap::Args;
+use clap::builder::{BoolishValueParser, RangedI64ValueParser, TypedValueParser};
 
 pub use groups::{Every, Streaming};
 
@@ -60,7 +60,7 @@ pub struct Source {
           hide_possible_values = true)]
     pub repeat: bool,
     /// Stop after this many frames
-    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = RangedI64ValueParser::<u64>::new().range(1..))]
     pub frames: Option<u64>,
     /// Picture size; of a camera, the nearest that it has [default: 1280x720 of a camera, 640x480 of `synthetic`]
     #[arg(long, value_name = "WxH")]
@@ -270,7 +270,7 @@ pub struct Stream {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Output")]
 pub struct Output {
-    /// Overwrite what exists
+    /// Overwrite what exists, once what replaces it is whole; of a folder, only files that bokehcam wrote
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]
@@ -294,7 +294,7 @@ fn disparities(text: &str) -> Result<u32, String> {
 
 /// A parser of numbers of threads.
 pub fn threads() -> impl TypedValueParser<Value = usize> {
-    value_parser!(u64).range(1..=1024).map(|threads| threads as usize)
+    RangedI64ValueParser::<u64>::new().range(1..=1024).map(|threads| threads as usize)
 }
 
 fn rate(text: &str) -> Result<f64, String> {

@@ -61,7 +61,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
     if let Some(folder) = command.source.folder() {
         refuse_source("--to", &command.to, folder)?;
     }
-    let Source { mut camera, depth: mut source, rig, depth_from } = Source::open(&command.source, &wanted)?;
+    let Source { mut camera, depth: mut source, rig, depth_from, .. } = Source::open(&command.source, &wanted)?;
     unused::warn(
         &given.settings,
         &unused::Run {

@@ -204,22 +204,29 @@ mod tests {
 
     /// A terminal that takes nothing until it is told to.
     #[derive(Clone, Default)]
-    struct Stopped(Arc<(Mutex<(bool, Vec<u8>)>, Condvar)>);
+    struct Stopped(Arc<Taking>);
+
+    #[derive(Default)]
+    struct Taking {
+        /// Whether it takes anything, and what it took.
+        state: Mutex<(bool, Vec<u8>)>,
+        told: Condvar,
+    }
 
     impl Stopped {
         fn go_on(&self) {
-            self.0.0.lock().unwrap().0 = true;
-            self.0.1.notify_all();
+            self.0.state.lock().unwrap().0 = true;
+            self.0.told.notify_all();
         }
 
         fn text(&self) -> String {
-            String::from_utf8(self.0.0.lock().unwrap().1.clone()).unwrap()
+            String::from_utf8(self.0.state.lock().unwrap().1.clone()).unwrap()
         }
     }
 
     impl Write for Stopped {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            let (state, told) = &*self.0;
+            let Taking { state, told } = &*self.0;
             let mut state = told.wait_while(state.lock().unwrap(), |(goes, _)| !*goes).unwrap();
             state.1.extend_from_slice(bytes);
             Ok(bytes.len())

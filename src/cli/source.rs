@@ -23,9 +23,11 @@ use crate::capture::{Brings, Camera, CaptureError};
 use crate::clock::Clock;
 use crate::compute::team::cores;
 use crate::depth::DepthSource;
+use crate::depth::focus::FocusRule;
 use crate::depth::recorded::Recorded;
+use crate::frame::DepthMap;
 use crate::optics::StereoRig;
-use crate::recording::{Options, Pair, Recording};
+use crate::recording::{Options, Pair, Recording, Scratch};
 use crate::scene::Scene;
 #[cfg(feature = "camera")]
 use crate::v4l2::{layout::Content, live::Wish};
@@ -40,6 +42,8 @@ pub struct Source {
     pub rig: Option<StereoRig>,
     /// What depth comes from.
     pub depth_from: DepthFrom,
+    /// The first map of recorded depth, where a distance was given that it can be compared with.
+    pub first_depth: Option<DepthMap>,
 }
 
 /// How a source is wanted.
@@ -104,10 +108,12 @@ impl Source {
             if let Some(blur) = wanted.blur {
                 stereo::check_focus(&rig, blur)?;
             }
-            let (depth, depth_from) = (Some(Box::new(depth) as Box<dyn DepthSource>), DepthFrom::Eyes);
-            return Ok(Self { camera: source.camera, depth, rig: Some(rig), depth_from });
+            let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
+            let depth_from = DepthFrom::Eyes;
+            return Ok(Self { camera: source.camera, depth, rig: Some(rig), depth_from, first_depth: None });
         }
-        Ok(Self { camera: source.camera, depth: source.depth, rig: None, depth_from })
+        let Opened { camera, depth, first_depth, .. } = source;
+        Ok(Self { camera, depth, rig: None, depth_from, first_depth })
     }
 
     /// Whether its frames have depth.
@@ -154,6 +160,7 @@ struct Opened {
     camera: Box<dyn Camera>,
     depth: Option<Box<dyn DepthSource>>,
     depth_from: DepthFrom,
+    first_depth: Option<DepthMap>,
     /// What it says of its two eyes.
     pair: Pair,
     /// The disparities that occur in it.
@@ -163,8 +170,14 @@ struct Opened {
 impl Opened {
     fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, CliError> {
         let Wanted { frames, depth, .. } = *wanted;
-        let depth_from = DepthFrom::Nothing;
-        let of = |camera| Self { camera, depth: None, depth_from, pair: Pair::Unstated, disparities: None };
+        let of = |camera| Self {
+            camera,
+            depth: None,
+            depth_from: DepthFrom::Nothing,
+            first_depth: None,
+            pair: Pair::Unstated,
+            disparities: None,
+        };
         match name {
             SourceName::Synthetic => {
                 let size = frames.size.unwrap_or(defaults::SIZE);
@@ -202,6 +215,7 @@ impl Opened {
                 }
                 let disparities = recording.disparities();
                 let depth_from = depth_of(&recording);
+                let first_depth = wanted.blur.and_then(|blur| first_depth(&recording, blur));
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
@@ -209,6 +223,7 @@ impl Opened {
                 Ok(Self {
                     depth,
                     depth_from,
+                    first_depth,
                     pair: pair.unwrap_or(Pair::Unstated),
                     disparities,
                     ..of(Box::new(camera))
@@ -227,6 +242,14 @@ impl Opened {
             }
         }
     }
+}
+
+/// The first depth map of a recording, where the focus is in metres. A faulty one is told in its turn.
+pub fn first_depth(recording: &Recording, blur: &options::Blur) -> Option<DepthMap> {
+    let mut map = DepthMap::default();
+    let is_compared = recording.has_depth() && matches!(blur.focus, FocusRule::Metres(_));
+    let read = is_compared.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
+    read.ok().map(|()| map)
 }
 
 /// What the depth of a recording is.

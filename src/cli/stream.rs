@@ -12,7 +12,8 @@ use super::layers::Given;
 #[cfg(feature = "window")]
 use super::preview;
 use super::source::{Source, SourceName, Wanted};
-use super::{options, sinks, terminal, unused, values};
+use super::unused::{self, DepthFrom};
+use super::{focus, options, sinks, terminal, values};
 use crate::bokeh::Effect;
 use crate::clock::Clock;
 use crate::link::demand::Demand;
@@ -109,6 +110,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
             window: false,
         },
     );
+    if let Some(map) = source.first_depth.as_ref() {
+        focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
+    }
     let bokeh = look.settings(info.size, adaptive).map(|settings| executor.create(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
     let demand = stream.on_demand.then(Demand::new);

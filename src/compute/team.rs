@@ -192,8 +192,10 @@ impl Shared {
             }
         });
         if let Err(thrown) = catch_unwind(work) {
-            // Dropping it may panic, and then a member would never leave, or `run` while members are at work.
-            std::mem::forget(thrown);
+            // That may panic, and then a member would never leave, or `run` would while members are at work.
+            if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(thrown))) {
+                std::mem::forget(again);
+            }
             self.panicked.store(true, Ordering::Relaxed);
         }
     }
@@ -287,7 +289,7 @@ mod tests {
     impl Drop for Bomb {
         fn drop(&mut self) {
             if !thread::panicking() {
-                panic!("dropping it panics");
+                std::panic::panic_any(());
             }
         }
     }

@@ -278,7 +278,7 @@ mod tests {
             fs::write(dir.path().join(name), "").unwrap();
         }
         symlink(dir.path().join("b"), dir.path().join(".a.mkv.8-0.part")).unwrap();
-        assert_eq!(left_behind(&path).unwrap(), [left.clone()]);
+        assert_eq!(left_behind(&path).unwrap(), std::slice::from_ref(&left));
         let kept = keep_incomplete(&left, &path).unwrap();
         assert_eq!(kept, dir.path().join("a.mkv.incomplete"));
         alive.file().write_all(b"more").unwrap();

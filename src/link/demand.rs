@@ -77,6 +77,18 @@ mod tests {
     }
 
     #[test]
+    fn nobody_is_waited_for_as_long_as_said_and_somebody_not_at_all() {
+        let (demand, began) = (Demand::new(), Instant::now());
+        demand.wait(Duration::from_millis(20));
+        assert!(began.elapsed() >= Duration::from_millis(20));
+        let watch = demand.watch();
+        demand.wait(Duration::ZERO);
+        // The bell is silent by now.
+        demand.wait(Duration::from_secs(3600));
+        drop(watch);
+    }
+
+    #[test]
     fn a_waiter_wakes_when_somebody_watches() {
         let demand = Demand::new();
         let began = Instant::now();

@@ -177,6 +177,22 @@ mod tests {
     }
 
     #[test]
+    fn who_waits_for_a_buffer_is_woken_when_one_comes_home() {
+        let pool = Pool::new(2, || ());
+        for _ in 0..20 {
+            let [first, second] = [(); 2].map(|()| pool.try_take().expect("both are home"));
+            std::thread::scope(|scope| {
+                let takers = [(); 2].map(|()| scope.spawn(|| pool.take()));
+                // Asleep, as like as not.
+                std::thread::sleep(std::time::Duration::from_millis(1));
+                drop((first, second));
+                drop(takers.map(|taker| taker.join()));
+            });
+            assert_eq!(pool.free(), 2);
+        }
+    }
+
+    #[test]
     fn a_buffer_may_outlive_its_pool() {
         let pool = Pool::new(1, || 5);
         let loan = pool.take();

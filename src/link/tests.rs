@@ -77,6 +77,20 @@ fn a_mailbox_holds_only_the_newest() {
 }
 
 #[test]
+fn what_is_there_is_taken_without_a_wait() {
+    for (mut sender, mut receiver) in [live(), lossless()] {
+        assert_eq!(receiver.try_recv(), None);
+        sender.send(5).unwrap();
+        assert_eq!((receiver.try_recv(), receiver.try_recv()), (Some(5), None));
+        sender.send(6).unwrap();
+        assert!(matches!(receiver.recv_timeout(Duration::from_secs(600)), Received::Item(6)));
+        assert!(matches!(receiver.recv_timeout(Duration::from_millis(1)), Received::Nothing));
+        drop(sender);
+        assert!(matches!(receiver.recv_timeout(Duration::from_secs(600)), Received::Ended));
+    }
+}
+
+#[test]
 fn a_gone_receiver_is_seen_and_nothing_leaks() {
     for (mut sender, receiver) in [live(), lossless()] {
         let item = Arc::new(());

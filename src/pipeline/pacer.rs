@@ -112,6 +112,20 @@ mod tests {
     }
 
     #[test]
+    fn only_what_would_be_more_than_a_period_late_is_passed_over() {
+        let late = |since_ns: u64, read_ns: u64| {
+            let clock = Clock::manual();
+            let mut pacer = Pacer::new(clock.clone(), true, PERIOD_NS);
+            pacer.wait(0, read_ns, || false);
+            clock.advance_ns(since_ns);
+            pacer.skip(&mut Positions(1))
+        };
+        // The next frame is due at 100.
+        assert_eq!([199, 200, 201, 300, 301].map(|since_ns| late(since_ns, 0)), [0, 0, 1, 1, 2]);
+        assert_eq!([170, 171].map(|since_ns| late(since_ns, 30)), [0, 1], "it takes 30 to be read");
+    }
+
+    #[test]
     fn a_rest_passes_over_nothing() {
         let clock = Clock::manual();
         let mut pacer = Pacer::new(clock.clone(), true, PERIOD_NS);

@@ -3,14 +3,15 @@
 //! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`. `NAME-color.png` is the picture
 //! before the blur, `NAME-depth.pfm` its depth as the blur had it, in metres.
 
-use std::fs::{self, File};
-use std::io::{self, ErrorKind, Write};
+use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::coded;
 use super::error::RecordingError;
 use super::fault::PictureFault;
 use super::still::{write_color, write_depth};
+use crate::files::whole;
 use crate::frame::{ColorImage, DepthMap};
 
 /// The keyword of the text in a PNG that has the settings.
@@ -46,16 +47,42 @@ pub fn save(dir: &Path, stem: &str, snapshot: &Snapshot) -> Result<PathBuf, Reco
     let mut png = Vec::new();
     encode(snapshot, &mut png).map_err(|error| unfit(&error.to_string()))?;
     fs::create_dir_all(dir).map_err(RecordingError::io("create", dir))?;
-    let mut place = Place::find(dir, stem)?;
-    let files = [beside(&place.path, COLOR), beside(&place.path, DEPTH)];
-    let written = write_color(&files[0], snapshot.color, false)
-        .and_then(|()| snapshot.depth.map_or(Ok(()), |depth| write_depth(&files[1], depth, 1.0, false)))
-        .and_then(|()| place.fill(&png));
+    for number in 1u32.. {
+        let name = if number == 1 { format!("{stem}.png") } else { format!("{stem}-{number}.png") };
+        let path = dir.join(name);
+        match write(&path, snapshot, &png) {
+            Err(RecordingError::Exists { .. }) => {}
+            written => return written.map(|()| path),
+        }
+    }
+    Err(RecordingError::io("create", &dir.join(stem))(ErrorKind::AlreadyExists.into()))
+}
+
+/// Writes the picture and the files beside it, or none of them.
+fn write(path: &Path, snapshot: &Snapshot, png: &[u8]) -> Result<(), RecordingError> {
+    let (color, depth) = sources(path);
+    if let Some(taken) = [path, &color, &depth].into_iter().find(|path| path.symlink_metadata().is_ok()) {
+        return Err(RecordingError::Exists { path: taken.to_owned() });
+    }
+    write_color(&color, snapshot.color, false)?;
+    // Nothing is replaced, so what was written is ours; others may write here at the same time.
+    let mut own = vec![&color];
+    let depth_written = snapshot.depth.map_or(Ok(()), |map| {
+        write_depth(&depth, map, 1.0, false)?;
+        own.push(&depth);
+        Ok(())
+    });
+    let written = depth_written.and_then(|()| {
+        whole::write(path, png, false).map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => RecordingError::Exists { path: path.to_owned() },
+            _ => RecordingError::io("write", path)(error),
+        })
+    });
     if written.is_err() {
         // The first failure is the one to tell.
-        files.iter().chain([&place.part]).for_each(|file| drop(fs::remove_file(file)));
+        own.into_iter().for_each(|file| drop(fs::remove_file(file)));
     }
-    written.map(|()| place.path)
+    written
 }
 
 /// What follows the name of the picture in those of the files beside it.
@@ -122,37 +149,4 @@ fn encode(snapshot: &Snapshot, file: &mut Vec<u8>) -> Result<(), png::EncodingEr
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&snapshot.picture.rgb)?;
     writer.finish()
-}
-
-/// Where a snapshot goes: names that nothing has, kept from others by the unfinished picture.
-struct Place {
-    path: PathBuf,
-    part: PathBuf,
-    file: File,
-}
-
-impl Place {
-    fn find(dir: &Path, stem: &str) -> Result<Self, RecordingError> {
-        for number in 1u32.. {
-            let name = if number == 1 { stem.to_owned() } else { format!("{stem}-{number}") };
-            let path = dir.join(format!("{name}.png"));
-            let part = dir.join(format!("{name}.png.part"));
-            let file = match File::create_new(&part) {
-                Ok(file) => file,
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
-                Err(error) => return Err(RecordingError::io("create", &part)(error)),
-            };
-            let (color, depth) = sources(&path);
-            if [&path, &color, &depth].iter().all(|path| path.symlink_metadata().is_err()) {
-                return Ok(Self { path, part, file });
-            }
-            fs::remove_file(&part).map_err(RecordingError::io("remove", &part))?;
-        }
-        Err(RecordingError::io("create", &dir.join(stem))(io::Error::from(ErrorKind::AlreadyExists)))
-    }
-
-    fn fill(&mut self, bytes: &[u8]) -> Result<(), RecordingError> {
-        let written = self.file.write_all(bytes).and_then(|()| self.file.sync_all());
-        written.and_then(|()| fs::rename(&self.part, &self.path)).map_err(RecordingError::io("write", &self.path))
-    }
 }

@@ -107,7 +107,8 @@ impl Output {
 impl Drop for Output {
     fn drop(&mut self) {
         if let Some(part) = self.part.take().filter(|_| self.frames > 0) {
-            tracing::warn!("{}: what there is of it is kept as {}", self.path.display(), keep(part).display());
+            let kept = keep(part);
+            tracing::warn!("{}: what there is of it is kept as {}", self.path.display(), kept.display());
         }
     }
 }
@@ -120,7 +121,8 @@ fn keep(part: Part) -> PathBuf {
 
 /// Keeps what runs that were killed left of `path`; gives the names.
 fn recover(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
-    let left = whole::left_behind(path).map_err(SinkError::write(path))?;
+    // One may write into folders that one must not list.
+    let left = whole::left_behind(path).unwrap_or_default();
     let kept = left.into_iter().map(|part| keep_or_remove(&part, path));
     kept.filter_map(Result::transpose).collect::<Result<_, _>>().map_err(SinkError::write(path))
 }

@@ -191,4 +191,36 @@ mod tests {
         assert_eq!(broken.finish(Ending::Whole).unwrap_err().to_string(), "cannot write a: full");
         assert_eq!(*log.lock().unwrap(), ["a finish", "b finish"]);
     }
+
+    /// Fails at once; live, if it is one.
+    struct Broken(Option<Duration>);
+
+    impl Sink for Broken {
+        fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+            Err(SinkError::write("broken".as_ref())(io::Error::other("gone")))
+        }
+        fn hold(&self) -> Option<Duration> {
+            self.0
+        }
+        fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
+            panic!("it has failed")
+        }
+        fn describe(&self) -> String {
+            "broken".into()
+        }
+    }
+
+    #[test]
+    fn one_that_fails_is_left_out_unless_it_is_live_and_is_an_error_in_the_end() {
+        for (hold, ends) in [(None, false), (Some(Duration::from_millis(50)), true)] {
+            let log: Arc<Mutex<Vec<String>>> = Arc::default();
+            let good = Witness { name: "a", log: Arc::clone(&log), hold_ms: None, wants: 9, breaks_down: false };
+            let mut tee = Box::new(Tee::new(vec![Box::new(Broken(hold)), Box::new(good)]));
+            let frame = ColorImage::new(2, 2);
+            assert_eq!(tee.put(&frame, 0).is_err(), ends);
+            assert_eq!(tee.finish(Ending::Cut).is_err(), !ends, "what ended the run was told");
+            let expected: &[&str] = if ends { &["a finish"] } else { &["a put", "a finish"] };
+            assert_eq!(*log.lock().unwrap(), expected);
+        }
+    }
 }

@@ -125,6 +125,16 @@ mod tests {
     }
 
     #[test]
+    fn the_rank_is_the_nearest_and_no_higher() {
+        let mut times = Histogram::default();
+        (1..=20).rev().for_each(|ns| times.add(ns));
+        let ranks = [(0.0, 1), (0.05, 1), (0.051, 2), (0.5, 10), (0.51, 11), (0.95, 19), (0.99, 20), (1.0, 20)];
+        for (p, ns) in ranks {
+            assert_eq!(times.percentile_ns(p), ns, "p{p}");
+        }
+    }
+
+    #[test]
     fn passes_keep_their_order() {
         let mut passes = PassHistograms::default();
         for name in ["prepare", "rows", "prepare"] {

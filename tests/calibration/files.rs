@@ -238,7 +238,7 @@ fn what_is_wrong_is_told_in_one_line_with_its_place() {
         assert!(refusal.contains(what) && !refusal.contains('\n'), "{refusal}, not {what}");
     }
     let refusal = calibration::load(&[Path::new("nowhere.yml")]).unwrap_err().to_string();
-    assert!(refusal.starts_with("nowhere.yml: "), "{refusal}");
+    assert!(refusal.contains("nowhere.yml: "), "{refusal}");
     assert!(calibration::load(&[]).unwrap_err().to_string().contains("one or two files"));
 }
 

@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::process::Command;
-use std::time::Duration;
 
 use bokehcam::v4l2::Device;
 use bokehcam::v4l2::controls::{self, Value};
@@ -152,7 +151,7 @@ fn a_busy_camera_names_who_has_it() {
     let mut other = Command::new("v4l2-ctl");
     other.args(["-d", CAMERA, "--stream-mmap", "--stream-count=1000"]);
     let other = Beside::start(other);
-    until("the other program has it", Duration::from_secs(10), || !holders(CAMERA.as_ref()).is_empty());
+    until("the other program has it", || !holders(CAMERA.as_ref()).is_empty());
     let refused = bokehcam("stream 0 --to null --frames 1").output().unwrap();
     let said = String::from_utf8(refused.stderr).unwrap();
     let name = format!("v4l2-ctl (process {})", other.id());

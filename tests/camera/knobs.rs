@@ -2,7 +2,6 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
-use std::time::Duration;
 
 use bokehcam::v4l2::live::knobs::{self, Knob};
 
@@ -34,7 +33,7 @@ fn knobs_are_listed_turned_and_read_back_while_the_camera_streams() {
             }
         });
         let _ends = Ends(&over);
-        let wait = |what: &str, is: &mut dyn FnMut() -> bool| until(what, Duration::from_secs(20), is);
+        let wait = |what: &str, is: &mut dyn FnMut() -> bool| until(what, is);
         wait("pictures", &mut || count.load(Ordering::SeqCst) > 2);
 
         let all = knobs::list("vivid").unwrap();

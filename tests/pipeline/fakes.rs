@@ -225,7 +225,7 @@ fn exists() -> SinkError {
 }
 
 impl Sink for FakeSink {
-    fn put(&mut self, frame: &ColorImage) -> Result<ControlFlow<()>, SinkError> {
+    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         let index = self.received.count() as usize;
         if self.trouble.strikes(index) {
             return Err(exists());

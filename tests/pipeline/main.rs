@@ -2,6 +2,7 @@
 
 mod accounting;
 mod changes;
+mod clocked;
 mod fakes;
 mod fallback;
 mod faults;

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use bokehcam::sink::{SinkError, Target};
+use bokehcam::sink::Target;
 
 use crate::{open, options};
 

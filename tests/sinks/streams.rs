@@ -5,7 +5,6 @@ use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use bokehcam::frame::ColorImage;
 use bokehcam::sink::yuv::{Converter, Matrix};
 use bokehcam::sink::{Ending, Sink, Y4m};
 
@@ -117,7 +116,7 @@ fn an_hour_without_a_picture_is_no_hour_of_data() {
     let name = folder.path().join("clip.y4m");
     let mut sink = open(&name, &options((2, 2))).unwrap();
     for at in [0, 90_000, 90_001] {
-        sink.put(&flat(2, 2, [0; 3]), at * PERIOD_NS).unwrap();
+        assert!(sink.put(&flat(2, 2, [0; 3]), at * PERIOD_NS).unwrap().is_continue());
     }
     sink.finish(Ending::Whole).unwrap();
     assert_eq!(lumas(&fs::read(&name).unwrap(), 6).len(), 10 * 25 + 3, "ten seconds, and the frames");

@@ -2,12 +2,10 @@
 
 use std::fs;
 use std::io;
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use bokehcam::frame::ColorImage;
 use bokehcam::sink::{Ending, Sink, SinkError, Y4m};
 
 use crate::{PERIOD_NS, flat, forced, listing, open, options, picture, put_all};
@@ -20,8 +18,8 @@ fn a_player_shows_pictures_as_they_come() {
         .args(["-v", "error", "-probesize", "32", "-analyzeduration", "0"])
         .args(["-threads", "1", "-f", "yuv4mpegpipe", "-i", "pipe:0"])
         .args(["-f", "rawvideo", "-flush_packets", "1", "pipe:1"])
-        .stdin(std::process::Stdio::piped())
-        .stdout(std::process::Stdio::piped())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
         .spawn()
         .unwrap();
     let mut stream = Y4m::new(player.stdin.take().unwrap(), Path::new("player"), &options((64, 48)));

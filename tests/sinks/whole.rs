@@ -72,8 +72,9 @@ fn two_that_write_one_file_never_mix() {
     let name = folder.path().join("clip.y4m");
     let [mut one, mut two] = [0, 1].map(|_| open(&name, &options((6, 4))).unwrap());
     for frame in 0..3 {
-        one.put(&flat(6, 4, [0; 3]), frame * PERIOD_NS).unwrap();
-        two.put(&flat(6, 4, [255; 3]), frame * PERIOD_NS).unwrap();
+        for (sink, grey) in [(&mut one, 0), (&mut two, 255)] {
+            assert!(sink.put(&flat(6, 4, [grey; 3]), frame * PERIOD_NS).unwrap().is_continue());
+        }
     }
     one.finish(Ending::Whole).unwrap();
     assert!(matches!(two.finish(Ending::Whole), Err(SinkError::Kept { .. })));

@@ -10,6 +10,8 @@ use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{Atom, AtomEnum, ClientMessageEvent, ConnectionExt, EventMask, Window};
 use x11rb::rust_connection::RustConnection;
 
+use super::window::PATIENCE;
+
 /// Size of the screen, in pixels.
 pub const SIZE: (u16, u16) = (1600, 1000);
 
@@ -62,7 +64,7 @@ impl Screen {
         let root = x.setup().roots[number].root;
         let screen = Self { x, root, display, _manager: manager, _server: server, _settings: settings };
         // A window that opens before that may stay unmanaged.
-        until("a window manager", Duration::from_secs(20), || ready.exists());
+        until("a window manager", PATIENCE, || ready.exists());
         screen
     }
 

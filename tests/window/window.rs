@@ -12,7 +12,7 @@ use super::picture;
 use super::screen::{Screen, until};
 
 /// How long anything on the screen may take; a machine with other work is slow, a program that hangs takes for ever.
-pub const PATIENCE: Duration = Duration::from_secs(20);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A window.
 pub struct Window<'a> {

@@ -11,6 +11,8 @@ use crate::compute::team::{Shelf, Team};
 
 /// Planes of a level: premultiplied colour and CoC, and how much of it is known.
 const PLANES: usize = 5;
+/// A pixel of which less is known after all has flowed back is not known at all.
+const KNOWN: f32 = 0.5;
 /// Rows of a level that are one part of the work.
 const PART: usize = 8;
 
@@ -197,9 +199,10 @@ impl Behind<'_> {
         for x in 0..W {
             // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
             let hidden = 1.0 - self.unhidden.at(coc[x]);
-            if hidden > 0.0 {
-                let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
-                let fill = |p: usize| row[p * self.level.rows.stride + half];
+            let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
+            let fill = |p: usize| row[p * self.level.rows.stride + half];
+            // Where something near touches every pixel nothing is known, and nothing lies behind.
+            if hidden > 0.0 && fill(PLANES - 1) > KNOWN {
                 let mix = |own: f32, p: usize| own + (fill(p) - own) * hidden;
                 (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
                 coc[x] = mix(coc[x], 3).max(self.nearest_px);

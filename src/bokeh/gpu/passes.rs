@@ -115,7 +115,7 @@ impl Passes {
             for (level, (fine, _)) in b.levels.iter().zip(&b.level_sizes).rev() {
                 fill.push(maker.fixed("fill", shaders::PUSH, *fine, SMALL_TILE, &[level, &b.pyramid, &b.known]));
             }
-            let filled = [&b.frame, &b.pyramid, &b.scene, &b.ranges];
+            let filled = [&b.frame, &b.pyramid, &b.scene, &b.ranges, &b.known];
             fill.push(maker.fixed("fill", shaders::FILL, picture, TILE, &filled));
         }
         let filters = |maker: &mut Maker, bank: &Filters, k: usize| {

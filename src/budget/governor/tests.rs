@@ -149,3 +149,85 @@ fn a_smaller_budget_is_heeded_at_once() {
     machine.governor.note(sample, BUDGET_NS / 2);
     assert_eq!(machine.governor.rung(), 1);
 }
+
+/// As light as to step up to the finest rung: returns after how many frames that comes.
+fn frames_to_the_top(machine: &mut Machine) -> u32 {
+    let rises = |_: &u32| {
+        machine.play(200_000.0, 1, |_| false);
+        machine.governor.rung() == 4
+    };
+    (1..5000).find(rises).expect("it rises")
+}
+
+/// As heavy as to step down from there, once it is clear that the load has changed and not a cost.
+fn take_back(machine: &mut Machine) {
+    machine.play(200_000.0, LEARN_FROM, |_| false);
+    machine.play(400_000.0, 10, |_| false);
+    assert_eq!(machine.governor.rung(), 2);
+}
+
+/// Whether a step up after `frames` was one of this patience: the loads before it must first be forgotten.
+fn is_of(patience: u32, frames: u32) -> bool {
+    (patience..=patience + RECENT as u32).contains(&frames)
+}
+
+#[test]
+fn a_step_that_is_taken_back_is_tried_ever_more_rarely_until_one_holds() {
+    let mut machine = Machine::new(0);
+    for patience in [30, 60, 120, 240, 480, 960, 960] {
+        let frames = frames_to_the_top(&mut machine);
+        assert!(is_of(patience, frames), "{frames} frames where {patience} are to be");
+        take_back(&mut machine);
+    }
+    frames_to_the_top(&mut machine);
+    machine.play(200_000.0, (REGRET * MOST_PATIENCE) as usize, |_| false);
+    take_back(&mut machine);
+    let frames = frames_to_the_top(&mut machine);
+    assert!(is_of(PATIENCE, frames), "{frames} frames after a step up that held");
+}
+
+#[test]
+fn a_pause_ends_the_wait_for_the_next_try() {
+    let mut machine = Machine::new(0);
+    for _ in 0..4 {
+        frames_to_the_top(&mut machine);
+        take_back(&mut machine);
+    }
+    machine.now_ns += 2 * IDLE_NS;
+    let frames = frames_to_the_top(&mut machine);
+    assert!(is_of(PATIENCE, frames), "{frames} frames after a pause");
+}
+
+#[test]
+fn a_load_that_is_too_high_now_and_then_is_too_high() {
+    let mut machine = Machine::new(0);
+    // Every sixth frame takes more than there is at the fourth rung; the median knows nothing of it.
+    let mut play = |frames: usize| -> Vec<usize> {
+        (0..frames).flat_map(|k| machine.play(if k % 6 == 5 { 420_000.0 } else { 240_000.0 }, 1, |_| false)).collect()
+    };
+    play(300);
+    assert!(play(600).iter().all(|&rung| rung == 2));
+}
+
+#[test]
+fn a_step_up_goes_no_further_than_was_allowed_all_the_while() {
+    let mut machine = Machine::new(0);
+    machine.play(550_000.0, 100, |_| false);
+    assert_eq!(machine.governor.rung(), 1);
+    // First there is time for the fourth rung, then for the fifth.
+    machine.play(280_000.0, 25, |_| false);
+    let up = machine.play(200_000.0, 40, |_| false);
+    let rose: Vec<usize> = up.chunk_by(|a, b| a == b).map(|rungs| rungs[0]).collect();
+    assert_eq!(rose, [1, 3], "{up:?}");
+    machine.play(200_000.0, 40, |_| false);
+    assert_eq!(machine.governor.rung(), 4);
+}
+
+#[test]
+fn no_cost_is_learnt_beyond_what_is_credible() {
+    let mut machine = Machine::new(0);
+    // The finest rung takes ten times what it was said to.
+    machine.costs = [1.0, 1.5, 2.0, 3.0, 40.0];
+    machine.play(70_000.0, 5000, |_| false);
+    assert_eq!(machine.governor.costs()[4], LEARN_MOST * COSTS[4]);
+}

@@ -119,7 +119,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
         });
         add(&|look| look.aperture.shape = Shape::Polygon { blades: 16, rotation_deg: 0.0, curvature: number });
     }
-    for number in [0.0, 12.0, 1e30, 3.4e38] {
+    for number in [0.0, 12.0, 1234.5678, 2e4] {
         add(&|look| look.strength = Strength::AtInfinity(number));
         add(&|look| look.max_coc_px = Some(number));
         add(&|look| look.focus_range_m = number + 0.25);

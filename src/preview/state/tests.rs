@@ -217,6 +217,18 @@ fn notes_are_few_and_numbered() {
 }
 
 #[test]
+fn what_went_wrong_stays_until_it_is_known() {
+    let mut state = state();
+    state.hear(Told::Trouble("the disk is full".into()));
+    for k in 0..20 {
+        state.hear(Told::Note(format!("note {k}")));
+    }
+    assert_eq!(state.trouble.as_deref(), Some("the disk is full"));
+    assert_eq!(state.apply(Action::Dismiss), []);
+    assert_eq!(state.trouble, None);
+}
+
+#[test]
 fn the_wheel_gets_away_from_no_blur_and_back() {
     let mut look = look();
     for _ in 0..200 {

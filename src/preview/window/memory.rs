@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::input;
+use crate::files::{input, whole};
 
 /// The window, in points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,9 +30,8 @@ impl Memory {
     /// Writes it whole or not at all. Where it cannot be written, the next window has the first size again.
     pub fn write(self, path: &Path) {
         let Ok(text) = toml::to_string(&self) else { return };
-        let beside = path.with_extension("new");
         let folder = path.parent().map_or(Ok(()), fs::create_dir_all);
-        let written = folder.and_then(|()| fs::write(&beside, text)).and_then(|()| fs::rename(&beside, path));
+        let written = folder.and_then(|()| whole::write(path, text.as_bytes(), true));
         if let Err(error) = written {
             tracing::info!("the window's size is not remembered: {}: {error}", path.display());
         }

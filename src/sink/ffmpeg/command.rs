@@ -29,10 +29,13 @@ impl Format {
         match extension.as_deref() {
             Some("webm") => matroska(&["-cluster_time_limit", "1000", "-f", "webm"], VP9),
             Some("mkv") => matroska(&["-cluster_time_limit", "1000", "-f", "matroska"], H264),
-            _ => Self { container: Container::Mp4, muxer: FRAGMENTS, encoder: H264, time_base: "1:90000" },
+            _ => Self { container: Container::Mp4, muxer: FRAGMENTS, encoder: H264, time_base: MP4_TIME_BASE },
         }
     }
 }
+
+/// Ticks of which the usual rates are multiples, but so few that readers believe a gap of half a day (2^28 ticks).
+const MP4_TIME_BASE: &str = "1:6000";
 
 const FRAGMENTS: &[&str] =
     &["-movflags", "+frag_keyframe+delay_moov+default_base_moof", "-frag_duration", "1000000", "-f", "mp4"];

@@ -1,8 +1,10 @@
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
 
 use super::*;
+
+/// Nothing here takes so long: against a hang.
+const HANG: Duration = Duration::from_secs(120);
 
 /// A member that behaves as it is told to.
 #[derive(Default)]
@@ -16,7 +18,8 @@ struct Fake {
     leaves_at: Option<usize>,
     /// The frame that it cannot write.
     fails_at: Option<usize>,
-    finish_takes: Duration,
+    /// It is completed once this says so.
+    finish_at: Option<Receiver<()>>,
     finish_fails: bool,
     finish_panics: bool,
 }
@@ -48,7 +51,7 @@ impl Sink for Fake {
     }
 
     fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-        thread::sleep(self.finish_takes);
+        self.finish_at.iter().for_each(|at| at.recv_timeout(HANG).unwrap());
         assert!(!self.finish_panics, "as it should");
         if self.finish_fails { Err(full(self.name)) } else { Ok(()) }
     }
@@ -133,17 +136,19 @@ fn a_member_that_fails_or_whose_reader_goes_is_taken_out_and_the_others_go_on() 
 #[test]
 fn a_member_that_takes_long_to_complete_does_not_hold_frames_up() {
     let (mut switch, board, told) = switch();
-    let slow = Duration::from_millis(400);
-    board.add("slow", Box::new(Fake { finish_takes: slow, ..Fake::default() })).unwrap();
+    let (complete, finish_at) = mpsc::channel();
+    board.add("slow", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
     put(&mut switch, 0..1);
     board.remove("slow");
-    let began_at = Instant::now();
     put(&mut switch, 1..100);
-    assert!(began_at.elapsed() < slow / 2, "{:?}", began_at.elapsed());
-    assert_eq!(all(&told), [began("slow")]);
+    assert_eq!(all(&told), [began("slow")], "frames went on while it was not complete");
+    let late = thread::spawn(move || {
+        thread::sleep(Duration::from_millis(20));
+        complete.send(()).unwrap();
+    });
     switch.finish(Ending::Whole).unwrap();
-    assert!(began_at.elapsed() >= slow, "the end waits for it");
-    assert_eq!(all(&told), [completed("slow", 1)]);
+    assert_eq!(all(&told), [completed("slow", 1)], "the end waits for it");
+    late.join().unwrap();
 }
 
 #[test]
@@ -151,9 +156,14 @@ fn errors_at_the_end_are_told_and_returned_after_all_are_completed() {
     let (mut switch, board, told) = switch();
     board.add("a", Box::new(Fake { finish_panics: true, ..Fake::default() })).unwrap();
     board.add("b", Box::new(Fake { name: "b", finish_fails: true, ..Fake::default() })).unwrap();
-    let slow = Duration::from_millis(50);
-    board.add("c", Box::new(Fake { finish_takes: slow, ..Fake::default() })).unwrap();
+    let (complete, finish_at) = mpsc::channel();
+    board.add("c", Box::new(Fake { finish_at: Some(finish_at), ..Fake::default() })).unwrap();
     put(&mut switch, 0..2);
+    // After the others have failed, as like as not.
+    thread::spawn(move || {
+        thread::sleep(Duration::from_millis(20));
+        complete.send(()).unwrap();
+    });
     assert_eq!(switch.finish(Ending::Whole).unwrap_err().to_string(), "cannot write b: full");
     let [a, b, c] = [failed("a", 2, "it was given up"), failed("b", 2, "cannot write b: full"), completed("c", 2)];
     assert_eq!(all(&told), [began("a"), a, began("b"), b, began("c"), c]);

@@ -146,6 +146,11 @@ impl State {
         Ok(())
     }
 
+    /// Buffers that the kernel has, filled or to be filled.
+    pub fn with_kernel(&self) -> usize {
+        self.buffers.iter().filter(|buffer| **buffer != Buffer::Dequeued).count()
+    }
+
     /// The camera takes a picture, and fills a buffer if it has one.
     pub fn shoot(&mut self) {
         self.clock.advance_ns(PERIOD_NS);

@@ -1,0 +1,66 @@
+//! Calibrations of two cameras, and of a depth camera beside a colour camera.
+
+use bokehcam::calibration::{self, rectifier::Rectifier};
+use bokehcam::cli::parsers;
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
+
+use super::input::{assert_one_line, files, place, put};
+
+/// OpenCV, Kalibr and EuRoC, in one or two files, up to rectified pictures.
+pub fn calibration(data: &[u8]) {
+    let (one, two) = ("intrinsics.yml", "other.yml");
+    let read = match files(data).as_slice() {
+        [only] => calibration::load(&[&put(one, only)]),
+        [left, right, ..] => calibration::load(&[&put(one, left), &put(two, right)]),
+        [] => return,
+    };
+    let rig = match read {
+        Ok(rig) => rig,
+        Err(error) => return assert_one_line(error),
+    };
+    assert!(!place("extrinsics.yml").exists());
+    let _ = (rig.baseline_m(), rig.is_swapped(), rig.exchanged());
+    let own = rig.eyes[0].size.unwrap_or((32, 24));
+    for size in [(32, 24), (2, 2), (16, 16), (own.0.min(64), own.1.min(64))] {
+        let _ = rig.notes(size);
+        match Rectifier::new(&rig, size) {
+            Ok(rectifier) => rectifies(&rectifier, size),
+            Err(error) => assert_one_line(error),
+        }
+    }
+}
+
+fn rectifies(rectifier: &Rectifier, (width, height): (u32, u32)) {
+    let rig = rectifier.rig();
+    assert!(rig.focal_px.is_finite() && rig.focal_px > 0.0, "{rig:?}");
+    assert!(rig.baseline_m.is_finite() && rig.baseline_m > 0.0, "{rig:?}");
+    assert!(rig.doffs_px.is_finite(), "{rig:?}");
+    for disparity_px in [0.0, 1.0, 100.0, -5.0] {
+        assert!(!rig.depth_m(disparity_px).is_nan(), "{rig:?}");
+    }
+    let (mut color, mut rectified) = (ColorImage::new(width, height), ColorImage::default());
+    color.rgb.iter_mut().enumerate().for_each(|(at, byte)| *byte = at as u8);
+    rectifier.left(&color, &mut rectified);
+    assert_eq!(rectified.rgb.len(), color.rgb.len());
+    let (mut grey, mut rectified) = (GrayImage::default(), GrayImage::default());
+    grey.resize(width, height);
+    rectifier.right(&grey, &mut rectified);
+    assert_eq!(rectified.luma.len(), grey.luma.len());
+}
+
+/// The TOML file, and depth that is registered by it.
+pub fn depth_calibration(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let mut registration = match parsers::depth_calibration("calibration.toml".as_ref(), text) {
+        Ok(registration) => registration,
+        Err(error) => return assert_one_line(error),
+    };
+    const ODD: [f32; 8] = [0.0, 0.5, 2.0, 1e30, f32::NAN, f32::INFINITY, -1.0, 1e-30];
+    let mut registered = DepthMap::default();
+    for (width, height) in [(4, 2), (1, 1), (16, 9)] {
+        let mut depth = DepthMap::new(width, height);
+        depth.metres.iter_mut().zip(ODD.iter().cycle()).for_each(|(to, from)| *to = *from);
+        registration.register(&depth, &mut registered);
+        assert!(registered.metres.iter().all(|metres| metres.is_finite() && *metres >= 0.0));
+    }
+}

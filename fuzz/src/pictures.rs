@@ -1,0 +1,115 @@
+//! Pictures, depth maps and disparities in files, and snapshots.
+
+use std::path::Path;
+
+use bokehcam::frame::{ColorImage, DepthMap, DisparityMap};
+use bokehcam::recording::still::{self, Map};
+use bokehcam::recording::{Extras, snapshot as snapshots};
+
+use super::input::{assert_one_line, place, put};
+
+/// Larger pictures are not written again: it takes long.
+const MOST_WRITTEN_BYTES: usize = 1 << 16;
+
+/// PNG and JPEG, as each command reads them.
+pub fn picture(data: &[u8]) {
+    let path = put("picture.png", data);
+    match still::read_photo(&path) {
+        Ok((image, extras)) => {
+            assert!(image.width > 0 && image.height > 0);
+            assert_eq!(image.rgb.len(), image.width as usize * image.height as usize * 3);
+            if image.rgb.len() < MOST_WRITTEN_BYTES {
+                is_written_whole(&image, extras);
+            }
+        }
+        Err(error) => assert_one_line(error),
+    }
+    maps(&path);
+    match still::read_grey(&path) {
+        Ok((width, height, grey)) => {
+            assert_eq!(grey.len(), width as usize * height as usize);
+            assert!(grey.iter().all(|value| (0.0..=1.0).contains(value)));
+        }
+        Err(error) => assert_one_line(error),
+    }
+    if let Err(error) = snapshots::settings(&path) {
+        assert_one_line(error);
+    }
+}
+
+/// PFM, as depth and as disparity.
+pub fn pfm(data: &[u8]) {
+    let path = put("map.pfm", data);
+    maps(&path);
+}
+
+/// A file as depth and as disparity.
+fn maps(path: &Path) {
+    for depth_scale in [None, Some(1000.0)] {
+        match still::read_map(path, depth_scale, Some(7)) {
+            Ok(Map::Depth(depth)) => assert_depth(&depth),
+            Ok(Map::Disparity(disparity, _)) => assert_disparity(&disparity),
+            Err(error) => assert_one_line(error),
+        }
+    }
+    match still::read_depth(path, 5000.0, None) {
+        Ok(depth) => assert_depth(&depth),
+        Err(error) => assert_one_line(error),
+    }
+    match still::read_disparity(path) {
+        Ok(disparity) => assert_disparity(&disparity),
+        Err(error) => assert_one_line(error),
+    }
+}
+
+/// A picture and what goes with it, written as the program writes it, are read again.
+fn is_written_whole(image: &ColorImage, extras: Extras) {
+    let extras = extras.without_thumbnail();
+    for (name, extras) in [("again.png", extras.clone()), ("again.jpg", extras.for_jpeg())] {
+        let path = place(name);
+        still::write_photo(&path, image, &extras, true).expect("a picture that was read can be written");
+        let (again, with) = still::read_photo(&path).expect("a picture that was written can be read");
+        assert_eq!((again.width, again.height), (image.width, image.height), "{name}");
+        assert_eq!((with.icc_profile, with.exif), (extras.icc_profile, extras.exif), "{name}");
+        assert!(name != "again.png" || again.rgb == image.rgb);
+    }
+}
+
+/// The settings in a snapshot: as a text that the input is, and as one that `--like` takes over.
+pub fn snapshot(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let path = put("snapshot.png", &png_with(text));
+    match snapshots::settings(&path) {
+        Ok(settings) => {
+            assert!(settings.iter().all(|(_, value)| !value.contains('\n')), "{settings:?}");
+            let flags = settings.into_iter().map(|(name, value)| format!("--{name}={value}"));
+            let command = ["bokehcam", "config", "dump"].map(String::from).into_iter().chain(flags);
+            let command: Vec<_> = command.map(Into::into).collect();
+            if let Err(message) = bokehcam::cli::parsers::arguments(&command) {
+                assert_one_line(message);
+            }
+        }
+        Err(error) => assert_one_line(error),
+    }
+}
+
+fn png_with(text: &str) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.add_itxt_chunk(snapshots::KEYWORD.to_string(), text.to_string()).unwrap();
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&[0; 3]).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+fn assert_depth(depth: &DepthMap) {
+    assert_eq!(depth.metres.len(), depth.width as usize * depth.height as usize);
+    assert!(depth.metres.iter().all(|metres| metres.is_finite() && *metres >= 0.0));
+}
+
+fn assert_disparity(disparity: &DisparityMap) {
+    assert_eq!(disparity.px.len(), disparity.width as usize * disparity.height as usize);
+    assert!(disparity.px.iter().all(|px| px.is_finite() && *px >= 0.0));
+}

@@ -1,0 +1,97 @@
+//! The lists and calibrations of recordings, in folders with pictures.
+
+use std::cell::Cell;
+
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
+use bokehcam::recording::{Options, Recording, Scratch, still};
+
+use super::input::{assert_one_line, files, place, put};
+
+/// A layout: its folder, and the files in it that the input gives.
+const LAYOUTS: [(&str, &[&str]); 5] = [
+    ("tum", &["rgb.txt", "depth.txt"]),
+    ("pairs", &["associations.txt", "rgb.txt"]),
+    ("kitti", &["times.txt", "calib.txt"]),
+    ("euroc", &["mav0/cam0/data.csv", "mav0/cam1/data.csv", "mav0/cam0/sensor.yaml", "mav0/cam1/sensor.yaml"]),
+    ("middlebury", &["calib.txt", "disp0.pfm"]),
+];
+
+thread_local! {
+    static READY: Cell<bool> = const { Cell::new(false) };
+}
+
+/// A recording: the first byte chooses the layout, the second one the options, then come the files.
+pub fn recording(data: &[u8]) {
+    let Some((&[layout, flags], rest)) = data.split_first_chunk() else { return };
+    if !READY.replace(true) {
+        make_pictures();
+    }
+    let (folder, names) = LAYOUTS[layout as usize % LAYOUTS.len()];
+    let given = files(rest);
+    for (at, name) in names.iter().enumerate() {
+        let name = format!("{folder}/{name}");
+        match given.get(at) {
+            Some(bytes) if at == 0 || !bytes.is_empty() => drop(put(&name, bytes)),
+            _ => drop(std::fs::remove_file(place(&name))),
+        }
+    }
+    let options = Options {
+        keep_going: flags & 1 != 0,
+        pair_tolerance_ns: if flags & 2 != 0 { u64::MAX } else { 20_000_000 },
+        depth_scale: if flags & 4 != 0 { 1e-38 } else { 5000.0 },
+        depth_invalid: (flags & 8 != 0).then_some(65535),
+    };
+    match Recording::open(&place(folder), &options) {
+        Ok(recording) => reads(&recording),
+        Err(error) => assert_one_line(error),
+    }
+}
+
+fn reads(recording: &Recording) {
+    assert!(!recording.is_empty() && recording.period_ns() > 0);
+    let times: Vec<u64> = (0..recording.len()).map(|index| recording.time_ns(index)).collect();
+    assert!(times.is_sorted_by(|one, next| one < next), "times do not increase: {times:?}");
+    let mut scratch = Scratch::default();
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+    for index in 0..recording.len().min(4) {
+        if let Err(error) = recording.read_color(index, &mut scratch, &mut color) {
+            assert_one_line(error);
+        }
+        match recording.read_depth(index, &mut scratch, &mut depth) {
+            Ok(()) => {
+                assert_eq!(depth.metres.len(), depth.width as usize * depth.height as usize);
+                assert!(depth.metres.iter().all(|metres| !metres.is_nan()));
+            }
+            Err(error) => assert_one_line(error),
+        }
+        if let Err(error) = recording.read_right(index, &mut scratch, &mut right) {
+            assert_one_line(error);
+        }
+    }
+}
+
+fn make_pictures() {
+    let mut color = ColorImage::new(8, 6);
+    color.rgb.iter_mut().enumerate().for_each(|(at, byte)| *byte = (at * 5) as u8);
+    let mut depth = DepthMap::new(8, 6);
+    depth.metres.iter_mut().enumerate().for_each(|(at, metres)| *metres = at as f32 * 0.1);
+    let [color_file, depth_file] = [place("color.png"), place("depth.png")];
+    still::write_color(&color_file, &color, true).unwrap();
+    still::write_depth(&depth_file, &depth, 5000.0, true).unwrap();
+    let [color, depth] = [color_file, depth_file].map(|path| std::fs::read(path).unwrap());
+    for frame in 0..4 {
+        for list in ["tum", "pairs"] {
+            put(&format!("{list}/rgb/{frame}.png"), &color);
+            put(&format!("{list}/depth/{frame}.png"), &depth);
+        }
+        for eye in ["image_2", "image_3"] {
+            put(&format!("kitti/{eye}/{frame:06}.png"), &color);
+        }
+        for eye in ["cam0", "cam1"] {
+            put(&format!("euroc/mav0/{eye}/data/140363657976355555{frame}.png"), &color);
+        }
+    }
+    for eye in ["im0.png", "im1.png"] {
+        put(&format!("middlebury/{eye}"), &color);
+    }
+}

@@ -1,0 +1,41 @@
+//! How wide a blur may be.
+
+use super::{BokehError, Effect, Method, Rank, Settings};
+
+/// Largest radius of [`Method::Gather`], in pixels: it filters at full scale.
+const MOST_GATHERED_PX: f32 = 512.0;
+/// The same with [`Rank::Full`], when it gathers in two dimensions: kernels grow with the square of the radius.
+const MOST_EXACT_PX: f32 = 128.0;
+
+impl Settings {
+    /// The largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their diagonal,
+    /// or less where the method bears no more.
+    pub fn most_radius_px(&self, size: (u32, u32)) -> f32 {
+        let diagonal_px = (size.0 as f32).hypot(size.1 as f32).ceil();
+        diagonal_px.min(match (self.effect, self.method, self.rank) {
+            (Effect::Dof, Method::Gather, Some(Rank::Full)) => MOST_EXACT_PX,
+            (Effect::Dof, Method::Gather, _) => MOST_GATHERED_PX,
+            _ => f32::INFINITY,
+        })
+    }
+
+    /// These settings, with radii cut to what pictures of `size` bear.
+    pub(super) fn within(&self, size: (u32, u32)) -> Self {
+        let most_px = self.most_radius_px(size);
+        let cut = |radius_px: f32| radius_px.max(0.0).min(most_px);
+        Self { far_max_px: cut(self.far_max_px), near_max_px: cut(self.near_max_px), ..self.clone() }
+    }
+
+    /// Whether pictures of `size` (width, height) can be blurred so.
+    ///
+    /// # Errors
+    /// [`BokehError::TooWide`].
+    pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
+        let most_px = self.most_radius_px(size);
+        // Not a number is beyond any.
+        let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&most_px).is_none_or(|order| order.is_gt());
+        let Some(radius_px) = [self.far_max_px, self.near_max_px].into_iter().find(is_beyond) else { return Ok(()) };
+        let by_method = (self.effect, self.method) == (Effect::Dof, Method::Gather);
+        Err(BokehError::TooWide { radius_px, most_px, size, by_method })
+    }
+}

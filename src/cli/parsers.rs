@@ -1,0 +1,43 @@
+//! What users write, read without running a command: for the fuzz targets, who know no other way in.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use super::arguments::{joined, one_line};
+use super::settings::SettingsFile;
+use super::{CliError, Command, ConfigCommand, Refusal, dump, log};
+
+/// The settings that a command line stands for, as `config dump` prints them; nothing for other commands.
+///
+/// # Errors
+/// It is refused: the message, as it is printed.
+pub fn arguments(args: &[OsString]) -> Result<String, String> {
+    let parsed = super::parse(&joined(args.iter().cloned())).map_err(|refusal| {
+        let message = match refusal {
+            Refusal::Arguments(error) => one_line(&error),
+            Refusal::Settings(error) => error.to_string(),
+        };
+        log::printable(&message, &[]).into_owned()
+    })?;
+    Ok(match parsed.cli.command {
+        Command::Config(ConfigCommand::Dump { .. }) => {
+            dump::as_toml(&parsed.layers.resolved(&parsed.matches), &parsed.file.presets)
+        }
+        _ => String::new(),
+    })
+}
+
+/// Reads the text of a settings file, and each preset in it.
+///
+/// # Errors
+/// As the program says it.
+pub fn settings(path: &Path, text: &str) -> Result<(), CliError> {
+    let file = SettingsFile::parse(path, text)?;
+    for name in file.presets.keys() {
+        assert!(file.preset(name).is_some(), "the preset {name:?} is there and is not found");
+    }
+    Ok(())
+}
+
+#[cfg(feature = "camera")]
+pub use super::calibration::parse as depth_calibration;

@@ -1,0 +1,120 @@
+//! How one set of files takes the place of another, and what is done with what was broken off.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use super::{FolderError, LIST, PART, Set, WHOLE, list};
+use crate::files::whole;
+
+/// Refuses files of the set that the list does not have.
+pub(super) fn refuse_foreign(path: &Path, set: &Set) -> Result<(), FolderError> {
+    let ours = list::read(path)?;
+    for subfolder in [""].iter().chain(set.subfolders) {
+        let folder = path.join(subfolder);
+        match fs::symlink_metadata(&folder) {
+            Err(error) if error.kind() == ErrorKind::NotFound => continue,
+            Ok(there) if !subfolder.is_empty() && !there.is_dir() => return Err(FolderError::Foreign { path: folder }),
+            _ => {}
+        }
+        for entry in fs::read_dir(&folder).map_err(FolderError::write(&folder))? {
+            let name = entry.map_err(FolderError::write(&folder))?.file_name();
+            let Some(name) = name.to_str() else { continue };
+            let name = if subfolder.is_empty() { name.to_owned() } else { format!("{subfolder}/{name}") };
+            if (set.has)(&name) && !ours.contains(&name) {
+                return Err(FolderError::Foreign { path: path.join(name) });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Ends what a run that was killed began.
+pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
+    if is_folder(&path.join(WHOLE)) {
+        swap(path)?;
+    }
+    let part = path.join(PART);
+    if is_folder(&part) {
+        if list::read(&part)?.is_empty() {
+            fs::remove_dir_all(&part).map_err(FolderError::write(&part))?;
+        } else {
+            let kept = keep(&part, path)?;
+            tracing::warn!("{}: what an earlier run left unfinished is kept as {}", path.display(), kept.display());
+        }
+    }
+    for folder in [""].iter().chain(set.subfolders).map(|subfolder| path.join(subfolder)) {
+        // Where there is none, nothing is left behind.
+        for (part, name) in whole::all_left_behind(&folder).unwrap_or_default() {
+            let file = folder.join(name);
+            let name = file.strip_prefix(path).ok().and_then(Path::to_str);
+            if name.is_some_and(|name| (set.has)(name)) {
+                // One file that is not whole, of many that are.
+                fs::remove_file(&part).map_err(FolderError::write(&part))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Moves whole files to where they belong, after the old ones are gone, the last ones first. May have been broken off
+/// anywhere before. Gives the number of files that went.
+pub(super) fn swap(path: &Path) -> Result<u64, FolderError> {
+    let whole = path.join(WHOLE);
+    let (old, new) = (list::read(path)?, list::read(&whole)?);
+    let mut gone = 0;
+    for name in old.iter().rev() {
+        let is_moved = new.contains(name) && !whole.join(name).exists();
+        let file = path.join(name);
+        if is_moved || !is_file(path, name) {
+            continue;
+        }
+        fs::remove_file(&file).map_err(FolderError::write(&file))?;
+        gone += 1;
+    }
+    for name in new.iter() {
+        let (from, to) = (whole.join(name), path.join(name));
+        if let Some((subfolder, _)) = name.rsplit_once('/') {
+            make_subfolder(&path.join(subfolder))?;
+        }
+        match whole::rename(&from, &to, false) {
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(FolderError::Foreign { path: to }),
+            renamed => renamed.map_err(FolderError::write(&to))?,
+        }
+    }
+    let list = path.join(LIST);
+    whole::rename(&whole.join(LIST), &list, true).map_err(FolderError::write(&list))?;
+    fs::remove_dir_all(&whole).map_err(FolderError::write(&whole))?;
+    for name in old.iter().filter_map(|name| Some(name.rsplit_once('/')?.0)) {
+        // It goes with its last file.
+        let _ = fs::remove_dir(path.join(name));
+    }
+    whole::sync_folder(&list).map_err(FolderError::write(path))?;
+    Ok(gone)
+}
+
+/// Whether `name` is a file in the folder `path`, and no link leads there.
+fn is_file(path: &Path, name: &str) -> bool {
+    let folder_is_own = name.rsplit_once('/').is_none_or(|(subfolder, _)| is_folder(&path.join(subfolder)));
+    folder_is_own && fs::symlink_metadata(path.join(name)).is_ok_and(|there| there.is_file())
+}
+
+fn is_folder(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|there| there.is_dir())
+}
+
+pub(super) fn make_subfolder(path: &Path) -> Result<(), FolderError> {
+    match fs::create_dir(path) {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists && is_folder(path) => Ok(()),
+        made => made.map_err(FolderError::write(path)),
+    }
+}
+
+/// Keeps files beside the folder; within it, where that is another file system or must not be written.
+pub(super) fn keep(part: &Path, path: &Path) -> Result<PathBuf, FolderError> {
+    let path = if path.file_name().is_some() { path.to_owned() } else { fs::canonicalize(path).unwrap_or(path.into()) };
+    let within = path.join(path.file_name().unwrap_or("files".as_ref()));
+    let kept = whole::keep_incomplete(part, &path).or_else(|_| whole::keep_incomplete(part, &within));
+    kept.map_err(FolderError::write(part))
+}

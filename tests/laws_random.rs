@@ -1,0 +1,375 @@
+//! The laws of the blur on random settings, sizes and fields, on both executors.
+//!
+//! `BOKEHCAM_TEST_CASES=5000` plays as many cases of each law, `BOKEHCAM_TEST_SEED=7` begins with that seed: what a test
+//! says when it fails plays that one case again.
+#![allow(missing_docs)]
+
+mod common;
+
+use bokehcam::bokeh::aperture::{Aperture, Picture, Shape};
+use bokehcam::bokeh::cpu::{CpuBokeh, srgb_to_linear};
+use bokehcam::bokeh::plan::Plan;
+use bokehcam::bokeh::{Effect, Method, Rank, Settings};
+use bokehcam::budget::Quality;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::{CocField, DepthCoc, Ramp};
+use common::{EFFECTS, Numbers, color, depth};
+
+/// Cases of each law where nobody asks for more.
+const CASES: u64 = 40;
+
+fn number(variable: &str, default: u64) -> u64 {
+    match std::env::var(variable) {
+        Ok(text) => text.parse().unwrap_or_else(|_| panic!("{variable}={text} is no number")),
+        Err(_) => default,
+    }
+}
+
+/// Says how to play a case again, should it panic.
+struct Again(u64);
+
+impl Drop for Again {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("again: BOKEHCAM_TEST_SEED={} BOKEHCAM_TEST_CASES=1", self.0);
+        }
+    }
+}
+
+/// Plays the cases of a law.
+fn each_case(law: impl Fn(&mut Random)) {
+    let first = number("BOKEHCAM_TEST_SEED", 1);
+    for seed in first..first + number("BOKEHCAM_TEST_CASES", CASES) {
+        let again = Again(seed);
+        law(&mut Random::new(seed));
+        drop(again);
+    }
+}
+
+struct Random(Numbers);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        let mut numbers = Numbers(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        (0..4).for_each(|_| _ = numbers.next());
+        Self(numbers)
+    }
+    /// From 0 to below 1.
+    fn share(&mut self) -> f32 {
+        self.0.next()
+    }
+    fn below(&mut self, count: usize) -> usize {
+        (self.share() * count as f32) as usize
+    }
+    fn of<T: Clone>(&mut self, choices: &[T]) -> T {
+        choices[self.below(choices.len())].clone()
+    }
+    fn code(&mut self) -> u8 {
+        self.below(256) as u8
+    }
+
+    fn size(&mut self) -> (u32, u32) {
+        let (width, height) = match self.below(6) {
+            0 => (self.below(8), self.below(8)),
+            1 => (self.below(900), self.below(3)),
+            2 => (self.below(3), self.below(500)),
+            _ => (self.below(160), self.below(120)),
+        };
+        (width as u32 + 1, height as u32 + 1)
+    }
+
+    /// Any aperture; `even` ones look the same turned by 180 degrees.
+    fn shape(&mut self, even: bool) -> Shape {
+        let corners = if even { 4 + 2 * self.below(7) as u32 } else { 3 + self.below(14) as u32 };
+        match self.below(if even { 4 } else { 6 }) {
+            0 => Shape::Disc,
+            1 => Shape::Ring { inner: self.share() * 0.99 },
+            2 => {
+                Shape::Polygon { blades: corners, rotation_deg: 720.0 * self.share() - 360.0, curvature: self.share() }
+            }
+            3 => Shape::Star { points: corners },
+            4 => Shape::Heart,
+            _ => {
+                let (width, height) = (1 + self.below(12) as u32, 1 + self.below(12) as u32);
+                let grey = (0..width * height).map(|_| self.share()).collect();
+                Shape::Picture(std::sync::Arc::new(Picture { width, height, grey }))
+            }
+        }
+    }
+
+    fn settings(&mut self, effect: Effect) -> Settings {
+        let near_max_px = if effect == Effect::Dof { self.radius_px() } else { 0.0 };
+        let far_max_px = if effect == Effect::Dof && self.below(2) == 0 { near_max_px } else { self.radius_px() };
+        Settings {
+            effect,
+            method: if self.below(6) == 0 { Method::Gather } else { Method::Layered },
+            aperture: Aperture { shape: self.shape(false), intensity: 2.0 * self.share() - 1.0 },
+            rim: self.share(),
+            rank: match self.below(4) {
+                0 => Some(Rank::Terms(1 + self.below(16) as u32)),
+                1 if far_max_px.max(near_max_px) < 15.0 => Some(Rank::Full),
+                _ => None,
+            },
+            highlights: if self.below(2) == 0 { 0.0 } else { self.of(&[1.0, 8.0, 100.0]) * self.share() },
+            quality: self.of(&Quality::ALL),
+            adaptive: self.below(2) == 0,
+            far_max_px,
+            near_max_px,
+        }
+    }
+
+    fn radius_px(&mut self) -> f32 {
+        match self.below(6) {
+            0 => 0.0,
+            1 => 1e-6,
+            2 => 100.0 * self.share(),
+            _ => 20.0 * self.share(),
+        }
+    }
+
+    /// A field of an effect, no larger than the settings say, and depth for it.
+    fn field(&mut self, settings: &Settings, (width, height): (u32, u32)) -> (CocField, DepthMap) {
+        let (far_px, base_m) = (settings.far_max_px, 0.3 + 3.0 * self.share());
+        let map = self.depth(base_m, (width, height));
+        let field = match settings.effect {
+            Effect::Blur => CocField::Uniform { radius_px: far_px * self.share() },
+            Effect::TiltShift => CocField::Ramp(Ramp {
+                normal: glam::Vec2::from_angle(7.0 * self.share()),
+                offset_px: 200.0 * self.share() - 50.0,
+                half_band_px: 40.0 * self.share(),
+                slope: self.share(),
+                max_px: far_px,
+            }),
+            Effect::Dof => CocField::Depth(DepthCoc {
+                // Any lens, where the largest radius is the same on both sides.
+                coc_at_infinity_px: if far_px >= settings.near_max_px { self.of(&[far_px, 1e30]) } else { far_px },
+                focus_m: self.of(&[base_m, 1e-3, 1e6, 1.0]),
+                range_m: self.of(&[0.0, 0.5, 1e9]),
+                max_coc_px: settings.near_max_px,
+            }),
+        };
+        (field, map)
+    }
+
+    fn depth(&mut self, base_m: f32, (width, height): (u32, u32)) -> DepthMap {
+        let (width, height) = (1 + self.below(width as usize) as u32, 1 + self.below(height as usize) as u32);
+        let (kind, step) = (self.below(5), 1 + self.below(30) as u32);
+        let odd = [f32::NAN, f32::INFINITY, -1.0, 0.0, 1e-45, 3e38, f32::NEG_INFINITY, 1e-20];
+        depth(width, height, |x, y| match kind {
+            0 => base_m,
+            1 => base_m + self.share(),
+            2 if self.below(2) == 0 => self.of(&odd),
+            2 => 0.2 + 5.0 * self.share(),
+            3 => self.of(&[0.5, 1.0, 4.0, 0.0]),
+            // Surfaces with edges between them.
+            _ => base_m * [1.0, 0.6, 2.0, 1e3, 0.0][((x / step * 7 + y / step * 3) % 5) as usize],
+        })
+    }
+}
+
+/// What blurs a sequence of frames.
+trait Blurs {
+    fn blur(&mut self, quality: Quality, image: &ColorImage, map: &DepthMap, field: &CocField) -> ColorImage;
+}
+
+impl Blurs for CpuBokeh {
+    fn blur(&mut self, quality: Quality, image: &ColorImage, map: &DepthMap, field: &CocField) -> ColorImage {
+        let mut out = ColorImage::default();
+        self.set_quality(quality);
+        CpuBokeh::blur(self, image, Some(map), field, &mut out).expect("a blur of fitting input");
+        out
+    }
+}
+
+fn cpu(settings: &Settings, (width, height): (u32, u32), threads: usize) -> Box<dyn Blurs> {
+    Box::new(CpuBokeh::new(Plan::new(settings, width, height), Some(threads)))
+}
+
+type Make<'a> = &'a dyn Fn(&Settings, (u32, u32)) -> Box<dyn Blurs>;
+
+fn a_constant_picture_stays_constant(make: Make) {
+    each_case(|random| {
+        let (effect, size) = (random.of(&EFFECTS), random.size());
+        let settings = random.settings(effect);
+        let mut executor = make(&settings, size);
+        for frame in 0..1 + random.below(3) {
+            let constant = [random.code(), random.code(), random.code()];
+            let (field, map) = random.field(&settings, size);
+            let quality = random.of(&Quality::ALL);
+            let out = executor.blur(quality, &color(size.0, size.1, |_, _| constant), &map, &field);
+            let off = |pixel: &[u8]| pixel.iter().zip(constant).map(|(a, b)| a.abs_diff(b)).max();
+            let worst = out.rgb.chunks_exact(3).map(off).max().flatten();
+            assert!(
+                worst <= Some(1),
+                "frame {frame}: {constant:?} is off by {worst:?}: {size:?} {quality} {settings:?} {field:?}, \
+                 depth of {:?}, such as {:?}",
+                (map.width, map.height),
+                &map.metres[..map.metres.len().min(8)]
+            );
+        }
+    });
+}
+
+#[test]
+fn a_constant_picture_stays_constant_on_the_cpu() {
+    a_constant_picture_stays_constant(&|settings, size| cpu(settings, size, 2));
+}
+
+/// Grey pictures: a highlight's colours are brought back by their luminance, and not one by one.
+fn nothing_is_darker_or_brighter_than_all_there_was(make: Make) {
+    each_case(|random| {
+        let (effect, size) = (random.of(&EFFECTS), random.size());
+        let settings = random.settings(effect);
+        let mut executor = make(&settings, size);
+        let (low, high) = (random.code() / 2, 128 + random.code() / 2);
+        let lit = 0.5 * random.share() * random.share();
+        let image = color(size.0, size.1, |_, _| [if random.share() < lit { high } else { low }; 3]);
+        let (field, map) = random.field(&settings, size);
+        let out = executor.blur(settings.quality, &image, &map, &field);
+        let light = |code: u8| srgb_to_linear(f32::from(code) / 255.0);
+        // Half a code value is lost in rounding.
+        let range = 0.98 * light(low) - 0.5 / 255.0..=1.02 * light(high) + 0.5 / 255.0;
+        let beyond = out.rgb.iter().find(|&&code| !range.contains(&light(code)));
+        assert!(beyond.is_none(), "{beyond:?} of {low} to {high}: {size:?} {settings:?} {field:?}");
+    });
+}
+
+#[test]
+fn nothing_is_darker_or_brighter_than_all_there_was_on_the_cpu() {
+    nothing_is_darker_or_brighter_than_all_there_was(&|settings, size| cpu(settings, size, 2));
+}
+
+fn a_blurred_point_does_not_shift(make: Make) {
+    const SIDE: u32 = 141;
+    each_case(|random| {
+        let effect = random.of(&[Effect::Blur, Effect::Dof]);
+        let far_max_px = 1.0 + 19.0 * random.share();
+        let settings = Settings {
+            aperture: Aperture { shape: random.shape(true), intensity: 2.0 * random.share() - 1.0 },
+            highlights: 0.0,
+            far_max_px,
+            rank: random.of(&[None, Some(Rank::Terms(2)), Some(Rank::Terms(5))]),
+            ..random.settings(effect)
+        };
+        let field = match effect {
+            Effect::Blur => CocField::Uniform { radius_px: far_max_px },
+            _ => CocField::Depth(DepthCoc {
+                coc_at_infinity_px: far_max_px,
+                focus_m: 1.0,
+                range_m: 0.0,
+                max_coc_px: 100.0,
+            }),
+        };
+        let side = 5 + random.below(8) as u32;
+        let (left, top) = (60 + random.below(8) as u32, 60 + random.below(8) as u32);
+        let inside = |x: u32, y: u32| (left..left + side).contains(&x) && (top..top + side).contains(&y);
+        let image = color(SIDE, SIDE, |x, y| [if inside(x, y) { 255 } else { 0 }; 3]);
+        let out = make(&settings, (SIDE, SIDE)).blur(settings.quality, &image, &depth(1, 1, |_, _| 1e9), &field);
+        let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
+        for (k, pixel) in out.rgb.chunks_exact(3).enumerate() {
+            let light = f64::from(srgb_to_linear(f32::from(pixel[1]) / 255.0));
+            sum += light;
+            sum_x += light * f64::from(k as u32 % SIDE);
+            sum_y += light * f64::from(k as u32 / SIDE);
+        }
+        let middle = f64::from(side - 1) / 2.0;
+        let off = [sum_x / sum - f64::from(left) - middle, sum_y / sum - f64::from(top) - middle];
+        assert!(off.iter().all(|px| px.abs() < 0.05), "off by {off:?} px: square of {side} {settings:?} {field:?}");
+    });
+}
+
+#[test]
+fn a_blurred_point_does_not_shift_on_the_cpu() {
+    a_blurred_point_does_not_shift(&|settings, size| cpu(settings, size, 2));
+}
+
+#[test]
+fn frames_before_and_the_number_of_threads_change_nothing() {
+    each_case(|random| {
+        let (effect, size) = (random.of(&EFFECTS), random.size());
+        let settings = random.settings(effect);
+        let mut executor = cpu(&settings, size, 1 + random.below(4));
+        for frame in 0..3 {
+            let image = color(size.0, size.1, |_, _| [random.code(), random.code(), random.code()]);
+            let (field, map) = random.field(&settings, size);
+            let quality = random.of(&Quality::ALL);
+            let out = executor.blur(quality, &image, &map, &field);
+            let alone = cpu(&settings, size, 1).blur(quality, &image, &map, &field);
+            assert!(out == alone, "frame {frame}: {size:?} {quality} {settings:?} {field:?}");
+        }
+    });
+}
+
+#[test]
+fn what_is_in_focus_stays_as_it_is() {
+    each_case(|random| {
+        let size = random.size();
+        let settings = Settings { method: Method::Layered, ..random.settings(Effect::Dof) };
+        let lens = DepthCoc {
+            coc_at_infinity_px: settings.far_max_px,
+            focus_m: 0.1 + 5.0 * random.share(),
+            range_m: random.share(),
+            max_coc_px: settings.far_max_px.max(settings.near_max_px),
+        };
+        let map = depth(size.0, size.1, |_, _| lens.near_m() + (lens.far_m() - lens.near_m()) * random.share());
+        let image = color(size.0, size.1, |_, _| [random.code(), random.code(), random.code()]);
+        let out = cpu(&settings, size, 2).blur(settings.quality, &image, &map, &CocField::Depth(lens));
+        let worst = out.rgb.iter().zip(&image.rgb).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst <= Some(1), "{worst:?}: {size:?} {settings:?} {lens:?}");
+    });
+}
+
+#[cfg(feature = "gpu")]
+mod on_the_gpu {
+    use super::*;
+    use bokehcam::bokeh::gpu::GpuBokeh;
+    use bokehcam::bokeh::{Bokeh, Job};
+    use bokehcam::compute::Place;
+    use bokehcam::compute::device::Device;
+    use bokehcam::link::pool::Pooled;
+    use std::sync::Arc;
+
+    impl Blurs for GpuBokeh {
+        fn blur(&mut self, quality: Quality, image: &ColorImage, map: &DepthMap, field: &CocField) -> ColorImage {
+            self.submit(Job {
+                ticket: 0,
+                color: Pooled::detached(image.clone()),
+                depth: Some(Pooled::detached(map.clone())),
+                coc: *field,
+                quality,
+                place: Place::Memory,
+                out: Pooled::detached(ColorImage::default()),
+            })
+            .expect("the GPU takes a frame");
+            let finished = self.collect(true).expect("the GPU blurs").expect("a frame comes back");
+            finished.out.clone()
+        }
+    }
+
+    /// Executors on one device.
+    fn gpu() -> impl Fn(&Settings, (u32, u32)) -> Box<dyn Blurs> {
+        let device = Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"));
+        move |settings, (width, height)| {
+            let plan = Plan::new(settings, width, height);
+            Box::new(GpuBokeh::on(&plan, Arc::clone(&device)).expect("such a picture fits"))
+        }
+    }
+
+    #[test]
+    #[ignore = "needs a Vulkan adapter (software will do)"]
+    fn a_constant_picture_stays_constant_on_the_gpu() {
+        a_constant_picture_stays_constant(&gpu());
+    }
+
+    #[test]
+    #[ignore = "needs a Vulkan adapter (software will do)"]
+    fn nothing_is_darker_or_brighter_than_all_there_was_on_the_gpu() {
+        nothing_is_darker_or_brighter_than_all_there_was(&gpu());
+    }
+
+    #[test]
+    #[ignore = "needs a Vulkan adapter (software will do)"]
+    fn a_blurred_point_does_not_shift_on_the_gpu() {
+        a_blurred_point_does_not_shift(&gpu());
+    }
+}

@@ -1,0 +1,251 @@
+//! Runs on a clock that only the stages here move, one frame at a time: what is measured is exact, and the machine has
+//! no say in it.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread;
+use std::time::Duration;
+
+use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
+use bokehcam::budget::Quality;
+use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::clock::Clock;
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::optics::CocField;
+use bokehcam::pipeline::{Change, CocAtInfinity, CocRule, Executor, Pace, QualityRule, Run, run};
+use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::stats::{Cause, Report};
+
+use crate::fakes::{SIZE, simple};
+
+const MS: u64 = 1_000_000;
+const PERIOD_NS: u64 = 40 * MS;
+/// What each stage moves the clock on for a frame, and how old a frame is when the camera hands it out.
+const AGE_NS: u64 = 4 * MS;
+const READ_NS: u64 = 2 * MS;
+const DEPTH_NS: u64 = 5 * MS;
+const BLUR_NS: u64 = 7 * MS;
+const SINK_NS: u64 = 3 * MS;
+
+/// A camera that takes its next frame once the one before has been delivered.
+struct Lockstep {
+    clock: Clock,
+    delivered: Arc<AtomicU64>,
+    frames: usize,
+    next: usize,
+    waited_ns: u64,
+    /// Called before each frame.
+    before: Box<dyn FnMut(usize) + Send>,
+}
+
+impl Camera for Lockstep {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: "lockstep".into(),
+            size: SIZE,
+            period_ns: PERIOD_NS,
+            frames: None,
+            live: true,
+            brings: Brings::Color,
+        }
+    }
+
+    fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
+        let (index, asked_ns) = (self.next, self.clock.now_ns());
+        while self.delivered.load(Ordering::SeqCst) < index as u64 {
+            thread::sleep(Duration::from_micros(50));
+        }
+        if index == self.frames {
+            return Ok(Captured::End);
+        }
+        self.next += 1;
+        (self.before)(index);
+        self.clock.advance_ns(PERIOD_NS);
+        self.waited_ns = self.clock.now_ns() - asked_ns - READ_NS;
+        color.resize(SIZE.0, SIZE.1);
+        let captured_ns = Some(self.clock.now_ns() - AGE_NS);
+        Ok(Captured::Frame(Stamp { index, time_ns: index as u64 * PERIOD_NS, captured_ns }))
+    }
+
+    fn waited_ns(&self) -> u64 {
+        self.waited_ns
+    }
+}
+
+/// A wall at one metre.
+struct Wall(Clock, u64);
+
+impl DepthSource for Wall {
+    fn read(&mut self, _: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        self.0.advance_ns(self.1);
+        map.resize(SIZE.0, SIZE.1);
+        map.metres.fill(1.0);
+        Ok(())
+    }
+}
+
+/// Writes down by what each frame was to be blurred.
+struct Recorder {
+    clock: Clock,
+    job: Option<Job>,
+    fields: Arc<Mutex<Vec<CocField>>>,
+}
+
+impl Bokeh for Recorder {
+    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
+        self.clock.advance_ns(BLUR_NS);
+        self.fields.lock().unwrap().push(job.coc);
+        self.job = Some(job);
+        Ok(())
+    }
+    fn collect(&mut self, _: bool) -> Result<Option<Finished>, BokehError> {
+        Ok(self.job.take().map(|Job { ticket, mut out, color, depth, .. }| {
+            out.resize(SIZE.0, SIZE.1);
+            let times = PassTimes::new();
+            Finished { ticket, out, in_memory: true, on_device: None, color, depth, times }
+        }))
+    }
+    fn in_flight(&self) -> usize {
+        usize::from(self.job.is_some())
+    }
+    fn capacity(&self) -> usize {
+        1
+    }
+    fn describe(&self) -> String {
+        "cpu, recorder".into()
+    }
+}
+
+struct Slow(Clock);
+
+impl Sink for Slow {
+    fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.0.advance_ns(SINK_NS);
+        Ok(ControlFlow::Continue(()))
+    }
+    fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
+        Ok(())
+    }
+    fn describe(&self) -> String {
+        "slow".into()
+    }
+}
+
+fn dof(max_coc_px: f32) -> CocRule {
+    CocRule::Depth { focus: FocusRule::Metres(1.0), lens: CocAtInfinity::Px(8.0), range_m: 0.0, max_coc_px }
+}
+
+/// Runs some frames, of which depth takes `depth_ns`; gives the report and what each frame was to be blurred by.
+fn play(
+    (frames, pace): (usize, Pace),
+    depth_ns: u64,
+    budget_ns: u64,
+    changes: Option<mpsc::Receiver<Change>>,
+    before: impl FnMut(usize) + Send + 'static,
+) -> (Report, Vec<CocField>) {
+    let (clock, fields, delivered) = (Clock::manual(), Arc::default(), Arc::<AtomicU64>::default());
+    let camera = Lockstep {
+        clock: clock.clone(),
+        delivered: delivered.clone(),
+        frames,
+        next: 0,
+        waited_ns: 0,
+        before: Box::new(before),
+    };
+    let stop = AtomicBool::new(false);
+    let report = run(Run {
+        depth: Some(Box::new(Wall(clock.clone(), depth_ns))),
+        bokeh: Some(Box::new(Recorder { clock: clock.clone(), job: None, fields: Arc::clone(&fields) })),
+        coc: dof(10.0),
+        changes,
+        budget_ns,
+        clock: clock.clone(),
+        progress: &|progress| delivered.store(progress.delivered, Ordering::SeqCst),
+        ..simple(Box::new(camera), Box::new(Slow(clock)), &stop, pace)
+    })
+    .unwrap();
+    assert!(report.frames.balance(), "{:?}", report.frames);
+    assert_eq!((report.frames.captured, report.frames.delivered), (frames as u64, frames as u64));
+    let fields = fields.lock().unwrap().clone();
+    (report, fields)
+}
+
+/// Within what a histogram rounds by.
+fn is_about(measured_ms: f64, time_ns: u64) -> bool {
+    (measured_ms * MS as f64 / time_ns as f64 - 1.0).abs() < 0.01
+}
+
+#[test]
+fn each_time_is_that_of_its_own_stage_and_latency_is_all_since_the_capture() {
+    let (report, _) = play((5, Pace::Asap), DEPTH_NS, BLUR_NS, None, |_| {});
+    let latency_ns = AGE_NS + DEPTH_NS + BLUR_NS + SINK_NS;
+    assert_eq!(report.latency_ms.unwrap().max, latency_ns as f64 / MS as f64);
+    let interval_ns = PERIOD_NS + DEPTH_NS + BLUR_NS + SINK_NS;
+    assert_eq!(report.frame_ms.unwrap().max, interval_ns as f64 / MS as f64);
+    let stages: Vec<_> = report.stages_ms.0.iter().map(|(name, times)| (name.as_str(), times.p50, times.p99)).collect();
+    let expected = [("decode", READ_NS), ("depth", DEPTH_NS), ("blur", BLUR_NS), ("sink", SINK_NS)];
+    assert_eq!(stages.len(), expected.len(), "{stages:?}");
+    for (stage, (name, ns)) in stages.into_iter().zip(expected) {
+        assert!(stage.0 == name && is_about(stage.1, ns) && is_about(stage.2, ns), "{stage:?} is not {name}: {ns} ns");
+    }
+    assert_eq!((report.misses, report.depth_held), (0, 0), "a blur of exactly the budget is none too long");
+    let (report, _) = play((5, Pace::Asap), DEPTH_NS, BLUR_NS - 1, None, |_| {});
+    assert_eq!((report.misses, report.budget_ms), (5, 7.0));
+}
+
+#[test]
+fn a_change_of_the_look_holds_from_its_frame_on_where_depth_is_held_too() {
+    // Depth has 5 ms a frame and takes 14: each is for three frames.
+    let (send, changes) = mpsc::channel();
+    let before = move |frame: usize| {
+        // In every place of such three.
+        if frame >= 30 && frame % 4 == 0 {
+            let coc = dof(10.0 + frame as f32);
+            let (number, quality) = (frame as u64, QualityRule::Fixed(Quality::Fast));
+            let _ = send.send(Change { number, coc, refine: false, quality, bokeh: Executor::Keep });
+        }
+    };
+    let (report, fields) = play((60, Pace::Realtime), 14 * MS, 10 * MS, Some(changes), before);
+    assert!(report.depth_held > 20, "{} of 60 frames took over the depth of another", report.depth_held);
+    for (frame, field) in fields.into_iter().enumerate() {
+        let CocField::Depth(lens) = field else { panic!("no such rule was given") };
+        let expected_px = if frame < 32 { 10.0 } else { 10.0 + (frame / 4 * 4) as f32 };
+        assert_eq!(lens.max_coc_px, expected_px, "frame {frame}");
+    }
+}
+
+/// Loses frames between those that it gives: as many as their number, of each cause.
+struct Loser(usize);
+
+const LOSSES: [Cause; 3] = [Cause::Driver, Cause::Corrupt, Cause::Evicted];
+
+impl Camera for Loser {
+    fn info(&self) -> SourceInfo {
+        let name = "loser".into();
+        SourceInfo { name, size: SIZE, period_ns: PERIOD_NS, frames: None, live: true, brings: Brings::Color }
+    }
+    fn next(&mut self, Shot { color, .. }: Shot) -> Result<Captured, CaptureError> {
+        let index = self.0;
+        self.0 += 1;
+        color.resize(SIZE.0, SIZE.1);
+        Ok(match index {
+            0..6 if index % 2 == 0 => Captured::Lost(index as u64 + 3, LOSSES[index / 2]),
+            0..6 => Captured::Frame(Stamp { index, time_ns: 0, captured_ns: Some(0) }),
+            6 => Captured::Waiting,
+            _ => Captured::End,
+        })
+    }
+}
+
+#[test]
+fn what_a_camera_says_is_lost_counts_as_many_times_as_it_says() {
+    let (stop, sink) = (AtomicBool::new(false), Box::new(Slow(Clock::manual())));
+    let frames = run(simple(Box::new(Loser(0)), sink, &stop, Pace::Asap)).unwrap().frames;
+    assert!(frames.balance());
+    let dropped = frames.dropped;
+    assert_eq!((dropped.driver, dropped.corrupt, dropped.evicted, dropped.total()), (3, 5, 7, 15));
+    assert_eq!((frames.captured, frames.delivered, frames.in_flight), (18, 3, 0));
+}

@@ -1,0 +1,85 @@
+//! The depth map of a picture.
+
+use std::fs;
+
+use bokehcam::recording::still;
+
+use super::program::{Home, depth};
+
+fn render(home: &Home, more: &[&str]) -> super::program::Ran {
+    home.run(&[&["render", "photo.png", "--out", "out.png", "--force", "--backend", "cpu"], more].concat())
+}
+
+#[test]
+fn depth_of_another_aspect_or_orientation_is_refused() {
+    let home = Home::new().with_photo();
+    for (name, (width, height)) in [("tall.png", (48, 64)), ("square.pfm", (48, 48))] {
+        still::write_depth(&home.path(name), &depth(width, height), 5000.0, false).unwrap();
+        let said = format!("{name}: the depth map is {width}x{height}, which does not cover a colour picture of 64x48");
+        render(&home, &["--depth-map", name]).refused(1, &[&said]);
+    }
+    still::write_depth(&home.path("half.png"), &depth(32, 24), 5000.0, false).unwrap();
+    assert_eq!(render(&home, &["--depth-map", "half.png"]).warning(), "");
+}
+
+/// Puts an EXIF block that says "turn me a quarter clockwise" behind the header of a PNG.
+fn turn(path: &std::path::Path) {
+    const ORIENTATION_6: &[u8] =
+        b"eXIfMM\x00\x2a\x00\x00\x00\x08\x00\x01\x01\x12\x00\x03\x00\x00\x00\x01\x00\x06\x00\x00\x00\x00\x00\x00";
+    let mut file = fs::read(path).unwrap();
+    let crc = ORIENTATION_6.iter().fold(!0u32, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 })
+    });
+    let mut chunk = (ORIENTATION_6.len() as u32 - 4).to_be_bytes().to_vec();
+    chunk.extend_from_slice(ORIENTATION_6);
+    chunk.extend_from_slice(&(!crc).to_be_bytes());
+    let header_end = 8 + 25;
+    file.splice(header_end..header_end, chunk);
+    fs::write(path, file).unwrap();
+}
+
+#[test]
+fn a_picture_that_was_held_upright_needs_depth_that_was() {
+    let home = Home::new().with_photo();
+    turn(&home.path("photo.png"));
+    assert_eq!(still::read_color(&home.path("photo.png")).unwrap().size(), (48, 64));
+    render(&home, &["--depth-map", "depth.png"]).refused(1, &["64x48", "48x64"]);
+    turn(&home.path("depth.png"));
+    let turned = still::read_depth(&home.path("depth.png"), 5000.0, None).unwrap();
+    assert_eq!(turned.size(), (48, 64));
+    // What was left is above.
+    assert!(turned.metres[0] < 0.6 && turned.metres[63 * 48] > 4.0);
+    assert_eq!(render(&home, &["--depth-map", "depth.png"]).warning(), "");
+}
+
+#[test]
+fn a_focus_that_nothing_is_near_is_told_with_the_distances_that_there_are() {
+    let home = Home::new().with_photo();
+    let warned = |more: &[&str]| render(&home, &[&["--depth-map", "depth.png"], more].concat()).warning().to_owned();
+    assert_eq!(warned(&["--focus", "1.5"]), "");
+    let far = warned(&["--focus", "1.5", "--depth-scale", "100", "--coc-at-infinity", "4"]);
+    assert!(far.contains("--focus 1.5: the depth lies from 2") && far.contains("beyond that"), "{far}");
+    assert!(far.contains("is --depth-scale that of this depth?"), "{far}");
+    let near = warned(&["--focus", "100"]);
+    assert!(near.contains("all of it before that"), "{near}");
+    assert_eq!(warned(&["--focus", "auto", "--depth-scale", "100"]), "");
+}
+
+#[test]
+fn a_recording_in_other_units_is_told_as_well() {
+    let home = Home::new().with_recording();
+    let stream = |scale: &str| {
+        let args =
+            ["stream", "recording", "--to", "null", "--backend", "cpu", "--coc-at-infinity", "4", "--focus", "1.2"];
+        home.run(&[&args[..], &["--depth-scale", scale]].concat()).warning().to_owned()
+    };
+    assert_eq!(stream("5000"), "");
+    assert!(stream("50").contains("beyond that, and nothing is sharp; is --depth-scale that of this depth?"));
+}
+
+#[test]
+fn the_folder_of_the_result_is_made() {
+    let home = Home::new().with_photo();
+    home.run(&["render", "photo.png", "--effect", "none", "--out", "a/b/out.png"]).done();
+    assert!(home.path("a/b/out.png").is_file());
+}

@@ -1,0 +1,12 @@
+//! Settings as the user of the program meets them: which have an effect, where they come from, how they are saved, and
+//! how what is said of them looks.
+#![allow(missing_docs)]
+
+mod calib;
+mod depth_map;
+mod environment;
+mod messages;
+mod program;
+mod radius;
+mod save;
+mod unused;

@@ -1,0 +1,138 @@
+//! How messages look: in one line, as JSON where that was asked for, and with nothing that a terminal would obey.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::os::unix::ffi::OsStrExt;
+
+use super::program::{Home, Ran};
+
+#[test]
+fn numbers_below_zero_reach_the_option_that_they_are_for() {
+    for (option, value, said) in [
+        ("--focus", "-1", "METRES above 0"),
+        ("--focus", "-0.5,0.2", "fractions of width and height"),
+        ("--coc-at-infinity", "-3%", "from 0 to 20000"),
+        ("--max-coc", "-2", "from 0 to 20000"),
+        ("--rim", "-0.1", "from 0 to 1"),
+        ("--highlights", "-1", "from 0 to 1000"),
+        ("--depth-scale", "-5000", "above 0"),
+        ("--depth-invalid", "-1", "0..=65535"),
+        ("--f-number", "-2", "above 0"),
+        ("--tilt", "-1", "0.6:0.1:15"),
+        ("--frames", "-1", "1.."),
+        ("--start", "-1", "seconds from 0"),
+        ("--fps", "-5", "from 0.1 to 1000"),
+        ("--threads", "-2", "1..=1024"),
+        ("--max-disparity", "-16", "16 to 256"),
+        ("--budget-ms", "-1", "above 0"),
+        ("--rank", "-3", "1 to 16"),
+    ] {
+        let ran = Home::new().run(&["config", "dump", option, value]);
+        ran.refused(2, &[said]);
+        assert!(!ran.stderr.contains("tip:"), "{}", ran.stderr);
+    }
+    assert!(Home::new().run(&["config", "dump", "--intensity", "-0.5"]).stdout.contains("intensity = -0.5 # flag"));
+}
+
+#[test]
+fn a_mistyped_folder_is_a_folder_and_the_right_one_is_named() {
+    let home = Home::new().with_recording();
+    let stream = |source: &str| home.run(&["stream", source, "--to", "null"]);
+    stream("./recordng").refused(2, &["there is no such folder, did you mean ./recording?"]);
+    stream("nowhere/at/all").refused(2, &["there is no such folder; use"]);
+    if cfg!(feature = "camera") {
+        stream("recordng").refused(2, &["there is no camera 'recordng'", "did you mean the folder recording?"]);
+    }
+}
+
+#[test]
+fn a_folder_whose_name_is_no_text_works_and_other_arguments_are_named() {
+    let home = Home::new().with_recording();
+    let name = OsStr::from_bytes(b"caf\xe9");
+    fs::rename(home.path("recording"), home.0.path().join(name)).unwrap();
+    for args in [&["stream", "--to", "null", "--backend", "cpu"][..], &["record", "--to", "other"]] {
+        let ran: Ran = home.command(args).arg(name).output().unwrap().into();
+        ran.done();
+    }
+    let ran: Ran = home.command(&["stream", "synthetic", "--to"]).arg(name).output().unwrap().into();
+    ran.refused(2, &["'caf\\xe9' is no text in UTF-8"]);
+}
+
+#[test]
+fn with_json_every_line_is_an_object() {
+    let home = Home::new().with_photo().with_recording();
+    let json = |args: &[&str], code: i32| {
+        let ran = home.run(&[args, &["--log-format", "json"]].concat());
+        assert_eq!(ran.code, code, "{}", ran.stderr);
+        let objects = ran.stderr.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("{line}")));
+        objects.collect::<Vec<serde_json::Value>>()
+    };
+    let stream = ["stream", "recording", "--to", "null", "--backend", "cpu", "--fps", "9", "-v"];
+    let lines = json(&stream, 0);
+    assert!(
+        lines.iter().any(|line| line["level"] == "WARN" && line["fields"]["message"].to_string().contains("--fps 9"))
+    );
+    let report = lines.last().unwrap();
+    assert!(report["level"] == "INFO" && report["fields"]["message"].as_str().unwrap().starts_with("4 of 4 frames"));
+    assert!(lines.iter().all(|line| line["timestamp"].is_string() && line["target"].is_string()), "{lines:?}");
+    for (args, code) in [
+        (&["render", "nowhere.png", "--out", "out.png"][..], 1),
+        (&["render", "photo.png", "--out", "out.png", "--rim", "7"], 2),
+        (&["stream", "nowhere/", "--to", "null"], 2),
+    ] {
+        let lines = json(args, code);
+        assert_eq!((lines.len(), &lines[0]["level"]), (1, &"ERROR".into()), "{lines:?}");
+    }
+}
+
+#[test]
+fn nothing_that_a_terminal_would_obey_reaches_it() {
+    let home = Home::new().with_recording();
+    let nasty = "a\u{1b}[2J\u{9b}31m\r\nb";
+    let file = home.path(nasty);
+    fs::write(&file, "\"\\u001b]0;title\\u0007\" = 1\n").unwrap();
+    fs::write(home.path("plain.toml"), "\"\\u001b]0;title\\u0007\" = 1\n").unwrap();
+    fs::rename(home.path("recording"), home.path("re\u{1b}cording")).unwrap();
+    for args in [
+        &["render", &format!("{nasty}.png"), "--out", "out.png"][..],
+        &["config", "dump", "--config", nasty],
+        &["config", "dump", "--config", "plain.toml"],
+        &["stream", nasty, "--to", "null"],
+        &["stream", "synthetic", "--to", nasty, "--frames", "1", "--size", "16x12", "--aperture", "image:\u{1b}c"],
+        &["stream", "re\u{1b}cording", "--to", "null", "--backend", "cpu", "-v"],
+        &["render", "x.png", "--out", "x\u{7}.gif", "--preset", "\u{1b}c"],
+    ] {
+        let ran = home.run(args);
+        let acts = |c: char| c.is_control() && c != '\n';
+        assert!(!ran.stderr.contains(acts) && !ran.stdout.contains(acts), "{args:?}: {:?}", ran.stderr);
+        if ran.code != 0 {
+            assert_eq!(ran.stderr.lines().count(), 1, "{args:?}: {}", ran.stderr);
+        }
+    }
+}
+
+#[test]
+fn a_report_can_go_to_standard_output() {
+    let home = Home::new();
+    let args = ["stream", "synthetic", "--size", "32x24", "--frames", "2", "--effect", "none", "--report", "-", "--to"];
+    let ran = home.run(&[&args[..], &["null"]].concat());
+    ran.done();
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    assert_eq!(report["frames"]["delivered"], 2);
+    assert!(!home.path("-").exists());
+    home.run(&[&args[..], &["-"]].concat()).refused(2, &["--report - and --to -"]);
+}
+
+#[test]
+fn advice_names_options_that_there_are() {
+    let home = Home::new().with_recording();
+    let list = fs::read_to_string(home.path("recording/depth.txt")).unwrap();
+    let later = |line: &str| match line.split_once(' ') {
+        Some((time, file)) if !line.starts_with('#') => format!("{} {file}", time.parse::<f64>().unwrap() + 99.0),
+        _ => line.to_owned(),
+    };
+    fs::write(home.path("recording/depth.txt"), list.lines().map(later).collect::<Vec<_>>().join("\n")).unwrap();
+    let ran = home.run(&["stream", "recording", "--to", "null"]);
+    ran.refused(1, &["no depth map lies within 20 ms"]);
+    assert!(!ran.stderr.contains("tolerance"), "{}", ran.stderr);
+}
