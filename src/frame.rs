@@ -159,6 +159,7 @@ impl DepthMap {
     #[inline]
     pub fn is_known(metres: f32) -> bool {
         // Both comparisons are false for NaN; without a branch, so that loops over maps become vector code.
-        (metres >= Self::LEAST_M) & (metres <= Self::MOST_M)
+        let (is_beyond_least, is_below_most) = (metres >= Self::LEAST_M, metres <= Self::MOST_M);
+        is_beyond_least & is_below_most
     }
 }
