@@ -71,7 +71,6 @@ fn stand_ins(folder: &Path) {
     std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_bokehcam"), programs.join("bokehcam")).unwrap();
     fs::write(programs.join("ffplay"), "#!/bin/sh\nexec cat >/dev/null\n").unwrap();
     fs::set_permissions(programs.join("ffplay"), std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
-    fs::create_dir_all(folder.join("home/.config/bokehcam")).unwrap();
 }
 
 /// Runs the commands of a page; at least `least` of them, so that none is left out by mistake.
