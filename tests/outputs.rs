@@ -222,12 +222,14 @@ fn on_a_full_disk_the_whole_frames_are_kept_and_other_sinks_go_on() {
 fn pictures_of_an_earlier_run_stay_until_the_new_are_whole() {
     let home = Home::new();
     home.record("self", 4, 0.1);
-    home.record("long", 4000, 0.1);
     assert_eq!(home.run(&format!("stream self {BLUR} --to out/ -q")).code, Some(0));
     fs::write(home.at("out/notes.txt"), "mine").unwrap();
     let before = tree(&home.at("out"));
 
-    let again = home.command("", &format!("stream long {BLUR} --to out/ --force")).stderr(Stdio::piped()).spawn();
+    let again = home
+        .command("", &format!("stream self {BLUR} --loop --frames 100000 --to out/ --force"))
+        .stderr(Stdio::piped())
+        .spawn();
     let again = again.unwrap();
     until("a new picture", || home.at("out/.bokehcam.part/000003.png").exists());
     let ran = terminate(again);
@@ -261,8 +263,8 @@ fn a_report_that_fails_does_not_hide_why_the_run_ended() {
 #[test]
 fn a_folder_that_is_removed_ends_the_run() {
     let home = Home::new();
-    home.record("self", 4000, 0.05);
-    let args = format!("stream self {BLUR} --pace realtime --to out/");
+    home.record("self", 4, 0.05);
+    let args = format!("stream self {BLUR} --loop --pace realtime --to out/");
     let child = home.command("", &args).stderr(Stdio::piped()).spawn().unwrap();
     until("a picture", || home.at("out/000001.png").exists());
     fs::rename(home.at("out"), home.at("away")).unwrap();
@@ -274,9 +276,9 @@ fn a_folder_that_is_removed_ends_the_run() {
 #[test]
 fn a_reader_that_never_reads_does_not_keep_the_program() {
     let home = Home::new();
-    home.record("self", 4000, 0.01);
+    home.record("self", 4, 0.01);
     for pace in ["asap", "realtime"] {
-        let args = format!("stream self {BLUR} --pace {pace} --to - --report {pace}.json");
+        let args = format!("stream self {BLUR} --loop --pace {pace} --to - --report {pace}.json");
         let mut child = home.command("", &args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
         // The first line says that it runs; what follows fills the pipe.
@@ -316,11 +318,11 @@ fn an_encoder_that_says_all_is_well_is_not_believed() {
 #[test]
 fn an_encoder_that_hangs_does_not_keep_the_program() {
     let home = Home::new();
-    home.record("self", 4000, 0.01);
+    home.record("self", 4, 0.01);
     // It takes nothing, or all and never ends.
     for script in ["echo half > \"$out\"; sleep 1000", "echo half > \"$out\"; cat > /dev/null; sleep 1000"] {
         let path = home.fake_ffmpeg(&format!("[ \"$1\" = -version ] && exit\n{script}"));
-        let args = format!("stream self {BLUR} --to out/ --to x.mkv");
+        let args = format!("stream self {BLUR} --loop --to out/ --to x.mkv");
         let child = home.command(&path, &args).stderr(Stdio::piped()).spawn().unwrap();
         until("a picture", || home.at("out").exists() && pngs(&home.at("out")) > 3);
         let ran = terminate(child);
@@ -353,9 +355,12 @@ fn a_video_on_a_full_disk_is_an_error_and_kept() {
 fn a_video_of_a_loaded_machine_is_as_long_as_the_take() {
     let home = Home::new();
     // So many frames a second that some are dropped anywhere.
-    home.record("self", 3000, 0.001);
+    home.record("self", 50, 0.001);
     for name in ["x.mp4", "x.mkv", "x.y4m"] {
-        assert_eq!(home.run(&format!("stream self {BLUR} --pace realtime --to {name} -q")).code, Some(0));
+        assert_eq!(
+            home.run(&format!("stream self {BLUR} --loop --frames 3000 --pace realtime --to {name} -q")).code,
+            Some(0)
+        );
         let probe = Command::new("ffprobe")
             .args(["-v", "error", "-of", "csv=p=0", "-show_entries", "format=duration"])
             .arg(home.at(name))
