@@ -133,7 +133,7 @@ pub struct DepthMap {
 
 impl DepthMap {
     /// The least depth: no scene is nearer, and its reciprocal, squared, still is a number.
-    pub const LEAST_M: f32 = 1e-7;
+    pub const LEAST_M: f32 = 1e-6;
     /// The largest depth: what is infinitely far in files that have to write a number is nearer than this.
     pub const MOST_M: f32 = 1e12;
 
@@ -159,6 +159,7 @@ impl DepthMap {
     #[inline]
     pub fn is_known(metres: f32) -> bool {
         // Both comparisons are false for NaN; without a branch, so that loops over maps become vector code.
-        (metres >= Self::LEAST_M) & (metres <= Self::MOST_M)
+        let (is_beyond_least, is_below_most) = (metres >= Self::LEAST_M, metres <= Self::MOST_M);
+        is_beyond_least & is_below_most
     }
 }

@@ -173,7 +173,7 @@ fn nothing_to_focus_on_gives_a_usable_distance() {
 /// Numbers that are no distances, among those that are, end in no number that is none.
 #[test]
 fn depths_of_no_scene_are_unknown() {
-    let odd = [1e-38, 1e-45, f32::MIN_POSITIVE, 9e-8, 3e38, f32::MAX, 2e12, f32::NAN, f32::INFINITY, -0.0];
+    let odd = [1e-38, 1e-45, f32::MIN_POSITIVE, 9e-7, 3e38, f32::MAX, 2e12, f32::NAN, f32::INFINITY, -0.0];
     let (size, color) = ((60, 45), ColorImage::new(120, 90));
     for rare in [1, 2, 7] {
         for value in odd {

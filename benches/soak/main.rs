@@ -166,8 +166,11 @@ fn starts(options: &Options) -> Result<bool, Box<dyn Error>> {
     Ok(flat)
 }
 
-/// Frames of the recording in real time: the report, and when each came out how old.
-fn replay(options: &Options, frames: u64) -> Result<(Report, Vec<(u64, u64)>), Box<dyn Error>> {
+/// When each frame came out, and how old, in nanoseconds.
+type Deliveries = Vec<(u64, u64)>;
+
+/// Frames of the recording in real time.
+fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dyn Error>> {
     let name = options.folder.display().to_string();
     let reading = Reading { depth_scale: options.depth_scale, ..Reading::default() };
     let recording = Arc::new(Recording::open(&options.folder, &reading)?);

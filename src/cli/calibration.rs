@@ -55,7 +55,7 @@ pub fn load(path: &Path) -> Result<Registration, CliError> {
 /// Reads the text of the calibration file `path`.
 ///
 /// # Errors
-/// As [`load`], but for the reading.
+/// The text is no depth calibration.
 pub fn parse(path: &Path, text: &str) -> Result<Registration, CliError> {
     let refuse = |at: usize, what: String| CliError::Settings {
         path: path.to_owned(),

@@ -24,8 +24,8 @@ const MOST_JPEG_ICC_BYTES: usize = 255 * (65_533 - 14);
 
 impl Extras {
     pub(super) fn of_png(info: &png::Info) -> Self {
-        let mut extras = Self::default();
-        extras.exif = info.exif_metadata.as_deref().map(<[u8]>::to_vec);
+        let exif = info.exif_metadata.as_deref().map(<[u8]>::to_vec);
+        let mut extras = Self { exif, ..Self::default() };
         extras.take_profile(info.icc_profile.as_deref().map(<[u8]>::to_vec));
         let by_palette = info.color_type == png::ColorType::Indexed || info.trns.is_some();
         if info.trns.is_some() || (!by_palette && info.color_type.samples().is_multiple_of(2)) {
@@ -38,9 +38,9 @@ impl Extras {
     }
 
     pub(super) fn of_jpeg<R: BufRead + Seek>(decoder: &mut JpegDecoder<R>) -> Self {
-        let mut extras = Self::default();
         // Without what cannot be read the pixels are none the worse.
-        extras.exif = decoder.exif_metadata().ok().flatten();
+        let exif = decoder.exif_metadata().ok().flatten();
+        let mut extras = Self { exif, ..Self::default() };
         extras.take_profile(decoder.icc_profile().ok().flatten());
         extras
     }

@@ -202,7 +202,7 @@ fn a_change_of_the_look_holds_from_its_frame_on_where_depth_is_held_too() {
     let (send, changes) = mpsc::channel();
     let before = move |frame: usize| {
         // In every place of such three.
-        if frame >= 30 && frame % 4 == 0 {
+        if frame >= 30 && frame.is_multiple_of(4) {
             let coc = dof(10.0 + frame as f32);
             let (number, quality) = (frame as u64, QualityRule::Fixed(Quality::Fast));
             let _ = send.send(Change { number, coc, refine: false, quality, bokeh: Executor::Keep });
@@ -232,7 +232,7 @@ impl Camera for Loser {
         self.0 += 1;
         color.resize(SIZE.0, SIZE.1);
         Ok(match index {
-            0..6 if index % 2 == 0 => Captured::Lost(index as u64 + 3, LOSSES[index / 2]),
+            0..6 if index.is_multiple_of(2) => Captured::Lost(index as u64 + 3, LOSSES[index / 2]),
             0..6 => Captured::Frame(Stamp { index, time_ns: 0, captured_ns: Some(0) }),
             6 => Captured::Waiting,
             _ => Captured::End,

@@ -130,6 +130,8 @@ fn a_recording_is_begun_and_ended_by_a_key() {
         window.key(&[], u32::from('s'));
         until("the snapshot", PATIENCE, || picture.exists());
         window.key(&[], u32::from('v'));
+        let has_begun = |file: fs::DirEntry| file.file_name().as_encoded_bytes().starts_with(b".bokehcam-1.mp4.");
+        until("the recording", PATIENCE, || fs::read_dir(program.home()).unwrap().flatten().any(has_begun));
         std::thread::sleep(Duration::from_millis(2500));
         window.key(&[], u32::from('v'));
         until("the video is whole", PATIENCE, || video.exists());
