@@ -39,6 +39,7 @@ pub mod files;
 pub mod frame;
 pub mod link;
 pub mod look;
+mod names;
 pub mod optics;
 pub mod pipeline;
 #[cfg(feature = "window")]

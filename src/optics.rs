@@ -75,6 +75,17 @@ pub enum CocField {
     Depth(DepthCoc),
 }
 
+/// A kind of [`CocField`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CocKind {
+    /// [`CocField::Uniform`].
+    Uniform,
+    /// [`CocField::Ramp`].
+    Ramp,
+    /// [`CocField::Depth`].
+    Depth,
+}
+
 /// Tilt-shift: the radius is `slope * (distance of the pixel from the band)`, at most `max_px`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ramp {

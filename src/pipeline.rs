@@ -8,6 +8,7 @@
 mod blur;
 mod capture;
 mod change;
+mod coc;
 mod deliver;
 mod depth;
 mod error;
@@ -23,6 +24,7 @@ use std::sync::{Arc, mpsc};
 use std::thread::{self, Scope, ScopedJoinHandle};
 
 pub use change::{Change, Executor};
+pub use coc::{CocMaker, Finish};
 pub use error::{Fault, PipelineError};
 pub use view::{Progress, Trace, View};
 pub use wanted::Wanted;
@@ -31,70 +33,24 @@ use crate::bokeh::Bokeh;
 use crate::budget::Quality;
 use crate::capture::{Brings, Camera};
 use crate::clock::{self, Clock};
+use crate::compute::Backend;
 use crate::depth::DepthSource;
-use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::demand::Demand;
 use crate::link::pool::Pool;
 use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
-use crate::optics::{CocField, DepthCoc, Lens};
+use crate::look::{Effect, Look};
+use crate::names::named;
 use crate::sink::{Ending, Sink};
 use crate::stats::{About, Cause, Report, Tally, Ticket, Timings};
 
-/// Whether frames wait for the program, or the program for frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
-    /// Frames come when they are due, the newest wins, and frames that are too old are dropped.
-    Realtime,
-    /// As fast as it goes: every frame is delivered, and the result is the same every time.
-    Asap,
-}
-
-/// How finely frames are blurred.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum QualityRule {
-    /// All at one rung.
-    Fixed(Quality),
-    /// As the time there is allows, from this rung on; the executor is made for all of them.
-    Auto(Quality),
-}
-
-/// Where the CoC of a frame comes from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum CocRule {
-    /// The same field for every frame (effects `blur` and `tilt-shift`).
-    Fixed(CocField),
-    /// The thin lens over the frame's depth (effect `dof`).
-    Depth {
-        /// What the lens is focused on.
-        focus: FocusRule,
-        /// How large the CoC grows.
-        lens: CocAtInfinity,
-        /// All within half of this to either side of the focal plane is sharp, in metres, >= 0.
-        range_m: f32,
-        /// Largest CoC radius, in pixels.
-        max_coc_px: f32,
-    },
-}
-
-/// The CoC radius of a point at infinity.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum CocAtInfinity {
-    /// The same at every focus distance, in pixels.
-    Px(f32),
-    /// What a real lens gives at each focus distance.
-    Lens(Lens),
-}
-
-impl CocAtInfinity {
-    /// The CoC over depth of a picture `width_px` wide, focused at `focus_m` metres, with a sharp range of `range_m`
-    /// around.
-    pub fn field(self, (focus_m, range_m): (f32, f32), width_px: u32, max_coc_px: f32) -> CocField {
-        let coc_at_infinity_px = match self {
-            Self::Px(radius_px) => radius_px,
-            Self::Lens(lens) => lens.coc_at_infinity_px(focus_m, width_px),
-        };
-        CocField::Depth(DepthCoc { coc_at_infinity_px, focus_m, range_m, max_coc_px })
+named! {
+    /// Whether frames wait for the program, or the program for frames.
+    pub enum Pace default Asap {
+        /// As they were recorded; late frames are dropped
+        Realtime = "realtime",
+        /// As fast as they are delivered; none is dropped
+        Asap = "asap",
     }
 }
 
@@ -102,16 +58,16 @@ impl CocAtInfinity {
 pub struct Run<'a> {
     /// Where frames come from.
     pub camera: Box<dyn Camera>,
-    /// Where their depth comes from, unless they bring it with them; read only for [`CocRule::Depth`].
+    /// Where their depth comes from, unless they bring it with them; read only where the look follows it.
     pub depth: Option<Box<dyn DepthSource>>,
     /// What blurs them; `None` passes them through (effect `none`).
     pub bokeh: Option<Box<dyn Bokeh>>,
-    /// At which rung `bokeh` blurs.
-    pub quality: QualityRule,
-    /// By how much they are blurred.
-    pub coc: CocRule,
-    /// Fit depth to the pictures and steady it before it is used; otherwise only its holes are filled.
-    pub refine: bool,
+    /// How they are blurred: `bokeh` is an executor of its [settings](Look::settings).
+    pub look: Look,
+    /// Whether `bokeh` was made for every quality, so that it can follow the time there is.
+    pub adaptive: bool,
+    /// Whether depth was measured, so that refining it makes it better ([`Look::refines`]).
+    pub measured: bool,
     /// Where a change of all that comes from; `None` keeps everything as it is.
     pub changes: Option<mpsc::Receiver<Change>>,
     /// Where they go.
@@ -158,7 +114,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let Run { camera, depth: source, bokeh: executor, mut sink, pace, clock, .. } = run;
     let info = camera.info();
     let mut about = About {
-        backend: executor.as_ref().map_or("none", |executor| executor.backend()).into(),
+        backend: executor.as_ref().map_or("none", |executor| executor.backends()).into(),
         adapter: executor.as_ref().map_or_else(|| "none".into(), |executor| executor.describe()),
         source: info.name.clone(),
         sink: sink.describe(),
@@ -182,6 +138,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         repeats,
     } = &mut timings;
     let most = most(executor.as_deref());
+    let quality = run.look.quality_rule(run.adaptive);
     let live_ns = (pace == Pace::Realtime).then_some(info.period_ns);
     let (began_ns, cpu_ns) = (clock.now_ns(), clock::cpu_ns());
     let over = AtomicBool::new(false);
@@ -215,8 +172,10 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     };
     let depth = depth::Stage {
         // Without a blur nobody asks for depth.
-        coc: if executor.is_some() { run.coc } else { UNUSED },
-        refine: run.refine,
+        look: if executor.is_some() { run.look } else { Look::plain(Effect::None) },
+        size: info.size,
+        measured: run.measured,
+        adaptive: run.adaptive,
         changes: run.changes,
         rate: live_ns.map(|_| rate::Rate::new(run.budget_ns / 2, source.as_ref().map_or(&[1.0], |s| s.efforts()))),
         source,
@@ -231,8 +190,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let blur = blur::Stage {
         executor,
         late: live_ns.map(quality::LateRule::new),
-        picker: quality::Picker::new(run.quality, most, run.budget_ns, live_ns),
-        rule: run.quality,
+        picker: quality::Picker::new(quality, most, run.budget_ns, live_ns),
+        rule: quality,
         about: &mut about,
         outs: &outs,
         wanted: run.wanted.filter(|_| !run.mirror),
@@ -288,8 +247,10 @@ fn link<T>(pace: Pace) -> (Sender<T>, Receiver<T>) {
 /// The finest level that an executor is given as the time allows.
 fn most(executor: Option<&dyn Bokeh>) -> Quality {
     // On the processor a finer level takes twice the time for half a decibel, and other programs need it, too.
-    let on_gpu = executor.is_none_or(|executor| executor.backend() == "gpu");
-    if on_gpu { Quality::Best } else { Quality::Balanced }
+    match executor.map(Bokeh::backend) {
+        Some(Backend::Cpu) => Quality::Balanced,
+        _ => Quality::Best,
+    }
 }
 
 /// Hands a frame on; gives back whether there is anybody to take more.
@@ -343,9 +304,6 @@ impl Places {
         if self.in_blur == 0 { 0 } else { self.in_blur + 2 * Self::HAND + Self::LINK + self.views() }
     }
 }
-
-/// The CoC of a frame that passes through.
-const UNUSED: CocRule = CocRule::Fixed(CocField::Uniform { radius_px: 0.0 });
 
 type Ended = Result<(), Fault>;
 

@@ -22,7 +22,7 @@ use bokehcam::depth::{DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::live;
 use bokehcam::link::pool::{Pool, Pooled};
-use common::{EFFECTS, coc, noise, settings, three_depths};
+use common::{COC_KINDS, coc, noise, settings, three_depths};
 use glam::{DMat3, DVec2, DVec3};
 
 struct Counting;
@@ -84,7 +84,7 @@ fn window() {
         trace: Trace { quality: Some(Quality::Fast), ..Trace::default() },
         frames: Frames::default(),
     };
-    let settings = settings(EFFECTS[2]);
+    let settings = settings(COC_KINDS[2]);
     let (mut views, mut meters) = (Views::default(), Meters::default());
     let mut painter = Painter::new();
     painter.resize((320, 200));
@@ -241,7 +241,7 @@ fn two_eyes() {
 fn blur() {
     let (width, height) = (160, 120);
     let (image, map) = (noise(width, height), three_depths(width, height));
-    for effect in EFFECTS {
+    for effect in COC_KINDS {
         for quality in [Quality::Draft, Quality::Balanced] {
             let plan = Plan::new(&Settings { quality, highlights: 4.0, ..settings(effect) }, width, height);
             let mut cpu = CpuBokeh::new(plan, Some(2));
@@ -261,7 +261,7 @@ fn blur() {
 fn levels() {
     let (width, height) = (160, 120);
     let (image, map) = (noise(width, height), three_depths(width, height));
-    for effect in EFFECTS {
+    for effect in COC_KINDS {
         let plan = Plan::new(&Settings { adaptive: true, highlights: 4.0, ..settings(effect) }, width, height);
         let mut cpu = CpuBokeh::new(plan, Some(2));
         let mut out = ColorImage::new(width, height);

@@ -14,13 +14,14 @@ use std::time::Duration;
 
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
-use bokehcam::bokeh::{self, Bokeh, BokehError, Effect, Job};
+use bokehcam::bokeh::{self, Bokeh, BokehError, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::device::Device;
 use bokehcam::compute::{Backend, Place};
 use bokehcam::depth::stereo::{self, Effort, Pair};
 use bokehcam::frame::{ColorImage, DisparityMap, GrayImage};
 use bokehcam::link::pool::Pooled;
+use bokehcam::optics::CocKind;
 use common::{coc, noise, settings, three_depths};
 use tempfile::TempDir;
 
@@ -75,7 +76,7 @@ fn job(ticket: u64) -> Job {
         ticket,
         color: Pooled::detached(noise(SIZE.0, SIZE.1)),
         depth: Some(Pooled::detached(three_depths(SIZE.0, SIZE.1))),
-        coc: coc(Effect::Dof, SIZE.1),
+        coc: coc(CocKind::Depth, SIZE.1),
         quality: Quality::Balanced,
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
@@ -86,7 +87,7 @@ fn job(ticket: u64) -> Job {
 fn blur(bokeh: &mut dyn Bokeh, mut before: impl FnMut(u64)) {
     let mut expected = ColorImage::default();
     let Job { color, depth, coc, .. } = job(0);
-    let mut cpu = CpuBokeh::new(Plan::new(&settings(Effect::Dof), SIZE.0, SIZE.1), Some(1));
+    let mut cpu = CpuBokeh::new(Plan::new(&settings(CocKind::Depth), SIZE.0, SIZE.1), Some(1));
     cpu.blur(&color, depth.as_deref(), &coc, &mut expected).unwrap();
     let (mut submitted, mut collected) = (0, 0);
     while collected < FRAMES {
@@ -109,13 +110,13 @@ fn blur(bokeh: &mut dyn Bokeh, mut before: impl FnMut(u64)) {
 fn a_destroyed_device_is_followed_by_the_cpu() {
     for gone_before in [0, 1, 2, 3, 5] {
         let device = Arc::new(device());
-        let mut bokeh = bokeh::create_on(&settings(Effect::Dof), SIZE, Arc::clone(&device), Some(1)).unwrap();
+        let mut bokeh = bokeh::create_on(&settings(CocKind::Depth), SIZE, Arc::clone(&device), Some(1)).unwrap();
         blur(&mut *bokeh, |frame| {
             if frame == gone_before {
                 device.device.destroy();
             }
         });
-        assert_eq!(bokeh.backend(), "gpu, then cpu");
+        assert_eq!(bokeh.backends(), "gpu, then cpu");
         assert!(bokeh.describe().contains("then cpu, 1 threads"), "{}", bokeh.describe());
     }
 }
@@ -126,12 +127,12 @@ fn a_destroyed_device_is_followed_by_the_cpu() {
 fn frames_are_blurred_whatever_becomes_of_the_device() {
     let made = Device::open(false, None).map_err(BokehError::from).and_then(|device| {
         let device = device.with_patience(Duration::from_secs(1));
-        bokeh::create_on(&settings(Effect::Dof), SIZE, Arc::new(device), Some(1))
+        bokeh::create_on(&settings(CocKind::Depth), SIZE, Arc::new(device), Some(1))
     });
     match made {
         Ok(mut bokeh) => {
             blur(&mut *bokeh, |_| {});
-            println!("ran on {}: {}", bokeh.backend(), bokeh.describe());
+            println!("ran on {}: {}", bokeh.backends(), bokeh.describe());
         }
         Err(error) => println!("not made: {error}"),
     }

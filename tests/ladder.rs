@@ -5,16 +5,17 @@ mod common;
 
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
-use bokehcam::bokeh::{Effect, Method, Rank, Settings};
+use bokehcam::bokeh::{Method, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::capture::synthetic::{Format, Synthetic};
 use bokehcam::capture::{Camera, Captured, Shot};
 use bokehcam::depth::focus::{Focus, FocusRule};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
+use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
 use bokehcam::recording::{Options, Recording, Scratch};
-use common::{EFFECTS, Numbers, coc, depth, noise, settings, three_depths};
+use common::{COC_KINDS, Numbers, coc, depth, noise, settings, three_depths};
 
 const SIZE: (u32, u32) = (150, 110);
 
@@ -29,7 +30,7 @@ fn maps() -> Vec<DepthMap> {
 
 fn blurred(cpu: &mut CpuBokeh, image: &ColorImage, map: &DepthMap, settings: &Settings) -> ColorImage {
     let mut out = ColorImage::default();
-    cpu.blur(image, Some(map), &coc(settings.effect, SIZE.1), &mut out).expect("a blur");
+    cpu.blur(image, Some(map), &coc(settings.coc, SIZE.1), &mut out).expect("a blur");
     out
 }
 
@@ -60,23 +61,23 @@ fn check(settings: Settings, what: &str) {
 
 #[test]
 fn any_sequence_of_levels_is_bit_identical_to_each_alone() {
-    for effect in EFFECTS {
+    for effect in COC_KINDS {
         check(Settings { highlights: 4.0, ..settings(effect) }, &format!("{effect:?}"));
     }
-    check(Settings { rank: Some(Rank::Terms(6)), ..settings(Effect::Dof) }, "one rank for all");
-    check(Settings { far_max_px: 60.0, near_max_px: 90.0, ..settings(Effect::Dof) }, "large");
+    check(Settings { rank: Some(Rank::Terms(6)), ..settings(CocKind::Depth) }, "one rank for all");
+    check(Settings { far_max_px: 60.0, near_max_px: 90.0, ..settings(CocKind::Depth) }, "large");
 }
 
 #[test]
 fn the_comparison_methods_have_levels_too() {
     for rank in [None, Some(Rank::Full)] {
-        check(Settings { method: Method::Gather, rank, ..settings(Effect::Dof) }, &format!("gather {rank:?}"));
+        check(Settings { method: Method::Gather, rank, ..settings(CocKind::Depth) }, &format!("gather {rank:?}"));
     }
 }
 
 #[test]
 fn an_executor_of_one_level_keeps_it() {
-    let settings = settings(Effect::Dof);
+    let settings = settings(CocKind::Depth);
     let (image, map) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
     let mut cpu = CpuBokeh::new(Plan::new(&settings, SIZE.0, SIZE.1), Some(1));
     let before = blurred(&mut cpu, &image, &map, &settings);
@@ -86,7 +87,7 @@ fn an_executor_of_one_level_keeps_it() {
 
 #[test]
 fn one_level_takes_no_memory_for_others() {
-    for effect in EFFECTS {
+    for effect in COC_KINDS {
         let one = Plan::new(&settings(effect), SIZE.0, SIZE.1);
         let all = Plan::new(&Settings { adaptive: true, ..settings(effect) }, SIZE.0, SIZE.1);
         assert_eq!((one.levels.iter().count(), one.levels.banks.len()), (1, 1));
@@ -137,7 +138,7 @@ fn a_change_of_level_is_no_jump() {
     let lens =
         |focus_m| CocField::Depth(DepthCoc { coc_at_infinity_px: 14.0, focus_m, range_m: 0.0, max_coc_px: 22.0 });
     for (name, frames) in scenes() {
-        let settings = Settings { adaptive: true, far_max_px: 14.0, near_max_px: 22.0, ..settings(Effect::Dof) };
+        let settings = Settings { adaptive: true, far_max_px: 14.0, near_max_px: 22.0, ..settings(CocKind::Depth) };
         let mut cpu = CpuBokeh::new(Plan::new(&settings, frames[0].0.width, frames[0].0.height), Some(2));
         let mut focus = Focus::new(FocusRule::Auto);
         let blurred: Vec<Vec<ColorImage>> = frames

@@ -6,11 +6,12 @@ mod common;
 use bokehcam::bokeh::aperture::{Aperture, Shape};
 use bokehcam::bokeh::cpu::{CpuBokeh, linear_to_srgb, srgb_to_linear};
 use bokehcam::bokeh::plan::Plan;
-use bokehcam::bokeh::{Effect, Method, Rank, Settings};
+use bokehcam::bokeh::{Method, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
-use common::{EFFECTS, coc, color, depth, noise, settings, shapes, three_depths};
+use common::{COC_KINDS, coc, color, depth, noise, settings, shapes, three_depths};
 
 fn blur(settings: &Settings, color: &ColorImage, map: &DepthMap, field: &CocField) -> ColorImage {
     let mut out = ColorImage::default();
@@ -23,7 +24,7 @@ fn blur(settings: &Settings, color: &ColorImage, map: &DepthMap, field: &CocFiel
 fn a_constant_picture_stays_constant() {
     let (width, height) = (67, 45);
     let map = three_depths(width, height);
-    for effect in EFFECTS {
+    for effect in COC_KINDS {
         for shape in shapes() {
             for (quality, rank, highlights) in [
                 (Quality::Draft, None, 0.0),
@@ -73,7 +74,7 @@ fn full_rank_is_the_two_dimensional_convolution() {
             rank: Some(Rank::Full),
             aperture: Aperture { shape, intensity: 0.0 },
             far_max_px: 6.5,
-            ..settings(Effect::Blur)
+            ..settings(CocKind::Uniform)
         };
         let plan = Plan::new(&settings, 48, 37);
         let direct = convolve(&image, &plan, 6.5);
@@ -89,7 +90,7 @@ fn full_rank_is_the_two_dimensional_convolution() {
 fn the_exact_gather_is_the_two_dimensional_convolution_too() {
     let image = noise(40, 30);
     let settings =
-        Settings { method: Method::Gather, rank: Some(Rank::Full), near_max_px: 6.5, ..settings(Effect::Dof) };
+        Settings { method: Method::Gather, rank: Some(Rank::Full), near_max_px: 6.5, ..settings(CocKind::Depth) };
     let lens = DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 6.5 };
     let map = depth(40, 30, |_, _| 100.0);
     let plan = Plan::new(&settings, 40, 30);
@@ -132,7 +133,7 @@ fn a_blurred_point_does_not_shift() {
             let (image, middle) = bright_square(size);
             let field =
                 CocField::Depth(DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 18.0 });
-            let out = blur(&Settings { quality, ..settings(Effect::Dof) }, &image, &far, &field);
+            let out = blur(&Settings { quality, ..settings(CocKind::Depth) }, &image, &far, &field);
             let (x, y, _) = spot(&out, 0.0);
             assert!((x - middle).abs() < 0.05 && (y - middle).abs() < 0.05, "{quality} {size}: {x} {y} {middle}");
         }
@@ -147,7 +148,7 @@ fn quality_changes_fidelity_never_the_amount_of_blur() {
         let field =
             CocField::Depth(DepthCoc { coc_at_infinity_px: coc_px, focus_m: 1.0, range_m: 0.0, max_coc_px: 18.0 });
         let spread = |quality| {
-            let settings = Settings { quality, far_max_px: coc_px, ..settings(Effect::Dof) };
+            let settings = Settings { quality, far_max_px: coc_px, ..settings(CocKind::Depth) };
             spot(&blur(&settings, &image, &far, &field), 0.0).2
         };
         let best = spread(Quality::Best);
@@ -174,9 +175,9 @@ fn nothing_beside_a_highlight_is_darker_than_its_surroundings() {
                 rank: Some(Rank::Terms(rank)),
                 highlights: 8.0,
                 rim: 0.0,
-                ..settings(Effect::Dof)
+                ..settings(CocKind::Depth)
             };
-            let out = blur(&settings, &image, &far, &coc(Effect::Dof, 141));
+            let out = blur(&settings, &image, &far, &coc(CocKind::Depth, 141));
             for (p, &ground) in background.iter().enumerate() {
                 let lowest = out.rgb.iter().skip(p).step_by(3).min().copied().unwrap_or(0);
                 let light = |code: u8| srgb_to_linear(f32::from(code) / 255.0);
@@ -194,7 +195,7 @@ fn the_subject_in_focus_stays_as_it_is_and_does_not_leak_into_the_background() {
     let subject = |x: u32, y: u32| (40..80).contains(&x) && y >= 30;
     let image = color(width, height, |x, y| if subject(x, y) { [240, 30, 20] } else { [20, 40, 60] });
     let map = depth(width, height, |x, y| if subject(x, y) { 1.0 } else { 5.0 });
-    let out = blur(&settings(Effect::Dof), &image, &map, &coc(Effect::Dof, height));
+    let out = blur(&settings(CocKind::Depth), &image, &map, &coc(CocKind::Depth, height));
     for (k, (after, before)) in out.rgb.chunks_exact(3).zip(image.rgb.chunks_exact(3)).enumerate() {
         let far = after.iter().zip(before).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(far <= Some(2), "pixel {}, {}: {after:?} was {before:?}", k as u32 % width, k as u32 / width);
@@ -206,7 +207,7 @@ fn something_in_front_spreads_over_the_subject() {
     let (width, height) = (120, 60);
     let image = color(width, height, |x, _| if x < 40 { [255, 255, 255] } else { [0, 0, 0] });
     let map = depth(width, height, |x, _| if x < 40 { 0.6 } else { 1.0 });
-    let out = blur(&settings(Effect::Dof), &image, &map, &coc(Effect::Dof, height));
+    let out = blur(&settings(CocKind::Depth), &image, &map, &coc(CocKind::Depth, height));
     let light = |x: usize| srgb_to_linear(f32::from(out.rgb[(30 * width as usize + x) * 3]) / 255.0);
     // The CoC of the front is 8 px: half covered at its edge, some 5 px outside, nothing 12 px outside.
     assert!((light(39) + light(40) - 1.0).abs() < 0.1, "{} {}", light(39), light(40));
@@ -218,14 +219,14 @@ fn unknown_depth_is_blurred_never_shown() {
     let image = noise(64, 48);
     let unknown = depth(64, 48, |x, _| [0.0, f32::NAN, -1.0, f32::INFINITY][x as usize % 4]);
     let far = depth(64, 48, |_, _| 1e9);
-    let of = |map| blur(&settings(Effect::Dof), &image, map, &coc(Effect::Dof, 48));
+    let of = |map| blur(&settings(CocKind::Depth), &image, map, &coc(CocKind::Depth, 48));
     assert_eq!(of(&unknown), of(&far));
 }
 
 #[test]
 fn odd_and_tiny_pictures_work() {
     for (width, height) in [(1, 1), (17, 13), (2, 3), (4096, 2), (1, 300)] {
-        for effect in EFFECTS {
+        for effect in COC_KINDS {
             for quality in [Quality::Draft, Quality::Balanced, Quality::Best] {
                 let image = noise(width, height);
                 let settings = Settings { quality, ..settings(effect) };
@@ -241,10 +242,10 @@ fn the_number_of_threads_changes_nothing() {
     let (image, map) = (noise(150, 110), three_depths(150, 110));
     let of = |threads| {
         let mut out = ColorImage::default();
-        let plan = Plan::new(&settings(Effect::Dof), 150, 110);
+        let plan = Plan::new(&settings(CocKind::Depth), 150, 110);
         let mut cpu = CpuBokeh::new(plan, Some(threads));
         for _ in 0..3 {
-            cpu.blur(&image, Some(&map), &coc(Effect::Dof, 110), &mut out).expect("a blur");
+            cpu.blur(&image, Some(&map), &coc(CocKind::Depth, 110), &mut out).expect("a blur");
         }
         out
     };
@@ -256,13 +257,13 @@ fn the_number_of_threads_changes_nothing() {
 #[test]
 fn a_frame_leaves_no_trace_in_the_next() {
     let (width, height) = (150, 110);
-    let mut cpu = CpuBokeh::new(Plan::new(&settings(Effect::Dof), width, height), Some(2));
-    let (image, field) = (noise(width, height), coc(Effect::Dof, height));
+    let mut cpu = CpuBokeh::new(Plan::new(&settings(CocKind::Depth), width, height), Some(2));
+    let (image, field) = (noise(width, height), coc(CocKind::Depth, height));
     let mut out = ColorImage::default();
     for k in 0..6 {
         let map = depth(width, height, |x, y| [0.5, 1.0, 4.0, 1.4][((x / 30 + y / 20 + k) % 4) as usize]);
         cpu.blur(&image, Some(&map), &field, &mut out).expect("a blur");
-        assert_eq!(out, blur(&settings(Effect::Dof), &image, &map, &field), "frame {k}");
+        assert_eq!(out, blur(&settings(CocKind::Depth), &image, &map, &field), "frame {k}");
     }
 }
 
@@ -272,7 +273,7 @@ fn a_range_of_focus_is_sharp_as_a_whole_and_its_ends_are_focal_planes() {
     let image = noise(width, height);
     let lens =
         |focus_m, range_m| CocField::Depth(DepthCoc { coc_at_infinity_px: 12.0, focus_m, range_m, max_coc_px: 18.0 });
-    let settings = settings(Effect::Dof);
+    let settings = settings(CocKind::Depth);
     let (near_m, far_m) = (1.0 - 0.5 * 0.4f32, 1.0 + 0.5 * 0.4f32);
     let within = depth(width, height, |x, y| 0.801 + 0.398 * ((x * 7 + y * 13) % 101) as f32 / 101.0);
     let out = blur(&settings, &image, &within, &lens(1.0, 0.4));

@@ -9,11 +9,12 @@ mod common;
 use bokehcam::bokeh::aperture::{Aperture, Picture, Shape};
 use bokehcam::bokeh::cpu::{CpuBokeh, srgb_to_linear};
 use bokehcam::bokeh::plan::Plan;
-use bokehcam::bokeh::{Effect, Method, Rank, Settings};
+use bokehcam::bokeh::{Method, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};
-use common::{EFFECTS, Numbers, color, depth};
+use common::{COC_KINDS, Numbers, color, depth};
 
 /// Cases of each law where nobody asks for more.
 const CASES: u64 = 40;
@@ -92,16 +93,16 @@ impl Random {
             _ => {
                 let (width, height) = (1 + self.below(12) as u32, 1 + self.below(12) as u32);
                 let grey = (0..width * height).map(|_| self.share()).collect();
-                Shape::Picture(std::sync::Arc::new(Picture { width, height, grey }))
+                Shape::Picture(std::sync::Arc::new(Picture { file: None, width, height, grey }))
             }
         }
     }
 
-    fn settings(&mut self, effect: Effect) -> Settings {
-        let near_max_px = if effect == Effect::Dof { self.radius_px() } else { 0.0 };
-        let far_max_px = if effect == Effect::Dof && self.below(2) == 0 { near_max_px } else { self.radius_px() };
+    fn settings(&mut self, coc: CocKind) -> Settings {
+        let near_max_px = if coc == CocKind::Depth { self.radius_px() } else { 0.0 };
+        let far_max_px = if coc == CocKind::Depth && self.below(2) == 0 { near_max_px } else { self.radius_px() };
         Settings {
-            effect,
+            coc,
             method: if self.below(6) == 0 { Method::Gather } else { Method::Layered },
             aperture: Aperture { shape: self.shape(false), intensity: 2.0 * self.share() - 1.0 },
             rim: self.share(),
@@ -131,16 +132,16 @@ impl Random {
     fn field(&mut self, settings: &Settings, (width, height): (u32, u32)) -> (CocField, DepthMap) {
         let (far_px, base_m) = (settings.far_max_px, 0.3 + 3.0 * self.share());
         let map = self.depth(base_m, (width, height));
-        let field = match settings.effect {
-            Effect::Blur => CocField::Uniform { radius_px: far_px * self.share() },
-            Effect::TiltShift => CocField::Ramp(Ramp {
+        let field = match settings.coc {
+            CocKind::Uniform => CocField::Uniform { radius_px: far_px * self.share() },
+            CocKind::Ramp => CocField::Ramp(Ramp {
                 normal: glam::Vec2::from_angle(7.0 * self.share()),
                 offset_px: 200.0 * self.share() - 50.0,
                 half_band_px: 40.0 * self.share(),
                 slope: self.share(),
                 max_px: far_px,
             }),
-            Effect::Dof => CocField::Depth(DepthCoc {
+            CocKind::Depth => CocField::Depth(DepthCoc {
                 // Any lens, where the largest radius is the same on both sides.
                 coc_at_infinity_px: if far_px >= settings.near_max_px { self.of(&[far_px, 1e30]) } else { far_px },
                 focus_m: self.of(&[base_m, 1e-3, 1e6, 1.0]),
@@ -189,7 +190,7 @@ type Make<'a> = &'a dyn Fn(&Settings, (u32, u32)) -> Box<dyn Blurs>;
 
 fn a_constant_picture_stays_constant(make: Make) {
     each_case(|random| {
-        let (effect, size) = (random.of(&EFFECTS), random.size());
+        let (effect, size) = (random.of(&COC_KINDS), random.size());
         let settings = random.settings(effect);
         let mut executor = make(&settings, size);
         for frame in 0..1 + random.below(3) {
@@ -218,7 +219,7 @@ fn a_constant_picture_stays_constant_on_the_cpu() {
 /// Grey pictures: a highlight's colours are brought back by their luminance, and not one by one.
 fn nothing_is_darker_or_brighter_than_all_there_was(make: Make) {
     each_case(|random| {
-        let (effect, size) = (random.of(&EFFECTS), random.size());
+        let (effect, size) = (random.of(&COC_KINDS), random.size());
         let settings = random.settings(effect);
         let mut executor = make(&settings, size);
         let (low, high) = (random.code() / 2, 128 + random.code() / 2);
@@ -242,17 +243,17 @@ fn nothing_is_darker_or_brighter_than_all_there_was_on_the_cpu() {
 fn a_blurred_point_does_not_shift(make: Make) {
     const SIDE: u32 = 141;
     each_case(|random| {
-        let effect = random.of(&[Effect::Blur, Effect::Dof]);
+        let kind = random.of(&[CocKind::Uniform, CocKind::Depth]);
         let far_max_px = 1.0 + 19.0 * random.share();
         let settings = Settings {
             aperture: Aperture { shape: random.shape(true), intensity: 2.0 * random.share() - 1.0 },
             highlights: 0.0,
             far_max_px,
             rank: random.of(&[None, Some(Rank::Terms(2)), Some(Rank::Terms(5))]),
-            ..random.settings(effect)
+            ..random.settings(kind)
         };
-        let field = match effect {
-            Effect::Blur => CocField::Uniform { radius_px: far_max_px },
+        let field = match kind {
+            CocKind::Uniform => CocField::Uniform { radius_px: far_max_px },
             _ => CocField::Depth(DepthCoc {
                 coc_at_infinity_px: far_max_px,
                 focus_m: 1.0,
@@ -286,7 +287,7 @@ fn a_blurred_point_does_not_shift_on_the_cpu() {
 #[test]
 fn frames_before_and_the_number_of_threads_change_nothing() {
     each_case(|random| {
-        let (effect, size) = (random.of(&EFFECTS), random.size());
+        let (effect, size) = (random.of(&COC_KINDS), random.size());
         let settings = random.settings(effect);
         let mut executor = cpu(&settings, size, 1 + random.below(4));
         for frame in 0..3 {
@@ -304,7 +305,7 @@ fn frames_before_and_the_number_of_threads_change_nothing() {
 fn what_is_in_focus_stays_as_it_is() {
     each_case(|random| {
         let size = random.size();
-        let settings = Settings { method: Method::Layered, ..random.settings(Effect::Dof) };
+        let settings = Settings { method: Method::Layered, ..random.settings(CocKind::Depth) };
         let lens = DepthCoc {
             coc_at_infinity_px: settings.far_max_px,
             focus_m: 0.1 + 5.0 * random.share(),

@@ -4,13 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the crate by layer, the lowest first.
-const LAYERS: [&[&str]; 9] = [
+const LAYERS: [&[&str]; 10] = [
+    &["names"],
     &["frame", "optics", "clock", "files"],
     &["compute", "calibration"],
     &["link", "budget", "stats", "recording", "scene", "v4l2"],
     &["capture", "depth", "bokeh", "sink"],
-    &["pipeline"],
     &["look"],
+    &["pipeline"],
     &["preview"],
     &["cli"],
     &["main"],
@@ -29,7 +30,7 @@ const DOORS: [(&str, &[&str]); 20] = [
     ("indicatif", &["cli"]),
     ("plotters", &["cli"]),
     ("png", &["recording", "sink"]),
-    ("rustix", &["capture/synthetic", "clock", "files", "link/bell", "sink/ffmpeg", "sink/pipe", "v4l2"]),
+    ("rustix", &["capture/synthetic", "cli/memory", "clock", "files", "link/bell", "sink/ffmpeg", "sink/pipe", "v4l2"]),
     ("saphyr_parser", &["calibration"]),
     ("softbuffer", &["preview/present"]),
     ("strsim", &["cli", "v4l2"]),

@@ -9,13 +9,14 @@ use bokehcam::bokeh::bank::STEPS_PER_PX;
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::gpu::GpuBokeh;
 use bokehcam::bokeh::plan::{CELL, Compositing, Plan, SEGMENT};
-use bokehcam::bokeh::{Bokeh, Effect, Job, Method, Probe, Rank, Settings};
+use bokehcam::bokeh::{Bokeh, Job, Method, Probe, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
+use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
-use common::{EFFECTS, Numbers, coc, color, depth, noise, settings, shapes, three_depths};
+use common::{COC_KINDS, Numbers, coc, color, depth, noise, settings, shapes, three_depths};
 
 /// Difference of an 8-bit value that at most one in a thousand may exceed, and that none may exceed twice over: a
 /// radius that falls between two nodes of the bank may round to either.
@@ -102,7 +103,7 @@ fn close(a: &[[f32; 4]], b: &[[f32; 4]], limit: f32, what: &str) {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn every_effect_and_quality_agrees() {
     let (image, map) = (noise(97, 71), three_depths(97, 71));
-    for effect in EFFECTS {
+    for effect in COC_KINDS {
         for quality in Quality::ALL {
             let settings = Settings { quality, ..settings(effect) };
             same(&settings, &image, &map, &coc(effect, 71), &format!("{effect:?} {quality}"));
@@ -117,8 +118,8 @@ fn every_aperture_and_rank_agrees() {
     for shape in shapes() {
         for rank in [Rank::Terms(1), Rank::Terms(6)] {
             let aperture = Aperture { shape: shape.clone(), intensity: 0.3 };
-            let settings = Settings { aperture, rank: Some(rank), highlights: 6.0, ..settings(Effect::Dof) };
-            same(&settings, &image, &map, &coc(Effect::Dof, 60), &format!("{shape:?} {rank:?}"));
+            let settings = Settings { aperture, rank: Some(rank), highlights: 6.0, ..settings(CocKind::Depth) };
+            same(&settings, &image, &map, &coc(CocKind::Depth, 60), &format!("{shape:?} {rank:?}"));
         }
     }
 }
@@ -129,8 +130,8 @@ fn the_comparison_methods_agree() {
     let (image, map) = (noise(64, 48), three_depths(64, 48));
     for rank in [Rank::Terms(3), Rank::Full] {
         let aperture = Aperture { shape: Shape::Heart, intensity: 0.0 };
-        let settings = Settings { method: Method::Gather, rank: Some(rank), aperture, ..settings(Effect::Dof) };
-        same(&settings, &image, &map, &coc(Effect::Dof, 48), &format!("gather {rank:?}"));
+        let settings = Settings { method: Method::Gather, rank: Some(rank), aperture, ..settings(CocKind::Depth) };
+        same(&settings, &image, &map, &coc(CocKind::Depth, 48), &format!("gather {rank:?}"));
     }
 }
 
@@ -142,7 +143,7 @@ fn wide_radii_agree() {
     let field = CocField::Depth(DepthCoc { coc_at_infinity_px: 37.3, focus_m: 1.0, range_m: 0.0, max_coc_px: 51.7 });
     for (method, rank) in [(Method::Gather, Rank::Terms(2)), (Method::Layered, Rank::Full)] {
         let (far_max_px, near_max_px) = (37.3, 51.7);
-        let settings = Settings { method, rank: Some(rank), far_max_px, near_max_px, ..settings(Effect::Dof) };
+        let settings = Settings { method, rank: Some(rank), far_max_px, near_max_px, ..settings(CocKind::Depth) };
         same(&settings, &image, &map, &field, &format!("wide {method:?} {rank:?}"));
     }
 }
@@ -156,7 +157,7 @@ fn a_range_of_focus_agrees() {
         let lens = DepthCoc { coc_at_infinity_px: 12.0, focus_m, range_m, max_coc_px: 18.0 };
         for (name, map) in [("slope", &slope), ("three depths", &three_depths(width, height))] {
             let what = format!("{name} {range_m} m around {focus_m} m");
-            same(&settings(Effect::Dof), &image, map, &CocField::Depth(lens), &what);
+            same(&settings(CocKind::Depth), &image, map, &CocField::Depth(lens), &what);
         }
     }
 }
@@ -164,10 +165,10 @@ fn a_range_of_focus_agrees() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn odd_inputs_agree() {
-    let settings = settings(Effect::Dof);
+    let settings = settings(CocKind::Depth);
     for (width, height) in [(17, 13), (1, 1), (4096, 2), (3, 130)] {
         let (image, map) = (noise(width, height), three_depths(width, height));
-        same(&settings, &image, &map, &coc(Effect::Dof, height), &format!("{width}x{height}"));
+        same(&settings, &image, &map, &coc(CocKind::Depth, height), &format!("{width}x{height}"));
     }
     let (width, height) = (70, 50);
     let constant = color(width, height, |_, _| [7, 130, 255]);
@@ -185,7 +186,7 @@ fn odd_inputs_agree() {
     ];
     for (name, map) in &maps {
         for (kind, image) in [("constant", &constant), ("point", &point), ("noise", &noise(width, height))] {
-            same(&settings, image, map, &coc(Effect::Dof, height), &format!("{name} {kind}"));
+            same(&settings, image, map, &coc(CocKind::Depth, height), &format!("{name} {kind}"));
         }
     }
 }
@@ -198,7 +199,7 @@ fn what_the_cpu_leaves_out_makes_no_difference() {
     let image = noise(width, height);
     for (name, metres) in [("far", 4.0), ("slightly far", 1.2), ("near", 0.5)] {
         let map = depth(width, height, |x, y| if x + y < 130 { metres } else { 1.0 + 1e-4 * (x % 7) as f32 });
-        same(&settings(Effect::Dof), &image, &map, &coc(Effect::Dof, height), name);
+        same(&settings(CocKind::Depth), &image, &map, &coc(CocKind::Depth, height), name);
     }
 }
 
@@ -209,7 +210,7 @@ fn any_sequence_of_levels_agrees() {
     let (width, height) = (97, 71);
     let image = noise(width, height);
     let maps = [three_depths(width, height), depth(width, height, |x, _| 0.4 + 0.05 * x as f32)];
-    for effect in EFFECTS {
+    for effect in COC_KINDS {
         let all = Settings { adaptive: true, ..settings(effect) };
         let field = coc(effect, height);
         let blurred = |gpu: &mut GpuBokeh, map: &DepthMap, quality| {
@@ -236,9 +237,9 @@ fn any_sequence_of_levels_agrees() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn frames_in_flight_come_back_in_order_and_whole() {
     let (width, height) = (64, 48);
-    let plan = Plan::new(&settings(Effect::Dof), width, height);
+    let plan = Plan::new(&settings(CocKind::Depth), width, height);
     let (mut gpu, mut cpu) = (gpu(&plan), CpuBokeh::new(plan, Some(1)));
-    let (image, field) = (noise(width, height), coc(Effect::Dof, height));
+    let (image, field) = (noise(width, height), coc(CocKind::Depth, height));
     let map = |k: u64| depth(width, height, |x, _| if u64::from(x) > 8 * (k % 7) { 1.0 } else { 3.0 });
     let (mut next, mut back) = (0, 0);
     while back < 20 {

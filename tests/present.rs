@@ -6,12 +6,13 @@ mod common;
 
 use std::sync::Arc;
 
-use bokehcam::bokeh::{self, Effect, Job};
+use bokehcam::bokeh::{self, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
 use bokehcam::compute::device::{Device, DevicePicture};
 use bokehcam::frame::ColorImage;
 use bokehcam::link::pool::Pooled;
+use bokehcam::optics::CocKind;
 use bokehcam::preview::panel;
 use bokehcam::preview::present::gpu::Canvas;
 use bokehcam::preview::present::soft::Painter;
@@ -357,7 +358,7 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
     let device = device();
     let mut canvas = Canvas::new(Arc::clone(&device), FORMAT);
     for (width, height) in [(97, 71), (64, 48)] {
-        let settings = settings(Effect::Dof);
+        let settings = settings(CocKind::Depth);
         let mut bokeh = bokeh::create_on(&settings, (width, height), Arc::clone(&device), None).expect("a blur");
         let (image, map) = (noise(width, height), three_depths(width, height));
         let mut results = Vec::new();
@@ -366,7 +367,7 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
                 ticket: 0,
                 color: Pooled::detached(image.clone()),
                 depth: Some(Pooled::detached(map.clone())),
-                coc: coc(Effect::Dof, height),
+                coc: coc(CocKind::Depth, height),
                 quality: Quality::default(),
                 place,
                 out: Pooled::detached(ColorImage::default()),
@@ -402,14 +403,14 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn results_go_to_memory_when_the_device_has_no_more_room_for_them() {
-    let mut bokeh = bokeh::create_on(&settings(Effect::Blur), (16, 16), device(), None).expect("a blur");
+    let mut bokeh = bokeh::create_on(&settings(CocKind::Uniform), (16, 16), device(), None).expect("a blur");
     let mut kept = Vec::new();
     for frame in 0..40 {
         let job = Job {
             ticket: frame,
             color: Pooled::detached(noise(16, 16)),
             depth: None,
-            coc: coc(Effect::Blur, 16),
+            coc: coc(CocKind::Uniform, 16),
             quality: Quality::default(),
             place: Place::Device,
             out: Pooled::detached(ColorImage::default()),

@@ -9,15 +9,14 @@ use std::process::{Command, Stdio};
 
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
-use bokehcam::bokeh::{Bokeh, Effect, Job};
+use bokehcam::bokeh::{Bokeh, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
-use bokehcam::look::{Look, Strength};
+use bokehcam::look::{CocRule, Effect, Look, Patch, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::CocRule;
 use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::recording::still::{read_color, write_color};
 use common::{noise, three_depths};
@@ -182,14 +181,14 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
         focus_range_m: 0.123_456_7,
         strength: Strength::Percent(9.7),
         highlights: 5.0,
-        ..Look::plain(Some(Effect::Dof))
+        ..Look::default()
     };
-    let tilt = Look { strength: Strength::Default, rim: 0.1, ..Look::plain(Some(Effect::TiltShift)) };
+    let tilt = Look { strength: Strength::Default, rim: 0.1, ..Look::plain(Effect::TiltShift) };
     let shots = home.path().join("shots");
     for (name, look, quality) in [("a", &dof, Quality::Fast), ("a", &dof, Quality::High), ("b.c", &tilt, Quality::Best)]
     {
         let (picture, field) = blurred(look, &color, &map, 1.123_456_7, quality);
-        let settings = look.flags_of_frame(&field, Some(quality));
+        let settings = Patch::of(&look.of_frame(&field, Some(quality))).values();
         let depth = matches!(field, CocField::Depth(_)).then_some(&map);
         let shot = Snapshot { picture: &picture, color: &color, depth, settings: &settings };
         let path = snapshot::save(&shots, name, &shot).unwrap();
@@ -228,9 +227,9 @@ fn a_snapshot_is_repeated_to_the_bit_whatever_the_settings_around() {
 fn a_snapshots_settings_can_be_given_to_another_picture() {
     let home = home_with("");
     let (color, map) = (noise(40, 30), three_depths(40, 30));
-    let look = Look::plain(Some(Effect::Blur));
+    let look = Look::plain(Effect::Blur);
     let (picture, field) = blurred(&look, &color, &map, 1.0, Quality::Balanced);
-    let settings = look.flags_of_frame(&field, None);
+    let settings = Patch::of(&look.of_frame(&field, None)).values();
     let shot = Snapshot { picture: &picture, color: &color, depth: None, settings: &settings };
     let like = snapshot::save(home.path(), "x", &shot).unwrap();
     let other = home.path().join("other.png");
@@ -259,7 +258,7 @@ fn a_snapshot_that_cannot_be_repeated_costs_one_line() {
     fs::write(at("text.png"), "no picture").unwrap();
     save("alien", &[("mirror", "true".to_string())]);
     save("bad", &[("rim", "7".to_string())]);
-    save("good", &Look::plain(Some(Effect::Dof)).flags_of_frame(&common::DOF, None));
+    save("good", &Patch::of(&Look::default().of_frame(&common::DOF, None)).values());
     save("lone", &[("effect", "blur".to_string())]);
     fs::remove_file(at("lone-color.png")).unwrap();
     fs::copy(at("good.png"), at("depthless.png")).unwrap();

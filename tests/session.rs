@@ -8,16 +8,17 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use bokehcam::bokeh::{self, Backend, Bokeh, Effect};
+use bokehcam::bokeh::{self, Backend, Bokeh};
 use bokehcam::capture::synthetic::{Format, Synthetic};
 use bokehcam::frame::ColorImage;
 use bokehcam::link::Receiver;
-use bokehcam::look::{Look, Strength};
+use bokehcam::look::presets::Preset;
+use bokehcam::look::{Effect, Look, Patch, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
-use bokehcam::preview::backstage::{Backstage, Choice, Control, Opened, Preset, Switch};
+use bokehcam::preview::backstage::{Backstage, Choice, Control, Opened, Switch};
 use bokehcam::preview::session::{Heard, Session, Start};
-use bokehcam::preview::state::{Effect as Todo, Output, Source, Told};
+use bokehcam::preview::state::{Output, Request, Source, Told};
 use bokehcam::sink::{Ending, Sink, SinkError};
 
 /// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
@@ -81,8 +82,8 @@ impl Backstage for Wings {
     fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
         format!("show {source} {outputs:?} {switches:?}")
     }
-    fn presets(&mut self, look: &Look) -> Vec<Preset> {
-        vec![Preset { name: "same".into(), look: look.clone(), own: false }]
+    fn presets(&mut self) -> Vec<Preset> {
+        vec![Preset { name: "same".into(), patch: Patch::default(), own: false }]
     }
     fn save_preset(&mut self, name: &str, _: &Look) -> Result<(), String> {
         if name.is_empty() { Err("no name".into()) } else { Ok(()) }
@@ -102,7 +103,7 @@ struct Watched {
 const PATIENCE: Duration = Duration::from_secs(120);
 
 fn look() -> Look {
-    Look { strength: Strength::AtInfinity(2.0), ..Look::plain(Some(Effect::Dof)) }
+    Look { strength: Strength::AtInfinity(2.0), ..Look::default() }
 }
 
 impl Watched {
@@ -188,17 +189,17 @@ fn a_look_takes_effect_while_frames_go_on() {
     let made = watched.executors.load(Ordering::SeqCst);
 
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..look() };
-    watched.session.order(Todo::Look(Box::new(stronger.clone())));
+    watched.session.order(Request::Look(Box::new(stronger.clone())));
     watched.frame("more blur", |view| radius_px(view) == 5.0);
     let near = Look { focus: bokehcam::depth::focus::FocusRule::Metres(0.7), ..stronger };
-    watched.session.order(Todo::Look(Box::new(near.clone())));
+    watched.session.order(Request::Look(Box::new(near.clone())));
     watched.frame("another focus", |view| matches!(view.coc, CocField::Depth(coc) if (coc.focus_m - 0.7).abs() < 0.02));
     assert!(watched.executors.load(Ordering::SeqCst) <= made + 1, "another focus needs no other executor");
 
-    let even = Look { effect: Some(Effect::Blur), ..near.clone() };
-    watched.session.order(Todo::Look(Box::new(even)));
+    let even = Look { effect: Effect::Blur, ..near.clone() };
+    watched.session.order(Request::Look(Box::new(even)));
     watched.frame("an even blur", |view| radius_px(view) == -5.0);
-    watched.session.order(Todo::Look(Box::new(Look { effect: None, ..near })));
+    watched.session.order(Request::Look(Box::new(Look { effect: Effect::None, ..near })));
     watched.frame("no blur", |view| view.color.is_none());
     let report = watched.session.close().report.unwrap();
     assert!(report.frames.balance(), "{:?}", report.frames);
@@ -208,17 +209,17 @@ fn a_look_takes_effect_while_frames_go_on() {
 fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     let mut watched = Watched::begin("nothing");
     watched.until("why", |told| *told == Told::Source(Source::Lost("no such source: nothing".into())));
-    watched.session.order(Todo::Begin(Output { name: "film".into(), is_camera: false }));
+    watched.session.order(Request::Begin(Output { name: "film".into(), is_camera: false }));
     watched.until("nothing to write", |told| matches!(told, Told::Note(line) if line.contains("no source")));
-    watched.session.order(Todo::Open("32".into()));
+    watched.session.order(Request::Open("32".into()));
     watched.until("it runs", |told| is_running(told, 32));
     watched.frame("a frame", |view| view.picture.width == 32);
-    watched.session.order(Todo::Open("48".into()));
+    watched.session.order(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));
     watched.frame("a frame of the other", |view| view.picture.width == 48);
-    watched.session.order(Todo::Open("24 then no more".into()));
+    watched.session.order(Request::Open("24 then no more".into()));
     watched.until("its end", |told| *told == Told::Source(Source::Ended));
-    watched.session.order(Todo::Open("24 then no more".into()));
+    watched.session.order(Request::Open("24 then no more".into()));
     watched.until("it runs again", |told| is_running(told, 24));
     watched.until("and ends", |told| *told == Told::Source(Source::Ended));
     let report = watched.session.close().report.unwrap();
@@ -230,11 +231,11 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
     let output = |name: &str, is_camera| Output { name: name.into(), is_camera };
-    watched.session.order(Todo::Begin(output("full", false)));
+    watched.session.order(Request::Begin(output("full", false)));
     watched.until("why not", |told| *told == Told::Note("the disk is full".into()));
     watched.until("none is written", |told| *told == Told::Outputs(Vec::new()));
-    watched.session.order(Todo::Begin(output("film", false)));
-    watched.session.order(Todo::Begin(output("camera", true)));
+    watched.session.order(Request::Begin(output("film", false)));
+    watched.session.order(Request::Begin(output("camera", true)));
     watched.until("two", |told| *told == Told::Outputs(vec![output("film", false), output("camera", true)]));
     watched.session.copy(vec![("split".into(), "0.5".into())]);
     watched.until("the command", |told| matches!(told, Told::Note(line) if line.starts_with("Copied: show 32")));
@@ -246,11 +247,11 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
         assert!(began.elapsed() < PATIENCE);
         std::thread::sleep(Duration::from_millis(5));
     }
-    watched.session.order(Todo::End(output("film", false)));
+    watched.session.order(Request::End(output("film", false)));
     watched
         .until("the film is complete", |told| matches!(told, Told::Note(line) if line.starts_with("film: complete")));
     // A recording ends with its source, and a virtual camera goes on with the next one.
-    watched.session.order(Todo::Open("48".into()));
+    watched.session.order(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));
     watched.until("one", |told| *told == Told::Outputs(vec![output("camera", true)]));
     while !has(&watched, "camera 48") {
@@ -268,7 +269,7 @@ fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
     for (name, why) in [("fills up", "full now"), ("no end", "full at the end")] {
         let mut watched = Watched::begin("32");
         watched.until("it runs", |told| is_running(told, 32));
-        watched.session.order(Todo::Begin(Output { name: name.into(), is_camera: false }));
+        watched.session.order(Request::Begin(Output { name: name.into(), is_camera: false }));
         if name == "fills up" {
             watched.until("why", |told| matches!(told, Told::Trouble(line) if line.contains(why)));
             watched.until("none is written", |told| *told == Told::Outputs(Vec::new()));

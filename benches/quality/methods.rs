@@ -3,12 +3,13 @@
 use std::fmt;
 
 use bokehcam::bokeh::aperture::Aperture;
-use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Effect, Job, Rank, Settings};
+use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Job, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
 use bokehcam::depth::{fill::Filler, refine::Refiner};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
+use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
 
 use super::picture::{Plane, decode, encode};
@@ -131,7 +132,7 @@ impl Blurrer {
             _ => return Ok(Self::of(method, None)),
         };
         let settings = Settings {
-            effect: Effect::Dof,
+            coc: CocKind::Depth,
             method: layers,
             aperture: shot.aperture.clone(),
             rim,

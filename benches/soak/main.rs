@@ -21,14 +21,14 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use bokehcam::bokeh::aperture::Aperture;
-use bokehcam::bokeh::{self, Backend, Effect, Method, Settings};
+use bokehcam::bokeh::{self, Backend};
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::depth::DepthSource;
-use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::recorded::Recorded;
-use bokehcam::pipeline::{self, CocAtInfinity, CocRule, Pace, QualityRule, Run};
+use bokehcam::look::number::OrAuto;
+use bokehcam::look::{Effect, Look, Refine, Strength};
+use bokehcam::pipeline::{self, Pace, Run};
 use bokehcam::recording::{Options as Reading, Recording};
 use bokehcam::stats::Report;
 use clap::Parser;
@@ -70,8 +70,8 @@ struct Options {
     #[arg(long)]
     loader: bool,
     /// auto, or a quality level for all frames
-    #[arg(long, value_name = "LEVEL", default_value = "auto", value_parser = quality)]
-    quality: QualityRule,
+    #[arg(long, value_name = "LEVEL", default_value = "auto")]
+    quality: OrAuto<Quality>,
     /// Time that the blur of one frame may take, in milliseconds [default: the frame period]
     #[arg(long, value_name = "MS")]
     budget_ms: Option<f64>,
@@ -93,13 +93,6 @@ struct Options {
     /// Given by `cargo bench`
     #[arg(long, hide = true)]
     bench: bool,
-}
-
-fn quality(text: &str) -> Result<QualityRule, String> {
-    match text {
-        "auto" => Ok(QualityRule::Auto(Quality::default())),
-        level => level.parse().map(QualityRule::Fixed),
-    }
 }
 
 fn main() -> ExitCode {
@@ -178,22 +171,14 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
     let height = size.1 as f32;
     let coc_px = options.coc_at_infinity.unwrap_or(height / 45.0);
     let max_coc_px = coc_px.max(height * 0.06);
-    let (quality, adaptive) = match options.quality {
-        QualityRule::Fixed(quality) => (quality, false),
-        QualityRule::Auto(quality) => (quality, true),
+    let look = Look {
+        strength: Strength::AtInfinity(coc_px),
+        max_coc_px: Some(max_coc_px),
+        refine: if options.no_refine { Refine::Off } else { Refine::On },
+        quality: options.quality.chosen(),
+        ..Look::plain(Effect::Dof)
     };
-    let settings = Settings {
-        effect: Effect::Dof,
-        method: Method::Layered,
-        aperture: Aperture::default(),
-        rim: 0.2,
-        rank: None,
-        highlights: 0.0,
-        quality,
-        adaptive,
-        far_max_px: coc_px,
-        near_max_px: max_coc_px,
-    };
+    let settings = look.settings(size, true).ok_or("there is no blur")?;
     let backend = if options.gpu { Backend::Auto } else { Backend::Cpu };
     let executor = bokeh::create(&settings, size, backend, None, None)?;
     let clock = Clock::system();
@@ -203,9 +188,9 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
         depth: Some(Box::new(Recorded::new(Arc::clone(&recording), &name)?) as Box<dyn DepthSource>),
         camera: Box::new(Looped::new(recording, &name, frames, clock.clone(), stamps.clone())),
         bokeh: Some(Box::new(Slowed::new(executor, options.slow))),
-        quality: options.quality,
-        coc: CocRule::Depth { focus: FocusRule::Auto, lens: CocAtInfinity::Px(coc_px), range_m: 0.0, max_coc_px },
-        refine: !options.no_refine,
+        look,
+        adaptive: true,
+        measured: true,
         changes: None,
         sink: Box::new(Stamping::new(clock.clone(), stamps.clone())),
         pace: Pace::Realtime,

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
+use bokehcam::compute::Backend;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::recording::{Recording, Scratch};
 use bokehcam::sink::{Ending, Sink, SinkError};
@@ -136,6 +137,9 @@ impl Bokeh for Slowed {
     }
     fn capacity(&self) -> usize {
         self.inner.capacity()
+    }
+    fn backend(&self) -> Backend {
+        self.inner.backend()
     }
     fn describe(&self) -> String {
         self.inner.describe()

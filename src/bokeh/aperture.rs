@@ -1,6 +1,7 @@
 //! The shape of the lens opening, sampled as an antialiased mask.
 
 use std::f64::consts::{PI, TAU};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A lens opening, drawn as a far highlight shows it (x right, y down), inside the unit disc.
@@ -45,6 +46,8 @@ pub enum Shape {
 /// A greyscale picture used as an aperture.
 #[derive(Debug, PartialEq)]
 pub struct Picture {
+    /// Where it was read from, if that is known.
+    pub file: Option<PathBuf>,
     /// Columns.
     pub width: u32,
     /// Rows.
@@ -258,14 +261,15 @@ mod tests {
         let mask = of(Shape::Heart).mask(64, 0.0);
         let rows = |r: std::ops::Range<usize>| mask.values[r.start * 64..r.end * 64].iter().sum::<f64>();
         assert!(rows(0..32) > 1.2 * rows(32..64), "a heart is wider above");
-        let picture = Picture { width: 2, height: 1, grey: vec![1.0, 0.0] };
+        let picture = Picture { file: None, width: 2, height: 1, grey: vec![1.0, 0.0] };
         let mask = of(Shape::Picture(Arc::new(picture))).mask(64, 0.0);
         assert!(mask.values[32 * 64 + 10] > 0.9 && mask.values[32 * 64 + 54] == 0.0);
     }
 
     #[test]
     fn a_black_picture_is_a_pinhole() {
-        let black = of(Shape::Picture(Arc::new(Picture { width: 1, height: 1, grey: vec![0.0] }))).mask(16, 0.1);
+        let black =
+            of(Shape::Picture(Arc::new(Picture { file: None, width: 1, height: 1, grey: vec![0.0] }))).mask(16, 0.1);
         assert_eq!(black.sum(), 1.0);
     }
 

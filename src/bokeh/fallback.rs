@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::{Bokeh, BokehError, Finished, Job};
-use crate::compute::GpuError;
+use crate::compute::{Backend, GpuError};
 
 /// What makes an executor.
 pub type Makes = Box<dyn FnOnce() -> Box<dyn Bokeh> + Send>;
@@ -82,10 +82,14 @@ impl Bokeh for Fallback {
         self.now.capacity()
     }
 
-    fn backend(&self) -> &'static str {
-        match (&self.before, self.now.backend()) {
-            (Some(_), "cpu") => "gpu, then cpu",
-            (_, now) => now,
+    fn backend(&self) -> Backend {
+        self.now.backend()
+    }
+
+    fn backends(&self) -> &'static str {
+        match &self.before {
+            Some(_) => "gpu, then cpu",
+            None => self.now.backends(),
         }
     }
 
@@ -115,6 +119,10 @@ impl Bokeh for Nothing {
 
     fn capacity(&self) -> usize {
         0
+    }
+
+    fn backend(&self) -> Backend {
+        Backend::Cpu
     }
 
     fn describe(&self) -> String {
@@ -184,6 +192,10 @@ mod tests {
             self.capacity
         }
 
+        fn backend(&self) -> Backend {
+            if self.capacity > 1 { Backend::Gpu } else { Backend::Cpu }
+        }
+
         fn describe(&self) -> String {
             if self.capacity > 1 { "a GPU" } else { "cpu, marks" }.to_owned()
         }
@@ -204,7 +216,7 @@ mod tests {
             let pool = Pool::new(2 * 4, || ColorImage::new(2, 2));
             let other = Box::new(|| Box::new(Marks::new(2, 1, u32::MAX)) as Box<dyn Bokeh>);
             let mut bokeh = Fallback::new(Box::new(Marks::new(1, 3, fails_at)), other);
-            assert_eq!((bokeh.backend(), bokeh.describe().as_str()), ("gpu", "a GPU"));
+            assert_eq!((bokeh.backends(), bokeh.describe().as_str()), ("gpu", "a GPU"));
             let (mut submitted, mut marks) = (0, Vec::new());
             while (marks.len() as u64) < FRAMES {
                 if submitted < FRAMES && bokeh.in_flight() < bokeh.capacity() {
@@ -221,7 +233,7 @@ mod tests {
             let failed = fails_at <= 2 * FRAMES as u32;
             assert_eq!(marks.contains(&2), failed, "{fails_at}");
             let ran = if failed { ("gpu, then cpu", "GPU: it is lost; then cpu, marks") } else { ("gpu", "a GPU") };
-            assert_eq!((bokeh.backend(), bokeh.describe().as_str()), ran);
+            assert_eq!((bokeh.backends(), bokeh.describe().as_str()), ran);
         }
     }
 

@@ -8,8 +8,9 @@ use super::bank::Bank;
 use super::low_rank::Decomposition;
 use super::plan::Compositing;
 use super::rung::{MOST_FULL_RADIUS_PX, MOST_RADIUS_PX, Rung, SCALES, rung};
-use super::{Effect, Rank, Settings};
+use super::{Rank, Settings};
 use crate::budget::Quality;
+use crate::optics::CocKind;
 
 /// One quality level.
 #[derive(Clone, Debug)]
@@ -41,12 +42,12 @@ impl Levels {
         let wanted = |quality: &Quality| settings.adaptive || *quality == settings.quality;
         let levels = Quality::ALL.into_iter().filter(wanted).map(|quality| {
             let rung = rung(quality);
-            let terms = if settings.effect == Effect::Blur { rung.even_rank } else { rung.rank };
+            let terms = if settings.coc == CocKind::Uniform { rung.even_rank } else { rung.rank };
             let rank = settings.rank.unwrap_or(Rank::Terms(terms));
-            let bank_px = match settings.effect {
+            let bank_px = match settings.coc {
                 _ if compositing == Compositing::Gather => most_px,
                 _ if settings.rank == Some(Rank::Full) => most_px.min((most_px / coarsest).max(MOST_FULL_RADIUS_PX)),
-                Effect::Blur => most_px / rung.even_scale(most_px) as f32,
+                CocKind::Uniform => most_px / rung.even_scale(most_px) as f32,
                 _ => most_px.min((most_px / coarsest).max(MOST_RADIUS_PX)),
             };
             let bank = made.iter().position(|&like| like == (rank, bank_px)).unwrap_or_else(|| {

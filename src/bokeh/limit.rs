@@ -1,6 +1,7 @@
 //! How wide a blur may be.
 
-use super::{BokehError, Effect, Method, Rank, Settings};
+use super::{BokehError, Method, Rank, Settings};
+use crate::optics::CocKind;
 
 /// Largest radius of [`Method::Gather`], in pixels: it filters at full scale.
 const MOST_GATHERED_PX: f32 = 512.0;
@@ -12,9 +13,9 @@ impl Settings {
     /// or less where the method bears no more.
     pub fn most_radius_px(&self, size: (u32, u32)) -> f32 {
         let diagonal_px = (size.0 as f32).hypot(size.1 as f32).ceil();
-        diagonal_px.min(match (self.effect, self.method, self.rank) {
-            (Effect::Dof, Method::Gather, Some(Rank::Full)) => MOST_EXACT_PX,
-            (Effect::Dof, Method::Gather, _) => MOST_GATHERED_PX,
+        diagonal_px.min(match (self.coc, self.method, self.rank) {
+            (CocKind::Depth, Method::Gather, Some(Rank::Full)) => MOST_EXACT_PX,
+            (CocKind::Depth, Method::Gather, _) => MOST_GATHERED_PX,
             _ => f32::INFINITY,
         })
     }
@@ -35,7 +36,7 @@ impl Settings {
         // Not a number is beyond any.
         let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&most_px).is_none_or(|order| order.is_gt());
         let Some(radius_px) = [self.far_max_px, self.near_max_px].into_iter().find(is_beyond) else { return Ok(()) };
-        let by_method = (self.effect, self.method) == (Effect::Dof, Method::Gather);
+        let by_method = (self.coc, self.method) == (CocKind::Depth, Method::Gather);
         Err(BokehError::TooWide { radius_px, most_px, size, by_method })
     }
 }

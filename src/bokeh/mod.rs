@@ -30,26 +30,17 @@ use crate::compute::device::Device;
 use crate::compute::{DevicePicture, GpuError, Place};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
-use crate::optics::CocField;
+use crate::names::named;
+use crate::optics::{CocField, CocKind};
 
-/// What the blur is driven by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effect {
-    /// One radius everywhere.
-    Blur,
-    /// The radius is a ramp across the picture.
-    TiltShift,
-    /// The radius follows depth.
-    Dof,
-}
-
-/// How `dof` is composited.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// Depth bins, each blurred on its own, composited front to back.
-    Layered,
-    /// Every pixel gathers with its own radius (McGraw's plain form; kept for comparison).
-    Gather,
+named! {
+    /// How a blur that follows depth is composited.
+    pub enum Method default Layered {
+        /// Depth bins, blurred and composited front to back
+        Layered = "layered",
+        /// Every pixel gathers with its own radius: the paper's plain form
+        Gather = "gather",
+    }
 }
 
 /// How many separable terms approximate the aperture.
@@ -84,9 +75,9 @@ impl fmt::Display for Rank {
 /// Everything about the blur that stays the same from frame to frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// What the radius follows.
-    pub effect: Effect,
-    /// Compositing of `dof`; the other effects ignore it.
+    /// What kind of CoC frames have.
+    pub coc: CocKind,
+    /// Compositing where it follows depth.
     pub method: Method,
     /// Shape of the aperture.
     pub aperture: aperture::Aperture,
@@ -307,9 +298,12 @@ pub trait Bokeh: Send {
     /// Frames that may be in flight at once.
     fn capacity(&self) -> usize;
 
-    /// What runs it, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
-    fn backend(&self) -> &'static str {
-        if self.describe().starts_with("cpu") { "cpu" } else { "gpu" }
+    /// What runs it: [`Backend::Gpu`] or [`Backend::Cpu`].
+    fn backend(&self) -> Backend;
+
+    /// What ran it, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
+    fn backends(&self) -> &'static str {
+        self.backend().name()
     }
 
     /// One line for the report, such as `cpu, 2 threads, AVX-512` or the adapter's name.

@@ -18,10 +18,10 @@ use super::levels::Levels;
 use super::rung::{MOST_FULL_RADIUS_PX, Rung, scale_within};
 pub use super::share::Share;
 use super::split::{Counts, MAX_PIECES, Piece};
-use super::{Effect, Method, Rank, Settings};
+use super::{Method, Rank, Settings};
 use crate::budget::Quality;
 use crate::frame::DepthMap;
-use crate::optics::CocField;
+use crate::optics::{CocField, CocKind};
 
 /// Bin pixels a side of a cell of the coarse grid.
 pub const CELL: usize = 8;
@@ -107,7 +107,7 @@ pub struct Plan {
     pub expansion: f32,
     /// Whether the rank is full and the method the paper's: an exact 2-D gather.
     pub exact: bool,
-    effect: Effect,
+    coc: CocKind,
     /// Whether bins stay at full scale as far as [`MOST_FULL_RADIUS_PX`] allows.
     full_scale: bool,
     /// Largest radius in the bin in focus.
@@ -123,10 +123,10 @@ impl Plan {
     /// [`Settings::most_radius_px`].
     pub fn new(settings: &Settings, width: u32, height: u32) -> Self {
         let settings = &settings.within((width, height));
-        let compositing = match (settings.effect, settings.method) {
-            (Effect::Dof, Method::Layered) => Compositing::Layers,
-            (Effect::Dof, Method::Gather) => Compositing::Gather,
-            (Effect::Blur | Effect::TiltShift, _) => Compositing::Select,
+        let compositing = match (settings.coc, settings.method) {
+            (CocKind::Depth, Method::Layered) => Compositing::Layers,
+            (CocKind::Depth, Method::Gather) => Compositing::Gather,
+            (CocKind::Uniform | CocKind::Ramp, _) => Compositing::Select,
         };
         let mask = settings.aperture.mask(MASK_CELLS, settings.rim);
         let levels = Arc::new(Levels::new(settings, &mask, compositing));
@@ -144,7 +144,7 @@ impl Plan {
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
             exact: compositing == Compositing::Gather && settings.rank == Some(Rank::Full),
             levels,
-            effect: settings.effect,
+            coc: settings.coc,
             full_scale: settings.rank == Some(Rank::Full),
             focus_px: settings.far_max_px.max(settings.near_max_px),
             max_px: [settings.far_max_px, settings.near_max_px],
@@ -174,13 +174,13 @@ impl Plan {
         far.clear();
         near.clear();
         self.focus_px = far_px.max(near_px);
-        match self.effect {
-            Effect::TiltShift => {
+        match self.coc {
+            CocKind::Ramp => {
                 far.extend(even_pieces(far_px, self.rung.bins_per_side));
                 self.focus_px = far.first().map_or(self.focus_px, |piece| piece.border_px);
             }
-            Effect::Blur => far.push(Piece { border_px: 0.0, low_px: far_px, high_px: far_px }),
-            Effect::Dof => {}
+            CocKind::Uniform => far.push(Piece { border_px: 0.0, low_px: far_px, high_px: far_px }),
+            CocKind::Depth => {}
         }
         self.lay_out();
     }
@@ -257,12 +257,12 @@ impl Plan {
 
     /// Memories for bins that an executor needs, whatever the level.
     pub fn slots(&self) -> usize {
-        match self.effect {
-            Effect::Dof if self.compositing == Compositing::Gather => 1,
-            Effect::Dof => 1 + 2 * self.levels.most_bins_per_side(),
-            Effect::TiltShift if self.pieces[0].is_empty() => 1,
-            Effect::TiltShift => 1 + self.levels.most_bins_per_side(),
-            Effect::Blur => 2,
+        match self.coc {
+            CocKind::Depth if self.compositing == Compositing::Gather => 1,
+            CocKind::Depth => 1 + 2 * self.levels.most_bins_per_side(),
+            CocKind::Ramp if self.pieces[0].is_empty() => 1,
+            CocKind::Ramp => 1 + self.levels.most_bins_per_side(),
+            CocKind::Uniform => 2,
         }
     }
 

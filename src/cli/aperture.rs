@@ -9,11 +9,11 @@ use serde::Serialize;
 use super::error::CliError;
 use super::files::{refuse_overwrite, refuse_source, write_whole};
 use super::options::{Global, Output};
-use super::values::between;
 use super::{aperture_plot, aperture_sheet, defaults, terminal};
-use crate::bokeh::aperture::Mask;
+use crate::bokeh::aperture::{Aperture, Mask};
 use crate::bokeh::low_rank::Decomposition;
 use crate::look::ApertureName;
+use crate::look::number::within;
 use crate::recording::still::write_color;
 
 /// The error curves end at this rank.
@@ -44,7 +44,7 @@ pub struct ApertureCommand {
           value_parser = value_parser!(u16).range(1..=64))]
     ranks: Vec<u16>,
     /// Width of the soft rim, as a fraction of the radius; 0 is the hard rim of the paper
-    #[arg(id = "analysed_rim", long = "rim", value_name = "W", default_value_t = 0.0, value_parser = between(0.0, 1.0))]
+    #[arg(id = "analysed_rim", long = "rim", value_name = "W", default_value_t = 0.0, value_parser = within(0.0..=1.0))]
     rim: f32,
     #[command(flatten)]
     output: Output,
@@ -127,7 +127,7 @@ pub fn run(command: &ApertureCommand, global: &Global) -> Result<(), CliError> {
 
     let mut analyses = Vec::new();
     for name in &command.apertures {
-        let mask = name.load(0.0)?.mask(usize::from(command.size), command.rim);
+        let mask = Aperture { shape: name.load()?, intensity: 0.0 }.mask(usize::from(command.size), command.rim);
         analyses.push(Analysis::of(name.to_string(), &mask, &ranks));
     }
     let table = Table {

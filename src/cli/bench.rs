@@ -9,14 +9,16 @@ use serde::Serialize;
 use super::config::{self, Executor};
 use super::error::CliError;
 use super::layers::Given;
-use super::values::{self, DepthChoice, OrAuto, Size, between};
+use super::values::{DepthChoice, Size};
 use super::{defaults, options, print, render, unused};
 use crate::bokeh::{Bokeh, Job, PassTimes};
 use crate::budget::Quality;
-use crate::compute::{Place, team::cores};
+use crate::compute::{Backend, Place, team::cores};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
-use crate::look::{COC_AT_INFINITY_PER_HEIGHT, MOST_RADIUS_PX, Strength};
+use crate::look::number::within;
+use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength};
+use crate::names::named;
 use crate::optics::CocField;
 use crate::scene::{Scene, View};
 
@@ -38,26 +40,26 @@ pub struct BenchCommand {
     #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = defaults::BENCHED_SIZES)]
     sizes: Vec<Size>,
     /// Blur radii at infinity, in pixels [default: height / 45]
-    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = between(0.0, MOST_RADIUS_PX))]
+    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = within(0.0..=MOST_RADIUS_PX))]
     coc: Vec<f32>,
     /// Quality levels
     #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
-          default_value = Quality::default().name(), value_parser = super::quality::level())]
+          default_value = Quality::default().name(), value_parser = options::named::<Quality>())]
     quality: Vec<Quality>,
     /// Numbers of threads of the CPU backend [default: one per core]
     #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
           value_parser = value_parser!(u16).range(1..=1024))]
     threads: Vec<u16>,
     /// What is in the picture
-    #[arg(long, value_enum, value_name = "WHICH", default_value_t = BenchScene::Sitter)]
+    #[arg(long, value_parser = options::named::<BenchScene>(), value_name = "WHICH", default_value_t = BenchScene::Sitter)]
     scene: BenchScene,
     /// Frames to measure
     #[arg(id = "benched_frames", long = "frames", value_name = "N", default_value_t = defaults::BENCHED_FRAMES,
           value_parser = value_parser!(u32).range(1..))]
     frames: u32,
     /// What runs the blur
-    #[arg(long, value_enum, value_name = "WHICH", default_value = "auto")]
-    backend: values::Backend,
+    #[arg(long, value_parser = options::named::<Backend>(), value_name = "WHICH", default_value = "auto")]
+    backend: Backend,
     /// Part of the name of the GPU to take
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -69,17 +71,16 @@ pub struct BenchCommand {
     passes: bool,
     #[command(flatten)]
     blur: options::Blur,
-    #[command(flatten)]
-    aperture: options::Aperture,
 }
 
-/// The picture that is blurred.
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum BenchScene {
-    /// A person in focus, and a room behind
-    Sitter,
-    /// The same with things in front, for which what they hide is filled in
-    Portrait,
+named! {
+    /// The picture that is blurred.
+    enum BenchScene default Sitter {
+        /// A person in focus, and a room behind
+        Sitter = "sitter",
+        /// The same with things in front, for which what they hide is filled in
+        Portrait = "portrait",
+    }
 }
 
 /// One line of the result.
@@ -106,8 +107,8 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
         let what = "--depth is for `stream`: the scene that is measured has its own depth; leave it out, or use none";
         return Err(CliError::Usage(what.to_string()));
     }
-    let options = options::Blur { coc_at_infinity: Some(Strength::Default), ..command.blur.clone() };
-    let look = config::look(&options, &command.aperture, OrAuto::Auto, true)?;
+    let look = config::look(&command.blur, &options::LookSettings::default())?;
+    let look = config::look_for(&Look { strength: Strength::Default, ..look }, &command.blur.depth, true)?;
     unused::warn(
         &given.settings,
         &unused::Run {
@@ -117,7 +118,7 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
             effect: look.effect,
             lens: false,
             realtime: false,
-            cpu_only: command.backend == values::Backend::Cpu,
+            cpu_only: command.backend == Backend::Cpu,
             window: false,
         },
     );
@@ -135,8 +136,8 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
         for &coc_px in radii_px {
             for &quality in &command.quality {
                 for &threads in &threads {
-                    let executor = Executor::new(command.backend, command.adapter.clone(), threads);
-                    let measured = measure(command, (&color, &depth), coc_px, quality, &executor)?;
+                    let executor = Executor { backend: command.backend, adapter: command.adapter.clone(), threads };
+                    let measured = measure(command, &look, (&color, &depth), coc_px, quality, &executor)?;
                     print(measured.line(command.json, command.passes).as_bytes())?;
                 }
             }
@@ -147,13 +148,13 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
 
 fn measure(
     command: &BenchCommand,
+    look: &Look,
     (color, depth): (&ColorImage, &DepthMap),
     coc_px: f32,
     quality: Quality,
     executor: &Executor,
 ) -> Result<Measured, CliError> {
-    let options = options::Blur { coc_at_infinity: Some(Strength::AtInfinity(coc_px)), ..command.blur.clone() };
-    let look = config::look(&options, &command.aperture, OrAuto::This(quality), true)?;
+    let look = Look { strength: Strength::AtInfinity(coc_px), quality: Some(quality), ..look.clone() };
     let size = color.size();
     let Some(settings) = look.settings(size, false) else {
         return Err(CliError::Usage(

@@ -1,10 +1,10 @@
 //! A look as a whole command for a shell.
 
-use crate::look::flags::Flag;
+use crate::look::settings::Value;
 
 /// The command that shows `source` with these settings, or streams it into `outputs` where there are any; `switches`
 /// are other options of that command. Every word is quoted as a POSIX shell needs it.
-pub fn equivalent(source: &str, outputs: &[String], flags: &[Flag], switches: &[(String, String)]) -> String {
+pub fn equivalent(source: &str, outputs: &[String], flags: &[Value], switches: &[(String, String)]) -> String {
     let mut words = vec!["bokehcam".to_string()];
     words.push(if outputs.is_empty() { "preview" } else { "stream" }.to_string());
     // What begins with a dash would be taken for an option.

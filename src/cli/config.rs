@@ -4,101 +4,66 @@
 use std::sync::Arc;
 
 use super::error::CliError;
+use super::values::DepthChoice;
 use super::{memory, options};
-use super::values::{self, DepthChoice, Effect, OrAuto};
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
-use crate::budget::Quality;
 #[cfg(feature = "window")]
 use crate::compute::device::Device;
 use crate::compute::team::cores;
 use crate::depth::DepthError;
 use crate::depth::focus::FocusRule;
 use crate::depth::stereo::{self, Matcher};
-use crate::look::{ApertureName, Look, Strength};
-use crate::optics::Lens;
+use crate::look::{Effect, Look, Strength};
 
-/// Resolves options for a source that has depth or not.
+/// The look that options ask for, whatever the source.
 ///
 /// # Errors
-/// The options do not fit each other or the source, or the aperture's picture cannot be read.
-pub fn look(
-    blur: &options::Blur,
-    aperture: &options::Aperture,
-    quality: OrAuto<Quality>,
-    has_depth: bool,
-) -> Result<Look, CliError> {
+/// A lens is not known by all of its numbers, or the aperture's picture cannot be read.
+pub fn look(blur: &options::Blur, quality: &options::LookSettings<true>) -> Result<Look, CliError> {
+    let mut patch = blur.look.0.clone();
+    patch.quality = quality.0.quality;
+    Ok(patch.on(&Look::default())?)
+}
+
+/// The look as far as a source with depth or without allows it.
+///
+/// # Errors
+/// It needs depth that there is not, or a distance of focus.
+pub fn look_for(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result<Look, CliError> {
     let usage = |text: &str| Err(CliError::Usage(text.to_string()));
-    let uses_depth = has_depth && blur.depth != DepthChoice::None;
-    let effect = match blur.effect {
-        Effect::None => None,
-        Effect::Blur => Some(bokeh::Effect::Blur),
-        Effect::TiltShift => Some(bokeh::Effect::TiltShift),
-        Effect::Dof | Effect::Auto if uses_depth => Some(bokeh::Effect::Dof),
-        Effect::Dof if has_depth => {
-            return usage("--effect dof needs depth: leave --depth none out, or use --effect blur or tilt-shift");
-        }
-        Effect::Dof => {
-            return usage("--effect dof needs depth, and the source has none: use --effect blur or tilt-shift");
-        }
-        Effect::Auto => Some(bokeh::Effect::Blur),
-    };
-    if blur.depth == DepthChoice::Recorded && !has_depth {
+    let uses_depth = has_depth && *depth != DepthChoice::None;
+    if look.effect == Effect::Dof && !uses_depth {
+        return usage(match has_depth {
+            true => "--effect dof needs depth: leave --depth none out, or use --effect blur or tilt-shift",
+            false => "--effect dof needs depth, and the source has none: use --effect blur or tilt-shift",
+        });
+    }
+    if *depth == DepthChoice::Recorded && !has_depth {
         return usage("--depth recorded: the source has no depth");
     }
-    let strength = match (blur.coc_at_infinity, blur.f_number, blur.focal_length, blur.sensor_width) {
-        (Some(strength), ..) => strength,
-        (None, None, None, None) => Strength::Default,
-        (None, Some(f_number), Some(focal_length_mm), Some(sensor_width_mm)) => {
-            Strength::Lens(Lens { focal_length_mm, f_number, sensor_width_mm })
-        }
-        _ => return usage("a lens needs all of --f-number, --focal-length and --sensor-width"),
-    };
-    let focuses_by_depth = effect == Some(bokeh::Effect::Dof);
-    if matches!(strength, Strength::Lens(_)) && !focuses_by_depth && !matches!(blur.focus, FocusRule::Metres(_)) {
+    let look = look.for_source(uses_depth);
+    let has_distance = look.effect.follows_depth() || matches!(look.focus, FocusRule::Metres(_));
+    if matches!(look.strength, Strength::Lens(_)) && !has_distance {
         return usage("a lens without depth needs --focus METRES: its blur depends on the distance of focus");
     }
-    Ok(Look {
-        effect,
-        method: blur.method.into(),
-        focus: blur.focus,
-        focus_range_m: blur.focus_range,
-        strength,
-        max_coc_px: blur.max_coc.and_then(OrAuto::chosen),
-        refine: blur.refine.into(),
-        tilt: blur.tilt,
-        aperture: aperture.aperture.load(aperture.intensity)?,
-        aperture_file: match &aperture.aperture {
-            ApertureName::Image(file) => Some(file.clone()),
-            _ => None,
-        },
-        rim: aperture.rim,
-        rank: aperture.rank.and_then(OrAuto::chosen),
-        highlights: aperture.highlights,
-        quality: quality.chosen(),
-    })
+    Ok(look)
 }
 
 /// What runs the blur.
 #[derive(Clone, Debug)]
 pub struct Executor {
-    backend: Backend,
-    adapter: Option<String>,
-    threads: Option<usize>,
+    /// Where it runs.
+    pub backend: Backend,
+    /// Part of the name of the GPU to take.
+    pub adapter: Option<String>,
+    /// Threads of the CPU executor; all cores when `None`.
+    pub threads: Option<usize>,
 }
 
 impl Executor {
     /// Resolves options.
     pub fn of(computing: &options::Computing) -> Self {
-        Self::new(computing.backend, computing.adapter.clone(), computing.threads)
-    }
-
-    /// An executor by its backend, part of its adapter's name, and its number of threads.
-    pub fn new(backend: values::Backend, adapter: Option<String>, threads: Option<usize>) -> Self {
-        let backend = match backend {
-            values::Backend::Auto => Backend::Auto,
-            values::Backend::Gpu => Backend::Gpu,
-            values::Backend::Cpu => Backend::Cpu,
-        };
+        let options::Computing { backend, adapter, threads, .. } = computing.clone();
         Self { backend, adapter, threads }
     }
 
@@ -120,12 +85,6 @@ impl Executor {
                 Ok(None)
             }
         }
-    }
-
-    /// Threads of the CPU executor; all cores when `None`.
-    #[cfg(feature = "window")]
-    pub fn threads(&self) -> Option<usize> {
-        self.threads
     }
 
     /// An executor for pictures of `size` pixels.

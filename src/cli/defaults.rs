@@ -1,10 +1,7 @@
-//! Every default of the command line, in one place.
+//! Defaults of the command line; those of a look are [`crate::look::Look::default`].
 
 use super::values::Size;
-pub use crate::look::defaults::{FOCUS_RANGE_M, HIGHLIGHTS, INTENSITY, RIM, TILT};
 
-/// Shape of the aperture.
-pub const APERTURE: &str = "disc";
 /// Units of a 16-bit depth picture per metre: the TUM convention.
 pub const DEPTH_SCALE: f32 = 5000.0;
 /// The same of depth cameras, most of which give millimetres.

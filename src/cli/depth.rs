@@ -2,9 +2,9 @@
 
 use super::error::CliError;
 use super::options;
-use super::source::{Source, depth_of, first_depth};
+use super::source::{Source, Wanted, depth_of};
 use super::unused::DepthFrom;
-use super::values::{DepthChoice, Effect};
+use super::values::DepthChoice;
 use crate::capture::Brings;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
@@ -15,28 +15,23 @@ use crate::recording::{Options, Recording};
 ///
 /// # Errors
 /// It cannot be opened, or an option does not apply to it.
-pub fn beside(
-    source: Source,
-    blur: &options::Blur,
-    depth: &options::Depth,
-    keep_going: bool,
-    clock: &Clock,
-) -> Result<Source, CliError> {
+pub fn beside(source: Source, wanted: &Wanted, clock: &Clock) -> Result<Source, CliError> {
+    let &Wanted { depth, from, keep_going, .. } = wanted;
     let usage = |text: &str| Err(CliError::Usage(text.to_string()));
-    if depth.depth_calibration.is_some() && !matches!(blur.depth, DepthChoice::Device(_)) {
+    if depth.depth_calibration.is_some() && !matches!(from, DepthChoice::Device(_)) {
         return usage("--depth-calibration is for a depth camera: name it with --depth, such as --depth /dev/video2");
     }
-    if !blur.depth.is_elsewhere() {
+    if !from.is_elsewhere() {
         return Ok(source);
     }
-    if !matches!(blur.effect, Effect::Auto | Effect::Dof) {
+    if !wanted.uses_depth() {
         return usage("--depth names depth, and only --effect dof uses any: leave one of them out");
     }
     if source.camera.info().brings == Brings::Depth {
         return usage("the source knows its depth: leave --depth out");
     }
     let mut first = None;
-    let (opened, depth_from): (Box<dyn DepthSource>, _) = match &blur.depth {
+    let (opened, depth_from): (Box<dyn DepthSource>, _) = match from {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
             let options = Options {
@@ -47,7 +42,7 @@ pub fn beside(
             };
             let recording = Recording::open(folder, &options)?;
             let depth_from = depth_of(&recording);
-            first = first_depth(&recording, blur);
+            first = wanted.first_depth(&recording);
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Device(name) => (device(name, depth, clock)?, DepthFrom::Units),

@@ -3,20 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::{Args, ValueEnum, value_parser};
+use clap::{Args, value_parser};
 
 use super::calib::{self, Eyes};
 use super::config::Executor;
 use super::disparity_preview::preview;
 use super::error::CliError;
 use super::files::{make_folder_of, refuse_overwrite, refuse_source};
-use super::values::{Backend, above_zero, between};
 use super::{defaults, options, terminal};
 use crate::calibration::rectifier::Rectifier;
+use crate::compute::Backend;
 use crate::depth::DepthError;
 use crate::depth::stereo::check::{Verdict, check};
-use crate::depth::stereo::{self, MatchError, Pair, Settings};
+use crate::depth::stereo::{Effort, MatchError, Pair, Settings};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
+use crate::look::number::{above_zero, within};
 use crate::optics::StereoRig;
 use crate::recording::geometry::Geometry;
 use crate::recording::still::{self, MapFormat};
@@ -58,7 +59,7 @@ pub struct DepthCommand {
           conflicts_with = "pair_calib", requires = "pair_focal_px")]
     baseline_m: Option<f32>,
     /// Column of the right principal point less that of the left, in pixels [default: 0]
-    #[arg(id = "pair_doffs_px", long = "doffs-px", value_name = "PX", value_parser = between(-10_000.0, 10_000.0),
+    #[arg(id = "pair_doffs_px", long = "doffs-px", value_name = "PX", value_parser = within(-10_000.0..=10_000.0),
           conflicts_with = "pair_calib", requires = "pair_focal_px")]
     doffs_px: Option<f32>,
     /// Write depth in metres instead: .pfm, or .png of 5000 units per metre (TUM); 0 = unknown
@@ -68,10 +69,10 @@ pub struct DepthCommand {
     #[arg(long, value_name = "FILE.png")]
     preview: Option<PathBuf>,
     /// How much is done for it
-    #[arg(long, value_enum, value_name = "HOW", default_value = "full")]
+    #[arg(long, value_parser = options::named::<Effort>(), value_name = "HOW", default_value = "full")]
     effort: Effort,
     /// What runs it
-    #[arg(long, value_enum, value_name = "WHICH", default_value = "auto", help_heading = "Computing")]
+    #[arg(long, value_parser = options::named::<Backend>(), value_name = "WHICH", default_value = "auto", help_heading = "Computing")]
     backend: Backend,
     /// Part of the name of the GPU to take
     #[arg(long, value_name = "NAME", help_heading = "Computing")]
@@ -81,15 +82,6 @@ pub struct DepthCommand {
     threads: Option<usize>,
     #[command(flatten)]
     output: options::Output,
-}
-
-/// How much is done for a disparity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Effort {
-    /// Half the columns and rows
-    Fast,
-    /// All pixels
-    Full,
 }
 
 /// Runs the command.
@@ -117,12 +109,9 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     }
     let left = luma_of(&color);
     let disparities = command.disparities(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
-    let effort = match command.effort {
-        Effort::Fast => stereo::Effort::Fast,
-        Effort::Full => stereo::Effort::Full,
-    };
-    let executor = Executor::new(command.backend, command.adapter.clone(), command.threads);
-    let mut matcher = executor.matcher(disparities, effort, size)?;
+    let (adapter, threads) = (command.adapter.clone(), command.threads);
+    let executor = Executor { backend: command.backend, adapter, threads };
+    let mut matcher = executor.matcher(disparities, command.effort, size)?;
     let mut disparity = DisparityMap::default();
     let start = Instant::now();
     let pair = Pair { left: &left, color: Some(&color), right: &right };

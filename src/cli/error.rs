@@ -8,6 +8,7 @@ use crate::bokeh::BokehError;
 use crate::calibration::CalibrationError;
 use crate::capture::CaptureError;
 use crate::depth::DepthError;
+use crate::look::LookError;
 use crate::pipeline::Fault;
 use crate::recording::RecordingError;
 use crate::sink::SinkError;
@@ -93,6 +94,9 @@ pub enum CliError {
     /// A picture or a recording cannot be read or written.
     #[error(transparent)]
     Recording(RecordingError),
+    /// The settings make no look.
+    #[error(transparent)]
+    Look(#[from] LookError),
     /// The source failed.
     #[error(transparent)]
     Capture(#[from] CaptureError),
@@ -136,7 +140,13 @@ impl CliError {
 
     /// Whether the caller has to write something differently.
     pub fn is_wrong_argument(&self) -> bool {
-        matches!(self, CliError::Usage(_) | CliError::Settings { .. } | CliError::Bokeh(BokehError::TooWide { .. }))
+        matches!(
+            self,
+            CliError::Usage(_)
+                | CliError::Settings { .. }
+                | CliError::Look(LookError::Lens)
+                | CliError::Bokeh(BokehError::TooWide { .. })
+        )
     }
 
     /// 2 for what the caller has to write differently, else 1.

@@ -3,9 +3,8 @@
 use super::log;
 use crate::depth::focus::FocusRule;
 use crate::frame::DepthMap;
-use crate::look::Look;
+use crate::look::{CocRule, Look};
 use crate::optics::{CocField, DepthCoc};
-use crate::pipeline::CocRule;
 
 /// So much of a map on one side of the focal plane, and blurred, is all of it: the rest is noise.
 const NEARLY_ALL: f32 = 0.99;

@@ -14,7 +14,7 @@ use super::arguments::one_line;
 use super::error::CliError;
 use super::leaf;
 use super::settings::{SettingsFile, Values, all_settings, excluded_by, on_settings, parse_flags};
-use crate::look::flags;
+use crate::look::{SETTINGS, settings};
 use crate::recording::snapshot;
 
 /// One setting, resolved.
@@ -104,25 +104,27 @@ impl Layers {
         ];
         let is_given = |setting: &Setting| {
             let name = setting.name.as_str();
-            ["flag", "environment"].contains(&setting.origin) && !flags::NAMES.contains(&name) && !ONCE.contains(&name)
+            ["flag", "environment"].contains(&setting.origin)
+                && !settings::setting(name).is_some()
+                && !ONCE.contains(&name)
         };
-        /// Each of these sets aside the others.
-        const STRENGTH: [&str; 4] = ["coc-at-infinity", "f-number", "focal-length", "sensor-width"];
-        let settings = self.resolved(matches);
+        let resolved = self.resolved(matches);
         let is_behind = |setting: &&Setting| {
-            flags::NAMES.contains(&setting.name.as_str()) && !["flag", "default"].contains(&setting.origin)
+            settings::setting(&setting.name).is_some() && !["flag", "default"].contains(&setting.origin)
         };
-        let mut behind: Vec<String> = settings.iter().filter(is_behind).map(|setting| setting.name.clone()).collect();
-        if behind.iter().any(|name| STRENGTH.contains(&name.as_str())) {
-            behind.extend(STRENGTH.map(str::to_owned));
+        let mut behind: Vec<String> = resolved.iter().filter(is_behind).map(|setting| setting.name.clone()).collect();
+        let of_strength = |name: &str| settings::setting(name).is_some_and(settings::Setting::is_strength);
+        if behind.iter().any(|name| of_strength(name)) {
+            let all = SETTINGS.iter().filter(|setting| setting.is_strength());
+            behind.extend(all.map(|setting| setting.name.to_owned()));
         }
         let is_said = |setting: &&Setting| match setting.origin {
             "flag" | "environment" => true,
             "preset" => !is_usual(setting),
             _ => false,
         };
-        let said = settings.iter().filter(is_said).cloned().collect();
-        let given = settings.into_iter().filter(is_given);
+        let said = resolved.iter().filter(is_said).cloned().collect();
+        let given = resolved.into_iter().filter(is_given);
         let switches = given.filter_map(|setting| Some((setting.name, setting.value?))).collect();
         Given { switches, behind, settings: said }
     }
@@ -193,7 +195,7 @@ fn source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
 fn of_snapshot(path: &Path) -> Result<Values, CliError> {
     let refuse = |what: String| CliError::Usage(format!("--like {}: {what}", path.display()));
     let values: Values = snapshot::settings(path)?.into_iter().collect();
-    if let Some(other) = values.keys().find(|name| !flags::NAMES.contains(&name.as_str())) {
+    if let Some(other) = values.keys().find(|name| !settings::setting(name).is_some()) {
         return Err(refuse(format!(
             "its setting '{other}' is none of a look: it is of another version, or was edited"
         )));

@@ -33,7 +33,6 @@ pub mod parsers;
 mod presets;
 #[cfg(feature = "window")]
 mod preview;
-mod quality;
 mod record;
 mod render;
 mod save;

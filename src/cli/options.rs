@@ -2,6 +2,7 @@
 //! the settings file, before it means anything.
 
 mod groups;
+mod look;
 
 use std::path::PathBuf;
 
@@ -9,20 +10,17 @@ use clap::Args;
 use clap::builder::{BoolishValueParser, RangedI64ValueParser, TypedValueParser};
 
 pub use groups::{Every, Streaming};
+pub use look::{LookSettings, named};
 
 use super::defaults;
 #[cfg(feature = "window")]
 pub use super::preview::options::Window;
-use super::quality::level_or_auto;
-use super::values::{
-    Backend, DepthChoice, Effect, LogFormat, Method, OrAuto, Pace, Refine, Size, above_zero, between, not_negative,
-    seconds,
-};
-use crate::bokeh::Rank;
-use crate::budget::Quality;
-use crate::depth::focus::FocusRule;
+use super::values::{DepthChoice, LogFormat, Size, seconds};
+use crate::compute::Backend;
 use crate::depth::stereo::Settings;
-use crate::look::{ApertureName, MOST_RADIUS_PX, Strength, Tilt};
+use crate::look::Effect;
+use crate::look::number::{above_zero, within};
+use crate::pipeline::Pace;
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
 
@@ -37,7 +35,7 @@ pub struct Global {
     #[arg(short, long, global = true)]
     pub quiet: bool,
     /// How log lines are written to stderr; RUST_LOG chooses which
-    #[arg(long, global = true, value_enum, value_name = "FORMAT", default_value = "text")]
+    #[arg(long, global = true, value_parser = named::<LogFormat>(), value_name = "FORMAT", default_value = "text")]
     pub log_format: LogFormat,
     /// Settings file instead of $XDG_CONFIG_HOME/bokehcam/config.toml
     #[arg(long, global = true, value_name = "FILE", env = "BOKEHCAM_CONFIG", hide_env = true)]
@@ -130,7 +128,7 @@ pub struct Stereo {
     #[arg(long, value_name = "M", value_parser = above_zero, conflicts_with = "calib")]
     pub baseline_m: Option<f32>,
     /// Column of its right principal point less that of the left, in pixels [default: 0]
-    #[arg(long, value_name = "PX", value_parser = between(-10_000.0, 10_000.0),
+    #[arg(long, value_name = "PX", value_parser = within(-10_000.0..=10_000.0),
           conflicts_with = "calib")]
     pub doffs_px: Option<f32>,
 }
@@ -143,86 +141,32 @@ pub struct Blur {
     /// settings file); other settings of the look go before it
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
-    /// What the blur follows
-    #[arg(long, value_enum, value_name = "WHAT", default_value = "auto")]
-    pub effect: Effect,
-    /// How dof is composited
-    #[arg(long, value_enum, value_name = "HOW", default_value = "layered")]
-    pub method: Method,
     /// Where depth comes from: auto (the source's, when the effect needs it: recorded, else from its two eyes), recorded
     /// (the source's), stereo (from its two eyes), none, a folder with a recording whose depth is played in a loop, or a
     /// depth camera (/dev/videoN, N, or part of its name)
     #[arg(long, value_name = "FROM", default_value = "auto")]
     pub depth: DepthChoice,
-    /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker
-    #[arg(long, value_enum, value_name = "WHEN", default_value = "auto")]
-    pub refine: Refine,
-    /// Distance of the focal plane: METRES, auto, or X,Y as fractions of width and height
-    #[arg(long, value_name = "WHERE", default_value = "auto")]
-    pub focus: FocusRule,
-    /// Distances that are sharp as a whole, in metres: half of it on either side of the focal plane
-    #[arg(long, value_name = "METRES", default_value_t = defaults::FOCUS_RANGE_M, value_parser = not_negative)]
-    pub focus_range: f32,
-    /// Blur radius of a point at infinity: the strength of the blur, in pixels, or as a share of the height such as 3%
-    /// [default: auto, which is height / 45]
-    #[arg(long, value_name = "PX",
-          conflicts_with_all = ["f_number", "focal_length", "sensor_width"])]
-    pub coc_at_infinity: Option<Strength>,
-    /// The strength by a lens instead: its f-number, with --focal-length and --sensor-width
-    #[arg(long, value_name = "N", value_parser = above_zero)]
-    pub f_number: Option<f32>,
-    /// Focal length of that lens, in millimetres
-    #[arg(long, value_name = "MM", value_parser = above_zero)]
-    pub focal_length: Option<f32>,
-    /// Width of the sensor behind that lens, in millimetres
-    #[arg(long, value_name = "MM", value_parser = above_zero)]
-    pub sensor_width: Option<f32>,
-    /// Largest blur radius, in pixels [default: auto, which is 0.06 x height]
-    #[arg(long, value_name = "PX", value_parser = OrAuto::parser(between(0.0, MOST_RADIUS_PX)))]
-    pub max_coc: Option<OrAuto<f32>>,
-    /// Sharp band of tilt-shift: CENTER_Y[:BAND[:ANGLE_DEG]], the first two as fractions of the height
-    #[arg(long, value_name = "BAND", default_value_t = defaults::TILT)]
-    pub tilt: Tilt,
+    /// The look, but for its quality.
+    #[command(flatten)]
+    pub look: LookSettings<false>,
 }
 
 impl Blur {
     /// Whether there was to be depth if the source has any, and else none.
     pub fn takes_whatever_depth(&self) -> bool {
-        self.effect == Effect::Auto && self.depth == DepthChoice::Auto
+        self.look.0.effect == Some(Effect::Auto) && self.depth == DepthChoice::Auto
     }
-}
-
-/// The lens opening.
-#[derive(Args, Clone, Debug)]
-#[command(next_help_heading = "Aperture")]
-pub struct Aperture {
-    /// disc, ring:INNER, polygon:N[:ROTATION_DEG[:CURVATURE]], heart, star:N or image:FILE
-    #[arg(long, value_name = "SHAPE", default_value = defaults::APERTURE)]
-    pub aperture: ApertureName,
-    /// Radial intensity: -1 soap bubbles, 0 flat, 1 bright in the middle
-    #[arg(long, value_name = "I", default_value_t = defaults::INTENSITY, value_parser = between(-1.0, 1.0))]
-    pub intensity: f32,
-    /// Width of the soft rim, as a fraction of the radius
-    #[arg(long, value_name = "W", default_value_t = defaults::RIM, value_parser = between(0.0, 1.0))]
-    pub rim: f32,
-    /// Separable terms, 1 to 16 or full [default: auto, which is the quality level's]
-    #[arg(long, value_name = "TERMS", value_parser = OrAuto::parser(str::parse::<Rank>))]
-    pub rank: Option<OrAuto<Rank>>,
-    /// Take clipped white as this many times as bright; 0 is off
-    #[arg(long, value_name = "M", default_value_t = defaults::HIGHLIGHTS, value_parser = between(0.0, 1000.0))]
-    pub highlights: f32,
 }
 
 /// How finely and on what the blur is computed.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Computing")]
 pub struct Computing {
-    /// Quality level: changes fidelity, never the amount of blur. auto follows the time there is (--budget-ms) where
-    /// frames come in real time, up to balanced on the CPU and best on a GPU; elsewhere it is balanced
-    #[arg(long, value_name = "LEVEL", default_value = "auto", value_parser = level_or_auto())]
-    pub quality: OrAuto<Quality>,
+    /// The quality of the look.
+    #[command(flatten)]
+    pub quality: LookSettings<true>,
     /// What runs the blur
-    #[arg(long, value_enum, value_name = "WHICH", default_value = "auto")]
+    #[arg(long, value_parser = named::<Backend>(), value_name = "WHICH", default_value = "auto")]
     pub backend: Backend,
     /// Part of the name of the GPU to take
     #[arg(long, value_name = "NAME")]
@@ -241,7 +185,7 @@ pub struct Stream {
     pub budget_ms: Option<f32>,
     /// Whether frames come when they are due, or as fast as they can be written [default: realtime from a camera or
     /// into a virtual one, else asap]
-    #[arg(long, value_enum, value_name = "HOW")]
+    #[arg(long, value_parser = named::<Pace>(), value_name = "HOW")]
     pub pace: Option<Pace>,
     /// Picture size of a virtual camera; pictures of another size are fitted into it [default: the source's]
     #[arg(long, value_name = "WxH")]

@@ -15,14 +15,15 @@ use super::files::{check_report, write_report};
 use super::layers::Given;
 use super::options::{Global, Streaming};
 use super::source::SourceName;
-use super::{settings, sinks, terminal, unused, values};
-use crate::look::Look;
+use super::{settings, sinks, terminal, unused};
+use crate::look::{Effect, Look};
+use crate::pipeline::Pace;
 use crate::preview::session::Start;
-use crate::preview::state::{Output, Shown, State};
+use crate::preview::state::{Output, State};
 use crate::preview::window::{self, Preview};
 use crate::sink::Target;
 
-use options::{Show, Window};
+use options::Window;
 use wings::Wings;
 
 /// Show a camera, a recording or the synthetic scene in portrait mode, live, and find a look
@@ -78,7 +79,7 @@ pub fn show(
     check_report(stream.report.as_deref(), output.force, to)?;
     let usage = |what: &str| CliError::Usage(what.to_string());
     let refuse = |what: &str| Err(usage(what));
-    if stream.pace == Some(values::Pace::Asap) {
+    if stream.pace == Some(Pace::Asap) {
         return refuse("--pace asap: a window shows frames in their own time; leave --pace out");
     }
     if stream.on_demand {
@@ -96,7 +97,10 @@ pub fn show(
     let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
     // As if there were depth: what the source lacks is seen when it is open.
     sinks::try_report(stream.report.as_deref())?;
-    let look = config::look(&parts.blur, &parts.aperture, computing.quality, true)?;
+    let look = config::look(&parts.blur, &computing.quality)?;
+    let look = config::look_for(&look, &parts.blur.depth, true)?;
+    let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
+    let look = Look { effect, ..look };
     let executor = Executor::of(computing);
     let device = executor.device()?;
     let state = first_state(look.clone(), source, window, stream.mirror);
@@ -105,7 +109,7 @@ pub fn show(
     let ended = window::show(Preview {
         state,
         session: Start {
-            backstage: Box::new(Wings::new(parts, &executor, device.clone(), global.config.clone(), given)),
+            backstage: Box::new(Wings::new((parts, &look), &executor, device.clone(), global.config.clone(), given)),
             look,
             source: source.to_owned(),
             outputs,
@@ -134,12 +138,7 @@ pub fn show(
 
 fn first_state(look: Look, source: &str, window: &Window, mirror: bool) -> State {
     let mut state = State::new(look, source.to_owned());
-    state.shown = match window.show {
-        Show::Picture => Shown::Picture,
-        Show::Depth => Shown::Depth,
-        Show::Coc => Shown::Coc,
-        Show::Bins => Shown::Bins,
-    };
+    state.shown = window.show;
     state.split = window.split;
     state.mirror = mirror;
     state.full_screen = window.full_screen;

@@ -10,10 +10,13 @@ use super::error::CliError;
 use super::files::refuse_source;
 use super::layers::Given;
 use super::source::{Source, SourceName, Wanted};
-use super::{options, terminal, unused, values};
+use super::values::DepthChoice;
+use super::{options, terminal, unused};
 use crate::capture::{Brings, Captured, Shot};
+use crate::compute::Backend;
 use crate::depth::Seen;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
+use crate::look::Effect;
 use crate::recording::tum::{Writer, WriterOptions, Written};
 
 /// Record a source in the TUM RGB-D layout
@@ -53,8 +56,9 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
         frames: &command.frames,
         depth: &command.depth,
         stereo: &command.stereo,
-        blur: None,
-        executor: &Executor::new(values::Backend::Auto, None, None),
+        from: &DepthChoice::Auto,
+        look: None,
+        executor: &Executor { backend: Backend::Auto, adapter: None, threads: None },
         cycle: false,
         keep_going: false,
     };
@@ -68,7 +72,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             source: command.source.kind(),
             depth: depth_from,
             uses_depth: true,
-            effect: None,
+            effect: Effect::None,
             lens: false,
             realtime: true,
             cpu_only: false,

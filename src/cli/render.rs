@@ -10,16 +10,15 @@ use super::files::{make_folder_of, refuse_overwrite, refuse_source};
 use super::layers::Given;
 use super::unused::{DepthFrom, From};
 use super::values::DepthChoice;
-use super::{debug, focus, log, options, stereo, terminal, unused, values};
-use crate::bokeh::{BokehError, Effect, Job};
-use crate::compute::Place;
-use crate::depth::{fill::Filler, focus::Focus, refine::Refiner};
+use super::{debug, focus, log, options, terminal, unused};
+use crate::bokeh::{BokehError, Job};
+use crate::compute::{Backend, Place};
 use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::look::{ApertureName, Look, Strength};
 use crate::optics::{CocField, StereoRig};
-use crate::pipeline::CocRule;
+use crate::pipeline::{CocMaker, Finish};
 use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::recording::{Extras, snapshot};
 
@@ -57,8 +56,6 @@ pub struct RenderCommand {
     #[command(flatten)]
     depth: options::Depth,
     #[command(flatten)]
-    aperture: options::Aperture,
-    #[command(flatten)]
     computing: options::Computing,
     #[command(flatten)]
     output: options::Output,
@@ -85,8 +82,9 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
         let what = "--depth FOLDER, stereo or a depth camera are for `stream`: give a picture's depth with --depth-map";
         return Err(CliError::Usage(what.to_string()));
     }
-    let (color, extras, depth) = read(command)?;
-    let look = config::look(&command.blur, &command.aperture, command.computing.quality, depth.is_some())?;
+    let look = config::look(&command.blur, &command.computing.quality)?;
+    let (color, extras, depth) = read(command, &look)?;
+    let look = config::look_for(&look, &command.blur.depth, depth.is_some())?;
     command.warn(&look, color.size(), depth.as_ref(), given);
     let executor = Executor::of(&command.computing);
     make_folder_of(&command.out)?;
@@ -114,7 +112,7 @@ impl RenderCommand {
     fn warn(&self, look: &Look, size: (u32, u32), depth: Option<&Depth>, given: &Given) {
         let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
         let in_units = self.depth_map.as_ref().is_some_and(in_units);
-        let uses_depth = look.effect == Some(Effect::Dof);
+        let uses_depth = look.effect.follows_depth();
         unused::warn(
             &given.settings,
             &unused::Run {
@@ -128,7 +126,7 @@ impl RenderCommand {
                 effect: look.effect,
                 lens: matches!(look.strength, Strength::Lens(_)),
                 realtime: false,
-                cpu_only: self.computing.backend == values::Backend::Cpu,
+                cpu_only: self.computing.backend == Backend::Cpu,
                 window: false,
             },
         );
@@ -149,8 +147,8 @@ fn sources(command: &RenderCommand) -> Vec<PathBuf> {
         let (color, depth) = snapshot::sources(like);
         [like.clone(), color, depth]
     });
-    let aperture = match &command.aperture.aperture {
-        ApertureName::Image(file) => Some(file),
+    let aperture = match &command.blur.look.0.aperture {
+        Some(ApertureName::Image(file)) => Some(file),
         _ => None,
     };
     [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(beside).collect()
@@ -165,13 +163,14 @@ pub enum Depth {
 }
 
 /// The picture, what goes with it, and its depth if there is any.
-fn read(command: &RenderCommand) -> Result<(ColorImage, Extras, Option<Depth>), CliError> {
+fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Option<Depth>), CliError> {
     let sources = command.like.as_ref().map(|like| snapshot::sources(like));
-    let given = command.depth_map.as_deref().map(|file| read_depth(file, command)).transpose()?.map(Depth::Measured);
+    let given =
+        command.depth_map.as_deref().map(|file| read_depth(file, command, look)).transpose()?.map(Depth::Measured);
     let (color, extras, depth) = match (&command.image, sources) {
         (None, Some((color, depth))) => {
             let kept = given.is_none() && depth.exists();
-            let kept = kept.then(|| read_depth(&depth, command)).transpose()?.map(Depth::Final);
+            let kept = kept.then(|| read_depth(&depth, command, look)).transpose()?.map(Depth::Final);
             let (color, extras) = still::read_photo(&color)?;
             (color, extras, given.or(kept))
         }
@@ -187,7 +186,7 @@ fn read(command: &RenderCommand) -> Result<(ColorImage, Extras, Option<Depth>), 
 }
 
 /// Depth from a file, in metres, or where the file has disparity without distances in those of assumed eyes.
-fn read_depth(file: &Path, command: &RenderCommand) -> Result<DepthMap, CliError> {
+fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
     let name = file.display();
     let options::Depth { depth_scale, depth_invalid, .. } = command.depth;
     let (map, rig) = match still::read_map(file, depth_scale, Some(depth_invalid))? {
@@ -197,7 +196,7 @@ fn read_depth(file: &Path, command: &RenderCommand) -> Result<DepthMap, CliError
     if depth_scale.is_some() {
         tracing::warn!("{name}: holds disparity, to which --depth-scale does not apply");
     }
-    let rig = match (rig, stereo::needs_metres(&command.blur)) {
+    let rig = match (rig, look.needs_metres()) {
         (Some(rig), _) => rig,
         (None, None) => {
             tracing::warn!("{name}: holds disparity without distances: what is near and far is known, and not how far");
@@ -249,24 +248,15 @@ pub fn prepared(
     color: &ColorImage,
     depth: Option<Depth>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
-    match (look.coc_rule(color.size()), depth) {
-        (CocRule::Fixed(field), _) => Ok((field, None)),
-        (CocRule::Depth { .. }, None) => Err(BokehError::NoDepth),
-        (CocRule::Depth { focus, lens, range_m, max_coc_px }, Some(depth)) => {
-            let (mut map, measured) = match depth {
-                Depth::Measured(map) => (map, true),
-                Depth::Final(map) => (map, false),
-            };
-            // Focus looks at what was measured, so it comes before the holes are filled.
-            let focus_m = Focus::new(focus).focus_m(&map, 0);
-            if measured && look.refines(false) {
-                let mut refiner = Refiner::new();
-                refiner.focus_at(focus_m);
-                refiner.refine(&mut map, color, 0);
-            } else if measured {
-                Filler::new().fill_by(&mut map, color);
-            }
-            Ok((lens.field((focus_m, range_m), color.width, max_coc_px), Some(map)))
-        }
+    let (finish, map) = match depth {
+        Some(Depth::Measured(map)) => (Finish::measured(look.refines(false)), Some(map)),
+        Some(Depth::Final(map)) => (Finish::Keep, Some(map)),
+        None => (Finish::Keep, None),
+    };
+    let mut maker = CocMaker::new(look.coc_rule(color.size()), finish);
+    match (maker.fixed(), map) {
+        (Some(field), _) => Ok((field, None)),
+        (None, None) => Err(BokehError::NoDepth),
+        (None, Some(mut map)) => Ok((maker.make(&mut map, color, 0), Some(map))),
     }
 }

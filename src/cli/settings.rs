@@ -16,7 +16,8 @@ use super::environment::variable;
 use super::error::CliError;
 use super::options::Every;
 use crate::files::input;
-use crate::look::{flags, presets};
+use crate::look::presets::{self, Preset};
+use crate::look::{self, Patch, SETTINGS};
 
 /// Settings by their flags without the dashes, each value as it would follow its flag.
 pub type Values = BTreeMap<String, String>;
@@ -74,7 +75,7 @@ impl SettingsFile {
             for entry in in_order(presets.value.as_table().ok_or_else(no_table)?) {
                 let settings = entry.value.as_table().ok_or_else(no_table)?;
                 check_name(entry.name).map_err(|what| refuse((entry.at, what)))?;
-                let of_a_look = |name: &str| flags::NAMES.contains(&name);
+                let of_a_look = |name: &str| look::settings::setting(name).is_some();
                 let values = values(in_order(settings), &of_a_look).map_err(refuse)?;
                 file.presets.insert(entry.name.to_owned(), values);
             }
@@ -88,15 +89,35 @@ impl SettingsFile {
 
     /// The settings of a preset, built-in or in this file.
     pub fn preset(&self, name: &str) -> Option<Values> {
-        let owned = |&(name, value): &(&str, &str)| (name.to_owned(), value.to_owned());
-        let built_in = presets::built_in(name).map(|preset| preset.settings.iter().map(owned).collect());
-        built_in.or_else(|| self.presets.get(name).cloned())
+        let built_in = presets::built_in().find(|preset| preset.name == name);
+        let values = built_in.map(|preset| preset.patch.values());
+        let owned =
+            |values: Vec<_>| values.into_iter().map(|(name, value): (&str, _)| (name.to_owned(), value)).collect();
+        values.map(owned).or_else(|| self.presets.get(name).cloned())
+    }
+
+    /// All presets, those in this file last. Those that cannot be, such as one whose aperture is a picture that is gone, are
+    /// left out with a warning.
+    pub fn all_presets(&self) -> Vec<Preset> {
+        let own = self.presets.iter().filter_map(|(name, values)| {
+            let pairs = values.iter().map(|(name, value)| (name.as_str(), value.as_str()));
+            // It was read before.
+            let mut patch = Patch::parse(pairs).ok()?;
+            match patch.load() {
+                Ok(()) => Some(Preset { name: name.clone(), patch, own: true }),
+                Err(error) => {
+                    tracing::warn!("preset {name}: {error}");
+                    None
+                }
+            }
+        });
+        presets::built_in().chain(own).collect()
     }
 
     /// Says that there is no preset of this name, and which there are.
     pub fn no_preset(&self, name: &str) -> String {
-        let built_in = presets::BUILT_IN.iter().map(|preset| preset.name);
-        let all: Vec<&str> = built_in.chain(self.presets.keys().map(String::as_str)).collect();
+        let built_in = presets::built_in().map(|preset| preset.name);
+        let all: Vec<String> = built_in.chain(self.presets.keys().cloned()).collect();
         format!("there is no preset '{name}': use {}", all.join(", "))
     }
 }
@@ -112,9 +133,9 @@ pub fn check_name(name: &str) -> Result<(), String> {
     if name.contains(char::is_control) {
         return Err(format!("the name {name:?} of a preset has control characters: leave them out"));
     }
-    match presets::built_in(name) {
-        Some(_) => Err(format!("the preset '{name}' is built in: choose another name")),
-        None => Ok(()),
+    match presets::built_in().any(|preset| preset.name == name) {
+        true => Err(format!("the preset '{name}' is built in: choose another name")),
+        false => Ok(()),
     }
 }
 
@@ -167,7 +188,7 @@ fn values<'a>(
 
 /// The settings of a look, as a list for people.
 fn names() -> String {
-    flags::NAMES.join(", ")
+    SETTINGS.each_ref().map(|setting| setting.name).join(", ")
 }
 
 /// `$XDG_CONFIG_HOME/bokehcam/config.toml`, or the same under `~/.config`.

@@ -9,7 +9,7 @@ use super::source_name::Named;
 pub use super::source_name::SourceName;
 use super::stereo;
 use super::unused::DepthFrom;
-use super::values::{DepthChoice, Effect};
+use super::values::DepthChoice;
 use super::{defaults, options};
 use crate::capture::replay::{Part, Replay};
 use crate::capture::side_by_side::SideBySide;
@@ -26,6 +26,7 @@ use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::recorded::Recorded;
 use crate::frame::DepthMap;
+use crate::look::Look;
 use crate::optics::StereoRig;
 use crate::recording::{Options, Pair, Recording, Scratch};
 use crate::scene::Scene;
@@ -54,8 +55,10 @@ pub struct Wanted<'a> {
     pub depth: &'a options::Depth,
     /// What is said of its two eyes.
     pub stereo: &'a options::Stereo,
+    /// Where depth comes from.
+    pub from: &'a DepthChoice,
     /// What its depth is for; `None` for itself.
-    pub blur: Option<&'a options::Blur>,
+    pub look: Option<&'a Look>,
     /// What matches its two eyes.
     pub executor: &'a Executor,
     /// Faulty lines of a recording's lists become frames that fail.
@@ -85,7 +88,7 @@ impl Source {
         let depth_from = if info.brings == Brings::Depth { DepthFrom::Metres } else { source.depth_from };
         if stereo.side_by_side
             && source.depth.is_some()
-            && matches!(wanted.choice(), DepthChoice::Auto | DepthChoice::Recorded)
+            && matches!(wanted.from, DepthChoice::Auto | DepthChoice::Recorded)
         {
             return Err(CliError::Usage(format!(
                 "--side-by-side: the depth of {} is that of whole pictures, not of their left halves; add --depth stereo \
@@ -94,7 +97,7 @@ impl Source {
             )));
         }
         if info.brings != Brings::RightEye {
-            if wanted.choice() == &DepthChoice::Stereo {
+            if *wanted.from == DepthChoice::Stereo {
                 return Err(CliError::Usage(format!(
                     "--depth stereo: {} has one eye; use two cameras LEFT,RIGHT, a recording with both eyes, or \
                      --side-by-side",
@@ -105,8 +108,8 @@ impl Source {
         } else if wanted.matches(source.depth.is_some()) {
             let depth = stereo::open(&info, &source.pair, source.disparities, stereo, wanted.executor)?;
             let rig = *depth.rig();
-            if let Some(blur) = wanted.blur {
-                stereo::check_focus(&rig, blur)?;
+            if let Some(look) = wanted.look {
+                stereo::check_focus(&rig, look)?;
             }
             let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
             let depth_from = DepthFrom::Eyes;
@@ -128,17 +131,22 @@ impl Source {
 }
 
 impl Wanted<'_> {
-    fn choice(&self) -> &DepthChoice {
-        self.blur.map_or(&DepthChoice::Auto, |blur| &blur.depth)
+    /// Whether the effect is one that uses depth.
+    pub fn uses_depth(&self) -> bool {
+        self.look.is_none_or(|look| look.effect.follows_depth())
     }
 
-    /// Whether the effect is one that uses depth.
-    fn uses_depth(&self) -> bool {
-        self.blur.is_none_or(|blur| matches!(blur.effect, Effect::Auto | Effect::Dof))
+    /// The first depth map of a recording, where the focus is in metres. A faulty one is told in its turn.
+    pub fn first_depth(&self, recording: &Recording) -> Option<DepthMap> {
+        let is_compared = self.look.is_some_and(|look| matches!(look.focus, FocusRule::Metres(_)));
+        let mut map = DepthMap::default();
+        let is_compared = is_compared && recording.has_depth();
+        let read = is_compared.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
+        read.ok().map(|()| map)
     }
 
     fn check_effect(&self) -> Result<(), CliError> {
-        if self.choice() == &DepthChoice::Stereo && !self.uses_depth() {
+        if *self.from == DepthChoice::Stereo && !self.uses_depth() {
             let what = "--depth stereo: only --effect dof uses depth; leave one of them out";
             return Err(CliError::Usage(what.to_string()));
         }
@@ -147,7 +155,7 @@ impl Wanted<'_> {
 
     /// Whether two eyes are matched, where there are two, and depth of another kind or not.
     fn matches(&self, has_depth: bool) -> bool {
-        match self.choice() {
+        match self.from {
             DepthChoice::Stereo => true,
             DepthChoice::Auto => self.uses_depth() && !has_depth,
             _ => false,
@@ -215,7 +223,7 @@ impl Opened {
                 }
                 let disparities = recording.disparities();
                 let depth_from = depth_of(&recording);
-                let first_depth = wanted.blur.and_then(|blur| first_depth(&recording, blur));
+                let first_depth = wanted.first_depth(&recording);
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
                     false => None,
@@ -242,14 +250,6 @@ impl Opened {
             }
         }
     }
-}
-
-/// The first depth map of a recording, where the focus is in metres. A faulty one is told in its turn.
-pub fn first_depth(recording: &Recording, blur: &options::Blur) -> Option<DepthMap> {
-    let mut map = DepthMap::default();
-    let is_compared = recording.has_depth() && matches!(blur.focus, FocusRule::Metres(_));
-    let read = is_compared.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
-    read.ok().map(|()| map)
 }
 
 /// What the depth of a recording is.

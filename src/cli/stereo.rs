@@ -9,9 +9,9 @@ use super::options;
 use crate::calibration::rectification::Rectification;
 use crate::calibration::rectifier::Rectifier;
 use crate::capture::SourceInfo;
-use crate::depth::focus::FocusRule;
 use crate::depth::stereo::source::StereoDepth;
 use crate::depth::stereo::{Effort, Settings};
+use crate::look::Look;
 use crate::optics::StereoRig;
 use crate::recording::Pair;
 
@@ -131,22 +131,12 @@ pub fn open(
 ///
 /// # Errors
 /// The focus or the lens needs metres, and `rig` has none.
-pub fn check_focus(rig: &StereoRig, blur: &options::Blur) -> Result<(), CliError> {
-    let Some(needs) = needs_metres(blur).filter(|_| !rig.metric) else { return Ok(()) };
+pub fn check_focus(rig: &StereoRig, look: &Look) -> Result<(), CliError> {
+    let Some(needs) = look.needs_metres().filter(|_| !rig.metric) else { return Ok(()) };
     Err(CliError::Usage(format!(
         "{needs} needs distances, and these two eyes tell none: give --calib FILE, or --focal-px and --baseline-m; \
          --focus auto or X,Y and --coc-at-infinity need none"
     )))
-}
-
-/// The setting that needs distances, if there is one.
-pub fn needs_metres(blur: &options::Blur) -> Option<String> {
-    match (blur.focus, blur.f_number) {
-        (FocusRule::Metres(metres), _) => Some(format!("--focus {metres}")),
-        _ if blur.focus_range > 0.0 => Some(format!("--focus-range {}", blur.focus_range)),
-        (_, Some(f_number)) => Some(format!("--f-number {f_number}")),
-        _ => None,
-    }
 }
 
 /// Disparities to try: as many as are known to occur, else those of a tenth of the picture's width.

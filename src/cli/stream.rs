@@ -13,9 +13,9 @@ use super::layers::Given;
 use super::preview;
 use super::source::{Source, SourceName, Wanted};
 use super::unused::{self, DepthFrom};
-use super::{focus, options, sinks, terminal, values};
-use crate::bokeh::Effect;
+use super::{focus, options, sinks, terminal};
 use crate::clock::Clock;
+use crate::compute::Backend;
 use crate::link::demand::Demand;
 use crate::look::Strength;
 use crate::pipeline::{self, Pace, Run};
@@ -71,42 +71,40 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         return preview::show(&command.source.to_string(), &others, &command.window, parts, (global, given));
     }
     check_report(stream.report.as_deref(), output.force, &command.to)?;
-    if stream.pace == Some(values::Pace::Asap) && !command.source.devices().is_empty() {
+    if stream.pace == Some(Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
     }
     let executor = Executor::of(&parts.computing);
+    let look = config::look(&parts.blur, &parts.computing.quality)?;
     let wanted = Wanted {
         frames: &parts.frames,
         depth: &parts.depth,
         stereo: &parts.stereo,
-        blur: Some(&parts.blur),
+        from: &parts.blur.depth,
+        look: Some(&look),
         executor: &executor,
         keep_going: stream.keep_going,
         cycle: false,
     };
     let source = Source::open(&command.source, &wanted)?;
-    let source = depth::beside(source, &parts.blur, &parts.depth, stream.keep_going, &Clock::system())?;
+    let source = depth::beside(source, &wanted, &Clock::system())?;
     let info = source.camera.info();
     let measured = source.is_measured();
-    let pace = match stream.pace {
-        Some(values::Pace::Realtime) => Pace::Realtime,
-        Some(values::Pace::Asap) => Pace::Asap,
-        None if info.live || command.to.iter().any(Target::is_live) => Pace::Realtime,
-        None => Pace::Asap,
-    };
-    let look = config::look(&parts.blur, &parts.aperture, parts.computing.quality, source.has_depth())?;
+    let is_live = info.live || command.to.iter().any(Target::is_live);
+    let pace = stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
+    let look = config::look_for(&look, &parts.blur.depth, source.has_depth())?;
     let adaptive = pace == Pace::Realtime;
     unused::warn(
         &given.settings,
         &unused::Run {
             source: command.source.kind(),
             depth: source.depth_from,
-            uses_depth: look.effect == Some(Effect::Dof),
+            uses_depth: look.effect.follows_depth(),
             effect: look.effect,
             lens: matches!(look.strength, Strength::Lens(_)),
             realtime: adaptive,
-            cpu_only: parts.computing.backend == values::Backend::Cpu,
+            cpu_only: parts.computing.backend == Backend::Cpu,
             window: false,
         },
     );
@@ -139,9 +137,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         camera: source.camera,
         depth: source.depth,
         bokeh,
-        quality: look.quality_rule(adaptive),
-        coc: look.coc_rule(info.size),
-        refine: look.refines(measured),
+        look,
+        adaptive,
+        measured,
         changes: None,
         sink,
         pace,

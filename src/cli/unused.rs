@@ -4,7 +4,7 @@
 
 use super::layers::Setting;
 use super::log;
-use crate::bokeh::Effect;
+use crate::look::Effect;
 
 /// What a run came to, as far as settings depend on it.
 #[derive(Clone, Copy, Debug)]
@@ -15,8 +15,8 @@ pub struct Run {
     pub depth: DepthFrom,
     /// Whether anything is made of it.
     pub uses_depth: bool,
-    /// What the blur follows, where frames are blurred.
-    pub effect: Option<Effect>,
+    /// What the blur follows.
+    pub effect: Effect,
     /// Whether the strength is that of a lens.
     pub lens: bool,
     /// Whether frames come in real time.
@@ -74,7 +74,7 @@ const NEEDS: [(&[&str], Why); 13] = [
     (&["focus"], |run| if run.lens { None } else { dof(run) }),
     (&["focus-range", "method"], dof),
     (&["refine"], |run| if run.source == From::Bench { Some("the scene's depth is exact") } else { dof(run) }),
-    (&["tilt"], |run| (run.effect != Some(Effect::TiltShift)).then_some("the effect is not tilt-shift")),
+    (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
     (&["coc-at-infinity", "f-number", "focal-length", "sensor-width"], |run| {
         if run.source == From::Bench { Some("`bench` takes --coc") } else { blur(run) }
     }),
@@ -98,14 +98,14 @@ const DEPTH_UNUSED: &str = "the effect does not use depth";
 /// Depth is used by one effect.
 fn dof(run: &Run) -> Option<&'static str> {
     match (run.effect, run.depth) {
-        (Some(Effect::Dof), _) => None,
+        (effect, _) if effect.follows_depth() => None,
         (_, DepthFrom::Nothing) => Some(NO_DEPTH),
         _ => Some(DEPTH_UNUSED),
     }
 }
 
 fn blur(run: &Run) -> Option<&'static str> {
-    run.effect.is_none().then_some("nothing is blurred")
+    (run.effect == Effect::None).then_some("nothing is blurred")
 }
 
 /// Warns of what was given and has no effect.
@@ -120,7 +120,7 @@ pub fn warn_by_source(given: &[Setting], source: From) {
         source,
         depth: DepthFrom::Nothing,
         uses_depth: false,
-        effect: None,
+        effect: Effect::None,
         lens: false,
         realtime: true,
         cpu_only: false,
@@ -167,14 +167,16 @@ fn called(setting: &Setting) -> String {
     }
 }
 
-/// Warns that a picture without depth is blurred as a whole, where depth was not declined.
+/// Warns that a picture without depth gets tilt-shift, where depth was not declined.
 pub fn warn_of_no_depth(source: From) {
     let way = match source {
         From::Picture => "--depth-map FILE gives its depth",
         From::Recording => "--depth FOLDER takes another recording's",
         From::Camera | From::Synthetic | From::Bench => "--depth NAME takes a depth camera's",
     };
-    log::warn(&format!("{NO_DEPTH}, so the whole picture is blurred: {way}, --effect tilt-shift keeps a band sharp"));
+    log::warn(&format!(
+        "{NO_DEPTH}, so a band of the picture stays sharp and the rest is blurred (tilt-shift): {way}, --effect blur blurs it all"
+    ));
 }
 
 #[cfg(test)]
@@ -190,7 +192,7 @@ mod tests {
         source: From::Picture,
         depth: DepthFrom::Nothing,
         uses_depth: false,
-        effect: Some(Effect::Blur),
+        effect: Effect::Blur,
         lens: false,
         realtime: false,
         cpu_only: false,
@@ -214,15 +216,15 @@ mod tests {
         let why = |name: &str, run: &Run| unused(&[setting(name)], run).first().map(|(_, why)| *why);
         assert_eq!(why("focus", &RUN), Some(NO_DEPTH));
         assert_eq!(why("focus", &Run { lens: true, ..RUN }), None);
-        let dof = Run { depth: DepthFrom::Units, uses_depth: true, effect: Some(Effect::Dof), ..RUN };
+        let dof = Run { depth: DepthFrom::Units, uses_depth: true, effect: Effect::Dof, ..RUN };
         for name in ["focus", "refine", "focus-range", "depth-scale", "method"] {
             assert_eq!(why(name, &dof), None, "{name}");
             assert_eq!(why(name, &Run { depth: DepthFrom::Nothing, ..RUN }), Some(NO_DEPTH), "{name}");
         }
         assert!(why("depth-scale", &Run { depth: DepthFrom::Eyes, ..dof }).is_some());
-        assert!(why("tilt", &dof).is_some() && why("tilt", &Run { effect: Some(Effect::TiltShift), ..RUN }).is_none());
+        assert!(why("tilt", &dof).is_some() && why("tilt", &Run { effect: Effect::TiltShift, ..RUN }).is_none());
         assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &Run { realtime: true, ..dof }).is_none());
-        assert!(why("rim", &Run { effect: None, ..dof }).is_some() && why("rim", &dof).is_none());
+        assert!(why("rim", &Run { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
         assert!(why("fps", &Run { source: From::Recording, ..dof }).is_some());
     }
 }

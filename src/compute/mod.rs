@@ -9,6 +9,8 @@ pub mod team;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use crate::names::named;
+
 #[cfg(feature = "gpu")]
 pub use device::DevicePicture;
 
@@ -17,16 +19,16 @@ pub use device::DevicePicture;
 #[derive(Debug)]
 pub enum DevicePicture {}
 
-/// Where the executors run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Backend {
-    /// A hardware GPU where there is one, else the CPU: a software Vulkan driver is far slower than plain code.
-    #[default]
-    Auto,
-    /// Any Vulkan adapter, a software one included.
-    Gpu,
-    /// The CPU.
-    Cpu,
+named! {
+    /// Where the executors run. A software Vulkan driver is far slower than plain code, so it has to be asked for.
+    pub enum Backend default Auto {
+        /// A hardware GPU if there is one, else the CPU
+        Auto = "auto",
+        /// A GPU, or an error
+        Gpu = "gpu",
+        /// The CPU
+        Cpu = "cpu",
+    }
 }
 
 /// Where a picture is wanted.

@@ -5,17 +5,17 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use super::number_in;
-use crate::bokeh::aperture::{Aperture, Picture, Shape};
+use super::number::number_in;
+use crate::bokeh::aperture::{Picture, Shape};
 use crate::recording::RecordingError;
 use crate::recording::still::read_grey;
 
 /// An aperture as it is written: its picture, if any, not yet read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ApertureName {
-    /// A shape by its name and numbers; no [`Shape::Picture`].
+    /// A shape by its name and numbers, or a picture that was read.
     Drawn(Shape),
-    /// `image:FILE`.
+    /// `image:FILE`, not read.
     Image(PathBuf),
 }
 
@@ -68,25 +68,35 @@ impl fmt::Display for ApertureName {
             }
             Shape::Heart => f.write_str("heart"),
             Shape::Star { points } => write!(f, "star:{points}"),
-            Shape::Picture(_) => f.write_str("image"),
+            Shape::Picture(picture) => match &picture.file {
+                Some(file) => write!(f, "image:{}", file.display()),
+                None => f.write_str("image"),
+            },
         }
     }
 }
 
 impl ApertureName {
-    /// The aperture, with the radial `intensity` -1 to 1.
+    /// The name of a shape; a picture of which no file is known has none.
+    pub fn of(shape: &Shape) -> Option<Self> {
+        match shape {
+            Shape::Picture(picture) if picture.file.is_none() => None,
+            shape => Some(Self::Drawn(shape.clone())),
+        }
+    }
+
+    /// The shape.
     ///
     /// # Errors
     /// The picture of `image:FILE` cannot be read.
-    pub fn load(&self, intensity: f32) -> Result<Aperture, RecordingError> {
-        let shape = match self {
-            ApertureName::Drawn(shape) => shape.clone(),
-            ApertureName::Image(file) => {
+    pub fn load(&self) -> Result<Shape, RecordingError> {
+        Ok(match self {
+            Self::Drawn(shape) => shape.clone(),
+            Self::Image(file) => {
                 let (width, height, grey) = read_grey(file)?;
-                Shape::Picture(Arc::new(Picture { width, height, grey }))
+                Shape::Picture(Arc::new(Picture { file: Some(file.clone()), width, height, grey }))
             }
-        };
-        Ok(Aperture { shape, intensity })
+        })
     }
 }
 

@@ -1,51 +1,50 @@
 //! How the picture shall look: everything about the blur, for pictures of any size.
 //!
-//! The command line and the preview window make looks; what runs them, [`crate::bokeh`] and [`crate::pipeline`], is
-//! told of one picture size.
+//! A [`Look`] is data: it is read and written by the table of [`settings`], and a [`Patch`] changes some of it. For
+//! pictures of one size it becomes the executor's [`bokeh::Settings`] and a [`CocRule`].
 
 mod aperture;
-pub mod defaults;
-pub mod flags;
+mod coc;
+mod effect;
+pub mod number;
 pub mod presets;
+pub mod settings;
 mod strength;
 mod tilt;
 
-use std::path::PathBuf;
-
 pub use aperture::ApertureName;
+pub use coc::{CocAtInfinity, CocRule};
+pub use effect::{Effect, Refine};
+pub use settings::{LookError, Patch, SETTINGS};
 pub use strength::Strength;
 pub use tilt::Tilt;
 
 use crate::bokeh::{self, aperture::Aperture};
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
-use crate::optics::CocField;
-use crate::pipeline::{CocAtInfinity, CocRule, QualityRule};
+use crate::optics::{CocField, CocKind};
 
 /// CoC radius at infinity, as a fraction of the picture's height: a portrait lens wide open.
 pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
 /// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
 pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
-
 /// No CoC radius is larger, in pixels: pictures have sides up to 16384 px. What a picture bears is its diagonal.
 pub const MOST_RADIUS_PX: f32 = 20_000.0;
 
-/// Whether depth is refined before the blur.
+/// At which rungs of the quality ladder frames are blurred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refine {
-    /// Where it was measured.
-    Auto,
-    /// Always.
-    On,
-    /// Never: only holes are filled.
-    Off,
+pub enum QualityRule {
+    /// All at one rung.
+    Fixed(Quality),
+    /// As the time there is allows, from this rung on; the executor is made for all of them.
+    Auto(Quality),
 }
 
 /// Everything about the blur, for pictures of any size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// What the radius follows; `None` passes pictures through.
-    pub effect: Option<bokeh::Effect>,
+    /// What the radius follows.
+    pub effect: Effect,
     /// Compositing of the effect `dof`.
     pub method: bokeh::Method,
     /// Where the focal plane is.
@@ -62,8 +61,6 @@ pub struct Look {
     pub tilt: Tilt,
     /// The lens opening.
     pub aperture: Aperture,
-    /// The file that its shape comes from, where that is a picture.
-    pub aperture_file: Option<PathBuf>,
     /// Width of its soft rim, as a fraction of the radius.
     pub rim: f32,
     /// Separable terms; `None` takes the quality level's.
@@ -74,45 +71,85 @@ pub struct Look {
     pub quality: Option<Quality>,
 }
 
-impl Look {
-    /// Everything as it is where nothing is said, with this effect.
-    pub fn plain(effect: Option<bokeh::Effect>) -> Self {
+impl Default for Look {
+    fn default() -> Self {
         Self {
-            effect,
+            effect: Effect::Auto,
             method: bokeh::Method::Layered,
             focus: FocusRule::Auto,
-            focus_range_m: defaults::FOCUS_RANGE_M,
+            focus_range_m: 0.0,
             strength: Strength::Default,
             max_coc_px: None,
             refine: Refine::Auto,
-            tilt: defaults::TILT,
+            tilt: Tilt { center_y: 0.55, band: 0.15, angle_deg: 0.0 },
             aperture: Aperture::default(),
-            aperture_file: None,
-            rim: defaults::RIM,
+            // Rank 3 is then as good as rank 7 of a hard disc.
+            rim: 0.2,
             rank: None,
-            highlights: defaults::HIGHLIGHTS,
+            // It invents light.
+            highlights: 0.0,
             quality: None,
         }
     }
+}
 
-    /// The look as far as a source with depth or without allows it: without, depth of field is that of a toy world.
+impl Look {
+    /// Everything as it is where nothing is said, with this effect.
+    pub fn plain(effect: Effect) -> Self {
+        Self { effect, ..Self::default() }
+    }
+
+    /// The look as far as a source with depth or without allows it: without, depth of field is a sharp band and blur
+    /// that grows away from it.
     pub fn for_source(&self, has_depth: bool) -> Self {
         let effect = match self.effect {
-            Some(bokeh::Effect::Dof) if !has_depth => Some(bokeh::Effect::TiltShift),
+            effect if effect.follows_depth() && !has_depth => Effect::TiltShift,
             effect => effect,
         };
         Self { effect, ..self.clone() }
     }
 
+    /// Which kind of CoC frames have; none when they pass through.
+    pub fn coc_kind(&self) -> Option<CocKind> {
+        match self.effect {
+            Effect::None => None,
+            Effect::Blur => Some(CocKind::Uniform),
+            Effect::TiltShift => Some(CocKind::Ramp),
+            Effect::Auto | Effect::Dof => Some(CocKind::Depth),
+        }
+    }
+
+    /// The setting that needs distances in metres, if there is one, as it is written.
+    pub fn needs_metres(&self) -> Option<String> {
+        match (self.focus, self.strength) {
+            (FocusRule::Metres(metres), _) => Some(format!("--focus {metres}")),
+            _ if self.focus_range_m > 0.0 => Some(format!("--focus-range {}", self.focus_range_m)),
+            (_, Strength::Lens(lens)) => Some(format!("--f-number {}", lens.f_number)),
+            _ => None,
+        }
+    }
+
+    /// All settings of one frame, as it was blurred: those that give the same picture of the same colours and depth.
+    /// `coc` is the frame's, which knows where the focus was, and `quality` its rung, if it was blurred.
+    pub fn of_frame(&self, coc: &CocField, quality: Option<Quality>) -> Self {
+        let focus = match coc {
+            CocField::Depth(lens) => FocusRule::Metres(lens.focus_m),
+            CocField::Uniform { .. } | CocField::Ramp(_) => self.focus,
+        };
+        // Without its depth it cannot be repeated.
+        let effect = if self.effect.follows_depth() { Effect::Dof } else { self.effect };
+        Self { effect, focus, quality: quality.or(self.quality), ..self.clone() }
+    }
+
     /// The executor's settings for pictures of `size` pixels; none when frames pass through.
     /// `adaptive` says whether the quality may follow the time there is.
     pub fn settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
-        let effect = self.effect?;
+        let coc = self.coc_kind()?;
         let max_px = self.max_coc_px(size);
         let far_max_px = self.even_px(size).min(max_px);
-        let near_max_px = if effect == bokeh::Effect::Dof { max_px } else { 0.0 };
+        let near_max_px = if coc == CocKind::Depth { max_px } else { 0.0 };
         Some(bokeh::Settings {
-            effect,
+            coc,
             method: self.method,
             aperture: self.aperture.clone(),
             rim: self.rim,
@@ -129,11 +166,11 @@ impl Look {
     pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
         let max_coc_px = self.max_coc_px(size);
         let even_px = self.even_px(size).min(max_coc_px);
-        match self.effect {
+        match self.coc_kind() {
             None => CocRule::Fixed(CocField::Uniform { radius_px: 0.0 }),
-            Some(bokeh::Effect::Blur) => CocRule::Fixed(CocField::Uniform { radius_px: even_px }),
-            Some(bokeh::Effect::TiltShift) => CocRule::Fixed(CocField::Ramp(self.tilt.ramp(size, even_px))),
-            Some(bokeh::Effect::Dof) => CocRule::Depth {
+            Some(CocKind::Uniform) => CocRule::Fixed(CocField::Uniform { radius_px: even_px }),
+            Some(CocKind::Ramp) => CocRule::Fixed(CocField::Ramp(self.tilt.ramp(size, even_px))),
+            Some(CocKind::Depth) => CocRule::Depth {
                 focus: self.focus,
                 lens: match self.strength {
                     Strength::Lens(lens) => CocAtInfinity::Lens(lens),
@@ -183,9 +220,4 @@ impl Look {
             Strength::Default | Strength::Lens(_) => by_height_px,
         })
     }
-}
-
-/// The number that `text` is, if it lies from `low` to `high`.
-pub(crate) fn number_in(text: &str, low: f32, high: f32) -> Option<f32> {
-    text.trim().parse().ok().filter(|number| (low..=high).contains(number))
 }

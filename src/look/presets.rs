@@ -1,20 +1,24 @@
-//! The looks that are built in: each nothing but settings.
+//! Presets: looks by name.
 
-/// A built-in preset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BuiltIn {
+use super::Patch;
+
+/// A look by name: it changes what it sets of another look.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Preset {
     /// Its name.
-    pub name: &'static str,
-    /// Its settings, by their flags without the dashes. What it does not set stays: where the focus is, how finely it
-    /// is blurred, what depth is fitted to.
-    pub settings: &'static [(&'static str, &'static str)],
+    pub name: String,
+    /// Its settings.
+    pub patch: Patch,
+    /// Whether it is the person's own.
+    pub own: bool,
 }
 
-/// The built-in presets, in the order in which they are shown.
-pub const BUILT_IN: [BuiltIn; 5] = [
-    BuiltIn {
-        name: "portrait",
-        settings: &[
+/// The built-in presets, in the order in which they are shown. What they do not set stays: where the focus is, how finely it
+/// is blurred, what depth is fitted to.
+const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
+    (
+        "portrait",
+        &[
             ("effect", "auto"),
             ("aperture", "disc"),
             ("intensity", "0"),
@@ -23,11 +27,11 @@ pub const BUILT_IN: [BuiltIn; 5] = [
             ("coc-at-infinity", "auto"),
             ("focus-range", "0"),
         ],
-    },
+    ),
     // Rounded blades, a crisp edge, lights that glow.
-    BuiltIn {
-        name: "cinematic",
-        settings: &[
+    (
+        "cinematic",
+        &[
             ("effect", "auto"),
             ("aperture", "polygon:6:15:0.4"),
             ("intensity", "0"),
@@ -36,11 +40,11 @@ pub const BUILT_IN: [BuiltIn; 5] = [
             ("coc-at-infinity", "3.2%"),
             ("focus-range", "0"),
         ],
-    },
+    ),
     // Discs that fade out, much of them.
-    BuiltIn {
-        name: "dreamy",
-        settings: &[
+    (
+        "dreamy",
+        &[
             ("effect", "auto"),
             ("aperture", "disc"),
             ("intensity", "0.8"),
@@ -49,11 +53,11 @@ pub const BUILT_IN: [BuiltIn; 5] = [
             ("coc-at-infinity", "4.5%"),
             ("focus-range", "0"),
         ],
-    },
+    ),
     // The whole of a thing in the hand, and of the hand.
-    BuiltIn {
-        name: "product",
-        settings: &[
+    (
+        "product",
+        &[
             ("effect", "auto"),
             ("aperture", "disc"),
             ("intensity", "0"),
@@ -62,10 +66,10 @@ pub const BUILT_IN: [BuiltIn; 5] = [
             ("coc-at-infinity", "1.6%"),
             ("focus-range", "0.3"),
         ],
-    },
-    BuiltIn {
-        name: "miniature",
-        settings: &[
+    ),
+    (
+        "miniature",
+        &[
             ("effect", "tilt-shift"),
             ("tilt", "0.55:0.2:0"),
             ("aperture", "disc"),
@@ -75,10 +79,30 @@ pub const BUILT_IN: [BuiltIn; 5] = [
             ("coc-at-infinity", "3%"),
             ("focus-range", "0"),
         ],
-    },
+    ),
 ];
 
-/// The built-in preset of this name.
-pub fn built_in(name: &str) -> Option<&'static BuiltIn> {
-    BUILT_IN.iter().find(|preset| preset.name == name)
+/// The built-in presets, in the order in which they are shown.
+pub fn built_in() -> impl Iterator<Item = Preset> {
+    BUILT_IN.iter().map(|(name, settings)| Preset {
+        name: (*name).to_string(),
+        patch: Patch::parse(settings.iter().copied()).unwrap_or_default(),
+        own: false,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_settings_of_built_in_presets_are_read() {
+        for ((_, settings), preset) in BUILT_IN.iter().zip(built_in()) {
+            let mut values = preset.patch.values();
+            let mut written: Vec<_> = settings.iter().map(|(name, text)| (*name, (*text).to_string())).collect();
+            values.sort_unstable();
+            written.sort_unstable();
+            assert_eq!(values, written);
+        }
+    }
 }

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{MOST_RADIUS_PX, number_in};
+use super::MOST_RADIUS_PX;
+use super::number::number_in;
 use crate::optics::Lens;
 
 /// How strong the blur is.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::depth::Ready;
 use super::quality::{LateRule, Picker};
 use super::wanted::Wanted;
-use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, QualityRule, Trace, hand_on};
+use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, Trace, hand_on};
 use crate::bokeh::{Bokeh, Finished, Job, PassTimes};
 use crate::budget::Quality;
 use crate::clock::Clock;
@@ -14,6 +14,7 @@ use crate::compute::{DevicePicture, Place};
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Receiver, Sender};
+use crate::look::QualityRule;
 use crate::optics::CocField;
 use crate::stats::{About, Cause, Histogram, PassHistograms, RungCounts, Tally, Ticket};
 
@@ -70,7 +71,7 @@ struct Pending {
 impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Ready>>, mut to: Sender<Frame<Blurred>>) -> Ended {
         let mut executor = self.executor.take();
-        let mut backend = executor.as_deref().map(Bokeh::backend);
+        let mut backends = executor.as_deref().map(Bokeh::backends);
         let mut pending = VecDeque::with_capacity(MOST_IN_FLIGHT);
         let mut swapped = 0;
         loop {
@@ -95,7 +96,7 @@ impl Stage<'_> {
                     }
                     if let Some((new, quality)) = swap.take() {
                         executor = new;
-                        backend = executor.as_deref().map(Bokeh::backend);
+                        backends = executor.as_deref().map(Bokeh::backends);
                         self.rule = quality;
                         self.picker = self.picker.with(quality, super::most(executor.as_deref()));
                     }
@@ -115,8 +116,8 @@ impl Stage<'_> {
                 if !self.collect(&mut **executor, &mut pending, wait, &mut to)? {
                     return Ok(());
                 }
-                if backend.replace(executor.backend()) != Some(executor.backend()) {
-                    (self.about.backend, self.about.adapter) = (executor.backend().into(), executor.describe());
+                if backends.replace(executor.backends()) != Some(executor.backends()) {
+                    (self.about.backend, self.about.adapter) = (executor.backends().into(), executor.describe());
                     self.picker = self.picker.with(self.rule, super::most(Some(&**executor)));
                 }
             }

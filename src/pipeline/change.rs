@@ -2,19 +2,15 @@
 
 use std::sync::Mutex;
 
-use super::{CocRule, QualityRule};
 use crate::bokeh::Bokeh;
+use crate::look::{Look, QualityRule};
 
 /// Another blur, from the next frame on. Every frame has the CoC and the executor of one and the same change.
 pub struct Change {
     /// What its frames are known by ([`super::Trace::change`]); those before any change have 0.
     pub number: u64,
-    /// By how much frames are blurred.
-    pub coc: CocRule,
-    /// Whether depth is fitted to the pictures and steadied.
-    pub refine: bool,
-    /// At which rung a new executor blurs.
-    pub quality: QualityRule,
+    /// How frames are blurred.
+    pub look: Look,
     /// What blurs them.
     pub bokeh: Executor,
 }

@@ -5,16 +5,15 @@ use std::time::Duration;
 
 use super::capture::Shot;
 use super::change::{Change, Executor, Swap};
+use super::coc::{CocMaker, Finish};
 use super::rate::Rate;
-use super::{CocAtInfinity, CocRule, Ended, Fault, Frame, hand_on};
+use super::{Ended, Fault, Frame, hand_on};
 use crate::clock::Clock;
-use crate::depth::fill::Filler;
-use crate::depth::focus::Focus;
-use crate::depth::refine::Refiner;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Received, Receiver, Sender};
+use crate::look::Look;
 use crate::optics::CocField;
 use crate::stats::{Cause, Histogram, Tally};
 
@@ -31,8 +30,13 @@ pub(super) struct Ready {
 }
 
 pub(super) struct Stage<'a> {
-    pub coc: CocRule,
-    pub refine: bool,
+    pub look: Look,
+    /// Columns and rows of the pictures.
+    pub size: (u32, u32),
+    /// Whether depth was measured, so that refining it makes it better.
+    pub measured: bool,
+    /// Whether executors are made for every quality.
+    pub adaptive: bool,
     pub changes: Option<mpsc::Receiver<Change>>,
     pub source: Option<Box<dyn DepthSource>>,
     pub source_name: &'a str,
@@ -46,79 +50,9 @@ pub(super) struct Stage<'a> {
     pub held: &'a mut u64,
 }
 
-/// A [`CocRule`] at work.
-enum Coc {
-    Fixed(CocField),
-    Depth(Box<DepthCoc>),
-}
-
-struct DepthCoc {
-    focus: Focus,
-    maker: Maker,
-    lens: CocAtInfinity,
-    range_m: f32,
-    max_coc_px: f32,
-}
-
-/// What makes a map for the blur of the depth that was measured.
-enum Maker {
-    Fill(Filler),
-    Refine(Box<Refiner>),
-}
-
-impl Coc {
-    fn new(rule: CocRule, refine: bool) -> Self {
-        match rule {
-            CocRule::Fixed(field) => Self::Fixed(field),
-            CocRule::Depth { focus, lens, range_m, max_coc_px } => Self::Depth(Box::new(DepthCoc {
-                focus: Focus::new(focus),
-                maker: Maker::new(refine),
-                lens,
-                range_m,
-                max_coc_px,
-            })),
-        }
-    }
-
-    /// Follows another rule, from where the lens stands now.
-    fn follow(&mut self, rule: CocRule, refine: bool) {
-        match (self, rule) {
-            (Self::Depth(coc), CocRule::Depth { focus, lens, range_m, max_coc_px }) => {
-                coc.focus.follow(focus);
-                (coc.lens, coc.range_m, coc.max_coc_px) = (lens, range_m, max_coc_px);
-                if refine != matches!(coc.maker, Maker::Refine(_)) {
-                    coc.maker = Maker::new(refine);
-                }
-            }
-            (coc, rule) => *coc = Self::new(rule, refine),
-        }
-    }
-}
-
-impl Maker {
-    fn new(refine: bool) -> Self {
-        if refine { Self::Refine(Box::new(Refiner::new())) } else { Self::Fill(Filler::new()) }
-    }
-}
-
-impl DepthCoc {
-    /// Focuses on what was measured, and only then makes up what was not.
-    fn see(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
-        let focus_m = self.focus.focus_m(map, time_ns);
-        match &mut self.maker {
-            Maker::Fill(filler) => filler.fill_by(map, color),
-            Maker::Refine(refiner) => {
-                refiner.focus_at(focus_m);
-                refiner.refine(map, color, time_ns);
-            }
-        }
-        self.lens.field((focus_m, self.range_m), color.width, self.max_coc_px)
-    }
-}
-
 impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
-        let mut coc = Coc::new(self.coc, self.refine);
+        let mut coc = CocMaker::new(self.look.coc_rule(self.size), self.finish(&self.look));
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
         let mut change = 0;
@@ -134,23 +68,19 @@ impl Stage<'_> {
                         continue;
                     }
                 };
-            for Change { number, coc: rule, refine, quality, bokeh } in
-                self.changes.iter().flat_map(mpsc::Receiver::try_iter)
-            {
-                coc.follow(rule, refine);
+            for Change { number, look, bokeh } in self.changes.iter().flat_map(mpsc::Receiver::try_iter) {
+                coc.follow(look.coc_rule(self.size), self.finish(&look));
                 change = number;
                 self.rate.iter_mut().for_each(Rate::forget);
                 if let Executor::To(executor) = bokeh {
                     let number = swap.map_or(1, |last| last.number + 1);
-                    swap = Some(Arc::new(Swap::new(number, executor, quality)));
+                    swap = Some(Arc::new(Swap::new(number, executor, look.quality_rule(self.adaptive))));
                 }
             }
             let began_ns = self.clock.now_ns();
-            let made = match &mut coc {
-                Coc::Fixed(field) => Ok((None, *field)),
-                Coc::Depth(coc) => {
-                    self.see(coc, (depth, right), &mut color, stamp).map(|(map, field)| (Some(map), field))
-                }
+            let made = match coc.fixed() {
+                Some(field) => Ok((None, field)),
+                None => self.see(&mut coc, (depth, right), &mut color, stamp).map(|(map, field)| (Some(map), field)),
             };
             let (depth, coc) = match made {
                 Ok(made) => made,
@@ -181,10 +111,14 @@ impl Stage<'_> {
         Ok(())
     }
 
+    fn finish(&self, look: &Look) -> Finish {
+        Finish::measured(look.refines(self.measured))
+    }
+
     /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more.
     fn see(
         &mut self,
-        coc: &mut DepthCoc,
+        coc: &mut CocMaker,
         (brought, right): (Option<Pooled<DepthMap>>, Option<Pooled<GrayImage>>),
         color: &mut ColorImage,
         stamp: Stamp,
@@ -201,7 +135,7 @@ impl Stage<'_> {
         }
         let seen = Seen { stamp, color, right: right.as_deref() };
         let mut map = brought.map_or_else(|| self.read(seen), Ok)?;
-        let field = coc.see(&mut map, color, stamp.time_ns);
+        let field = coc.make(&mut map, color, stamp.time_ns);
         let now_ns = self.clock.now_ns();
         self.times.add(now_ns - began_ns);
         if let Some(rate) = &mut self.rate {

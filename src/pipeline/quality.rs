@@ -1,8 +1,8 @@
 //! Which frames are blurred, and how finely: what there is time for.
 
-use super::QualityRule;
 use crate::bokeh::rung::COSTS;
 use crate::budget::{Governor, Quality, Sample, Window};
+use crate::look::QualityRule;
 
 /// Periods after capture at which a frame is to be delivered at the latest.
 const DEADLINE_PERIODS: u64 = 2;

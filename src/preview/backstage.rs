@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use crate::bokeh::{self, Bokeh};
 use crate::capture::Camera;
 use crate::depth::DepthSource;
-use crate::look::Look;
+use crate::look::{Look, presets::Preset};
 use crate::sink::Sink;
 
 /// Something to choose, by the name that the command line has for it.
@@ -16,17 +16,6 @@ pub struct Choice {
     pub name: String,
     /// What a person calls it.
     pub label: String,
-}
-
-/// A look by name.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Preset {
-    /// Its name.
-    pub name: String,
-    /// What it makes of another look: values that it does not set stay.
-    pub look: Look,
-    /// Whether it is the person's own.
-    pub own: bool,
 }
 
 /// An option of the command line that is none of the look: its name and its value.
@@ -110,8 +99,8 @@ pub trait Backstage: Send {
     /// `bokehcam stream ...` into `outputs`.
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String;
 
-    /// The presets, the person's own last, each upon `look`.
-    fn presets(&mut self, look: &Look) -> Vec<Preset>;
+    /// The presets, the person's own last.
+    fn presets(&mut self) -> Vec<Preset>;
 
     /// Saves a look under a name of the person's.
     ///

@@ -3,7 +3,7 @@
 //! Three threads beside the pipeline's own: the window's (the main thread: events, controls, presenting), the
 //! session's (opens sources, makes executors, takes outputs up and down), and the one that runs the pipeline. What the
 //! person does is an [`state::Action`]; [`state::State::apply`] makes of it another state and the
-//! [`state::Effect`]s that only others can bring about.
+//! [`state::Request`]s that only others can bring about.
 
 pub mod backstage;
 pub mod keys;

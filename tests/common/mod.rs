@@ -2,9 +2,10 @@
 #![allow(dead_code, missing_docs)]
 
 use bokehcam::bokeh::aperture::{Aperture, Shape};
-use bokehcam::bokeh::{Effect, Method, Settings};
+use bokehcam::bokeh::{Method, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};
 
 /// A small generator of numbers that look random: the same everywhere.
@@ -52,9 +53,9 @@ pub fn three_depths(width: u32, height: u32) -> DepthMap {
     })
 }
 
-pub fn settings(effect: Effect) -> Settings {
+pub fn settings(coc: CocKind) -> Settings {
     Settings {
-        effect,
+        coc,
         method: Method::Layered,
         aperture: Aperture::default(),
         rim: 0.2,
@@ -63,28 +64,28 @@ pub fn settings(effect: Effect) -> Settings {
         quality: Quality::Balanced,
         adaptive: false,
         far_max_px: 12.0,
-        near_max_px: if effect == Effect::Dof { 18.0 } else { 0.0 },
+        near_max_px: if coc == CocKind::Depth { 18.0 } else { 0.0 },
     }
 }
 
 pub const DOF: CocField =
     CocField::Depth(DepthCoc { coc_at_infinity_px: 12.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 18.0 });
 
-pub fn coc(effect: Effect, height: u32) -> CocField {
-    match effect {
-        Effect::Blur => CocField::Uniform { radius_px: 12.0 },
-        Effect::TiltShift => CocField::Ramp(Ramp {
+pub fn coc(kind: CocKind, height: u32) -> CocField {
+    match kind {
+        CocKind::Uniform => CocField::Uniform { radius_px: 12.0 },
+        CocKind::Ramp => CocField::Ramp(Ramp {
             normal: glam::Vec2::new(0.1, 0.995).normalize(),
             offset_px: height as f32 * 0.5,
             half_band_px: height as f32 * 0.1,
             slope: 0.2,
             max_px: 12.0,
         }),
-        Effect::Dof => DOF,
+        CocKind::Depth => DOF,
     }
 }
 
-pub const EFFECTS: [Effect; 3] = [Effect::Blur, Effect::TiltShift, Effect::Dof];
+pub const COC_KINDS: [CocKind; 3] = [CocKind::Uniform, CocKind::Ramp, CocKind::Depth];
 
 pub fn shapes() -> Vec<Shape> {
     vec![

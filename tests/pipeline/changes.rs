@@ -8,14 +8,14 @@ use std::thread;
 use std::time::Duration;
 
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
-use bokehcam::budget::Quality;
+use bokehcam::compute::Backend;
 use bokehcam::frame::ColorImage;
 use bokehcam::link;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{Change, CocRule, Executor, Pace, QualityRule, Run, View, run};
+use bokehcam::pipeline::{Change, Executor, Pace, Run, View, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 
-use super::fakes::{FakeSink, Received, SIZE, Trouble, fake_camera, simple};
+use super::fakes::{FakeSink, Received, SIZE, Trouble, fake_camera, simple, uniform};
 
 /// Blurs nothing, but knows the one radius that it was made for.
 struct Made {
@@ -54,6 +54,9 @@ impl Bokeh for Made {
     fn capacity(&self) -> usize {
         2
     }
+    fn backend(&self) -> Backend {
+        Backend::Cpu
+    }
     fn describe(&self) -> String {
         "made".into()
     }
@@ -77,10 +80,6 @@ impl Sink for Nobody {
     }
 }
 
-fn uniform(radius_px: f32) -> CocRule {
-    CocRule::Fixed(CocField::Uniform { radius_px })
-}
-
 #[test]
 fn every_frame_has_the_radius_and_the_executor_of_one_change() {
     for pace in [Pace::Asap, Pace::Realtime] {
@@ -101,14 +100,7 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
             .map(|k| {
                 // Now and then frames pass through.
                 let executor = (k % 5 != 0).then(|| made(f32::from(k)));
-                let quality = QualityRule::Fixed(Quality::Fast);
-                Change {
-                    number: u64::from(k),
-                    coc: uniform(f32::from(k)),
-                    refine: false,
-                    quality,
-                    bokeh: Executor::To(executor),
-                }
+                Change { number: u64::from(k), look: uniform(f32::from(k)), bokeh: Executor::To(executor) }
             })
             .collect();
         let report = thread::scope(|scope| {
@@ -120,7 +112,7 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
             });
             run(Run {
                 bokeh: Some(made(0.0)),
-                coc: uniform(0.0),
+                look: uniform(0.0),
                 changes: Some(changes),
                 ..simple(Box::new(fake_camera(400)), Box::new(sink), &stop, pace)
             })
@@ -158,7 +150,7 @@ fn a_viewer_sees_what_pictures_were_made_of_and_counts_where_the_sink_does_not()
             let made = Made { radius_px: 7.0, held: VecDeque::new(), blurred: Arc::default(), wrong: Arc::default() };
             let report = run(Run {
                 bokeh: Some(Box::new(made)),
-                coc: uniform(7.0),
+                look: uniform(7.0),
                 view: Some(view),
                 ..simple(Box::new(fake_camera(300)), sink, &stop, Pace::Asap)
             });

@@ -8,18 +8,19 @@ use std::thread;
 use std::time::Duration;
 
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
-use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
+use bokehcam::compute::Backend;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::look::Look;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{Change, CocAtInfinity, CocRule, Executor, Pace, QualityRule, Run, run};
+use bokehcam::pipeline::{Change, Executor, Pace, Run, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::stats::{Cause, Report};
 
-use crate::fakes::{SIZE, simple};
+use crate::fakes::{SIZE, dof_with, simple};
 
 const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 40 * MS;
@@ -114,6 +115,9 @@ impl Bokeh for Recorder {
     fn capacity(&self) -> usize {
         1
     }
+    fn backend(&self) -> Backend {
+        Backend::Cpu
+    }
     fn describe(&self) -> String {
         "cpu, recorder".into()
     }
@@ -134,8 +138,8 @@ impl Sink for Slow {
     }
 }
 
-fn dof(max_coc_px: f32) -> CocRule {
-    CocRule::Depth { focus: FocusRule::Metres(1.0), lens: CocAtInfinity::Px(8.0), range_m: 0.0, max_coc_px }
+fn dof(max_coc_px: f32) -> Look {
+    dof_with(FocusRule::Metres(1.0), max_coc_px)
 }
 
 /// Runs some frames, of which depth takes `depth_ns`; gives the report and what each frame was to be blurred by.
@@ -159,7 +163,7 @@ fn play(
     let report = run(Run {
         depth: Some(Box::new(Wall(clock.clone(), depth_ns))),
         bokeh: Some(Box::new(Recorder { clock: clock.clone(), job: None, fields: Arc::clone(&fields) })),
-        coc: dof(10.0),
+        look: dof(10.0),
         changes,
         budget_ns,
         clock: clock.clone(),
@@ -203,9 +207,8 @@ fn a_change_of_the_look_holds_from_its_frame_on_where_depth_is_held_too() {
     let before = move |frame: usize| {
         // In every place of such three.
         if frame >= 30 && frame.is_multiple_of(4) {
-            let coc = dof(10.0 + frame as f32);
-            let (number, quality) = (frame as u64, QualityRule::Fixed(Quality::Fast));
-            let _ = send.send(Change { number, coc, refine: false, quality, bokeh: Executor::Keep });
+            let look = dof(10.0 + frame as f32);
+            let _ = send.send(Change { number: frame as u64, look, bokeh: Executor::Keep });
         }
     };
     let (report, fields) = play((60, Pace::Realtime), 14 * MS, 10 * MS, Some(changes), before);

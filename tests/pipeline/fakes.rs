@@ -12,12 +12,14 @@ use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
 use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
+use bokehcam::compute::Backend;
 use bokehcam::compute::GpuError;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{CocAtInfinity, CocRule, Pace, PipelineError, Progress, QualityRule, Run, run};
+use bokehcam::pipeline::{Pace, PipelineError, Progress, Run, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::stats::Report;
 
@@ -187,6 +189,9 @@ impl Bokeh for FakeBokeh {
     fn capacity(&self) -> usize {
         self.capacity
     }
+    fn backend(&self) -> Backend {
+        Backend::Cpu
+    }
     fn describe(&self) -> String {
         "cpu, fake".into()
     }
@@ -257,19 +262,30 @@ pub struct Setup {
     pub sink: Trouble,
     pub closes_at: usize,
     pub finish_fails: bool,
-    pub coc: CocRule,
+    pub look: Look,
     pub pace: Pace,
     pub keep_going: bool,
     pub stop_after: u64,
 }
 
-pub fn dof() -> CocRule {
-    CocRule::Depth {
-        focus: FocusRule::Point { x: 0.0, y: 0.0 },
-        lens: CocAtInfinity::Px(8.0),
-        range_m: 0.0,
-        max_coc_px: 20.0,
+/// A blur that follows depth, cut at `max_coc_px`.
+pub fn dof_with(focus: FocusRule, max_coc_px: f32) -> Look {
+    Look {
+        focus,
+        strength: Strength::AtInfinity(8.0),
+        max_coc_px: Some(max_coc_px),
+        quality: Some(Quality::Fast),
+        ..Look::plain(Effect::Dof)
     }
+}
+
+pub fn dof() -> Look {
+    dof_with(FocusRule::Point { x: 0.0, y: 0.0 }, 20.0)
+}
+
+/// One radius everywhere.
+pub fn uniform(radius_px: f32) -> Look {
+    Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Fast), ..Look::plain(Effect::Blur) }
 }
 
 pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {
@@ -288,7 +304,7 @@ impl Setup {
             sink: Trouble::default(),
             closes_at: NEVER,
             finish_fails: false,
-            coc: dof(),
+            look: dof(),
             pace,
             keep_going: false,
             stop_after: u64::MAX,
@@ -310,9 +326,9 @@ impl Setup {
             }),
             depth: self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _),
             bokeh: self.bokeh.map(|bokeh| Box::new(bokeh) as _),
-            quality: QualityRule::Fixed(Quality::Fast),
-            coc: self.coc,
-            refine: false,
+            look: self.look,
+            adaptive: false,
+            measured: false,
             changes: None,
             sink: Box::new(FakeSink {
                 received: received.clone(),
@@ -386,9 +402,9 @@ pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a Atomic
         camera,
         depth: None,
         bokeh: None,
-        quality: QualityRule::Fixed(Quality::Fast),
-        coc: CocRule::Fixed(CocField::Uniform { radius_px: 3.0 }),
-        refine: false,
+        look: uniform(3.0),
+        adaptive: false,
+        measured: false,
         changes: None,
         sink,
         pace,

@@ -4,9 +4,11 @@ use std::sync::atomic::AtomicBool;
 
 use bokehcam::bokeh::fallback::Fallback;
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job};
-use bokehcam::pipeline::{Pace, QualityRule, Run, run};
+use bokehcam::compute::Backend;
+use bokehcam::look::Look;
+use bokehcam::pipeline::{Pace, Run, run};
 
-use crate::fakes::{FakeBokeh, FakeSink, NEVER, Received, Trouble, fake_bokeh, fake_camera, simple};
+use crate::fakes::{FakeBokeh, FakeSink, NEVER, Received, Trouble, fake_bokeh, fake_camera, simple, uniform};
 
 /// Gives back what it has when it fails.
 struct Gpu(FakeBokeh);
@@ -27,6 +29,9 @@ impl Bokeh for Gpu {
     fn capacity(&self) -> usize {
         self.0.capacity()
     }
+    fn backend(&self) -> Backend {
+        Backend::Gpu
+    }
     fn describe(&self) -> String {
         "a GPU".into()
     }
@@ -44,7 +49,8 @@ fn a_run_goes_on_without_its_gpu_and_the_report_says_so() {
             FakeSink { received: received.clone(), trouble: Trouble::default(), closes_at: NEVER, finish_fails: false };
         let report = run(Run {
             bokeh: Some(Box::new(Fallback::new(Box::new(gpu), Box::new(cpu)))),
-            quality: QualityRule::Auto(Default::default()),
+            look: Look { quality: None, ..uniform(3.0) },
+            adaptive: true,
             ..simple(Box::new(fake_camera(FRAMES)), Box::new(sink), &stop, Pace::Asap)
         });
         let report = report.unwrap();

@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use bokehcam::bokeh::rung::COSTS;
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
-use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::compute::Backend;
 use bokehcam::frame::Stamp;
-use bokehcam::optics::CocField;
-use bokehcam::pipeline::{CocRule, Fault, Pace, QualityRule, Run, run};
+use bokehcam::look::Look;
+use bokehcam::pipeline::{Fault, Pace, Run, run};
 use bokehcam::sink::Null;
 
 use crate::fakes::*;
@@ -31,8 +31,8 @@ fn depth_comes_with_the_frame_it_belongs_to() {
 #[test]
 fn a_fixed_coc_and_no_blur_ask_for_no_depth() {
     let never = Some(Trouble::panics_at(0));
-    let coc = CocRule::Fixed(CocField::Uniform { radius_px: 4.0 });
-    let (result, received) = Setup { depth: never, coc, ..Setup::new(10, Pace::Asap) }.run();
+    let look = uniform(4.0);
+    let (result, received) = Setup { depth: never, look, ..Setup::new(10, Pace::Asap) }.run();
     result.unwrap();
     assert!(
         received
@@ -111,6 +111,9 @@ impl Bokeh for Paced {
     fn capacity(&self) -> usize {
         1
     }
+    fn backend(&self) -> Backend {
+        Backend::Gpu
+    }
     fn describe(&self) -> String {
         "a GPU, paced".into()
     }
@@ -122,7 +125,8 @@ fn quality_follows_the_time_there_is() {
     for (took_us, quality) in [(1000, "best"), (3300, "balanced"), (4500, "fast"), (90_000, "draft")] {
         let report = run(Run {
             bokeh: Some(Box::new(Paced(Duration::from_micros(took_us), None))),
-            quality: QualityRule::Auto(Quality::Balanced),
+            look: Look { quality: None, ..uniform(3.0) },
+            adaptive: true,
             budget_ns: 4_000_000,
             ..simple(Box::new(fake_camera(150)), Box::new(Null), &stop, Pace::Asap)
         });

@@ -5,12 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::frame::{ColorImage, Stamp};
 use bokehcam::link::demand::{Demand, Watch};
-use bokehcam::pipeline::{Pace, QualityRule, Run, run};
+use bokehcam::pipeline::{Pace, Run, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 
 use crate::fakes::{PERIOD_NS, SIZE, dof};
@@ -101,9 +100,9 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
         camera: Box::new(Sleeper { opened: Arc::clone(&opened), open: false, index: 0 }),
         depth: None,
         bokeh: None,
-        quality: QualityRule::Fixed(Quality::Fast),
-        coc: dof(),
-        refine: false,
+        look: dof(),
+        adaptive: false,
+        measured: false,
         changes: None,
         sink: Box::new(Screen { demand: demand.clone(), watch: None, shown: 0, phases: Arc::clone(&phases) }),
         pace: Pace::Realtime,

@@ -200,8 +200,7 @@ fn frames_before_the_first_depth_are_counted_and_the_run_goes_on() {
     let frames = run(Run {
         depth: Some(Box::new(Late(4))),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
-        coc: dof(),
-        refine: false,
+        look: dof(),
         changes: None,
         keep_going: false,
         ..simple(Box::new(camera), sink, &stop, Pace::Asap)
@@ -220,8 +219,7 @@ fn rendered(dir: &Path, file: &Path) -> Vec<u8> {
     let report = run(Run {
         depth: Some(Box::new(Recorded::new(recording, "test recording").unwrap())),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
-        coc: dof(),
-        refine: false,
+        look: dof(),
         changes: None,
         ..simple(Box::new(camera), sink, &stop, Pace::Asap)
     })

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use bokehcam::bokeh::aperture::Aperture;
-use bokehcam::bokeh::{self, Backend, Effect, Method};
+use bokehcam::bokeh::{self, Backend, Method};
 use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::depth::focus::FocusRule;
@@ -13,8 +13,9 @@ use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::optics::CocKind;
 use bokehcam::optics::StereoRig;
-use bokehcam::pipeline::{CocAtInfinity, CocRule, Fault, Pace, Run, run};
+use bokehcam::pipeline::{Fault, Pace, Run, run};
 use bokehcam::stats::Cause;
 
 use crate::fakes::*;
@@ -75,7 +76,7 @@ fn the_right_eye_comes_with_its_picture_and_unpaired_frames_are_counted() {
         let frames = run(Run {
             depth: Some(Box::new(OfTheRight)),
             bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
-            coc: dof(),
+            look: dof(),
             ..simple(Box::new(LosesPartners(two_eyes(60))), fake_sink(&received), &stop, pace)
         })
         .unwrap()
@@ -96,7 +97,7 @@ fn depth_from_two_eyes_of_a_camera_with_one_is_an_error() {
     let error = run(Run {
         depth: Some(Box::new(StereoDepth::of_rectified("fake camera", StereoRig::assumed(SIZE.0), matcher, 16))),
         bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
-        coc: dof(),
+        look: dof(),
         ..simple(Box::new(fake_camera(5)), fake_sink(&Received::default()), &stop, Pace::Asap)
     })
     .unwrap_err();
@@ -140,7 +141,7 @@ fn without_time_depth_is_made_with_less_effort_and_every_picture_is_straightened
         let report = run(Run {
             depth: Some(Box::new(Slow { effort: last.clone(), most: 1 })),
             bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
-            coc: dof(),
+            look: dof(),
             ..simple(Box::new(two_eyes(150)), fake_sink(&received), &stop, pace)
         })
         .unwrap();
@@ -178,7 +179,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
     let (width, height) = planes::SIZE;
     let (sharp, _) = planes::seen();
     let settings = bokeh::Settings {
-        effect: Effect::Dof,
+        coc: CocKind::Depth,
         method: Method::Layered,
         aperture: Aperture::default(),
         rim: 0.2,
@@ -198,12 +199,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
             run(Run {
                 depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher, 16))),
                 bokeh: Some(bokeh::create(&settings, (width, height), Backend::Cpu, None, Some(1)).unwrap()),
-                coc: CocRule::Depth {
-                    focus: FocusRule::Point { x: focus.0, y: focus.1 },
-                    lens: CocAtInfinity::Px(8.0),
-                    range_m: 0.0,
-                    max_coc_px: 16.0,
-                },
+                look: dof_with(FocusRule::Point { x: focus.0, y: focus.1 }, 16.0),
                 ..simple(Box::new(TwoPlanes(1)), fake_sink(&received), &stop, Pace::Asap)
             })
             .unwrap();

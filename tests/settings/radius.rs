@@ -2,8 +2,9 @@
 
 use std::fs;
 
-use bokehcam::bokeh::{self, Backend, BokehError, Effect, Method, Rank, Settings, aperture::Aperture};
+use bokehcam::bokeh::{self, Backend, BokehError, Method, Rank, Settings, aperture::Aperture};
 use bokehcam::budget::Quality;
+use bokehcam::optics::CocKind;
 use bokehcam::recording::snapshot::{self, Snapshot};
 use bokehcam::recording::still;
 
@@ -53,8 +54,8 @@ fn a_radius_beyond_the_diagonal_is_refused_once_the_size_is_known() {
 
 #[test]
 fn the_library_refuses_what_the_command_line_does() {
-    let settings = |effect, method, rank, radius_px| Settings {
-        effect,
+    let settings = |coc, method, rank, radius_px| Settings {
+        coc,
         method,
         aperture: Aperture::default(),
         rim: 0.2,
@@ -66,21 +67,21 @@ fn the_library_refuses_what_the_command_line_does() {
         near_max_px: 0.0,
     };
     let create = |settings: &Settings| bokeh::create(settings, (640, 360), Backend::Cpu, None, Some(1)).map(|_| ());
-    for (effect, method, rank, most_px) in [
-        (Effect::Blur, Method::Layered, None, 735.0),
-        (Effect::TiltShift, Method::Layered, None, 735.0),
-        (Effect::Dof, Method::Layered, Some(Rank::Full), 735.0),
-        (Effect::Dof, Method::Gather, None, 512.0),
-        (Effect::Dof, Method::Gather, Some(Rank::Full), 128.0),
+    for (coc, method, rank, most_px) in [
+        (CocKind::Uniform, Method::Layered, None, 735.0),
+        (CocKind::Ramp, Method::Layered, None, 735.0),
+        (CocKind::Depth, Method::Layered, Some(Rank::Full), 735.0),
+        (CocKind::Depth, Method::Gather, None, 512.0),
+        (CocKind::Depth, Method::Gather, Some(Rank::Full), 128.0),
     ] {
         for radius_px in [most_px + 1.0, 1e9, f32::INFINITY, f32::NAN] {
-            let refused = create(&settings(effect, method, rank, radius_px)).unwrap_err();
+            let refused = create(&settings(coc, method, rank, radius_px)).unwrap_err();
             assert!(matches!(refused, BokehError::TooWide { most_px: most, .. } if most == most_px), "{refused}");
             assert!(!refused.to_string().contains('\n'), "{refused}");
         }
         // Where nobody asks, radii are cut, and nothing grows without a bound.
-        let plan = bokeh::plan::Plan::new(&settings(effect, method, rank, 1e30), 640, 360);
+        let plan = bokeh::plan::Plan::new(&settings(coc, method, rank, 1e30), 640, 360);
         let bytes: usize = plan.levels.banks.iter().map(|bank| (bank.horizontal.len() * 2) * 4).sum();
-        assert!(bytes < 200 << 20, "{effect:?} {method:?} {rank:?}: {bytes} bytes");
+        assert!(bytes < 200 << 20, "{coc:?} {method:?} {rank:?}: {bytes} bytes");
     }
 }

@@ -32,8 +32,8 @@ use super::plan::{CELL, Compositing, MAX_BINS, Plan};
 use super::rung::SCALES;
 use super::{Bokeh, BokehError, Finished, Job, PassTimes};
 use crate::budget::Quality;
-use crate::compute::simd;
 use crate::compute::team::{Shelf, Team, cores};
+use crate::compute::{Backend, simd};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
@@ -305,6 +305,10 @@ impl Bokeh for CpuBokeh {
 
     fn capacity(&self) -> usize {
         1
+    }
+
+    fn backend(&self) -> Backend {
+        Backend::Cpu
     }
 
     fn describe(&self) -> String {

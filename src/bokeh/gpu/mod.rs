@@ -19,7 +19,7 @@ use super::bank::STEPS_PER_PX;
 use super::plan::{Compositing, Plan};
 use super::{Bokeh, BokehError, Finished, Job};
 use crate::compute::device::{Device, DevicePicture};
-use crate::compute::{GpuError, Place};
+use crate::compute::{Backend, GpuError, Place};
 use crate::link::pool::{Pool, Pooled};
 use crate::optics::CocField;
 
@@ -211,6 +211,10 @@ impl Bokeh for GpuBokeh {
 
     fn capacity(&self) -> usize {
         CAPACITY
+    }
+
+    fn backend(&self) -> Backend {
+        Backend::Gpu
     }
 
     fn describe(&self) -> String {

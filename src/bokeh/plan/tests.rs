@@ -3,9 +3,9 @@ use super::*;
 use crate::budget::Quality;
 use crate::optics::DepthCoc;
 
-fn settings(effect: Effect, quality: Quality) -> Settings {
+fn settings(coc: CocKind, quality: Quality) -> Settings {
     Settings {
-        effect,
+        coc,
         method: Method::Layered,
         aperture: Aperture::default(),
         rim: 0.2,
@@ -29,7 +29,7 @@ fn split(plan: &mut Plan, coc_px: impl Iterator<Item = f32>) {
 #[test]
 fn bins_tile_the_line_front_to_back() {
     for quality in Quality::ALL {
-        let mut plan = Plan::new(&settings(Effect::Dof, quality), 640, 360);
+        let mut plan = Plan::new(&settings(CocKind::Depth, quality), 640, 360);
         for spread in [0.01, 0.1, 1.0] {
             split(&mut plan, (0..300).map(|k| (k - 200) as f32 * 0.15 * spread));
             assert!(plan.bins.len() <= MAX_BINS && plan.bins.len() <= plan.slots());
@@ -47,7 +47,7 @@ fn bins_tile_the_line_front_to_back() {
 
 #[test]
 fn borders_lie_where_no_pixels_do() {
-    let mut plan = Plan::new(&settings(Effect::Dof, Quality::Balanced), 640, 360);
+    let mut plan = Plan::new(&settings(CocKind::Depth, Quality::Balanced), 640, 360);
     // In focus, a thing at 6 px, a wall at 11 to 12 px, and something near at -9 px.
     let parts = [(0.0, 100), (6.0, 60), (11.0, 100), (12.0, 100), (-9.0, 40)];
     split(&mut plan, parts.iter().flat_map(|&(coc_px, count)| std::iter::repeat_n(coc_px, count)));
@@ -61,7 +61,7 @@ fn borders_lie_where_no_pixels_do() {
 
 #[test]
 fn one_radius_needs_one_bin() {
-    let plan = Plan::new(&settings(Effect::Blur, Quality::Balanced), 33, 17);
+    let plan = Plan::new(&settings(CocKind::Uniform, Quality::Balanced), 33, 17);
     assert_eq!(plan.bins.len(), 1);
     assert_eq!((plan.bins[0].scale, plan.bins[0].width, plan.bins[0].height), (1, 33, 17));
 }

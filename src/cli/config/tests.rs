@@ -1,12 +1,11 @@
 use clap::{Args, Command, FromArgMatches};
 
 use super::*;
-use crate::bokeh::Effect;
 use crate::bokeh::aperture::{Aperture, Shape};
+use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
-use crate::look::{Refine, Tilt, flags};
+use crate::look::{ApertureName, CocRule, Patch, Refine, SETTINGS, Tilt};
 use crate::optics::{CocField, Lens};
-use crate::pipeline::CocRule;
 
 const SIZE: (u32, u32) = (640, 450);
 
@@ -14,7 +13,7 @@ fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, CliError> {
     let command = options::Every::augment_args(Command::new("test").no_binary_name(true));
     let matches = command.try_get_matches_from(flags).unwrap();
     let every = options::Every::from_arg_matches(&matches).unwrap();
-    look(&every.blur, &every.aperture, every.computing.quality, has_depth)
+    look_for(&look(&every.blur, &every.computing.quality)?, &every.blur.depth, has_depth)
 }
 
 fn refusal(flags: &[&str], has_depth: bool) -> String {
@@ -23,9 +22,9 @@ fn refusal(flags: &[&str], has_depth: bool) -> String {
 
 #[test]
 fn the_effect_follows_what_the_source_has() {
-    assert_eq!(resolve(&[], true).unwrap().effect, Some(bokeh::Effect::Dof));
-    assert_eq!(resolve(&[], false).unwrap().effect, Some(bokeh::Effect::Blur));
-    assert_eq!(resolve(&["--depth=none"], true).unwrap().effect, Some(bokeh::Effect::Blur));
+    assert!(resolve(&[], true).unwrap().effect.follows_depth());
+    assert_eq!(resolve(&[], false).unwrap().effect, Effect::TiltShift);
+    assert_eq!(resolve(&["--depth=none"], true).unwrap().effect, Effect::TiltShift);
     assert!(resolve(&["--effect=none"], true).unwrap().settings(SIZE, false).is_none());
     assert!(refusal(&["--effect=dof"], false).contains("the source has none"));
     assert!(refusal(&["--effect=dof", "--depth=none"], true).contains("--depth none"));
@@ -60,7 +59,7 @@ fn the_executor_is_made_for_every_radius_that_can_come() {
     let dof = resolve(&["--f-number=2", "--focal-length=50", "--sensor-width=36"], true).unwrap();
     let settings = dof.settings(SIZE, false).unwrap();
     assert_eq!((settings.far_max_px, settings.near_max_px), (27.0, 27.0));
-    let blur = resolve(&["--coc-at-infinity=7"], false).unwrap().settings(SIZE, false).unwrap();
+    let blur = resolve(&["--effect=blur", "--coc-at-infinity=7"], false).unwrap().settings(SIZE, false).unwrap();
     assert_eq!((blur.far_max_px, blur.near_max_px), (7.0, 0.0));
 }
 
@@ -94,7 +93,7 @@ fn the_range_of_focus_reaches_the_lens() {
 
 /// Looks that differ from the plain one in every field, in every form that it has.
 fn looks(picture: &std::path::Path) -> Vec<Look> {
-    let plain = Look::plain(Some(Effect::Dof));
+    let plain = Look::default();
     let mut looks = vec![plain.clone()];
     let mut add = |change: &dyn Fn(&mut Look)| {
         let mut look = plain.clone();
@@ -102,7 +101,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
         assert_ne!(look, plain);
         looks.push(look);
     };
-    for effect in [None, Some(Effect::Blur), Some(Effect::TiltShift)] {
+    for effect in [Effect::None, Effect::Blur, Effect::TiltShift, Effect::Dof] {
         add(&|look| look.effect = effect);
     }
     // Numbers that have no short form in binary, large ones and small ones.
@@ -132,8 +131,7 @@ fn looks(picture: &std::path::Path) -> Vec<Look> {
         add(&|look| look.aperture = Aperture { shape: shape.clone(), intensity: 0.5 });
     }
     add(&|look| {
-        look.aperture = ApertureName::Image(picture.to_owned()).load(-1.0).unwrap();
-        look.aperture_file = Some(picture.to_owned());
+        look.aperture = Aperture { shape: ApertureName::Image(picture.to_owned()).load().unwrap(), intensity: -1.0 };
     });
     add(&|look| look.method = bokeh::Method::Gather);
     for refine in [Refine::On, Refine::Off] {
@@ -153,34 +151,30 @@ fn the_flags_of_a_look_give_the_look() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("a cat's, odd: name.png");
     crate::recording::still::write_color(&picture, &ColorImage::new(3, 2), false).unwrap();
-    let written = |flags: &[flags::Flag]| -> Vec<String> {
-        flags.iter().map(|(name, value)| format!("--{name}={value}")).collect()
+    let written = |patch: &Patch| -> Vec<String> {
+        patch.values().iter().map(|(name, value)| format!("--{name}={value}")).collect()
     };
-    let parsed = |flags: &[flags::Flag]| {
-        let written = written(flags);
+    let parsed = |patch: &Patch| {
+        let written = written(patch);
         resolve(&written.iter().map(String::as_str).collect::<Vec<_>>(), true).unwrap()
     };
     let looks = looks(&picture);
-    assert_eq!(looks[0].flags(), []);
+    let usual = Patch::of(&looks[0]);
+    let unusual = |look: &Look| Patch::of(look).beside(&usual);
     assert_eq!(resolve(&[], true).unwrap(), looks[0]);
     for (k, look) in looks.iter().enumerate() {
-        assert_eq!(parsed(&look.flags()), *look, "{:?}", look.flags());
-        assert_eq!(parsed(&look.every_flag()), *look);
+        let flags = unusual(look).values();
+        assert_eq!(parsed(&unusual(look)), *look, "{flags:?}");
+        assert_eq!(parsed(&Patch::of(look)), *look);
         // One change, one setting; a lens is three.
-        let count = if matches!(look.strength, Strength::Lens(_)) { 3 } else { look.flags().len().min(2) };
-        assert_eq!(look.flags().len(), count, "{:?}", look.flags());
-        // From any look to any other, all of the first being there.
+        let count = if matches!(look.strength, Strength::Lens(_)) { 3 } else { flags.len().min(2) };
+        assert_eq!(flags.len(), count, "{flags:?}");
+        // From any look to any other, by what is unlike.
         let other = &looks[(k * 7 + 3) % looks.len()];
-        let mut all: Vec<_> = other.every_flag();
-        let beside = look.flags_beside(other);
-        let is_strength = |name: &str| ["coc-at-infinity", "f-number", "focal-length", "sensor-width"].contains(&name);
-        let strength = beside.iter().any(|(name, _)| is_strength(name));
-        let is_replaced = |name: &str| beside.iter().any(|(other, _)| *other == name) || strength && is_strength(name);
-        all.retain(|(name, _)| !is_replaced(name));
-        all.extend(beside);
-        assert_eq!(parsed(&all), *look);
+        assert_eq!(Patch::of(look).beside(&Patch::of(other)).on(other).unwrap(), *look);
+        assert_eq!(serde_json::from_str::<Look>(&serde_json::to_string(look).unwrap()).unwrap(), *look);
     }
-    let names: Vec<_> = looks.iter().flat_map(Look::every_flag).map(|(name, _)| name).collect();
-    assert!(flags::NAMES.iter().all(|name| names.contains(name)) && names.iter().all(|n| flags::NAMES.contains(n)));
-    assert_eq!(written(&Look { rim: 0.1, ..looks[0].clone() }.flags()), ["--rim=0.1"]);
+    let names: Vec<_> = looks.iter().flat_map(|look| Patch::of(look).values()).map(|(name, _)| name).collect();
+    assert!(SETTINGS.iter().all(|setting| names.contains(&setting.name)));
+    assert_eq!(written(&unusual(&Look { rim: 0.1, ..looks[0].clone() })), ["--rim=0.1"]);
 }

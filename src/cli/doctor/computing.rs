@@ -3,11 +3,9 @@
 use std::process::{Command, Stdio};
 
 use super::super::config::Executor;
-use super::super::values::Backend;
 use super::findings::Finding;
-use crate::bokeh::aperture::Aperture;
-use crate::bokeh::{Effect, Method, Settings};
-use crate::budget::Quality;
+use crate::compute::Backend;
+use crate::look::{Effect, Look};
 
 const BLUR: &str = "blur";
 const PROGRAMS: &str = "programs";
@@ -21,23 +19,14 @@ pub fn look() -> Vec<Finding> {
 fn blur() -> Finding {
     /// Any size will do.
     const SIZE: (u32, u32) = (64, 64);
-    let settings = Settings {
-        effect: Effect::Blur,
-        method: Method::Layered,
-        aperture: Aperture::default(),
-        rim: 0.2,
-        rank: None,
-        highlights: 0.0,
-        quality: Quality::default(),
-        adaptive: false,
-        far_max_px: 2.0,
-        near_max_px: 0.0,
-    };
-    match Executor::new(Backend::Auto, None, None).create(&settings, SIZE) {
+    let settings = Look::plain(Effect::Blur).settings(SIZE, false);
+    let executor = Executor { backend: Backend::Auto, adapter: None, threads: None };
+    match settings.as_ref().map(|settings| executor.create(settings, SIZE)).transpose() {
         Err(error) => Finding::note(BLUR, error.to_string(), "report this"),
-        Ok(bokeh) => {
+        Ok(None) => Finding::note(BLUR, "nothing is blurred".to_string(), "report this"),
+        Ok(Some(bokeh)) => {
             let name = bokeh.describe();
-            if name.starts_with("cpu") && cfg!(feature = "gpu") {
+            if bokeh.backend() == Backend::Cpu && cfg!(feature = "gpu") {
                 let fix = "install a Vulkan driver if there is a GPU; `bokehcam bench` tells how fast the CPU is";
                 Finding::note(BLUR, format!("no hardware GPU: {name}"), fix)
             } else {

@@ -4,7 +4,7 @@ use clap::Args;
 
 #[cfg(feature = "window")]
 use super::Window;
-use super::{Aperture, Blur, Computing, Depth, Output, Source, Stereo, Stream};
+use super::{Blur, Computing, Depth, Output, Source, Stereo, Stream};
 
 /// What is needed to blur a stream, wherever it goes.
 #[derive(Args, Clone, Debug)]
@@ -21,9 +21,6 @@ pub struct Streaming {
     /// Two eyes.
     #[command(flatten)]
     pub stereo: Stereo,
-    /// The lens opening.
-    #[command(flatten)]
-    pub aperture: Aperture,
     /// The executor.
     #[command(flatten)]
     pub computing: Computing,
@@ -50,9 +47,6 @@ pub struct Every {
     /// The blur.
     #[command(flatten)]
     pub blur: Blur,
-    /// The lens opening.
-    #[command(flatten)]
-    pub aperture: Aperture,
     /// The executor.
     #[command(flatten)]
     pub computing: Computing,

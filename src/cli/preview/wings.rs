@@ -12,13 +12,14 @@ use super::super::options::{self, Streaming};
 use super::super::settings::SettingsFile;
 use super::super::source::{Source, SourceName, Wanted};
 use super::super::unused::From;
-use super::super::values::Effect;
 use super::super::{command_line, depth, presets, print, save};
 use crate::bokeh::{self, Backend, Bokeh};
 use crate::clock::Clock;
 use crate::compute::device::Device;
-use crate::look::{Look, flags::Flag};
-use crate::preview::backstage::{Backstage, Choice, Control, Opened, Preset, Switch};
+use crate::look::presets::Preset;
+use crate::look::settings::Value;
+use crate::look::{Effect, Look, Patch};
+use crate::preview::backstage::{Backstage, Choice, Control, Opened, Switch};
 use crate::sink::{self, Sink, Target};
 
 /// What is said when there is nothing to look at but our own scene.
@@ -29,6 +30,8 @@ const SYNTHETIC: &str = "synthetic";
 
 pub(super) struct Wings {
     parts: Streaming,
+    /// The look at the start.
+    look: Look,
     executor: Executor,
     /// The GPU that blurs and draws, where one does.
     device: Option<Arc<Device>>,
@@ -51,17 +54,15 @@ pub(super) struct Wings {
 impl Wings {
     /// Opens what is asked for as `parts` say.
     pub fn new(
-        parts: &Streaming,
+        (parts, look): (&Streaming, &Look),
         executor: &Executor,
         device: Option<Arc<Device>>,
         chosen: Option<PathBuf>,
         Given { switches: given, behind, .. }: Given,
     ) -> Self {
-        let mut parts = parts.clone();
-        // Of depth the window may make use later.
-        parts.blur.effect = Effect::Auto;
         Self {
-            parts,
+            parts: parts.clone(),
+            look: look.clone(),
             executor: executor.clone(),
             device,
             chosen,
@@ -77,19 +78,22 @@ impl Wings {
     fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
         let Streaming { frames, blur, depth, stereo, stream, .. } = &self.parts;
+        // Of depth the window may make use later.
+        let look = Look { effect: Effect::Auto, ..self.look.clone() };
         let frames =
             options::Source { repeat: frames.repeat && source_name.kind() == From::Recording, ..frames.clone() };
         let wanted = Wanted {
             frames: &frames,
             depth,
             stereo,
-            blur: Some(blur),
+            from: &blur.depth,
+            look: Some(&look),
             executor: &self.executor,
             keep_going: stream.keep_going,
             cycle: true,
         };
         let source = Source::open(&source_name, &wanted).map_err(|error| error.to_string())?;
-        let source = depth::beside(source, blur, depth, stream.keep_going, &Clock::system());
+        let source = depth::beside(source, &wanted, &Clock::system());
         Ok((source.map_err(|error| error.to_string())?, source_name))
     }
 }
@@ -146,7 +150,7 @@ impl Backstage for Wings {
     }
 
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
-        let threads = self.executor.threads();
+        let threads = self.executor.threads;
         // One that failed stays so.
         let made = match self.device.as_ref().filter(|device| device.check().is_ok()) {
             Some(device) => bokeh::create_on(settings, size, Arc::clone(device), threads),
@@ -183,23 +187,22 @@ impl Backstage for Wings {
             let controls: Vec<String> = self.set.iter().map(|(name, value)| format!("{name}={value}")).collect();
             switches.push(("control".into(), controls.join(",")));
         }
-        let usual = look.flags();
-        let says = |flag: &Flag| usual.contains(flag) || self.behind.iter().any(|name| name == flag.0);
-        let flags: Vec<Flag> = look.every_flag().into_iter().filter(says).collect();
+        let unusual = Patch::of(look).beside(&Patch::of(&Look::default())).values();
+        let says = |value: &Value| unusual.contains(value) || self.behind.iter().any(|name| name == value.0);
+        let flags: Vec<Value> = Patch::of(look).values().into_iter().filter(says).collect();
         let command = command_line::equivalent(source, outputs, &flags, &switches);
         // Whoever reads it may be gone.
         let _ = print(format!("{command}\n").as_bytes());
         command
     }
 
-    fn presets(&mut self, look: &Look) -> Vec<Preset> {
-        let presets = presets::all_upon(&self.file, look, true).into_iter();
-        presets.map(|presets::Upon { name, look, own }| Preset { name, look, own }).collect()
+    fn presets(&mut self) -> Vec<Preset> {
+        self.file.all_presets()
     }
 
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
         let saved = save::file_to_save(self.chosen.as_deref());
-        let saved = saved.and_then(|file| presets::save(&file, name, &look.every_flag()));
+        let saved = saved.and_then(|file| presets::save(&file, name, &Patch::of(look).values()));
         saved.map_err(|error| error.to_string())?;
         self.sources();
         Ok(())

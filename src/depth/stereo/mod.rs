@@ -30,6 +30,7 @@ use tidy::Tidy;
 use crate::compute::team::{Shelf, Team};
 use crate::compute::{Backend, GpuError};
 use crate::frame::{ColorImage, DisparityMap, GrayImage};
+use crate::names::named;
 
 /// How pairs are matched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,13 +50,14 @@ impl Settings {
     pub const MOST_DISPARITIES: u32 = 256;
 }
 
-/// The ladder of speeds of matching.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Effort {
-    /// Half the columns, rows and disparities.
-    Fast,
-    /// All pixels.
-    Full,
+named! {
+    /// The ladder of speeds of matching.
+    pub enum Effort default Full {
+        /// Half the columns and rows
+        Fast = "fast",
+        /// All pixels
+        Full = "full",
+    }
 }
 
 /// A rectified pair.

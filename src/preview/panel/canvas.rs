@@ -5,8 +5,8 @@ use egui::{Id, Pos2, Rect, Response, Sense, Ui, Vec2, pos2};
 use super::Canvas;
 use super::marks::{self, Tilting};
 use super::state::{Action, Shown, State, tweak};
-use crate::bokeh::Effect;
 use crate::depth::focus::FocusRule;
+use crate::look::Effect;
 use crate::look::Look;
 
 /// How long a ring shows where one clicked, in seconds.
@@ -71,7 +71,7 @@ impl Gestures {
         // No stop for the Tab key: the arrow keys do what a click does.
         let response = ui.interact(place.rect, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
         let line = split_line(ui, state, &place);
-        let is_tilt = state.look.effect == Some(Effect::TiltShift) && state.shown == Shown::Picture && !state.bare;
+        let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.bare;
         let own = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
         if !own {
             self.click(&response, state, &place, actions);
@@ -93,7 +93,7 @@ impl Gestures {
         let Some(at) = response.interact_pointer_pos().filter(|_| response.clicked()) else { return };
         let mut look = state.look.clone();
         let [x, y] = place.fractions(at);
-        if look.effect == Some(Effect::TiltShift) {
+        if look.effect == Effect::TiltShift {
             look.tilt.center_y = marks::center_through(&look.tilt, place.size, [x, y]);
         // A double click soon after another click counts as a third.
         } else if response.double_clicked() || response.triple_clicked() {
@@ -135,7 +135,7 @@ impl Gestures {
             let near = self.tilting.or_else(|| pointer.and_then(|at| marks::grip(&state.look.tilt, place, at)));
             marks::tilt(&painter, &state.look.tilt, place, near);
         }
-        if let (FocusRule::Point { x, y }, Some(Effect::Dof)) = (state.look.focus, state.look.effect) {
+        if let (FocusRule::Point { x, y }, Effect::Auto) = (state.look.focus, state.look.effect) {
             marks::point(&painter, place.point([x, y]));
         }
         if let Some((at, since)) = self.ring {

@@ -104,7 +104,7 @@ fn status(ui: &mut Ui, state: &State) {
     if let Source::Running(running) = &state.source {
         parts.push(running.label.clone());
     }
-    let focused = state.look.effect == Some(crate::bokeh::Effect::Dof);
+    let focused = state.look.effect.follows_depth();
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
         parts.push(format!("focused at {metres:.2} m"));
     }

@@ -6,10 +6,10 @@ use std::sync::{Arc, mpsc};
 
 use super::live::{self, Live};
 use super::{Closed, Heard, News, Order, Start, Still};
-use crate::look::Look;
+use crate::look::{Look, Patch};
 use crate::pipeline::{PipelineError, Wanted};
 use crate::preview::backstage::{Backstage, Switch};
-use crate::preview::state::{Effect, Output, Source, Told};
+use crate::preview::state::{Output, Request, Source, Told};
 use crate::recording::snapshot::{self, Snapshot};
 use crate::sink;
 use crate::sink::switch::{Fate, Told as Written};
@@ -80,10 +80,10 @@ impl Host {
             while let Some(order) = next.take() {
                 match order {
                     // Of looks that wait, the last one counts.
-                    Order::Do(Effect::Look(mut look)) => {
+                    Order::Do(Request::Look(mut look)) => {
                         for order in inbox.try_iter() {
                             match order {
-                                Order::Do(Effect::Look(newer)) => look = newer,
+                                Order::Do(Request::Look(newer)) => look = newer,
                                 other => {
                                     next = Some(other);
                                     break;
@@ -92,7 +92,7 @@ impl Host {
                         }
                         self.adopt(*look);
                     }
-                    Order::Do(effect) => self.bring_about(effect),
+                    Order::Do(request) => self.bring_about(request),
                     Order::Save(still) => self.save(&still),
                     Order::Copy(switches) => self.copy(&switches),
                     Order::Wrote(run, written) => self.wrote(run, &written),
@@ -122,38 +122,38 @@ impl Host {
         }
     }
 
-    fn bring_about(&mut self, effect: Effect) {
-        match effect {
-            Effect::Open(name) => {
+    fn bring_about(&mut self, request: Request) {
+        match request {
+            Request::Open(name) => {
                 self.source = name;
                 self.stop();
                 self.open();
             }
-            Effect::Begin(output) => {
+            Request::Begin(output) => {
                 self.begin(output);
                 self.tell_outputs();
             }
-            Effect::End(output) => {
+            Request::End(output) => {
                 self.outputs.retain(|other| *other != output);
                 if let Some(live) = &self.live {
                     live.end(&output);
                 }
                 self.tell_outputs();
             }
-            Effect::Control(name, value) => match self.backstage.set_control(&name, value) {
+            Request::Control(name, value) => match self.backstage.set_control(&name, value) {
                 Ok(controls) => self.news.tell(Told::Controls(controls)),
                 Err(line) => self.news.note(line),
             },
-            Effect::Refresh => self.tell_choices(),
-            Effect::SavePreset(name, look) => match self.backstage.save_preset(&name, &look) {
+            Request::Refresh => self.tell_choices(),
+            Request::SavePreset(name, look) => match self.backstage.save_preset(&name, &look) {
                 Ok(()) => {
                     self.news.note(format!("saved as preset '{name}'"));
-                    self.news.tell(Told::Presets(self.backstage.presets(&self.look)));
+                    self.news.tell(Told::Presets(self.backstage.presets()));
                 }
                 Err(line) => self.news.note(line),
             },
             // These are the window's own, or come another way.
-            Effect::Look(_) | Effect::Snapshot | Effect::CopyCommand | Effect::FullScreen(_) | Effect::Close => {}
+            Request::Look(_) | Request::Snapshot | Request::CopyCommand | Request::FullScreen(_) | Request::Close => {}
         }
     }
 
@@ -161,7 +161,7 @@ impl Host {
         let sources = self.backstage.sources();
         let virtual_cameras = self.backstage.virtual_cameras();
         self.news.tell(Told::Choices { sources, virtual_cameras });
-        self.news.tell(Told::Presets(self.backstage.presets(&self.look)));
+        self.news.tell(Told::Presets(self.backstage.presets()));
     }
 
     fn tell_outputs(&self) {
@@ -231,8 +231,6 @@ impl Host {
                 self.news.note(line);
             }
         }
-        // They change other looks than before.
-        self.news.tell(Told::Presets(self.backstage.presets(&self.look)));
     }
 
     fn begin(&mut self, mut output: Output) {
@@ -312,7 +310,7 @@ impl Host {
     fn save(&self, still: &Still) {
         let its_own = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
         let look = its_own.map_or(&self.look, |(_, look)| look);
-        let settings = look.flags_of_frame(&still.coc, still.quality);
+        let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
         let Still { picture, color, depth, .. } = still;
         let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
         match snapshot::save(&self.folder, "bokehcam", &snapshot) {

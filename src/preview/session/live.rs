@@ -32,7 +32,6 @@ pub(super) struct Live {
     pub size: (u32, u32),
     pub period_ns: u64,
     has_depth: bool,
-    measured: bool,
     /// What the executor was made for.
     made_for: Option<bokeh::Settings>,
     changes: mpsc::Sender<Change>,
@@ -70,16 +69,15 @@ impl Live {
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), settings.keep_going);
         let wanted = Arc::clone(&settings.wanted);
-        let (coc, refine, quality) = (look.coc_rule(info.size), look.refines(measured), look.quality_rule(ADAPTIVE));
         news.send(Heard::Views(views));
         let run = move || {
             pipeline::run(Run {
                 camera,
                 depth,
                 bokeh,
-                quality,
-                coc,
-                refine,
+                look,
+                adaptive: ADAPTIVE,
+                measured,
                 changes: Some(to_come),
                 sink: Box::new(sink),
                 pace: Pace::Realtime,
@@ -113,17 +111,8 @@ impl Live {
             executor,
             budget_ns,
         });
-        let live = Self {
-            size: info.size,
-            period_ns: info.period_ns,
-            has_depth,
-            measured,
-            made_for,
-            changes,
-            board,
-            stop,
-            thread,
-        };
+        let live =
+            Self { size: info.size, period_ns: info.period_ns, has_depth, made_for, changes, board, stop, thread };
         Ok((live, source))
     }
 
@@ -139,15 +128,10 @@ impl Live {
     pub(super) fn adopt(&mut self, look: &Look, number: u64, backstage: &mut dyn Backstage) -> Result<(), String> {
         let look = self.effective(look);
         let made_for = look.settings(self.size, ADAPTIVE);
-        let change = |number, bokeh| Change {
-            number,
-            coc: look.coc_rule(self.size),
-            refine: look.refines(self.measured),
-            quality: look.quality_rule(ADAPTIVE),
-            bokeh,
-        };
+        let change = |number, bokeh| Change { number, look: look.clone(), bokeh };
+        let kind = |settings: &Option<bokeh::Settings>| settings.as_ref().map(|settings| settings.coc);
         // A run that has ended hears nothing.
-        if self.effect() == look.effect {
+        if kind(&self.made_for) == kind(&made_for) {
             // At once what can be at once: the executor at hand cuts what it was not made for.
             let number = if made_for == self.made_for { number } else { number - 1 };
             let _ = self.changes.send(change(number, Executor::Keep));
@@ -160,10 +144,6 @@ impl Live {
             self.made_for = made_for;
         }
         Ok(())
-    }
-
-    fn effect(&self) -> Option<bokeh::Effect> {
-        self.made_for.as_ref().map(|settings| settings.effect)
     }
 
     /// Frames go to this sink, too.

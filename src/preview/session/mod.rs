@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use host::Host;
 
 use super::backstage::{Backstage, Switch};
-use super::state::{Effect, Output, Told};
+use super::state::{Output, Request, Told};
 use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
@@ -86,7 +86,7 @@ pub struct Closed {
 
 /// What a session is to do.
 enum Order {
-    Do(Effect),
+    Do(Request),
     Save(Box<Still>),
     Copy(Vec<Switch>),
     /// What became of an output of the run of this number.
@@ -119,8 +119,8 @@ impl Session {
     }
 
     /// Has an effect brought about. One that comes after the end is nobody's.
-    pub fn order(&self, effect: Effect) {
-        let _ = self.orders.send(Order::Do(effect));
+    pub fn order(&self, request: Request) {
+        let _ = self.orders.send(Order::Do(request));
     }
 
     /// Saves a frame.

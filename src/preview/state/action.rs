@@ -2,7 +2,8 @@
 
 use super::{Output, Shown, Source};
 use crate::look::Look;
-use crate::preview::backstage::{Choice, Control, Preset};
+use crate::look::presets::Preset;
+use crate::preview::backstage::{Choice, Control};
 
 /// What a person can do. Every control and key is one of these.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +71,7 @@ pub enum Action {
 
 /// What others have to do after an action.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Effect {
+pub enum Request {
     /// The look changed.
     Look(Box<Look>),
     /// Save it under this name.

@@ -1,8 +1,7 @@
 //! What an action makes of the state.
 
-use super::{Action, Effect, Output, Shown, Source, State, TEXT_SCALES};
-use crate::bokeh;
-use crate::look::{Look, Strength};
+use super::{Action, Output, Request, Shown, Source, State, TEXT_SCALES};
+use crate::look::{Effect, Look, Strength};
 
 /// What is missing where a look or a view needs depth; also what to do.
 pub const NO_DEPTH: &str =
@@ -14,7 +13,7 @@ pub const NO_VIRTUAL_CAMERA: &str = "There is no virtual camera yet: `bokehcam d
 
 impl State {
     /// Does what the person did; gives back what only others can bring about.
-    pub fn apply(&mut self, action: Action) -> Vec<Effect> {
+    pub fn apply(&mut self, action: Action) -> Vec<Request> {
         match action {
             Action::Look { look, stroke } => return self.set_look(*look, stroke),
             Action::Settle => self.history.settle(),
@@ -30,10 +29,10 @@ impl State {
             Action::Preset(name) => return self.set_preset(&name),
             Action::SavePreset(name) => match name.trim() {
                 "" => self.note("A preset needs a name."),
-                name => return vec![Effect::SavePreset(name.to_owned(), Box::new(self.look.clone()))],
+                name => return vec![Request::SavePreset(name.to_owned(), Box::new(self.look.clone()))],
             },
             Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(NO_DEPTH),
-            Action::Show(Shown::Depth) if self.look.effect != Some(bokeh::Effect::Dof) => self.note(NOT_FOLLOWED),
+            Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(NOT_FOLLOWED),
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
             Action::Mirror(on) => self.mirror = on,
@@ -48,23 +47,23 @@ impl State {
             Action::TextScale(_) => {}
             Action::FullScreen(on) => {
                 self.full_screen = on;
-                return vec![Effect::FullScreen(on)];
+                return vec![Request::FullScreen(on)];
             }
-            Action::Snapshot => return vec![Effect::Snapshot],
+            Action::Snapshot => return vec![Request::Snapshot],
             Action::Record(on) => return self.record(on),
             Action::VirtualCamera(name) => return self.write_to(name),
             Action::Open(name) => return self.open(name),
             Action::Retry => return self.open(self.source_name.clone()),
             Action::Control(name, value) => return self.set_control(name, value),
-            Action::Refresh => return vec![Effect::Refresh],
-            Action::CopyCommand => return vec![Effect::CopyCommand],
-            Action::Close => return vec![Effect::Close],
+            Action::Refresh => return vec![Request::Refresh],
+            Action::CopyCommand => return vec![Request::CopyCommand],
+            Action::Close => return vec![Request::Close],
             Action::Dismiss => self.trouble = None,
         }
         Vec::new()
     }
 
-    fn set_look(&mut self, look: Look, stroke: Option<&'static str>) -> Vec<Effect> {
+    fn set_look(&mut self, look: Look, stroke: Option<&'static str>) -> Vec<Request> {
         let look = self.fitting(look);
         if look == self.look {
             return Vec::new();
@@ -73,11 +72,10 @@ impl State {
         self.go_to(Some(look))
     }
 
-    fn go_to(&mut self, look: Option<Look>) -> Vec<Effect> {
+    fn go_to(&mut self, look: Option<Look>) -> Vec<Request> {
         let Some(look) = look else { return Vec::new() };
         let mut look = self.fitting(look);
-        let follows = |look: &Look| look.effect == Some(bokeh::Effect::Dof);
-        if follows(&self.look) && !follows(&look) {
+        if self.look.effect.follows_depth() && !look.effect.follows_depth() {
             // Without depth a lens would need a distance, and there is no depth to be seen.
             if matches!(look.strength, Strength::Lens(_)) {
                 look.strength = Strength::Default;
@@ -87,22 +85,29 @@ impl State {
             }
         }
         self.look = look;
-        vec![Effect::Look(Box::new(self.look.clone()))]
+        vec![Request::Look(Box::new(self.look.clone()))]
     }
 
-    fn set_preset(&mut self, name: &str) -> Vec<Effect> {
+    fn set_preset(&mut self, name: &str) -> Vec<Request> {
         let Some(preset) = self.presets.iter().find(|preset| preset.name == name) else {
             self.note(format!("There is no preset '{name}'."));
             return Vec::new();
         };
-        if preset.look.effect == Some(bokeh::Effect::Dof) && !self.may_have_depth() {
+        if preset.patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
             self.note(NO_DEPTH);
             return Vec::new();
         }
-        self.set_look(preset.look.clone(), None)
+        match preset.patch.on(&self.look) {
+            Ok(look) => self.set_look(look, None),
+            Err(error) => {
+                let line = format!("preset {name}: {error}");
+                self.note(line);
+                Vec::new()
+            }
+        }
     }
 
-    fn record(&mut self, on: bool) -> Vec<Effect> {
+    fn record(&mut self, on: bool) -> Vec<Request> {
         match (on, self.recording().cloned()) {
             (true, None) => self.begin(Output { name: String::new(), is_camera: false }),
             (false, Some(output)) => self.end(output),
@@ -110,7 +115,7 @@ impl State {
         }
     }
 
-    fn write_to(&mut self, name: Option<String>) -> Vec<Effect> {
+    fn write_to(&mut self, name: Option<String>) -> Vec<Request> {
         let current = self.virtual_camera().cloned();
         if current.as_ref().map(|output| &output.name) == name.as_ref() {
             if name.is_none() {
@@ -124,17 +129,17 @@ impl State {
     }
 
     /// It counts as written to from now on, so that nothing begins it twice; what becomes of it, others tell.
-    fn begin(&mut self, output: Output) -> Vec<Effect> {
+    fn begin(&mut self, output: Output) -> Vec<Request> {
         self.outputs.push(output.clone());
-        vec![Effect::Begin(output)]
+        vec![Request::Begin(output)]
     }
 
-    fn end(&mut self, output: Output) -> Vec<Effect> {
+    fn end(&mut self, output: Output) -> Vec<Request> {
         self.outputs.retain(|other| *other != output);
-        vec![Effect::End(output)]
+        vec![Request::End(output)]
     }
 
-    fn open(&mut self, name: String) -> Vec<Effect> {
+    fn open(&mut self, name: String) -> Vec<Request> {
         if name != self.source_name {
             self.controls.clear();
             self.source_name.clone_from(&name);
@@ -142,10 +147,10 @@ impl State {
         self.source = Source::Opening;
         self.frozen = false;
         self.focus_m = None;
-        vec![Effect::Open(name)]
+        vec![Request::Open(name)]
     }
 
-    fn set_control(&mut self, name: String, value: i64) -> Vec<Effect> {
+    fn set_control(&mut self, name: String, value: i64) -> Vec<Request> {
         let Some(control) = self.controls.iter_mut().find(|control| control.name == name && control.active) else {
             return Vec::new();
         };
@@ -154,6 +159,6 @@ impl State {
         if std::mem::replace(&mut control.value, value) == value {
             return Vec::new();
         }
-        vec![Effect::Control(name, value)]
+        vec![Request::Control(name, value)]
     }
 }

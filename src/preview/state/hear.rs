@@ -1,13 +1,12 @@
 //! What others tell, and what it makes of the state.
 
 use super::apply::NO_DEPTH;
-use super::{Effect, Shown, Source, State, Told};
-use crate::bokeh;
-use crate::look::Look;
+use super::{Request, Shown, Source, State, Told};
+use crate::look::{Effect, Look};
 
 impl State {
     /// Takes note of what others tell; gives back another look where the source calls for one.
-    pub fn hear(&mut self, told: Told) -> Option<Effect> {
+    pub fn hear(&mut self, told: Told) -> Option<Request> {
         match told {
             Told::Source(source) => return self.source_is(source),
             Told::Choices { sources, virtual_cameras } => {
@@ -22,7 +21,7 @@ impl State {
         None
     }
 
-    fn source_is(&mut self, source: Source) -> Option<Effect> {
+    fn source_is(&mut self, source: Source) -> Option<Request> {
         if let Source::Running(running) = &source {
             self.meters.restart();
             self.source_name.clone_from(&running.name);
@@ -36,14 +35,14 @@ impl State {
             // What was changed for a source without depth is changed back for one that has it.
             Source::Running(running) if running.has_depth && self.fitted => {
                 self.fitted = false;
-                let follows = self.look.effect == Some(bokeh::Effect::TiltShift);
-                Look { effect: if follows { Some(bokeh::Effect::Dof) } else { self.look.effect }, ..self.look.clone() }
+                let follows = self.look.effect == Effect::TiltShift;
+                Look { effect: if follows { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
             }
             _ => self.fitting(self.look.clone()),
         };
         (look != self.look).then(|| {
             self.look = look;
-            Effect::Look(Box::new(self.look.clone()))
+            Request::Look(Box::new(self.look.clone()))
         })
     }
 

@@ -13,27 +13,29 @@ mod switches;
 mod tests;
 pub mod tweak;
 
-pub use action::{Action, Effect, Told};
+pub use action::{Action, Request, Told};
 pub use apply::{NO_DEPTH, NO_VIRTUAL_CAMERA};
 pub use history::History;
 
-use super::backstage::{Choice, Control, Preset};
+use super::backstage::{Choice, Control};
 use super::meters::Meters;
 use super::views::Legend;
 use crate::look::Look;
+use crate::look::presets::Preset;
+use crate::names::named;
 
-/// What of a frame is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Shown {
-    /// The picture.
-    #[default]
-    Picture,
-    /// Its depth, in colours, with a legend in metres.
-    Depth,
-    /// Its circle of confusion.
-    Coc,
-    /// The bins that it is split into.
-    Bins,
+named! {
+    /// What of a frame is shown.
+    pub enum Shown default Picture {
+        /// The picture
+        Picture = "picture",
+        /// Its depth, in colours
+        Depth = "depth",
+        /// Its circle of confusion
+        Coc = "coc",
+        /// The bins that it is split into
+        Bins = "bins",
+    }
 }
 
 /// The source as it is now.
@@ -218,7 +220,7 @@ impl State {
 
     /// Whether the look is that of a preset, wherever it is focused.
     pub fn is_in_use(&self, preset: &Preset) -> bool {
-        let look = &preset.look;
-        look.effect == self.look.effect && Look { focus: self.look.focus, ..look.clone() } == self.look
+        let used = preset.patch.on(&self.look);
+        used.is_ok_and(|look| Look { focus: self.look.focus, ..look } == self.look)
     }
 }

@@ -1,30 +1,13 @@
 //! A state to try things on.
 
 use super::{Running, Source, State};
-use crate::bokeh::aperture::Aperture;
-use crate::bokeh::{Effect, Method};
-use crate::depth::focus::FocusRule;
-use crate::look::{Look, Refine, Strength, Tilt};
-use crate::preview::backstage::{Choice, Control, Preset};
+use crate::look::presets::Preset;
+use crate::look::{Effect, Look, Patch, Strength, Tilt};
+use crate::preview::backstage::{Choice, Control};
 
 /// The look that the command line has without any flags.
 pub fn look() -> Look {
-    Look {
-        effect: Some(Effect::Dof),
-        method: Method::Layered,
-        focus: FocusRule::Auto,
-        focus_range_m: 0.0,
-        strength: Strength::Default,
-        max_coc_px: None,
-        refine: Refine::Auto,
-        tilt: Tilt { center_y: 0.5, band: 0.15, angle_deg: 0.0 },
-        aperture: Aperture::default(),
-        aperture_file: None,
-        rim: 0.2,
-        rank: None,
-        highlights: 8.0,
-        quality: None,
-    }
+    Look { tilt: Tilt { center_y: 0.5, band: 0.15, angle_deg: 0.0 }, highlights: 8.0, ..Look::default() }
 }
 
 /// Another look than [`look`], by how strong it is.
@@ -53,13 +36,13 @@ pub fn state() -> State {
     let choice = |name: &str, label: &str| Choice { name: name.into(), label: label.into() };
     state.sources = vec![choice("portrait", "Recording: portrait"), choice("/dev/video0", "Desk camera")];
     state.virtual_cameras = vec![choice("/dev/video9", "bokehcam (/dev/video9)")];
-    let preset = |name: &str, look: Look, own: bool| Preset { name: name.into(), look, own };
+    let preset = |name: &str, look: Look, own: bool| Preset { name: name.into(), patch: Patch::of(&look), own };
     state.presets = vec![
         preset("portrait", look(), false),
         preset("cinematic", blurred(30.0), false),
         preset("dreamy", Look { highlights: 20.0, ..blurred(40.0) }, false),
         preset("product", Look { focus_range_m: 0.2, ..blurred(12.0) }, false),
-        preset("miniature", Look { effect: Some(Effect::TiltShift), ..blurred(14.0) }, false),
+        preset("miniature", Look { effect: Effect::TiltShift, ..blurred(14.0) }, false),
         preset("my desk", blurred(21.0), true),
     ];
     let control = |name: &str, value: i64, range: (i64, i64, i64)| Control {

@@ -6,15 +6,10 @@ use crate::preview::backstage::Switch;
 impl State {
     /// The options that show the window as it is, beside those of the look; what is usual is left out.
     pub fn switches(&self) -> Vec<Switch> {
-        let shown = match self.shown {
-            Shown::Picture => None,
-            Shown::Depth => Some("depth"),
-            Shown::Coc => Some("coc"),
-            Shown::Bins => Some("bins"),
-        };
+        let shown = Some(self.shown).filter(|shown| *shown != Shown::default());
         let yes = |on: bool| on.then(|| "true".to_owned());
         let switches = [
-            ("show", shown.map(str::to_owned)),
+            ("show", shown.map(|shown| shown.to_string())),
             ("split", self.split.map(|at| format!("{at:.3}"))),
             ("mirror", yes(self.mirror)),
             ("full-screen", yes(self.full_screen)),

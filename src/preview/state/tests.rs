@@ -1,9 +1,8 @@
 use super::sample::{blurred, look, running, state};
 use super::*;
-use crate::bokeh;
-use crate::look::{Look, Strength};
+use crate::look::{Effect, Look, Strength};
 
-fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<Effect> {
+fn set(state: &mut State, radius_px: f32, stroke: Option<&'static str>) -> Vec<Request> {
     state.apply(Action::Look { look: Box::new(blurred(radius_px)), stroke })
 }
 
@@ -21,10 +20,10 @@ fn a_look_takes_effect_and_can_be_undone_and_redone() {
     assert_eq!(state.history.can(), (false, false));
     for radius_px in [1.0, 2.0, 3.0] {
         let effects = set(&mut state, radius_px, None);
-        assert_eq!(effects, [Effect::Look(Box::new(blurred(radius_px)))]);
+        assert_eq!(effects, [Request::Look(Box::new(blurred(radius_px)))]);
     }
     assert_eq!(set(&mut state, 3.0, None), [], "nothing changed");
-    assert_eq!(state.apply(Action::Undo), [Effect::Look(Box::new(blurred(2.0)))]);
+    assert_eq!(state.apply(Action::Undo), [Request::Look(Box::new(blurred(2.0)))]);
     state.apply(Action::Undo);
     assert_eq!((radius_px(&state), state.history.can()), (1.0, (true, true)));
     state.apply(Action::Redo);
@@ -73,7 +72,7 @@ fn reset_goes_to_the_first_look_and_can_be_undone() {
     let mut state = state();
     assert_eq!(state.apply(Action::Reset), []);
     set(&mut state, 7.0, None);
-    assert_eq!(state.apply(Action::Reset), [Effect::Look(Box::new(look()))]);
+    assert_eq!(state.apply(Action::Reset), [Request::Look(Box::new(look()))]);
     state.apply(Action::Undo);
     assert_eq!(radius_px(&state), 7.0);
 }
@@ -98,8 +97,8 @@ fn presets_are_looks_by_name() {
 fn what_needs_depth_says_so_where_there_is_none() {
     let mut state = state();
     // What follows depth becomes tilt-shift, and the session is told.
-    let toy = Look { effect: Some(bokeh::Effect::TiltShift), ..look() };
-    assert_eq!(state.hear(Told::Source(running(false))), Some(Effect::Look(Box::new(toy.clone()))));
+    let toy = Look { effect: Effect::TiltShift, ..look() };
+    assert_eq!(state.hear(Told::Source(running(false))), Some(Request::Look(Box::new(toy.clone()))));
     for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
         let before = state.notes.len();
         assert_eq!(state.apply(action), []);
@@ -108,10 +107,10 @@ fn what_needs_depth_says_so_where_there_is_none() {
     assert_eq!((state.shown, &state.look), (Shown::Picture, &toy));
     assert_eq!(state.apply(Action::Reset), [], "nor does the first look follow any");
     assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
-    assert_eq!(state.look.effect, Some(bokeh::Effect::TiltShift));
+    assert_eq!(state.look.effect, Effect::TiltShift);
     // It follows depth again where there is some; a view of it goes back to the picture when the next source has none.
     state.hear(Told::Source(running(true)));
-    assert_eq!(state.look.effect, Some(bokeh::Effect::Dof));
+    assert_eq!(state.look.effect, Effect::Auto);
     state.apply(Action::Show(Shown::Depth));
     state.hear(Told::Source(running(false)));
     assert_eq!(state.shown, Shown::Picture);
@@ -133,7 +132,7 @@ fn switches_are_what_they_were_set_to() {
         }
         let switches = [state.mirror, state.frozen, state.panel, state.instruments, state.bare, state.help];
         assert_eq!(switches, [on; 6]);
-        assert_eq!(state.apply(Action::FullScreen(on)), [Effect::FullScreen(on)]);
+        assert_eq!(state.apply(Action::FullScreen(on)), [Request::FullScreen(on)]);
         assert_eq!(state.full_screen, on);
     }
     for (asked, got) in [(0.3, Some(0.3)), (-1.0, Some(0.0)), (7.0, Some(1.0)), (f32::NAN, None)] {
@@ -150,20 +149,20 @@ fn switches_are_what_they_were_set_to() {
 fn outputs_begin_once_and_end_once() {
     let mut state = state();
     let recording = Output { name: String::new(), is_camera: false };
-    assert_eq!(state.apply(Action::Record(true)), [Effect::Begin(recording.clone())]);
+    assert_eq!(state.apply(Action::Record(true)), [Request::Begin(recording.clone())]);
     assert_eq!(state.apply(Action::Record(true)), [], "twice at once");
     let named = Output { name: "clip.mp4".into(), is_camera: false };
     state.hear(Told::Outputs(vec![named.clone()]));
     assert_eq!(state.recording(), Some(&named));
-    assert_eq!(state.apply(Action::Record(false)), [Effect::End(named)]);
+    assert_eq!(state.apply(Action::Record(false)), [Request::End(named)]);
     assert_eq!(state.apply(Action::Record(false)), []);
 
     let camera = |name: &str| Output { name: name.into(), is_camera: true };
     let choose = |name: &str| Action::VirtualCamera(Some(name.to_owned()));
-    assert_eq!(state.apply(choose("a")), [Effect::Begin(camera("a"))]);
+    assert_eq!(state.apply(choose("a")), [Request::Begin(camera("a"))]);
     assert_eq!(state.apply(choose("a")), []);
-    assert_eq!(state.apply(choose("b")), [Effect::End(camera("a")), Effect::Begin(camera("b"))]);
-    assert_eq!(state.apply(Action::VirtualCamera(None)), [Effect::End(camera("b"))]);
+    assert_eq!(state.apply(choose("b")), [Request::End(camera("a")), Request::Begin(camera("b"))]);
+    assert_eq!(state.apply(Action::VirtualCamera(None)), [Request::End(camera("b"))]);
     assert_eq!(state.apply(Action::VirtualCamera(None)), []);
     assert_eq!(state.notes.last().unwrap().text, NO_VIRTUAL_CAMERA);
 }
@@ -172,12 +171,12 @@ fn outputs_begin_once_and_end_once() {
 fn a_source_is_opened_lost_and_opened_again() {
     let mut state = state();
     state.frozen = true;
-    assert_eq!(state.apply(Action::Open("/dev/video0".into())), [Effect::Open("/dev/video0".into())]);
+    assert_eq!(state.apply(Action::Open("/dev/video0".into())), [Request::Open("/dev/video0".into())]);
     assert_eq!((&state.source, state.frozen, state.controls.len()), (&Source::Opening, false, 0));
     for end in [Source::Lost("unplugged".into()), Source::Ended] {
         state.hear(Told::Source(end.clone()));
         assert_eq!(state.source, end);
-        assert_eq!(state.apply(Action::Retry), [Effect::Open("/dev/video0".into())]);
+        assert_eq!(state.apply(Action::Retry), [Request::Open("/dev/video0".into())]);
         assert_eq!(state.source, Source::Opening);
     }
 }
@@ -186,7 +185,7 @@ fn a_source_is_opened_lost_and_opened_again() {
 fn controls_of_the_camera_stay_in_their_range() {
     let mut state = state();
     let set = |state: &mut State, value: i64| state.apply(Action::Control("brightness".into(), value));
-    assert_eq!(set(&mut state, 500), [Effect::Control("brightness".into(), 64)]);
+    assert_eq!(set(&mut state, 500), [Request::Control("brightness".into(), 64)]);
     assert_eq!(set(&mut state, 64), [], "it is that already");
     assert_eq!(state.apply(Action::Control("exposure_time_absolute".into(), 3)), [], "it cannot be changed now");
     assert_eq!(state.apply(Action::Control("nothing".into(), 3)), []);
@@ -196,10 +195,10 @@ fn controls_of_the_camera_stay_in_their_range() {
 fn what_others_do_is_asked_of_them() {
     let mut state = state();
     for (action, effect) in [
-        (Action::Snapshot, Effect::Snapshot),
-        (Action::Refresh, Effect::Refresh),
-        (Action::CopyCommand, Effect::CopyCommand),
-        (Action::Close, Effect::Close),
+        (Action::Snapshot, Request::Snapshot),
+        (Action::Refresh, Request::Refresh),
+        (Action::CopyCommand, Request::CopyCommand),
+        (Action::Close, Request::Close),
     ] {
         assert_eq!(state.apply(action), [effect]);
     }
@@ -260,7 +259,7 @@ fn arrows_move_what_is_sharp() {
     look.focus = FocusRule::Metres(2.0);
     tweak::move_focus(&mut look, 0.0, -0.02);
     assert!(matches!(look.focus, FocusRule::Metres(metres) if metres > 2.0));
-    look.effect = Some(bokeh::Effect::TiltShift);
+    look.effect = Effect::TiltShift;
     tweak::move_focus(&mut look, 0.02, 0.1);
     assert!((look.tilt.center_y - 0.6).abs() < 1e-6 && (look.tilt.angle_deg - 2.0).abs() < 1e-6);
     for (angle, by, is) in [(89.0, 2.0, -89.0), (-89.0, -2.0, 89.0), (0.0, 360.0, 0.0)] {

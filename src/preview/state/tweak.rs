@@ -1,8 +1,8 @@
 //! Small changes of a look, as a key or a turn of the wheel makes them.
 
-use crate::bokeh::{self, Rank};
+use crate::bokeh::Rank;
 use crate::depth::focus::FocusRule;
-use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MAX_COC_PER_HEIGHT, Strength};
+use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Effect, Look, MAX_COC_PER_HEIGHT, Strength};
 use crate::optics::Lens;
 
 /// The lens that is meant where none was chosen: a portrait lens on full frame.
@@ -41,7 +41,7 @@ pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
 /// Makes the f-number `factor` times as large; the first time, a lens is put on. Only where the blur follows depth has a
 /// lens a distance.
 pub fn f_number_by(look: &mut Look, factor: f32) {
-    if look.effect != Some(bokeh::Effect::Dof) {
+    if !look.effect.follows_depth() {
         return;
     }
     let lens = match look.strength {
@@ -61,7 +61,7 @@ pub fn focus_range_by(look: &mut Look, by_m: f32) {
 /// Moves what is sharp by fractions of the picture's width and height: the band of tilt-shift, the distance of focus
 /// where one was chosen (up is farther), else the point of focus.
 pub fn move_focus(look: &mut Look, dx: f32, dy: f32) {
-    if look.effect == Some(bokeh::Effect::TiltShift) {
+    if look.effect == Effect::TiltShift {
         look.tilt.center_y = (look.tilt.center_y + dy).clamp(0.0, 1.0);
         look.tilt.angle_deg = turned(look.tilt.angle_deg, dx * 100.0);
         return;

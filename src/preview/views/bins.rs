@@ -30,7 +30,7 @@ impl Bins {
         coc: &CocField,
     ) -> &Plan {
         let is_current = |(planned, at, _): &(Settings, (u32, u32), Plan)| {
-            let what = |settings: &Settings| (settings.effect, settings.method);
+            let what = |settings: &Settings| (settings.coc, settings.method);
             let radii_px = |settings: &Settings| [settings.far_max_px, settings.near_max_px];
             what(planned) == what(settings) && radii_px(planned) == radii_px(settings) && *at == size
         };

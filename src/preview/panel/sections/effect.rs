@@ -3,15 +3,15 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::bokeh::Effect;
+use crate::look::Effect;
 use crate::preview::panel::parts::{Number, choose, number, remark};
 use crate::preview::state::Source;
 
-const EFFECTS: [(&str, &str, Option<Effect>); 4] = [
-    ("Depth", "The farther from the focal plane, the more blur", Some(Effect::Dof)),
-    ("Tilt-shift", "A sharp band, and blur that grows away from it", Some(Effect::TiltShift)),
-    ("Even", "The same blur everywhere", Some(Effect::Blur)),
-    ("Off", "The picture as it is", None),
+const EFFECTS: [(&str, &str, Effect); 4] = [
+    ("Depth", "The farther from the focal plane, the more blur", Effect::Auto),
+    ("Tilt-shift", "A sharp band, and blur that grows away from it", Effect::TiltShift),
+    ("Even", "The same blur everywhere", Effect::Blur),
+    ("Off", "The picture as it is", Effect::None),
 ];
 
 /// The effect, and the band of tilt-shift.
@@ -30,7 +30,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
                     or use a depth camera or a recording with depth.",
         );
     }
-    if sheet.look.effect == Some(Effect::TiltShift) {
+    if sheet.look.effect == Effect::TiltShift {
         tilt(ui, sheet);
     }
 }

@@ -3,8 +3,8 @@
 use egui::{Align2, CornerRadius, FontFamily, FontId, Rect, Role, Sense, TextEdit, Ui, Vec2, WidgetInfo, vec2};
 
 use super::Sheet;
-use crate::bokeh::Effect;
-use crate::preview::backstage::Preset;
+use crate::look::Effect;
+use crate::look::presets::Preset;
 use crate::preview::panel::parts::focus_ring;
 use crate::preview::panel::theme::{Colors, medium};
 use crate::preview::state::Action;
@@ -23,7 +23,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving) {
         ui.horizontal_wrapped(|ui| {
             let state = sheet.state;
             for (index, preset) in state.presets.iter().enumerate() {
-                let possible = preset.look.effect != Some(Effect::Dof) || sheet.has_depth();
+                let needs_depth = preset.patch.effect.is_some_and(Effect::follows_depth);
+                let possible = !needs_depth || sheet.has_depth();
                 if chip(ui, index, preset, state.is_in_use(preset), possible) {
                     sheet.act(Action::Preset(preset.name.clone()));
                 }

@@ -17,7 +17,6 @@ use egui::Ui;
 
 use super::parts::section;
 use super::state::{Action, State};
-use crate::bokeh::Effect;
 use crate::look::Look;
 
 /// What the sections read and change.
@@ -51,7 +50,7 @@ impl Sheet<'_> {
     }
 
     fn follows_depth(&self) -> bool {
-        self.look.effect == Some(Effect::Dof)
+        self.look.effect.follows_depth()
     }
 }
 
@@ -63,7 +62,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving, thumbs: &mut Th
     if sheet.follows_depth() {
         section(ui, "Focus", true, |ui| focus::show(ui, sheet));
     }
-    if sheet.look.effect.is_some() {
+    if sheet.look.effect != crate::look::Effect::None {
         section(ui, "Blur", true, |ui| blur::show(ui, sheet));
         section(ui, "Aperture", true, |ui| aperture::show(ui, sheet, thumbs));
         section(ui, "Quality", false, |ui| quality::show(ui, sheet));

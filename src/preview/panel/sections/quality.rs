@@ -3,7 +3,7 @@
 use egui::{ComboBox, Ui};
 
 use super::Sheet;
-use crate::bokeh::{Effect, Method, Rank};
+use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::look::Refine;
 use crate::preview::panel::parts::choose;
@@ -34,7 +34,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             }
         }
     });
-    if sheet.look.effect == Some(Effect::Dof) {
+    if sheet.look.effect.follows_depth() {
         let methods = [
             ("Layered", "Depth bins, blurred and put together front to back"),
             ("Gather", "Every pixel gathers with its own radius: the plain form, for comparison"),

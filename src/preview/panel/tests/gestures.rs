@@ -3,8 +3,8 @@
 use egui::{Event, Modifiers, Pos2, pos2, vec2};
 
 use super::{Action, Window, on_panel, sample};
-use crate::bokeh::Effect;
 use crate::depth::focus::FocusRule;
+use crate::look::Effect;
 use crate::look::Look;
 use crate::preview::present::Area;
 
@@ -122,7 +122,7 @@ fn the_wheel_blurs_more_and_less_over_the_picture_only() {
 
 fn tilted() -> Window {
     let mut state = sample::state();
-    state.look.effect = Some(Effect::TiltShift);
+    state.look.effect = Effect::TiltShift;
     state.look.tilt.band = 0.2;
     Window::of(state, (1280, 720))
 }

@@ -6,8 +6,8 @@ use egui::{Event, Theme, pos2};
 
 use super::paint::{Painter, over};
 use super::{Window, button};
-use crate::bokeh::Effect;
 use crate::frame::ColorImage;
+use crate::look::Effect;
 use crate::preview::panel::theme::{Colors, rung};
 use crate::preview::state::{Source, sample};
 use crate::preview::views::Legend;
@@ -88,7 +88,7 @@ fn pictures() {
         state.note("Saved snapshot-0001.png");
     });
     shot("tilt", Theme::Dark, &|state| {
-        state.look.effect = Some(Effect::TiltShift);
+        state.look.effect = Effect::TiltShift;
         state.look.tilt.angle_deg = -12.0;
         state.source = sample::running(false);
     });

@@ -1,7 +1,7 @@
 //! Windows of all sizes, texts of all sizes, everything open: nothing panics, and nothing is nowhere.
 
 use super::{Window, sample};
-use crate::bokeh::Effect;
+use crate::look::Effect;
 use crate::preview::state::{Shown, Source, State};
 use crate::preview::views::Legend;
 
@@ -15,11 +15,11 @@ fn states() -> Vec<State> {
     full.note("A long line for the person ".repeat(30));
     all.push(full);
     let mut tilt = base.clone();
-    (tilt.look.effect, tilt.mirror, tilt.source) = (Some(Effect::TiltShift), true, sample::running(false));
+    (tilt.look.effect, tilt.mirror, tilt.source) = (Effect::TiltShift, true, sample::running(false));
     tilt.legend = Some(Legend::Coc { most_px: 0.0 });
     all.push(tilt);
     let mut off = base.clone();
-    (off.look.effect, off.shown, off.source) = (None, Shown::Bins, Source::Lost("why ".repeat(200)));
+    (off.look.effect, off.shown, off.source) = (Effect::None, Shown::Bins, Source::Lost("why ".repeat(200)));
     off.legend = Some(Legend::Bins { count: 13, high_px: [f32::INFINITY; 13] });
     off.focus_m = Some(f32::INFINITY);
     all.push(off);

@@ -11,7 +11,7 @@ use crate::compute::Place;
 use crate::preview::panel::Canvas;
 use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::Still;
-use crate::preview::state::{Action, Effect, Source, State};
+use crate::preview::state::{Action, Request, Source, State};
 
 /// Why nothing is saved.
 const NO_PICTURE: &str = "There is no picture to save.";
@@ -47,16 +47,16 @@ impl App {
     fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
         for effect in self.state.apply(action) {
             match effect {
-                Effect::Snapshot => self.snapshot(),
-                Effect::CopyCommand => self.session.copy(self.state.switches()),
-                Effect::FullScreen(on) => {
+                Request::Snapshot => self.snapshot(),
+                Request::CopyCommand => self.session.copy(self.state.switches()),
+                Request::FullScreen(on) => {
                     if let Some(gfx) = &self.gfx {
                         gfx.window.set_fullscreen(on.then_some(Fullscreen::Borderless(None)));
                     }
                 }
-                Effect::Close => events.exit(),
-                Effect::Look(look) => {
-                    self.session.order(Effect::Look(look));
+                Request::Close => events.exit(),
+                Request::Look(look) => {
+                    self.session.order(Request::Look(look));
                     self.look_changed();
                 }
                 other => self.session.order(other),

@@ -1,0 +1,38 @@
+//! What the blur follows, and how it is made of that: settings that have a few values.
+
+use crate::names::named;
+
+named! {
+    /// What the blur follows.
+    pub enum Effect default Auto {
+        /// dof with depth, else tilt-shift
+        Auto = "auto",
+        /// The radius follows depth
+        Dof = "dof",
+        /// A sharp band, and blur that grows away from it
+        TiltShift = "tilt-shift",
+        /// One radius everywhere
+        Blur = "blur",
+        /// Frames pass through
+        None = "none",
+    }
+}
+
+impl Effect {
+    /// Whether it needs depth, where there is any.
+    pub fn follows_depth(self) -> bool {
+        matches!(self, Self::Auto | Self::Dof)
+    }
+}
+
+named! {
+    /// Whether depth is refined before the blur.
+    pub enum Refine default Auto {
+        /// Depth of a recording in a stream; not exact depth, nor a picture on its own
+        Auto = "auto",
+        /// Always
+        On = "on",
+        /// Never: only holes are filled
+        Off = "off",
+    }
+}

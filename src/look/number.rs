@@ -1,0 +1,86 @@
+//! Numbers as they are written in settings.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+/// The number that `text` is, if it lies from `low` to `high`.
+pub(crate) fn number_in(text: &str, low: f32, high: f32) -> Option<f32> {
+    text.trim().parse().ok().filter(|number| (low..=high).contains(number))
+}
+
+/// A parser of numbers within `range`.
+pub fn within(range: RangeInclusive<f32>) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync + 'static {
+    let (low, high) = range.into_inner();
+    move |text| number_in(text, low, high).ok_or_else(|| format!("use a number from {low} to {high}"))
+}
+
+/// A parser of finite numbers above 0.
+///
+/// # Errors
+/// It is none.
+pub fn above_zero(text: &str) -> Result<f32, String> {
+    number_in(text, 0.0, f32::MAX).filter(|number| *number > 0.0).ok_or_else(|| "use a number above 0".to_string())
+}
+
+/// A parser of finite numbers from 0.
+///
+/// # Errors
+/// It is none.
+pub fn not_negative(text: &str) -> Result<f32, String> {
+    number_in(text, 0.0, f32::MAX).ok_or_else(|| "use a number from 0".to_string())
+}
+
+/// A value, or `auto`: what the picture or the quality level calls for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OrAuto<T> {
+    /// `auto`.
+    Auto,
+    /// This one.
+    This(T),
+}
+
+impl<T> OrAuto<T> {
+    /// The value, where one is chosen.
+    pub fn chosen(self) -> Option<T> {
+        match self {
+            Self::Auto => None,
+            Self::This(value) => Some(value),
+        }
+    }
+
+    /// A parser of what `parse` does, and of `auto`.
+    pub fn parser(
+        parse: impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static,
+    ) -> impl Fn(&str) -> Result<Self, String> + Clone + Send + Sync + 'static {
+        move |text| match text {
+            "auto" => Ok(Self::Auto),
+            value => parse(value).map(Self::This).map_err(|accepted| format!("{accepted}, or auto")),
+        }
+    }
+}
+
+impl<T> From<Option<T>> for OrAuto<T> {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Auto, Self::This)
+    }
+}
+
+impl<T: FromStr<Err = String>> FromStr for OrAuto<T> {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            value => value.parse().map(Self::This).map_err(|accepted| format!("{accepted}, or auto")),
+        }
+    }
+}
+
+impl<T: fmt::Display> fmt::Display for OrAuto<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::This(value) => value.fmt(f),
+        }
+    }
+}

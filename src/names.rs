@@ -1,0 +1,114 @@
+//! Enumerations whose values have names: the same on the command line, in files and in the window.
+
+use std::fmt::Write;
+
+/// An enumeration whose values have names.
+pub trait Named: Copy + PartialEq + 'static {
+    /// All values, in the order in which they are shown.
+    const VALUES: &'static [Self];
+
+    /// The value's name.
+    fn name(self) -> &'static str;
+
+    /// What the value does, in a line.
+    fn help(self) -> &'static str;
+}
+
+/// The value that is called `text`.
+///
+/// # Errors
+/// There is none: the names that there are.
+pub fn parse<T: Named>(text: &str) -> Result<T, String> {
+    T::VALUES.iter().copied().find(|value| value.name() == text).ok_or_else(|| {
+        let mut accepted = String::from("use ");
+        for (k, value) in T::VALUES.iter().enumerate() {
+            let before = match k {
+                0 => "",
+                _ if k + 1 == T::VALUES.len() => " or ",
+                _ => ", ",
+            };
+            // Writing to a String cannot fail.
+            let _ = write!(accepted, "{before}{}", value.name());
+        }
+        accepted
+    })
+}
+
+/// Makes an enumeration [`Named`]: `named! { pub enum Name default Value { /// help Value = "value", ... } }`.
+macro_rules! named {
+    ($(#[$meta:meta])* $vis:vis enum $name:ident default $default:ident {
+        $($(#[doc = $help:literal])+ $value:ident = $text:literal),+ $(,)?
+    }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        $vis enum $name { $($(#[doc = $help])+ $value),+ }
+
+        impl $name {
+            /// All values, in the order in which they are shown.
+            pub const ALL: [Self; [$($text),+].len()] = [$(Self::$value),+];
+
+            /// The value's name.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$value => $text),+ }
+            }
+        }
+
+        impl $crate::names::Named for $name {
+            const VALUES: &'static [Self] = &Self::ALL;
+
+            fn name(self) -> &'static str {
+                $name::name(self)
+            }
+
+            fn help(self) -> &'static str {
+                match self { $(Self::$value => concat!($($help),+).trim_start()),+ }
+            }
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self::$default
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str($crate::names::Named::name(*self))
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = String;
+            fn from_str(text: &str) -> Result<Self, String> {
+                $crate::names::parse(text)
+            }
+        }
+    };
+}
+pub(crate) use named;
+
+#[cfg(test)]
+mod tests {
+    named! {
+        enum Meal default Tea {
+            /// Hot
+            Tea = "tea",
+            /// Cold,
+            /// sweet
+            Ice = "ice-cream",
+            /// For birds
+            Seed = "seed",
+        }
+    }
+
+    use super::Named;
+
+    #[test]
+    fn values_are_read_as_they_are_written() {
+        for meal in Meal::ALL {
+            assert_eq!(meal.to_string().parse(), Ok(meal));
+        }
+        assert_eq!((Meal::default(), Meal::Ice.help()), (Meal::Tea, "Cold, sweet"));
+        assert_eq!("Tea".parse::<Meal>(), Err("use tea, ice-cream or seed".to_string()));
+    }
+}

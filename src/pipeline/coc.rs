@@ -1,0 +1,110 @@
+//! From a frame's depth to its circle of confusion (CoC): the one step that every blur by depth goes through.
+
+use crate::depth::fill::Filler;
+use crate::depth::focus::{Focus, FocusRule};
+use crate::depth::refine::Refiner;
+use crate::frame::{ColorImage, DepthMap};
+use crate::look::CocRule;
+use crate::optics::CocField;
+
+/// What is done to a depth map before it is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Finish {
+    /// Nothing: it was finished before.
+    Keep,
+    /// Holes are filled.
+    Fill,
+    /// It is fitted to the picture and steadied, and holes are filled.
+    Refine,
+}
+
+impl Finish {
+    /// Of depth as it was measured.
+    pub fn measured(refine: bool) -> Self {
+        if refine { Self::Refine } else { Self::Fill }
+    }
+}
+
+/// A [`CocRule`] at work, from frame to frame.
+pub struct CocMaker {
+    rule: CocRule,
+    focus: Focus,
+    finisher: Finisher,
+}
+
+enum Finisher {
+    Keep,
+    Fill(Filler),
+    Refine(Box<Refiner>),
+}
+
+impl Finisher {
+    fn new(finish: Finish) -> Self {
+        match finish {
+            Finish::Keep => Self::Keep,
+            Finish::Fill => Self::Fill(Filler::new()),
+            Finish::Refine => Self::Refine(Box::new(Refiner::new())),
+        }
+    }
+
+    fn is(&self, finish: Finish) -> bool {
+        finish
+            == match self {
+                Self::Keep => Finish::Keep,
+                Self::Fill(_) => Finish::Fill,
+                Self::Refine(_) => Finish::Refine,
+            }
+    }
+}
+
+impl CocMaker {
+    /// Nothing was seen yet.
+    pub fn new(rule: CocRule, finish: Finish) -> Self {
+        let focus = match rule {
+            CocRule::Fixed(_) => FocusRule::Auto,
+            CocRule::Depth { focus, .. } => focus,
+        };
+        Self { rule, focus: Focus::new(focus), finisher: Finisher::new(finish) }
+    }
+
+    /// Follows another rule, from where the lens stands now.
+    pub fn follow(&mut self, rule: CocRule, finish: Finish) {
+        match (self.rule, rule) {
+            (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
+                self.focus.follow(focus);
+                if !self.finisher.is(finish) {
+                    self.finisher = Finisher::new(finish);
+                }
+                self.rule = rule;
+            }
+            _ => *self = Self::new(rule, finish),
+        }
+    }
+
+    /// The CoC of every frame, where that needs no depth.
+    pub fn fixed(&self) -> Option<CocField> {
+        match self.rule {
+            CocRule::Fixed(field) => Some(field),
+            CocRule::Depth { .. } => None,
+        }
+    }
+
+    /// The CoC of the frame that was taken at `time_ns`. Focuses on what `map` has as it was measured, and only then makes
+    /// up what it has not.
+    pub fn make(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) -> CocField {
+        let (lens, range_m, max_coc_px) = match self.rule {
+            CocRule::Fixed(field) => return field,
+            CocRule::Depth { lens, range_m, max_coc_px, .. } => (lens, range_m, max_coc_px),
+        };
+        let focus_m = self.focus.focus_m(map, time_ns);
+        match &mut self.finisher {
+            Finisher::Keep => {}
+            Finisher::Fill(filler) => filler.fill_by(map, color),
+            Finisher::Refine(refiner) => {
+                refiner.focus_at(focus_m);
+                refiner.refine(map, color, time_ns);
+            }
+        }
+        lens.field((focus_m, range_m), color.width, max_coc_px)
+    }
+}
