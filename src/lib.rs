@@ -1,24 +1,38 @@
 //! **bokehcam**: depth-aware, disc-shaped background blur for cameras and RGB-D recordings.
 //!
-//! A frame goes one straight way, and only empty buffers come back:
+//! A picture with a depth map, in five lines:
+//!
+//! ```no_run
+#![doc = include_str!("../examples/blur_a_picture.rs")]
+//! ```
+//!
+//! A stream goes one straight way, and only empty buffers come back:
 //!
 //! ```text
 //! capture ──> depth ──> bokeh ──> sink
 //!    colour     + depth    blurred   file, stream, window
 //! ```
 //!
-//! The map of the house; imports go down only, and siblings do not know each other:
+//! [`source`] opens cameras and recordings by name, [`look`] says how they shall look, [`pipeline`] runs them into a
+//! [`sink`]. `examples/` has a program for each: a picture, a stereo pair, a stream into a sink of one's own, a depth source
+//! of one's own, the low-rank kernels of an aperture.
+//!
+//! The map of the house; imports go down only, and siblings do not know each other. What is hidden here is no part of
+//! the interface and may change with every version; `docs/developers.md` walks through all rooms.
 //!
 //! | layer | modules |
 //! |---|---|
-//! | 7 | [`cli`]: arguments to one resolved configuration, one function per command |
-//! | 6 | `preview`: the window |
+//! | 10 | `cli`: arguments to options, one function per command |
+//! | 9 | `preview`: the window |
+//! | 8 | [`source`]: cameras, recordings and their depth, by name |
+//! | 7 | [`pipeline`]: the one place that knows all stages |
+//! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
-//! | 4 | [`pipeline`]: the one place that knows all stages |
-//! | 3 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 2 | [`link`], [`budget`], [`stats`], [`recording`], [`scene`], `v4l2` |
-//! | 1 | [`compute`], [`calibration`] |
-//! | 0 | [`frame`], [`optics`], [`clock`], [`files`] |
+//! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
+//! | 3 | `link`, [`budget`], [`stats`], [`recording`], `scene`, `v4l2` |
+//! | 2 | `compute`, [`calibration`] |
+//! | 1 | [`frame`], [`optics`], [`clock`], [`knob`], `files` |
+//! | 0 | `names` |
 //!
 //! Words: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in
@@ -31,22 +45,32 @@ pub mod bokeh;
 pub mod budget;
 pub mod calibration;
 pub mod capture;
+#[doc(hidden)]
 pub mod cli;
 pub mod clock;
+#[doc(hidden)]
 pub mod compute;
+pub mod computing;
 pub mod depth;
+#[doc(hidden)]
 pub mod files;
 pub mod frame;
+pub mod knob;
+#[doc(hidden)]
 pub mod link;
 pub mod look;
 mod names;
 pub mod optics;
 pub mod pipeline;
 #[cfg(feature = "window")]
+#[doc(hidden)]
 pub mod preview;
 pub mod recording;
+#[doc(hidden)]
 pub mod scene;
 pub mod sink;
+pub mod source;
 pub mod stats;
 #[cfg(feature = "camera")]
+#[doc(hidden)]
 pub mod v4l2;

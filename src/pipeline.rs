@@ -16,6 +16,7 @@ mod pacer;
 mod playout;
 mod quality;
 mod rate;
+pub mod still;
 mod view;
 mod wanted;
 
@@ -29,11 +30,12 @@ pub use error::{Fault, PipelineError};
 pub use view::{Progress, Trace, View};
 pub use wanted::Wanted;
 
-use crate::bokeh::Bokeh;
+use crate::bokeh::{Bokeh, BokehError};
 use crate::budget::Quality;
 use crate::capture::{Brings, Camera};
 use crate::clock::{self, Clock};
 use crate::compute::Backend;
+use crate::computing::Computing;
 use crate::depth::DepthSource;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::demand::Demand;
@@ -95,6 +97,44 @@ pub struct Run<'a> {
     pub stop: &'a AtomicBool,
     /// Told after each delivered frame, on the caller's thread.
     pub progress: &'a dyn Fn(Progress),
+}
+
+impl<'a> Run<'a> {
+    /// Every frame of `camera`, blurred as `look` says, into `sink`, as fast as it goes. `depth` gives their depth, in metres
+    /// as it was measured, where the look follows depth and the camera does not bring it. `stop` ends it.
+    ///
+    /// # Errors
+    /// The blur is too wide for the pictures, or there is no such GPU.
+    pub fn new(
+        camera: Box<dyn Camera>,
+        depth: Option<Box<dyn DepthSource>>,
+        look: Look,
+        sink: Box<dyn Sink>,
+        stop: &'a AtomicBool,
+    ) -> Result<Self, BokehError> {
+        let info = camera.info();
+        let settings = look.settings(info.size, false);
+        Ok(Self {
+            bokeh: settings.map(|settings| Computing::default().blur(&settings, info.size)).transpose()?,
+            measured: depth.is_some(),
+            camera,
+            depth,
+            look,
+            adaptive: false,
+            changes: None,
+            sink,
+            pace: Pace::Asap,
+            budget_ns: info.period_ns,
+            keep_going: false,
+            demand: None,
+            mirror: false,
+            wanted: None,
+            view: None,
+            clock: Clock::system(),
+            stop,
+            progress: &|_| {},
+        })
+    }
 }
 
 /// A frame on its way: what identifies it, what it took, and what there is of it at this point.

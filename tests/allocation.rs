@@ -62,6 +62,7 @@ fn a_frame_allocates_nothing() {
 /// A frame in a window: its view, its painting at its own size and scaled, and the instruments.
 #[cfg(feature = "window")]
 fn window() {
+    use bokehcam::bokeh::Picture;
     use bokehcam::optics::{CocField, DepthCoc};
     use bokehcam::pipeline::{Trace, View};
     use bokehcam::preview::meters::Meters;
@@ -73,9 +74,7 @@ fn window() {
     let (picture, depth) = (noise(160, 90), three_depths(160, 90));
     let lens = DepthCoc { coc_at_infinity_px: 6.0, focus_m: 1.5, range_m: 0.0, max_coc_px: 12.0 };
     let view = View {
-        picture: Pooled::detached(picture.clone()),
-        in_memory: true,
-        on_device: None,
+        picture: Picture::in_memory(Pooled::detached(picture.clone())),
         color: Some(Pooled::detached(picture)),
         depth: Some(Pooled::detached(depth)),
         coc: CocField::Depth(lens),

@@ -54,7 +54,7 @@ fn same(settings: &Settings, image: &ColorImage, map: &DepthMap, field: &CocFiel
     gpu.submit(job(3, image, map, field)).expect("the GPU takes a frame");
     let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
     assert_eq!(finished.ticket, 3);
-    assert_eq!(finished.out.size(), image.size());
+    assert_eq!(finished.picture.memory().unwrap().size(), image.size());
 
     for k in (0..plan.bins.len()).filter(|&k| cpu.is_present(k) && plan.compositing != Compositing::Gather) {
         let (bin, around) = (&plan.bins[k], (plan.reach_cells(&plan.bins[k]) + 1) * CELL);
@@ -77,7 +77,8 @@ fn same(settings: &Settings, image: &ColorImage, map: &DepthMap, field: &CocFiel
             close(&ours, &theirs, limit, &format!("{what}: {probe:?}"));
         }
     }
-    let differences: Vec<u8> = finished.out.rgb.iter().zip(&expected.rgb).map(|(a, b)| a.abs_diff(*b)).collect();
+    let differences: Vec<u8> =
+        finished.picture.memory().unwrap().rgb.iter().zip(&expected.rgb).map(|(a, b)| a.abs_diff(*b)).collect();
     let beyond = differences.iter().filter(|&&d| d > CODES).count();
     let worst = differences.iter().max().copied().unwrap_or(0);
     assert!(beyond <= differences.len() / 1000 + 1 && worst <= 2 * CODES, "{what}: {beyond} beyond, worst {worst}");
@@ -215,7 +216,7 @@ fn any_sequence_of_levels_agrees() {
         let field = coc(effect, height);
         let blurred = |gpu: &mut GpuBokeh, map: &DepthMap, quality| {
             gpu.submit(Job { quality, ..job(0, &image, map, &field) }).expect("room for a frame");
-            gpu.collect(true).expect("a frame").expect("one is in flight").out.clone()
+            gpu.collect(true).expect("a frame").expect("one is in flight").picture.memory().unwrap().clone()
         };
         let alone: Vec<Vec<ColorImage>> = (Quality::ALL.iter())
             .map(|&quality| {
@@ -251,7 +252,10 @@ fn frames_in_flight_come_back_in_order_and_whole() {
         assert_eq!(finished.ticket, back);
         let mut expected = ColorImage::default();
         cpu.blur(&image, Some(&map(back)), &field, &mut expected).expect("a blur");
-        assert!(finished.out.rgb.iter().zip(&expected.rgb).all(|(a, b)| a.abs_diff(*b) <= CODES), "frame {back}");
+        assert!(
+            finished.picture.memory().unwrap().rgb.iter().zip(&expected.rgb).all(|(a, b)| a.abs_diff(*b) <= CODES),
+            "frame {back}"
+        );
         assert!(finished.times.iter().count() > 0);
         back += 1;
     }

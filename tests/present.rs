@@ -375,20 +375,20 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
             bokeh.submit(job).expect("room for a frame");
             let finished = bokeh.collect(true).expect("the GPU blurs").expect("a frame comes back");
             assert_eq!(
-                (finished.in_memory, finished.on_device.is_some()),
+                (finished.picture.memory().is_some(), finished.picture.device().is_some()),
                 match place {
                     Place::Memory => (true, false),
                     Place::Both => (true, true),
                     Place::Device => (false, true),
                 }
             );
-            results.extend(finished.in_memory.then(|| finished.out.clone()));
-            if let Some(picture) = finished.on_device {
+            results.extend(finished.picture.memory().cloned());
+            if let Some(picture) = finished.picture.device() {
                 assert!(picture.is_on(&device) && picture.size() == (width, height));
-                results.push(ColorImage { width, height, rgb: bytes(&device, &picture) });
+                results.push(ColorImage { width, height, rgb: bytes(&device, picture) });
                 let place = area(3, 0, 140, 120);
                 let here = drawing(&results[0], place);
-                let there = Drawing { picture: Image::Device(&picture), ..here };
+                let there = Drawing { picture: Image::Device(picture), ..here };
                 let (here, there) =
                     (drawn(&device, &mut canvas, (150, 120), &here), drawn(&device, &mut canvas, (150, 120), &there));
                 assert_eq!(here, there);
@@ -418,9 +418,9 @@ fn results_go_to_memory_when_the_device_has_no_more_room_for_them() {
         bokeh.submit(job).expect("room for a frame");
         kept.push(bokeh.collect(true).expect("the GPU blurs").expect("a frame comes back"));
     }
-    let stayed = kept.iter().take_while(|finished| finished.on_device.is_some()).count();
+    let stayed = kept.iter().take_while(|finished| finished.picture.device().is_some()).count();
     assert!((8..40).contains(&stayed), "{stayed}");
-    assert!(kept[stayed..].iter().all(|finished| finished.in_memory && finished.out.rgb == kept[stayed].out.rgb));
+    assert!(kept[stayed..].iter().all(|finished| finished.picture.memory() == kept[stayed].picture.memory()));
     kept.clear();
 }
 

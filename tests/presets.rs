@@ -164,7 +164,7 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
         out: Pooled::detached(ColorImage::default()),
     })
     .unwrap();
-    (cpu.collect(true).unwrap().unwrap().out.clone(), field)
+    (cpu.collect(true).unwrap().unwrap().picture.memory().unwrap().clone(), field)
 }
 
 #[test]

@@ -11,18 +11,20 @@ use std::time::{Duration, Instant};
 use bokehcam::bokeh::{self, Backend, Bokeh};
 use bokehcam::capture::synthetic::{Format, Synthetic};
 use bokehcam::frame::ColorImage;
+use bokehcam::knob::Knob;
 use bokehcam::link::Receiver;
 use bokehcam::look::presets::Preset;
 use bokehcam::look::{Effect, Look, Patch, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
-use bokehcam::preview::backstage::{Backstage, Choice, Control, Opened, Switch};
+use bokehcam::preview::services::{Opened, Services, Switch};
 use bokehcam::preview::session::{Heard, Session, Start};
 use bokehcam::preview::state::{Output, Request, Source, Told};
 use bokehcam::sink::{Ending, Sink, SinkError};
+use bokehcam::source::{self, devices::Choice};
 
 /// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
-struct Wings {
+struct Small {
     executors: Arc<AtomicUsize>,
     written: Arc<Mutex<Vec<String>>>,
 }
@@ -49,7 +51,7 @@ impl Sink for Film {
     }
 }
 
-impl Backstage for Wings {
+impl Services for Small {
     fn sources(&mut self) -> Vec<Choice> {
         vec![Choice { name: "32".into(), label: "A scene".into() }]
     }
@@ -63,9 +65,9 @@ impl Backstage for Wings {
         let format = Format { size: (width, 18), fps: 60.0, frames, threads: 1, cycle: None };
         let camera = Box::new(Synthetic::new(format).map_err(|error| error.to_string())?);
         let (name, notes, controls) = (name.to_owned(), vec!["a note".to_owned()], Vec::new());
-        Ok(Opened { name, camera, depth: None, has_depth: true, measured: false, notes, controls })
+        Ok(Opened { name, source: source::Source::of(camera, None), notes, controls })
     }
-    fn set_control(&mut self, _: &str, _: i64) -> Result<Vec<Control>, String> {
+    fn turn(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
         Err("it has no controls".into())
     }
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
@@ -114,7 +116,7 @@ impl Watched {
     fn begin_in(source: &str, folder: &Path) -> Self {
         let (executors, written) = (Arc::<AtomicUsize>::default(), Arc::<Mutex<Vec<String>>>::default());
         let start = Start {
-            backstage: Box::new(Wings { executors: Arc::clone(&executors), written: Arc::clone(&written) }),
+            services: Box::new(Small { executors: Arc::clone(&executors), written: Arc::clone(&written) }),
             look: look(),
             source: source.into(),
             outputs: Vec::new(),
@@ -185,7 +187,7 @@ fn a_look_takes_effect_while_frames_go_on() {
     watched.until("it runs", |told| is_running(told, 32));
     watched.until("the note", |told| *told == Told::Note("a note".into()) || matches!(told, Told::Outputs(_)));
     let first = watched.frame("a frame", |view| radius_px(view) == 2.0);
-    assert!(first.in_memory && first.color.is_some() && first.depth.is_some());
+    assert!(first.picture.memory().is_some() && first.color.is_some() && first.depth.is_some());
     let made = watched.executors.load(Ordering::SeqCst);
 
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..look() };
@@ -213,10 +215,10 @@ fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     watched.until("nothing to write", |told| matches!(told, Told::Note(line) if line.contains("no source")));
     watched.session.order(Request::Open("32".into()));
     watched.until("it runs", |told| is_running(told, 32));
-    watched.frame("a frame", |view| view.picture.width == 32);
+    watched.frame("a frame", |view| view.picture.size().0 == 32);
     watched.session.order(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));
-    watched.frame("a frame of the other", |view| view.picture.width == 48);
+    watched.frame("a frame of the other", |view| view.picture.size().0 == 48);
     watched.session.order(Request::Open("24 then no more".into()));
     watched.until("its end", |told| *told == Told::Source(Source::Ended));
     watched.session.order(Request::Open("24 then no more".into()));

@@ -196,6 +196,6 @@ impl Blurrer {
             out: Pooled::detached(ColorImage::default()),
         })?;
         let finished = bokeh.collect(true)?;
-        Ok(finished.map(|mut finished| std::mem::take(&mut *finished.out)).unwrap_or_default())
+        Ok(finished.and_then(|mut finished| finished.picture.memory_mut().map(std::mem::take)).unwrap_or_default())
     }
 }

@@ -125,7 +125,7 @@ impl Bokeh for Slowed {
             if self.factor > 1.0 {
                 finished.times.add("wasted", self.wasted);
             }
-            if let Some(first) = finished.out.rgb.first_chunk_mut() {
+            if let Some(first) = finished.picture.memory_mut().and_then(|picture| picture.rgb.first_chunk_mut()) {
                 *first = finished.ticket.to_le_bytes();
             }
         }

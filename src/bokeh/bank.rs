@@ -28,11 +28,9 @@ pub const MASK_CELLS: usize = 128;
 /// in(p + (i, j))`, and its taps sum to 1 at every node.
 #[derive(Clone, Debug)]
 pub struct Bank {
-    /// Separable terms.
     pub terms: usize,
     /// Taps reach from `-reach` to `reach` at the largest radius.
     pub reach: usize,
-    /// Radii tabulated.
     pub nodes: usize,
     /// Whether every profile is even, so that taps at `-j` and `j` are equal.
     pub even: bool,

@@ -134,6 +134,7 @@ impl Bokeh for Nothing {
 mod tests {
     use super::*;
     use crate::bokeh::PassTimes;
+    use crate::bokeh::Picture;
     use crate::budget::Quality;
     use crate::compute::Place;
     use crate::frame::ColorImage;
@@ -177,7 +178,7 @@ mod tests {
             self.step()?;
             let Some(Job { ticket, color, depth, mut out, .. }) = self.jobs.pop_front() else { return Ok(None) };
             out.rgb.fill(self.mark);
-            Ok(Some(Finished { ticket, out, in_memory: true, on_device: None, color, depth, times: PassTimes::new() }))
+            Ok(Some(Finished { ticket, picture: Picture::in_memory(out), color, depth, times: PassTimes::new() }))
         }
 
         fn take_back(&mut self) -> Option<Job> {
@@ -225,7 +226,7 @@ mod tests {
                 } else {
                     let finished = bokeh.collect(true).unwrap().expect("something is in flight");
                     assert_eq!(finished.ticket, marks.len() as u64);
-                    marks.push(finished.out.rgb[0]);
+                    marks.push(finished.picture.memory().unwrap().rgb[0]);
                 }
             }
             assert_eq!((bokeh.in_flight(), pool.free()), (0, 8), "nothing is left behind");

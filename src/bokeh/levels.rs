@@ -12,12 +12,9 @@ use super::{Rank, Settings};
 use crate::budget::Quality;
 use crate::optics::CocKind;
 
-/// One quality level.
 #[derive(Clone, Debug)]
 pub struct Level {
-    /// Its name.
     pub quality: Quality,
-    /// What it trades.
     pub rung: Rung,
     /// Which of [`Levels::banks`] has its filters.
     pub bank: usize,

@@ -1,12 +1,18 @@
-//! How wide a blur may be.
+//! How wide a blur may be, and how large a picture.
 
 use super::{BokehError, Method, Rank, Settings};
+use crate::compute::memory;
 use crate::optics::CocKind;
 
 /// Largest radius of [`Method::Gather`], in pixels: it filters at full scale.
 const MOST_GATHERED_PX: f32 = 512.0;
 /// The same with [`Rank::Full`], when it gathers in two dimensions: kernels grow with the square of the radius.
 const MOST_EXACT_PX: f32 = 128.0;
+/// What preparing and blurring a picture takes at most, at the finest quality with refined depth
+/// (`docs/reliability.md` has the measurements).
+const BYTES_PER_PIXEL: u64 = 90;
+/// Below this nothing is asked: the estimate leaves out what does not grow with the picture.
+const SMALL_PX: u64 = 16 << 20;
 
 impl Settings {
     /// The largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their diagonal,
@@ -30,8 +36,13 @@ impl Settings {
     /// Whether pictures of `size` (width, height) can be blurred so.
     ///
     /// # Errors
-    /// [`BokehError::TooWide`].
+    /// [`BokehError::Memory`], [`BokehError::TooWide`].
     pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
+        let (pixels, free) = (u64::from(size.0) * u64::from(size.1), memory::free_bytes());
+        let needed = pixels * BYTES_PER_PIXEL;
+        if let Some(free) = free.filter(|&free| pixels > SMALL_PX && needed > free) {
+            return Err(BokehError::Memory { size, needed_mb: needed >> 20, free_mb: free >> 20 });
+        }
         let most_px = self.most_radius_px(size);
         // Not a number is beyond any.
         let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&most_px).is_none_or(|order| order.is_gt());

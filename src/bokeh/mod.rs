@@ -4,17 +4,27 @@
 //! (`gpu`) run it with the same passes under the same names.
 
 pub mod aperture;
+#[doc(hidden)]
 pub mod bank;
+#[doc(hidden)]
 pub mod cpu;
+#[doc(hidden)]
 pub mod fallback;
 #[cfg(feature = "gpu")]
+#[doc(hidden)]
 pub mod gpu;
+#[doc(hidden)]
 pub mod levels;
 mod limit;
 pub mod low_rank;
+mod picture;
+#[doc(hidden)]
 pub mod plan;
+#[doc(hidden)]
 pub mod rung;
+#[doc(hidden)]
 pub mod share;
+#[doc(hidden)]
 pub mod split;
 
 use std::fmt;
@@ -24,10 +34,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::budget::Quality;
+pub use picture::Picture;
+
 pub use crate::compute::Backend;
 #[cfg(feature = "gpu")]
 use crate::compute::device::Device;
-use crate::compute::{DevicePicture, GpuError, Place};
+use crate::compute::{GpuError, Place};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::names::named;
@@ -119,12 +131,8 @@ pub struct Job {
 pub struct Finished {
     /// The job's ticket.
     pub ticket: u64,
-    /// The result, where it is in memory; any picture otherwise.
-    pub out: Pooled<ColorImage>,
-    /// Whether it is. A result that was wanted on the device alone may be here instead.
-    pub in_memory: bool,
-    /// The result on the device, where it was wanted there and is.
-    pub on_device: Option<Pooled<DevicePicture>>,
+    /// The result, where it was wanted; who computes elsewhere leaves it in memory.
+    pub picture: Picture,
     /// The job's picture.
     pub color: Pooled<ColorImage>,
     /// The job's depth.
@@ -199,6 +207,23 @@ pub enum BokehError {
         /// Whether the method is what sets the limit.
         by_method: bool,
     },
+    /// A picture needs more memory than there is.
+    #[error(
+        "a picture of {}x{} pixels takes about {needed_mb} MB to blur, and {free_mb} MB are free: make it smaller, or close \
+         other programs",
+        size.0, size.1
+    )]
+    Memory {
+        /// Width and height in pixels.
+        size: (u32, u32),
+        /// What the blur is estimated to take.
+        needed_mb: u64,
+        /// What this process can still take.
+        free_mb: u64,
+    },
+    /// The executor took a picture and gave none back.
+    #[error("the blur gave no picture back: please report this")]
+    Lost,
     /// No GPU, or it refused or was lost.
     #[error(transparent)]
     Gpu(#[from] GpuError),

@@ -57,13 +57,11 @@ pub enum Compositing {
 pub struct Bin {
     /// Lower border of the CoC, pixels of the picture; `-inf` for the first.
     pub low_px: f32,
-    /// Upper border.
     pub high_px: f32,
     /// A bin pixel covers `scale` x `scale` pixels of the picture: one of [`super::rung::SCALES`].
     pub scale: usize,
     /// Columns of the bin's picture.
     pub width: usize,
-    /// Rows.
     pub height: usize,
     /// Largest radius of its content, in bin pixels, already compensated.
     pub max_radius_px: f32,
@@ -85,13 +83,10 @@ impl Bin {
 pub struct Plan {
     /// Columns of the picture.
     pub width: usize,
-    /// Rows.
     pub height: usize,
     /// How bins become a picture.
     pub compositing: Compositing,
-    /// The quality level.
     pub quality: Quality,
-    /// What it trades.
     pub rung: Rung,
     /// Every level that the plan can be set to.
     pub levels: Arc<Levels>,

@@ -14,7 +14,6 @@ pub const MOST_FULL_RADIUS_PX: f32 = 128.0;
 /// What a quality level trades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rung {
-    /// Separable terms.
     pub rank: u32,
     /// Bins behind the focal plane, and as many in front.
     pub bins_per_side: u32,

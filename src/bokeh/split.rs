@@ -28,7 +28,6 @@ pub struct Piece {
     pub border_px: f32,
     /// Below this lies nothing but strays.
     pub low_px: f32,
-    /// Nothing lies above.
     pub high_px: f32,
 }
 

@@ -60,7 +60,6 @@ pub struct Analysis {
     pub kernel: Vec<f64>,
     /// The largest tap: what the errors are relative to.
     pub plateau: f64,
-    /// One per rank.
     pub approximations: Vec<Approximation>,
     /// `sqrt(sum_{i>r} sigma_i^2 / sum sigma_i^2)` for r = 1, 2, ...
     pub truncation_errors: Vec<f64>,
@@ -70,7 +69,6 @@ pub struct Analysis {
 
 /// A kernel from its first terms, scaled to unit sum again.
 pub struct Approximation {
-    /// Number of terms.
     pub rank: usize,
     /// `size * size` taps, row-major, their sum 1.
     pub taps: Vec<f64>,

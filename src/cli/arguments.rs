@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 
-use super::values::LogFormat;
+use super::log::LogFormat;
 use super::{environment, log};
 
 /// The arguments, with a number below zero made part of the option that it follows: `--focus -1` is `--focus=-1`, and

@@ -6,21 +6,23 @@ use std::time::{Duration, Instant};
 use clap::{Args, value_parser};
 use serde::Serialize;
 
-use super::config::{self, Executor};
+use super::config;
 use super::error::CliError;
 use super::layers::Given;
-use super::values::{DepthChoice, Size};
-use super::{defaults, options, print, render, unused};
-use crate::bokeh::{Bokeh, Job, PassTimes};
+use super::{defaults, options, print, unused};
+use crate::bokeh::{Bokeh, BokehError, Job, PassTimes};
 use crate::budget::Quality;
 use crate::compute::{Backend, Place, team::cores};
+use crate::computing::Computing;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
 use crate::look::number::within;
 use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength};
 use crate::names::named;
 use crate::optics::CocField;
+use crate::pipeline::still::{Depth, prepared};
 use crate::scene::{Scene, View};
+use crate::source::{self, DepthChoice, Size};
 
 /// Frames before those that are measured: caches and clocks settle.
 const WARM_UP_FRAMES: usize = 2;
@@ -108,12 +110,12 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
         return Err(CliError::Usage(what.to_string()));
     }
     let look = config::look(&command.blur, &options::LookSettings::default())?;
-    let look = config::look_for(&Look { strength: Strength::Default, ..look }, &command.blur.depth, true)?;
+    let look = source::fitting_look(&Look { strength: Strength::Default, ..look }, &command.blur.depth, true)?;
     unused::warn(
         &given.settings,
         &unused::Run {
             source: unused::From::Bench,
-            depth: unused::DepthFrom::Metres,
+            depth: source::DepthFrom::Metres,
             uses_depth: true,
             effect: look.effect,
             lens: false,
@@ -136,8 +138,8 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
         for &coc_px in radii_px {
             for &quality in &command.quality {
                 for &threads in &threads {
-                    let executor = Executor { backend: command.backend, adapter: command.adapter.clone(), threads };
-                    let measured = measure(command, &look, (&color, &depth), coc_px, quality, &executor)?;
+                    let computing = Computing { backend: command.backend, adapter: command.adapter.clone(), threads };
+                    let measured = measure(command, &look, (&color, &depth), coc_px, quality, &computing)?;
                     print(measured.line(command.json, command.passes).as_bytes())?;
                 }
             }
@@ -152,7 +154,7 @@ fn measure(
     (color, depth): (&ColorImage, &DepthMap),
     coc_px: f32,
     quality: Quality,
-    executor: &Executor,
+    computing: &Computing,
 ) -> Result<Measured, CliError> {
     let look = Look { strength: Strength::AtInfinity(coc_px), quality: Some(quality), ..look.clone() };
     let size = color.size();
@@ -161,8 +163,8 @@ fn measure(
             "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
         ));
     };
-    let (coc, depth) = render::prepared(&look, color, Some(render::Depth::Measured(depth.clone())))?;
-    let mut bokeh = executor.create(&settings, size)?;
+    let (coc, depth) = prepared(&look, color, Some(Depth::Measured(depth.clone())))?;
+    let mut bokeh = computing.blur(&settings, size)?;
     let buffers = Buffers {
         colors: Pool::new(bokeh.capacity(), || color.clone()),
         depths: depth.map(|depth| Pool::new(bokeh.capacity(), || depth.clone())),
@@ -227,7 +229,7 @@ impl Buffers {
         bokeh.submit(job)?;
         let finished = bokeh.collect(true)?;
         let time = began.elapsed();
-        finished.map(|finished| (time, finished.times)).ok_or(CliError::NothingCameBack)
+        finished.map(|finished| (time, finished.times)).ok_or(BokehError::Lost.into())
     }
 }
 

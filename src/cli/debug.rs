@@ -6,17 +6,18 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::config::Executor;
 use super::debug_pictures::{coc, grey, light};
 use super::error::CliError;
 use super::files::{refuse_overwrite, write_whole};
-use super::render::{Depth, prepared};
 use crate::bokeh::cpu::CpuBokeh;
-use crate::bokeh::plan::{Bin, Compositing};
+use crate::bokeh::plan::{Bin, Compositing, Plan};
 use crate::bokeh::{Bokeh, Probe};
+use crate::compute::Backend;
+use crate::computing::Computing;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 use crate::optics::CocField;
+use crate::pipeline::still::{Depth, prepared};
 use crate::recording::still;
 
 /// The file of numbers, which is always there.
@@ -43,7 +44,6 @@ struct PlanFile {
     filled: bool,
     /// Share of the picture in tiles where nothing behind is blurred.
     still_share: f32,
-    /// Front to back.
     bins: Vec<BinEntry>,
     /// What was written beside this file.
     files: Vec<String>,
@@ -72,7 +72,6 @@ struct BinEntry {
     content_depth_m: Option<Range>,
 }
 
-/// Lowest and highest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct Range(f32, f32);
 
@@ -94,7 +93,7 @@ pub fn blurred(
     color: ColorImage,
     depth: Option<Depth>,
     look: &Look,
-    executor: &Executor,
+    computing: &Computing,
     (dir, force): (&Path, bool),
 ) -> Result<(ColorImage, String), CliError> {
     let size = color.size();
@@ -103,7 +102,12 @@ pub fn blurred(
     match look.settings(size, false) {
         None => result = color,
         Some(settings) => {
-            let mut bokeh = executor.create_open(&settings, size)?;
+            if computing.backend == Backend::Gpu || computing.adapter.is_some() {
+                let text = "--debug-dir looks into the CPU executor: leave --backend gpu and --adapter out";
+                return Err(CliError::Usage(text.to_string()));
+            }
+            settings.check(size)?;
+            let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
             let (coc, depth) = prepared(look, &color, depth)?;
             bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
             inside.look(&bokeh, &color, depth.as_ref(), &coc);

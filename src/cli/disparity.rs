@@ -5,14 +5,13 @@ use std::time::Instant;
 
 use clap::{Args, value_parser};
 
-use super::calib::{self, Eyes};
-use super::config::Executor;
 use super::disparity_preview::preview;
 use super::error::CliError;
 use super::files::{make_folder_of, refuse_overwrite, refuse_source};
 use super::{defaults, options, terminal};
 use crate::calibration::rectifier::Rectifier;
 use crate::compute::Backend;
+use crate::computing::Computing;
 use crate::depth::DepthError;
 use crate::depth::stereo::check::{Verdict, check};
 use crate::depth::stereo::{Effort, MatchError, Pair, Settings};
@@ -21,6 +20,8 @@ use crate::look::number::{above_zero, within};
 use crate::optics::StereoRig;
 use crate::recording::geometry::Geometry;
 use crate::recording::still::{self, MapFormat};
+use crate::source::calib::{self, Eyes};
+use crate::source::options::DEPTH_SCALE;
 
 /// Find the disparity of a rectified stereo pair, or its depth
 ///
@@ -110,8 +111,8 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
     let left = luma_of(&color);
     let disparities = command.disparities(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
     let (adapter, threads) = (command.adapter.clone(), command.threads);
-    let executor = Executor { backend: command.backend, adapter, threads };
-    let mut matcher = executor.matcher(disparities, command.effort, size)?;
+    let computing = Computing { backend: command.backend, adapter, threads };
+    let mut matcher = computing.matcher(disparities, command.effort, size)?;
     let mut disparity = DisparityMap::default();
     let start = Instant::now();
     let pair = Pair { left: &left, color: Some(&color), right: &right };
@@ -136,7 +137,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         Some(Geometry { rig, .. }) => {
             let depth = disparity.depth(|px| rig.depth_m(px));
             note_what_is_too_far(&command.out, &depth, &note)?;
-            still::write_depth(&command.out, &depth, defaults::DEPTH_SCALE, force)?;
+            still::write_depth(&command.out, &depth, DEPTH_SCALE, force)?;
         }
         None => {
             let rig = geometry.map(|geometry| geometry.rig);
@@ -251,7 +252,7 @@ fn luma_of(color: &ColorImage) -> GrayImage {
 
 /// Tells how much of the depth a PNG cannot hold.
 fn note_what_is_too_far(out: &Path, depth: &DepthMap, note: &dyn Fn(String)) -> Result<(), CliError> {
-    let most_m = f32::from(u16::MAX) / defaults::DEPTH_SCALE;
+    let most_m = f32::from(u16::MAX) / DEPTH_SCALE;
     let beyond = depth.metres.iter().filter(|&&metres| metres > most_m).count();
     if still::map_format(out)? == MapFormat::Png && beyond > 0 {
         let percent = 100.0 * beyond as f32 / depth.metres.len() as f32;

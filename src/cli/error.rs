@@ -12,6 +12,7 @@ use crate::look::LookError;
 use crate::pipeline::Fault;
 use crate::recording::RecordingError;
 use crate::sink::SinkError;
+use crate::source::SourceError;
 
 /// Why a command did not do what was asked for.
 #[derive(Debug, thiserror::Error)]
@@ -22,7 +23,6 @@ pub enum CliError {
     /// The settings file cannot be used.
     #[error("{}:{line}: {what}", path.display())]
     Settings {
-        /// The file.
         path: PathBuf,
         /// Line, from 1.
         line: usize,
@@ -37,7 +37,6 @@ pub enum CliError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// Why.
         source: io::Error,
     },
     /// There is no window, or it failed.
@@ -58,23 +57,6 @@ pub enum CliError {
     /// No handler of signals can be set.
     #[error("signals cannot be handled: {0}")]
     Signals(String),
-    /// A picture needs more memory than there is.
-    #[error(
-        "a picture of {}x{} pixels takes about {needed_mb} MB to blur, and {free_mb} MB are free: make it smaller, or close \
-         other programs",
-        size.0, size.1
-    )]
-    Memory {
-        /// Width and height in pixels.
-        size: (u32, u32),
-        /// What the blur is estimated to take.
-        needed_mb: u64,
-        /// What this process can still take.
-        free_mb: u64,
-    },
-    /// The executor took a picture and gave none back.
-    #[error("the blur gave no picture back: please report this")]
-    NothingCameBack,
     /// This program was built so.
     #[error("this bokehcam was built without cameras: build it with the feature camera")]
     #[cfg(not(feature = "camera"))]
@@ -97,7 +79,6 @@ pub enum CliError {
     /// The settings make no look.
     #[error(transparent)]
     Look(#[from] LookError),
-    /// The source failed.
     #[error(transparent)]
     Capture(#[from] CaptureError),
     /// There is no depth.
@@ -106,17 +87,14 @@ pub enum CliError {
     /// The calibration of two eyes cannot be used.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// The depth camera cannot be opened.
-    #[cfg(feature = "camera")]
-    #[error("--depth: {0}")]
-    DepthCamera(#[from] crate::v4l2::live::OpenError),
-    /// The output failed.
+    /// The source cannot be opened.
+    #[error(transparent)]
+    Source(#[from] SourceError),
     #[error(transparent)]
     Sink(#[from] SinkError),
     /// A stage of the pipeline failed.
     #[error(transparent)]
     Run(#[from] Fault),
-    /// The blur failed.
     #[error(transparent)]
     Bokeh(#[from] BokehError),
 }
@@ -140,6 +118,9 @@ impl CliError {
 
     /// Whether the caller has to write something differently.
     pub fn is_wrong_argument(&self) -> bool {
+        if let CliError::Source(error) = self {
+            return error.is_wrong_argument();
+        }
         matches!(
             self,
             CliError::Usage(_)

@@ -17,7 +17,6 @@ use super::settings::{SettingsFile, Values, all_settings, excluded_by, on_settin
 use crate::look::{SETTINGS, settings};
 use crate::recording::snapshot;
 
-/// One setting, resolved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Its flag without the dashes.
@@ -26,7 +25,6 @@ pub struct Setting {
     pub value: Option<String>,
     /// Where the value comes from.
     pub origin: &'static str,
-    /// What it does.
     pub help: String,
 }
 

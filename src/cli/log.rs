@@ -16,7 +16,17 @@ use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
 
 use super::options::Global;
 use super::screen::Screen;
-use super::values::LogFormat;
+use crate::names::named;
+
+named! {
+    /// How log lines are written.
+    pub enum LogFormat default Text {
+        /// For people
+        Text = "text",
+        /// One JSON object a line
+        Json = "json",
+    }
+}
 
 /// How messages are written; text until [`start`] says otherwise.
 static JSON: AtomicBool = AtomicBool::new(false);

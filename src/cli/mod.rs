@@ -5,15 +5,12 @@ mod aperture_plot;
 mod aperture_sheet;
 mod arguments;
 mod bench;
-mod calib;
-#[cfg(feature = "camera")]
-mod calibration;
+#[cfg(feature = "window")]
 mod command_line;
 mod config;
 mod debug;
 mod debug_pictures;
 mod defaults;
-mod depth;
 mod devices;
 mod disparity;
 mod disparity_preview;
@@ -25,11 +22,10 @@ mod files;
 mod focus;
 mod layers;
 mod log;
-mod memory;
-mod near;
 mod options;
 #[doc(hidden)]
 pub mod parsers;
+#[cfg(feature = "window")]
 mod presets;
 #[cfg(feature = "window")]
 mod preview;
@@ -39,13 +35,9 @@ mod save;
 mod screen;
 mod settings;
 mod sinks;
-mod source;
-mod source_name;
-mod stereo;
 mod stream;
 mod terminal;
 mod unused;
-mod values;
 
 use std::ffi::OsString;
 use std::io::{self, Write};

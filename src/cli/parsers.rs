@@ -40,4 +40,4 @@ pub fn settings(path: &Path, text: &str) -> Result<(), CliError> {
 }
 
 #[cfg(feature = "camera")]
-pub use super::calibration::parse as depth_calibration;
+pub use crate::source::registration::parse as depth_calibration;

@@ -1,7 +1,7 @@
 //! `preview`: a window that shows a source in portrait mode, live.
 
 pub mod options;
-mod wings;
+mod store;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -9,22 +9,23 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::config::{self, Executor};
+use super::config;
 use super::error::CliError;
 use super::files::{check_report, write_report};
 use super::layers::Given;
 use super::options::{Global, Streaming};
-use super::source::SourceName;
 use super::{settings, sinks, terminal, unused};
 use crate::look::{Effect, Look};
 use crate::pipeline::Pace;
 use crate::preview::session::Start;
 use crate::preview::state::{Output, State};
+use crate::preview::system::System;
 use crate::preview::window::{self, Preview};
 use crate::sink::Target;
+use crate::source::{self, SourceName};
 
 use options::Window;
-use wings::Wings;
+use store::FileStore;
 
 /// Show a camera, a recording or the synthetic scene in portrait mode, live, and find a look
 #[derive(Args, Debug)]
@@ -69,7 +70,7 @@ pub fn run(command: &PreviewCommand, global: &Global, given: Given) -> Result<()
 /// # Errors
 /// As for [`run`].
 pub fn show(
-    source: &str,
+    name: &str,
     to: &[Target],
     window: &Window,
     parts: &Streaming,
@@ -85,10 +86,10 @@ pub fn show(
     if stream.on_demand {
         return refuse("--on-demand: the window watches all the time; leave it out, or use `bokehcam stream`");
     }
-    if !source.is_empty() {
-        let name = SourceName::from_str(source).map_err(|error| CliError::Usage(format!("{source}: {error}")))?;
-        sinks::check(to, parts, &name)?;
-        unused::warn_by_source(&given.settings, name.kind());
+    if !name.is_empty() {
+        let source = SourceName::from_str(name).map_err(|error| CliError::Usage(format!("{name}: {error}")))?;
+        sinks::check(to, parts, &source)?;
+        unused::warn_by_source(&given.settings, source.kind());
     }
     let outputs = to.iter().map(|target| match target.path() {
         Some(path) => Ok(Output { name: path.display().to_string(), is_camera: target.is_live() }),
@@ -98,20 +99,24 @@ pub fn show(
     // As if there were depth: what the source lacks is seen when it is open.
     sinks::try_report(stream.report.as_deref())?;
     let look = config::look(&parts.blur, &computing.quality)?;
-    let look = config::look_for(&look, &parts.blur.depth, true)?;
+    let look = source::fitting_look(&look, &parts.blur.depth, true)?;
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
     let look = Look { effect, ..look };
-    let executor = Executor::of(computing);
-    let device = executor.device()?;
-    let state = first_state(look.clone(), source, window, stream.mirror);
+    let device = computing.choice().device()?;
+    let store = FileStore { chosen: global.config.clone(), given };
+    let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
+    system.device.clone_from(&device);
+    system.out_size = stream.out_size.map(|size| (size.width, size.height));
+    system.force = output.force;
+    let state = first_state(look.clone(), name, window, stream.mirror);
     let closes = frames.frames.is_some() || !frames.repeat;
     let stop = terminal::stop_flag()?;
     let ended = window::show(Preview {
         state,
         session: Start {
-            backstage: Box::new(Wings::new((parts, &look), &executor, device.clone(), global.config.clone(), given)),
+            services: Box::new(system),
             look,
-            source: source.to_owned(),
+            source: name.to_owned(),
             outputs,
             keep_going: stream.keep_going,
             budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),

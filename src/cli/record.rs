@@ -5,19 +5,16 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 
-use super::config::Executor;
 use super::error::CliError;
 use super::files::refuse_source;
 use super::layers::Given;
-use super::source::{Source, SourceName, Wanted};
-use super::values::DepthChoice;
 use super::{options, terminal, unused};
 use crate::capture::{Brings, Captured, Shot};
-use crate::compute::Backend;
 use crate::depth::Seen;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 use crate::look::Effect;
 use crate::recording::tum::{Writer, WriterOptions, Written};
+use crate::source::{Options, Source, SourceName};
 
 /// Record a source in the TUM RGB-D layout
 ///
@@ -32,13 +29,13 @@ Examples:
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
 pub struct RecordCommand {
     /// A camera, two cameras LEFT,RIGHT, a folder with a recording, or `synthetic`
-    #[arg(value_parser = SourceName::parser())]
+    #[arg(value_parser = options::source_name())]
     source: SourceName,
     /// Folder for the recording
     #[arg(long, value_name = "DIR")]
     to: PathBuf,
     #[command(flatten)]
-    frames: options::Source,
+    frames: options::Frames,
     #[command(flatten)]
     depth: options::Depth,
     #[command(flatten)]
@@ -52,24 +49,20 @@ pub struct RecordCommand {
 /// # Errors
 /// The source cannot be read, or the recording exists (without `--force`) or cannot be written.
 pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
-    let wanted = Wanted {
-        frames: &command.frames,
-        depth: &command.depth,
-        stereo: &command.stereo,
-        from: &DepthChoice::Auto,
-        look: None,
-        executor: &Executor { backend: Backend::Auto, adapter: None, threads: None },
-        cycle: false,
-        keep_going: false,
+    let options = Options {
+        frames: command.frames.clone(),
+        depth: command.depth.clone(),
+        stereo: command.stereo.clone(),
+        ..Options::default()
     };
     if let Some(folder) = command.source.folder() {
         refuse_source("--to", &command.to, folder)?;
     }
-    let Source { mut camera, depth: mut source, rig, depth_from, .. } = Source::open(&command.source, &wanted)?;
+    let Source { mut camera, depth: mut source, rig, depth_from, .. } = Source::open(&command.source, &options, None)?;
     unused::warn(
         &given.settings,
         &unused::Run {
-            source: command.source.kind(),
+            source: unused::From::Source(command.source.kind()),
             depth: depth_from,
             uses_depth: true,
             effect: Effect::None,

@@ -4,23 +4,21 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::config::{self, Executor};
+use super::config;
 use super::error::CliError;
 use super::files::{make_folder_of, refuse_overwrite, refuse_source};
 use super::layers::Given;
-use super::unused::{DepthFrom, From};
-use super::values::DepthChoice;
+use super::unused::From;
 use super::{debug, focus, log, options, terminal, unused};
-use crate::bokeh::{BokehError, Job};
-use crate::compute::{Backend, Place};
+use crate::compute::Backend;
 use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
-use crate::link::pool::Pooled;
 use crate::look::{ApertureName, Look, Strength};
-use crate::optics::{CocField, StereoRig};
-use crate::pipeline::{CocMaker, Finish};
+use crate::optics::StereoRig;
+use crate::pipeline::{self, still::Depth};
 use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::recording::{Extras, snapshot};
+use crate::source::{self, DepthChoice, DepthFrom};
 
 /// Blur one still picture
 #[derive(Args, Debug)]
@@ -84,13 +82,13 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     }
     let look = config::look(&command.blur, &command.computing.quality)?;
     let (color, extras, depth) = read(command, &look)?;
-    let look = config::look_for(&look, &command.blur.depth, depth.is_some())?;
+    let look = source::fitting_look(&look, &command.blur.depth, depth.is_some())?;
     command.warn(&look, color.size(), depth.as_ref(), given);
-    let executor = Executor::of(&command.computing);
+    let computing = command.computing.choice();
     make_folder_of(&command.out)?;
     let (result, by) = match &command.debug_dir {
-        Some(dir) => debug::blurred(color, depth, &look, &executor, (dir, command.output.force))?,
-        None => blurred(color, depth, &look, &executor)?,
+        Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
+        None => pipeline::still::blur(&look, color, depth, &computing)?,
     };
     // Its thumbnail would show what the blur hides.
     let mut extras = extras.without_thumbnail();
@@ -154,14 +152,6 @@ fn sources(command: &RenderCommand) -> Vec<PathBuf> {
     [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(beside).collect()
 }
 
-/// A depth map for one picture.
-pub enum Depth {
-    /// As it was measured: with holes, and noise.
-    Measured(DepthMap),
-    /// As a blur had it.
-    Final(DepthMap),
-}
-
 /// The picture, what goes with it, and its depth if there is any.
 fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Option<Depth>), CliError> {
     let sources = command.like.as_ref().map(|like| snapshot::sources(like));
@@ -210,53 +200,4 @@ fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<Depth
         }
     };
     Ok(map.depth(|px| rig.depth_m(px)))
-}
-
-/// The blurred picture, and what blurred it.
-fn blurred(
-    color: ColorImage,
-    depth: Option<Depth>,
-    look: &Look,
-    executor: &Executor,
-) -> Result<(ColorImage, String), CliError> {
-    let size = color.size();
-    let Some(settings) = look.settings(size, false) else { return Ok((color, "not blurred".to_string())) };
-    let (coc, depth) = prepared(look, &color, depth)?;
-    let mut bokeh = executor.create(&settings, size)?;
-    bokeh.submit(Job {
-        ticket: 0,
-        color: Pooled::detached(color),
-        depth: depth.map(Pooled::detached),
-        coc,
-        quality: settings.quality,
-        place: Place::Memory,
-        out: Pooled::detached(ColorImage::default()),
-    })?;
-    match bokeh.collect(true)? {
-        Some(mut finished) => Ok((std::mem::take(&mut *finished.out), bokeh.describe())),
-        None => Err(CliError::NothingCameBack),
-    }
-}
-
-/// What a frame on its own is blurred by: the radius of every pixel, and the depth map (if it was measured, with holes
-/// filled, and refined if that was asked for) if that needs it.
-///
-/// # Errors
-/// [`BokehError::NoDepth`] when the blur follows depth and there is none.
-pub fn prepared(
-    look: &Look,
-    color: &ColorImage,
-    depth: Option<Depth>,
-) -> Result<(CocField, Option<DepthMap>), BokehError> {
-    let (finish, map) = match depth {
-        Some(Depth::Measured(map)) => (Finish::measured(look.refines(false)), Some(map)),
-        Some(Depth::Final(map)) => (Finish::Keep, Some(map)),
-        None => (Finish::Keep, None),
-    };
-    let mut maker = CocMaker::new(look.coc_rule(color.size()), finish);
-    match (maker.fixed(), map) {
-        (Some(field), _) => Ok((field, None)),
-        (None, None) => Err(BokehError::NoDepth),
-        (None, Some(mut map)) => Ok((maker.make(&mut map, color, 0), Some(map))),
-    }
 }

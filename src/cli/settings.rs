@@ -22,10 +22,8 @@ use crate::look::{self, Patch, SETTINGS};
 /// Settings by their flags without the dashes, each value as it would follow its flag.
 pub type Values = BTreeMap<String, String>;
 
-/// The settings file.
 #[derive(Debug, Default)]
 pub struct SettingsFile {
-    /// Its settings.
     pub values: Values,
     /// The settings of each preset in it.
     pub presets: BTreeMap<String, Values>,
@@ -98,6 +96,7 @@ impl SettingsFile {
 
     /// All presets, those in this file last. Those that cannot be, such as one whose aperture is a picture that is gone, are
     /// left out with a warning.
+    #[cfg(feature = "window")]
     pub fn all_presets(&self) -> Vec<Preset> {
         let own = self.presets.iter().filter_map(|(name, values)| {
             let pairs = values.iter().map(|(name, value)| (name.as_str(), value.as_str()));

@@ -5,10 +5,9 @@ use std::path::Path;
 use super::error::CliError;
 use super::files::refuse_source;
 use super::options::Streaming;
-use super::source::SourceName;
-use super::values::DepthChoice;
 use crate::files::{place, whole};
 use crate::sink::{Options, Sink, Target, Tee};
+use crate::source::{DepthChoice, SourceName};
 
 /// Whether what was asked of the sinks fits together, and leaves `source` alone.
 ///

@@ -4,22 +4,20 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::config::{self, Executor};
-use super::depth;
+use super::config;
 use super::error::CliError;
 use super::files::{check_report, write_report};
 use super::layers::Given;
 #[cfg(feature = "window")]
 use super::preview;
-use super::source::{Source, SourceName, Wanted};
-use super::unused::{self, DepthFrom};
-use super::{focus, options, sinks, terminal};
+use super::{focus, options, sinks, terminal, unused};
 use crate::clock::Clock;
 use crate::compute::Backend;
 use crate::link::demand::Demand;
 use crate::look::Strength;
 use crate::pipeline::{self, Pace, Run};
 use crate::sink::{self, Target};
+use crate::source::{DepthFrom, Source, SourceName};
 
 /// Blur a camera, a recording or the synthetic scene, frame by frame
 #[derive(Args, Debug)]
@@ -38,7 +36,7 @@ Examples:
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
     /// folder with a recording, or `synthetic`
-    #[arg(value_parser = SourceName::parser())]
+    #[arg(value_parser = options::source_name())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]
     to: Vec<Target>,
@@ -75,30 +73,19 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
     }
-    let executor = Executor::of(&parts.computing);
     let look = config::look(&parts.blur, &parts.computing.quality)?;
-    let wanted = Wanted {
-        frames: &parts.frames,
-        depth: &parts.depth,
-        stereo: &parts.stereo,
-        from: &parts.blur.depth,
-        look: Some(&look),
-        executor: &executor,
-        keep_going: stream.keep_going,
-        cycle: false,
-    };
-    let source = Source::open(&command.source, &wanted)?;
-    let source = depth::beside(source, &wanted, &Clock::system())?;
+    let options = parts.source_options();
+    let source = Source::open(&command.source, &options, Some(&look))?;
     let info = source.camera.info();
     let measured = source.is_measured();
     let is_live = info.live || command.to.iter().any(Target::is_live);
     let pace = stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
-    let look = config::look_for(&look, &parts.blur.depth, source.has_depth())?;
+    let look = source.fitting_look(&look, &options)?;
     let adaptive = pace == Pace::Realtime;
     unused::warn(
         &given.settings,
         &unused::Run {
-            source: command.source.kind(),
+            source: unused::From::Source(command.source.kind()),
             depth: source.depth_from,
             uses_depth: look.effect.follows_depth(),
             effect: look.effect,
@@ -111,7 +98,8 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     if let Some(map) = source.first_depth.as_ref() {
         focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
     }
-    let bokeh = look.settings(info.size, adaptive).map(|settings| executor.create(&settings, info.size)).transpose()?;
+    let settings = look.settings(info.size, adaptive);
+    let bokeh = settings.map(|settings| options.computing.blur(&settings, info.size)).transpose()?;
     // Last, so that nothing is begun that cannot be carried through.
     let demand = stream.on_demand.then(Demand::new);
     let stop = terminal::stop_flag()?;
@@ -130,7 +118,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
     }
     if parts.blur.takes_whatever_depth() && !source.has_depth() {
-        unused::warn_of_no_depth(command.source.kind());
+        unused::warn_of_no_depth(unused::From::Source(command.source.kind()));
     }
     let bar = terminal::Progress::new(info.frames, global);
     let ended = pipeline::run(Run {

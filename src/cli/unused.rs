@@ -5,6 +5,7 @@
 use super::layers::Setting;
 use super::log;
 use crate::look::Effect;
+use crate::source::{DepthFrom, Kind};
 
 /// What a run came to, as far as settings depend on it.
 #[derive(Clone, Copy, Debug)]
@@ -30,38 +31,19 @@ pub struct Run {
 /// What frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum From {
-    /// A camera, or two.
-    Camera,
-    /// A folder with a recording.
-    Recording,
-    /// The synthetic scene.
-    Synthetic,
-    /// One picture.
+    /// A source of frames.
+    Source(Kind),
     Picture,
     /// The scene that is measured.
     Bench,
 }
 
-/// What depth comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DepthFrom {
-    /// There is none, or it is not used.
-    Nothing,
-    /// Numbers in units of their own, as 16-bit pictures and depth cameras have them.
-    Units,
-    /// Metres, or disparities that become metres.
-    Metres,
-    /// Two eyes.
-    Eyes,
-}
-
 /// Why a setting has no effect in a run, if it has none.
 type Why = fn(&Run) -> Option<&'static str>;
 
-/// What settings need.
 const NEEDS: [(&[&str], Why); 13] = [
-    (&["size", "fps"], |run| (run.source == From::Recording).then_some("a recording has its own")),
-    (&["format", "control"], |run| (run.source != From::Camera).then_some("the source is no camera")),
+    (&["size", "fps"], |run| (run.source == From::Source(Kind::Recording)).then_some("a recording has its own")),
+    (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
     (&["depth-scale", "depth-invalid"], |run| match run.depth {
         DepthFrom::Nothing => Some(NO_DEPTH),
         DepthFrom::Metres | DepthFrom::Eyes => Some("this depth is in metres already"),
@@ -115,9 +97,9 @@ pub fn warn(given: &[Setting], run: &Run) {
 
 /// The same, as far as that depends on the source alone: the window changes all else.
 #[cfg(feature = "window")]
-pub fn warn_by_source(given: &[Setting], source: From) {
+pub fn warn_by_source(given: &[Setting], source: Kind) {
     let run = Run {
-        source,
+        source: From::Source(source),
         depth: DepthFrom::Nothing,
         uses_depth: false,
         effect: Effect::None,
@@ -171,8 +153,8 @@ fn called(setting: &Setting) -> String {
 pub fn warn_of_no_depth(source: From) {
     let way = match source {
         From::Picture => "--depth-map FILE gives its depth",
-        From::Recording => "--depth FOLDER takes another recording's",
-        From::Camera | From::Synthetic | From::Bench => "--depth NAME takes a depth camera's",
+        From::Source(Kind::Recording) => "--depth FOLDER takes another recording's",
+        From::Source(_) | From::Bench => "--depth NAME takes a depth camera's",
     };
     log::warn(&format!(
         "{NO_DEPTH}, so a band of the picture stays sharp and the rest is blurred (tilt-shift): {way}, --effect blur blurs it all"
@@ -225,6 +207,6 @@ mod tests {
         assert!(why("tilt", &dof).is_some() && why("tilt", &Run { effect: Effect::TiltShift, ..RUN }).is_none());
         assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &Run { realtime: true, ..dof }).is_none());
         assert!(why("rim", &Run { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
-        assert!(why("fps", &Run { source: From::Recording, ..dof }).is_some());
+        assert!(why("fps", &Run { source: From::Source(Kind::Recording), ..dof }).is_some());
     }
 }

@@ -14,7 +14,6 @@ pub struct Aligned<T = f32> {
 }
 
 impl<T: Copy + Default> Aligned<T> {
-    /// Zeros.
     pub fn zeros(length: usize) -> Self {
         // The allocation is longer than needed by a line, and never moves.
         let memory = vec![T::default(); length + LINE / size_of::<T>()];

@@ -8,7 +8,6 @@ use super::{GpuError, catching};
 /// A pass: the name of its entry point and file, and its source.
 #[derive(Clone, Copy, Debug)]
 pub struct Shader {
-    /// Entry point.
     pub name: &'static str,
     /// Whole source, shared parts included.
     pub source: &'static str,
@@ -24,9 +23,7 @@ pub struct Device {
     pub instance: wgpu::Instance,
     /// What it was opened on.
     pub adapter: wgpu::Adapter,
-    /// The device.
     pub device: wgpu::Device,
-    /// Its queue.
     pub queue: wgpu::Queue,
     /// Name, kind and driver of the adapter.
     pub name: String,
@@ -199,7 +196,6 @@ impl Device {
         Ok(())
     }
 
-    /// The device hangs.
     fn give_up(&self) {
         // Freeing it would wait for what never comes.
         std::mem::forget((self.instance.clone(), self.device.clone(), self.queue.clone()));
@@ -250,7 +246,6 @@ impl DevicePicture {
         self.size
     }
 
-    /// Where it is.
     pub fn buffer(&self) -> &wgpu::Buffer {
         &self.buffer
     }

@@ -3,6 +3,7 @@
 pub mod aligned;
 #[cfg(feature = "gpu")]
 pub mod device;
+pub mod memory;
 pub mod simd;
 pub mod team;
 
@@ -34,12 +35,10 @@ named! {
 /// Where a picture is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Place {
-    /// In memory.
     #[default]
     Memory,
     /// In the memory of the GPU that made it; who computes elsewhere leaves it in memory.
     Device,
-    /// In both.
     Both,
 }
 
@@ -51,7 +50,6 @@ pub enum GpuError {
     NoAdapter {
         /// What was asked for.
         wanted: String,
-        /// What there is.
         found: String,
     },
     /// The GPU refused or was lost.

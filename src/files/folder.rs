@@ -31,34 +31,20 @@ const WHOLE: &str = ".bokehcam.whole";
 pub enum FolderError {
     /// It has something in it, and nothing may be replaced.
     #[error("the folder {} is not empty; choose another or write into it with --force", path.display())]
-    NotEmpty {
-        /// The folder.
-        path: PathBuf,
-    },
+    NotEmpty { path: PathBuf },
     /// A file has a name that is to be written, and is none of ours.
     #[error("{} was not written by bokehcam, and stays: move it away, or choose another folder", path.display())]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
+    Foreign { path: PathBuf },
     /// Another program, or this one twice.
     #[error("the folder {} is being written by another run: choose another", path.display())]
-    Busy {
-        /// The folder.
-        path: PathBuf,
-    },
+    Busy { path: PathBuf },
     /// It was removed while it was written.
     #[error("the folder {} was removed meanwhile", path.display())]
-    Gone {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// The system refused.
+    Gone { path: PathBuf },
     #[error("cannot write {}: {cause}", path.display())]
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// What it said.
         cause: io::Error,
     },
 }

@@ -47,7 +47,6 @@ impl Part {
         &self.path
     }
 
-    /// The name meanwhile.
     pub fn part(&self) -> &Path {
         &self.part
     }

@@ -16,7 +16,6 @@ struct Shared {
 }
 
 impl Demand {
-    /// Nobody watches yet.
     pub fn new() -> Self {
         Self(Arc::new(Shared { watched: AtomicUsize::new(0), bell: Bell::new() }))
     }

@@ -53,9 +53,7 @@ pub const LOSSLESS_ITEMS: usize = 2;
 /// What came of waiting for an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received<T> {
-    /// An item.
     Item(T),
-    /// None in time.
     Nothing,
     /// The sender is gone and nothing is pending.
     Ended,

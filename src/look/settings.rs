@@ -334,3 +334,38 @@ impl<'de> Deserialize<'de> for Look {
         Patch::deserialize(deserializer)?.on(&Self::default()).map_err(de::Error::custom)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_values_say_what_is_accepted() {
+        for text in ["0", "-1", "inf", "0.5", "far", "0.5,1.1", "0.5,", "1,1,1"] {
+            let accepted = text.parse::<FocusRule>();
+            assert_eq!(accepted.is_ok(), text == "0.5", "{text}: {accepted:?}");
+        }
+        for text in ["0", "17", "all"] {
+            assert!(text.parse::<Rank>().unwrap_err().contains("1 to 16"), "{text}");
+        }
+        assert!("0.5:0.1:0:0".parse::<Tilt>().is_err());
+        assert_eq!("0.6".parse(), Ok(Tilt { center_y: 0.6, band: 0.15, angle_deg: 0.0 }));
+        assert_eq!(Patch::parse([("rim", "2")]), Err(("rim".to_string(), "use a number from 0 to 1".to_string())));
+        assert!(Patch::parse([("mirror", "true")]).is_err());
+    }
+
+    #[test]
+    fn a_lens_is_known_by_three_numbers_or_changed_by_one() {
+        let one = Patch::parse([("f-number", "2")]).unwrap();
+        assert!(matches!(one.on(&Look::default()), Err(LookError::Lens)));
+        let lens = Patch::parse([("f-number", "4"), ("focal-length", "50"), ("sensor-width", "36")]).unwrap();
+        let by_lens = lens.on(&Look::default()).unwrap();
+        let wider = one.on(&by_lens).unwrap();
+        assert_eq!(
+            wider.strength,
+            Strength::Lens(Lens { f_number: 2.0, focal_length_mm: 50.0, sensor_width_mm: 36.0 })
+        );
+        let at_infinity = Patch::parse([("coc-at-infinity", "auto")]).unwrap();
+        assert_eq!(at_infinity.on(&wider).unwrap(), Look::default());
+    }
+}

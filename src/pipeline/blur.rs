@@ -7,10 +7,10 @@ use super::depth::Ready;
 use super::quality::{LateRule, Picker};
 use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, Trace, hand_on};
-use crate::bokeh::{Bokeh, Finished, Job, PassTimes};
+use crate::bokeh::{Bokeh, Finished, Job, PassTimes, Picture};
 use crate::budget::Quality;
 use crate::clock::Clock;
-use crate::compute::{DevicePicture, Place};
+use crate::compute::Place;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Receiver, Sender};
@@ -20,10 +20,7 @@ use crate::stats::{About, Cause, Histogram, PassHistograms, RungCounts, Tally, T
 
 /// A blurred picture, and what it was made of.
 pub(super) struct Blurred {
-    pub picture: Pooled<ColorImage>,
-    /// Whether the picture is in memory; otherwise it is on the device alone.
-    pub in_memory: bool,
-    pub on_device: Option<Pooled<DevicePicture>>,
+    pub picture: Picture,
     /// The picture before; `None` where nothing was blurred, or nobody looks at it.
     pub color: Option<Pooled<ColorImage>>,
     pub depth: Option<Pooled<DepthMap>>,
@@ -131,14 +128,8 @@ impl Stage<'_> {
             self.tally.dropped(ticket, Cause::Late);
             return true;
         }
-        let item = Blurred {
-            picture: color,
-            in_memory: true,
-            on_device: None,
-            color: None,
-            depth: depth.filter(|_| self.viewed),
-            coc,
-        };
+        let item =
+            Blurred { picture: Picture::in_memory(color), color: None, depth: depth.filter(|_| self.viewed), coc };
         hand_on(to, Frame { ticket, stamp, trace, item }, self.tally)
     }
 
@@ -186,17 +177,11 @@ impl Stage<'_> {
         let Some(done) = pending.pop_front().filter(|oldest| oldest.ticket.id.0 == finished.ticket) else {
             return Err(Fault::LostFrame);
         };
-        let Finished { out, in_memory, on_device, color, depth, times, .. } = finished;
+        let Finished { picture, color, depth, times, .. } = finished;
         let blur_ns = self.measure(&done, &times, executor.capacity());
         let Pending { ticket, stamp, trace, coc, quality, .. } = done;
-        let item = Blurred {
-            picture: out,
-            in_memory,
-            on_device,
-            color: Some(color).filter(|_| self.viewed),
-            depth: depth.filter(|_| self.viewed),
-            coc,
-        };
+        let item =
+            Blurred { picture, color: Some(color).filter(|_| self.viewed), depth: depth.filter(|_| self.viewed), coc };
         let trace = Trace { blur_ns, passes: times, quality: Some(quality), ..trace };
         Ok(hand_on(to, Frame { ticket, stamp, trace, item }, self.tally))
     }

@@ -49,14 +49,14 @@ impl Stage<'_> {
                 Received::Ended => break,
             };
             if self.mirror {
-                mirror(&mut frame.picture);
+                frame.picture.memory_mut().map(mirror);
             }
             if let Some(playout) = &mut self.playout {
                 self.clock.sleep_until_ns(playout.due_ns(ticket.captured_ns, self.clock.now_ns()));
             }
             let began_ns = self.clock.now_ns();
-            if frame.in_memory {
-                match self.sink.put(&frame.picture, stamp.time_ns) {
+            if let Some(picture) = frame.picture.memory() {
+                match self.sink.put(picture, stamp.time_ns) {
                     Ok(flow) if flow.is_break() => break,
                     Ok(_) => {}
                     Err(error) => {
@@ -75,13 +75,13 @@ impl Stage<'_> {
             }
             let captured_ns = ticket.captured_ns;
             // Where the viewer alone takes frames, one is delivered once it did.
-            let taken = frame.in_memory && self.sink.keeps();
+            let taken = frame.picture.memory().is_some() && self.sink.keeps();
             let (sunk, kept) = if self.view.is_none() || taken { (Some(ticket), None) } else { (None, Some(ticket)) };
             sunk.into_iter().for_each(|ticket| self.tally.delivered(ticket));
             if let Some(view) = &mut self.view {
-                let Blurred { picture, in_memory, on_device, color, depth, coc } = frame;
+                let Blurred { picture, color, depth, coc } = frame;
                 let frames = self.tally.frames();
-                let item = View { picture, in_memory, on_device, color, depth, coc, stamp, captured_ns, trace, frames };
+                let item = View { picture, color, depth, coc, stamp, captured_ns, trace, frames };
                 match view.send(item) {
                     Ok(displaced) => self.looked_at(displaced.is_none(), std::mem::replace(&mut viewed, kept)),
                     // Nobody knows the fate of this frame, nor of the one before: they stay in flight.

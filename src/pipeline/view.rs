@@ -1,8 +1,7 @@
 //! What others see of a run while it goes on.
 
-use crate::bokeh::PassTimes;
+use crate::bokeh::{PassTimes, Picture};
 use crate::budget::Quality;
-use crate::compute::DevicePicture;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::Pooled;
 use crate::optics::CocField;
@@ -23,12 +22,8 @@ pub struct Progress {
 
 /// A frame, for who looks at more than the picture.
 pub struct View {
-    /// The picture as the sink was given it; any picture where it is not in memory.
-    pub picture: Pooled<ColorImage>,
-    /// Whether the picture is in memory.
-    pub in_memory: bool,
-    /// The picture on the device that blurs, where it was wanted there and is.
-    pub on_device: Option<Pooled<DevicePicture>>,
+    /// The picture; in memory where the sink was given it.
+    pub picture: Picture,
     /// The picture before the blur; `None` where nothing was blurred.
     pub color: Option<Pooled<ColorImage>>,
     /// The depth that it was blurred by, holes filled.

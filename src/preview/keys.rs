@@ -9,7 +9,6 @@ use crate::look::Look;
 /// Keys to press together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chord {
-    /// The key.
     pub key: Key,
     /// Whether Ctrl is held.
     pub ctrl: bool,
@@ -19,11 +18,9 @@ pub struct Chord {
 
 /// What a key does.
 pub struct Binding {
-    /// Any of these.
     pub chords: &'static [Chord],
     /// What the help calls them.
     pub keys: &'static str,
-    /// What they do.
     pub does: &'static str,
     /// Whether it goes on while the key is held.
     pub repeats: bool,
@@ -34,7 +31,6 @@ pub struct Binding {
 pub struct Group {
     /// What they are about.
     pub name: &'static str,
-    /// The bindings.
     pub bindings: &'static [Binding],
 }
 
@@ -69,7 +65,6 @@ const fn held(chords: &'static [Chord], keys: &'static str, does: &'static str, 
     Binding { chords, keys, does, repeats: true, make }
 }
 
-/// Another look.
 fn look(state: &State, stroke: &'static str, change: impl FnOnce(&mut Look)) -> Option<Action> {
     let mut look = state.look.clone();
     change(&mut look);
@@ -110,7 +105,6 @@ const RANGE_STEP_M: f32 = 0.05;
 /// A step of the size of text.
 const TEXT_STEP: f32 = 1.1;
 
-/// All keys.
 pub const GROUPS: [Group; 5] = [
     Group {
         name: "Look",

@@ -41,13 +41,9 @@ pub struct Meters {
 /// Mean times of the last frames, in milliseconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stages {
-    /// Reading and decoding.
     pub decode_ms: f64,
-    /// Depth and CoC.
     pub depth_ms: f64,
-    /// The blur.
     pub blur_ms: f64,
-    /// Drawing the window.
     pub present_ms: f64,
     passes: [(&'static str, f64); PASSES],
     seen: usize,
@@ -63,7 +59,6 @@ impl Stages {
 /// What was presented in all.
 #[derive(Clone, Debug, Default)]
 pub struct Totals {
-    /// Frames presented.
     pub presented: u64,
     /// From the start of the preview to the first frame, in nanoseconds.
     pub first_frame_ns: Option<u64>,
@@ -71,7 +66,6 @@ pub struct Totals {
     pub latency: Histogram,
     /// From an input to the picture that shows what it did.
     pub reaction: Histogram,
-    /// Drawing the window.
     pub present: Histogram,
 }
 

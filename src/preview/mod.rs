@@ -5,12 +5,13 @@
 //! person does is an [`state::Action`]; [`state::State::apply`] makes of it another state and the
 //! [`state::Request`]s that only others can bring about.
 
-pub mod backstage;
 pub mod keys;
 pub mod meters;
 pub mod panel;
 pub mod present;
+pub mod services;
 pub mod session;
 pub mod state;
+pub mod system;
 pub mod views;
 pub mod window;

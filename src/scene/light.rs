@@ -8,7 +8,6 @@ use glam::Vec3;
 use super::grid::Grid;
 use super::part::Surface;
 
-/// A lamp.
 #[derive(Clone, Copy, Debug)]
 pub struct Light {
     /// Where it is, in metres.
@@ -24,16 +23,13 @@ pub struct Light {
 /// Light from all around, by the direction that a surface faces.
 #[derive(Clone, Copy, Debug)]
 pub struct Ambient {
-    /// From above.
     pub above: Vec3,
-    /// From below.
     pub below: Vec3,
 }
 
 /// A ball in the way of light, in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Shade {
-    /// Middle.
     pub centre: Vec3,
     /// Radius in metres.
     pub radius: f32,
@@ -52,7 +48,6 @@ pub struct Lit<'a> {
     pub surface: Surface,
     /// The part that it belongs to.
     pub part: usize,
-    /// The balls around.
     pub shades: &'a [Shade],
 }
 

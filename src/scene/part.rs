@@ -22,7 +22,6 @@ pub struct Spot {
     pub tangent: Vec3,
     /// The material's colour, linear.
     pub tint: Vec3,
-    /// The material's seed.
     pub seed: u32,
 }
 
@@ -62,7 +61,6 @@ impl Surface {
         }
     }
 
-    /// With a highlight.
     pub fn glossy(self, gloss: f32, shine: f32) -> Self {
         Self { gloss, shine, ..self }
     }
@@ -74,7 +72,6 @@ pub type Paint = fn(&Spot) -> Surface;
 /// A paint with its colour and seed.
 #[derive(Clone, Copy, Debug)]
 pub struct Material {
-    /// The paint.
     pub paint: Paint,
     /// Its colour, linear.
     pub tint: Vec3,
@@ -97,7 +94,6 @@ impl Material {
 /// A rigid group of shapes.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// The shapes.
     pub shapes: Vec<Shape>,
     /// The paint of each shape.
     pub materials: Vec<Material>,
@@ -122,7 +118,6 @@ impl Part {
         Self { shapes: Vec::new(), materials: Vec::new(), tree: Bvh::default(), motion, form: None, shades: Vec::new() }
     }
 
-    /// Adds a shape.
     pub fn add(&mut self, shape: Shape, material: Material) {
         self.shapes.push(shape);
         self.materials.push(material);

@@ -5,7 +5,6 @@ use glam::{Mat3, Vec3};
 /// A half line. `origin + t * direction`; for a camera ray `direction.z` is 1, so that `t` is the depth in metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// Start.
     pub origin: Vec3,
     /// Step per unit of `t`, of any length.
     pub direction: Vec3,
@@ -37,7 +36,6 @@ impl Ray {
     }
 }
 
-/// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     /// The corner of the lowest coordinates.
@@ -60,7 +58,6 @@ impl Bounds {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// The middle.
     pub fn centre(&self) -> Vec3 {
         0.5 * (self.low + self.high)
     }
@@ -91,7 +88,6 @@ impl Bounds {
 /// Where a part stands: `world = turn * local + place`.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
-    /// A rotation.
     pub turn: Mat3,
     /// Where the part's origin is, in metres.
     pub place: Vec3,

@@ -11,9 +11,7 @@ use crate::frame::{ColorImage, DepthMap};
 /// A camera: picture size, focal length, and which eye of a rectified pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Columns.
     pub width: u32,
-    /// Rows.
     pub height: u32,
     /// Focal length in pixels, for this width.
     pub focal_px: f32,
@@ -75,9 +73,7 @@ pub struct ThinLens<'a> {
 /// Linear light: `height` x `width`, row-major, 1 = white, not limited.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearImage {
-    /// Columns.
     pub width: u32,
-    /// Rows.
     pub height: u32,
     /// `height * width` radiances (R, G, B), >= 0.
     pub rgb: Vec<Vec3>,

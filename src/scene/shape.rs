@@ -15,7 +15,6 @@ pub type Distance = fn(Vec3) -> f32;
 pub enum Shape {
     /// The parallelogram `centre + u * right + v * up` for `u`, `v` in -1..1, where `cut` (u, v) holds.
     Quad {
-        /// Middle.
         centre: Vec3,
         /// From the middle to the right edge.
         right: Vec3,
@@ -24,25 +23,20 @@ pub enum Shape {
         /// The outline within the parallelogram.
         cut: fn(Vec2) -> bool,
     },
-    /// A ball.
     Sphere {
-        /// Middle.
         centre: Vec3,
         /// Radius in metres.
         radius: f32,
     },
     /// A stretched ball: the points that `to_unit * (p - centre)` puts on the unit sphere.
     Ellipsoid {
-        /// Middle.
         centre: Vec3,
         /// Shrinks the surface to the unit sphere.
         to_unit: Mat3,
     },
     /// A box, turned by `axes` (whose columns are the box's directions).
     Cuboid {
-        /// Middle.
         centre: Vec3,
-        /// A rotation.
         axes: Mat3,
         /// Half the edges in metres.
         half: Vec3,
@@ -51,7 +45,6 @@ pub enum Shape {
     Cone {
         /// The first end.
         a: Vec3,
-        /// The other end.
         b: Vec3,
         /// Radius at `a`, in metres.
         radius_a: f32,
@@ -71,7 +64,6 @@ pub enum Shape {
     },
     /// The zero set of a distance function inside a box.
     Field {
-        /// The function.
         distance: Distance,
         /// Where it is looked for.
         bounds: Bounds,
@@ -210,7 +202,6 @@ impl Shape {
 pub struct Skin {
     /// Outward unit normal.
     pub normal: Vec3,
-    /// Surface coordinates.
     pub uv: Vec2,
     /// Unit vector along a cone, or to the right of a quad.
     pub tangent: Vec3,

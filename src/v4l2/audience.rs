@@ -27,7 +27,6 @@ const SETTLE: Duration = Duration::from_millis(60);
 pub enum Heard {
     /// Whether there are readers now.
     Readers(bool),
-    /// Nothing in time.
     Nothing,
     /// The end: [`Stop`] was used or dropped, or the node is gone.
     Stopped,
@@ -44,7 +43,6 @@ pub struct Audience {
     stop: OwnedFd,
 }
 
-/// Ends the listening.
 #[derive(Debug)]
 pub struct Stop(OwnedFd);
 

@@ -20,7 +20,6 @@ pub struct Control {
     pub name: String,
     /// Its name as the driver writes it: `Exposure, Dynamic Framerate`.
     pub label: String,
-    /// Its number.
     pub id: u32,
     /// What values it takes.
     pub kind: Kind,
@@ -48,7 +47,6 @@ pub struct Control {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// Whole numbers.
     Integer,
     /// 0 or 1.
     Boolean,
@@ -60,7 +58,6 @@ pub enum Kind {
     Button,
     /// Whole numbers of 64 bits.
     Integer64,
-    /// Text.
     String,
     /// Bits.
     Bitmask,
@@ -71,7 +68,6 @@ pub enum Kind {
 /// An item of a menu.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Item {
-    /// Its number.
     pub index: i64,
     /// Its name; of a menu of numbers, the number.
     pub name: String,

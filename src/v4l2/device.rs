@@ -87,7 +87,6 @@ impl Device {
         Ok(Self { fd, path: path.to_owned() })
     }
 
-    /// The node.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -128,7 +127,6 @@ impl Device {
         set_format: VIDIOC_S_FMT(sys::v4l2_format);
         /// What setting a format would give.
         try_format: VIDIOC_TRY_FMT(sys::v4l2_format);
-        /// The frame rate.
         get_parameters: VIDIOC_G_PARM(sys::v4l2_streamparm);
         /// Sets the frame rate; the driver may change it.
         set_parameters: VIDIOC_S_PARM(sys::v4l2_streamparm);

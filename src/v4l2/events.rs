@@ -25,7 +25,6 @@ const fn number<T>(direction: c_ulong, place: c_ulong) -> Request {
 /// What a device has to tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
-    /// Which event.
     pub kind: u32,
     /// What comes with it; how it is read depends on the event.
     pub data: [u8; 64],

@@ -8,7 +8,6 @@ use std::path::Path;
 /// A process that has a device open.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Holder {
-    /// Its number.
     pub pid: u32,
     /// Its name as the system cuts it, to 15 bytes.
     pub name: String,

@@ -36,9 +36,7 @@ pub enum Layout {
     Yu12,
     /// Two planes, colour halved both ways and interleaved.
     Nv12,
-    /// R G B.
     Rgb24,
-    /// B G R.
     Bgr24,
 }
 
@@ -51,7 +49,6 @@ impl Layout {
         (Self::Bgr24, b"BGR3"),
     ];
 
-    /// Its four characters.
     pub fn fourcc(self) -> &'static str {
         let code = Self::ALL.iter().find(|(layout, _)| *layout == self).map_or(b"????", |(_, code)| code);
         std::str::from_utf8(code).unwrap_or("????")
@@ -146,7 +143,6 @@ impl Output {
         Ok(Self { device: Arc::new(device), card, layout, size })
     }
 
-    /// The open node.
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }

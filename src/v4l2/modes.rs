@@ -46,14 +46,12 @@ impl QueueKind {
 pub struct FormatModes {
     /// The queue that gives it.
     pub queue: QueueKind,
-    /// Its four letters.
     #[serde(serialize_with = "as_text")]
     pub fourcc: FourCc,
     /// What the driver calls it.
     pub description: String,
     /// A library would have to convert to it: the device itself does not send it.
     pub emulated: bool,
-    /// Its sizes.
     pub sizes: Sizes,
 }
 
@@ -142,7 +140,6 @@ impl Interval {
         (u64::from(self.numerator) * 1_000_000_000 / u64::from(self.denominator)).max(1)
     }
 
-    /// For the kernel.
     pub fn fraction(self) -> sys::v4l2_fract {
         sys::v4l2_fract { numerator: self.numerator, denominator: self.denominator }
     }

@@ -24,7 +24,6 @@ pub struct Node {
     pub driver: String,
     /// Where the device is plugged in.
     pub bus: String,
-    /// What it does.
     pub kind: Kind,
     /// Whether frames can be taken from it now. A virtual camera may change its mind when it is written to.
     pub captures: bool,
@@ -58,7 +57,6 @@ pub enum Kind {
     Other,
 }
 
-/// A USB connection.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Usb {
     /// Signalling rate, in Mbit/s: 480 is USB 2, 5000 and more USB 3.
@@ -72,20 +70,10 @@ pub struct Usb {
 pub enum NodeError {
     /// Nothing has this name.
     #[error("there is no camera '{name}'{}", listed(.there, ": there is ", "; no camera is connected (`bokehcam doctor` tells more)"))]
-    None {
-        /// The name.
-        name: String,
-        /// What there is.
-        there: Vec<String>,
-    },
+    None { name: String, there: Vec<String> },
     /// Several devices have this name.
     #[error("'{name}' is the name of {}; use the path of one", listed(.candidates, "", "several"))]
-    Ambiguous {
-        /// The name.
-        name: String,
-        /// All of them.
-        candidates: Vec<String>,
-    },
+    Ambiguous { name: String, candidates: Vec<String> },
     /// The path leads to something else.
     #[error("{}: this is no device node", .0.display())]
     NotADevice(PathBuf),

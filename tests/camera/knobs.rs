@@ -3,7 +3,8 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 
-use bokehcam::v4l2::live::knobs::{self, Knob};
+use bokehcam::knob::Knob;
+use bokehcam::v4l2::live::knobs;
 
 use super::machine::{CAMERA, Machine, frame, open, sh, until, wish};
 

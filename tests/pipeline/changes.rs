@@ -7,7 +7,7 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
+use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use bokehcam::compute::Backend;
 use bokehcam::frame::ColorImage;
 use bokehcam::link;
@@ -44,7 +44,7 @@ impl Bokeh for Made {
             job.out.rgb[0] = self.radius_px as u8;
             let times = PassTimes::new();
             let Job { ticket, out, color, depth, .. } = job;
-            Finished { ticket, out, in_memory: true, on_device: None, color, depth, times }
+            Finished { ticket, picture: Picture::in_memory(out), color, depth, times }
         }))
     }
 
@@ -139,8 +139,9 @@ fn a_viewer_sees_what_pictures_were_made_of_and_counts_where_the_sink_does_not()
                 let mut seen = 0;
                 while let Some(view) = views.recv() {
                     let before = view.color.as_ref().expect("it was blurred");
-                    assert_eq!(before.rgb[1..], view.picture.rgb[1..]);
-                    assert_eq!((view.picture.rgb[0], view.coc), (7, CocField::Uniform { radius_px: 7.0 }));
+                    let picture = view.picture.memory().expect("it is in memory");
+                    assert_eq!(before.rgb[1..], picture.rgb[1..]);
+                    assert_eq!((picture.rgb[0], view.coc), (7, CocField::Uniform { radius_px: 7.0 }));
                     assert!(view.frames.captured > 0);
                     seen += 1;
                     thread::sleep(Duration::from_millis(patience_ms));

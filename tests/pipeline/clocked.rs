@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
+use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
@@ -106,7 +106,7 @@ impl Bokeh for Recorder {
         Ok(self.job.take().map(|Job { ticket, mut out, color, depth, .. }| {
             out.resize(SIZE.0, SIZE.1);
             let times = PassTimes::new();
-            Finished { ticket, out, in_memory: true, on_device: None, color, depth, times }
+            Finished { ticket, picture: Picture::in_memory(out), color, depth, times }
         }))
     }
     fn in_flight(&self) -> usize {

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::Duration;
 
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
+use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::clock::Clock;
@@ -173,9 +173,7 @@ impl Bokeh for FakeBokeh {
             times.add("columns", Duration::from_micros(300));
             Finished {
                 ticket: job.ticket,
-                out: job.out,
-                in_memory: true,
-                on_device: None,
+                picture: Picture::in_memory(job.out),
                 color: job.color,
                 depth: job.depth,
                 times,

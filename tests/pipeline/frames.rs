@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use bokehcam::bokeh::rung::COSTS;
-use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes};
+use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::compute::Backend;
 use bokehcam::frame::Stamp;
@@ -93,9 +93,7 @@ impl Bokeh for Paced {
         times.add("all", self.0.mul_f64(COSTS[job.quality as usize]));
         self.1 = Some(Finished {
             ticket: job.ticket,
-            out: job.out,
-            in_memory: true,
-            on_device: None,
+            picture: Picture::in_memory(job.out),
             color: job.color,
             depth: job.depth,
             times,

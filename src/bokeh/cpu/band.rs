@@ -12,9 +12,7 @@ use crate::compute::aligned::Line;
 
 /// Some rows of the picture: whole rows of cells of every bin.
 pub struct Band<'a> {
-    /// The frame.
     pub source: Source<'a>,
-    /// What is where.
     pub tiles: &'a Tiles,
     /// First row, and how many.
     pub rows: std::ops::Range<usize>,
@@ -42,7 +40,6 @@ pub enum Hidden<'a> {
 pub struct BandSums(Vec<BinSums>);
 
 impl BandSums {
-    /// Of nothing.
     pub fn new() -> Self {
         Self(vec![BinSums::new(); MAX_BINS])
     }

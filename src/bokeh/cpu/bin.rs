@@ -37,7 +37,6 @@ pub struct BinRows<'a> {
     pub rows: usize,
     /// As [`Strips`](super::rows::Strips) has it.
     pub out: &'a mut [f32],
-    /// Strips across.
     pub across: usize,
     /// `[row of cells][CELL_PLANES][across]`.
     pub cells: &'a mut [f32],
@@ -59,7 +58,6 @@ pub type Means = Line<[[f32; PLANE]; SUMS]>;
 type CellSums = Line<[[f32; PLANE]; CELL_PLANES]>;
 
 impl BinSums {
-    /// Of nothing.
     pub fn new() -> Self {
         let mut empty = Self {
             rows: Line([[[0.0; WIDE]; SUMS]; 2]),
@@ -77,7 +75,6 @@ fn strip_row(across: usize, x: usize, row: usize) -> usize {
     (row / CELL * across + x / STRIP) * STRIP_CELLS + row % CELL * STRIP_ROW
 }
 
-/// Cells of nothing.
 #[inline(always)]
 fn clear_cells(cells: &mut CellSums) {
     for (plane, &value) in cells.0.iter_mut().zip(&EMPTY_CELL) {
@@ -106,7 +103,6 @@ fn note<V: Simd>(simd: V, cells: &mut CellSums, x: usize, sums: [V::f32s; 2], ow
 }
 
 impl BinRows<'_> {
-    /// Empties a block.
     #[inline(always)]
     pub fn clear(&mut self, block: usize) {
         let (x0, width) = (block * BLOCK / self.scale, BLOCK / self.scale);

@@ -29,7 +29,6 @@ pub struct Strip<'a> {
     pub cells: &'a Cells,
     /// Radius and range of colours, from `reach`.
     pub edges: &'a Edges,
-    /// The filters.
     pub bank: &'a Bank,
     /// Whether the bin covers every pixel.
     pub whole: bool,
@@ -37,7 +36,6 @@ pub struct Strip<'a> {
     pub turned: bool,
     /// Outermost tap that this bin can need.
     pub reach: usize,
-    /// Which strip.
     pub strip: usize,
     /// `[row][4][STRIP]`: the result.
     pub out: &'a mut [f32],

@@ -28,7 +28,6 @@ const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
 pub struct EncodeTable(Box<[u8; ENCODE_SIZE]>);
 
 impl EncodeTable {
-    /// The table.
     pub fn new() -> Self {
         let mut codes = Box::new([255; ENCODE_SIZE]);
         let half = |most: f32| (0..=ENCODE_STEPS).map(move |k| k as f32 / ENCODE_STEPS as f32 * most);
@@ -41,9 +40,7 @@ impl EncodeTable {
 
 /// Rows `y0..` of the result, a row of tiles.
 pub struct Composite<'a> {
-    /// The plan.
     pub plan: &'a Plan,
-    /// The blurred bins.
     pub slots: &'a [Slot],
     /// What stays as it is.
     pub tiles: &'a Tiles,

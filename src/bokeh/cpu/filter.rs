@@ -45,7 +45,6 @@ fn between<S: Simd>(simd: S, left: f32, right: f32, across: S::f32s) -> S::f32s 
 
 /// The taps of a group of `R` terms for one vector of a segment.
 pub struct Taps<'a, const R: usize> {
-    /// From the bank.
     pub table: &'a [f32],
     /// Tap 0 at the left edge of the segment.
     pub left: usize,
@@ -53,7 +52,6 @@ pub struct Taps<'a, const R: usize> {
     pub right: usize,
     /// From one tap to the next.
     pub step: isize,
-    /// Outermost tap.
     pub reach: usize,
     /// Where in the segment the vector begins.
     pub lane: usize,

@@ -101,7 +101,6 @@ struct Exact<'a> {
     pub bank: &'a Bank,
     /// Signed CoC of this row.
     pub coc: &'a [f32],
-    /// The row.
     pub y: usize,
     /// `[3][width]`.
     pub out: &'a mut [f32],
@@ -145,15 +144,11 @@ impl WithSimd for Exact<'_> {
 struct GatherRow<'a> {
     /// As in [`Exact`].
     pub source: &'a Rows<4>,
-    /// Columns.
     pub width: usize,
-    /// The filters.
     pub bank: &'a Bank,
     /// Signed CoC of this row.
     pub coc: &'a [f32],
-    /// The row.
     pub y: usize,
-    /// The result.
     pub out: &'a mut [f32],
 }
 
@@ -187,13 +182,10 @@ struct GatherColumn<'a> {
     pub rows: &'a [f32],
     /// Columns and rows.
     pub size: (usize, usize),
-    /// The filters.
     pub bank: &'a Bank,
     /// Signed CoC of this row.
     pub coc: &'a [f32],
-    /// The row.
     pub y: usize,
-    /// The result.
     pub out: &'a mut [f32],
 }
 

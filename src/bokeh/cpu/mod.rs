@@ -30,7 +30,7 @@ use unpack::Source;
 
 use super::plan::{CELL, Compositing, MAX_BINS, Plan};
 use super::rung::SCALES;
-use super::{Bokeh, BokehError, Finished, Job, PassTimes};
+use super::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use crate::budget::Quality;
 use crate::compute::team::{Shelf, Team, cores};
 use crate::compute::{Backend, simd};
@@ -291,7 +291,7 @@ impl Bokeh for CpuBokeh {
         self.plan.set_quality(job.quality);
         let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
         let Job { ticket, color, depth, out, .. } = job;
-        self.done = Some(Finished { ticket, out, in_memory: true, on_device: None, color, depth, times });
+        self.done = Some(Finished { ticket, picture: Picture::in_memory(out), color, depth, times });
         Ok(())
     }
 

@@ -12,7 +12,6 @@ pub const STRIP: usize = 32;
 
 /// A picture of `CH` planes, row by row: `[row][plane][stride]`, each plane row with `pad` columns on both sides.
 pub struct Rows<const CH: usize> {
-    /// The values.
     pub data: Aligned,
     /// Values from one plane row to the next.
     pub stride: usize,
@@ -53,9 +52,7 @@ pub fn repeat_ends(plane: &mut [f32], pad: usize, width: usize) {
 pub struct Cells {
     /// `[row][plane][width]`.
     pub data: Vec<f32>,
-    /// Cells across.
     pub width: usize,
-    /// Cells down.
     pub height: usize,
 }
 
@@ -96,7 +93,6 @@ pub struct Edges {
     pub data: Vec<f32>,
     /// Edges across: one more than there are segments.
     pub across: usize,
-    /// Rows of cells.
     pub height: usize,
 }
 
@@ -142,9 +138,7 @@ impl Edges {
 /// A bin's picture in strips, so that a filter that goes down a strip reads on and on:
 /// `[row of cells][strip][CELL][4][STRIP]`, premultiplied colour and coverage.
 pub struct Strips {
-    /// The values.
     pub data: Aligned,
-    /// Strips across.
     pub across: usize,
 }
 
@@ -186,7 +180,6 @@ impl Strips {
 
 /// What one bin needs while a frame is blurred: memory for the largest that it can be, in the shape of the current one.
 pub struct Slot {
-    /// Which one.
     pub index: usize,
     /// What the pass `bin` makes.
     pub source: Strips,

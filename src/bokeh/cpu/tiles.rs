@@ -23,9 +23,7 @@ pub struct Tiles {
     /// Per tile, whether it and all around it is still, so that no bin needs it.
     pub idle: Vec<bool>,
     scratch: Vec<bool>,
-    /// Tiles across.
     pub across: usize,
-    /// Tiles down.
     pub down: usize,
 }
 

@@ -54,7 +54,6 @@ pub fn compress(luminance: f32, expansion: f32) -> f32 {
 /// A frame as it came.
 #[derive(Clone, Copy)]
 pub struct Source<'a> {
-    /// The picture.
     pub color: &'a ColorImage,
     /// Its depth, of any size.
     pub depth: Option<&'a DepthMap>,

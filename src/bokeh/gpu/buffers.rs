@@ -21,7 +21,6 @@ pub struct Buffers {
     pub levels: Vec<wgpu::Buffer>,
     /// Sizes of those steps: fine, coarse.
     pub level_sizes: Vec<([u32; 2], [u32; 2])>,
-    /// Packed picture in.
     pub color: wgpu::Buffer,
     /// Linear light and CoC.
     pub scene: wgpu::Buffer,
@@ -35,13 +34,11 @@ pub struct Buffers {
     pub edges: wgpu::Buffer,
     /// Results of the horizontal filters, of the bins that are filtered at once.
     pub rows: wgpu::Buffer,
-    /// All blurred bins.
     pub blurred: wgpu::Buffer,
     /// Per tile of rows, whether anything is there.
     pub filtered: wgpu::Buffer,
     /// Per tile of blurred bins, whether anything is there.
     pub active: wgpu::Buffer,
-    /// Packed picture out.
     pub result: wgpu::Buffer,
     /// Half-size flags of what near objects touch.
     pub hidden: wgpu::Buffer,
@@ -57,7 +54,6 @@ pub struct Buffers {
 
 /// The filters of a bank.
 pub struct Filters {
-    /// Separable terms.
     pub terms: usize,
     /// Horizontal and vertical, four terms a vector.
     pub taps: [wgpu::Buffer; 2],

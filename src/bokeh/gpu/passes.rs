@@ -50,7 +50,6 @@ pub struct Passes {
     work: Vec<u8>,
 }
 
-/// Makes the steps.
 struct Maker<'a> {
     device: &'a Device,
     buffers: &'a Buffers,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::bokeh::{BokehError, Finished, Job, PassTimes};
+use crate::bokeh::{BokehError, Finished, Job, PassTimes, Picture};
 use crate::compute::GpuError;
 use crate::compute::device::{Device, DevicePicture};
 use crate::link::pool::Pooled;
@@ -22,7 +22,6 @@ const FAILED: u8 = 2;
 
 /// Buffers of one frame in flight.
 pub struct Slot {
-    /// The packed picture.
     pub picture: wgpu::Buffer,
     /// Timestamps: two per pass.
     pub stamps: Option<wgpu::Buffer>,
@@ -50,7 +49,6 @@ struct Pending {
     state: Arc<AtomicU8>,
 }
 
-/// The ring.
 pub struct Ring {
     free: Vec<Slot>,
     pending: VecDeque<Pending>,
@@ -83,7 +81,6 @@ impl Ring {
         self.free.pop()
     }
 
-    /// Frames in flight.
     pub fn in_flight(&self) -> usize {
         self.pending.len()
     }
@@ -174,6 +171,10 @@ impl Ring {
         slot.passes.clear();
         self.free.push(slot);
         let Job { ticket, color, depth, out, .. } = job;
-        Ok(Some(Finished { ticket, out, in_memory, on_device, color, depth, times }))
+        let picture = match on_device {
+            Some(device) => Picture::on_device(device, out, in_memory),
+            None => Picture::in_memory(out),
+        };
+        Ok(Some(Finished { ticket, picture, color, depth, times }))
     }
 }

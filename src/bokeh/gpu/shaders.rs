@@ -25,9 +25,7 @@ pub const UNPACK: Shader = shader!("unpack", "range");
 pub const BIN: Shader = shader!("bin", "work");
 /// Local radius and range of colours.
 pub const REACH: Shader = shader!("reach", "work");
-/// Horizontal filters.
 pub const BLUR_ROWS: Shader = shader!("blur_rows", "work", "filter");
-/// Vertical filters.
 pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "work", "filter");
 /// The exact two-dimensional gather.
 pub const GATHER: Shader = shader!("gather");
@@ -39,12 +37,9 @@ pub const KNOW: Shader = shader!("know");
 pub const PULL: Shader = shader!("pull", "level");
 /// Back to the finer level.
 pub const PUSH: Shader = shader!("push", "level");
-/// The filled scene.
 pub const FILL: Shader = shader!("fill", "range");
-/// The final picture.
 pub const COMPOSITE: Shader = shader!("composite");
 
-/// Every shader.
 pub const ALL: [Shader; 12] =
     [UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, KNOW, PULL, PUSH, FILL, COMPOSITE];
 

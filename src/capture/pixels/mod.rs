@@ -53,7 +53,7 @@ pub enum PixelError {
     Short {
         /// As given.
         found_bytes: usize,
-        /// At least.
+        /// What the layout needs.
         needed_bytes: usize,
     },
     /// The JPEG is cut short or damaged.
@@ -90,7 +90,7 @@ impl Decoder {
         Ok(Self { layout: *layout, kind })
     }
 
-    /// What it decodes.
+    /// The layout that it decodes.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }

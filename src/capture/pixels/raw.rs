@@ -14,7 +14,6 @@ use crate::v4l2::layout::{Component, Family, Range};
 pub(super) struct Raw {
     arch: Arch,
     coefficients: Coefficients,
-    /// Applied last.
     table: Option<Box<Table>>,
     rows: Rows,
 }

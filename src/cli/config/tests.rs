@@ -1,19 +1,23 @@
 use clap::{Args, Command, FromArgMatches};
 
 use super::*;
+use crate::bokeh;
 use crate::bokeh::aperture::{Aperture, Shape};
 use crate::budget::Quality;
+use crate::depth::focus::FocusRule;
 use crate::frame::{ColorImage, DepthMap};
-use crate::look::{ApertureName, CocRule, Patch, Refine, SETTINGS, Tilt};
+use crate::look::{ApertureName, CocRule, Effect, Patch, Refine, SETTINGS, Strength, Tilt};
 use crate::optics::{CocField, Lens};
+use crate::source::{SourceError, fitting_look};
 
 const SIZE: (u32, u32) = (640, 450);
 
-fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, CliError> {
+fn resolve(flags: &[&str], has_depth: bool) -> Result<Look, SourceError> {
     let command = options::Every::augment_args(Command::new("test").no_binary_name(true));
     let matches = command.try_get_matches_from(flags).unwrap();
     let every = options::Every::from_arg_matches(&matches).unwrap();
-    look_for(&look(&every.blur, &every.computing.quality)?, &every.blur.depth, has_depth)
+    let look = look(&every.blur, &every.computing.quality).map_err(|error| SourceError::Usage(error.to_string()))?;
+    fitting_look(&look, &every.blur.depth, has_depth)
 }
 
 fn refusal(flags: &[&str], has_depth: bool) -> String {

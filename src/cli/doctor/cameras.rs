@@ -9,7 +9,6 @@ use crate::v4l2::modes::{FormatModes, Interval, Rates, SizeModes, Sizes, modes};
 use crate::v4l2::node::{Kind, Node};
 use crate::v4l2::{Device, controls::Control};
 
-/// The heading.
 pub const ABOUT: &str = "camera";
 
 /// USB 2 carries no more.

@@ -2,9 +2,9 @@
 
 use std::process::{Command, Stdio};
 
-use super::super::config::Executor;
 use super::findings::Finding;
 use crate::compute::Backend;
+use crate::computing::Computing;
 use crate::look::{Effect, Look};
 
 const BLUR: &str = "blur";
@@ -20,8 +20,8 @@ fn blur() -> Finding {
     /// Any size will do.
     const SIZE: (u32, u32) = (64, 64);
     let settings = Look::plain(Effect::Blur).settings(SIZE, false);
-    let executor = Executor { backend: Backend::Auto, adapter: None, threads: None };
-    match settings.as_ref().map(|settings| executor.create(settings, SIZE)).transpose() {
+    let computing = Computing::default();
+    match settings.as_ref().map(|settings| computing.blur(settings, SIZE)).transpose() {
         Err(error) => Finding::note(BLUR, error.to_string(), "report this"),
         Ok(None) => Finding::note(BLUR, "nothing is blurred".to_string(), "report this"),
         Ok(Some(bokeh)) => {

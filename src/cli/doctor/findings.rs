@@ -28,14 +28,12 @@ pub struct Finding {
     pub about: &'static str,
     /// How good it is.
     pub level: Level,
-    /// What was found.
     pub found: String,
     /// What to do about it.
     pub fix: Option<String>,
 }
 
 impl Finding {
-    /// All is well.
     pub fn good(about: &'static str, found: impl Into<String>) -> Self {
         Self { about, level: Level::Good, found: found.into(), fix: None }
     }

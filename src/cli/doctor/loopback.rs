@@ -10,7 +10,6 @@ use crate::v4l2::holders::holders;
 use crate::v4l2::loopback::{self, modprobe};
 use crate::v4l2::node::{Kind, Node};
 
-/// The heading.
 pub const ABOUT: &str = "virtual camera";
 
 const LOADED: &str = "/sys/module/v4l2loopback";

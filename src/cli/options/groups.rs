@@ -4,14 +4,15 @@ use clap::Args;
 
 #[cfg(feature = "window")]
 use super::Window;
-use super::{Blur, Computing, Depth, Output, Source, Stereo, Stream};
+use super::{Blur, Computing, Depth, Frames, Output, Stereo, Stream};
+use crate::source::Options;
 
 /// What is needed to blur a stream, wherever it goes.
 #[derive(Args, Clone, Debug)]
 pub struct Streaming {
     /// Which frames.
     #[command(flatten)]
-    pub frames: Source,
+    pub frames: Frames,
     /// The blur.
     #[command(flatten)]
     pub blur: Blur,
@@ -32,12 +33,27 @@ pub struct Streaming {
     pub output: Output,
 }
 
+impl Streaming {
+    /// How the source is opened.
+    pub fn source_options(&self) -> Options {
+        Options {
+            frames: self.frames.clone(),
+            depth: self.depth.clone(),
+            stereo: self.stereo.clone(),
+            depth_choice: self.blur.depth.clone(),
+            computing: self.computing.choice(),
+            keep_going: self.stream.keep_going,
+            cycle: false,
+        }
+    }
+}
+
 /// Every setting: the keys of the settings file and of the environment.
 #[derive(Args, Debug)]
 pub struct Every {
     /// Which frames.
     #[command(flatten)]
-    pub source: Source,
+    pub source: Frames,
     /// Depth pictures.
     #[command(flatten)]
     pub depth: Depth,
@@ -53,7 +69,6 @@ pub struct Every {
     /// The stream.
     #[command(flatten)]
     pub stream: Stream,
-    /// The window.
     #[cfg(feature = "window")]
     #[command(flatten)]
     pub window: Window,

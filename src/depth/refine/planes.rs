@@ -67,11 +67,9 @@ impl Planes {
 
 /// Takes inverse depths, and how much each of them weighs.
 pub struct SetDepths<'a> {
-    /// Where to.
     pub planes: &'a mut Planes,
     /// Inverse depths of the picture, row by row.
     pub inverse: &'a [f32],
-    /// Their weights.
     pub sure: &'a [f32],
 }
 

@@ -172,7 +172,6 @@ mod tests {
     const WALL: [u8; 3] = [170, 150, 120];
     const RED: [u8; 3] = [190, 30, 40];
     const SIZE: (usize, usize) = (80, 40);
-    /// The border's width.
     const UNSEEN: usize = 16;
     const NEAR: u16 = 60 * ONE;
     const FAR: u16 = 10 * ONE;

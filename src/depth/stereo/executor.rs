@@ -31,7 +31,6 @@ pub trait Executor: Send {
     ) -> Result<(), GpuError>;
 }
 
-/// Makes executors.
 pub(super) struct Executors {
     threads: usize,
     /// A GPU, and whether nothing else will do.
@@ -91,20 +90,24 @@ impl Executors {
 }
 
 /// One executor, and another one from the first fault of the GPU on.
+#[cfg(feature = "gpu")]
 struct Fallback {
     now: Box<dyn Executor>,
     /// What makes the other one, until it is needed.
     other: Option<MakesExecutor>,
 }
 
+#[cfg(feature = "gpu")]
 type MakesExecutor = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
 
+#[cfg(feature = "gpu")]
 impl Fallback {
     fn new(first: Box<dyn Executor>, other: impl FnOnce() -> Box<dyn Executor> + Send + 'static) -> Self {
         Self { now: first, other: Some(Box::new(other)) }
     }
 }
 
+#[cfg(feature = "gpu")]
 impl Executor for Fallback {
     fn describe(&self) -> String {
         self.now.describe()

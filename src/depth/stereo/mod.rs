@@ -6,11 +6,13 @@
 mod alike;
 mod border;
 pub mod check;
+#[doc(hidden)]
 pub mod cpu;
 pub mod executor;
 pub mod fixed;
 mod gaps;
 #[cfg(feature = "gpu")]
+#[doc(hidden)]
 pub mod gpu;
 mod half;
 mod penalty;
@@ -60,7 +62,7 @@ named! {
     }
 }
 
-/// A rectified pair.
+/// A rectified stereo pair: the same point is in the same row.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
     /// What the left eye saw.
@@ -103,7 +105,7 @@ pub enum MatchError {
     /// The pictures are of another size than was set.
     #[error("the matcher is made for {}x{} and was given {}x{}", made_for.0, made_for.1, got.0, got.1)]
     Size {
-        /// What was set.
+        /// Width and height that the matcher was made for.
         made_for: (u32, u32),
         /// Columns and rows of the pictures.
         got: (u32, u32),
@@ -136,11 +138,9 @@ const SPECKLE: u32 = 100;
 struct Matching {
     settings: Settings,
     team: Team,
-    /// By effort.
     levels: [Level; 2],
     /// Left and right at half the size.
     small: [GrayImage; 2],
-    /// For each row.
     taken: Vec<AtomicBool>,
 }
 

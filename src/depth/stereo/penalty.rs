@@ -9,7 +9,6 @@ const EDGE: f32 = 10.0;
 pub struct Penalties([u8; 256]);
 
 impl Penalties {
-    /// Computes them.
     pub fn new() -> Self {
         let mut table = [0; 256];
         for (step, p2) in table.iter_mut().enumerate() {

@@ -29,7 +29,6 @@ impl List {
         Ok(Self { path, file, bytes: 0, len: 0 })
     }
 
-    /// Names in it.
     pub(super) fn len(&self) -> u64 {
         self.len
     }

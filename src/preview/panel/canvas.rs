@@ -28,7 +28,6 @@ pub struct Gestures {
 /// The picture on the screen, in points.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// Where it is.
     pub rect: Rect,
     /// Its own columns and rows.
     pub size: Vec2,

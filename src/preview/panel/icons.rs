@@ -22,9 +22,7 @@ pub enum Icon {
     Redo,
     /// A circle that begins anew.
     Reset,
-    /// A question mark.
     Help,
-    /// A cross.
     Close,
 }
 

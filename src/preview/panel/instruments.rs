@@ -24,7 +24,6 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// Draws the instruments.
     pub fn show(&mut self, ctx: &Context, state: &State) {
         let now_s = ctx.input(|input| input.time);
         if now_s - self.at_s >= EVERY_S || self.summary == Summary::default() {

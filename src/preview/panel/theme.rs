@@ -28,7 +28,6 @@ pub struct Colors {
     pub field: Color32,
     /// The same under the pointer.
     pub hover: Color32,
-    /// Text.
     pub text: Color32,
     /// Text that is less important.
     pub weak: Color32,
@@ -36,7 +35,6 @@ pub struct Colors {
     pub accent: Color32,
     /// Text on `accent`.
     pub on_accent: Color32,
-    /// Borders and rules.
     pub line: Color32,
     /// What went wrong, and recording.
     pub alarm: Color32,
@@ -68,7 +66,6 @@ const LIGHT: Colors = Colors {
 
 /// On the picture itself, whatever the theme: light lines with a dark border are seen on every picture.
 pub const ON_PICTURE: Color32 = Color32::from_rgb(255, 255, 255);
-/// That border.
 pub const SHADE: Color32 = Color32::from_rgba_premultiplied(0, 0, 0, 150);
 
 impl Colors {

@@ -23,16 +23,13 @@ pub struct Area {
     pub x: u32,
     /// Rows from the top.
     pub y: u32,
-    /// Columns.
     pub width: u32,
-    /// Rows.
     pub height: u32,
 }
 
 /// A picture, where it is.
 #[derive(Clone, Copy, Debug)]
 pub enum Image<'a> {
-    /// In memory.
     Memory(&'a ColorImage),
     /// In a GPU's memory; only who [takes](Presenter::takes) it shows it.
     Device(&'a DevicePicture),
@@ -53,7 +50,6 @@ impl Image<'_> {
 pub struct Drawing<'a> {
     /// Where the picture goes, scaled to fill it; the rest of the window is the background.
     pub area: Area,
-    /// The picture.
     pub picture: Image<'a>,
     /// Another one of the same size, shown instead left of this fraction of the area's width.
     pub before: Option<(&'a ColorImage, f32)>,
@@ -78,7 +74,6 @@ impl Tone {
 /// Controls that changed, as egui gives them.
 #[derive(Clone)]
 pub struct Controls {
-    /// What to paint.
     pub primitives: Vec<egui::ClippedPrimitive>,
     /// Textures to set before and to free after.
     pub textures: egui::TexturesDelta,

@@ -8,7 +8,7 @@ use super::live::{self, Live};
 use super::{Closed, Heard, News, Order, Start, Still};
 use crate::look::{Look, Patch};
 use crate::pipeline::{PipelineError, Wanted};
-use crate::preview::backstage::{Backstage, Switch};
+use crate::preview::services::{Services, Switch};
 use crate::preview::state::{Output, Request, Source, Told};
 use crate::recording::snapshot::{self, Snapshot};
 use crate::sink;
@@ -17,7 +17,7 @@ use crate::stats::Report;
 
 /// What a session has and does.
 pub(super) struct Host {
-    backstage: Box<dyn Backstage>,
+    services: Box<dyn Services>,
     look: Look,
     source: String,
     outputs: Vec<Output>,
@@ -28,7 +28,6 @@ pub(super) struct Host {
     news: News,
     orders: mpsc::Sender<Order>,
     live: Option<Live>,
-    /// Runs begun.
     runs: u64,
     report: Option<Report>,
     /// Why the first of the outputs failed that did.
@@ -49,9 +48,9 @@ const KEPT_LOOKS: usize = 512;
 impl Host {
     /// A session that nothing was done of yet; `orders` is the way to it.
     pub fn new(start: Start, news: News, orders: mpsc::Sender<Order>) -> Self {
-        let Start { backstage, look, source, outputs, keep_going, budget_ns, folder, wanted } = start;
+        let Start { services, look, source, outputs, keep_going, budget_ns, folder, wanted } = start;
         Self {
-            backstage,
+            services,
             look,
             source,
             outputs,
@@ -140,15 +139,15 @@ impl Host {
                 }
                 self.tell_outputs();
             }
-            Request::Control(name, value) => match self.backstage.set_control(&name, value) {
+            Request::Control(name, value) => match self.services.turn(&name, value) {
                 Ok(controls) => self.news.tell(Told::Controls(controls)),
                 Err(line) => self.news.note(line),
             },
             Request::Refresh => self.tell_choices(),
-            Request::SavePreset(name, look) => match self.backstage.save_preset(&name, &look) {
+            Request::SavePreset(name, look) => match self.services.save_preset(&name, &look) {
                 Ok(()) => {
                     self.news.note(format!("saved as preset '{name}'"));
-                    self.news.tell(Told::Presets(self.backstage.presets()));
+                    self.news.tell(Told::Presets(self.services.presets()));
                 }
                 Err(line) => self.news.note(line),
             },
@@ -158,10 +157,10 @@ impl Host {
     }
 
     fn tell_choices(&mut self) {
-        let sources = self.backstage.sources();
-        let virtual_cameras = self.backstage.virtual_cameras();
+        let sources = self.services.sources();
+        let virtual_cameras = self.services.virtual_cameras();
         self.news.tell(Told::Choices { sources, virtual_cameras });
-        self.news.tell(Told::Presets(self.backstage.presets()));
+        self.news.tell(Told::Presets(self.services.presets()));
     }
 
     fn tell_outputs(&self) {
@@ -181,7 +180,7 @@ impl Host {
     /// Opens the source and begins a run of it.
     fn open(&mut self) {
         self.news.tell(Told::Source(Source::Opening));
-        let opened = match self.backstage.open(&self.source) {
+        let opened = match self.services.open(&self.source) {
             Ok(opened) => opened,
             Err(line) => return self.without_source(Source::Lost(line)),
         };
@@ -204,7 +203,7 @@ impl Host {
             budget_ns: self.budget_ns,
             wanted: Arc::clone(&self.wanted),
         };
-        match Live::begin(opened, &settings, &mut *self.backstage, &self.news, wrote, ended) {
+        match Live::begin(opened, &settings, &mut *self.services, &self.news, wrote, ended) {
             Ok((live, source)) => {
                 self.looks = VecDeque::from([(0, live.effective(&self.look))]);
                 self.live = Some(live);
@@ -227,7 +226,7 @@ impl Host {
             if self.looks.len() > KEPT_LOOKS {
                 self.looks.pop_front();
             }
-            if let Err(line) = live.adopt(&self.look, number, &mut *self.backstage) {
+            if let Err(line) = live.adopt(&self.look, number, &mut *self.services) {
                 self.news.note(line);
             }
         }
@@ -238,7 +237,7 @@ impl Host {
         if output.name.is_empty() {
             output.name = self.free_name().display().to_string();
         }
-        match self.backstage.output(&output.name, live.size, live.period_ns, &live.stop) {
+        match self.services.output(&output.name, live.size, live.period_ns, &live.stop) {
             Ok(sink) => {
                 self.wanted.need(true);
                 live.write_to(&output, sink);
@@ -257,7 +256,7 @@ impl Host {
     fn copy(&self, switches: &[Switch]) {
         let outputs: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
         let look = self.live.as_ref().map_or_else(|| self.look.clone(), |live| live.effective(&self.look));
-        let command = self.backstage.command(&look, &self.source, &outputs, switches);
+        let command = self.services.command(&look, &self.source, &outputs, switches);
         self.news.note(format!("Copied: {command}"));
         self.news.send(Heard::Copy(command));
     }

@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
-use super::super::backstage::{Backstage, Opened};
+use super::super::services::{Opened, Services};
 use super::super::state::{Output, Running, Source};
 use super::{Heard, News};
 use crate::bokeh;
@@ -51,16 +51,18 @@ impl Live {
     pub(super) fn begin(
         opened: Opened,
         settings: &Settings,
-        backstage: &mut dyn Backstage,
+        services: &mut dyn Services,
         news: &News,
         wrote: impl Fn(Written) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
-        let Opened { name, camera, depth, has_depth, measured, .. } = opened;
+        let Opened { name, source, .. } = opened;
+        let (has_depth, measured) = (source.has_depth(), source.is_measured());
+        let crate::source::Source { camera, depth, .. } = source;
         let info = camera.info();
         let look = settings.look.for_source(has_depth);
         let made_for = look.settings(info.size, ADAPTIVE);
-        let bokeh = made_for.as_ref().map(|made_for| backstage.executor(made_for, info.size)).transpose()?;
+        let bokeh = made_for.as_ref().map(|made_for| services.executor(made_for, info.size)).transpose()?;
         let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let budget_ns = settings.budget_ns.unwrap_or(info.period_ns);
         let (sink, board) = Switch::new("window", wrote);
@@ -125,7 +127,7 @@ impl Live {
     ///
     /// # Errors
     /// Its executor cannot be made: one line. The one before goes on.
-    pub(super) fn adopt(&mut self, look: &Look, number: u64, backstage: &mut dyn Backstage) -> Result<(), String> {
+    pub(super) fn adopt(&mut self, look: &Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
         let look = self.effective(look);
         let made_for = look.settings(self.size, ADAPTIVE);
         let change = |number, bokeh| Change { number, look: look.clone(), bokeh };
@@ -138,7 +140,7 @@ impl Live {
         }
         if made_for != self.made_for {
             let began = Instant::now();
-            let bokeh = made_for.as_ref().map(|made_for| backstage.executor(made_for, self.size)).transpose()?;
+            let bokeh = made_for.as_ref().map(|made_for| services.executor(made_for, self.size)).transpose()?;
             tracing::debug!("an executor was made in {:?}", began.elapsed());
             let _ = self.changes.send(change(number, Executor::To(bokeh)));
             self.made_for = made_for;
@@ -152,7 +154,6 @@ impl Live {
         let _ = self.board.add(&output.name, sink);
     }
 
-    /// Completes a sink.
     pub(super) fn end(&self, output: &Output) {
         self.board.remove(&output.name);
     }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use host::Host;
 
-use super::backstage::{Backstage, Switch};
+use super::services::{Services, Switch};
 use super::state::{Output, Request, Told};
 use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
@@ -32,8 +32,7 @@ pub type Wake = Arc<dyn Fn() + Send + Sync>;
 /// What a session begins with.
 pub struct Start {
     /// Gets what is asked for by name.
-    pub backstage: Box<dyn Backstage>,
-    /// The look.
+    pub services: Box<dyn Services>,
     pub look: Look,
     /// The source; empty for the first camera there is, else the synthetic scene.
     pub source: String,
@@ -51,7 +50,6 @@ pub struct Start {
 
 /// What comes from a session.
 pub enum Heard {
-    /// News.
     Told(Told),
     /// Frames of another run come from here.
     Views(Receiver<View>),
@@ -63,7 +61,6 @@ pub enum Heard {
 pub struct Still {
     /// As it is shown.
     pub picture: ColorImage,
-    /// Before the blur.
     pub color: ColorImage,
     /// What it was blurred by.
     pub depth: Option<DepthMap>,
@@ -123,7 +120,6 @@ impl Session {
         let _ = self.orders.send(Order::Do(request));
     }
 
-    /// Saves a frame.
     pub fn save(&self, still: Still) {
         let _ = self.orders.send(Order::Save(Box::new(still)));
     }

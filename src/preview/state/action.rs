@@ -1,16 +1,16 @@
 //! What a person can do, what others have to do then, and what they tell.
 
 use super::{Output, Shown, Source};
+use crate::knob::Knob;
 use crate::look::Look;
 use crate::look::presets::Preset;
-use crate::preview::backstage::{Choice, Control};
+use crate::source::devices::Choice;
 
 /// What a person can do. Every control and key is one of these.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Another look. Looks of the same `stroke` (one drag of one control) are undone together.
     Look {
-        /// The look.
         look: Box<Look>,
         /// The control in hand, or `None` for a single change.
         stroke: Option<&'static str>,
@@ -19,7 +19,6 @@ pub enum Action {
     Settle,
     /// Back to the look before.
     Undo,
-    /// And forth again.
     Redo,
     /// Back to the look at the start.
     Reset,
@@ -53,7 +52,6 @@ pub enum Action {
     Record(bool),
     /// Writes to this virtual camera, or to none.
     VirtualCamera(Option<String>),
-    /// Opens another source.
     Open(String),
     /// Opens the source again.
     Retry,
@@ -63,7 +61,6 @@ pub enum Action {
     Refresh,
     /// Puts the equivalent command on the clipboard.
     CopyCommand,
-    /// Closes the window.
     Close,
     /// What went wrong is known.
     Dismiss,
@@ -72,7 +69,6 @@ pub enum Action {
 /// What others have to do after an action.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// The look changed.
     Look(Box<Look>),
     /// Save it under this name.
     SavePreset(String, Box<Look>),
@@ -80,11 +76,8 @@ pub enum Request {
     Snapshot,
     /// Begin to write to an output. A recording without a name is to be given one.
     Begin(Output),
-    /// Complete an output.
     End(Output),
-    /// Open a source.
     Open(String),
-    /// Set a control.
     Control(String, i64),
     /// Look which sources and virtual cameras there are.
     Refresh,
@@ -92,7 +85,6 @@ pub enum Request {
     CopyCommand,
     /// Fill the screen, or not.
     FullScreen(bool),
-    /// Close the window.
     Close,
 }
 
@@ -103,15 +95,11 @@ pub enum Told {
     Source(Source),
     /// What can be chosen.
     Choices {
-        /// Sources.
         sources: Vec<Choice>,
-        /// Virtual cameras.
         virtual_cameras: Vec<Choice>,
     },
-    /// The presets.
     Presets(Vec<Preset>),
-    /// The camera's controls.
-    Controls(Vec<Control>),
+    Controls(Vec<Knob>),
     /// The outputs that are written to now: after each that was begun or ended, also where that failed.
     Outputs(Vec<Output>),
     /// A line for the person.

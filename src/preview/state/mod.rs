@@ -17,12 +17,13 @@ pub use action::{Action, Request, Told};
 pub use apply::{NO_DEPTH, NO_VIRTUAL_CAMERA};
 pub use history::History;
 
-use super::backstage::{Choice, Control};
 use super::meters::Meters;
 use super::views::Legend;
+use crate::knob::Knob;
 use crate::look::Look;
 use crate::look::presets::Preset;
 use crate::names::named;
+use crate::source::devices::Choice;
 
 named! {
     /// What of a frame is shown.
@@ -44,7 +45,6 @@ pub enum Source {
     /// It is being opened.
     #[default]
     Opening,
-    /// Frames come.
     Running(Running),
     /// There are no frames any more, or never were: why. The last picture stays.
     Lost(String),
@@ -65,7 +65,6 @@ pub struct Running {
     pub period_ns: u64,
     /// Whether its frames have depth.
     pub has_depth: bool,
-    /// What blurs them.
     pub executor: String,
     /// Time that a frame's blur may take.
     pub budget_ns: u64,
@@ -85,7 +84,6 @@ pub struct Output {
 pub struct Note {
     /// Counts from 1; another line has another number.
     pub number: u64,
-    /// What it says.
     pub text: String,
 }
 
@@ -101,15 +99,12 @@ pub struct State {
     pub first_look: Look,
     /// What the source is called on the command line.
     pub source_name: String,
-    /// The source.
     pub source: Source,
     /// The sources that can be chosen.
     pub sources: Vec<Choice>,
     /// The virtual cameras that can be chosen.
     pub virtual_cameras: Vec<Choice>,
-    /// The camera's controls.
-    pub controls: Vec<Control>,
-    /// The presets.
+    pub controls: Vec<Knob>,
     pub presets: Vec<Preset>,
     /// Where pictures go besides the window.
     pub outputs: Vec<Output>,
@@ -143,17 +138,14 @@ pub struct State {
     pub trouble: Option<String>,
     /// How large text and controls are, in [`TEXT_SCALES`]; 1 is usual.
     pub text_scale: f32,
-    /// What was measured.
     pub meters: Meters,
     /// The looks before, and those that were undone.
     pub history: History,
     /// Whether the effect is another than was chosen, because the source has no depth.
     fitted: bool,
-    /// Notes made.
     noted: u64,
 }
 
-/// Notes kept.
 const NOTES: usize = 6;
 
 impl State {

@@ -1,9 +1,10 @@
 //! A state to try things on.
 
 use super::{Running, Source, State};
+use crate::knob::Knob;
 use crate::look::presets::Preset;
 use crate::look::{Effect, Look, Patch, Strength, Tilt};
-use crate::preview::backstage::{Choice, Control};
+use crate::source::devices::Choice;
 
 /// The look that the command line has without any flags.
 pub fn look() -> Look {
@@ -45,7 +46,7 @@ pub fn state() -> State {
         preset("miniature", Look { effect: Effect::TiltShift, ..blurred(14.0) }, false),
         preset("my desk", blurred(21.0), true),
     ];
-    let control = |name: &str, value: i64, range: (i64, i64, i64)| Control {
+    let control = |name: &str, value: i64, range: (i64, i64, i64)| Knob {
         name: name.into(),
         value,
         range,
@@ -56,9 +57,9 @@ pub fn state() -> State {
     let menu = vec![(1, "Manual Mode".to_owned()), (3, "Aperture Priority Mode".to_owned())];
     state.controls = vec![
         control("brightness", 10, (-64, 64, 1)),
-        Control { switch: true, ..control("white_balance_automatic", 1, (0, 1, 1)) },
-        Control { menu, ..control("auto_exposure", 3, (0, 3, 1)) },
-        Control { active: false, ..control("exposure_time_absolute", 157, (1, 5000, 1)) },
+        Knob { switch: true, ..control("white_balance_automatic", 1, (0, 1, 1)) },
+        Knob { menu, ..control("auto_exposure", 3, (0, 3, 1)) },
+        Knob { active: false, ..control("exposure_time_absolute", 157, (1, 5000, 1)) },
     ];
     state
 }

@@ -1,7 +1,7 @@
 //! What the window shows, as options of the command line.
 
 use super::{Shown, State};
-use crate::preview::backstage::Switch;
+use crate::preview::services::Switch;
 
 impl State {
     /// The options that show the window as it is, beside those of the look; what is usual is left out.

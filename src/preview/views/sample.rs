@@ -7,7 +7,6 @@ use crate::optics::{CocField, DepthCoc, Ramp};
 pub enum Field<'a> {
     /// One radius.
     Even(f32),
-    /// A ramp.
     Ramp(Ramp),
     /// Depth, which may have fewer pixels than the picture.
     Depth(&'a DepthMap, DepthCoc),

@@ -1,4 +1,5 @@
 use super::*;
+use crate::bokeh::Picture;
 use crate::bokeh::plan::Plan;
 use crate::budget::Quality;
 use crate::frame::{DepthMap, Stamp};
@@ -21,9 +22,7 @@ fn view(size: (u32, u32), map: (u32, u32), coc: CocField) -> View {
         depth
     });
     View {
-        picture: pictures.take(),
-        in_memory: true,
-        on_device: None,
+        picture: Picture::in_memory(pictures.take()),
         color: None,
         depth: Some(maps.take()),
         coc,

@@ -12,7 +12,6 @@ use super::geometry::Geometry;
 use super::{Options, Pair, Unpaired};
 use crate::optics::StereoRig;
 
-/// Two pictures.
 pub(super) const LAYOUT: Layout =
     Layout { name: "Middlebury stereo", looked_for: "im0.png and im1.png", is_in: |dir| eyes(dir).is_some(), open };
 

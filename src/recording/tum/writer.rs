@@ -59,9 +59,9 @@ pub struct Writer {
 /// What became of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// Where it is.
+    /// The recording.
     pub dir: PathBuf,
-    /// Its frames.
+    /// How many frames it has.
     pub frames: usize,
     /// Files of an earlier recording that went.
     pub replaced: u64,
@@ -150,7 +150,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Frames so far.
+    /// Frames added so far.
     pub fn frames(&self) -> usize {
         self.count
     }

@@ -8,7 +8,6 @@ use crate::scene::noise::{Dice, cell, fractal};
 use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::shape::{Shape, whole};
 
-/// The street.
 pub fn part() -> Part {
     let mut part = Part::still();
     let sky = Shape::Quad { centre: Vec3::new(-3.0, 1.0, 12.8), right: 8.0 * Vec3::X, up: 5.0 * Vec3::Y, cut: whole };

@@ -6,7 +6,6 @@ use super::form::{hex, step};
 use crate::scene::noise::{cell, fractal, unit, value};
 use crate::scene::part::{Spot, Surface};
 
-/// One colour, dull.
 pub fn plain(spot: &Spot) -> Surface {
     Surface::matt(spot, spot.tint)
 }
@@ -89,7 +88,6 @@ pub fn book(spot: &Spot) -> Surface {
     Surface::matt(spot, (spot.tint * worn).lerp(hex(0xd8b878), 0.8 * gilt)).glossy(0.05, 20.0)
 }
 
-/// A woven cloth.
 pub fn cloth(spot: &Spot) -> Surface {
     let weave = value(Vec3::new(300.0, 220.0, 300.0) * spot.p);
     let soft = fractal(14.0 * spot.p, 3);

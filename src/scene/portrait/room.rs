@@ -21,7 +21,6 @@ const FLOOR_Y: f32 = -1.02;
 const SOFA: Vec3 = Vec3::new(-0.98, -0.40, 2.35);
 const TABLE: Vec3 = Vec3::new(1.10, -0.50, 2.45);
 
-/// The room.
 pub fn part() -> Part {
     let mut part = Part::still();
     let around = Bounds { low: Vec3::new(-2.2, FLOOR_Y - 0.02, 1.75), high: Vec3::new(2.3, 1.1, WALL_M + 0.05) };

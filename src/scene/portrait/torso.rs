@@ -11,7 +11,6 @@ use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::ray::{Bounds, Pose};
 use crate::scene::shape::Shape;
 
-/// The upper body.
 pub fn part(motion: fn(f32) -> Pose) -> Part {
     let mut part = Part::moving(motion);
     let bounds = Bounds { low: Vec3::new(-0.33, -0.55, -0.12), high: Vec3::new(0.33, -0.12, 0.19) };

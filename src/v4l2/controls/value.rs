@@ -13,7 +13,6 @@ use super::{Control, Item, Kind};
 pub enum Value {
     /// A number; 0 and 1 for no and yes; the number of a menu's item.
     Number(i64),
-    /// A text.
     Text(String),
 }
 
@@ -32,7 +31,6 @@ pub enum ControlError {
     /// The device has none of this name.
     #[error("control {name}: {}", known(near, *count))]
     Unknown {
-        /// The name.
         name: String,
         /// Names that look alike, or all where none does.
         near: Vec<String>,
@@ -41,29 +39,15 @@ pub enum ControlError {
     },
     /// It does not take this value.
     #[error("control {name}={value}: {accepted}")]
-    Value {
-        /// The control.
-        name: String,
-        /// The value.
-        value: String,
-        /// What it takes.
-        accepted: String,
-    },
+    Value { name: String, value: String, accepted: String },
     /// It cannot be set, or not now.
     #[error("control {name} {why}")]
-    Fixed {
-        /// The control.
-        name: String,
-        /// Why.
-        why: &'static str,
-    },
+    Fixed { name: String, why: &'static str },
     /// It has no value that one could write down.
     #[error("control {0} has no value to read")]
     NoValue(String),
-    /// The device refuses.
     #[error("control {name}: {source}")]
     Device {
-        /// The control.
         name: String,
         /// What the system says.
         source: io::Error,

@@ -10,7 +10,6 @@ pub enum Matrix {
     /// Standard definition, JPEG, and what cameras give that do not say.
     #[default]
     Bt601,
-    /// High definition.
     Bt709,
     /// Ultra high definition, non-constant luminance.
     Bt2020,

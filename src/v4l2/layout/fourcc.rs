@@ -10,9 +10,7 @@ pub struct FourCc(pub [u8; 4]);
 /// What a format's pictures are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
-    /// Colours or brightness.
     Color,
-    /// Distances.
     Depth,
 }
 
@@ -23,9 +21,7 @@ pub enum Family {
     Packed422 {
         /// Place of the first luma, 0 or 1; the second is two bytes further.
         luma: usize,
-        /// Place of Cb.
         cb: usize,
-        /// Place of Cr.
         cr: usize,
     },
     /// A plane of luma, then one with a pair of chroma samples for each 2 x 2 pixels.
@@ -79,9 +75,7 @@ const TABLE: [(FourCc, Family); 19] = [
 ];
 
 impl FourCc {
-    /// Motion JPEG.
     pub const MJPG: Self = Self(*b"MJPG");
-    /// JPEG.
     pub const JPEG: Self = Self(*b"JPEG");
     /// Packed 4:2:2.
     pub const YUYV: Self = Self(*b"YUYV");
@@ -91,9 +85,7 @@ impl FourCc {
     pub const NV12: Self = Self(*b"NV12");
     /// Planar 4:2:0.
     pub const YU12: Self = Self(*b"YU12");
-    /// Red, green, blue.
     pub const RGB3: Self = Self(*b"RGB3");
-    /// Blue, green, red.
     pub const BGR3: Self = Self(*b"BGR3");
     /// 8-bit brightness.
     pub const GREY: Self = Self(*b"GREY");

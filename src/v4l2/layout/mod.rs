@@ -56,7 +56,6 @@ pub struct Component {
     pub stride_bytes: usize,
     /// That matter of each row.
     pub row_bytes: usize,
-    /// Rows.
     pub rows: usize,
 }
 
@@ -78,22 +77,13 @@ pub enum LayoutError {
     FourCc(FourCc),
     /// No picture has this size.
     #[error("the device gives pictures of {width} x {height} pixels, and 1 to {MAX_SIDE_PX} a side can be used")]
-    Size {
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-    },
-    /// Rows that overlap.
+    Size { width: u32, height: u32 },
     #[error("the device says {stride_bytes} bytes a row, and {width} pixels of {fourcc} need {needed_bytes}")]
     Stride {
-        /// The format.
         fourcc: FourCc,
-        /// Columns.
         width: u32,
         /// As the device says.
         stride_bytes: usize,
-        /// At least.
         needed_bytes: usize,
     },
     /// A buffer that cannot hold the picture.
@@ -101,21 +91,16 @@ pub enum LayoutError {
         "the device says {size_bytes} bytes a picture, and {width} x {height} pixels of {fourcc} need {needed_bytes}"
     )]
     Short {
-        /// The format.
         fourcc: FourCc,
-        /// Columns.
         width: u32,
-        /// Rows.
         height: u32,
         /// As the device says.
         size_bytes: usize,
-        /// At least.
         needed_bytes: usize,
     },
     /// Memory planes that do not fit the format.
     #[error("the device gives {fourcc} in {found} memory planes instead of {expected}")]
     Planes {
-        /// The format.
         fourcc: FourCc,
         /// As the device says.
         found: usize,
@@ -201,7 +186,6 @@ impl Layout {
         self
     }
 
-    /// Its format's family.
     pub fn family(&self) -> Family {
         // Layouts are made of supported formats only, but the field is open.
         self.fourcc.family().unwrap_or(Family::Jpeg)

@@ -19,41 +19,27 @@ pub enum OpenError {
     /// The node is not there, or nothing is behind it.
     #[error("{}: there is no camera; is it plugged in? `bokehcam devices` lists what there is", .0.display())]
     Gone(PathBuf),
-    /// No rights.
     #[error("{}: permission denied; join the group that may use cameras: sudo usermod -aG video $USER, then log in again", .0.display())]
     Denied(PathBuf),
     /// Someone else has it.
     #[error("{}: the camera is busy{}", path.display(), held_by(.holders))]
     Busy {
-        /// The node.
         path: PathBuf,
         /// Who has it open.
         holders: Vec<Holder>,
     },
-    /// Not a camera.
     #[error("{}: this is no camera: {what}; `bokehcam devices` lists those that are", path.display())]
     NotACamera {
-        /// The node.
         path: PathBuf,
         /// What it is instead.
         what: &'static str,
     },
     /// It has no mode that can be used.
     #[error("{}: {source}", path.display())]
-    NoMode {
-        /// The node.
-        path: PathBuf,
-        /// Why.
-        source: NoMode,
-    },
+    NoMode { path: PathBuf, source: NoMode },
     /// It gives pictures that cannot be read.
     #[error("{}: {source}", path.display())]
-    Layout {
-        /// The node.
-        path: PathBuf,
-        /// Why.
-        source: LayoutError,
-    },
+    Layout { path: PathBuf, source: LayoutError },
     /// The cable is full.
     #[error(
         "{}: not enough USB bandwidth to start; choose --format MJPG, a smaller --size or a lower --fps, or plug the \
@@ -63,30 +49,13 @@ pub enum OpenError {
     Bandwidth(PathBuf),
     /// A control cannot be set as asked.
     #[error("{}: {source}", path.display())]
-    Control {
-        /// The node.
-        path: PathBuf,
-        /// Why.
-        source: ControlError,
-    },
+    Control { path: PathBuf, source: ControlError },
     /// The queue of buffers cannot be had.
     #[error("{}: the camera cannot be started: {source}", path.display())]
-    Queue {
-        /// The node.
-        path: PathBuf,
-        /// Why.
-        source: QueueError,
-    },
+    Queue { path: PathBuf, source: QueueError },
     /// Anything else that the system says.
     #[error("{}: {what}: {source}", path.display())]
-    Io {
-        /// The node.
-        path: PathBuf,
-        /// What was tried.
-        what: &'static str,
-        /// What was said.
-        source: io::Error,
-    },
+    Io { path: PathBuf, what: &'static str, source: io::Error },
 }
 
 const EPERM: i32 = rustix::io::Errno::PERM.raw_os_error();

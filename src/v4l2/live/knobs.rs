@@ -5,26 +5,10 @@ use std::path::Path;
 use v4l::v4l_sys as sys;
 
 use super::OpenError;
+use crate::knob::Knob;
 use crate::v4l2::controls::{self, Control, Kind, Value};
 use crate::v4l2::device::Device;
 use crate::v4l2::node;
-
-/// A control with a number that a person understands: brightness, exposure, white balance, zoom, focus and the like.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Knob {
-    /// Its name as tools write it: `exposure_time_absolute`.
-    pub name: String,
-    /// What it is set to.
-    pub value: i64,
-    /// Least and largest value, and the step between, at least 1.
-    pub range: (i64, i64, i64),
-    /// Names of the values of a menu, by value; empty otherwise.
-    pub menu: Vec<(i64, String)>,
-    /// Whether it is on (1) or off (0).
-    pub switch: bool,
-    /// Whether it can be changed now, and has an effect.
-    pub active: bool,
-}
 
 /// The knobs of the camera that is meant by `name` (see [`node::resolve`]), in the driver's order, as they are now. The
 /// camera may be streaming, here or elsewhere.

@@ -38,7 +38,6 @@ pub struct Live {
     state: State,
     watchdog: Watchdog,
     light: Light,
-    /// Not told yet.
     losses: Losses,
     /// The first frame was asked for.
     begun: bool,
@@ -70,7 +69,6 @@ pub enum Next {
     },
     /// Frames that nobody will see. Each is told once, before the frame that follows them.
     Lost(Losses),
-    /// No frame yet.
     Waiting,
 }
 

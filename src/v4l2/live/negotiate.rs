@@ -9,7 +9,6 @@ use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Siz
 /// What is wanted of a camera. What is not said is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wish {
-    /// Colours or distances.
     pub content: Content,
     /// Width and height, in pixels.
     pub size_px: Option<(u32, u32)>,
@@ -38,7 +37,6 @@ pub enum Wire {
 /// A mode to ask for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// The queue.
     pub queue: QueueKind,
     /// Pixel format.
     pub fourcc: FourCc,
@@ -51,25 +49,16 @@ pub struct Choice {
 /// Why no mode can be taken.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoMode {
-    /// An empty list.
     #[error("it offers no picture format; a virtual camera offers one only while something writes to it")]
     Nothing,
     /// No format that can be read.
     #[error("it offers {offered}, of which none can be read as {as_what}; readable are {readable}")]
-    Unreadable {
-        /// Its formats.
-        offered: String,
-        /// Colours or depth.
-        as_what: &'static str,
-        /// Ours.
-        readable: String,
-    },
+    Unreadable { offered: String, as_what: &'static str, readable: String },
     /// Not the one that was asked for.
     #[error("it does not offer {wanted}; choose --format from {offered}")]
     Format {
         /// What was asked for.
         wanted: FourCc,
-        /// Its readable formats.
         offered: String,
     },
 }

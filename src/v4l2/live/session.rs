@@ -23,7 +23,6 @@ pub type Setting = (String, String);
 pub struct Agreed {
     /// What was asked for in the end.
     pub choice: Choice,
-    /// Its pictures.
     pub layout: Layout,
     /// Time from frame to frame, as the driver says.
     pub interval: Interval,
@@ -38,9 +37,7 @@ impl fmt::Display for Agreed {
 
 /// An open camera that streams.
 pub struct Session {
-    /// Its buffers.
     pub queue: Queue<DeviceKernel>,
-    /// Its mode.
     pub agreed: Agreed,
     /// What it answered when it was opened.
     pub capability: sys::v4l2_capability,
@@ -88,7 +85,6 @@ impl Session {
         is_loopback(&self.capability)
     }
 
-    /// The device.
     pub fn device(&self) -> &Device {
         self.queue.kernel().device()
     }

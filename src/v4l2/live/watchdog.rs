@@ -17,10 +17,8 @@ pub struct Watchdog {
     errors: u32,
 }
 
-/// What to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Remedy {
-    /// Nothing yet.
     Wait,
     /// Stop the stream and start it.
     Restart,
@@ -56,7 +54,6 @@ impl Watchdog {
         self.trouble_ns.take().map(|trouble_ns| Duration::from_nanos(now_ns.saturating_sub(trouble_ns)))
     }
 
-    /// No frame came.
     pub fn silence(&mut self, now_ns: u64) -> Remedy {
         if now_ns.saturating_sub(self.since_ns) < self.limit_ns {
             return Remedy::Wait;

@@ -12,20 +12,13 @@ use crate::v4l2::holders::Holder;
 pub enum LoopbackError {
     /// There is no such node.
     #[error("there is no {}: {}", path.display(), remedy(path))]
-    Missing {
-        /// The node.
-        path: PathBuf,
-    },
+    Missing { path: PathBuf },
     /// It is no node of Video4Linux.
     #[error("{} is no video device: {}", path.display(), remedy(path))]
-    NoVideo {
-        /// The node.
-        path: PathBuf,
-    },
+    NoVideo { path: PathBuf },
     /// It belongs to another driver.
     #[error("{} is '{card}', not a virtual camera: {}", path.display(), remedy(Path::new("")))]
     NotLoopback {
-        /// The node.
         path: PathBuf,
         /// Name of the device.
         card: String,
@@ -36,14 +29,10 @@ pub enum LoopbackError {
          and log in again",
         path.display()
     )]
-    Denied {
-        /// The node.
-        path: PathBuf,
-    },
+    Denied { path: PathBuf },
     /// Someone else writes to it, or as many have it open as may.
     #[error("{} is in use{}: stop that, or take another virtual camera", path.display(), By(by))]
     Taken {
-        /// The node.
         path: PathBuf,
         /// Who has it open.
         by: Vec<Holder>,
@@ -55,13 +44,10 @@ pub enum LoopbackError {
         path.display(), By(by), path.display()
     )]
     Frozen {
-        /// The node.
         path: PathBuf,
         /// Its pixel format.
         fourcc: String,
-        /// Columns.
         width: u32,
-        /// Rows.
         height: u32,
         /// Who has it open.
         by: Vec<Holder>,
@@ -72,16 +58,10 @@ pub enum LoopbackError {
          load the module anew with `{}`",
         path.display(), modprobe(path)
     )]
-    Stuck {
-        /// The node.
-        path: PathBuf,
-    },
-    /// The system refused.
+    Stuck { path: PathBuf },
     #[error("{}: {doing}: {cause}", path.display())]
     System {
-        /// The node.
         path: PathBuf,
-        /// What was tried.
         doing: &'static str,
         /// What the system said.
         cause: io::Error,

@@ -32,7 +32,6 @@ pub trait Kernel {
     fn queue(&mut self, index: u32) -> io::Result<()>;
     /// Takes the oldest filled buffer; [`io::ErrorKind::WouldBlock`] when there is none.
     fn dequeue(&mut self) -> io::Result<Dequeued>;
-    /// Starts the stream.
     fn stream_on(&mut self) -> io::Result<()>;
     /// Stops the stream; all buffers come back.
     fn stream_off(&mut self) -> io::Result<()>;
@@ -40,10 +39,8 @@ pub trait Kernel {
     fn wait(&mut self, patience: Duration) -> io::Result<Wake>;
 }
 
-/// Why waiting ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wake {
-    /// Time is up.
     Late,
     /// A buffer is filled.
     Filled,
@@ -54,7 +51,6 @@ pub enum Wake {
 /// Where a plane's memory is, as the kernel numbers it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Span {
-    /// What to map.
     pub offset: u64,
     /// How much, in bytes.
     pub length_bytes: usize,
@@ -63,7 +59,6 @@ pub struct Span {
 /// What the kernel knows of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Described {
-    /// Its planes.
     pub planes: [Span; MAX_PLANES],
     /// How many of those there are.
     pub plane_count: usize,
@@ -113,7 +108,6 @@ impl DeviceKernel {
         Self { device, kind, writer }
     }
 
-    /// The device.
     pub fn device(&self) -> &Device {
         &self.device
     }

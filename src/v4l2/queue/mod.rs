@@ -32,9 +32,7 @@ const OFFERS: u32 = 3;
 /// A buffer that the kernel gave back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dequeued {
-    /// Which.
     pub index: u32,
-    /// Its frame's number.
     pub sequence: u32,
     /// When the frame was taken, on the system's monotonic clock, where the driver uses that.
     pub stamp_ns: Option<u64>,
@@ -65,7 +63,6 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// All of them.
     pub fn total(self) -> u64 {
         self.missed + self.stale + self.corrupt
     }
@@ -74,12 +71,10 @@ impl Losses {
 /// Why a queue cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum QueueError {
-    /// The driver refused.
     #[error("{step}: {source}")]
     Refused {
         /// What was asked for.
         step: &'static str,
-        /// What it said.
         source: io::Error,
     },
     /// Too few to read one while another is filled.
@@ -166,7 +161,6 @@ impl<K: Kernel> Queue<K> {
         Ok(queue)
     }
 
-    /// The kernel's side.
     pub fn kernel(&self) -> &K {
         &self.kernel
     }

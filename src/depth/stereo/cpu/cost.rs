@@ -17,7 +17,6 @@ pub type Codes<'a> = [[&'a [u8]; PLANES]; 2];
 pub struct Costs<'a, const N: usize> {
     /// From the row above the group to the one below it.
     pub codes: [Codes<'a>; ROWS],
-    /// Columns.
     pub width: usize,
     /// `[column][row][disparity]`, at least `width * GROUP * N`.
     pub out: &'a mut [u8],

@@ -37,11 +37,9 @@ pub struct CpuExecutor {
     penalties: Penalties,
     left: Census,
     right: Census,
-    /// Stripes of columns.
     stripes: usize,
     /// Groups that are worked on at a time.
     chunk: usize,
-    /// Of a chunk.
     costs: Aligned<u8>,
     /// Of a chunk, laid out as the costs.
     sums: Aligned<u8>,

@@ -133,7 +133,6 @@ pub struct Rows<'a, const N: usize> {
     pub costs: &'a [u8],
     /// Grey values of the left picture, `[row][column]`: of the rows of the group that there are.
     pub luma: &'a [u8],
-    /// Columns.
     pub width: usize,
     /// P2.
     pub penalties: &'a Penalties,

@@ -9,9 +9,7 @@ use super::GROUP;
 pub struct Winners<'a, const N: usize> {
     /// Sums of costs, `[column][row][disparity]`.
     pub sums: &'a [u8],
-    /// Columns.
     pub width: usize,
-    /// Memory.
     pub eyes: &'a mut Eyes,
     /// Fixed-point disparities, `[row][column]`: of the rows of the group that there are.
     pub out: &'a mut [u16],

@@ -27,7 +27,6 @@ pub const COLUMNS: Shader = shader!("stereo_columns", "stereo_path");
 /// What both eyes agree on.
 pub const WINNERS: Shader = shader!("stereo_winners");
 
-/// Every shader.
 pub const ALL: [Shader; 5] = [CENSUS, COST, ROWS, COLUMNS, WINNERS];
 
 /// The `override` constants of `stereo_common.wgsl`.

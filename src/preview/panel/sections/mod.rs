@@ -54,7 +54,6 @@ impl Sheet<'_> {
     }
 }
 
-/// All sections.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving, thumbs: &mut Thumbs) {
     looks::show(ui, sheet, saving);
     ui.add_space(2.0);

@@ -3,7 +3,7 @@
 use egui::{ComboBox, Ui};
 
 use super::Sheet;
-use crate::preview::backstage::Control;
+use crate::knob::Knob;
 use crate::preview::panel::parts::{Number, number, remark, switch};
 use crate::preview::state::{Action, Source};
 
@@ -50,7 +50,6 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     });
 }
 
-/// The camera's controls.
 pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     for control in &state.controls {
@@ -62,7 +61,7 @@ pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
 }
 
 /// A control of the camera; its new value, if it was changed.
-fn one(ui: &mut Ui, control: &Control) -> Option<i64> {
+fn one(ui: &mut Ui, control: &Knob) -> Option<i64> {
     let label = title(&control.name);
     let hint = format!("--control {}={}", control.name, control.value);
     if control.switch {

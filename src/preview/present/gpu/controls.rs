@@ -64,7 +64,6 @@ impl Overlay {
         self.renderer.update_buffers(&device.device, &device.queue, encoder, &self.primitives, &screen)
     }
 
-    /// Draws them.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'static>) {
         self.renderer.render(pass, &self.primitives, &self.screen());
     }

@@ -60,7 +60,6 @@ impl Overlay {
         (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
     }
 
-    /// Paints what changed.
     pub fn paint(&mut self) {
         if !std::mem::take(&mut self.outdated) {
             return;

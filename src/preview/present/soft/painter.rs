@@ -38,7 +38,6 @@ pub struct Painter {
 struct Around {
     area: Area,
     background: [u8; 3],
-    /// Counts the changes.
     version: u64,
     /// What the buffers have that were painted last, the last one in front.
     painted: [u64; BUFFERS],
@@ -139,7 +138,6 @@ impl Around {
     }
 }
 
-/// One painting.
 struct Window<'a> {
     arch: Arch,
     width: usize,

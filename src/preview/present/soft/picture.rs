@@ -94,7 +94,6 @@ impl WithSimd for Expand<'_> {
     }
 }
 
-/// Grey and dim.
 struct Stale<'a> {
     row: &'a mut [u32],
 }

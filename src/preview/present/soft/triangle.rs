@@ -12,7 +12,6 @@ const PIXEL: i64 = SUBPIXELS as i64;
 /// No corner is further away, in pixels, so that nothing overflows.
 const FURTHEST: f32 = 1e6;
 
-/// A corner.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
     /// Where it is, in pixels.
@@ -54,7 +53,6 @@ pub fn fill(
     }
 }
 
-/// The three edges.
 struct Shape {
     edges: [Edge; 3],
     top: i64,
@@ -126,7 +124,6 @@ struct Plane {
 }
 
 impl Plane {
-    /// Through three corners.
     fn through(at: [[f32; 2]; 3], values: [f32; 3]) -> Self {
         let (ab, ac) = ([at[1][0] - at[0][0], at[1][1] - at[0][1]], [at[2][0] - at[0][0], at[2][1] - at[0][1]]);
         let area = ab[0] * ac[1] - ab[1] * ac[0];

@@ -187,7 +187,7 @@ impl App {
             self.heard_at = Instant::now();
             self.listen();
         }
-        let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.in_memory);
+        let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
         if let Some(view) = newest.filter(|_| !frozen) {
             self.state.focus_m = match view.coc {
                 CocField::Depth(coc) => Some(coc.focus_m),

@@ -79,17 +79,15 @@ impl App {
     /// Saves the frame that is shown, or the next one where this one is on the GPU alone.
     pub(super) fn snapshot(&mut self) {
         let Some(view) = &self.view else { return self.state.note(NO_PICTURE) };
-        if !view.in_memory && !matches!(self.state.source, Source::Running(_)) {
+        if view.picture.memory().is_none() && !matches!(self.state.source, Source::Running(_)) {
             return self.state.note(NO_PICTURE);
         }
-        self.snapshot_due = !view.in_memory;
+        self.snapshot_due = view.picture.memory().is_none();
         self.place();
-        if self.snapshot_due {
-            return;
-        }
+        let Some(picture) = view.picture.memory() else { return };
         self.session.save(Still {
-            picture: view.picture.clone(),
-            color: (**view.color.as_ref().unwrap_or(&view.picture)).clone(),
+            picture: picture.clone(),
+            color: view.color.as_deref().unwrap_or(picture).clone(),
             depth: view.depth.as_ref().map(|depth| (**depth).clone()),
             coc: view.coc,
             change: view.trace.change,
@@ -111,8 +109,8 @@ impl App {
         let made = self.state.legend.map(|_| self.made.image());
         let State { mirror, split, source, .. } = &self.state;
         let view = self.view.as_ref();
-        let in_memory = view.filter(|view| view.in_memory).map_or(&self.nothing, |view| &*view.picture);
-        let on_device = view.and_then(|view| view.on_device.as_deref()).filter(|there| gfx.presenter.takes(there));
+        let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(&self.nothing);
+        let on_device = view.and_then(|view| view.picture.device()).filter(|there| gfx.presenter.takes(there));
         let picture = on_device.map_or(Image::Memory(in_memory), Image::Device);
         let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };

@@ -6,7 +6,7 @@ use glam::{Mat3, Vec3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::error::CliError;
+use super::SourceError;
 use crate::depth::registration::{Calibration, CalibrationError, Pinhole, Registration};
 use crate::files::input;
 
@@ -48,16 +48,20 @@ impl Camera {
 ///
 /// # Errors
 /// It cannot be read, has a wrong or a missing key, or numbers that cannot be.
-pub fn load(path: &Path) -> Result<Registration, CliError> {
-    parse(path, &input::read_text(path, input::MOST_CALIBRATION_BYTES).map_err(CliError::io(path))?)
+pub fn load(path: &Path) -> Result<Registration, SourceError> {
+    parse(
+        path,
+        &input::read_text(path, input::MOST_CALIBRATION_BYTES)
+            .map_err(|source| SourceError::Io { path: path.to_owned(), source })?,
+    )
 }
 
 /// Reads the text of the calibration file `path`.
 ///
 /// # Errors
 /// The text is no depth calibration.
-pub fn parse(path: &Path, text: &str) -> Result<Registration, CliError> {
-    let refuse = |at: usize, what: String| CliError::Settings {
+pub fn parse(path: &Path, text: &str) -> Result<Registration, SourceError> {
+    let refuse = |at: usize, what: String| SourceError::Registration {
         path: path.to_owned(),
         line: text[..at.min(text.len())].matches('\n').count() + 1,
         what,

@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use super::calib::{self, Eyes};
-use super::config::Executor;
-use super::error::CliError;
-use super::options;
+use super::{SourceError, options};
 use crate::calibration::rectification::Rectification;
 use crate::calibration::rectifier::Rectifier;
 use crate::capture::SourceInfo;
+use crate::computing::Computing;
 use crate::depth::stereo::source::StereoDepth;
 use crate::depth::stereo::{Effort, Settings};
 use crate::look::Look;
@@ -28,7 +27,7 @@ impl options::Stereo {
     ///
     /// # Errors
     /// There is such an option.
-    pub fn refuse(&self) -> Result<(), CliError> {
+    pub fn refuse(&self) -> Result<(), SourceError> {
         let given = [
             (self.rectified, "--rectified"),
             (!self.calib.is_empty(), "--calib"),
@@ -37,7 +36,7 @@ impl options::Stereo {
             (self.doffs_px.is_some(), "--doffs-px"),
         ];
         match given.into_iter().find(|(given, _)| *given) {
-            Some((_, name)) => Err(CliError::Usage(format!(
+            Some((_, name)) => Err(SourceError::Usage(format!(
                 "{name} is for depth from two eyes: a source LEFT,RIGHT, a recording with both, or --side-by-side"
             ))),
             None => Ok(()),
@@ -45,22 +44,22 @@ impl options::Stereo {
     }
 
     /// The geometry that the options spell out.
-    fn rig(&self) -> Result<Option<StereoRig>, CliError> {
+    fn rig(&self) -> Result<Option<StereoRig>, SourceError> {
         match (self.focal_px, self.baseline_m) {
             (Some(focal_px), Some(baseline_m)) => {
                 Ok(Some(StereoRig { focal_px, baseline_m, doffs_px: self.doffs_px.unwrap_or(0.0), metric: true }))
             }
             (None, None) if self.doffs_px.is_none() => Ok(None),
-            _ => Err(CliError::Usage("the geometry of two eyes needs both --focal-px and --baseline-m".to_string())),
+            _ => Err(SourceError::Usage("the geometry of two eyes needs both --focal-px and --baseline-m".to_string())),
         }
     }
 
     /// What the two eyes are: what the options state, else what the source says. Nothing is guessed.
-    fn state(&self, pair: &Pair, source_name: &str, size: (u32, u32)) -> Result<Stated, CliError> {
+    fn state(&self, pair: &Pair, source_name: &str, size: (u32, u32)) -> Result<Stated, SourceError> {
         if let Some(rig) = self.rig()? {
             return match (self.rectified, pair) {
                 (true, _) | (false, Pair::Rectified(_)) => Ok(Stated::Rectified(rig)),
-                _ => Err(CliError::Usage(
+                _ => Err(SourceError::Usage(
                     "--focal-px and --baseline-m are those of a rectified pair: add --rectified if this is one, or use \
                      --calib FILE"
                         .to_string(),
@@ -88,7 +87,7 @@ impl options::Stereo {
                 Ok(stated)
             }
             Pair::Unstated if self.rectified => Ok(Stated::Rectified(StereoRig::assumed(size.0))),
-            Pair::Unstated => Err(CliError::Usage(
+            Pair::Unstated => Err(SourceError::Usage(
                 "depth from two eyes needs --calib FILE, or --rectified if their pictures are rectified already"
                     .to_string(),
             )),
@@ -105,11 +104,11 @@ pub fn open(
     pair: &Pair,
     disparities: Option<u32>,
     options: &options::Stereo,
-    executor: &Executor,
-) -> Result<StereoDepth, CliError> {
+    computing: &Computing,
+) -> Result<StereoDepth, SourceError> {
     let stated = options.state(pair, &info.name, info.size)?;
     let disparities = options.max_disparity.unwrap_or_else(|| settled(disparities, info.size.0));
-    let matcher = executor.matcher(disparities, Effort::Full, info.size)?;
+    let matcher = computing.matcher(disparities, Effort::Full, info.size)?;
     let (depth, how) = match stated {
         Stated::Raw(rectifier) => {
             (StereoDepth::of_raw(&info.name, *rectifier, matcher, disparities), "to be rectified")
@@ -131,9 +130,9 @@ pub fn open(
 ///
 /// # Errors
 /// The focus or the lens needs metres, and `rig` has none.
-pub fn check_focus(rig: &StereoRig, look: &Look) -> Result<(), CliError> {
+pub fn check_focus(rig: &StereoRig, look: &Look) -> Result<(), SourceError> {
     let Some(needs) = look.needs_metres().filter(|_| !rig.metric) else { return Ok(()) };
-    Err(CliError::Usage(format!(
+    Err(SourceError::Usage(format!(
         "{needs} needs distances, and these two eyes tell none: give --calib FILE, or --focal-px and --baseline-m; \
          --focus auto or X,Y and --coc-at-infinity need none"
     )))

@@ -1,16 +1,34 @@
-//! From SOURCE to a camera and its depth.
+//! Sources by name: a camera, two of them, a recording or the synthetic scene, with the depth that goes with it.
+//!
+//! The command line, the window and other programs open them in one way:
+//!
+//! ```no_run
+//! use bokehcam::look::Look;
+//! use bokehcam::source::{Options, Source, SourceName};
+//!
+//! let name: SourceName = "recordings/portrait".parse()?;
+//! let source = Source::open(&name, &Options::default(), Some(&Look::default()))?;
+//! println!("{}: {:?} pixels", source.camera.info().name, source.camera.info().size);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod calib;
+pub mod devices;
+mod elsewhere;
+mod error;
+mod eyes;
+mod name;
+mod near;
+pub mod options;
+#[cfg(feature = "camera")]
+pub mod registration;
 
 use std::sync::Arc;
 
-use super::config::Executor;
-use super::error::CliError;
-#[cfg(feature = "camera")]
-use super::source_name::Named;
-pub use super::source_name::SourceName;
-use super::stereo;
-use super::unused::DepthFrom;
-use super::values::DepthChoice;
-use super::{defaults, options};
+pub use error::SourceError;
+pub use name::{Kind, SourceName};
+pub use options::{DepthChoice, Frames, Size};
+
 use crate::capture::replay::{Part, Replay};
 use crate::capture::side_by_side::SideBySide;
 use crate::capture::synthetic::{Format, Synthetic};
@@ -19,19 +37,37 @@ use crate::capture::two_eyes::TwoEyes;
 #[cfg(feature = "camera")]
 use crate::capture::v4l2::V4l2Camera;
 use crate::capture::{Brings, Camera, CaptureError};
-#[cfg(feature = "camera")]
 use crate::clock::Clock;
 use crate::compute::team::cores;
+use crate::computing::Computing;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::recorded::Recorded;
 use crate::frame::DepthMap;
-use crate::look::Look;
+use crate::look::{Effect, Look, Strength};
 use crate::optics::StereoRig;
-use crate::recording::{Options, Pair, Recording, Scratch};
+use crate::recording::{Options as Reading, Pair, Recording, Scratch};
 use crate::scene::Scene;
 #[cfg(feature = "camera")]
 use crate::v4l2::{layout::Content, live::Wish};
+
+/// Picture size of the synthetic scene.
+const SYNTHETIC_SIZE: (u32, u32) = (640, 480);
+/// Frame rate of the synthetic scene.
+const SYNTHETIC_FPS: f64 = 30.0;
+
+/// What depth comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthFrom {
+    /// There is none, or it is not used.
+    Nothing,
+    /// Numbers in units of their own, as 16-bit pictures and depth cameras have them.
+    Units,
+    /// Metres, or disparities that become metres.
+    Metres,
+    /// Two eyes.
+    Eyes,
+}
 
 /// An opened source.
 pub struct Source {
@@ -47,24 +83,29 @@ pub struct Source {
     pub first_depth: Option<DepthMap>,
 }
 
-/// How a source is wanted.
-pub struct Wanted<'a> {
+/// How a source is opened.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
     /// Which frames.
-    pub frames: &'a options::Source,
+    pub frames: Frames,
     /// How depth pictures are read.
-    pub depth: &'a options::Depth,
+    pub depth: options::Depth,
     /// What is said of its two eyes.
-    pub stereo: &'a options::Stereo,
+    pub stereo: options::Stereo,
     /// Where depth comes from.
-    pub from: &'a DepthChoice,
-    /// What its depth is for; `None` for itself.
-    pub look: Option<&'a Look>,
+    pub depth_choice: DepthChoice,
     /// What matches its two eyes.
-    pub executor: &'a Executor,
+    pub computing: Computing,
     /// Faulty lines of a recording's lists become frames that fail.
     pub keep_going: bool,
     /// The synthetic scene repeats itself, so that it can be played smoothly.
     pub cycle: bool,
+}
+
+/// How a source is opened, and what its depth is for; `None` for itself.
+struct Wanted<'a> {
+    options: &'a Options,
+    look: Option<&'a Look>,
 }
 
 /// Refinement of depth from two eyes, unless it is chosen: it knows nothing of how matching errs, but steadies it.
@@ -75,30 +116,43 @@ impl Source {
     ///
     /// # Errors
     /// It cannot be read, it has no frame between `--start` and `--end`, or an option does not apply to it.
-    pub fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, CliError> {
-        let Wanted { frames, stereo, .. } = wanted;
+    pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
+        let wanted = Wanted { options, look };
+        elsewhere::beside(Self::open_own(name, &wanted)?, &wanted, &Clock::system())
+    }
+
+    /// A camera of one's own, and what gives depth to its frames, in metres.
+    pub fn of(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
+        let has_depth = depth.is_some() || camera.info().brings == Brings::Depth;
+        let depth_from = if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing };
+        Self { camera, depth, rig: None, depth_from, first_depth: None }
+    }
+
+    /// Opens a source with its own depth.
+    fn open_own(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
+        let Options { frames, stereo, depth_choice, computing, .. } = wanted.options;
         name.check(frames)?;
         wanted.check_effect()?;
         let mut source = Opened::open(name, wanted)?;
         if stereo.side_by_side {
-            let usage = |error: CaptureError| CliError::Usage(error.to_string());
+            let usage = |error: CaptureError| SourceError::Usage(error.to_string());
             source.camera = Box::new(SideBySide::new(source.camera).map_err(usage)?);
         }
         let info = source.camera.info();
         let depth_from = if info.brings == Brings::Depth { DepthFrom::Metres } else { source.depth_from };
         if stereo.side_by_side
             && source.depth.is_some()
-            && matches!(wanted.from, DepthChoice::Auto | DepthChoice::Recorded)
+            && matches!(depth_choice, DepthChoice::Auto | DepthChoice::Recorded)
         {
-            return Err(CliError::Usage(format!(
+            return Err(SourceError::Usage(format!(
                 "--side-by-side: the depth of {} is that of whole pictures, not of their left halves; add --depth stereo \
                  or --depth none",
                 info.name
             )));
         }
         if info.brings != Brings::RightEye {
-            if *wanted.from == DepthChoice::Stereo {
-                return Err(CliError::Usage(format!(
+            if *depth_choice == DepthChoice::Stereo {
+                return Err(SourceError::Usage(format!(
                     "--depth stereo: {} has one eye; use two cameras LEFT,RIGHT, a recording with both eyes, or \
                      --side-by-side",
                     info.name
@@ -106,10 +160,10 @@ impl Source {
             }
             stereo.refuse()?;
         } else if wanted.matches(source.depth.is_some()) {
-            let depth = stereo::open(&info, &source.pair, source.disparities, stereo, wanted.executor)?;
+            let depth = eyes::open(&info, &source.pair, source.disparities, stereo, computing)?;
             let rig = *depth.rig();
             if let Some(look) = wanted.look {
-                stereo::check_focus(&rig, look)?;
+                eyes::check_focus(&rig, look)?;
             }
             let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
             let depth_from = DepthFrom::Eyes;
@@ -124,6 +178,14 @@ impl Source {
         self.depth.is_some() || self.camera.info().brings == Brings::Depth
     }
 
+    /// A look as far as this source allows it, opened with these options.
+    ///
+    /// # Errors
+    /// It needs depth that there is not, or a distance of focus.
+    pub fn fitting_look(&self, look: &Look, options: &Options) -> Result<Look, SourceError> {
+        fitting_look(look, &options.depth_choice, self.has_depth())
+    }
+
     /// Whether its depth was measured, so that refining it makes it better.
     pub fn is_measured(&self) -> bool {
         self.depth.is_some() && (self.rig.is_none() || REFINES_STEREO)
@@ -131,6 +193,17 @@ impl Source {
 }
 
 impl Wanted<'_> {
+    /// How a recording with depth pictures is read.
+    fn reading(&self) -> Reading {
+        let Options { depth, keep_going, .. } = self.options;
+        Reading {
+            depth_scale: depth.file_scale(),
+            depth_invalid: Some(depth.depth_invalid),
+            keep_going: *keep_going,
+            ..Reading::default()
+        }
+    }
+
     /// Whether the effect is one that uses depth.
     pub fn uses_depth(&self) -> bool {
         self.look.is_none_or(|look| look.effect.follows_depth())
@@ -145,17 +218,17 @@ impl Wanted<'_> {
         read.ok().map(|()| map)
     }
 
-    fn check_effect(&self) -> Result<(), CliError> {
-        if *self.from == DepthChoice::Stereo && !self.uses_depth() {
+    fn check_effect(&self) -> Result<(), SourceError> {
+        if self.options.depth_choice == DepthChoice::Stereo && !self.uses_depth() {
             let what = "--depth stereo: only --effect dof uses depth; leave one of them out";
-            return Err(CliError::Usage(what.to_string()));
+            return Err(SourceError::Usage(what.to_string()));
         }
         Ok(())
     }
 
     /// Whether two eyes are matched, where there are two, and depth of another kind or not.
     fn matches(&self, has_depth: bool) -> bool {
-        match self.from {
+        match self.options.depth_choice {
             DepthChoice::Stereo => true,
             DepthChoice::Auto => self.uses_depth() && !has_depth,
             _ => false,
@@ -176,8 +249,8 @@ struct Opened {
 }
 
 impl Opened {
-    fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, CliError> {
-        let Wanted { frames, depth, .. } = *wanted;
+    fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
+        let Options { frames, .. } = wanted.options;
         let of = |camera| Self {
             camera,
             depth: None,
@@ -188,27 +261,19 @@ impl Opened {
         };
         match name {
             SourceName::Synthetic => {
-                let size = frames.size.unwrap_or(defaults::SIZE);
+                let size = frames.size.map_or(SYNTHETIC_SIZE, |size| (size.width, size.height));
+                let fps = frames.fps.unwrap_or(SYNTHETIC_FPS);
                 let camera = Synthetic::new(Format {
-                    size: (size.width, size.height),
-                    fps: frames.fps.unwrap_or(defaults::FPS),
+                    size,
+                    fps,
                     frames: frames.frames,
                     threads: cores(),
-                    cycle: wanted
-                        .cycle
-                        .then(|| Scene::portrait().period_s() * frames.fps.unwrap_or(defaults::FPS))
-                        .map(|n| n as u64),
+                    cycle: wanted.options.cycle.then(|| (Scene::portrait().period_s() * fps) as u64),
                 })?;
                 Ok(of(Box::new(camera)))
             }
             SourceName::Folder(folder) => {
-                let options = Options {
-                    depth_scale: depth.file_scale(),
-                    depth_invalid: Some(depth.depth_invalid),
-                    keep_going: wanted.keep_going,
-                    ..Options::default()
-                };
-                let recording = Arc::new(Recording::open(folder, &options)?);
+                let recording = Arc::new(Recording::open(folder, &wanted.reading())?);
                 let name = folder.display().to_string();
                 let part = Part {
                     start_s: frames.start.unwrap_or(0.0),
@@ -244,7 +309,7 @@ impl Opened {
             }
             #[cfg(feature = "camera")]
             SourceName::Cameras([left, right]) => {
-                let open = |eye: &Named| V4l2Camera::open(&eye.name, wish(frames), frames.control.clone(), None);
+                let open = |eye: &name::Named| V4l2Camera::open(&eye.name, wish(frames), frames.control.clone(), None);
                 let eyes = TwoEyes::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
                 Ok(of(Box::new(eyes)))
             }
@@ -262,11 +327,36 @@ pub fn depth_of(recording: &Recording) -> DepthFrom {
 }
 
 #[cfg(feature = "camera")]
-fn wish(frames: &options::Source) -> Wish {
+fn wish(frames: &Frames) -> Wish {
     Wish {
         content: Content::Color,
         size_px: frames.size.map(|size| (size.width, size.height)),
         fps: frames.fps,
         fourcc: frames.format,
     }
+}
+
+/// The look as far as a source with depth or without allows it.
+///
+/// # Errors
+/// It needs depth that there is not, or a distance of focus.
+pub fn fitting_look(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result<Look, SourceError> {
+    let uses_depth = has_depth && *depth != DepthChoice::None;
+    if look.effect == Effect::Dof && !uses_depth {
+        return SourceError::usage(match has_depth {
+            true => "--effect dof needs depth: leave --depth none out, or use --effect blur or tilt-shift",
+            false => "--effect dof needs depth, and the source has none: use --effect blur or tilt-shift",
+        });
+    }
+    if *depth == DepthChoice::Recorded && !has_depth {
+        return SourceError::usage("--depth recorded: the source has no depth");
+    }
+    let look = look.for_source(uses_depth);
+    let has_distance = look.effect.follows_depth() || matches!(look.focus, FocusRule::Metres(_));
+    if matches!(look.strength, Strength::Lens(_)) && !has_distance {
+        return SourceError::usage(
+            "a lens without depth needs --focus METRES: its blur depends on the distance of focus",
+        );
+    }
+    Ok(look)
 }

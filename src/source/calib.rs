@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::error::CliError;
+use super::SourceError;
 use crate::calibration::{self, CalibrationError, Fault, StereoCalibration};
 use crate::recording::geometry::Geometry;
 
@@ -24,7 +24,7 @@ pub enum Eyes {
 ///
 /// # Errors
 /// It is of another kind, lacks an entry, has numbers that cannot be, or is for pictures of another aspect.
-pub fn read(files: &[PathBuf], pictures: &Path, size: (u32, u32)) -> Result<Eyes, CliError> {
+pub fn read(files: &[PathBuf], pictures: &Path, size: (u32, u32)) -> Result<Eyes, SourceError> {
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     match (calibration::load(&paths), &paths[..]) {
         (Ok(calibration), _) => Ok(Eyes::Raw(Box::new(calibration))),

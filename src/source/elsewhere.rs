@@ -1,46 +1,37 @@
-//! From `--depth` to depth from elsewhere: a recording's, or a depth camera's.
+//! Depth from elsewhere than the source: a recording's, or a depth camera's.
 
-use super::error::CliError;
-use super::options;
-use super::source::{Source, Wanted, depth_of};
-use super::unused::DepthFrom;
-use super::values::DepthChoice;
+use super::{DepthChoice, DepthFrom, Options, Source, SourceError, Wanted, depth_of, options};
 use crate::capture::Brings;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
 use crate::depth::beside::Beside;
-use crate::recording::{Options, Recording};
+use crate::recording::Recording;
 
 /// Gives `source` the depth that was chosen, where that is not its own and the effect needs it.
 ///
 /// # Errors
 /// It cannot be opened, or an option does not apply to it.
-pub fn beside(source: Source, wanted: &Wanted, clock: &Clock) -> Result<Source, CliError> {
-    let &Wanted { depth, from, keep_going, .. } = wanted;
-    let usage = |text: &str| Err(CliError::Usage(text.to_string()));
+pub(super) fn beside(source: Source, wanted: &Wanted, clock: &Clock) -> Result<Source, SourceError> {
+    let Options { depth, depth_choice: from, .. } = wanted.options;
     if depth.depth_calibration.is_some() && !matches!(from, DepthChoice::Device(_)) {
-        return usage("--depth-calibration is for a depth camera: name it with --depth, such as --depth /dev/video2");
+        return SourceError::usage(
+            "--depth-calibration is for a depth camera: name it with --depth, such as --depth /dev/video2",
+        );
     }
     if !from.is_elsewhere() {
         return Ok(source);
     }
     if !wanted.uses_depth() {
-        return usage("--depth names depth, and only --effect dof uses any: leave one of them out");
+        return SourceError::usage("--depth names depth, and only --effect dof uses any: leave one of them out");
     }
     if source.camera.info().brings == Brings::Depth {
-        return usage("the source knows its depth: leave --depth out");
+        return SourceError::usage("the source knows its depth: leave --depth out");
     }
     let mut first = None;
     let (opened, depth_from): (Box<dyn DepthSource>, _) = match from {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
-            let options = Options {
-                depth_scale: depth.file_scale(),
-                depth_invalid: Some(depth.depth_invalid),
-                keep_going,
-                ..Options::default()
-            };
-            let recording = Recording::open(folder, &options)?;
+            let recording = Recording::open(folder, &wanted.reading())?;
             let depth_from = depth_of(&recording);
             first = wanted.first_depth(&recording);
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
@@ -51,16 +42,16 @@ pub fn beside(source: Source, wanted: &Wanted, clock: &Clock) -> Result<Source, 
 }
 
 #[cfg(feature = "camera")]
-fn device(name: &str, depth: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, CliError> {
-    use super::{calibration, defaults};
+fn device(name: &str, depth: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
+    use super::registration;
     use crate::depth::live::{LiveDepth, Units};
     use crate::v4l2::live::OpenError;
-    let registration = depth.depth_calibration.as_deref().map(calibration::load).transpose()?;
-    let units = Units { per_m: depth.depth_scale.unwrap_or(defaults::LIVE_DEPTH_SCALE), invalid: depth.depth_invalid };
+    let registration = depth.depth_calibration.as_deref().map(registration::load).transpose()?;
+    let units = Units { per_m: depth.live_scale(), invalid: depth.depth_invalid };
     match LiveDepth::open(name, units, registration, clock.clone()) {
         Ok(camera) => Ok(Box::new(camera)),
         // A slip of the pen, as like as not.
-        Err(error @ OpenError::Name(_)) => Err(CliError::Usage(format!(
+        Err(error @ OpenError::Name(_)) => Err(SourceError::Usage(format!(
             "--depth {name}: {error}; or use auto, recorded, stereo, none or a folder with a recording"
         ))),
         Err(error) => Err(error.into()),
@@ -68,8 +59,8 @@ fn device(name: &str, depth: &options::Depth, clock: &Clock) -> Result<Box<dyn D
 }
 
 #[cfg(not(feature = "camera"))]
-fn device(name: &str, _: &options::Depth, _: &Clock) -> Result<Box<dyn DepthSource>, CliError> {
-    Err(CliError::Usage(format!(
+fn device(name: &str, _: &options::Depth, _: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
+    Err(SourceError::Usage(format!(
         "--depth {name}: there is no such folder, and this build leaves cameras out (feature `camera`)"
     )))
 }

@@ -5,11 +5,18 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::builder::{OsStringValueParser, TypedValueParser};
+use super::{Frames, SourceError, near};
 
-use super::error::CliError;
-use super::unused::From;
-use super::{near, options};
+/// What frames come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A camera, or two.
+    Camera,
+    /// A folder with a recording.
+    Recording,
+    /// The synthetic scene.
+    Synthetic,
+}
 
 /// A camera: how it was called, and the node that this means now.
 #[cfg(feature = "camera")]
@@ -121,19 +128,17 @@ fn camera(text: &str) -> Result<SourceName, String> {
 #[cfg(feature = "camera")]
 impl Named {
     /// Its device node.
-    #[cfg(feature = "window")]
     pub fn node(&self) -> &Path {
         &self.node
     }
 }
 
 impl SourceName {
-    /// A parser of sources. A folder's name need not be text.
-    pub fn parser() -> impl TypedValueParser<Value = Self> {
-        OsStringValueParser::new().try_map(|name| Self::from_os(&name))
-    }
-
-    fn from_os(name: &OsStr) -> Result<Self, String> {
+    /// The source of this name. A folder's name need not be text.
+    ///
+    /// # Errors
+    /// There is none: what there could be.
+    pub fn from_os(name: &OsStr) -> Result<Self, String> {
         let path = Path::new(name);
         match name.to_str() {
             Some("synthetic") => Ok(SourceName::Synthetic),
@@ -145,13 +150,13 @@ impl SourceName {
         }
     }
 
-    /// What it is, as far as settings depend on it.
-    pub fn kind(&self) -> From {
+    /// What it is.
+    pub fn kind(&self) -> Kind {
         match self {
-            SourceName::Synthetic => From::Synthetic,
-            SourceName::Folder(_) => From::Recording,
+            SourceName::Synthetic => Kind::Synthetic,
+            SourceName::Folder(_) => Kind::Recording,
             #[cfg(feature = "camera")]
-            SourceName::Camera(_) | SourceName::Cameras(_) => From::Camera,
+            SourceName::Camera(_) | SourceName::Cameras(_) => Kind::Camera,
         }
     }
 
@@ -159,7 +164,7 @@ impl SourceName {
     ///
     /// # Errors
     /// One is given, and it is no recording.
-    pub fn check(&self, source: &options::Source) -> Result<(), CliError> {
+    pub fn check(&self, source: &Frames) -> Result<(), SourceError> {
         let what = match self {
             SourceName::Folder(_) => return Ok(()),
             SourceName::Synthetic => "synthetic",
@@ -169,7 +174,7 @@ impl SourceName {
         if source.start.is_none() && source.end.is_none() && !source.repeat {
             return Ok(());
         }
-        Err(CliError::Usage(format!(
+        Err(SourceError::Usage(format!(
             "--start, --end and --loop are for recordings: {what} never ends, give it --frames"
         )))
     }

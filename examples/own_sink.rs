@@ -1,0 +1,25 @@
+//! A recording, blurred, into a sink of one's own.
+use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
+
+use bokehcam::frame::ColorImage;
+use bokehcam::sink::{Sink, SinkError};
+use bokehcam::{look::Look, pipeline, source::Options, source::Source};
+
+struct Brightness;
+
+impl Sink for Brightness {
+    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        let sum: u64 = frame.rgb.iter().map(|&value| u64::from(value)).sum();
+        println!("{:6.3} s: {}", time_ns as f64 / 1e9, sum / frame.rgb.len() as u64);
+        Ok(ControlFlow::Continue(()))
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let (look, stop) = (Look::default(), AtomicBool::new(false));
+    let source = Source::open(&"recordings/portrait".parse()?, &Options::default(), Some(&look))?;
+    let run = pipeline::Run::new(source.camera, source.depth, look, Box::new(Brightness), &stop)?;
+    println!("{}", pipeline::run(run)?);
+    Ok(())
+}

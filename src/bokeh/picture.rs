@@ -1,0 +1,50 @@
+//! A picture, wherever it is.
+
+use crate::compute::DevicePicture;
+use crate::frame::ColorImage;
+use crate::link::pool::Pooled;
+
+/// A picture in memory, on the device that made it, or in both.
+pub struct Picture {
+    /// The memory, which goes back to its pool either way.
+    image: Pooled<ColorImage>,
+    in_memory: bool,
+    device: Option<Pooled<DevicePicture>>,
+}
+
+impl Picture {
+    /// A picture in memory.
+    pub fn in_memory(image: Pooled<ColorImage>) -> Self {
+        Self { image, in_memory: true, device: None }
+    }
+
+    /// A picture on the device, and in memory where `in_memory`; `image` has its size in any case.
+    pub fn on_device(device: Pooled<DevicePicture>, image: Pooled<ColorImage>, in_memory: bool) -> Self {
+        Self { image, in_memory, device: Some(device) }
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        self.image.size()
+    }
+
+    /// The picture, where it is in memory.
+    pub fn memory(&self) -> Option<&ColorImage> {
+        self.in_memory.then_some(&*self.image)
+    }
+
+    /// The same, to be changed: what is on a device stays as it is.
+    pub fn memory_mut(&mut self) -> Option<&mut ColorImage> {
+        self.in_memory.then_some(&mut *self.image)
+    }
+
+    /// The picture on the device, where it is there.
+    pub fn device(&self) -> Option<&DevicePicture> {
+        self.device.as_deref()
+    }
+
+    /// The picture's memory, where it is in memory.
+    pub fn into_memory(self) -> Option<Pooled<ColorImage>> {
+        self.in_memory.then_some(self.image)
+    }
+}

@@ -1,0 +1,69 @@
+//! One picture on its own: the same blur as in a stream, without one.
+
+use super::{CocMaker, Finish};
+use crate::bokeh::{BokehError, Job};
+use crate::compute::Place;
+use crate::computing::Computing;
+use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pooled;
+use crate::look::Look;
+use crate::optics::CocField;
+
+/// A depth map for one picture.
+pub enum Depth {
+    /// As it was measured: with holes, and noise.
+    Measured(DepthMap),
+    /// As a blur had it.
+    Final(DepthMap),
+}
+
+/// What a picture is blurred by: the radius of every pixel, and the depth map (if it was measured, with holes filled, and
+/// refined if the look asks for that) if that needs it.
+///
+/// # Errors
+/// [`BokehError::NoDepth`] when the blur follows depth and there is none.
+pub fn prepared(
+    look: &Look,
+    color: &ColorImage,
+    depth: Option<Depth>,
+) -> Result<(CocField, Option<DepthMap>), BokehError> {
+    let (finish, map) = match depth {
+        Some(Depth::Measured(map)) => (Finish::measured(look.refines(false)), Some(map)),
+        Some(Depth::Final(map)) => (Finish::Keep, Some(map)),
+        None => (Finish::Keep, None),
+    };
+    let mut maker = CocMaker::new(look.coc_rule(color.size()), finish);
+    match (maker.fixed(), map) {
+        (Some(field), _) => Ok((field, None)),
+        (None, None) => Err(BokehError::NoDepth),
+        (None, Some(mut map)) => Ok((maker.make(&mut map, color, 0), Some(map))),
+    }
+}
+
+/// The picture `color` in `look`, and what blurred it; as it is where the effect is none.
+///
+/// # Errors
+/// The blur follows depth and there is none, is too wide for the picture, or there is no such GPU.
+pub fn blur(
+    look: &Look,
+    color: ColorImage,
+    depth: Option<Depth>,
+    computing: &Computing,
+) -> Result<(ColorImage, String), BokehError> {
+    let size = color.size();
+    let Some(settings) = look.settings(size, false) else { return Ok((color, "not blurred".to_string())) };
+    let (coc, depth) = prepared(look, &color, depth)?;
+    let mut bokeh = computing.blur(&settings, size)?;
+    bokeh.submit(Job {
+        ticket: 0,
+        color: Pooled::detached(color),
+        depth: depth.map(Pooled::detached),
+        coc,
+        quality: settings.quality,
+        place: Place::Memory,
+        out: Pooled::detached(ColorImage::default()),
+    })?;
+    let mut finished = bokeh.collect(true)?.ok_or(BokehError::Lost)?;
+    let picture = finished.picture.memory_mut().ok_or(BokehError::Lost)?;
+    Ok((std::mem::take(picture), bokeh.describe()))
+}

@@ -1,0 +1,157 @@
+//! [`Services`] of this system.
+
+use std::collections::BTreeMap;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::services::{Opened, Services, SettingsStore, Switch};
+use crate::bokeh::{self, Backend, Bokeh};
+use crate::compute::device::Device;
+use crate::knob::Knob;
+use crate::look::{Effect, Look, presets::Preset};
+use crate::sink::{self, Sink, Target};
+use crate::source::devices::{self, Choice};
+use crate::source::{Kind, Options, Source, SourceName};
+
+/// What is said when there is nothing to look at but our own scene.
+const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
+                         `bokehcam doctor` says what is missing.";
+/// What is called so needs no camera.
+const SYNTHETIC: &str = "synthetic";
+
+/// Opens everything as the command line would.
+pub struct System {
+    /// How sources are opened.
+    pub options: Options,
+    /// The look at the start.
+    pub look: Look,
+    /// The GPU that blurs and draws, where one does.
+    pub device: Option<Arc<Device>>,
+    /// Width and height of virtual cameras; `None`: those of the frames.
+    pub out_size: Option<(u32, u32)>,
+    pub force: bool,
+    /// Where settings are kept.
+    pub settings: Box<dyn SettingsStore>,
+    /// The source that was asked for at the start.
+    first: Option<Choice>,
+    /// Knobs that were turned, by name.
+    turned: BTreeMap<String, i64>,
+    /// The camera that was opened last, where it has knobs.
+    camera: Option<String>,
+}
+
+impl System {
+    /// Nothing is open yet; there is no GPU, and nothing is overwritten.
+    pub fn new(options: Options, look: Look, settings: Box<dyn SettingsStore>) -> Self {
+        Self {
+            options,
+            look,
+            device: None,
+            out_size: None,
+            force: false,
+            settings,
+            first: None,
+            turned: BTreeMap::new(),
+            camera: None,
+        }
+    }
+
+    fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
+        let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
+        let mut options = self.options.clone();
+        options.cycle = true;
+        options.frames.repeat &= source_name.kind() == Kind::Recording;
+        // Of depth the window may make use later.
+        let look = Look { effect: Effect::Auto, ..self.look.clone() };
+        let source = Source::open(&source_name, &options, Some(&look)).map_err(|error| error.to_string())?;
+        Ok((source, source_name))
+    }
+}
+
+impl Services for System {
+    fn sources(&mut self) -> Vec<Choice> {
+        let mut sources = devices::cameras();
+        let is_other = |choice: &&Choice| choice.name != SYNTHETIC && !sources.contains(choice);
+        let first = self.first.iter().find(is_other).cloned();
+        sources.extend(first);
+        sources.push(Choice { name: SYNTHETIC.into(), label: "Synthetic scene".into() });
+        sources
+    }
+
+    fn virtual_cameras(&mut self) -> Vec<Choice> {
+        devices::virtual_cameras()
+    }
+
+    fn open(&mut self, name: &str) -> Result<Opened, String> {
+        let mut notes = Vec::new();
+        let first = devices::cameras().into_iter().next();
+        let name = match name {
+            "" => first.map_or_else(
+                || {
+                    notes.push(NO_CAMERA.to_owned());
+                    SYNTHETIC.to_owned()
+                },
+                |camera| camera.name,
+            ),
+            name => name.to_owned(),
+        };
+        let (source, source_name) = self.open_source(&name)?;
+        self.turned.clear();
+        self.first.get_or_insert_with(|| Choice { name: name.clone(), label: name.clone() });
+        self.camera = devices::camera_of(&source_name);
+        let controls = self.camera.as_deref().map(devices::knobs).unwrap_or_default();
+        Ok(Opened { name, source, notes, controls })
+    }
+
+    fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+        let Some(camera) = &self.camera else { return Err("this source has no controls".to_owned()) };
+        let controls = devices::turn(camera, knob, value)?;
+        self.turned.insert(knob.to_owned(), value);
+        Ok(controls)
+    }
+
+    fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
+        let threads = self.options.computing.threads;
+        // One that failed stays so.
+        let made = match self.device.as_ref().filter(|device| device.check().is_ok()) {
+            Some(device) => bokeh::create_on(settings, size, Arc::clone(device), threads),
+            None => bokeh::create(settings, size, Backend::Cpu, None, threads),
+        };
+        made.map_err(|error| error.to_string())
+    }
+
+    fn output(
+        &mut self,
+        name: &str,
+        size: (u32, u32),
+        period_ns: u64,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn Sink>, String> {
+        let (force, out_size, stop) = (self.force, self.out_size, Arc::clone(stop));
+        let options = sink::Options { force, out_size, stop, ..sink::Options::new(size, period_ns) };
+        let target = Target::from_str(name).map_err(|error| error.to_string())?;
+        target.open(&options).map_err(|error| error.to_string())
+    }
+
+    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        let mut switches = match outputs {
+            [] => switches.to_vec(),
+            // They are the window's own.
+            _ => Vec::new(),
+        };
+        if !self.turned.is_empty() {
+            let controls: Vec<String> = self.turned.iter().map(|(name, value)| format!("{name}={value}")).collect();
+            switches.push(("control".into(), controls.join(",")));
+        }
+        self.settings.command(look, source, outputs, &switches)
+    }
+
+    fn presets(&mut self) -> Vec<Preset> {
+        self.settings.presets()
+    }
+
+    fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
+        self.settings.save_preset(name, look)
+    }
+}

@@ -1,0 +1,79 @@
+//! Cameras, virtual cameras and knobs, as there are now. A build without cameras has none.
+
+use super::SourceName;
+use crate::knob::Knob;
+#[cfg(feature = "camera")]
+use crate::v4l2::{
+    live::knobs,
+    node::{self, Kind, Node},
+};
+
+/// A device to choose.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// What the command line calls it.
+    pub name: String,
+    /// What a person calls it.
+    pub label: String,
+}
+
+/// Cameras.
+pub fn cameras() -> Vec<Choice> {
+    #[cfg(feature = "camera")]
+    return choices(Kind::Capture);
+    #[cfg(not(feature = "camera"))]
+    return Vec::new();
+}
+
+/// Virtual cameras that could be written to.
+pub fn virtual_cameras() -> Vec<Choice> {
+    #[cfg(feature = "camera")]
+    return choices(Kind::Virtual);
+    #[cfg(not(feature = "camera"))]
+    return Vec::new();
+}
+
+#[cfg(feature = "camera")]
+fn choices(kind: Kind) -> Vec<Choice> {
+    let of_kind = |node: &Node| node.kind == kind && (kind == Kind::Virtual || node.captures);
+    let choice = |node: Node| {
+        let name = node.path.display().to_string();
+        let label = if node.card.is_empty() { name.clone() } else { format!("{} ({name})", node.card) };
+        Choice { name, label }
+    };
+    node::nodes().into_iter().filter(of_kind).map(choice).collect()
+}
+
+/// The camera of a source whose knobs can be turned: one has its own; two have to see alike.
+pub fn camera_of(source: &SourceName) -> Option<String> {
+    match source {
+        #[cfg(feature = "camera")]
+        SourceName::Camera(camera) => Some(camera.node().display().to_string()),
+        _ => None,
+    }
+}
+
+/// The knobs of a camera; none where it has none, or does not tell.
+pub fn knobs(camera: &str) -> Vec<Knob> {
+    #[cfg(feature = "camera")]
+    return knobs::list(camera).unwrap_or_else(|error| {
+        tracing::info!("{error}");
+        Vec::new()
+    });
+    #[cfg(not(feature = "camera"))]
+    return {
+        let _ = camera;
+        Vec::new()
+    };
+}
+
+/// Turns a knob of a camera; gives back all of them.
+///
+/// # Errors
+/// The camera refuses: one line for the person.
+pub fn turn(camera: &str, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
+    #[cfg(feature = "camera")]
+    return knobs::turn(camera, knob, value).map_err(|error| error.to_string());
+    #[cfg(not(feature = "camera"))]
+    return Err(format!("{camera}: this build leaves cameras out (feature `camera`), so {knob} cannot be {value}"));
+}

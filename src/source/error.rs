@@ -1,0 +1,62 @@
+//! Why a source cannot be opened.
+
+use std::io;
+use std::path::PathBuf;
+
+use crate::calibration::CalibrationError;
+use crate::capture::CaptureError;
+use crate::depth::DepthError;
+use crate::recording::RecordingError;
+
+/// Why a source cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// What is asked for does not make sense together.
+    #[error("{0}")]
+    Usage(String),
+    /// The calibration of a depth camera cannot be used.
+    #[error("{}:{line}: {what}", path.display())]
+    Registration {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong, and what is accepted.
+        what: String,
+    },
+    /// A file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The source failed.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// It is no recording, or a faulty one.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// There is no depth.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+    /// The calibration of two eyes cannot be used.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// The depth camera cannot be opened.
+    #[cfg(feature = "camera")]
+    #[error("--depth: {0}")]
+    DepthCamera(#[from] crate::v4l2::live::OpenError),
+}
+
+impl SourceError {
+    /// Whether the caller has to write something differently.
+    pub fn is_wrong_argument(&self) -> bool {
+        matches!(self, Self::Usage(_) | Self::Registration { .. })
+    }
+
+    pub(super) fn usage<T>(what: impl Into<String>) -> Result<T, Self> {
+        Err(Self::Usage(what.into()))
+    }
+}

@@ -1,0 +1,217 @@
+//! How a source is opened: options that hold for files, cameras and other programs alike.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::Args;
+use clap::builder::{BoolishValueParser, RangedI64ValueParser};
+
+use crate::depth::stereo::Settings;
+use crate::look::number::{above_zero, within};
+#[cfg(feature = "camera")]
+use crate::v4l2::{FourCc, live::Setting};
+
+/// Units of a 16-bit depth picture per metre: the TUM convention.
+pub const DEPTH_SCALE: f32 = 5000.0;
+/// The same of depth cameras, most of which give millimetres.
+#[cfg(feature = "camera")]
+const LIVE_DEPTH_SCALE: f32 = 1000.0;
+
+/// Which frames of which source.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Source")]
+pub struct Frames {
+    /// Start this many seconds after the first frame
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub start: Option<f64>,
+    /// End this many seconds after the first frame
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub end: Option<f64>,
+    /// Begin again at the end; only with --frames or Ctrl-C does it end
+    #[arg(long = "loop", value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub repeat: bool,
+    /// Stop after this many frames
+    #[arg(long, value_name = "N", value_parser = RangedI64ValueParser::<u64>::new().range(1..))]
+    pub frames: Option<u64>,
+    /// Picture size; of a camera, the nearest that it has [default: 1280x720 of a camera, 640x480 of `synthetic`]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Frames per second; of a camera, the nearest that it has [default: 30]
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    pub fps: Option<f64>,
+    /// Pixel format of a camera, such as MJPG, YUYV or NV12 [default: what its cable carries best]
+    #[cfg(feature = "camera")]
+    #[arg(long, value_name = "FOURCC")]
+    pub format: Option<FourCc>,
+    /// Set a camera's control; may be given more than once, or as a list with commas
+    #[cfg(feature = "camera")]
+    #[arg(long, value_name = "NAME=VALUE", value_delimiter = ',', value_parser = control)]
+    pub control: Vec<Setting>,
+}
+
+/// How depth pictures are read.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Depth")]
+pub struct Depth {
+    /// Units of a 16-bit depth picture per metre (TUM 5000, millimetres 1000) [default: 5000; 1000 from a camera]
+    #[arg(long, value_name = "UNITS", value_parser = above_zero)]
+    pub depth_scale: Option<f32>,
+    /// Value of a depth picture that means unknown
+    #[arg(long, value_name = "VALUE", default_value = "0")]
+    pub depth_invalid: u16,
+    /// How a depth camera stands beside the colour camera: TOML with the tables [depth] and [color] (width, height, fx,
+    /// fy, cx, cy, in pixels) and [depth-to-color] (rotation: 9 numbers row by row; translation_m: 3 numbers)
+    /// [default: both see the same]
+    #[arg(long, value_name = "FILE.toml")]
+    pub depth_calibration: Option<PathBuf>,
+}
+
+impl Depth {
+    /// Units per metre of depth pictures in files.
+    pub fn file_scale(&self) -> f32 {
+        self.depth_scale.unwrap_or(DEPTH_SCALE)
+    }
+
+    /// Units per metre of a depth camera.
+    #[cfg(feature = "camera")]
+    pub fn live_scale(&self) -> f32 {
+        self.depth_scale.unwrap_or(LIVE_DEPTH_SCALE)
+    }
+}
+
+/// Depth from two eyes.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Two eyes")]
+pub struct Stereo {
+    /// Each picture of the source shows both eyes beside each other: the left half is the left eye's
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub side_by_side: bool,
+    /// The pictures are a rectified pair already: the same point is in the same row
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub rectified: bool,
+    /// Calibration of the two eyes; may be given more than once, or as a list with commas, for one in two files
+    #[arg(long, value_name = "FILE", value_delimiter = ',')]
+    pub calib: Vec<PathBuf>,
+    /// Disparities that are tried, in pixels: a multiple of 16 up to 256 [default: the recording's, else a tenth of the
+    /// width]
+    #[arg(long, value_name = "PX", value_parser = disparities)]
+    pub max_disparity: Option<u32>,
+    /// Focal length of a rectified pair, in pixels, with --baseline-m
+    #[arg(long, value_name = "PX", value_parser = above_zero, conflicts_with = "calib")]
+    pub focal_px: Option<f32>,
+    /// Distance of its eyes, in metres
+    #[arg(long, value_name = "M", value_parser = above_zero, conflicts_with = "calib")]
+    pub baseline_m: Option<f32>,
+    /// Column of its right principal point less that of the left, in pixels [default: 0]
+    #[arg(long, value_name = "PX", value_parser = within(-10_000.0..=10_000.0),
+          conflicts_with = "calib")]
+    pub doffs_px: Option<f32>,
+}
+
+/// Where depth comes from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum DepthChoice {
+    /// The source's, when the effect needs it.
+    #[default]
+    Auto,
+    /// The source's.
+    Recorded,
+    /// The source's two eyes.
+    Stereo,
+    /// None: for the effects that need none.
+    None,
+    /// The depth of the recording in this folder.
+    Folder(PathBuf),
+    /// A depth camera, by its path or name.
+    Device(String),
+}
+
+impl DepthChoice {
+    /// Whether it names depth that is not the source's own.
+    pub fn is_elsewhere(&self) -> bool {
+        matches!(self, Self::Folder(_) | Self::Device(_))
+    }
+}
+
+impl FromStr for DepthChoice {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(match text {
+            "auto" => Self::Auto,
+            "recorded" => Self::Recorded,
+            "stereo" => Self::Stereo,
+            "none" => Self::None,
+            "" => {
+                return Err(
+                    "use auto, recorded, stereo, none, a folder with a recording, or a depth camera".to_string()
+                );
+            }
+            folder if Path::new(folder).is_dir() => Self::Folder(folder.into()),
+            device => Self::Device(device.to_owned()),
+        })
+    }
+}
+
+/// Columns and rows, each 1 to 16384.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl FromStr for Size {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let side = |text: &str| text.parse().ok().filter(|side| (1..=16384).contains(side));
+        text.split_once(['x', 'X'])
+            .and_then(|(width, height)| Some(Size { width: side(width)?, height: side(height)? }))
+            .ok_or_else(|| "use WIDTHxHEIGHT, each 1 to 16384, such as 1280x720".to_string())
+    }
+}
+
+#[cfg(feature = "camera")]
+fn control(text: &str) -> Result<Setting, String> {
+    let parts = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
+    let (name, value) = parts
+        .filter(|(name, _)| !name.is_empty())
+        .ok_or_else(|| "use NAME=VALUE, such as exposure_dynamic_framerate=0".to_string())?;
+    Ok((name.to_owned(), value.to_owned()))
+}
+
+fn disparities(text: &str) -> Result<u32, String> {
+    const MOST: u32 = Settings::MOST_DISPARITIES;
+    let good = |disparities: &u32| (16..=MOST).contains(disparities) && disparities.is_multiple_of(16);
+    text.parse().ok().filter(good).ok_or_else(|| format!("use a multiple of 16 from 16 to {MOST}"))
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|rate| (0.1..=1000.0).contains(rate))
+        .ok_or_else(|| "use frames per second from 0.1 to 1000".to_string())
+}
+
+/// A parser of times in seconds, from 0.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|s: &f64| s.is_finite() && *s >= 0.0).ok_or_else(|| "use seconds from 0".to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_sizes_say_what_is_accepted() {
+        for text in ["640", "0x480", "640x", "99999x1"] {
+            assert!(text.parse::<Size>().unwrap_err().contains("1280x720"), "{text}");
+        }
+    }
+}
