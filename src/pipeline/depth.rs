@@ -222,3 +222,29 @@ impl Stage<'_> {
         Ok(map)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::focus::FocusRule;
+
+    #[test]
+    fn depth_is_refined_while_that_is_wanted_and_by_one_refiner() {
+        let focus = FocusRule::Point { x: 0.5, y: 0.5 };
+        let rule = CocRule::Depth { focus, lens: CocAtInfinity::Px(8.0), range_m: 0.0, max_coc_px: 20.0 };
+        let mut coc = Coc::new(rule, false);
+        let mut refiner_after = |refine| {
+            coc.follow(rule, refine);
+            match &coc {
+                Coc::Depth(depth) => match &depth.maker {
+                    Maker::Refine(refiner) => Some(std::ptr::from_ref(&**refiner)),
+                    Maker::Fill(_) => None,
+                },
+                Coc::Fixed(_) => unreachable!("the rule has depth"),
+            }
+        };
+        let [none, first, second, last] = [false, true, true, false].map(&mut refiner_after);
+        assert_eq!((none, last), (None, None));
+        assert!(first.is_some() && first == second, "what it has seen is kept");
+    }
+}

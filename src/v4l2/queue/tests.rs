@@ -45,6 +45,11 @@ fn the_newest_frame_wins_and_the_others_are_counted() {
 }
 
 #[test]
+fn every_loss_counts_once() {
+    assert_eq!(Losses { missed: 1, stale: 20, corrupt: 300 }.total(), 321);
+}
+
+#[test]
 fn parts_of_damaged_frames_are_never_given_out() {
     let clock = Clock::manual();
     let chances = Chances { damaged: 0.5, ..Chances::default() };
