@@ -229,3 +229,22 @@ fn settings_are_a_file_of_a_sensible_size() {
         assert!(stderr.contains(file) && stderr.contains(says), "{stderr}");
     }
 }
+
+/// The blur takes many times what the picture takes.
+#[test]
+fn a_picture_that_is_larger_than_memory_is_refused() {
+    let _alone = alone();
+    let dir = TempDir::new().unwrap();
+    save_wide(&dir.path().join("wide.png"), 5000, png::ColorType::Grayscale);
+    let line = format!(
+        "ulimit -v 1500000; exec '{}' render wide.png --effect blur --coc-at-infinity 2 --backend cpu --out out.png",
+        env!("CARGO_BIN_EXE_bokehcam")
+    );
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &line]).env("XDG_CONFIG_HOME", dir.path()).current_dir(dir.path()).stdin(Stdio::null());
+    let output = shell.output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), stderr.lines().count()), (Some(1), 1), "{stderr}");
+    assert!(stderr.contains("5000x5000") && stderr.contains("MB are free"), "{stderr}");
+    assert!(!dir.path().join("out.png").exists());
+}

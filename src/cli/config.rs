@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::error::CliError;
-use super::options;
+use super::{memory, options};
 use super::values::{self, DepthChoice, Effect, OrAuto};
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
 use crate::budget::Quality;
@@ -131,8 +131,9 @@ impl Executor {
     /// An executor for pictures of `size` pixels.
     ///
     /// # Errors
-    /// There is no such GPU.
+    /// There is no such GPU, or the picture is larger than memory.
     pub fn create(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, CliError> {
+        memory::check(size)?;
         Ok(bokeh::create(settings, size, self.backend, self.adapter.as_deref(), self.threads)?)
     }
 
@@ -154,12 +155,13 @@ impl Executor {
     /// The CPU executor, which can be looked into.
     ///
     /// # Errors
-    /// A GPU was asked for, or the blur is too wide.
+    /// A GPU was asked for, the blur is too wide, or the picture is larger than memory.
     pub fn create_open(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<CpuBokeh, CliError> {
         if self.backend == Backend::Gpu || self.adapter.is_some() {
             let text = "--debug-dir looks into the CPU executor: leave --backend gpu and --adapter out";
             return Err(CliError::Usage(text.to_string()));
         }
+        memory::check(size)?;
         settings.check(size)?;
         Ok(CpuBokeh::new(Plan::new(settings, size.0, size.1), self.threads))
     }

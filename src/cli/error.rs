@@ -57,6 +57,20 @@ pub enum CliError {
     /// No handler of signals can be set.
     #[error("signals cannot be handled: {0}")]
     Signals(String),
+    /// A picture needs more memory than there is.
+    #[error(
+        "a picture of {}x{} pixels takes about {needed_mb} MB to blur, and {free_mb} MB are free: make it smaller, or close \
+         other programs",
+        size.0, size.1
+    )]
+    Memory {
+        /// Width and height in pixels.
+        size: (u32, u32),
+        /// What the blur is estimated to take.
+        needed_mb: u64,
+        /// What this process can still take.
+        free_mb: u64,
+    },
     /// The executor took a picture and gave none back.
     #[error("the blur gave no picture back: please report this")]
     NothingCameBack,

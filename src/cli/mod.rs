@@ -25,6 +25,7 @@ mod files;
 mod focus;
 mod layers;
 mod log;
+mod memory;
 mod near;
 mod options;
 #[doc(hidden)]
