@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use super::error::CliError;
-use super::{memory, options};
 use super::values::{self, DepthChoice, Effect, OrAuto};
+use super::{memory, options};
 use crate::bokeh::{self, Backend, Bokeh, cpu::CpuBokeh, plan::Plan};
 use crate::budget::Quality;
 #[cfg(feature = "window")]

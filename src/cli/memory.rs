@@ -33,7 +33,8 @@ fn free_bytes() -> Option<u64> {
     let info = fs::read_to_string("/proc/meminfo").ok()?;
     let free = kilobytes(&info, "MemAvailable:")? + kilobytes(&info, "SwapFree:").unwrap_or(0);
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let own = getrlimit(Resource::As).current.map(|most| most.saturating_sub(kilobytes(&status, "VmSize:").unwrap_or(0)));
+    let own =
+        getrlimit(Resource::As).current.map(|most| most.saturating_sub(kilobytes(&status, "VmSize:").unwrap_or(0)));
     Some([own, group_bytes()].into_iter().flatten().fold(free, u64::min))
 }
 
@@ -41,7 +42,8 @@ fn free_bytes() -> Option<u64> {
 fn group_bytes() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let group = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
-    let number = |name: &str| fs::read_to_string(format!("/sys/fs/cgroup/{group}/{name}")).ok()?.trim().parse::<u64>().ok();
+    let number =
+        |name: &str| fs::read_to_string(format!("/sys/fs/cgroup/{group}/{name}")).ok()?.trim().parse::<u64>().ok();
     Some(number("memory.max")?.saturating_sub(number("memory.current")?))
 }
 

@@ -299,7 +299,7 @@ mod tests {
             timings.rungs.add(rung);
         }
         tally.lost(3, Cause::Late);
-        let about = About { budget_ns: 33_333_333, elapsed_ns: 500_000_000, ..About::default() };
+        let about = About { budget_ns: 33_333_333, elapsed_ns: 500_000_000, cpu_ns: 250_000_000, ..About::default() };
         Report::new(tally.frames(), &timings, about)
     }
 
@@ -317,7 +317,10 @@ mod tests {
         assert!(json["stages_ms"]["depth"].is_null(), "no stage that did nothing");
         assert_eq!(json["quality"]["balanced"], 0.75);
         assert_eq!(json["quality"]["switches"], 1);
-        assert_eq!(json["budget_ms"], 33.333);
+        assert_eq!(
+            (&json["budget_ms"], &json["elapsed_s"], &json["cpu_s"]),
+            (&33.333.into(), &0.5.into(), &0.25.into())
+        );
         for key in ["misses", "backend", "adapter", "source", "sink", "versions"] {
             assert!(!json[key].is_null(), "{key}");
         }

@@ -147,6 +147,23 @@ fn a_buffer_that_was_refused_is_offered_again() {
     }
 }
 
+#[test]
+fn a_buffer_of_which_nothing_can_be_learnt_is_left_to_the_kernel() {
+    let clock = Clock::manual();
+    let model = Model::new(11, Chances::default(), clock.clone());
+    let mut queue = open(&model, &clock).unwrap();
+    queue.start().unwrap();
+    let fails = |fails: bool| {
+        let mut state = model.0.borrow_mut();
+        (state.mute, state.chances.refused) = (fails, if fails { 1.0 } else { 0.0 });
+    };
+    fails(true);
+    assert!(queue.wait_newest(PATIENCE).is_err());
+    fails(false);
+    // The model panics where a buffer that it has is queued again.
+    assert!(queue.wait_newest(PATIENCE).unwrap());
+}
+
 /// Runs a queue against a kernel that fails at random: opens, starts, reads, stops. The model panics where a rule is
 /// broken. Returns frames taken, what was lost, and how often each of these errors came.
 fn fuzz(seed: u64, chances: Chances, errors: &mut [u64; 256]) -> (u64, Losses, Facts) {
