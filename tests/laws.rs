@@ -268,6 +268,19 @@ fn a_frame_leaves_no_trace_in_the_next() {
 }
 
 #[test]
+fn what_has_left_a_side_of_the_picture_leaves_no_trace_there() {
+    let (width, height) = (520, 40);
+    let mut cpu = CpuBokeh::new(Plan::new(&settings(CocKind::Depth), width, height), Some(1));
+    let (image, field) = (noise(width, height), coc(CocKind::Depth, height));
+    let mut out = ColorImage::default();
+    for (frame, metres) in [[4.0, 1.0], [1.0, 4.0], [0.5, 1.0], [1.0, 0.5], [1.0, 1.0], [4.0, 1.0]].iter().enumerate() {
+        let map = depth(width, height, |x, _| metres[usize::from(x >= width / 2)]);
+        cpu.blur(&image, Some(&map), &field, &mut out).expect("a blur");
+        assert!(out == blur(&settings(CocKind::Depth), &image, &map, &field), "frame {frame}");
+    }
+}
+
+#[test]
 fn a_range_of_focus_is_sharp_as_a_whole_and_its_ends_are_focal_planes() {
     let (width, height) = (150, 110);
     let image = noise(width, height);

@@ -17,3 +17,17 @@ named! {
         Best = "best",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_is_read_by_the_name_it_is_written_with() {
+        for quality in Quality::ALL {
+            assert_eq!(quality.to_string().parse(), Ok(quality));
+        }
+        let refused = "finest".parse::<Quality>();
+        assert_eq!(refused, Err("no quality level 'finest': use draft, fast, balanced, high, best".into()));
+    }
+}

@@ -52,3 +52,24 @@ impl DepthSource for Beside {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::recording::Options;
+
+    #[test]
+    fn each_time_has_the_frame_that_is_shown_then_lap_after_lap() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+        let recording = Recording::open(&folder, &Options::default()).unwrap();
+        let last = recording.len() - 1;
+        let (last_ns, period_ns) = (recording.time_ns(last), recording.period_ns());
+        let beside = Beside::new(recording, "portrait").unwrap();
+        let lap_ns = last_ns + period_ns;
+        let times_ns = [0, last_ns - 1, last_ns, lap_ns - 1, lap_ns, 3 * lap_ns + last_ns];
+        assert!(last > 1);
+        assert_eq!(times_ns.map(|time_ns| beside.index_at(time_ns)), [0, last - 1, last, last, 0, last]);
+    }
+}

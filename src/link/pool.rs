@@ -193,6 +193,16 @@ mod tests {
     }
 
     #[test]
+    fn a_pool_holds_as_many_as_it_was_made_with() {
+        for count in [0, 1, MOST_BUFFERS] {
+            let pool = Pool::new(count, || ());
+            assert_eq!(pool.free(), count);
+            let loans: Vec<_> = std::iter::from_fn(|| pool.try_take()).collect();
+            assert_eq!((loans.len(), pool.free()), (count, 0));
+        }
+    }
+
+    #[test]
     fn a_buffer_may_outlive_its_pool() {
         let pool = Pool::new(1, || 5);
         let loan = pool.take();

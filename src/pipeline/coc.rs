@@ -108,3 +108,26 @@ impl CocMaker {
         lens.field((focus_m, range_m), color.width, max_coc_px)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::look::CocAtInfinity;
+
+    #[test]
+    fn depth_is_refined_while_that_is_wanted_and_by_one_refiner() {
+        let focus = FocusRule::Point { x: 0.5, y: 0.5 };
+        let rule = CocRule::Depth { focus, lens: CocAtInfinity::Px(8.0), range_m: 0.0, max_coc_px: 20.0 };
+        let mut coc = CocMaker::new(rule, Finish::Fill);
+        let mut refiner_after = |refine| {
+            coc.follow(rule, Finish::measured(refine));
+            match &coc.finisher {
+                Finisher::Refine(refiner) => Some(std::ptr::from_ref(&**refiner)),
+                Finisher::Fill(_) | Finisher::Keep => None,
+            }
+        };
+        let [none, first, second, last] = [false, true, true, false].map(&mut refiner_after);
+        assert_eq!((none, last), (None, None));
+        assert!(first.is_some() && first == second, "what it has seen is kept");
+    }
+}

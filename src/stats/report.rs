@@ -299,7 +299,7 @@ mod tests {
             timings.rungs.add(rung);
         }
         tally.lost(3, Cause::Late);
-        let about = About { budget_ns: 33_333_333, elapsed_ns: 500_000_000, ..About::default() };
+        let about = About { budget_ns: 33_333_333, elapsed_ns: 500_000_000, cpu_ns: 250_000_000, ..About::default() };
         Report::new(tally.frames(), &timings, about)
     }
 
@@ -314,9 +314,13 @@ mod tests {
         assert!((json["latency_ms"]["p95"].as_f64().unwrap() - 30.0).abs() < 0.3);
         assert!(json["frame_ms"].is_null(), "nothing measured is not zero");
         assert!((json["stages_ms"]["blur.rows"]["p99"].as_f64().unwrap() - 7.0).abs() < 0.07);
+        assert!(json["stages_ms"]["depth"].is_null(), "no stage that did nothing");
         assert_eq!(json["quality"]["balanced"], 0.75);
         assert_eq!(json["quality"]["switches"], 1);
-        assert_eq!(json["budget_ms"], 33.333);
+        assert_eq!(
+            (&json["budget_ms"], &json["elapsed_s"], &json["cpu_s"]),
+            (&33.333.into(), &0.5.into(), &0.25.into())
+        );
         for key in ["misses", "backend", "adapter", "source", "sink", "versions"] {
             assert!(!json[key].is_null(), "{key}");
         }
@@ -328,5 +332,18 @@ mod tests {
         assert!(text.starts_with("10 of 13 frames delivered in 0.50 s (20.0 per second), 3 late\n"), "{text}");
         assert!(!text.contains("blur.rows"));
         assert!(text.ends_with("\nquality: fast 25 %, balanced 75 %; 1 changes"), "{text}");
+    }
+
+    #[test]
+    fn a_run_without_a_frame_and_one_of_one_frame_have_reports() {
+        let mut timings = Timings::default();
+        let empty = Report::new(Frames::default(), &timings, About::default());
+        let mut text = Vec::new();
+        empty.write_json(&mut text).unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        assert_eq!((&json["quality"], json["latency_ms"].is_null()), (&serde_json::json!({ "switches": 0 }), true));
+        timings.latency.add(5_000_000);
+        let latency_ms = Report::new(Frames::default(), &timings, About::default()).latency_ms;
+        assert_eq!(latency_ms, Some(Spread { p50: 5.0, p95: 5.0, p99: 5.0, max: 5.0 }));
     }
 }

@@ -312,8 +312,8 @@ mod tests {
 
     #[test]
     fn the_room_for_a_text_is_bounded() {
-        assert_eq!([0, 31].map(room), [Some(1), Some(32)]);
-        assert_eq!([-1, 1 << 40, i64::MAX].map(room), [None; 3]);
+        assert_eq!([0, 31, 65_535].map(room), [Some(1), Some(32), Some(65_536)]);
+        assert_eq!([-1, 65_536, 1 << 40, i64::MAX].map(room), [None; 4]);
     }
 
     #[test]

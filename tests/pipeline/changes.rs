@@ -3,16 +3,16 @@
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, mpsc};
+use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 use std::time::Duration;
 
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
-use bokehcam::compute::Backend;
+use bokehcam::compute::{Backend, Place};
 use bokehcam::frame::ColorImage;
 use bokehcam::link;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{Change, Executor, Pace, Run, View, run};
+use bokehcam::pipeline::{Change, Executor, Pace, Run, View, Wanted, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 
 use super::fakes::{FakeSink, Received, SIZE, Trouble, fake_camera, simple, uniform};
@@ -59,6 +59,34 @@ impl Bokeh for Made {
     }
     fn describe(&self) -> String {
         "made".into()
+    }
+}
+
+/// Remembers where pictures were wanted.
+struct Placed {
+    made: Made,
+    places: Arc<Mutex<Vec<Place>>>,
+}
+
+impl Bokeh for Placed {
+    fn submit(&mut self, job: Job) -> Result<(), BokehError> {
+        self.places.lock().unwrap().push(job.place);
+        self.made.submit(job)
+    }
+    fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+        self.made.collect(wait)
+    }
+    fn in_flight(&self) -> usize {
+        self.made.in_flight()
+    }
+    fn capacity(&self) -> usize {
+        self.made.capacity()
+    }
+    fn backend(&self) -> Backend {
+        self.made.backend()
+    }
+    fn describe(&self) -> String {
+        self.made.describe()
     }
 }
 
@@ -129,6 +157,37 @@ fn every_frame_has_the_radius_and_the_executor_of_one_change() {
 }
 
 #[test]
+fn the_first_change_is_known_by_its_number_and_frames_without_one_by_none() {
+    let made = |radius_px| Made { radius_px, held: VecDeque::new(), blurred: Arc::default(), wrong: Arc::default() };
+    for (number, radius_px) in [(0, 5.0), (9, 6.0)] {
+        let (send, changes) = mpsc::channel();
+        if number > 0 {
+            let look = uniform(radius_px);
+            let bokeh = Executor::To(Some(Box::new(made(radius_px))));
+            send.send(Change { number, look, bokeh }).unwrap();
+        }
+        let (view, mut views) = link::live::<View>();
+        let stop = AtomicBool::new(false);
+        let seen = thread::scope(|scope| {
+            let looking = scope.spawn(move || std::iter::from_fn(|| views.recv()).collect::<Vec<View>>());
+            let report = run(Run {
+                bokeh: Some(Box::new(made(5.0))),
+                look: uniform(5.0),
+                changes: Some(changes),
+                view: Some(view),
+                ..simple(Box::new(fake_camera(3)), Box::new(bokehcam::sink::Null), &stop, Pace::Asap)
+            });
+            assert_eq!(report.unwrap().frames.delivered, 3);
+            looking.join().unwrap()
+        });
+        assert!(!seen.is_empty());
+        for View { picture, trace, .. } in seen {
+            assert_eq!((picture.memory().unwrap().rgb[0], trace.change), (radius_px as u8, number));
+        }
+    }
+}
+
+#[test]
 fn a_viewer_sees_what_pictures_were_made_of_and_counts_where_the_sink_does_not() {
     for (keeps, patience_ms) in [(false, 0), (false, 5), (true, 5)] {
         let (view, mut views) = link::live::<View>();
@@ -178,4 +237,20 @@ fn a_viewer_that_leaves_ends_the_run() {
         run(Run { view: Some(view), ..simple(Box::new(fake_camera(usize::MAX)), Box::new(Nobody), &stop, Pace::Asap) });
     let frames = report.unwrap().frames;
     assert!(frames.balance() && frames.delivered == 0, "{frames:?}");
+}
+
+#[test]
+fn pictures_are_made_where_they_are_wanted_but_mirrored_ones_in_memory() {
+    for (mirror, place) in [(false, Place::Both), (true, Place::Memory)] {
+        let (places, stop) = (Arc::<Mutex<Vec<Place>>>::default(), AtomicBool::new(false));
+        let made = Made { radius_px: 3.0, held: VecDeque::new(), blurred: Arc::default(), wrong: Arc::default() };
+        run(Run {
+            bokeh: Some(Box::new(Placed { made, places: Arc::clone(&places) })),
+            mirror,
+            wanted: Some(Arc::new(Wanted::new(Place::Both))),
+            ..simple(Box::new(fake_camera(3)), Box::new(bokehcam::sink::Null), &stop, Pace::Asap)
+        })
+        .unwrap();
+        assert_eq!(*places.lock().unwrap(), [place; 3], "mirror {mirror}");
+    }
 }

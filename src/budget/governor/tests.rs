@@ -231,3 +231,48 @@ fn no_cost_is_learnt_beyond_what_is_credible() {
     machine.play(70_000.0, 5000, |_| false);
     assert_eq!(machine.governor.costs()[4], LEARN_MOST * COSTS[4]);
 }
+
+/// How long the next frame is expected to take, of a governor that has seen ten times this, and then this after a pause.
+fn expected_after(pause_ns: u64) -> Option<u64> {
+    let mut governor = Governor::new(&[1.0], 0);
+    (1..=10).for_each(|at_ns| governor.note(Sample { rung: 0, took_ns: 500, at_ns }, BUDGET_NS));
+    governor.note(Sample { rung: 0, took_ns: 50, at_ns: 10 + pause_ns }, BUDGET_NS);
+    governor.expected_ns()
+}
+
+#[test]
+fn only_a_pause_that_is_long_enough_is_one() {
+    assert_eq!([IDLE_NS, IDLE_NS + 1].map(expected_after), [Some(500), Some(50)]);
+}
+
+#[test]
+fn the_first_step_up_comes_with_the_last_frame_of_the_patience() {
+    let mut governor = Governor::new(&COSTS, 0);
+    let mut rungs = (1..=PATIENCE).map(|frame| {
+        governor.note(Sample { rung: 0, took_ns: 200_000, at_ns: u64::from(frame) }, BUDGET_NS);
+        governor.rung()
+    });
+    assert_eq!((rungs.by_ref().take(PATIENCE as usize - 1).max(), rungs.next()), (Some(0), Some(4)));
+}
+
+#[test]
+fn a_load_that_is_about_the_budget_changes_nothing() {
+    // Of what the median stands for, KEEP lies between these.
+    for (share_of_budget, kept) in [(0.92, true), (0.95, false)] {
+        let mut machine = Machine::new(0);
+        machine.play(share_of_budget * BUDGET_NS as f64 / COSTS[2], 300, |_| false);
+        assert_eq!(machine.governor.rung() == 2, kept, "{share_of_budget}");
+    }
+}
+
+#[test]
+fn a_step_up_has_held_after_twice_the_patience_and_not_before() {
+    for (frames, patience) in [(REGRET * PATIENCE - 15, 2 * PATIENCE), (REGRET * PATIENCE, PATIENCE)] {
+        let mut machine = Machine::new(0);
+        frames_to_the_top(&mut machine);
+        machine.play(200_000.0, frames as usize, |_| false);
+        take_back(&mut machine);
+        let needed = frames_to_the_top(&mut machine);
+        assert!(is_of(patience, needed), "{needed} frames after a step up that lasted {frames}");
+    }
+}

@@ -26,3 +26,14 @@ pub const BONUS: u8 = 2;
 
 /// The disparities that left and right take may differ by this much.
 pub const AGREE: u8 = 1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_many_disparities_are_tried_as_are_asked_for_and_no_needless_ones() {
+        assert!(RANGES.is_sorted() && RANGES.into_iter().all(|exact| range(exact) == exact));
+        assert_eq!([1, 17, 193, 256, 1000].map(range), [16, 32, 256, 256, 256]);
+    }
+}

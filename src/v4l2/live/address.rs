@@ -55,13 +55,17 @@ impl Address {
         Some(found)
     }
 
-    /// Whether the camera of this name is at that node now, wherever it is plugged in. Its other nodes have its name,
-    /// too, but give no frames.
+    /// Whether the camera of this name is at that node now, wherever it is plugged in.
     fn is(&self, node: &Path) -> bool {
         let mut capability: sys::v4l2_capability = zeroed();
         let answered = Device::open(node).and_then(|device| device.query_capability(&mut capability));
+        answered.is_ok() && self.answers(&capability)
+    }
+
+    /// Whether this is what the camera says of itself. Its other nodes have its name, too, but give no frames.
+    fn answers(&self, capability: &sys::v4l2_capability) -> bool {
         let frames = sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE;
-        answered.is_ok() && text(&capability.card) == self.card && own_caps(&capability) & frames != 0
+        text(&capability.card) == self.card && own_caps(capability) & frames != 0
     }
 
     /// The node of the same camera at the same place, or else the only one of the same name.
@@ -105,15 +109,33 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_camera_is_known_by_its_name_and_place_and_not_by_its_number() {
-        let address = Address {
+    fn c920() -> Address {
+        Address {
             given: "/dev/video0".into(),
             node: "/dev/video0".into(),
             links: Vec::new(),
             card: "C920".into(),
             bus: "usb-1".into(),
+        }
+    }
+
+    #[test]
+    fn only_the_node_that_gives_frames_is_the_camera() {
+        let answers = |card: &[u8; 4], own_caps: u32| {
+            let capabilities = sys::V4L2_CAP_DEVICE_CAPS | sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_META_CAPTURE;
+            let mut capability = sys::v4l2_capability { capabilities, device_caps: own_caps, ..zeroed() };
+            capability.card[..4].copy_from_slice(card);
+            c920().answers(&capability)
         };
+        for caps in [sys::V4L2_CAP_VIDEO_CAPTURE, sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE] {
+            assert!(answers(b"C920", caps) && !answers(b"C930", caps));
+        }
+        assert!(!answers(b"C920", sys::V4L2_CAP_META_CAPTURE), "it tells about the other node's pictures");
+    }
+
+    #[test]
+    fn a_camera_is_known_by_its_name_and_place_and_not_by_its_number() {
+        let address = c920();
         let found = |nodes: &[Node]| address.among(nodes);
         let moved = node("/dev/video4", "C920", "usb-1");
         let other = node("/dev/video0", "Laptop", "usb-1");

@@ -102,22 +102,27 @@ fn capability(device: &Device) -> Result<sys::v4l2_capability, OpenError> {
         Some(ENOTTY) => OpenError::NotACamera { path: path.to_owned(), what: "it does not answer as one" },
         _ => OpenError::at(path, "VIDIOC_QUERYCAP", error),
     })?;
-    let caps = own_caps(&capability);
+    match lacking(&capability) {
+        Some(what) => Err(OpenError::NotACamera { path: path.to_owned(), what }),
+        None => Ok(capability),
+    }
+}
+
+/// Why a device with this capability is no camera; nothing where it is one.
+fn lacking(capability: &sys::v4l2_capability) -> Option<&'static str> {
+    let caps = own_caps(capability);
     let can = |any: u32| caps & any != 0;
-    let what = if can(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
-        "it converts pictures"
-    } else if !can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE) {
-        match text(&capability.driver) {
+    if can(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
+        return Some("it converts pictures");
+    }
+    if !can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE) {
+        return Some(match text(&capability.driver) {
             driver if driver == LOOPBACK_DRIVER => "it is a virtual camera, and nothing writes to it",
             _ if can(sys::V4L2_CAP_META_CAPTURE) => "it tells about another node's pictures",
             _ => "it captures no pictures",
-        }
-    } else if !can(sys::V4L2_CAP_STREAMING) {
-        "it does not stream"
-    } else {
-        return Ok(capability);
-    };
-    Err(OpenError::NotACamera { path: path.to_owned(), what })
+        });
+    }
+    (!can(sys::V4L2_CAP_STREAMING)).then_some("it does not stream")
 }
 
 const ENOTTY: i32 = rustix::io::Errno::NOTTY.raw_os_error();
@@ -228,5 +233,29 @@ fn tell_differences(device: &Device, agreed: &Agreed, wish: &Wish) {
     if other_size || other_rate {
         let name = device.path().display();
         tracing::warn!("{name}: the camera cannot do exactly what was asked for and gives {agreed}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_camera_is_told_apart() {
+        let said = |driver: &str, device_caps: u32| {
+            let capabilities = sys::V4L2_CAP_DEVICE_CAPS;
+            let mut capability = sys::v4l2_capability { capabilities, device_caps, ..zeroed() };
+            capability.driver[..driver.len()].copy_from_slice(driver.as_bytes());
+            lacking(&capability)
+        };
+        let streams = sys::V4L2_CAP_STREAMING;
+        assert_eq!(said("uvcvideo", sys::V4L2_CAP_VIDEO_CAPTURE | streams), None);
+        assert_eq!(said("uvcvideo", sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE | streams), None);
+        assert_eq!(said("uvcvideo", sys::V4L2_CAP_VIDEO_CAPTURE), Some("it does not stream"));
+        assert_eq!(said("uvcvideo", sys::V4L2_CAP_META_CAPTURE), Some("it tells about another node's pictures"));
+        assert_eq!(said("vivid", sys::V4L2_CAP_VBI_CAPTURE | streams), Some("it captures no pictures"));
+        let unwritten = Some("it is a virtual camera, and nothing writes to it");
+        assert_eq!(said(LOOPBACK_DRIVER, sys::V4L2_CAP_VIDEO_OUTPUT), unwritten);
+        assert_eq!(said("codec", sys::V4L2_CAP_VIDEO_M2M | streams), Some("it converts pictures"));
     }
 }

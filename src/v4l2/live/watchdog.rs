@@ -140,6 +140,9 @@ mod tests {
     #[test]
     fn single_errors_pass_and_a_row_of_them_does_not() {
         let mut watchdog = Watchdog::new(PERIOD_NS, 0);
+        let mut waits = (1..MOST_ERRORS).map(|error| watchdog.error(u64::from(error) * MS));
+        assert!(waits.all(|remedy| remedy == Remedy::Wait), "as many at the start as later");
+        watchdog.frame(50 * MS);
         for frame in 0..100 {
             assert_eq!(watchdog.error(frame * MS), Remedy::Wait);
             watchdog.frame(frame * MS);

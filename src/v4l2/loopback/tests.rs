@@ -24,3 +24,15 @@ fn a_frame_has_the_bytes_of_its_layout() {
         assert_eq!((layout.fourcc(), layout.frame_bytes((1280, 720))), (fourcc, bytes));
     }
 }
+
+#[test]
+fn a_layout_takes_sizes_in_which_shared_colours_come_out_even() {
+    let takes = |layout: Layout| [(4, 2), (4, 3), (3, 2), (3, 3)].map(|size| layout.takes(size));
+    assert_eq!(takes(Layout::Yuyv), [true, true, false, false]);
+    for layout in [Layout::Yu12, Layout::Nv12] {
+        assert_eq!(takes(layout), [true, false, false, false]);
+    }
+    for layout in [Layout::Rgb24, Layout::Bgr24] {
+        assert_eq!(takes(layout), [true; 4]);
+    }
+}

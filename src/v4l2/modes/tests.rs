@@ -21,6 +21,13 @@ fn rates_are_found_by_ratio_and_written_as_people_do() {
 }
 
 #[test]
+fn a_fraction_without_a_part_is_no_rate() {
+    let told = |numerator, denominator| Interval::new(sys::v4l2_fract { numerator, denominator });
+    assert_eq!([told(1, 30), told(2, 1)], [Some(every(1, 30)), Some(every(2, 1))]);
+    assert_eq!([told(0, 30), told(1, 0)], [None, None]);
+}
+
+#[test]
 fn a_rate_becomes_the_fraction_that_drivers_use() {
     for (fps, expected) in [
         (30.0, every(1, 30)),
@@ -53,6 +60,20 @@ fn a_grid_of_sizes_stays_a_grid() {
     assert!(size_entry(&entry).is_none());
     let empty = zeroed::<sys::v4l2_frmsizeenum>();
     assert!(size_entry(&empty).is_none());
+}
+
+#[test]
+fn a_size_has_columns_and_rows() {
+    let told = |width, height| {
+        let mut entry = zeroed::<sys::v4l2_frmsizeenum>();
+        entry.type_ = sys::v4l2_frmsizetypes_V4L2_FRMSIZE_TYPE_DISCRETE;
+        entry.__bindgen_anon_1.discrete = sys::v4l2_frmsize_discrete { width, height };
+        match size_entry(&entry) {
+            Some(SizeEntry::One(size)) => Some(size),
+            _ => None,
+        }
+    };
+    assert_eq!([told(1, 1), told(0, 1), told(1, 0)], [Some((1, 1)), None, None]);
 }
 
 #[test]

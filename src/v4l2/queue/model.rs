@@ -64,6 +64,8 @@ pub struct State {
     sequence: u32,
     last_handed: Option<u32>,
     pub gone: bool,
+    /// Asked about a buffer, it fails.
+    pub mute: bool,
     pub facts: Facts,
 }
 
@@ -107,6 +109,7 @@ impl Model {
             sequence: 0,
             last_handed: None,
             gone: false,
+            mute: false,
             facts: Facts::default(),
         })))
     }
@@ -193,6 +196,9 @@ impl Kernel for Model {
     fn query(&mut self, index: u32) -> io::Result<Described> {
         let mut state = self.0.borrow_mut();
         state.call()?;
+        if state.mute {
+            return error(EIO);
+        }
         let in_kernel = state.buffers[index as usize] != Buffer::Dequeued;
         let span = |plane: u64| Span { offset: u64::from(index) * 8 + plane, length_bytes: PLANE_BYTES };
         let mut planes = [Span::default(); MAX_PLANES];

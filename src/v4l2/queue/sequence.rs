@@ -72,6 +72,8 @@ mod tests {
         assert_eq!(losses(&[(u32::MAX, 0.0), (1, 2.0)]), 1, "numbers wrap");
         let mut untimed = Sequence::new(PERIOD_NS);
         assert_eq!([3, 4, 9].map(|number| untimed.step(number, None)), [0, 0, 4]);
+        let mut frozen = Sequence::new(PERIOD_NS);
+        assert_eq!([3, 4, 9].map(|number| frozen.step(number, Some(7))), [0, 0, 4], "a time that stands tells nothing");
     }
 
     #[test]

@@ -45,6 +45,11 @@ fn the_newest_frame_wins_and_the_others_are_counted() {
 }
 
 #[test]
+fn every_loss_counts_once() {
+    assert_eq!(Losses { missed: 1, stale: 20, corrupt: 300 }.total(), 321);
+}
+
+#[test]
 fn parts_of_damaged_frames_are_never_given_out() {
     let clock = Clock::manual();
     let chances = Chances { damaged: 0.5, ..Chances::default() };
@@ -140,6 +145,23 @@ fn a_buffer_that_was_refused_is_offered_again() {
         queue.release();
         assert_eq!(model.0.borrow().with_kernel(), 4);
     }
+}
+
+#[test]
+fn a_buffer_of_which_nothing_can_be_learnt_is_left_to_the_kernel() {
+    let clock = Clock::manual();
+    let model = Model::new(11, Chances::default(), clock.clone());
+    let mut queue = open(&model, &clock).unwrap();
+    queue.start().unwrap();
+    let fails = |fails: bool| {
+        let mut state = model.0.borrow_mut();
+        (state.mute, state.chances.refused) = (fails, if fails { 1.0 } else { 0.0 });
+    };
+    fails(true);
+    assert!(queue.wait_newest(PATIENCE).is_err());
+    fails(false);
+    // The model panics where a buffer that it has is queued again.
+    assert!(queue.wait_newest(PATIENCE).unwrap());
 }
 
 /// Runs a queue against a kernel that fails at random: opens, starts, reads, stops. The model panics where a rule is
