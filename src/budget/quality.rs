@@ -28,6 +28,6 @@ mod tests {
             assert_eq!(quality.to_string().parse(), Ok(quality));
         }
         let refused = "finest".parse::<Quality>();
-        assert_eq!(refused, Err("no quality level 'finest': use draft, fast, balanced, high, best".into()));
+        assert_eq!(refused, Err("use draft, fast, balanced, high or best".into()));
     }
 }
