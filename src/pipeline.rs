@@ -13,6 +13,7 @@ mod deliver;
 mod depth;
 mod error;
 mod pacer;
+mod places;
 mod playout;
 mod quality;
 mod rate;
@@ -26,6 +27,8 @@ use std::thread::{self, Scope, ScopedJoinHandle};
 
 pub use change::{Change, Executor};
 pub use coc::{CocMaker, Finish};
+use places::{MOST_IN_FLIGHT, Places};
+
 pub use error::{Fault, PipelineError};
 pub use view::{Progress, Trace, View};
 pub use wanted::Wanted;
@@ -40,7 +43,7 @@ use crate::depth::DepthSource;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::demand::Demand;
 use crate::link::pool::Pool;
-use crate::link::{self, LOSSLESS_ITEMS, Receiver, Sender};
+use crate::link::{self, Receiver, Sender};
 use crate::look::{Effect, Look};
 use crate::names::named;
 use crate::sink::{Ending, Sink};
@@ -303,45 +306,6 @@ fn hand_on<T>(to: &mut Sender<Frame<T>>, frame: Frame<T>, tally: &Tally) -> bool
         }
         // Nobody knows the frame's fate: it stays in flight.
         Err(link::Abandoned) => false,
-    }
-}
-
-/// Room for buffers along the way, so that no stage waits for one that another has no need to give back.
-struct Places {
-    in_blur: usize,
-    /// Whether a viewer is given what the sink was, and what it was made of.
-    viewed: bool,
-}
-
-/// Most frames that any executor has in hand.
-const MOST_IN_FLIGHT: usize = 4;
-
-impl Places {
-    /// A link's items, and the one that it displaces or that waits for room.
-    const LINK: usize = LOSSLESS_ITEMS + 1;
-    const HAND: usize = 1;
-
-    fn colors(&self) -> usize {
-        // Where nothing blurs, the captured pictures themselves go on to the sink.
-        3 * (Self::HAND + Self::LINK) + Self::HAND + self.in_blur + self.views()
-    }
-
-    /// Those that a viewer has: one that it shows, one that it takes, and one that it keeps for long.
-    fn views(&self) -> usize {
-        if self.viewed { 3 * Self::HAND + Self::LINK } else { 0 }
-    }
-
-    fn depths(&self) -> usize {
-        self.colors()
-    }
-
-    /// The right eye's picture goes no further than its depth.
-    fn rights(&self) -> usize {
-        2 * Self::HAND + Self::LINK
-    }
-
-    fn outs(&self) -> usize {
-        if self.in_blur == 0 { 0 } else { self.in_blur + 2 * Self::HAND + Self::LINK + self.views() }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A look as a whole command for a shell.
 
-use crate::look::settings::Value;
+use crate::look::Value;
 
 /// The command that shows `source` with these settings, or streams it into `outputs` where there are any; `switches`
 /// are other options of that command. Every word is quoted as a POSIX shell needs it.

@@ -7,7 +7,7 @@ use toml_edit::{DocumentMut, Item, Table, TableLike};
 use super::error::CliError;
 use super::save;
 use super::settings::{PRESETS, check_name};
-use crate::look::settings::Value;
+use crate::look::Value;
 
 /// Saves settings ([`Patch::of`] a look, so that the preset depends on nothing else) as the preset `name` in the file
 /// at `path`, in place of one of that name. All else in the file stays as it is, and the file changes as a whole or

@@ -7,6 +7,7 @@ mod aperture;
 mod coc;
 mod effect;
 pub mod number;
+mod patch;
 pub mod presets;
 pub mod settings;
 mod strength;
@@ -15,7 +16,8 @@ mod tilt;
 pub use aperture::ApertureName;
 pub use coc::{CocAtInfinity, CocRule};
 pub use effect::{Effect, Refine};
-pub use settings::{LookError, Patch, SETTINGS};
+pub use patch::{LookError, Value};
+pub use settings::{Patch, SETTINGS};
 pub use strength::Strength;
 pub use tilt::Tilt;
 

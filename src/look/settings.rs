@@ -1,11 +1,8 @@
 //! The settings of a look: one table that the command line, the environment, the settings file, presets, snapshots and
 //! the window go by. [`Look::default`] has their defaults.
 
-use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
-
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::number::{OrAuto, above_zero, not_negative, within};
 use super::{ApertureName, Effect, Look, MOST_RADIUS_PX, Refine, Strength, Tilt};
@@ -13,8 +10,6 @@ use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
 use crate::names::Named;
-use crate::optics::Lens;
-use crate::recording::RecordingError;
 
 /// Radial intensity of the aperture that can be chosen.
 pub const INTENSITIES: RangeInclusive<f32> = -1.0..=1.0;
@@ -50,9 +45,9 @@ pub struct Setting {
     pub choices: fn() -> Vec<Choice>,
     /// Whether its default is worked out from the picture or the quality level, and has no value of its own.
     pub computed: bool,
-    set: fn(&mut Patch, &str) -> Result<(), String>,
-    get: fn(&Patch) -> Option<String>,
-    clear: fn(&mut Patch),
+    pub(super) set: fn(&mut Patch, &str) -> Result<(), String>,
+    pub(super) get: fn(&Patch) -> Option<String>,
+    pub(super) clear: fn(&mut Patch),
 }
 
 macro_rules! settings {
@@ -169,203 +164,5 @@ impl Setting {
     /// It has no such value: what is accepted.
     pub fn set(&self, patch: &mut Patch, text: &str) -> Result<(), String> {
         (self.set)(patch, text)
-    }
-}
-
-/// Why settings make no look.
-#[derive(Debug, thiserror::Error)]
-pub enum LookError {
-    /// A lens is not known by all of its numbers.
-    #[error("a lens needs all of --f-number, --focal-length and --sensor-width")]
-    Lens,
-    /// The picture of the aperture cannot be read.
-    #[error(transparent)]
-    Aperture(#[from] RecordingError),
-}
-
-impl Patch {
-    /// All settings of a look, so that the look depends on no other.
-    pub fn of(look: &Look) -> Self {
-        let (coc_at_infinity, lens) = match look.strength {
-            Strength::Lens(lens) => (None, Some(lens)),
-            strength => (Some(strength), None),
-        };
-        Self {
-            effect: Some(look.effect),
-            method: Some(look.method),
-            focus: Some(look.focus),
-            focus_range_m: Some(look.focus_range_m),
-            coc_at_infinity,
-            f_number: lens.map(|lens| lens.f_number),
-            focal_length_mm: lens.map(|lens| lens.focal_length_mm),
-            sensor_width_mm: lens.map(|lens| lens.sensor_width_mm),
-            max_coc_px: Some(look.max_coc_px.into()),
-            refine: Some(look.refine),
-            tilt: Some(look.tilt),
-            aperture: ApertureName::of(&look.aperture.shape),
-            intensity: Some(look.aperture.intensity),
-            rim: Some(look.rim),
-            rank: Some(look.rank.into()),
-            highlights: Some(look.highlights),
-            quality: Some(look.quality.into()),
-        }
-    }
-
-    /// Settings by their names.
-    ///
-    /// # Errors
-    /// One is none of a look, or has no such value: its name, and what is wrong.
-    pub fn parse<'a>(settings: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self, (String, String)> {
-        let mut patch = Self::default();
-        for (name, text) in settings {
-            let found = setting(name).ok_or_else(|| "it is none of a look".to_string());
-            found.and_then(|setting| setting.set(&mut patch, text)).map_err(|what| (name.to_string(), what))?;
-        }
-        Ok(patch)
-    }
-
-    /// What it says, by name, in the order of [`SETTINGS`]. Numbers are as short as they can be and give the same value
-    /// back.
-    pub fn values(&self) -> Vec<Value> {
-        SETTINGS.iter().filter_map(|setting| Some((setting.name, (setting.get)(self)?))).collect()
-    }
-
-    /// What it says that `other` does not.
-    pub fn beside(mut self, other: &Self) -> Self {
-        let is_same = |setting: &&Setting| (setting.get)(&self) == (setting.get)(other);
-        let same: Vec<&Setting> = SETTINGS.iter().filter(is_same).collect();
-        same.into_iter().for_each(|setting| (setting.clear)(&mut self));
-        self
-    }
-
-    /// Whether a look is as this says, as far as it says anything.
-    pub fn holds_in(&self, look: &Look) -> bool {
-        self.clone().beside(&Self::of(look)) == Self::default()
-    }
-
-    /// Reads the picture of the aperture, if it has one, so that [`Patch::on`] need not.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub fn load(&mut self) -> Result<(), RecordingError> {
-        if let Some(name) = &mut self.aperture {
-            *name = ApertureName::Drawn(name.load()?);
-        }
-        Ok(())
-    }
-
-    /// `base` with these settings; what it does not set is as before.
-    ///
-    /// # Errors
-    /// A lens misses a number, or the picture of the aperture cannot be read.
-    pub fn on(&self, base: &Look) -> Result<Look, LookError> {
-        let mut look = base.clone();
-        macro_rules! take {
-            ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
-        }
-        take!(effect, method, focus, focus_range_m, refine, tilt, rim, highlights);
-        look.strength = self.strength(base.strength)?;
-        if let Some(max_coc_px) = self.max_coc_px {
-            look.max_coc_px = max_coc_px.chosen();
-        }
-        // A picture that is there already is not read again.
-        let before = ApertureName::of(&look.aperture.shape).map(|name| name.to_string());
-        if let Some(name) = self.aperture.as_ref().filter(|name| before != Some(name.to_string())) {
-            look.aperture.shape = name.load()?;
-        }
-        if let Some(intensity) = self.intensity {
-            look.aperture.intensity = intensity;
-        }
-        if let Some(rank) = self.rank {
-            look.rank = rank.chosen();
-        }
-        if let Some(quality) = self.quality {
-            look.quality = quality.chosen();
-        }
-        Ok(look)
-    }
-
-    /// The strength at infinity or by a lens; a lens that is there keeps the numbers that are not set.
-    fn strength(&self, before: Strength) -> Result<Strength, LookError> {
-        let (f_number, focal_length_mm, sensor_width_mm) = (self.f_number, self.focal_length_mm, self.sensor_width_mm);
-        if f_number.or(focal_length_mm).or(sensor_width_mm).is_none() {
-            return Ok(self.coc_at_infinity.unwrap_or(before));
-        }
-        let before = match before {
-            Strength::Lens(lens) => Some(lens),
-            _ => None,
-        };
-        let lens = (|| {
-            Some(Lens {
-                f_number: f_number.or(before.map(|lens| lens.f_number))?,
-                focal_length_mm: focal_length_mm.or(before.map(|lens| lens.focal_length_mm))?,
-                sensor_width_mm: sensor_width_mm.or(before.map(|lens| lens.sensor_width_mm))?,
-            })
-        })();
-        lens.map(Strength::Lens).ok_or(LookError::Lens)
-    }
-}
-
-/// A setting's name and its value, as they follow the dashes.
-pub type Value = (&'static str, String);
-
-impl Serialize for Patch {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.values())
-    }
-}
-
-impl<'de> Deserialize<'de> for Patch {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let values = BTreeMap::<String, String>::deserialize(deserializer)?;
-        let pairs = values.iter().map(|(name, value)| (name.as_str(), value.as_str()));
-        Self::parse(pairs).map_err(|(name, what)| de::Error::custom(format!("{name}: {what}")))
-    }
-}
-
-impl Serialize for Look {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Patch::of(self).serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for Look {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Patch::deserialize(deserializer)?.on(&Self::default()).map_err(de::Error::custom)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn wrong_values_say_what_is_accepted() {
-        for text in ["0", "-1", "inf", "0.5", "far", "0.5,1.1", "0.5,", "1,1,1"] {
-            let accepted = text.parse::<FocusRule>();
-            assert_eq!(accepted.is_ok(), text == "0.5", "{text}: {accepted:?}");
-        }
-        for text in ["0", "17", "all"] {
-            assert!(text.parse::<Rank>().unwrap_err().contains("1 to 16"), "{text}");
-        }
-        assert!("0.5:0.1:0:0".parse::<Tilt>().is_err());
-        assert_eq!("0.6".parse(), Ok(Tilt { center_y: 0.6, band: 0.15, angle_deg: 0.0 }));
-        assert_eq!(Patch::parse([("rim", "2")]), Err(("rim".to_string(), "use a number from 0 to 1".to_string())));
-        assert!(Patch::parse([("mirror", "true")]).is_err());
-    }
-
-    #[test]
-    fn a_lens_is_known_by_three_numbers_or_changed_by_one() {
-        let one = Patch::parse([("f-number", "2")]).unwrap();
-        assert!(matches!(one.on(&Look::default()), Err(LookError::Lens)));
-        let lens = Patch::parse([("f-number", "4"), ("focal-length", "50"), ("sensor-width", "36")]).unwrap();
-        let by_lens = lens.on(&Look::default()).unwrap();
-        let wider = one.on(&by_lens).unwrap();
-        assert_eq!(
-            wider.strength,
-            Strength::Lens(Lens { f_number: 2.0, focal_length_mm: 50.0, sensor_width_mm: 36.0 })
-        );
-        let at_infinity = Patch::parse([("coc-at-infinity", "auto")]).unwrap();
-        assert_eq!(at_infinity.on(&wider).unwrap(), Look::default());
     }
 }

@@ -1,6 +1,7 @@
 //! Depth from elsewhere than the source: a recording's, or a depth camera's.
 
-use super::{DepthChoice, DepthFrom, Options, Source, SourceError, Wanted, depth_of, options};
+use super::opened::depth_of;
+use super::{DepthChoice, DepthFrom, Options, Source, SourceError, Wanted, options};
 use crate::capture::Brings;
 use crate::clock::Clock;
 use crate::depth::DepthSource;

@@ -19,42 +19,26 @@ mod error;
 mod eyes;
 mod name;
 mod near;
+mod opened;
 pub mod options;
 #[cfg(feature = "camera")]
 pub mod registration;
 
-use std::sync::Arc;
-
 pub use error::SourceError;
 pub use name::{Kind, SourceName};
+use opened::Opened;
 pub use options::{DepthChoice, Frames, Size};
 
-use crate::capture::replay::{Part, Replay};
 use crate::capture::side_by_side::SideBySide;
-use crate::capture::synthetic::{Format, Synthetic};
-#[cfg(feature = "camera")]
-use crate::capture::two_eyes::TwoEyes;
-#[cfg(feature = "camera")]
-use crate::capture::v4l2::V4l2Camera;
 use crate::capture::{Brings, Camera, CaptureError};
 use crate::clock::Clock;
-use crate::compute::team::cores;
 use crate::computing::Computing;
 use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
-use crate::depth::recorded::Recorded;
 use crate::frame::DepthMap;
 use crate::look::{Effect, Look, Strength};
 use crate::optics::StereoRig;
-use crate::recording::{Options as Reading, Pair, Recording, Scratch};
-use crate::scene::Scene;
-#[cfg(feature = "camera")]
-use crate::v4l2::{layout::Content, live::Wish};
-
-/// Picture size of the synthetic scene.
-const SYNTHETIC_SIZE: (u32, u32) = (640, 480);
-/// Frame rate of the synthetic scene.
-const SYNTHETIC_FPS: f64 = 30.0;
+use crate::recording::{Options as Reading, Recording, Scratch};
 
 /// What depth comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -233,106 +217,6 @@ impl Wanted<'_> {
             DepthChoice::Auto => self.uses_depth() && !has_depth,
             _ => false,
         }
-    }
-}
-
-/// A source before its two eyes, if it has two, are looked at.
-struct Opened {
-    camera: Box<dyn Camera>,
-    depth: Option<Box<dyn DepthSource>>,
-    depth_from: DepthFrom,
-    first_depth: Option<DepthMap>,
-    /// What it says of its two eyes.
-    pair: Pair,
-    /// The disparities that occur in it.
-    disparities: Option<u32>,
-}
-
-impl Opened {
-    fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
-        let Options { frames, .. } = wanted.options;
-        let of = |camera| Self {
-            camera,
-            depth: None,
-            depth_from: DepthFrom::Nothing,
-            first_depth: None,
-            pair: Pair::Unstated,
-            disparities: None,
-        };
-        match name {
-            SourceName::Synthetic => {
-                let size = frames.size.map_or(SYNTHETIC_SIZE, |size| (size.width, size.height));
-                let fps = frames.fps.unwrap_or(SYNTHETIC_FPS);
-                let camera = Synthetic::new(Format {
-                    size,
-                    fps,
-                    frames: frames.frames,
-                    threads: cores(),
-                    cycle: wanted.options.cycle.then(|| (Scene::portrait().period_s() * fps) as u64),
-                })?;
-                Ok(of(Box::new(camera)))
-            }
-            SourceName::Folder(folder) => {
-                let recording = Arc::new(Recording::open(folder, &wanted.reading())?);
-                let name = folder.display().to_string();
-                let part = Part {
-                    start_s: frames.start.unwrap_or(0.0),
-                    end_s: frames.end,
-                    looped: frames.repeat,
-                    frames: frames.frames,
-                };
-                let mut camera = Replay::new(Arc::clone(&recording), &name, &part)?;
-                let pair = recording.pair().cloned();
-                if pair.is_some() && wanted.matches(recording.has_depth()) {
-                    camera = camera.with_right_eye();
-                }
-                let disparities = recording.disparities();
-                let depth_from = depth_of(&recording);
-                let first_depth = wanted.first_depth(&recording);
-                let depth = match recording.has_depth() {
-                    true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
-                    false => None,
-                };
-                Ok(Self {
-                    depth,
-                    depth_from,
-                    first_depth,
-                    pair: pair.unwrap_or(Pair::Unstated),
-                    disparities,
-                    ..of(Box::new(camera))
-                })
-            }
-            #[cfg(feature = "camera")]
-            SourceName::Camera(camera) => {
-                let camera = V4l2Camera::open(&camera.name, wish(frames), frames.control.clone(), frames.frames)?;
-                Ok(of(Box::new(camera)))
-            }
-            #[cfg(feature = "camera")]
-            SourceName::Cameras([left, right]) => {
-                let open = |eye: &name::Named| V4l2Camera::open(&eye.name, wish(frames), frames.control.clone(), None);
-                let eyes = TwoEyes::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
-                Ok(of(Box::new(eyes)))
-            }
-        }
-    }
-}
-
-/// What the depth of a recording is.
-pub fn depth_of(recording: &Recording) -> DepthFrom {
-    match recording.has_depth() {
-        false => DepthFrom::Nothing,
-        true if recording.has_depth_in_units() => DepthFrom::Units,
-        true => DepthFrom::Metres,
-    }
-}
-
-#[cfg(feature = "camera")]
-fn wish(frames: &Frames) -> Wish {
-    Wish {
-        content: Content::Color,
-        size_px: frames.size.map(|size| (size.width, size.height)),
-        fps: frames.fps,
-        fourcc: frames.format,
     }
 }
 

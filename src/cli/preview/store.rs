@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use super::super::layers::Given;
 use super::super::settings::SettingsFile;
 use super::super::{command_line, presets, print, save};
+use crate::look::Value;
 use crate::look::presets::Preset;
-use crate::look::settings::Value;
 use crate::look::{Look, Patch};
 use crate::preview::services::{SettingsStore, Switch};
 

@@ -1,0 +1,42 @@
+//! How many buffers a run has.
+
+use crate::link::LOSSLESS_ITEMS;
+
+/// Room for buffers along the way, so that no stage waits for one that another has no need to give back.
+pub(super) struct Places {
+    pub in_blur: usize,
+    /// Whether a viewer is given what the sink was, and what it was made of.
+    pub viewed: bool,
+}
+
+/// Most frames that any executor has in hand.
+pub(super) const MOST_IN_FLIGHT: usize = 4;
+
+impl Places {
+    /// A link's items, and the one that it displaces or that waits for room.
+    const LINK: usize = LOSSLESS_ITEMS + 1;
+    const HAND: usize = 1;
+
+    pub fn colors(&self) -> usize {
+        // Where nothing blurs, the captured pictures themselves go on to the sink.
+        3 * (Self::HAND + Self::LINK) + Self::HAND + self.in_blur + self.views()
+    }
+
+    /// Those that a viewer has: one that it shows, one that it takes, and one that it keeps for long.
+    fn views(&self) -> usize {
+        if self.viewed { 3 * Self::HAND + Self::LINK } else { 0 }
+    }
+
+    pub fn depths(&self) -> usize {
+        self.colors()
+    }
+
+    /// The right eye's picture goes no further than its depth.
+    pub fn rights(&self) -> usize {
+        2 * Self::HAND + Self::LINK
+    }
+
+    pub fn outs(&self) -> usize {
+        if self.in_blur == 0 { 0 } else { self.in_blur + 2 * Self::HAND + Self::LINK + self.views() }
+    }
+}
