@@ -103,7 +103,7 @@ impl Layers {
         let is_given = |setting: &Setting| {
             let name = setting.name.as_str();
             ["flag", "environment"].contains(&setting.origin)
-                && !settings::setting(name).is_some()
+                && settings::setting(name).is_none()
                 && !ONCE.contains(&name)
         };
         let resolved = self.resolved(matches);
@@ -193,7 +193,7 @@ fn source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
 fn of_snapshot(path: &Path) -> Result<Values, CliError> {
     let refuse = |what: String| CliError::Usage(format!("--like {}: {what}", path.display()));
     let values: Values = snapshot::settings(path)?.into_iter().collect();
-    if let Some(other) = values.keys().find(|name| !settings::setting(name).is_some()) {
+    if let Some(other) = values.keys().find(|name| settings::setting(name).is_none()) {
         return Err(refuse(format!(
             "its setting '{other}' is none of a look: it is of another version, or was edited"
         )));

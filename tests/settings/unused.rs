@@ -11,7 +11,7 @@ fn a_picture_without_depth_says_what_that_costs() {
     };
     for more in [&["--preset", "portrait"][..], &[]] {
         let ran = render(more);
-        assert!(ran.warning().contains("there is no depth, so the whole picture is blurred: --depth-map"), "{more:?}");
+        assert!(ran.warning().contains("there is no depth, so a band of the picture stays sharp and the rest is blurred (tilt-shift): --depth-map"), "{more:?}");
     }
     for (more, named) in [
         (&["--focus", "1.2"][..], "--focus 1.2"),
@@ -67,7 +67,7 @@ fn recordings_say_what_they_have_no_use_for() {
 
     let home = Home::new().with_colours();
     let ran = home.run(&["stream", "colours", "--to", "null", "--backend", "cpu"]);
-    assert!(ran.warning().contains("there is no depth, so the whole picture is blurred"), "{}", ran.stderr);
+    assert!(ran.warning().contains("there is no depth, so a band of the picture stays sharp"), "{}", ran.stderr);
 }
 
 #[test]
