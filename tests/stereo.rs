@@ -112,7 +112,7 @@ fn a_recording_with_two_eyes_is_blurred_by_their_disparity() {
         assert!(near < 3.0 && far > 15.0, "{more:?}: {near} in focus, {far} behind");
     }
     // Nothing is matched where nothing asks for it.
-    let (near, far) = blurred(pair.path(), &["--depth", "none"]);
+    let (near, far) = blurred(pair.path(), &["--depth", "none", "--effect", "blur"]);
     assert!(near > 15.0 && far > 15.0, "{near}, {far}");
 }
 

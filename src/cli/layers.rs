@@ -32,8 +32,10 @@ pub struct Setting {
 #[derive(Clone, Debug, Default)]
 pub struct Given {
     /// What flags and the environment say of other things, by name and value.
+    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
     pub switches: Vec<(String, String)>,
     /// Settings of the look that come from elsewhere than flags and defaults: left unsaid, they come again.
+    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
     pub behind: Vec<String>,
     /// All that flags, the environment and the preset say; of the preset what is unlike the defaults.
     pub settings: Vec<Setting>,

@@ -16,8 +16,9 @@ use super::environment::variable;
 use super::error::CliError;
 use super::options::Every;
 use crate::files::input;
-use crate::look::presets::{self, Preset};
-use crate::look::{self, Patch, SETTINGS};
+use crate::look::{self, SETTINGS, presets};
+#[cfg(feature = "window")]
+use crate::look::{Patch, presets::Preset};
 
 /// Settings by their flags without the dashes, each value as it would follow its flag.
 pub type Values = BTreeMap<String, String>;

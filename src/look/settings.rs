@@ -57,7 +57,7 @@ macro_rules! settings {
     )+) => {
         /// Some settings of a look: what a preset, a snapshot, the settings file or flags say. `None` says nothing.
         #[derive(Clone, Debug, Default, PartialEq)]
-        pub struct Patch { $($(#[doc = $help])+ pub $field: Option<$type>,)+ }
+        pub struct Patch { $(#[doc = concat!("The setting `", $name, "`.")] pub $field: Option<$type>,)+ }
 
         /// All settings of a look, in the order of the help. Nothing else can be in a preset.
         pub static SETTINGS: [Setting; [$($name),+].len()] = [$(Setting {

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{DepthFrom, Frames, Options, SourceError, SourceName, Wanted, name};
+use super::{DepthFrom, Options, SourceError, SourceName, Wanted};
+#[cfg(feature = "camera")]
+use super::{Frames, name};
 use crate::capture::Camera;
 use crate::capture::replay::{Part, Replay};
 use crate::capture::synthetic::{Format, Synthetic};

@@ -1,5 +1,8 @@
 //! How a source is opened: options that hold for files, cameras and other programs alike.
 
+// What options say is shown as it is written, brackets included.
+#![allow(rustdoc::broken_intra_doc_links)]
+
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
