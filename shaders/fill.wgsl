@@ -1,4 +1,4 @@
-// Pass fill: in the scene, near objects become what lies behind.
+// Pass fill, the inpainting of disocclusions: in the scene, near objects become what lies behind.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> pyramid: array<vec4<f32>>;

@@ -1,4 +1,5 @@
-// Pass hide: at half size, whether any near object touches a pixel. Reads the scene only where a tile has any.
+// Pass hide, the occlusion mask: at half size, whether any near object touches a pixel. Reads the scene only where a
+// tile has any.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> scene: array<vec2<u32>>;

@@ -1,4 +1,4 @@
-// Pass pull: one level of the pyramid to the next coarser one, known pixels only.
+// Pass pull, of push-pull inpainting: one level of the pyramid to the next coarser one, known pixels only.
 
 @compute @workgroup_size(8, 8)
 fn pull(@builtin(global_invocation_id) id: vec3<u32>) {

@@ -1,4 +1,5 @@
-// Pass push: what a level of the pyramid does not know, from the next coarser one (linear interpolation).
+// Pass push, of push-pull inpainting: what a level of the pyramid does not know, from the next coarser one (linear
+// interpolation).
 
 // The other coarse pixel that a fine one lies between, along one axis.
 fn neighbour(at: u32, limit: u32) -> u32 {

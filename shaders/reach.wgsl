@@ -1,5 +1,5 @@
-// Pass reach: what the filters can reach from each edge of a segment, in the middle of each row of cells. Two vectors:
-// radius in bin pixels and lowest colour; highest colour.
+// Pass reach, a dilation of radii: what the filters can reach from each edge of a segment, in the middle of each row of
+// cells. Two vectors: radius in bin pixels and lowest colour; highest colour.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;

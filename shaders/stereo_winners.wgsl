@@ -1,4 +1,5 @@
-// Pass stereo_winners: of each pixel, the disparity that costs least, in fixed point, if the right eye agrees.
+// Pass stereo_winners, with the left-right consistency check: of each pixel, the disparity that costs least, in fixed
+// point, if the right eye agrees.
 
 @group(0) @binding(0) var<storage, read> totals: array<u32>;
 @group(0) @binding(1) var<storage, read_write> winners: array<u32>;     // two pixels a word

@@ -1,4 +1,4 @@
-//! One bank of 1-D filters for every radius.
+//! The separable kernels: one bank of 1-D filters for every radius.
 //!
 //! The singular functions of an aperture scale with the radius, so a filter tap is the integral of one of them over
 //! a pixel: a difference of two readings of its cumulative table. That makes fractional radii exact and continuous.

@@ -1,5 +1,6 @@
-//! Where a frame's CoC is split into bins: where few pixels lie, so that a surface stays in one piece and two surfaces
-//! do not share a bin. A flat background then costs one bin, however wide the range that the lens could reach.
+//! Depth slicing by histogram: where a frame's CoC is split into bins: where few pixels lie, so that a surface stays in
+//! one piece and two surfaces do not share a bin. A flat background then costs one bin, however wide the range that the
+//! lens could reach.
 
 use super::plan::FOCUS_BORDER_PX;
 use super::rung::Rung;

@@ -1,4 +1,4 @@
-//! The governor: the finest rung that keeps its time.
+//! The governor, a quality controller with hysteresis: the finest rung that keeps its time.
 //!
 //! The time of a frame is taken as `load * cost(rung)`, the rung's relative cost times the load of the moment, which
 //! makes frames of all rungs comparable. What a rung would take is then known before it is tried. Down goes at once,

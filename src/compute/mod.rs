@@ -1,4 +1,4 @@
-//! What the executors run on: a [`team`] of threads, vector instructions ([`simd`]), and a GPU ([`device`]).
+//! What the executors run on: a thread pool ([`team`]), vector instructions ([`simd`]), and a GPU ([`device`]).
 
 pub mod aligned;
 #[cfg(feature = "gpu")]

@@ -1,4 +1,4 @@
-//! Run-time choice of the vector instructions.
+//! SIMD dispatch: run-time choice of the vector instructions.
 //!
 //! Every pass is a [`pulp::WithSimd`]: compiled once per instruction set (AVX-512, AVX2 with FMA, NEON, or what the
 //! target guarantees), and the best that the machine has is taken. Inside, simple loops are left to the compiler, and

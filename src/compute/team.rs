@@ -1,4 +1,4 @@
-//! A fixed team of threads that share out the parts of one pass at a time.
+//! The thread pool: a fixed team of threads that share out the parts of one pass at a time.
 //!
 //! A pass is over when every part is done; a member that sleeps through it is not waited for. Nothing is allocated
 //! and no lock is taken. It needs `unsafe` because the threads outlive the borrow of the work they are handed; `run` is

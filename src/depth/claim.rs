@@ -1,4 +1,4 @@
-//! Holes beside the subject that are the subject.
+//! Hole filling guided by colour: holes beside the foreground that are foreground.
 //!
 //! A sensor that sees with two eyes loses a strip beside whatever is near. Filled from behind, that strip takes hair
 //! and shoulders along. Where the colours of the near and the far side of a hole differ, the colour of each pixel

@@ -1,4 +1,4 @@
-//! Unknown depth, filled from behind.
+//! Hole filling: unknown depth, taken from the background beside it.
 //!
 //! A hole beside a person is a depth shadow: the wall that one of the sensor's two eyes could not see. A hole inside
 //! the person is the person. Both come out right when a hole takes the farthest of the nearest known depths to its

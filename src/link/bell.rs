@@ -1,4 +1,4 @@
-//! A doorbell: how a thread sleeps until another one has something for it.
+//! A doorbell (an auto-reset event on a futex): how a thread sleeps until another one has something for it.
 //!
 //! One atomic word, and the kernel's `futex` on it: sleep if the word still says so, wake who sleeps. No mutex, so a
 //! thread that is suspended while it goes to sleep or wakes holds up nobody, and ringing while nobody sleeps is one

@@ -1,4 +1,5 @@
-//! Whether anybody watches the output: told by sinks, asked by capture, which lets the camera rest while nobody does.
+//! On-demand capture: whether anybody watches the output: told by sinks, asked by capture, which lets the camera rest
+//! while nobody does.
 
 use std::time::Duration;
 

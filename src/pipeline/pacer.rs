@@ -1,5 +1,5 @@
-//! Real time for stored frames: each waits for its media time, and those that cannot make theirs are passed over, as
-//! a camera would have overwritten them.
+//! Pacing of replay, real time for stored frames: each waits for its media time, and those that cannot make theirs are
+//! passed over, as a camera would have overwritten them.
 
 use crate::capture::Camera;
 use crate::clock::Clock;

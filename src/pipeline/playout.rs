@@ -1,4 +1,5 @@
-//! When pictures are shown: a steady while after they were captured, so that they come as evenly as they were taken.
+//! The play-out delay against jitter, when pictures are shown: a steady while after they were captured, so that they
+//! come as evenly as they were taken.
 //!
 //! Work takes now longer, now less long; a picture that is ready early waits for the others' sake. The wait follows
 //! what pictures need: nearly all are ready in time, and none waits longer than the age that a picture may have.

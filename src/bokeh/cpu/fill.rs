@@ -1,5 +1,6 @@
-//! Pass `fill`: what near objects hide is filled in from around them, colour and CoC, before the bins behind are
-//! taken. Pull-push: averages over ever larger areas, of known pixels only, flow back into the holes.
+//! Pass `fill`, the inpainting of disocclusions: what near objects hide is filled in from around them, colour and CoC,
+//! before the bins behind are taken. Pull-push: averages over ever larger areas, of known pixels only, flow back into
+//! the holes.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;

@@ -1,5 +1,5 @@
-//! Pass `reach`: on the coarse grid, what the filters can reach from each cell: the radius of the content there (its
-//! mean, weighted by coverage and nearness), and the range of its colours.
+//! Pass `reach`, a dilation of radii on the coarse grid: what the filters can reach from each cell: the radius of the
+//! content there (its mean, weighted by coverage and nearness), and the range of its colours.
 
 use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges, NO_COLOR};
 use crate::bokeh::plan::{ANY_COLOR, Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};

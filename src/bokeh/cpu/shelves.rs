@@ -1,4 +1,4 @@
-//! What the parts of a pass that runs over every bin at once read and write, bin by bin.
+//! Disjoint slices: what the parts of a pass that runs over every bin at once read and write, bin by bin.
 #![allow(missing_docs)] // The fields are those of `BinRows`.
 
 use super::bin::{BLOCK, BinRows};

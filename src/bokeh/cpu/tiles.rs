@@ -1,4 +1,5 @@
-//! What is where, before any colour is read: the range of CoC of every tile, and the tiles that stay as they are.
+//! Tile classification: what is where, before any colour is read: the range of CoC of every tile, and the tiles that
+//! stay as they are.
 
 use super::unpack::{Source, coc_row};
 use crate::bokeh::plan::Share;

@@ -1,4 +1,4 @@
-//! Depth edges, moved onto the edges of the colour picture.
+//! Edge alignment, guided by colour: depth edges, moved onto the edges of the colour picture.
 //!
 //! In a band around the jumps of depth each pixel asks the pixels around it: which depth do those have that look like
 //! you? Depths far from any jump are sure and count in full; those in the band, which may be the error, count little.

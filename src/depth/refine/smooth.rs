@@ -1,4 +1,4 @@
-//! Noise of smooth surfaces: how much there is, and less of it.
+//! Spatial denoising (edge-preserving): noise of smooth surfaces, how much there is, and less of it.
 //!
 //! The sigma filter (Lee, *Digital image smoothing and the sigma filter*, 1983) along rows and then along columns, with
 //! taps in symmetric pairs: a pair counts only if both its ends belong to the surface. A slanted plane then stays

@@ -1,4 +1,4 @@
-//! Depth that rests where the picture rests.
+//! The temporal filter: depth that rests where the picture rests.
 //!
 //! A recursive average of the inverse depth of each pixel. It forgets where the colour changed, because something
 //! moved there, and follows where the depth changes by more than noise. A depth that jumps from one surface to another

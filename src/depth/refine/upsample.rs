@@ -1,4 +1,4 @@
-//! A depth map with fewer pixels than its picture (or more), brought to the picture's size.
+//! Joint bilateral upsampling: a depth map with fewer pixels than its picture (or more), brought to the picture's size.
 //!
 //! Smooth surfaces are interpolated, in inverse depth, in which planes are linear. Across a jump or beside a hole the
 //! nearest depth is taken, so that no depth comes out that nobody measured; where the edge runs exactly is then for

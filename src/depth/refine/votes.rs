@@ -1,4 +1,4 @@
-//! The votes of a window for one pixel: which of the surfaces around is it on?
+//! A joint bilateral vote: the votes of a window for one pixel: which of the surfaces around is it on?
 
 use super::planes::{LANES, Planes};
 

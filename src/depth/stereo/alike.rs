@@ -1,4 +1,5 @@
-//! What has the colour of a surface that both eyes see belongs to it.
+//! Occlusions at the border, filled by colour similarity: what has the colour of a surface that both eyes see belongs
+//! to it.
 //!
 //! The left border is filled along the picture ([`super::border`]), which misses what stands before it and touches
 //! nothing that the right eye sees: leaves before a wall become wall. Where the known pixels of a colour nearly all lie

@@ -1,4 +1,5 @@
-//! Whether two pictures are a rectified pair: the same point in the same row, further to the left in the right picture.
+//! The epipolar check: whether two pictures are a rectified pair: the same point in the same row, further to the left
+//! in the right picture.
 //!
 //! Distinctive points (Shi and Tomasi, *Good features to track*, CVPR 1994) of the left picture are looked for in the
 //! right one by normalised correlation, in rows above and below and on both sides: first at half resolution, then to

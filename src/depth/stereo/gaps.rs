@@ -1,4 +1,5 @@
-//! What only one eye sees lies behind what hides it: gaps take the farther one of what is left and right of them.
+//! Occlusion filling from the background: what only one eye sees lies behind what hides it: gaps take the farther one
+//! of what is left and right of them.
 
 use super::fixed::UNKNOWN;
 

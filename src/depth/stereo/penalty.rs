@@ -1,4 +1,4 @@
-//! What it costs a path to change its disparity by more than one.
+//! The smoothness penalty P2 of semi-global matching: what it costs a path to change its disparity by more than one.
 
 /// This much across an edge of the picture, where a jump is likely, and up to so much more without one.
 const JUMP: (f32, f32) = (20.0, 40.0);

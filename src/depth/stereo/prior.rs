@@ -1,4 +1,5 @@
-//! What the last pair says about the next one: where the picture has not changed, its disparity is likely what it was.
+//! Temporal prior: what the last pair says about the next one: where the picture has not changed, its disparity is
+//! likely what it was.
 //!
 //! A blank wall costs much the same at any disparity, and noise decides anew for every frame. There a small bonus for the
 //! last disparity decides instead. Where there is texture, the right disparity is better by more than the bonus, so that

@@ -1,4 +1,4 @@
-//! Small islands of one disparity in another are chance.
+//! The speckle filter: small islands of one disparity in another are chance.
 
 use super::fixed::{ONE, UNKNOWN};
 

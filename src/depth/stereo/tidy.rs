@@ -1,5 +1,5 @@
-//! From the disparities that both eyes agree on to one for every pixel: islands go, gaps are filled from behind, and the
-//! median of 3x3 pixels takes what is left of chance.
+//! Post-processing: from the disparities that both eyes agree on to one for every pixel: islands go, gaps are filled
+//! from behind, and the median of 3x3 pixels takes what is left of chance.
 
 use std::sync::atomic::AtomicBool;
 

@@ -1,5 +1,5 @@
-//! What it costs to say that a pixel has a disparity: the bits in which the census of both eyes differs, averaged over
-//! 3x3 pixels.
+//! The matching cost (Hamming distance of census codes): what it costs to say that a pixel has a disparity: the bits in
+//! which the census of both eyes differs, averaged over 3x3 pixels.
 
 use pulp::WithSimd;
 

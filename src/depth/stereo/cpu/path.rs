@@ -1,5 +1,5 @@
-//! Costs summed along paths, so that neighbours agree (Hirschmüller, *Stereo processing by semiglobal matching and mutual
-//! information*, 2008):
+//! Semi-global cost aggregation: costs summed along paths, so that neighbours agree (Hirschmüller, *Stereo processing
+//! by semiglobal matching and mutual information*, 2008):
 //!
 //! `L(p, d) = C(p, d) + min(L(q, d), L(q, d ± 1) + P1, min L(q) + P2) - min L(q)`, with `q` the pixel before `p`.
 //!

@@ -1,4 +1,5 @@
-//! Of each pixel, the disparity that costs least, if the right eye agrees.
+//! Winner takes all, with the left-right consistency check: of each pixel, the disparity that costs least, if the right
+//! eye agrees.
 
 use pulp::WithSimd;
 
