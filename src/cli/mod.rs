@@ -1,4 +1,4 @@
-//! The command line: arguments to one resolved configuration, one function per command.
+//! The command line: arguments to options, and one function per command.
 
 mod aperture;
 mod aperture_plot;
@@ -50,7 +50,7 @@ pub use error::CliError;
 use layers::Layers;
 use settings::SettingsFile;
 
-/// Depth-aware, disc-shaped background blur for RGB-D recordings and stills
+/// Depth-aware, disc-shaped background blur for cameras, recordings and stills
 #[derive(Parser, Debug)]
 #[command(name = "bokehcam", version, arg_required_else_help = true, max_term_width = 110)]
 #[command(after_help = "\

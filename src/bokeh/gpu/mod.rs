@@ -1,4 +1,5 @@
-//! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the CPU's passes.
+//! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the passes in
+//! [`super::plan`]; where one is several dispatches (`fill`: hide, know, pull, push), each has a file.
 
 mod buffers;
 mod layout;

@@ -6,7 +6,7 @@ use crate::look::presets::Preset;
 use crate::look::{Effect, Look, Patch, Strength, Tilt};
 use crate::source::devices::Choice;
 
-/// The look that the command line has without any flags.
+/// A look as a person may have it.
 pub fn look() -> Look {
     Look { tilt: Tilt { center_y: 0.5, band: 0.15, angle_deg: 0.0 }, highlights: 8.0, ..Look::default() }
 }
