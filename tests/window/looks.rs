@@ -91,8 +91,10 @@ fn the_line_between_before_and_after_is_dragged() {
 #[ignore = "needs an X server"]
 fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
     let screen = Screen::new();
-    let (program, window) = start(&screen, &["--verbose", "--backend", "cpu"]);
+    let (program, window) = start(&screen, &["-vv", "--backend", "cpu"]);
     window.key(&[], u32::from('2'));
+    until("its executor", PATIENCE, || program.said().contains("an executor was made"));
+    // And a frame of it.
     std::thread::sleep(Duration::from_millis(500));
     window.key(&[], u32::from('s'));
     window.key(&[], u32::from('k'));
