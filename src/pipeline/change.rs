@@ -19,6 +19,9 @@ pub struct Change {
 pub enum Executor {
     /// What did before.
     Keep,
+    /// What did before, until that of the look comes with the next change: such frames have the CoC of one look and the
+    /// kernels of another ([`super::Trace::between`]).
+    Meanwhile,
     /// This one; `None` passes frames through.
     To(Option<Box<dyn Bokeh>>),
 }

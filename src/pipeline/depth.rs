@@ -55,7 +55,7 @@ impl Stage<'_> {
         let mut coc = CocMaker::new(self.look.coc_rule(self.size), self.finish(&self.look));
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
-        let mut change = 0;
+        let (mut change, mut between) = (0, false);
         loop {
             let Frame { ticket, stamp, mut trace, item: Shot { mut color, depth, right } } =
                 match from.recv_timeout(IDLE) {
@@ -70,7 +70,7 @@ impl Stage<'_> {
                 };
             for Change { number, look, bokeh } in self.changes.iter().flat_map(mpsc::Receiver::try_iter) {
                 coc.follow(look.coc_rule(self.size), self.finish(&look));
-                change = number;
+                (change, between) = (number, matches!(bokeh, Executor::Meanwhile));
                 self.rate.iter_mut().for_each(Rate::forget);
                 if let Executor::To(executor) = bokeh {
                     let number = swap.map_or(1, |last| last.number + 1);
@@ -101,7 +101,7 @@ impl Stage<'_> {
                     continue;
                 }
             };
-            trace.change = change;
+            (trace.change, trace.between) = (change, between);
             trace.depth_ns = self.clock.now_ns() - began_ns;
             let frame = Frame { ticket, stamp, trace, item: Ready { color, depth, coc, swap: swap.clone() } };
             if !hand_on(&mut to, frame, self.tally) {

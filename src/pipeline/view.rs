@@ -53,6 +53,8 @@ pub struct Trace {
     pub passes: PassTimes,
     /// The number of the last change before it; 0 where there was none.
     pub change: u64,
+    /// Whether it was blurred by the executor of the look before, as its own was still being made.
+    pub between: bool,
     /// The rung it was blurred at.
     pub quality: Option<Quality>,
 }

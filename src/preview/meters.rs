@@ -160,6 +160,7 @@ impl Meters {
                 passes,
                 quality,
                 change: 0,
+                between: false,
             };
             self.count(&trace, k * 33_400_000, 41_000_000 + k * 20_000, 1_900_000);
         }

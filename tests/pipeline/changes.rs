@@ -240,6 +240,34 @@ fn a_viewer_that_leaves_ends_the_run() {
 }
 
 #[test]
+fn frames_between_two_looks_are_known() {
+    let made = |radius_px| Made { radius_px, held: VecDeque::new(), blurred: Arc::default(), wrong: Arc::default() };
+    for (bokeh, between) in [
+        (Executor::Keep, false),
+        (Executor::Meanwhile, true),
+        (Executor::To(Some(Box::new(made(5.0)) as Box<dyn Bokeh>)), false),
+    ] {
+        let (send, changes) = mpsc::channel();
+        send.send(Change { number: 1, look: uniform(5.0), bokeh }).unwrap();
+        let (view, mut views) = link::live::<View>();
+        let stop = AtomicBool::new(false);
+        let seen = thread::scope(|scope| {
+            let looking = scope.spawn(move || std::iter::from_fn(|| views.recv()).collect::<Vec<View>>());
+            run(Run {
+                bokeh: Some(Box::new(made(5.0))),
+                look: uniform(5.0),
+                changes: Some(changes),
+                view: Some(view),
+                ..simple(Box::new(fake_camera(3)), Box::new(bokehcam::sink::Null), &stop, Pace::Asap)
+            })
+            .unwrap();
+            looking.join().unwrap()
+        });
+        assert!(!seen.is_empty() && seen.iter().all(|view| view.trace.between == between));
+    }
+}
+
+#[test]
 fn pictures_are_made_where_they_are_wanted_but_mirrored_ones_in_memory() {
     for (mirror, place) in [(false, Place::Both), (true, Place::Memory)] {
         let (places, stop) = (Arc::<Mutex<Vec<Place>>>::default(), AtomicBool::new(false));

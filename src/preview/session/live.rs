@@ -135,8 +135,9 @@ impl Live {
         // A run that has ended hears nothing.
         if kind(&self.made_for) == kind(&made_for) {
             // At once what can be at once: the executor at hand cuts what it was not made for.
-            let number = if made_for == self.made_for { number } else { number - 1 };
-            let _ = self.changes.send(change(number, Executor::Keep));
+            let (number, executor) =
+                if made_for == self.made_for { (number, Executor::Keep) } else { (number - 1, Executor::Meanwhile) };
+            let _ = self.changes.send(change(number, executor));
         }
         if made_for != self.made_for {
             let began = Instant::now();

@@ -76,15 +76,17 @@ impl App {
         });
     }
 
-    /// Saves the frame that is shown, or the next one where this one is on the GPU alone.
+    /// Saves the frame that is shown, or one of the next where this one is on the GPU alone, or between two looks and so
+    /// could not be repeated.
     pub(super) fn snapshot(&mut self) {
         let Some(view) = &self.view else { return self.state.note(NO_PICTURE) };
-        if view.picture.memory().is_none() && !matches!(self.state.source, Source::Running(_)) {
+        let runs = matches!(self.state.source, Source::Running(_));
+        if view.picture.memory().is_none() && !runs {
             return self.state.note(NO_PICTURE);
         }
-        self.snapshot_due = view.picture.memory().is_none();
+        self.snapshot_due = view.picture.memory().is_none() || runs && view.trace.between;
         self.place();
-        let Some(picture) = view.picture.memory() else { return };
+        let Some(picture) = view.picture.memory().filter(|_| !self.snapshot_due) else { return };
         self.session.save(Still {
             picture: picture.clone(),
             color: view.color.as_deref().unwrap_or(picture).clone(),
