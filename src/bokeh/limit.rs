@@ -38,9 +38,12 @@ impl Settings {
     /// # Errors
     /// [`BokehError::Memory`], [`BokehError::TooWide`].
     pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
-        let (pixels, free) = (u64::from(size.0) * u64::from(size.1), memory::free_bytes());
+        let pixels = u64::from(size.0) * u64::from(size.1);
         let needed = pixels * BYTES_PER_PIXEL;
-        if let Some(free) = free.filter(|&free| pixels > SMALL_PX && needed > free) {
+        if pixels > SMALL_PX
+            && let Some(free) = memory::free_bytes()
+            && needed > free
+        {
             return Err(BokehError::Memory { size, needed_mb: needed >> 20, free_mb: free >> 20 });
         }
         let most_px = self.most_radius_px(size);
