@@ -66,13 +66,10 @@ impl<T> From<Option<T>> for OrAuto<T> {
     }
 }
 
-impl<T: FromStr<Err = String>> FromStr for OrAuto<T> {
+impl<T: FromStr<Err = String> + 'static> FromStr for OrAuto<T> {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            value => value.parse().map(Self::This).map_err(|accepted| format!("{accepted}, or auto")),
-        }
+        Self::parser(T::from_str)(text)
     }
 }
 

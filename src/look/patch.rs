@@ -6,6 +6,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::settings::{SETTINGS, Setting, setting};
 use super::{ApertureName, Look, Patch, Strength};
+use crate::bokeh::aperture::Shape;
 use crate::optics::Lens;
 use crate::recording::RecordingError;
 
@@ -75,11 +76,6 @@ impl Patch {
         self
     }
 
-    /// Whether a look is as this says, as far as it says anything.
-    pub fn holds_in(&self, look: &Look) -> bool {
-        self.clone().beside(&Self::of(look)) == Self::default()
-    }
-
     /// Reads the picture of the aperture, if it has one, so that [`Patch::on`] need not.
     ///
     /// # Errors
@@ -105,10 +101,11 @@ impl Patch {
         if let Some(max_coc_px) = self.max_coc_px {
             look.max_coc_px = max_coc_px.chosen();
         }
-        // A picture that is there already is not read again.
-        let before = ApertureName::of(&look.aperture.shape).map(|name| name.to_string());
-        if let Some(name) = self.aperture.as_ref().filter(|name| before != Some(name.to_string())) {
-            look.aperture.shape = name.load()?;
+        match (&self.aperture, &look.aperture.shape) {
+            (None, _) => {}
+            // It is not read again.
+            (Some(ApertureName::Image(file)), Shape::Picture(there)) if there.file.as_ref() == Some(file) => {}
+            (Some(name), _) => look.aperture.shape = name.load()?,
         }
         if let Some(intensity) = self.intensity {
             look.aperture.intensity = intensity;
