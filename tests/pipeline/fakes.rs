@@ -396,26 +396,8 @@ impl Camera for LiveCamera {
 }
 
 pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a AtomicBool, pace: Pace) -> Run<'a> {
-    Run {
-        camera,
-        depth: None,
-        bokeh: None,
-        look: uniform(3.0),
-        adaptive: false,
-        measured: false,
-        changes: None,
-        sink,
-        pace,
-        budget_ns: PERIOD_NS,
-        keep_going: false,
-        demand: None,
-        mirror: false,
-        wanted: None,
-        view: None,
-        clock: Clock::system(),
-        stop,
-        progress: &|_| {},
-    }
+    let run = Run::new(camera, None, Look::plain(Effect::None), sink, stop).unwrap();
+    Run { look: uniform(3.0), pace, budget_ns: PERIOD_NS, ..run }
 }
 
 pub fn fake_camera(frames: usize) -> FakeCamera {
