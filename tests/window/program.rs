@@ -68,8 +68,7 @@ impl<'a> Program<'a> {
 
     /// Asks it to end, as Ctrl-C in a terminal does.
     pub fn interrupt(&self) {
-        let sent = Command::new("kill").args(["-INT", &self.process.0.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        self.process.interrupt();
     }
 
     /// Its window, as soon as it is on the screen.

@@ -98,6 +98,12 @@ impl Beside {
         let started = command.stdin(Stdio::null()).spawn();
         Self(started.unwrap_or_else(|error| panic!("{command:?}: {error}")))
     }
+
+    /// Asks it to end, as Ctrl-C in a terminal does.
+    pub fn interrupt(&self) {
+        let sent = Command::new("kill").args(["-INT", &self.0.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+    }
 }
 
 impl Drop for Beside {
