@@ -140,7 +140,7 @@ fn the_scan_finds_what_it_should() {
         ("stats.rs", "use crate::{frame::FrameId, recording::tum};"),
         ("pipeline.rs", "use crossbeam_channel::bounded;"),
         ("bokeh/cpu/mod.rs", "fn f() { wgpu::Instance::default(); }"),
-        ("cli/render.rs", "use image;"),
+        ("cli/commands/render/mod.rs", "use image;"),
         ("frame.rs", "#[cfg(test)]\nmod tests;\nuse crate::link::pool::Pool;"),
         ("attic.rs", ""),
     ];

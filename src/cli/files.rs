@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::error::CliError;
-use super::print;
+use super::terminal::print;
 use crate::files::{place, whole};
 use crate::sink::Target;
 use crate::stats::Report;

@@ -14,20 +14,8 @@ use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
 
-use super::options::Global;
+use super::options::{Global, LogFormat};
 use super::screen::Screen;
-use crate::names::named;
-
-named! {
-    /// How log lines are written.
-    pub enum LogFormat default Text {
-        /// For people
-        Text = "text",
-        /// One JSON object a line
-        Json = "json",
-    }
-}
-
 /// How messages are written; text until [`start`] says otherwise.
 static JSON: AtomicBool = AtomicBool::new(false);
 static QUIET: AtomicBool = AtomicBool::new(false);
@@ -50,8 +38,8 @@ pub fn start(global: &Global) {
     QUIET.store(global.quiet, Ordering::Relaxed);
     let level = match (global.quiet, global.verbose) {
         (true, _) => "error",
-        // What others grumble about is seldom for who uses this.
-        (_, 0) => "bokehcam=warn,error",
+        // What others grumble about is seldom for who uses this; the window's frame does where no desktop answers.
+        (_, 0) => "bokehcam=warn,sctk_adwaita=off,error",
         (_, 1) => "bokehcam=info,warn",
         (_, _) => "bokehcam=debug,info",
     };
@@ -175,6 +163,27 @@ impl Drop for LogLine {
         let line = printable(text.trim_end_matches('\n'), &['\x1b']);
         screen().print(format!("{line}\n").as_bytes());
     }
+}
+
+/// What clap says in paragraphs, in one line and without the usage.
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let told = text
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty() && !line.starts_with("Usage:") && !line.starts_with("For more information"));
+    let mut sentence = String::new();
+    for line in told {
+        let joint = match sentence.chars().last() {
+            None => "",
+            Some(':') => " ",
+            Some(_) if line.starts_with('[') => " ",
+            Some(_) => "; ",
+        };
+        sentence.push_str(joint);
+        sentence.push_str(line.strip_prefix("error: ").unwrap_or(line));
+    }
+    sentence
 }
 
 #[cfg(test)]

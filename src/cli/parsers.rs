@@ -3,21 +3,25 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use super::arguments::{joined, one_line};
-use super::settings::SettingsFile;
-use super::{CliError, Command, ConfigCommand, Refusal, dump, log};
+use super::CliError;
+use super::commands::{Command, ConfigCommand};
+use super::log::{one_line, printable};
+use super::parse::{Refusal, parse};
+use super::settings::arguments::joined;
+use super::settings::dump;
+use super::settings::file::SettingsFile;
 
 /// The settings that a command line stands for, as `config dump` prints them; nothing for other commands.
 ///
 /// # Errors
 /// It is refused: the message, as it is printed.
 pub fn arguments(args: &[OsString]) -> Result<String, String> {
-    let parsed = super::parse(&joined(args.iter().cloned())).map_err(|refusal| {
+    let parsed = parse(&joined(args.iter().cloned())).map_err(|refusal| {
         let message = match refusal {
             Refusal::Arguments(error) => one_line(&error),
             Refusal::Settings(error) => error.to_string(),
         };
-        log::printable(&message, &[]).into_owned()
+        printable(&message, &[]).into_owned()
     })?;
     Ok(match parsed.cli.command {
         Command::Config(ConfigCommand::Dump { .. }) => {

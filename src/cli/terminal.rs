@@ -1,6 +1,6 @@
 //! What the user sees while a command runs, and how it is ended.
 
-use std::io::{self, IsTerminal};
+use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -61,4 +61,17 @@ impl Drop for Progress {
     fn drop(&mut self) {
         self.0.iter().for_each(|(screen, count)| screen.end(count));
     }
+}
+
+/// Prints to standard output.
+///
+/// # Errors
+/// Nobody reads, or it is full.
+pub fn print(bytes: &[u8]) -> Result<(), CliError> {
+    let mut stdout = io::stdout().lock();
+    let text = String::from_utf8_lossy(bytes);
+    stdout
+        .write_all(log::printable(&text, &['\n', '\t']).as_bytes())
+        .and_then(|()| stdout.flush())
+        .map_err(CliError::io("standard output".as_ref()))
 }

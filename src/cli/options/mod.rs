@@ -3,6 +3,8 @@
 
 mod groups;
 mod look;
+#[cfg(feature = "window")]
+mod window;
 
 use std::path::PathBuf;
 
@@ -13,15 +15,25 @@ pub use crate::source::options::{Depth, Frames, Stereo};
 pub use groups::{Every, Streaming};
 pub use look::{LookSettings, named};
 
-use super::log::LogFormat;
-#[cfg(feature = "window")]
-pub use super::preview::options::Window;
 use crate::compute::Backend;
 use crate::computing;
 use crate::look::Effect;
 use crate::look::number::above_zero;
+use crate::names;
 use crate::pipeline::Pace;
 use crate::source::{DepthChoice, Size, SourceName};
+#[cfg(feature = "window")]
+pub use window::Window;
+
+names::named! {
+    /// How log lines are written.
+    pub enum LogFormat default Text {
+        /// For people
+        Text = "text",
+        /// One JSON object a line
+        Json = "json",
+    }
+}
 
 /// Options of every command.
 #[derive(Args, Debug)]

@@ -1,0 +1,267 @@
+//! `bench`: how fast the blur is on this machine.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use clap::{Args, value_parser};
+use serde::Serialize;
+
+use crate::bokeh::{Bokeh, BokehError, Job, PassTimes};
+use crate::budget::Quality;
+use crate::cli::error::CliError;
+use crate::cli::options;
+use crate::cli::settings::layers::Given;
+use crate::cli::settings::look;
+use crate::cli::settings::unused;
+use crate::cli::terminal::print;
+use crate::compute::{Backend, Place, team::cores};
+use crate::computing::Computing;
+use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pool;
+use crate::look::number::within;
+use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength};
+use crate::names::named;
+use crate::optics::CocField;
+use crate::pipeline::still::{Depth, prepared};
+use crate::scene::{Scene, View};
+use crate::source::{self, DepthChoice, Size};
+
+/// Frames before those that are measured: caches and clocks settle.
+const WARM_UP_FRAMES: usize = 2;
+
+/// Measure the blur on this machine, without reading or writing files
+///
+/// Blurs one frame of the synthetic scene again and again, one at a time, for every combination of the lists given.
+/// The time is that of one frame, in milliseconds, from handing it over until it is back.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam bench
+  bokehcam bench --sizes 1280x720 --quality draft,fast,balanced --threads 1,2,4
+  bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl")]
+pub struct BenchCommand {
+    /// Picture sizes
+    #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = "640x480,1280x720,1920x1080")]
+    sizes: Vec<Size>,
+    /// Blur radii at infinity, in pixels [default: height / 45]
+    #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = within(0.0..=MOST_RADIUS_PX))]
+    coc: Vec<f32>,
+    /// Quality levels
+    #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
+          default_value = Quality::default().name(), value_parser = options::named::<Quality>())]
+    quality: Vec<Quality>,
+    /// Numbers of threads of the CPU backend [default: one per core]
+    #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
+          value_parser = value_parser!(u16).range(1..=1024))]
+    threads: Vec<u16>,
+    /// What is in the picture
+    #[arg(long, value_parser = options::named::<BenchScene>(), value_name = "WHICH", default_value_t = BenchScene::Sitter)]
+    scene: BenchScene,
+    /// Frames to measure
+    #[arg(id = "benched_frames", long = "frames", value_name = "N", default_value_t = 20,
+          value_parser = value_parser!(u32).range(1..))]
+    frames: u32,
+    /// What runs the blur
+    #[arg(long, value_parser = options::named::<Backend>(), value_name = "WHICH", default_value = "auto")]
+    backend: Backend,
+    /// Part of the name of the GPU to take
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// One JSON object a line, instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Also the median of each pass, in milliseconds
+    #[arg(long)]
+    passes: bool,
+    #[command(flatten)]
+    blur: options::Blur,
+}
+
+named! {
+    /// The picture that is blurred.
+    enum BenchScene default Sitter {
+        /// A person in focus, and a room behind
+        Sitter = "sitter",
+        /// The same with things in front, for which what they hide is filled in
+        Portrait = "portrait",
+    }
+}
+
+/// One line of the result.
+#[derive(Serialize)]
+struct Measured {
+    size_px: (u32, u32),
+    coc_px: f32,
+    quality: &'static str,
+    executor: String,
+    frames: u32,
+    p50_ms: f64,
+    p95_ms: f64,
+    max_ms: f64,
+    frames_per_s: f64,
+    passes_ms: BTreeMap<&'static str, f64>,
+}
+
+/// Runs the command; each line is printed as soon as it is measured.
+///
+/// # Errors
+/// The options do not fit each other, there is no such executor, or it failed.
+pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
+    if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
+        let what = "--depth is for `stream`: the scene that is measured has its own depth; leave it out, or use none";
+        return Err(CliError::Usage(what.to_string()));
+    }
+    let look = look::look(&command.blur, &options::LookSettings::default())?;
+    let look = source::fitting_look(&Look { strength: Strength::Default, ..look }, &command.blur.depth, true)?;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: unused::From::Bench,
+            depth: source::DepthFrom::Metres,
+            uses_depth: true,
+            effect: look.effect,
+            lens: false,
+            realtime: false,
+            cpu_only: command.backend == Backend::Cpu,
+            window: false,
+        },
+    );
+    if !command.json {
+        print(b"size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n")?;
+    }
+    let threads: Vec<Option<usize>> = match &command.threads[..] {
+        [] => vec![None],
+        list => list.iter().map(|&threads| Some(usize::from(threads))).collect(),
+    };
+    for size in &command.sizes {
+        let (color, depth) = synthetic_frame(command.scene, (size.width, size.height));
+        let default_coc_px = [size.height as f32 * COC_AT_INFINITY_PER_HEIGHT];
+        let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
+        for &coc_px in radii_px {
+            for &quality in &command.quality {
+                for &threads in &threads {
+                    let computing = Computing { backend: command.backend, adapter: command.adapter.clone(), threads };
+                    let measured = measure(command, &look, (&color, &depth), coc_px, quality, &computing)?;
+                    print(measured.line(command.json, command.passes).as_bytes())?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn measure(
+    command: &BenchCommand,
+    look: &Look,
+    (color, depth): (&ColorImage, &DepthMap),
+    coc_px: f32,
+    quality: Quality,
+    computing: &Computing,
+) -> Result<Measured, CliError> {
+    let look = Look { strength: Strength::AtInfinity(coc_px), quality: Some(quality), ..look.clone() };
+    let size = color.size();
+    let Some(settings) = look.settings(size, false) else {
+        return Err(CliError::Usage(
+            "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
+        ));
+    };
+    let (coc, depth) = prepared(&look, color, Some(Depth::Measured(depth.clone())))?;
+    let mut bokeh = computing.blur(&settings, size)?;
+    let buffers = Buffers {
+        colors: Pool::new(bokeh.capacity(), || color.clone()),
+        depths: depth.map(|depth| Pool::new(bokeh.capacity(), || depth.clone())),
+        results: Pool::new(bokeh.capacity(), || ColorImage::new(size.0, size.1)),
+    };
+    for _ in 0..WARM_UP_FRAMES {
+        buffers.frame(&mut *bokeh, coc)?;
+    }
+    let mut times = Vec::new();
+    let mut passes = BTreeMap::<_, Vec<Duration>>::new();
+    for _ in 0..command.frames {
+        let (time, in_passes) = buffers.frame(&mut *bokeh, coc)?;
+        times.push(time);
+        in_passes.iter().for_each(|(name, time)| passes.entry(name).or_default().push(time));
+    }
+    times.sort_unstable();
+    Ok(Measured {
+        size_px: size,
+        coc_px,
+        quality: quality.name(),
+        executor: bokeh.describe(),
+        frames: command.frames,
+        p50_ms: share_ms(&times, 0.5),
+        p95_ms: share_ms(&times, 0.95),
+        max_ms: share_ms(&times, 1.0),
+        frames_per_s: times.len() as f64 / times.iter().sum::<Duration>().as_secs_f64(),
+        passes_ms: passes
+            .into_iter()
+            .map(|(name, mut times)| {
+                times.sort_unstable();
+                (name, share_ms(&times, 0.5))
+            })
+            .collect(),
+    })
+}
+
+/// The time that this share of the sorted times does not exceed.
+fn share_ms(sorted: &[Duration], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3
+}
+
+/// The same frame again and again, without copying it.
+struct Buffers {
+    colors: Pool<ColorImage>,
+    depths: Option<Pool<DepthMap>>,
+    results: Pool<ColorImage>,
+}
+
+impl Buffers {
+    /// Time from handing a frame over until it is back, and that of its passes.
+    fn frame(&self, bokeh: &mut dyn Bokeh, coc: CocField) -> Result<(Duration, PassTimes), CliError> {
+        let job = Job {
+            ticket: 0,
+            color: self.colors.take(),
+            depth: self.depths.as_ref().map(Pool::take),
+            coc,
+            quality: Quality::default(),
+            place: Place::Memory,
+            out: self.results.take(),
+        };
+        let began = Instant::now();
+        bokeh.submit(job)?;
+        let finished = bokeh.collect(true)?;
+        let time = began.elapsed();
+        finished.map(|finished| (time, finished.times)).ok_or(BokehError::Lost.into())
+    }
+}
+
+fn synthetic_frame(scene: BenchScene, size: (u32, u32)) -> (ColorImage, DepthMap) {
+    let threads = cores();
+    let scene = match scene {
+        BenchScene::Sitter => Scene::sitter(),
+        BenchScene::Portrait => Scene::portrait(),
+    };
+    let (mut color, mut depth) = (ColorImage::default(), DepthMap::default());
+    scene.render_pinhole(&View::new(size.0, size.1), 0.0, 1, threads, &mut color, &mut depth);
+    (color, depth)
+}
+
+impl Measured {
+    fn line(&self, json: bool, passes: bool) -> String {
+        if json {
+            // Numbers and texts always have a form in JSON.
+            return serde_json::to_string(self).unwrap_or_default() + "\n";
+        }
+        let Self { size_px: (width, height), coc_px, quality, executor, p50_ms, p95_ms, max_ms, frames_per_s, .. } =
+            self;
+        let passes: String = if passes {
+            self.passes_ms.iter().map(|(name, ms)| format!("    {name} {ms:.2}")).collect::<String>() + "\n"
+        } else {
+            String::new()
+        };
+        format!(
+            "{:<10} {coc_px:>7.1}  {quality:<9} {p50_ms:>7.2}  {p95_ms:>7.2}  {max_ms:>7.2} {frames_per_s:>7.1}  {executor}\n{passes}",
+            format!("{width}x{height}")
+        )
+    }
+}

@@ -1,0 +1,204 @@
+//! The list of devices, for people and for programs.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::{CliError, DevicesCommand};
+use crate::cli::terminal;
+use crate::cli::terminal::print;
+use crate::v4l2::controls::{self, Control, Kind as ControlKind};
+use crate::v4l2::holders::{Holder, holders};
+use crate::v4l2::modes::{FormatModes, modes};
+use crate::v4l2::node::{self, Kind, Node};
+use crate::v4l2::{Device, controls::Value};
+
+/// What is told about a device.
+#[derive(Serialize)]
+struct Told {
+    #[serde(flatten)]
+    node: Node,
+    holders: Vec<Holder>,
+    formats: Vec<FormatModes>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    controls: Option<Vec<Control>>,
+}
+
+#[derive(Serialize)]
+struct List {
+    cameras: Vec<Told>,
+    virtual_cameras: Vec<Told>,
+    /// Only what was asked for by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    others: Vec<Told>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// There is no such device.
+pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
+    let list = match &command.device {
+        None => List::of(node::nodes(), false, command.controls),
+        Some(name) => List::of(named(name)?, true, command.controls),
+    };
+    if command.json {
+        // Numbers and texts always have a form in JSON.
+        return print((serde_json::to_string_pretty(&list).unwrap_or_default() + "\n").as_bytes());
+    }
+    if list.cameras.is_empty() && list.virtual_cameras.is_empty() && list.others.is_empty() {
+        terminal::say("no camera and no virtual camera is here; `bokehcam doctor` says what to do");
+        return Ok(());
+    }
+    print(list.to_string().as_bytes())
+}
+
+/// The node that is meant by a name, also one that gives no pictures now.
+fn named(name: &str) -> Result<Vec<Node>, CliError> {
+    let nodes = node::nodes();
+    let path = match node::resolve(name) {
+        Ok(path) => path,
+        Err(error) => {
+            let wanted = name.to_lowercase();
+            let by_card = |node: &Node| !name.is_empty() && node.card.to_lowercase().contains(&wanted);
+            let found: Vec<Node> = nodes.into_iter().filter(by_card).collect();
+            return if found.is_empty() { Err(error.into()) } else { Ok(found) };
+        }
+    };
+    // It may be a link.
+    let meant = path.canonicalize().unwrap_or_else(|_| path.clone());
+    let found: Vec<Node> = nodes.into_iter().filter(|node| node.path == meant).collect();
+    if found.is_empty() { Err(CliError::NotVideo(path)) } else { Ok(found) }
+}
+
+impl List {
+    fn of(nodes: Vec<Node>, asked_for: bool, with_controls: bool) -> Self {
+        let mut list = Self { cameras: Vec::new(), virtual_cameras: Vec::new(), others: Vec::new() };
+        for node in nodes {
+            let group = match node.kind {
+                Kind::Capture => &mut list.cameras,
+                Kind::Virtual => &mut list.virtual_cameras,
+                // It may be a camera: this user cannot know.
+                _ if node.denied => &mut list.cameras,
+                _ if asked_for => &mut list.others,
+                _ => continue,
+            };
+            group.push(Told::of(node, with_controls));
+        }
+        list
+    }
+}
+
+impl Told {
+    fn of(node: Node, with_controls: bool) -> Self {
+        // Before this program is one of them.
+        let holders = holders(&node.path);
+        let device = Device::open(&node.path).ok();
+        let formats = device.as_ref().and_then(|device| modes(device).ok()).unwrap_or_default();
+        let controls =
+            with_controls.then(|| device.and_then(|device| controls::list(&device).ok()).unwrap_or_default());
+        Self { node, holders, formats, controls }
+    }
+}
+
+impl std::fmt::Display for List {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let groups = [("cameras", &self.cameras), ("virtual cameras", &self.virtual_cameras), ("others", &self.others)];
+        let mut first = true;
+        for (heading, group) in groups.iter().filter(|(_, group)| !group.is_empty()) {
+            writeln!(f, "{}{heading}", if first { "" } else { "\n" })?;
+            first = false;
+            for told in *group {
+                f.write_str(&told.lines())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Told {
+    fn lines(&self) -> String {
+        let Self { node, holders, formats, controls } = self;
+        let mut out = String::new();
+        let card = if node.card.is_empty() { "no name" } else { &node.card };
+        let mut about = vec![node.driver.clone(), node.bus.clone()];
+        about.extend(node.usb.as_ref().map(|usb| format!("USB {}, {} Mbit/s", usb.id, usb.mbit_per_s)));
+        about.retain(|part| !part.is_empty());
+        // Writing to a string does not fail.
+        let _ = writeln!(out, "  {}  {card}  ({})", node.path.display(), about.join(", "));
+        let mut line = |text: String| {
+            let _ = writeln!(out, "    {text}");
+        };
+        if let Some(problem) = &node.problem {
+            line(format!("cannot be opened: {problem}"));
+        }
+        for link in &node.links {
+            line(link.display().to_string());
+        }
+        if node.kind == Kind::Virtual {
+            line(state(node).to_owned());
+        }
+        if !holders.is_empty() {
+            let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
+            line(format!("opened by {}", names.join(", ")));
+        }
+        let (formats, others): (Vec<_>, Vec<_>) = formats.iter().partition(|format| format.fourcc.content().is_some());
+        let width = formats.iter().map(|format| format.fourcc.to_string().len()).max().unwrap_or_default();
+        for format in formats {
+            line(format!("{:width$}  {}", format.fourcc.to_string(), format.sizes));
+        }
+        if !others.is_empty() {
+            let names: Vec<_> = others.iter().map(|format| format.fourcc.to_string()).collect();
+            line(format!("also {}, which cannot be read here", names.join(" ")));
+        }
+        for control in controls.iter().flatten() {
+            line(control_line(control));
+        }
+        out
+    }
+}
+
+/// What a virtual camera is now: some tell it only while somebody writes.
+fn state(node: &Node) -> &'static str {
+    match (node.captures, node.outputs) {
+        (true, true) => "can be written to and read from",
+        (false, true) => "can be written to",
+        (true, false) => "is being written to",
+        (false, false) => "is in a state that takes neither writers nor readers: reload the module v4l2loopback",
+    }
+}
+
+fn control_line(control: &Control) -> String {
+    let Control { name, value, minimum, maximum, step, default, items, .. } = control;
+    let mut line = name.clone();
+    if let Some(value) = value {
+        let _ = match (control.kind, value) {
+            (ControlKind::Bitmask, Value::Number(bits)) => write!(line, "={bits:#x}"),
+            _ => write!(line, "={value}"),
+        };
+    }
+    let takes = match control.kind {
+        ControlKind::Integer | ControlKind::Integer64 if *step > 1 => {
+            format!("{minimum} to {maximum} in steps of {step}, default {default}")
+        }
+        ControlKind::Integer | ControlKind::Integer64 => format!("{minimum} to {maximum}, default {default}"),
+        ControlKind::Boolean => format!("0 or 1, default {default}"),
+        ControlKind::Menu | ControlKind::IntegerMenu => {
+            let items: Vec<_> = items.iter().map(|item| format!("{}: {}", item.index, item.name)).collect();
+            format!("{}; default {default}", items.join(", "))
+        }
+        ControlKind::Button => "button".to_owned(),
+        ControlKind::String => format!("text of {minimum} to {maximum} bytes"),
+        ControlKind::Bitmask => format!("bits of {maximum:#x}"),
+        ControlKind::Compound => "a table".to_owned(),
+    };
+    let _ = write!(line, "  ({takes})");
+    for (is, word) in
+        [(control.read_only, "read-only"), (control.inactive, "inactive"), (control.grabbed, "not while streaming")]
+    {
+        if is {
+            let _ = write!(line, ", {word}");
+        }
+    }
+    line
+}

@@ -1,0 +1,45 @@
+//! `devices`: which cameras there are, and what they can do.
+
+#[cfg(feature = "camera")]
+mod list;
+
+use clap::Args;
+
+use crate::cli::error::CliError;
+
+/// List cameras and virtual cameras
+///
+/// Cameras with their formats, sizes and rates, and who has them open; virtual cameras apart. Nodes that give no
+/// pictures, such as those for metadata, are left out.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam devices
+  bokehcam devices --controls brio
+  bokehcam devices --json /dev/video0")]
+#[cfg_attr(not(feature = "camera"), allow(dead_code))]
+pub struct DevicesCommand {
+    /// One device only: its path, number, by-id name, or a part of its card's name
+    #[arg(value_name = "DEVICE")]
+    device: Option<String>,
+    /// Also the settings that the device itself has, such as exposure
+    #[arg(long)]
+    controls: bool,
+    /// As JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// There is no such device, or this program was built without cameras.
+pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
+    #[cfg(feature = "camera")]
+    return list::run(command);
+    #[cfg(not(feature = "camera"))]
+    {
+        let _ = command;
+        Err(CliError::NoCameras)
+    }
+}

@@ -1,0 +1,50 @@
+//! What computes the blur, and programs that this one uses.
+
+use std::process::{Command, Stdio};
+
+use super::finding::Finding;
+use crate::compute::Backend;
+use crate::computing::Computing;
+use crate::look::{Effect, Look};
+
+const BLUR: &str = "blur";
+const PROGRAMS: &str = "programs";
+
+/// What there is to say about the blur and about other programs.
+pub fn look() -> Vec<Finding> {
+    vec![blur(), ffmpeg()]
+}
+
+/// What `--backend auto` gives here.
+fn blur() -> Finding {
+    /// Any size will do.
+    const SIZE: (u32, u32) = (64, 64);
+    let settings = Look::plain(Effect::Blur).settings(SIZE, false);
+    let computing = Computing::default();
+    match settings.as_ref().map(|settings| computing.blur(settings, SIZE)).transpose() {
+        Err(error) => Finding::note(BLUR, error.to_string(), "report this"),
+        Ok(None) => Finding::note(BLUR, "nothing is blurred".to_string(), "report this"),
+        Ok(Some(bokeh)) => {
+            let name = bokeh.describe();
+            if bokeh.backend() == Backend::Cpu && cfg!(feature = "gpu") {
+                let fix = "install a Vulkan driver if there is a GPU; `bokehcam bench` tells how fast the CPU is";
+                Finding::note(BLUR, format!("no hardware GPU: {name}"), fix)
+            } else {
+                Finding::good(BLUR, name)
+            }
+        }
+    }
+}
+
+fn ffmpeg() -> Finding {
+    let output = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).stderr(Stdio::null()).output();
+    let text = output.ok().filter(|output| output.status.success()).map(|output| output.stdout);
+    let first = text.as_deref().and_then(|text| text.split(|byte| *byte == b'\n').next());
+    match first {
+        Some(line) => {
+            let line = String::from_utf8_lossy(line);
+            Finding::good(PROGRAMS, line.split(" Copyright").next().unwrap_or_default().to_owned())
+        }
+        None => Finding::note(PROGRAMS, "ffmpeg is not installed", "install it to write .mp4, .mkv and .webm"),
+    }
+}

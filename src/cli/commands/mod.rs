@@ -1,0 +1,122 @@
+//! The commands: what each is called and what it does, one function per command.
+
+mod aperture;
+mod bench;
+mod depth;
+mod devices;
+mod doctor;
+#[cfg(feature = "window")]
+mod preview;
+mod record;
+mod render;
+mod stream;
+
+use clap::{ArgMatches, CommandFactory, Parser, Subcommand};
+
+use crate::cli::error::CliError;
+use crate::cli::options;
+use crate::cli::settings::file::SettingsFile;
+use crate::cli::settings::layers::Layers;
+use crate::cli::settings::{dump, save};
+use crate::cli::terminal::print;
+
+/// Depth-aware, disc-shaped background blur for cameras, recordings and stills
+#[derive(Parser, Debug)]
+#[command(name = "bokehcam", version, arg_required_else_help = true, max_term_width = 110)]
+#[command(after_help = "\
+Examples:
+  bokehcam stream recordings/portrait --to out/
+  bokehcam render photo.jpg --depth-map depth.png --out portrait.png
+  bokehcam aperture --out kernels/
+
+Settings come from flags, then the environment (BOKEHCAM_RIM for --rim), then the preset, then the settings file,
+then defaults.
+`bokehcam config dump` shows them all. Exit code: 0 done, 1 failed, 2 wrong arguments.")]
+pub struct Cli {
+    #[command(flatten)]
+    pub global: options::Global,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    #[cfg(feature = "window")]
+    Preview(Box<preview::PreviewCommand>),
+    Stream(Box<stream::StreamCommand>),
+    Render(Box<render::RenderCommand>),
+    Depth(Box<depth::DepthCommand>),
+    Record(Box<record::RecordCommand>),
+    Aperture(aperture::ApertureCommand),
+    Bench(Box<bench::BenchCommand>),
+    Devices(devices::DevicesCommand),
+    Doctor(doctor::DoctorCommand),
+    /// Print a script that completes commands and options in a shell
+    #[command(after_help = "\
+Examples:
+  bokehcam completions bash > ~/.local/share/bash-completion/completions/bokehcam
+  bokehcam completions zsh > ~/.zfunc/_bokehcam
+  bokehcam completions fish > ~/.config/fish/completions/bokehcam.fish")]
+    Completions {
+        /// The shell
+        #[arg(value_enum)]
+        shell: clap_complete::Shell,
+    },
+    /// Show the settings
+    #[command(subcommand, after_help = "Examples:\n  bokehcam config dump\n  bokehcam config save --rim 0.1")]
+    Config(ConfigCommand),
+}
+
+#[derive(Subcommand, Debug)]
+pub enum ConfigCommand {
+    /// Print every setting with its value and where that comes from, as a settings file
+    #[command(after_help = "\
+Examples:
+  bokehcam config dump
+  bokehcam config dump --preset cinematic --rim 0.3")]
+    Dump {
+        /// Settings to print with these values.
+        #[command(flatten)]
+        every: Box<options::Every>,
+    },
+    /// Save the settings given as flags in the settings file, whose other settings and comments stay
+    #[command(after_help = "\
+Examples:
+  bokehcam config save --aperture polygon:6 --rim 0.1
+  bokehcam config save --preset cinematic --config other.toml")]
+    Save {
+        /// Settings to save.
+        #[command(flatten)]
+        every: Box<options::Every>,
+    },
+}
+
+/// Runs a command.
+///
+/// # Errors
+/// What the command says.
+pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Layers) -> Result<(), CliError> {
+    match cli.command {
+        #[cfg(feature = "window")]
+        Command::Preview(command) => preview::run(&command, &cli.global, layers.given(matches)),
+        Command::Stream(command) => stream::run(&command, &cli.global, layers.given(matches)),
+        Command::Render(command) => render::run(&command, &cli.global, &layers.given(matches)),
+        Command::Depth(command) => depth::run(&command, &cli.global),
+        Command::Record(command) => record::run(&command, &cli.global, &layers.given(matches)),
+        Command::Aperture(command) => aperture::run(&command, &cli.global),
+        Command::Bench(command) => bench::run(&command, &layers.given(matches)),
+        Command::Devices(command) => devices::run(&command),
+        Command::Doctor(command) => doctor::run(&command),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "bokehcam", &mut script);
+            print(&script)
+        }
+        Command::Config(ConfigCommand::Dump { .. }) => {
+            print(dump::as_toml(&layers.resolved(matches), &file.presets).as_bytes())
+        }
+        Command::Config(ConfigCommand::Save { .. }) => {
+            save::run(cli.global.config.as_deref(), &layers.resolved(matches))
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! `preview`: a window that shows a source in portrait mode, live.
+
+mod store;
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use clap::Args;
+
+use crate::cli::error::CliError;
+use crate::cli::files::{check_report, write_report};
+use crate::cli::options::{Global, Streaming, Window};
+use crate::cli::settings::file;
+use crate::cli::settings::layers::Given;
+use crate::cli::settings::look;
+use crate::cli::settings::unused;
+use crate::cli::sinks;
+use crate::cli::terminal;
+use crate::look::{Effect, Look};
+use crate::pipeline::Pace;
+use crate::preview::session::Start;
+use crate::preview::state::{Output, State};
+use crate::preview::system::System;
+use crate::preview::window::{self, Preview};
+use crate::sink::Target;
+use crate::source::{self, SourceName};
+
+use store::FileStore;
+
+/// Show a camera, a recording or the synthetic scene in portrait mode, live, and find a look
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam preview                          the first camera there is
+  bokehcam preview 0 --mirror --to /dev/video10
+  bokehcam preview 0,2 --calib stereo.yml
+  bokehcam preview recordings/portrait --preset cinematic
+  bokehcam preview recordings/portrait --split 0.5 --highlights 12
+  bokehcam preview synthetic --full-screen
+
+In the window, F1 shows all keys. Click to focus there, double-click to follow the subject. What the window sets can be
+copied as a command (K). A recording is played in a loop.")]
+pub struct PreviewCommand {
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
+    /// folder with a recording, or `synthetic` [default: the first camera there is]
+    source: Option<String>,
+    /// Also write to /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or .webm from the start;
+    /// may be given more than once
+    #[arg(long, value_name = "SINK")]
+    to: Vec<Target>,
+    #[command(flatten)]
+    window: Window,
+    #[command(flatten)]
+    parts: Streaming,
+}
+
+/// Runs the command; `given` is what was said of other things than the look.
+///
+/// # Errors
+/// The options do not fit each other, there is no display, or there never was a frame.
+pub fn run(command: &PreviewCommand, global: &Global, given: Given) -> Result<(), CliError> {
+    let mut parts = command.parts.clone();
+    // Who looks for a look does so for longer than a recording takes.
+    parts.frames.repeat = true;
+    show(command.source.as_deref().unwrap_or_default(), &command.to, &command.window, &parts, (global, given))
+}
+
+/// Shows a source in a window, and writes it to `to`.
+///
+/// # Errors
+/// As for [`run`].
+pub fn show(
+    name: &str,
+    to: &[Target],
+    window: &Window,
+    parts: &Streaming,
+    (global, given): (&Global, Given),
+) -> Result<(), CliError> {
+    let Streaming { frames, stream, output, computing, .. } = parts;
+    check_report(stream.report.as_deref(), output.force, to)?;
+    let usage = |what: &str| CliError::Usage(what.to_string());
+    let refuse = |what: &str| Err(usage(what));
+    if stream.pace == Some(Pace::Asap) {
+        return refuse("--pace asap: a window shows frames in their own time; leave --pace out");
+    }
+    if stream.on_demand {
+        return refuse("--on-demand: the window watches all the time; leave it out, or use `bokehcam stream`");
+    }
+    if !name.is_empty() {
+        let source = SourceName::from_str(name).map_err(|error| CliError::Usage(format!("{name}: {error}")))?;
+        sinks::check(to, parts, &source)?;
+        unused::warn_by_source(&given.settings, source.kind());
+    }
+    let outputs = to.iter().map(|target| match target.path() {
+        Some(path) => Ok(Output { name: path.display().to_string(), is_camera: target.is_live() }),
+        None => Err(usage("--to: beside a window, use a virtual camera, a folder or a file")),
+    });
+    let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
+    // As if there were depth: what the source lacks is seen when it is open.
+    sinks::try_report(stream.report.as_deref())?;
+    let look = look::look(&parts.blur, &computing.quality)?;
+    let look = source::fitting_look(&look, &parts.blur.depth, true)?;
+    let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
+    let look = Look { effect, ..look };
+    let device = computing.choice().device()?;
+    let store = FileStore { chosen: global.config.clone(), given };
+    let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
+    system.device.clone_from(&device);
+    system.out_size = stream.out_size.map(|size| (size.width, size.height));
+    system.force = output.force;
+    let state = first_state(look.clone(), name, window, stream.mirror);
+    let closes = frames.frames.is_some() || !frames.repeat;
+    let stop = terminal::stop_flag()?;
+    let ended = window::show(Preview {
+        state,
+        session: Start {
+            services: Box::new(system),
+            look,
+            source: name.to_owned(),
+            outputs,
+            keep_going: stream.keep_going,
+            budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
+            wanted: Arc::default(),
+            folder: window.save_to.clone().unwrap_or_else(pictures_folder),
+        },
+        device: device.clone(),
+        close_at_end: closes,
+        memory: file::state_folder().map(|folder| folder.join("window.toml")),
+        stop,
+    })?;
+    let written = match (&stream.report, &ended.report) {
+        (Some(path), Some(report)) => write_report(path, report),
+        _ => Ok(()),
+    };
+    if let Some(report) = ended.report.as_ref().filter(|_| !global.quiet) {
+        terminal::say(&report.to_string());
+    }
+    match ended.lost {
+        Some(why) if ended.report.is_none() || closes => Err(CliError::NoFrames(why)),
+        _ => ended.unwritten.map_or(written, |why| Err(CliError::Unwritten(why))),
+    }
+}
+
+fn first_state(look: Look, source: &str, window: &Window, mirror: bool) -> State {
+    let mut state = State::new(look, source.to_owned());
+    state.shown = window.show;
+    state.split = window.split;
+    state.mirror = mirror;
+    state.full_screen = window.full_screen;
+    state.instruments = window.instruments;
+    state.panel = window.panel;
+    state.text_scale = window.text_scale;
+    state
+}
+
+/// Where people keep pictures, else here.
+fn pictures_folder() -> PathBuf {
+    let home = std::env::var_os("HOME").map(PathBuf::from);
+    let named = std::env::var_os("XDG_PICTURES_DIR").map(PathBuf::from);
+    let usual = home.map(|home| home.join("Pictures"));
+    named.into_iter().chain(usual).find(|folder| folder.is_dir()).unwrap_or_default()
+}

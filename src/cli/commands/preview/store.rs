@@ -1,0 +1,54 @@
+//! The settings file, as the window uses it.
+
+use std::path::PathBuf;
+
+use crate::cli::settings::command_line;
+use crate::cli::settings::file::SettingsFile;
+use crate::cli::settings::layers::Given;
+use crate::cli::settings::presets;
+use crate::cli::settings::save;
+use crate::cli::terminal::print;
+use crate::look::Value;
+use crate::look::presets::Preset;
+use crate::look::{Look, Patch};
+use crate::preview::services::{SettingsStore, Switch};
+
+/// The settings file, and what the command line said.
+pub(super) struct FileStore {
+    /// The settings file, where one was chosen.
+    pub chosen: Option<PathBuf>,
+    /// What was said besides the look.
+    pub given: Given,
+}
+
+impl SettingsStore for FileStore {
+    fn presets(&mut self) -> Vec<Preset> {
+        let file = SettingsFile::load(self.chosen.as_deref()).unwrap_or_else(|error| {
+            tracing::warn!("{error}");
+            SettingsFile::default()
+        });
+        file.all_presets()
+    }
+
+    fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
+        let saved = save::file_to_save(self.chosen.as_deref());
+        let saved = saved.and_then(|file| presets::save(&file, name, &Patch::of(look).values()));
+        saved.map_err(|error| error.to_string())
+    }
+
+    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        let mut switches = switches.to_vec();
+        let is_new = |(name, _): &&Switch| !switches.iter().any(|(other, _)| other == name);
+        let given: Vec<Switch> = self.given.switches.iter().filter(is_new).cloned().collect();
+        // Controls of the camera come last.
+        let at = switches.iter().position(|(name, _)| name == "control").unwrap_or(switches.len());
+        switches.splice(at..at, given);
+        let unusual = Patch::of(look).beside(&Patch::of(&Look::default())).values();
+        let says = |value: &Value| unusual.contains(value) || self.given.behind.iter().any(|name| name == value.0);
+        let flags: Vec<Value> = Patch::of(look).values().into_iter().filter(says).collect();
+        let command = command_line::equivalent(source, outputs, &flags, &switches);
+        // Whoever reads it may be gone.
+        let _ = print(format!("{command}\n").as_bytes());
+        command
+    }
+}

@@ -1,0 +1,210 @@
+//! `render`: one still picture.
+
+mod debug;
+mod debug_pictures;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::cli::error::CliError;
+use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source};
+use crate::cli::focus;
+use crate::cli::log;
+use crate::cli::options;
+use crate::cli::settings::layers::Given;
+use crate::cli::settings::look;
+use crate::cli::settings::unused;
+use crate::cli::settings::unused::From;
+use crate::cli::terminal;
+use crate::compute::Backend;
+use crate::files::place;
+use crate::frame::{ColorImage, DepthMap};
+use crate::look::{ApertureName, Look, Strength};
+use crate::optics::StereoRig;
+use crate::pipeline::{self, still::Depth};
+use crate::recording::still::{self, MapFormat, PhotoFormat};
+use crate::recording::{Extras, snapshot};
+use crate::source::{self, DepthChoice, DepthFrom};
+
+/// Blur one still picture
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam render photo.jpg --depth-map depth.png --out portrait.png
+  bokehcam render photo.jpg --depth-map depth.pfm --focus 0.5,0.4 --aperture polygon:6 --out portrait.png
+  bokehcam render photo.jpg --effect tilt-shift --tilt 0.6:0.1:10 --out small-world.png
+  bokehcam render photo.jpg --effect blur --coc-at-infinity 12 --aperture heart --out hearts.png
+  bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/
+  bokehcam render photo.jpg --depth-map depth.png --preset cinematic --out film.png
+  bokehcam render --like snapshot.png --rim 0.1 --out another.png")]
+pub struct RenderCommand {
+    /// The picture, PNG or JPEG [default: the one that the snapshot of --like was made of]
+    #[arg(required_unless_present = "like")]
+    image: Option<PathBuf>,
+    /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity that `depth` wrote
+    #[arg(long, value_name = "FILE")]
+    depth_map: Option<PathBuf>,
+    /// Take the settings of a snapshot of the preview; flags go before them. Without IMAGE, its NAME-color.png and, without
+    /// --depth-map, its NAME-depth.pfm are blurred, which gives the same picture again
+    #[arg(long, value_name = "NAME.png")]
+    like: Option<PathBuf>,
+    /// Where the result goes, .png or .jpg
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Write every intermediate of the blur into this folder: the CoC, each bin before and after its filters, what
+    /// near objects hide, as PNG, and plan.json (CPU executor)
+    #[arg(long, value_name = "DIR")]
+    debug_dir: Option<PathBuf>,
+    #[command(flatten)]
+    blur: options::Blur,
+    #[command(flatten)]
+    depth: options::Depth,
+    #[command(flatten)]
+    computing: options::Computing,
+    #[command(flatten)]
+    output: options::Output,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A picture cannot be read or written, the options do not fit it, or the blur failed.
+pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> Result<(), CliError> {
+    let plan_file = command.debug_dir.as_ref().map(|dir| dir.join(debug::PLAN));
+    refuse_overwrite([command.out.as_path()].into_iter().chain(plan_file.as_deref()), command.output.force)?;
+    let sources = sources(command);
+    for source in &sources {
+        refuse_source("--out", &command.out, source)?;
+        // Its files are called as they must be.
+        if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
+            && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
+        {
+            refuse_source("--debug-dir", dir, source)?;
+        }
+    }
+    if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
+        let what = "--depth FOLDER, stereo or a depth camera are for `stream`: give a picture's depth with --depth-map";
+        return Err(CliError::Usage(what.to_string()));
+    }
+    let look = look::look(&command.blur, &command.computing.quality)?;
+    let (color, extras, depth) = read(command, &look)?;
+    let look = source::fitting_look(&look, &command.blur.depth, depth.is_some())?;
+    command.warn(&look, color.size(), depth.as_ref(), given);
+    let computing = command.computing.choice();
+    make_folder_of(&command.out)?;
+    let (result, by) = match &command.debug_dir {
+        Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
+        None => pipeline::still::blur(&look, color, depth, &computing)?,
+    };
+    // Its thumbnail would show what the blur hides.
+    let mut extras = extras.without_thumbnail();
+    if still::photo_format(&command.out)? == PhotoFormat::Jpeg {
+        extras = extras.for_jpeg();
+    }
+    still::write_photo(&command.out, &result, &extras, command.output.force)?;
+    if !global.quiet {
+        if !extras.left_behind.is_empty() {
+            terminal::say(&format!("note: not in {}: {}", command.out.display(), extras.left_behind.join(", ")));
+        }
+        terminal::say(&format!("{}: written ({by})", command.out.display()));
+    }
+    Ok(())
+}
+
+impl RenderCommand {
+    /// Says what has no effect, and what cannot be meant.
+    fn warn(&self, look: &Look, size: (u32, u32), depth: Option<&Depth>, given: &Given) {
+        let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
+        let in_units = self.depth_map.as_ref().is_some_and(in_units);
+        let uses_depth = look.effect.follows_depth();
+        unused::warn(
+            &given.settings,
+            &unused::Run {
+                source: From::Picture,
+                depth: match depth {
+                    None => DepthFrom::Nothing,
+                    Some(Depth::Measured(_)) if in_units => DepthFrom::Units,
+                    Some(_) => DepthFrom::Metres,
+                },
+                uses_depth,
+                effect: look.effect,
+                lens: matches!(look.strength, Strength::Lens(_)),
+                realtime: false,
+                cpu_only: self.computing.backend == Backend::Cpu,
+                window: false,
+            },
+        );
+        match depth {
+            None if self.blur.takes_whatever_depth() => unused::warn_of_no_depth(From::Picture),
+            Some(_) if self.depth_map.is_some() && !uses_depth => {
+                log::warn("--depth-map has no effect: the effect does not use depth");
+            }
+            Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, size, map, in_units),
+            None => {}
+        }
+    }
+}
+
+/// The pictures that are read.
+fn sources(command: &RenderCommand) -> Vec<PathBuf> {
+    let beside = command.like.iter().flat_map(|like| {
+        let (color, depth) = snapshot::sources(like);
+        [like.clone(), color, depth]
+    });
+    let aperture = match &command.blur.look.0.aperture {
+        Some(ApertureName::Image(file)) => Some(file),
+        _ => None,
+    };
+    [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(beside).collect()
+}
+
+/// The picture, what goes with it, and its depth if there is any.
+fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Option<Depth>), CliError> {
+    let sources = command.like.as_ref().map(|like| snapshot::sources(like));
+    let given =
+        command.depth_map.as_deref().map(|file| read_depth(file, command, look)).transpose()?.map(Depth::Measured);
+    let (color, extras, depth) = match (&command.image, sources) {
+        (None, Some((color, depth))) => {
+            let kept = given.is_none() && depth.exists();
+            let kept = kept.then(|| read_depth(&depth, command, look)).transpose()?.map(Depth::Final);
+            let (color, extras) = still::read_photo(&color)?;
+            (color, extras, given.or(kept))
+        }
+        (image, _) => {
+            let (color, extras) = still::read_photo(image.as_deref().unwrap_or(Path::new("")))?;
+            (color, extras, given)
+        }
+    };
+    if let (Some(Depth::Measured(map)), Some(file)) = (&depth, &command.depth_map) {
+        still::check_depth_size(file, map.size(), color.size())?;
+    }
+    Ok((color, extras, depth))
+}
+
+/// Depth from a file, in metres, or where the file has disparity without distances in those of assumed eyes.
+fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
+    let name = file.display();
+    let options::Depth { depth_scale, depth_invalid, .. } = command.depth;
+    let (map, rig) = match still::read_map(file, depth_scale, Some(depth_invalid))? {
+        still::Map::Depth(map) => return Ok(map),
+        still::Map::Disparity(map, rig) => (map, rig),
+    };
+    if depth_scale.is_some() {
+        tracing::warn!("{name}: holds disparity, to which --depth-scale does not apply");
+    }
+    let rig = match (rig, look.needs_metres()) {
+        (Some(rig), _) => rig,
+        (None, None) => {
+            tracing::warn!("{name}: holds disparity without distances: what is near and far is known, and not how far");
+            StereoRig::assumed(map.width)
+        }
+        (None, Some(needs)) => {
+            return Err(CliError::Usage(format!(
+                "{needs} needs distances, and {name} holds disparity without any: write it with `depth --metres`; --focus \
+                 auto or X,Y and --coc-at-infinity need none"
+            )));
+        }
+    };
+    Ok(map.depth(|px| rig.depth_m(px)))
+}

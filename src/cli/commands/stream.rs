@@ -1,0 +1,165 @@
+//! `stream`: a source, blurred, into a sink.
+
+use std::sync::Arc;
+
+use clap::Args;
+
+#[cfg(feature = "window")]
+use crate::cli::commands::preview;
+use crate::cli::error::CliError;
+use crate::cli::files::{check_report, write_report};
+use crate::cli::focus;
+use crate::cli::options;
+use crate::cli::settings::layers::Given;
+use crate::cli::settings::look;
+use crate::cli::settings::unused;
+use crate::cli::sinks;
+use crate::cli::terminal;
+use crate::clock::Clock;
+use crate::compute::Backend;
+use crate::link::demand::Demand;
+use crate::look::Strength;
+use crate::pipeline::{self, Pace, Run};
+use crate::sink::{self, Target};
+use crate::source::{DepthFrom, Source, SourceName};
+
+/// Blur a camera, a recording or the synthetic scene, frame by frame
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam stream /dev/video0 --to /dev/video10
+  bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
+  bokehcam stream 0,2 --calib stereo.yml --to /dev/video10
+  bokehcam stream /dev/video4 --side-by-side --rectified --to /dev/video10
+  bokehcam stream recordings/portrait --to out/
+  bokehcam stream recordings/portrait --to out.mp4 --aperture polygon:6 --focus 1.2
+  bokehcam stream recordings/portrait --to - --quiet --pace realtime | ffplay -
+  bokehcam stream recordings/portrait --loop --to /dev/video10 --out-size 1280x720
+  bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
+  bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
+pub struct StreamCommand {
+    /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
+    /// folder with a recording, or `synthetic`
+    #[arg(value_parser = options::source_name())]
+    source: SourceName,
+    #[arg(long, value_name = "SINK", required = true, help = TO)]
+    to: Vec<Target>,
+    #[command(flatten)]
+    parts: options::Streaming,
+    #[cfg(feature = "window")]
+    #[command(flatten)]
+    window: options::Window,
+}
+
+#[cfg(feature = "window")]
+const TO: &str = "/dev/videoN (virtual camera), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), \
+                  FILE.mp4, .mkv or .webm (ffmpeg), or null; may be given more than once";
+#[cfg(not(feature = "window"))]
+const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, \
+                  .mkv or .webm (ffmpeg), or null; may be given more than once";
+
+/// Runs the command; `given` is what was said of other things than the look. The report is written whenever the pipeline
+/// ran, however it ended.
+///
+/// # Errors
+/// The options do not fit the source, something would be overwritten, or a stage of the pipeline failed.
+pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> Result<(), CliError> {
+    let StreamCommand { parts, .. } = command;
+    let options::Streaming { stream, output, .. } = parts;
+    sinks::check(&command.to, parts, &command.source)?;
+    #[cfg(feature = "window")]
+    if command.to.contains(&Target::Window) {
+        let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
+        return preview::show(&command.source.to_string(), &others, &command.window, parts, (global, given));
+    }
+    check_report(stream.report.as_deref(), output.force, &command.to)?;
+    if stream.pace == Some(Pace::Asap) && !command.source.devices().is_empty() {
+        let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
+        return Err(CliError::Usage(what.to_string()));
+    }
+    let look = look::look(&parts.blur, &parts.computing.quality)?;
+    let options = parts.source_options();
+    let source = Source::open(&command.source, &options, Some(&look))?;
+    let info = source.camera.info();
+    let measured = source.is_measured();
+    let is_live = info.live || command.to.iter().any(Target::is_live);
+    let pace = stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
+    let look = source.fitting_look(&look, &options)?;
+    let adaptive = pace == Pace::Realtime;
+    unused::warn(
+        &given.settings,
+        &unused::Run {
+            source: unused::From::Source(command.source.kind()),
+            depth: source.depth_from,
+            uses_depth: look.effect.follows_depth(),
+            effect: look.effect,
+            lens: matches!(look.strength, Strength::Lens(_)),
+            realtime: adaptive,
+            cpu_only: parts.computing.backend == Backend::Cpu,
+            window: false,
+        },
+    );
+    if let Some(map) = source.first_depth.as_ref() {
+        focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
+    }
+    let settings = look.settings(info.size, adaptive);
+    let bokeh = settings.map(|settings| options.computing.blur(&settings, info.size)).transpose()?;
+    // Last, so that nothing is begun that cannot be carried through.
+    let demand = stream.on_demand.then(Demand::new);
+    let stop = terminal::stop_flag()?;
+    let sink_options = sink::Options {
+        frames: info.frames,
+        force: output.force,
+        out_size: stream.out_size.map(|size| (size.width, size.height)),
+        demand: demand.clone(),
+        stop: Arc::clone(&stop),
+        ..sink::Options::new(info.size, info.period_ns)
+    };
+    sinks::try_report(stream.report.as_deref())?;
+    let sink = sinks::open(&command.to, &sink_options)?;
+
+    if info.live && !global.quiet {
+        terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
+    }
+    if parts.blur.takes_whatever_depth() && !source.has_depth() {
+        unused::warn_of_no_depth(unused::From::Source(command.source.kind()));
+    }
+    let bar = terminal::Progress::new(info.frames, global);
+    let ended = pipeline::run(Run {
+        camera: source.camera,
+        depth: source.depth,
+        bokeh,
+        look,
+        adaptive,
+        measured,
+        changes: None,
+        sink,
+        pace,
+        budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
+        keep_going: stream.keep_going,
+        demand,
+        mirror: stream.mirror,
+        wanted: None,
+        view: None,
+        clock: Clock::system(),
+        stop: &stop,
+        progress: &|progress| bar.delivered(progress.delivered),
+    });
+    drop(bar);
+    let (report, ended) = match ended {
+        Ok(report) => (Box::new(report), Ok(())),
+        Err(failed) => (failed.report, Err(failed.fault.into())),
+    };
+    let written = stream.report.as_ref().map_or(Ok(()), |path| write_report(path, &report));
+    if !global.quiet {
+        terminal::say(&report.to_string());
+    }
+    match (ended, written) {
+        // What ended the run is the error to tell.
+        (Err(ended), Err(unwritten)) => {
+            terminal::say(&format!("the report is not written: {unwritten}"));
+            Err(ended)
+        }
+        (ended, written) => ended.and(written),
+    }
+}

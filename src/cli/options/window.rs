@@ -1,0 +1,43 @@
+//! What a window shows first, as it is written.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::BoolishValueParser;
+
+use crate::cli::options::named;
+use crate::look::number::within;
+use crate::preview::state::{Shown, TEXT_SCALES};
+
+/// What a window shows first; all of it can be changed there.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Window")]
+pub struct Window {
+    /// What of each frame is shown
+    #[arg(long, value_parser = named::<Shown>(), value_name = "WHAT", default_value = "picture")]
+    pub show: Shown,
+    /// Show the picture as it was before the blur, left of this fraction of its width
+    #[arg(long, value_name = "FRACTION", value_parser = within(0.0..=1.0))]
+    pub split: Option<f32>,
+    /// Fill the screen
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub full_screen: bool,
+    /// Show frame times, latency and drops
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub instruments: bool,
+    /// Show the controls; --panel=false begins without
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = true,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(),
+          action = clap::ArgAction::Set, hide_possible_values = true)]
+    pub panel: bool,
+    /// Size of text and controls, 1 as usual
+    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = within(TEXT_SCALES))]
+    pub text_scale: f32,
+    /// Where snapshots and recordings go [default: the pictures folder]
+    #[arg(long, value_name = "DIR")]
+    pub save_to: Option<PathBuf>,
+}

@@ -1,0 +1,56 @@
+//! From arguments to a command with its settings.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use clap::{ArgMatches, CommandFactory, FromArgMatches};
+
+use super::commands::Cli;
+use super::error::CliError;
+use super::settings::file::SettingsFile;
+use super::settings::layers::Layers;
+use super::settings::{save, table};
+
+/// Why arguments are no command.
+pub enum Refusal {
+    Arguments(clap::Error),
+    Settings(CliError),
+}
+
+impl From<clap::Error> for Refusal {
+    fn from(error: clap::Error) -> Self {
+        Refusal::Arguments(error)
+    }
+}
+
+/// A command line, and what stands behind it.
+pub struct Parsed {
+    pub cli: Cli,
+    pub matches: ArgMatches,
+    pub file: SettingsFile,
+    pub layers: Layers,
+}
+
+/// Reads arguments, with what the environment, a preset and the settings file say.
+pub fn parse(args: &[OsString]) -> Result<Parsed, Refusal> {
+    let command = table::with_environment(Cli::command());
+    // Once without the settings file, to learn its name and the preset's; then again with their values as defaults.
+    let given = command.clone().try_get_matches_from(args)?;
+    let chosen = Cli::from_arg_matches(&given)?.global.config;
+    let file = settings_for(&given, chosen.as_deref()).map_err(Refusal::Settings)?;
+    let layers = Layers::of(&file, &given).map_err(Refusal::Settings)?;
+    let matches = layers.as_defaults(command).try_get_matches_from(args)?;
+    Ok(Parsed { cli: Cli::from_arg_matches(&matches)?, matches, file, layers })
+}
+
+/// The settings file, as the command needs it.
+fn settings_for(given: &ArgMatches, chosen: Option<&Path>) -> Result<SettingsFile, CliError> {
+    let config = given.subcommand_matches("config").and_then(ArgMatches::subcommand_name);
+    match (config, chosen) {
+        // It will be made.
+        (Some("save"), Some(path)) if path.symlink_metadata().is_err() => return Ok(SettingsFile::default()),
+        (Some("dump"), _) => save::refuse_redirect(chosen)?,
+        _ => {}
+    }
+    SettingsFile::load(chosen)
+}

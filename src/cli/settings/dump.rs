@@ -1,0 +1,57 @@
+//! `config dump`: the settings as a settings file.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use super::file::PRESETS;
+use super::layers::Setting;
+use super::table::Values;
+
+/// The settings in TOML, each under what it does and where its value comes from, and the presets of the file. Settings
+/// without a value of their own are comments, and so is the preset, whose values are all there.
+pub fn as_toml(settings: &[Setting], presets: &BTreeMap<String, Values>) -> String {
+    let mut text = String::from("# bokehcam settings. Flags and the environment go before this file.\n");
+    for setting in settings {
+        let Setting { name, value, origin, help } = setting;
+        // Writing to a String cannot fail.
+        let _ = match value {
+            Some(value) if name == "preset" => {
+                write!(text, "\n# {help}\n# {name} = {} # {origin}\n", toml_value(value))
+            }
+            Some(value) => write!(text, "\n# {help}\n{name} = {} # {origin}\n", toml_value(value)),
+            None => write!(text, "\n# {help}\n# {name} = # {origin}\n"),
+        };
+    }
+    for (name, values) in presets {
+        let _ = writeln!(text, "\n[{PRESETS}.{}]", toml_edit::Key::new(name).display_repr());
+        for (name, value) in values {
+            let _ = writeln!(text, "{name} = {}", toml_value(value));
+        }
+    }
+    text
+}
+
+/// Numbers and booleans bare, all else in quotes.
+fn toml_value(text: &str) -> String {
+    toml_number(text).unwrap_or_else(|| toml_edit::Value::from(text)).to_string()
+}
+
+/// The number or boolean that `text` is.
+pub fn toml_number(text: &str) -> Option<toml_edit::Value> {
+    let whole = text.parse::<i64>().map(toml_edit::Value::from).ok();
+    let whole = whole.or_else(|| text.parse::<bool>().map(toml_edit::Value::from).ok());
+    whole.or_else(|| text.parse::<f64>().ok().filter(|x| x.is_finite()).map(toml_edit::Value::from))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_keep_their_kind() {
+        for (text, toml) in [("3", "3"), ("0.2", "0.2"), ("true", "true"), ("disc", "\"disc\""), ("inf", "\"inf\"")] {
+            assert_eq!(toml_value(text), toml);
+        }
+        assert_eq!(toml_value("a\"b\\"), r#"'a"b\'"#);
+    }
+}

@@ -1,0 +1,85 @@
+//! Settings in the environment: what a variable is called, which variables are none, and what they are to blame for.
+
+use std::ffi::OsString;
+use std::os::unix::ffi::OsStrExt;
+
+use super::table::{PREFIX, all_settings, nearest_setting, variable};
+use crate::cli::log;
+
+/// Variables that are no settings: the settings file's, and those of the tests.
+const OTHERS: [&str; 6] = ["CONFIG", "DATA", "NO_VM", "PAIR", "SCREENSHOTS", "VM"];
+
+/// Warns of variables that would be settings if there were such settings.
+pub fn warn_of_unknown() {
+    let known: Vec<String> = all_settings().get_arguments().filter_map(|arg| arg.get_long().map(variable)).collect();
+    let names = std::env::vars_os().map(|(name, _)| name.to_string_lossy().into_owned());
+    let is_unknown = |name: &String| {
+        let own = name.strip_prefix(PREFIX);
+        own.is_some_and(|own| !OTHERS.contains(&own)) && !known.contains(name)
+    };
+    let mut unknown: Vec<String> = names.filter(is_unknown).map(|name| described(&name)).collect();
+    unknown.sort();
+    if !unknown.is_empty() {
+        log::warn(&format!("in the environment there is {}", unknown.join(" and ")));
+    }
+}
+
+fn described(name: &str) -> String {
+    let setting = name.strip_prefix(PREFIX).unwrap_or(name).replace('_', "-").to_lowercase();
+    let hint = nearest_setting(&setting).map_or(String::new(), |near| format!(", did you mean {}?", variable(&near)));
+    format!("{name}, which is no setting{hint}")
+}
+
+/// A message with the environment's variables that the options in it come from.
+pub fn with_origin(message: &str, args: &[OsString]) -> String {
+    let mut variables: Vec<String> = options_in(message)
+        .filter(|name| !has_option(args, name))
+        .filter_map(|name| {
+            let variable = variable(name);
+            let value = std::env::var_os(&variable).filter(|value| !value.is_empty())?;
+            Some(format!("{variable}={}", value.to_string_lossy()))
+        })
+        .collect();
+    variables.dedup();
+    match variables.is_empty() {
+        true => message.to_owned(),
+        false => format!("{message} (in the environment: {})", variables.join(", ")),
+    }
+}
+
+/// Whether the option `--name` is among the arguments.
+fn has_option(args: &[OsString], name: &str) -> bool {
+    let is_it = |arg: &OsString| {
+        let rest = arg.as_bytes().strip_prefix(b"--").and_then(|rest| rest.strip_prefix(name.as_bytes()));
+        rest.is_some_and(|rest| rest.is_empty() || rest[0] == b'=')
+    };
+    args.iter().any(is_it)
+}
+
+/// The options that a text speaks of, without their dashes.
+fn options_in(text: &str) -> impl Iterator<Item = &str> {
+    text.match_indices("--").filter_map(|(at, _)| {
+        let rest = &text[at + 2..];
+        let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '-').unwrap_or(rest.len());
+        Some(&rest[..end]).filter(|name| name.starts_with(|c: char| c.is_ascii_lowercase()))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_found_in_what_is_said_of_them() {
+        let text = "the argument '--coc-at-infinity <PX>' cannot be used with: --f-number; -- no more --";
+        assert_eq!(options_in(text).collect::<Vec<_>>(), ["coc-at-infinity", "f-number"]);
+        assert_eq!(variable("coc-at-infinity"), "BOKEHCAM_COC_AT_INFINITY");
+    }
+
+    #[test]
+    fn options_are_found_with_and_without_a_value() {
+        let given = ["--rim=0.1", "--focus", "1"].map(OsString::from);
+        assert!(has_option(&given, "rim") && has_option(&given, "focus"));
+        assert!(!has_option(&given, "foc") && !has_option(&given, "rank"));
+    }
+}

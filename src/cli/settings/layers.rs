@@ -1,0 +1,209 @@
+//! Which value of a setting holds: flag > snapshot > environment > preset > file > default.
+//!
+//! What is behind the environment becomes the default values of the flags. A setting sets aside those that it excludes
+//! in the layers behind it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use clap::builder::Resettable;
+use clap::parser::{RawValues, ValueSource};
+use clap::{Arg, ArgMatches, Command};
+
+use super::file::SettingsFile;
+use super::table::{Values, all_settings, excluded_by, on_settings, parse_flags};
+use crate::cli::error::CliError;
+use crate::cli::log::one_line;
+use crate::look::{SETTINGS, settings};
+use crate::recording::snapshot;
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Its flag without the dashes.
+    pub name: String,
+    /// Its value as it would follow the flag; none when its default depends on the picture.
+    pub value: Option<String>,
+    /// Where the value comes from.
+    pub origin: &'static str,
+    pub help: String,
+}
+
+/// What a command line says besides the look.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    /// What flags and the environment say of other things, by name and value.
+    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
+    pub switches: Vec<(String, String)>,
+    /// Settings of the look that come from elsewhere than flags and defaults: left unsaid, they come again.
+    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
+    pub behind: Vec<String>,
+    /// All that flags, the environment and the preset say; of the preset what is unlike the defaults.
+    pub settings: Vec<Setting>,
+}
+
+/// The settings of one command line that come from neither flags nor environment.
+#[derive(Debug, Default)]
+pub struct Layers {
+    /// Their values, and where those come from.
+    values: BTreeMap<String, (String, &'static str)>,
+    /// Settings whose environment variable is set aside.
+    silent: Vec<String>,
+}
+
+impl Layers {
+    /// What stands behind the flags and the environment in `given`.
+    ///
+    /// # Errors
+    /// There is no preset of the name that was chosen, or the snapshot that was named has no settings in it.
+    pub fn of(file: &SettingsFile, given: &ArgMatches) -> Result<Self, CliError> {
+        let given = leaf(given);
+        let from = |source: ValueSource| -> Vec<String> {
+            let is_from = |arg: &&Arg| source_of(given, arg) == Some(source);
+            all_settings().get_arguments().filter(is_from).filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
+        };
+        let (by_flag, by_environment) = (from(ValueSource::CommandLine), from(ValueSource::EnvVariable));
+        let named = |id: &str| given.try_get_one::<String>(id).ok().flatten();
+        let preset = match named("preset").or_else(|| file.values.get("preset")) {
+            Some(name) => file.preset(name).ok_or_else(|| CliError::Usage(file.no_preset(name)))?,
+            None => Values::new(),
+        };
+        let like = match given.try_get_one::<PathBuf>("like").ok().flatten() {
+            Some(path) => of_snapshot(path)?,
+            None => Values::new(),
+        };
+
+        let mut layers = Self::default();
+        let mut taken = by_flag.clone();
+        // A preset that was asked for beside a snapshot is meant to change it.
+        if !like.is_empty() && by_flag.iter().any(|name| name == "preset") {
+            layers.add(&preset, "preset", &mut taken);
+        }
+        layers.add(&like, "snapshot", &mut taken);
+        let (silent, heard) = apart(by_environment, &taken);
+        layers.silent = silent;
+        taken.extend(heard);
+        layers.add(&preset, "preset", &mut taken);
+        layers.add(&file.values, "file", &mut taken);
+        Ok(layers)
+    }
+
+    /// What a command that does the same has to say besides the look.
+    pub fn given(&self, matches: &ArgMatches) -> Given {
+        /// These are for one run, or the window's, which says them itself.
+        const ONCE: [&str; 10] = [
+            "preset",
+            "report",
+            "force",
+            "mirror",
+            "show",
+            "split",
+            "full-screen",
+            "instruments",
+            "panel",
+            "text-scale",
+        ];
+        let is_given = |setting: &Setting| {
+            let name = setting.name.as_str();
+            ["flag", "environment"].contains(&setting.origin)
+                && settings::setting(name).is_none()
+                && !ONCE.contains(&name)
+        };
+        let resolved = self.resolved(matches);
+        let is_behind = |setting: &&Setting| {
+            settings::setting(&setting.name).is_some() && !["flag", "default"].contains(&setting.origin)
+        };
+        let mut behind: Vec<String> = resolved.iter().filter(is_behind).map(|setting| setting.name.clone()).collect();
+        let of_strength = |name: &str| settings::setting(name).is_some_and(settings::Setting::is_strength);
+        if behind.iter().any(|name| of_strength(name)) {
+            let all = SETTINGS.iter().filter(|setting| setting.is_strength());
+            behind.extend(all.map(|setting| setting.name.to_owned()));
+        }
+        let is_said = |setting: &&Setting| match setting.origin {
+            "flag" | "environment" => true,
+            "preset" => !is_usual(setting),
+            _ => false,
+        };
+        let said = resolved.iter().filter(is_said).cloned().collect();
+        let given = resolved.into_iter().filter(is_given);
+        let switches = given.filter_map(|setting| Some((setting.name, setting.value?))).collect();
+        Given { switches, behind, settings: said }
+    }
+
+    /// Adds what no layer before has or excludes.
+    fn add(&mut self, values: &Values, origin: &'static str, taken: &mut Vec<String>) {
+        let (_, free) = apart(values.keys().cloned().collect(), taken);
+        self.values.extend(free.iter().map(|name| (name.clone(), (values[name].clone(), origin))));
+        taken.extend(free);
+    }
+
+    /// The command with these settings as defaults.
+    pub fn as_defaults(&self, command: Command) -> Command {
+        on_settings(command, &|arg, name| {
+            let heard = match self.silent.iter().any(|silent| silent == name) {
+                true => arg.env(Resettable::Reset),
+                false => arg,
+            };
+            match self.values.get(name) {
+                Some((value, _)) => heard.default_value(value.clone()),
+                None => heard,
+            }
+        })
+    }
+
+    /// All settings of the command that `given` belongs to, in the order of its help.
+    pub fn resolved(&self, given: &ArgMatches) -> Vec<Setting> {
+        let given = leaf(given);
+        let describe = |arg: &Arg| {
+            let name = arg.get_long()?.to_owned();
+            // A list as it would be written.
+            let listed = |values: RawValues| {
+                values.map(|value| value.to_string_lossy().into_owned()).collect::<Vec<_>>().join(",")
+            };
+            let value = given.try_get_raw(arg.get_id().as_str()).ok().flatten().map(listed);
+            let origin = match source_of(given, arg) {
+                Some(ValueSource::CommandLine) => "flag",
+                Some(ValueSource::EnvVariable) => "environment",
+                _ => self.values.get(&name).map_or("default", |(_, origin)| origin),
+            };
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            Some(Setting { name, value, origin, help })
+        };
+        all_settings().get_arguments().filter_map(describe).collect()
+    }
+}
+
+/// Whether a setting has the value that it has where nothing is said.
+fn is_usual(setting: &Setting) -> bool {
+    let every = all_settings();
+    let arg = every.get_arguments().find(|arg| arg.get_long() == Some(&setting.name));
+    let default = arg.and_then(|arg| arg.get_default_values().first()).map(|value| value.to_string_lossy());
+    setting.value.as_deref() == Some(default.as_deref().unwrap_or("auto"))
+}
+
+/// Those of `names` that are in `taken` or excluded by it, and the others.
+fn apart(names: Vec<String>, taken: &[String]) -> (Vec<String>, Vec<String>) {
+    let excluded = excluded_by(taken);
+    names.into_iter().partition(|name| taken.contains(name) || excluded.contains(name))
+}
+
+fn source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
+    let id = arg.get_id().as_str();
+    given.try_contains_id(id).is_ok_and(|present| present).then(|| given.value_source(id)).flatten()
+}
+
+/// The settings in a snapshot, as good as if they were flags.
+fn of_snapshot(path: &Path) -> Result<Values, CliError> {
+    let refuse = |what: String| CliError::Usage(format!("--like {}: {what}", path.display()));
+    let values: Values = snapshot::settings(path)?.into_iter().collect();
+    if let Some(other) = values.keys().find(|name| settings::setting(name).is_none()) {
+        return Err(refuse(format!(
+            "its setting '{other}' is none of a look: it is of another version, or was edited"
+        )));
+    }
+    parse_flags(&values).map_err(|error| refuse(one_line(&error)))?;
+    Ok(values)
+}
+/// The matches of the innermost command.
+fn leaf(matches: &ArgMatches) -> &ArgMatches {
+    matches.subcommand().map_or(matches, |(_, below)| leaf(below))
+}

@@ -1,0 +1,79 @@
+//! Settings by their names: the parser of the flags is the only one there is. A setting's environment variable and its
+//! key in the settings file are its flag's name.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+
+use clap::error::{ContextKind, ErrorKind};
+use clap::{Arg, ArgMatches, Args, Command};
+
+use crate::cli::options::Every;
+
+/// Settings by their flags without the dashes, each value as it would follow its flag.
+pub type Values = BTreeMap<String, String>;
+
+/// What the variables of settings begin with.
+pub const PREFIX: &str = "BOKEHCAM_";
+
+/// The variable of a setting: `BOKEHCAM_` and the flag's name in capitals.
+pub fn variable(setting: &str) -> String {
+    format!("{PREFIX}{}", setting.replace('-', "_").to_uppercase())
+}
+
+/// Gives every setting its environment variable.
+pub fn with_environment(command: Command) -> Command {
+    on_settings(command, &|arg, name| arg.env(variable(name)).hide_env(true))
+}
+
+/// A command that has every setting and nothing else.
+pub fn all_settings() -> Command {
+    Every::augment_args(Command::new("settings").disable_help_flag(true).no_binary_name(true))
+}
+
+/// Whether there is a setting of this name.
+pub fn is_setting(name: &str) -> bool {
+    all_settings().get_arguments().any(|arg| arg.get_long() == Some(name))
+}
+
+/// The setting whose name clap would suggest.
+pub fn nearest_setting(name: &str) -> Option<String> {
+    let error = all_settings().try_get_matches_from([format!("--{name}")]).err()?;
+    let suggested = error.get(ContextKind::SuggestedArg)?;
+    (error.kind() == ErrorKind::UnknownArgument).then(|| suggested.to_string().trim_start_matches('-').to_owned())
+}
+
+/// Settings as if they were flags.
+///
+/// # Errors
+/// One of them would be refused.
+pub fn parse_flags(values: &Values) -> Result<ArgMatches, clap::Error> {
+    let flags = values.iter().map(|(name, value)| OsString::from(format!("--{name}={value}")));
+    all_settings().try_get_matches_from(flags)
+}
+
+/// Names of the settings that exclude, or are excluded by, one of `names`.
+pub fn excluded_by(names: &[String]) -> Vec<String> {
+    let every = all_settings();
+    let exclude_each_other = |a: &Arg, b: &Arg| {
+        let names = |from: &Arg, to: &Arg| every.get_arg_conflicts_with(from).iter().any(|x| x.get_id() == to.get_id());
+        names(a, b) || names(b, a)
+    };
+    let is_named = |arg: &&Arg| arg.get_long().is_some_and(|long| names.iter().any(|name| name == long));
+    let (named, rest): (Vec<&Arg>, Vec<&Arg>) = every.get_arguments().partition(is_named);
+    let excluded = rest.into_iter().filter(|arg| named.iter().any(|other| exclude_each_other(arg, other)));
+    excluded.filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
+}
+
+/// Rewrites each setting of a command and of those below it.
+pub fn on_settings(command: Command, rewrite: &dyn Fn(Arg, &str) -> Arg) -> Command {
+    let settings = all_settings();
+    // By id: a command may have an option of the same name that is no setting.
+    rewrite_args(command, &|arg: Arg| match settings.get_arguments().find(|setting| setting.get_id() == arg.get_id()) {
+        Some(setting) => rewrite(arg, setting.get_long().unwrap_or_default()),
+        None => arg,
+    })
+}
+
+fn rewrite_args(command: Command, rewrite: &dyn Fn(Arg) -> Arg) -> Command {
+    command.mut_args(rewrite).mut_subcommands(|below| rewrite_args(below, rewrite))
+}

@@ -1,0 +1,213 @@
+//! Settings that were given and can have no effect in this run: said in one line, whatever the command.
+//!
+//! What was given is what flags, the environment and a preset say; the settings file is a wish for all runs.
+
+use super::layers::Setting;
+use super::table::variable;
+use crate::cli::log;
+use crate::look::Effect;
+use crate::source::{DepthFrom, Kind};
+
+/// What a run came to, as far as settings depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    /// What frames come from.
+    pub source: From,
+    /// What depth comes from.
+    pub depth: DepthFrom,
+    /// Whether anything is made of it.
+    pub uses_depth: bool,
+    /// What the blur follows.
+    pub effect: Effect,
+    /// Whether the strength is that of a lens.
+    pub lens: bool,
+    /// Whether frames come in real time.
+    pub realtime: bool,
+    /// Whether the CPU alone was asked for.
+    pub cpu_only: bool,
+    /// Whether there is a window.
+    pub window: bool,
+}
+
+/// What frames come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum From {
+    /// A source of frames.
+    Source(Kind),
+    Picture,
+    /// The scene that is measured.
+    Bench,
+}
+
+/// Why a setting has no effect in a run, if it has none.
+type Why = fn(&Run) -> Option<&'static str>;
+
+const NEEDS: [(&[&str], Why); 13] = [
+    (&["size", "fps"], |run| (run.source == From::Source(Kind::Recording)).then_some("a recording has its own")),
+    (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
+    (&["depth-scale", "depth-invalid"], |run| match run.depth {
+        DepthFrom::Nothing => Some(NO_DEPTH),
+        DepthFrom::Metres | DepthFrom::Eyes => Some("this depth is in metres already"),
+        DepthFrom::Units if run.uses_depth => None,
+        DepthFrom::Units => Some(DEPTH_UNUSED),
+    }),
+    (&["max-disparity", "rectified", "calib", "focal-px", "baseline-m", "doffs-px"], |run| {
+        (run.depth != DepthFrom::Eyes).then_some("depth is not taken from two eyes")
+    }),
+    (&["focus"], |run| if run.lens { None } else { dof(run) }),
+    (&["focus-range", "method"], dof),
+    (&["refine"], |run| if run.source == From::Bench { Some("the scene's depth is exact") } else { dof(run) }),
+    (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
+    (&["coc-at-infinity", "f-number", "focal-length", "sensor-width"], |run| {
+        if run.source == From::Bench { Some("`bench` takes --coc") } else { blur(run) }
+    }),
+    (&["max-coc", "aperture", "intensity", "rim", "rank", "highlights", "quality"], blur),
+    (&["backend", "adapter", "threads"], |run| match run.depth {
+        DepthFrom::Eyes => None,
+        _ => blur(run),
+    }),
+    (&["budget-ms"], |run| match run.realtime {
+        true => blur(run),
+        false => Some("frames do not come in real time: add --pace realtime"),
+    }),
+    (&["show", "split", "full-screen", "instruments", "panel", "text-scale", "save-to"], |run| {
+        (!run.window).then_some("there is no window")
+    }),
+];
+
+const NO_DEPTH: &str = "there is no depth";
+const DEPTH_UNUSED: &str = "the effect does not use depth";
+
+/// Depth is used by one effect.
+fn dof(run: &Run) -> Option<&'static str> {
+    match (run.effect, run.depth) {
+        (effect, _) if effect.follows_depth() => None,
+        (_, DepthFrom::Nothing) => Some(NO_DEPTH),
+        _ => Some(DEPTH_UNUSED),
+    }
+}
+
+fn blur(run: &Run) -> Option<&'static str> {
+    (run.effect == Effect::None).then_some("nothing is blurred")
+}
+
+/// Warns of what was given and has no effect.
+pub fn warn(given: &[Setting], run: &Run) {
+    warn_of(unused(given, run));
+}
+
+/// The same, as far as that depends on the source alone: the window changes all else.
+#[cfg(feature = "window")]
+pub fn warn_by_source(given: &[Setting], source: Kind) {
+    let run = Run {
+        source: From::Source(source),
+        depth: DepthFrom::Nothing,
+        uses_depth: false,
+        effect: Effect::None,
+        lens: false,
+        realtime: true,
+        cpu_only: false,
+        window: true,
+    };
+    let of_source = NEEDS[..2].iter().flat_map(|(names, _)| *names);
+    let names: Vec<&str> = of_source.copied().collect();
+    warn_of(unused(given, &run).into_iter().filter(|(setting, _)| names.contains(&setting.name.as_str())).collect());
+}
+
+fn unused<'a>(given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
+    let why = |setting: &Setting| {
+        let need = NEEDS.iter().find(|(names, _)| names.contains(&setting.name.as_str()));
+        let no_gpu = (setting.name == "adapter" && run.cpu_only).then_some("--backend cpu takes no GPU");
+        need.and_then(|(_, why)| why(run)).or(no_gpu)
+    };
+    given.iter().filter_map(|setting| Some((setting, why(setting)?))).collect()
+}
+
+/// One line, whatever there is to say: settings with one reason together.
+fn warn_of(unused: Vec<(&Setting, &str)>) {
+    let mut reasons: Vec<&str> = Vec::new();
+    for (_, why) in &unused {
+        if !reasons.contains(why) {
+            reasons.push(why);
+        }
+    }
+    let with = |why: &&str| {
+        let names: Vec<String> = unused.iter().filter(|(_, other)| other == why).map(|(s, _)| called(s)).collect();
+        format!("{} ({why})", names.join(", "))
+    };
+    if !reasons.is_empty() {
+        log::warn(&format!("without effect here: {}", reasons.iter().map(with).collect::<Vec<_>>().join("; ")));
+    }
+}
+
+fn called(setting: &Setting) -> String {
+    let Setting { name, value, origin, .. } = setting;
+    let value = value.as_deref().unwrap_or_default();
+    match *origin {
+        "flag" => format!("--{name} {value}"),
+        "environment" => format!("{}={value}", variable(name)),
+        origin => format!("{name} = {value} of the {origin}"),
+    }
+}
+
+/// Warns that a picture without depth gets tilt-shift, where depth was not declined.
+pub fn warn_of_no_depth(source: From) {
+    let way = match source {
+        From::Picture => "--depth-map FILE gives its depth",
+        From::Source(Kind::Recording) => "--depth FOLDER takes another recording's",
+        From::Source(_) | From::Bench => "--depth NAME takes a depth camera's",
+    };
+    log::warn(&format!(
+        "{NO_DEPTH}, so a band of the picture stays sharp and the rest is blurred (tilt-shift): {way}, --effect blur blurs it all"
+    ));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::all_settings;
+    use super::*;
+
+    fn setting(name: &str) -> Setting {
+        Setting { name: name.to_owned(), value: Some("1".into()), origin: "flag", help: String::new() }
+    }
+
+    const RUN: Run = Run {
+        source: From::Picture,
+        depth: DepthFrom::Nothing,
+        uses_depth: false,
+        effect: Effect::Blur,
+        lens: false,
+        realtime: false,
+        cpu_only: false,
+        window: false,
+    };
+
+    #[test]
+    fn every_name_in_the_table_is_a_setting_and_there_once() {
+        let mut names: Vec<&str> = NEEDS.iter().flat_map(|(names, _)| *names).copied().collect();
+        let all = all_settings();
+        let is_camera = |name: &&str| ["format", "control"].contains(name);
+        let is_setting = |name: &&str| all.get_arguments().any(|arg| arg.get_long() == Some(name));
+        let window = |name: &&str| cfg!(feature = "window") || !NEEDS[12].0.contains(name);
+        assert!(names.iter().all(|name| is_setting(name) || is_camera(name) || !window(name)), "{names:?}");
+        names.sort_unstable();
+        assert!(names.windows(2).all(|pair| pair[0] != pair[1]));
+    }
+
+    #[test]
+    fn a_setting_has_an_effect_where_what_it_needs_is_there() {
+        let why = |name: &str, run: &Run| unused(&[setting(name)], run).first().map(|(_, why)| *why);
+        assert_eq!(why("focus", &RUN), Some(NO_DEPTH));
+        assert_eq!(why("focus", &Run { lens: true, ..RUN }), None);
+        let dof = Run { depth: DepthFrom::Units, uses_depth: true, effect: Effect::Dof, ..RUN };
+        for name in ["focus", "refine", "focus-range", "depth-scale", "method"] {
+            assert_eq!(why(name, &dof), None, "{name}");
+            assert_eq!(why(name, &Run { depth: DepthFrom::Nothing, ..RUN }), Some(NO_DEPTH), "{name}");
+        }
+        assert!(why("depth-scale", &Run { depth: DepthFrom::Eyes, ..dof }).is_some());
+        assert!(why("tilt", &dof).is_some() && why("tilt", &Run { effect: Effect::TiltShift, ..RUN }).is_none());
+        assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &Run { realtime: true, ..dof }).is_none());
+        assert!(why("rim", &Run { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
+        assert!(why("fps", &Run { source: From::Source(Kind::Recording), ..dof }).is_some());
+    }
+}
