@@ -90,9 +90,9 @@ fn one_level_takes_no_memory_for_others() {
     for effect in COC_KINDS {
         let one = Plan::new(&settings(effect), SIZE.0, SIZE.1);
         let all = Plan::new(&Settings { adaptive: true, ..settings(effect) }, SIZE.0, SIZE.1);
-        assert_eq!((one.levels.iter().count(), one.levels.banks.len()), (1, 1));
-        assert_eq!(all.levels.iter().count(), Quality::ALL.len());
-        assert!(one.slots() <= all.slots() && all.levels.banks.len() <= 4, "levels share filters");
+        assert_eq!((one.ladder.iter().count(), one.ladder.banks.len()), (1, 1));
+        assert_eq!(all.ladder.iter().count(), Quality::ALL.len());
+        assert!(one.slots() <= all.slots() && all.ladder.banks.len() <= 4, "levels share filters");
     }
 }
 

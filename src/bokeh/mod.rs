@@ -14,7 +14,7 @@ pub mod fallback;
 #[doc(hidden)]
 pub mod gpu;
 #[doc(hidden)]
-pub mod levels;
+pub mod ladder;
 mod limit;
 pub mod low_rank;
 mod picture;

@@ -14,8 +14,8 @@
 use std::sync::Arc;
 
 use super::bank::{Bank, MASK_CELLS};
-use super::levels::Levels;
-use super::rung::{MOST_FULL_RADIUS_PX, Rung, scale_within};
+use super::ladder::{Compositing, Ladder};
+use super::rung::{FOCUS_BORDER_PX, MOST_FULL_RADIUS_PX, Rung, scale_within};
 pub use super::share::Share;
 use super::split::{Counts, MAX_PIECES, Piece};
 use super::{Method, Rank, Settings};
@@ -40,17 +40,6 @@ pub const ANY_COLOR: f32 = 1e20;
 
 /// Weight of far cells in a local radius, so that there is one wherever the filter finds anything at all.
 pub const FAR_WEIGHT: f32 = 0.02;
-
-/// How the blurred bins become one picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Compositing {
-    /// A pixel belongs to the bin of its own CoC; bins are stacked front to back.
-    Layers,
-    /// Every bin holds the whole picture; a pixel takes the bin of its own CoC (no depth edges to respect).
-    Select,
-    /// One bin at full scale, every pixel with exactly its own radius.
-    Gather,
-}
 
 /// A range of signed CoC, and how it is filtered.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,13 +77,13 @@ pub struct Plan {
     pub compositing: Compositing,
     pub quality: Quality,
     pub rung: Rung,
-    /// Every level that the plan can be set to.
-    pub levels: Arc<Levels>,
+    /// Every rung that the plan can be set to.
+    pub ladder: Arc<Ladder>,
     /// Front to back: by ascending CoC.
     pub bins: Vec<Bin>,
     /// The filters, in units of bin pixels.
     pub bank: Arc<Bank>,
-    /// Which of the levels' banks that is.
+    /// Which of the ladder's banks that is.
     pub bank_index: usize,
     /// Whether what near objects hide is filled in.
     pub fill: bool,
@@ -124,8 +113,8 @@ impl Plan {
             (CocKind::Uniform | CocKind::Ramp, _) => Compositing::Select,
         };
         let mask = settings.aperture.mask(MASK_CELLS, settings.rim);
-        let levels = Arc::new(Levels::new(settings, &mask, compositing));
-        let level = levels.nearest(settings.quality);
+        let ladder = Arc::new(Ladder::new(settings, &mask, compositing));
+        let level = ladder.nearest(settings.quality);
         let mut plan = Self {
             width: width as usize,
             height: height as usize,
@@ -133,12 +122,12 @@ impl Plan {
             quality: level.quality,
             rung: level.rung,
             bins: Vec::with_capacity(MAX_BINS),
-            bank: Arc::clone(&levels.banks[level.bank]),
+            bank: Arc::clone(&ladder.banks[level.bank]),
             bank_index: level.bank,
             fill: level.rung.fill,
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
             exact: compositing == Compositing::Gather && settings.rank == Some(Rank::Full),
-            levels,
+            ladder,
             coc: settings.coc,
             full_scale: settings.rank == Some(Rank::Full),
             focus_px: settings.far_max_px.max(settings.near_max_px),
@@ -152,13 +141,13 @@ impl Plan {
 
     /// Plans the next frames at another quality, or the nearest that the settings allow. Allocates nothing.
     pub fn set_quality(&mut self, quality: Quality) {
-        let level = self.levels.nearest(quality);
+        let level = self.ladder.nearest(quality);
         if level.quality == self.quality {
             return;
         }
         (self.quality, self.rung, self.fill) = (level.quality, level.rung, level.rung.fill);
         self.bank_index = level.bank;
-        self.bank = Arc::clone(&self.levels.banks[level.bank]);
+        self.bank = Arc::clone(&self.ladder.banks[level.bank]);
         self.lay_out_pieces();
     }
 
@@ -200,7 +189,7 @@ impl Plan {
     fn lay_out(&mut self) {
         let [far, near] = &self.pieces;
         // The same memory for the same place, whatever the level.
-        let side = self.levels.most_bins_per_side();
+        let side = self.ladder.most_bins_per_side();
         let first = |pieces: &[Piece]| pieces.first().map_or(f32::INFINITY, |piece| piece.border_px);
         let beyond = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
@@ -245,8 +234,8 @@ impl Plan {
 
     /// The least scale that a bin in this slot can have, at any level.
     pub fn least_scale(&self, slot: usize) -> usize {
-        let side = self.levels.most_bins_per_side();
-        let fine = slot == 0 || (slot - 1) % side.max(1) < self.levels.most_fine_bins();
+        let side = self.ladder.most_bins_per_side();
+        let fine = slot == 0 || (slot - 1) % side.max(1) < self.ladder.most_fine_bins();
         if self.full_scale || fine || self.compositing != Compositing::Layers { 1 } else { 2 }
     }
 
@@ -254,9 +243,9 @@ impl Plan {
     pub fn slots(&self) -> usize {
         match self.coc {
             CocKind::Depth if self.compositing == Compositing::Gather => 1,
-            CocKind::Depth => 1 + 2 * self.levels.most_bins_per_side(),
+            CocKind::Depth => 1 + 2 * self.ladder.most_bins_per_side(),
             CocKind::Ramp if self.pieces[0].is_empty() => 1,
-            CocKind::Ramp => 1 + self.levels.most_bins_per_side(),
+            CocKind::Ramp => 1 + self.ladder.most_bins_per_side(),
             CocKind::Uniform => 2,
         }
     }
@@ -314,8 +303,6 @@ impl Plan {
 const HAND_OVER: f32 = 0.15;
 /// What has this many times the CoC of the near bins' border, or more, hides what is behind it.
 const HIDDEN_FROM: f32 = 1.5;
-/// The smallest CoC at which a bin of its own begins, in pixels.
-pub const FOCUS_BORDER_PX: f32 = 1.0;
 
 /// Pieces of a ramp: geometric, as a blur's look goes with the ratio.
 fn even_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {

@@ -1,6 +1,5 @@
-//! The quality ladder of the blur: what each level trades for time.
+//! The quality ladder of the blur: what each rung costs, and what it trades for that.
 
-use super::plan::FOCUS_BORDER_PX;
 use crate::budget::Quality;
 
 /// Pixels of the picture that a bin pixel may cover, each way.
@@ -11,9 +10,16 @@ pub const MOST_RADIUS_PX: f32 = 14.0;
 /// does not grow with the blur.
 pub const MOST_FULL_RADIUS_PX: f32 = 128.0;
 
-/// What a quality level trades.
+/// The smallest CoC at which a bin of its own begins, in pixels.
+pub const FOCUS_BORDER_PX: f32 = 1.0;
+
+/// What a rung trades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rung {
+    /// The time of a frame beside that of the default rung: as measured for a person before a room, on two cores. Other
+    /// pictures and machines differ; whoever asks for more had better learn.
+    pub cost: f64,
+    /// Separable terms of each bin's filters.
     pub rank: u32,
     /// Bins behind the focal plane, and as many in front.
     pub bins_per_side: u32,
@@ -31,33 +37,65 @@ pub struct Rung {
     pub even_radius_px: f32,
 }
 
-/// The time that each quality level takes beside the default one, the cheapest first: as measured for a person before a
-/// room, on two cores. Other pictures and machines differ; whoever asks for more had better learn.
-pub const COSTS: [f64; Quality::ALL.len()] = [0.68, 0.70, 1.0, 1.3, 1.93];
+/// The ladder, the cheapest rung first: that of a quality is at its place in [`Quality::ALL`].
+pub const LADDER: [Rung; Quality::ALL.len()] = {
+    let fast = Rung {
+        cost: 0.70,
+        rank: 2,
+        bins_per_side: 2,
+        near_from_px: 2.5,
+        near_from_share: 0.07,
+        scale_from_px: [0.0, 3.0, 8.0, 20.0],
+        fill: true,
+        even_rank: 3,
+        even_radius_px: 9.0,
+    };
+    [
+        Rung { cost: 0.68, fill: false, even_rank: 2, even_radius_px: 6.0, ..fast },
+        fast,
+        Rung {
+            cost: 1.0,
+            rank: 3,
+            bins_per_side: 3,
+            near_from_px: 2.0,
+            scale_from_px: [0.0, 3.5, 18.0, 40.0],
+            even_rank: 4,
+            even_radius_px: 36.0,
+            ..fast
+        },
+        Rung {
+            cost: 1.3,
+            rank: 4,
+            bins_per_side: 4,
+            near_from_px: 1.5,
+            scale_from_px: [0.0, 5.0, 20.0, 48.0],
+            even_rank: 4,
+            even_radius_px: 48.0,
+            ..fast
+        },
+        Rung {
+            cost: 1.93,
+            rank: 4,
+            bins_per_side: 6,
+            near_from_px: FOCUS_BORDER_PX,
+            near_from_share: 0.0,
+            scale_from_px: [0.0, 8.0, 32.0, 80.0],
+            even_rank: 6,
+            even_radius_px: 96.0,
+            ..fast
+        },
+    ]
+};
 
-/// The rung of a quality level.
-pub fn rung(quality: Quality) -> Rung {
-    let rung =
-        |rank, bins_per_side, near_from_px, [half, quarter, eighth]: [f32; 3], fill, (even_rank, even_radius_px)| {
-            Rung {
-                rank,
-                bins_per_side,
-                near_from_px,
-                near_from_share: if near_from_px > FOCUS_BORDER_PX { 0.07 } else { 0.0 },
-                scale_from_px: [0.0, half, quarter, eighth],
-                fill,
-                even_rank,
-                even_radius_px,
-            }
-        };
-    match quality {
-        Quality::Draft => rung(2, 2, 2.5, [3.0, 8.0, 20.0], false, (2, 6.0)),
-        Quality::Fast => rung(2, 2, 2.5, [3.0, 8.0, 20.0], true, (3, 9.0)),
-        Quality::Balanced => rung(3, 3, 2.0, [3.5, 18.0, 40.0], true, (4, 36.0)),
-        Quality::High => rung(4, 4, 1.5, [5.0, 20.0, 48.0], true, (4, 48.0)),
-        Quality::Best => rung(4, 6, 1.0, [8.0, 32.0, 80.0], true, (6, 96.0)),
+/// [`Rung::cost`] of all rungs, as a governor takes them.
+pub const COSTS: [f64; LADDER.len()] = {
+    let (mut costs, mut rung) = ([0.0; LADDER.len()], 0);
+    while rung < LADDER.len() {
+        costs[rung] = LADDER[rung].cost;
+        rung += 1;
     }
-}
+    costs
+};
 
 /// The finest scale at which a radius has at most so many bin pixels, or the coarsest there is.
 pub fn scale_within(radius_px: f32, most_px: f32) -> usize {

@@ -2,8 +2,7 @@
 //! one piece and two surfaces do not share a bin. A flat background then costs one bin, however wide the range that the
 //! lens could reach.
 
-use super::plan::FOCUS_BORDER_PX;
-use super::rung::Rung;
+use super::rung::{FOCUS_BORDER_PX, Rung};
 use crate::frame::DepthMap;
 use crate::optics::DepthCoc;
 

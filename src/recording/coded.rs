@@ -14,6 +14,7 @@ use super::MAX_SIDE_PX;
 use super::extras::Extras;
 use super::fault::PictureFault;
 use super::jpeg;
+use super::samples::Samples;
 use crate::files::input;
 
 /// Far more than a photograph of 8192 x 8192 pixels takes.
@@ -31,34 +32,6 @@ enum Format {
     Png,
     Jpeg,
     Pfm,
-}
-
-/// What a pixel is stored in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Samples {
-    /// 1 is grey, 3 colour; one more is transparency.
-    pub(super) channels: usize,
-    /// Whether samples have 16 bits, high byte first, or 8.
-    pub(super) are_wide: bool,
-}
-
-impl Samples {
-    pub(super) fn has_color(self) -> bool {
-        self.channels >= 3
-    }
-
-    pub(super) fn has_alpha(self) -> bool {
-        self.channels.is_multiple_of(2)
-    }
-
-    /// 16-bit grey.
-    pub(super) fn is_depth(self) -> bool {
-        self.are_wide && self.channels == 1
-    }
-
-    pub(super) fn bytes_per_pixel(self) -> usize {
-        self.channels * (1 + usize::from(self.are_wide))
-    }
 }
 
 /// A picture whose header has been read.

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use super::coded::{self, Coded, Samples};
+use super::coded::{self, Coded};
 use super::depth_covers;
 use super::extras::Extras;
 use super::fault::PictureFault;
+use super::samples::Samples;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 
 /// Memory for decoding that is kept from frame to frame.

@@ -5,7 +5,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
 
 use super::extras::Extras;
-use super::unit::{self, Meaning};
+use super::unit::{self, DISPARITY_SCALE, Meaning};
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
 /// High enough that the blur, not the file format, decides what is seen.
@@ -13,9 +13,6 @@ const JPEG_QUALITY: u8 = 95;
 
 /// As small as choosing a filter for each row, in half the time (measured on 640x480 colour and depth).
 const FILTER: FilterType = FilterType::Paeth;
-
-/// Units of a 16-bit disparity picture per pixel, as in the KITTI benchmark.
-pub(super) const DISPARITY_SCALE: f32 = 256.0;
 
 /// Appends `image` to `file` as PNG, with the fast compression that keeps up with a camera.
 pub(super) fn color_png(image: &ColorImage, file: &mut Vec<u8>) -> ImageResult<()> {

@@ -2,8 +2,8 @@
 
 use std::io::{BufReader, ErrorKind, Read, Seek};
 
-use super::coded::Samples;
 use super::fault::PictureFault;
+use super::samples::Samples;
 
 /// Segments that a file may have before its frame; cameras write some tens.
 const MAX_SEGMENTS: usize = 1000;

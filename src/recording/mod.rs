@@ -22,6 +22,7 @@ mod list;
 mod middlebury;
 mod pair;
 mod pfm;
+mod samples;
 mod timeline;
 mod unit;
 

@@ -75,7 +75,7 @@ pub fn read_map(path: &Path, depth_scale: Option<f32>, invalid: Option<u16>) -> 
             Meaning::of_text(&chunk.text)
         });
         let scale = match (depth_scale, text) {
-            (_, Some(Meaning::Disparity { .. })) => encode::DISPARITY_SCALE,
+            (_, Some(Meaning::Disparity { .. })) => unit::DISPARITY_SCALE,
             (Some(given), Some(Meaning::Depth { per_m })) if given != per_m => {
                 let file = path.display();
                 tracing::warn!(
@@ -151,7 +151,7 @@ pub fn read_disparity(path: &Path) -> Result<DisparityMap, RecordingError> {
         true => pfm::read(path).map(|(map, _)| map),
         false => {
             let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
-            let units = DepthUnits { scale: encode::DISPARITY_SCALE, invalid: None };
+            let units = DepthUnits { scale: unit::DISPARITY_SCALE, invalid: None };
             decode::depth(path, units, None, &mut scratch, &mut map).map(|()| map)
         }
     };

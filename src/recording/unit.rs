@@ -1,8 +1,10 @@
 //! What the numbers of a map file mean, as far as the file says. Ours do, in ways that leave others able to read them: a PNG
 //! by a text (keyword [`KEYWORD`]), a PFM by how the number 1 of its scale is written.
 
-use super::encode::DISPARITY_SCALE;
 use crate::optics::StereoRig;
+
+/// Units of a 16-bit disparity picture per pixel, as in the KITTI benchmark.
+pub const DISPARITY_SCALE: f32 = 256.0;
 
 /// The keyword of the text in a PNG.
 pub(super) const KEYWORD: &str = "bokehcam map";

@@ -81,7 +81,7 @@ fn the_library_refuses_what_the_command_line_does() {
         }
         // Where nobody asks, radii are cut, and nothing grows without a bound.
         let plan = bokeh::plan::Plan::new(&settings(coc, method, rank, 1e30), 640, 360);
-        let bytes: usize = plan.levels.banks.iter().map(|bank| (bank.horizontal.len() * 2) * 4).sum();
+        let bytes: usize = plan.ladder.banks.iter().map(|bank| (bank.horizontal.len() * 2) * 4).sum();
         assert!(bytes < 200 << 20, "{coc:?} {method:?} {rank:?}: {bytes} bytes");
     }
 }

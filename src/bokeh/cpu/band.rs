@@ -3,8 +3,10 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::bin::{BLOCK, BinRows, BinSums, MARGIN, WIDE};
+use super::bin::{BinRows, BinSums};
 use super::fill::{Behind, HalfRows};
+use super::tent::{MARGIN, WIDE};
+use super::tiles::BLOCK;
 use super::tiles::{TILE_H, TILE_W, Tiles, widen};
 use super::unpack::{Piece, Source};
 use crate::bokeh::plan::{CELL, MAX_BINS, Share};

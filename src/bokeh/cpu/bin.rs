@@ -5,23 +5,12 @@
 use pulp::Simd;
 
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::tent::{ShareAt, reduce, sum_row};
-use super::tiles::TILE_W;
+use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, reduce, sum_row};
+use super::tiles::BLOCK;
 use super::unpack::Piece;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{load, store};
-
-/// Columns of the picture that are read at once.
-pub const BLOCK: usize = 4 * TILE_W;
-/// Columns beyond a block on both sides that its averages reach.
-pub const MARGIN: usize = 16;
-/// Columns of a block and its margins.
-pub const WIDE: usize = BLOCK + 2 * MARGIN;
-/// Values of a plane of a block: a line more than needed, as planes at multiples of 4096 bytes hinder each other.
-pub const PLANE: usize = BLOCK + 16;
-/// Planes of a sum: premultiplied colour, coverage, coverage times |CoC|.
-pub const SUMS: usize = 5;
 
 /// One bin's memory of a band.
 pub struct BinRows<'a> {
@@ -52,8 +41,6 @@ pub struct BinSums {
     means: Means,
 }
 
-/// A row of a block of the bin: the planes of a sum.
-pub type Means = Line<[[f32; PLANE]; SUMS]>;
 /// The rows of a row of cells so far, column by column.
 type CellSums = Line<[[f32; PLANE]; CELL_PLANES]>;
 

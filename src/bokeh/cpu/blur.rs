@@ -63,9 +63,9 @@ pub struct Scratch {
 impl Scratch {
     /// Memory for every bin of a plan.
     pub fn new(plan: &Plan) -> Self {
-        let reach = plan.levels.most_reach();
+        let reach = plan.ladder.most_reach();
         Self {
-            rows: Aligned::zeros(ring(reach) * GROUP.min(plan.levels.most_terms()) * STRIP_ROW),
+            rows: Aligned::zeros(ring(reach) * GROUP.min(plan.ladder.most_terms()) * STRIP_ROW),
             line: Aligned::zeros(4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }

@@ -10,7 +10,8 @@ use pulp::{Simd, WithSimd};
 use super::rows::{STRIP, Slot};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress, linear_to_srgb, luminance};
-use crate::bokeh::plan::{Bin, CELL, Compositing, HINDMOST_COVERAGE, MAX_BINS, Plan};
+use crate::bokeh::ladder::Compositing;
+use crate::bokeh::plan::{Bin, CELL, HINDMOST_COVERAGE, MAX_BINS, Plan};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, madd, store};
 

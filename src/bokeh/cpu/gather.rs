@@ -32,9 +32,9 @@ impl Gather {
             } else {
                 Vec::new()
             },
-            source: Rows::new(plan.width, plan.height, plan.levels.most_reach().next_multiple_of(PIECE)),
+            source: Rows::new(plan.width, plan.height, plan.ladder.most_reach().next_multiple_of(PIECE)),
             coc: vec![0.0; pixels],
-            rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * plan.levels.most_terms() }],
+            rows: vec![0.0; if plan.exact { 0 } else { pixels * 3 * plan.ladder.most_terms() }],
             result: vec![0.0; pixels * 3],
         }
     }

@@ -19,16 +19,16 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use band::{Band, BandSums, Hidden};
-use bin::BLOCK;
 use blur::{Scratch, Strip};
 use gather::Gather;
 use pulp::Arch;
 use rows::Slot;
 use shelves::{BinShelves, StripShelves};
-use tiles::{Survey, TILE_H, Tiles};
+use tiles::{BLOCK, Survey, TILE_H, Tiles};
 use unpack::Source;
 
-use super::plan::{CELL, Compositing, MAX_BINS, Plan};
+use super::ladder::Compositing;
+use super::plan::{CELL, MAX_BINS, Plan};
 use super::rung::SCALES;
 use super::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use crate::budget::Quality;
@@ -83,7 +83,7 @@ impl CpuBokeh {
         Self {
             encode: composite::EncodeTable::new(),
             tiles: Tiles::new(width, height),
-            pyramid: (plan.levels.fill() && plan.compositing == Compositing::Layers)
+            pyramid: (plan.ladder.fill() && plan.compositing == Compositing::Layers)
                 .then(|| fill::Pyramid::new(width, height)),
             waits: vec![false; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),

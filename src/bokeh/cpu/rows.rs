@@ -2,8 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::bin::BLOCK;
-use super::tiles::TILE_W;
+use super::tiles::{BLOCK, TILE_W};
 use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
 

@@ -1,9 +1,11 @@
 //! Disjoint slices: what the parts of a pass that runs over every bin at once read and write, bin by bin.
 #![allow(missing_docs)] // The fields are those of `BinRows`.
 
-use super::bin::{BLOCK, BinRows};
+use super::bin::BinRows;
 use super::rows::{CELL_PLANES, Cells, Edges, STRIP_CELLS, STRIP_ROW, Slot, Strips};
-use crate::bokeh::plan::{Bin, CELL, Compositing, Plan, Share};
+use super::tiles::BLOCK;
+use crate::bokeh::ladder::Compositing;
+use crate::bokeh::plan::{Bin, CELL, Plan, Share};
 use crate::compute::team::Shelf;
 
 /// What the parts of the pass `bin` write for one bin.

@@ -3,11 +3,23 @@
 
 use pulp::Simd;
 
-use super::bin::{BLOCK, MARGIN, Means, SUMS, WIDE};
+use super::tiles::BLOCK;
 use super::unpack::Piece;
 use crate::bokeh::plan::Share;
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, store};
+
+/// Columns beyond a block on both sides that its averages reach.
+pub const MARGIN: usize = 16;
+/// Columns of a block and its margins.
+pub const WIDE: usize = BLOCK + 2 * MARGIN;
+/// Values of a plane of a block: a line more than needed, as planes at multiples of 4096 bytes hinder each other.
+pub const PLANE: usize = BLOCK + 16;
+/// Planes of a sum: premultiplied colour, coverage, coverage times |CoC|.
+pub const SUMS: usize = 5;
+
+/// A row of a block of the bin: the planes of a sum.
+pub type Means = Line<[[f32; PLANE]; SUMS]>;
 
 /// Adds a row's shares to two rows of sums.
 #[inline(always)]

@@ -7,6 +7,8 @@ use crate::optics::CocField;
 
 /// Pixels of the picture across a tile.
 pub const TILE_W: usize = 64;
+/// Columns of the picture that are read at once.
+pub const BLOCK: usize = 4 * TILE_W;
 /// Rows of a tile.
 pub const TILE_H: usize = 8;
 /// The picture around a tile that can change it, in tiles: the widest filter at full scale in a bin that is in focus,

@@ -3,7 +3,8 @@
 use super::layout::Capacity;
 use super::shaders::{Bin, Frame, Level};
 use crate::bokeh::bank::Bank;
-use crate::bokeh::plan::{Compositing, MAX_BINS, Plan};
+use crate::bokeh::ladder::Compositing;
+use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::Device;
 
 /// Bytes from one uniform `Work` to the next: no device asks for more.
@@ -69,7 +70,7 @@ pub fn picture_bytes(plan: &Plan) -> u64 {
 /// Pieces of work of a frame that have a uniform `Work` each: two for the pass `bin`, one for `reach`, and every group
 /// of terms of every batch for the filters.
 pub fn works(plan: &Plan) -> usize {
-    3 + MAX_BINS * plan.levels.most_terms().div_ceil(4)
+    3 + MAX_BINS * plan.ladder.most_terms().div_ceil(4)
 }
 
 /// Bytes of the largest buffer of filters or kernels.
@@ -77,7 +78,7 @@ pub fn filter_bytes(plan: &Plan) -> u64 {
     let of_bank = |bank: &Bank| (bank.horizontal.len() / bank.terms * bank.terms.div_ceil(4) * 16) as u64;
     let of_node = |&reach: &u32| u64::from(2 * reach + 1).pow(2) * 4;
     let kernels = if plan.exact { plan.bank.node_reach.iter().map(of_node).sum() } else { 0 };
-    plan.levels.banks.iter().map(|bank| of_bank(bank)).fold(kernels, u64::max)
+    plan.ladder.banks.iter().map(|bank| of_bank(bank)).fold(kernels, u64::max)
 }
 
 impl Buffers {
@@ -102,7 +103,7 @@ impl Buffers {
         let (width, height) = (plan.width, plan.height);
         let layered = plan.compositing == Compositing::Layers;
         let (levels, pyramid_pixels) =
-            if layered && plan.levels.fill() { levels(width, height) } else { (Vec::new(), 1) };
+            if layered && plan.ladder.fill() { levels(width, height) } else { (Vec::new(), 1) };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let works = works(plan) as u64;
         Self {
@@ -117,7 +118,7 @@ impl Buffers {
             source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),
             edges: storage("edges", capacity.edges * 8),
-            rows: storage("rows", capacity.rows * 2 * plan.levels.most_terms().min(4)),
+            rows: storage("rows", capacity.rows * 2 * plan.ladder.most_terms().min(4)),
             blurred: storage("blurred", capacity.pixels * 2),
             filtered: storage("filtered", capacity.filtered),
             active: storage("active", capacity.active),
@@ -126,7 +127,7 @@ impl Buffers {
             pyramid: storage("pyramid", pyramid_pixels * 4),
             known: storage("known", pyramid_pixels),
             banks: plan
-                .levels
+                .ladder
                 .banks
                 .iter()
                 .map(|bank| Filters {

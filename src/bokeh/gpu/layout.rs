@@ -4,7 +4,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::shaders::Bin;
-use crate::bokeh::plan::{CELL, Compositing, MAX_BINS, Plan, SEGMENT};
+use crate::bokeh::ladder::Compositing;
+use crate::bokeh::plan::{CELL, MAX_BINS, Plan, SEGMENT};
 
 /// Columns of a tile of the CPU executor: both executors' grids are as wide, so that their cells agree.
 const GRID_ROUNDING: usize = 64;
@@ -48,9 +49,9 @@ impl Capacity {
         }
         // These bins are the same in every frame of a level.
         let mut plan = plan.clone();
-        let levels = Arc::clone(&plan.levels);
-        levels.iter().fold(Self::default(), |most, level| {
-            plan.set_quality(level.quality);
+        let ladder = Arc::clone(&plan.ladder);
+        ladder.iter().fold(Self::default(), |most, step| {
+            plan.set_quality(step.quality);
             most.max(Self::of_scales(&plan, plan.bins.iter().map(|bin| bin.scale)))
         })
     }

@@ -17,7 +17,8 @@ use passes::Passes;
 use readback::{CAPACITY, MAX_QUERIES, Ring, Sent};
 
 use super::bank::STEPS_PER_PX;
-use super::plan::{Compositing, Plan};
+use super::ladder::Compositing;
+use super::plan::Plan;
 use super::{Bokeh, BokehError, Finished, Job};
 use crate::compute::device::{Device, DevicePicture};
 use crate::compute::{Backend, GpuError, Place};
@@ -62,7 +63,7 @@ impl GpuBokeh {
     pub fn on(plan: &Plan, device: Arc<Device>) -> Result<Self, BokehError> {
         let most = device.device.limits().max_storage_buffer_binding_size;
         let capacity = Capacity::of(plan);
-        let rows = capacity.rows * plan.levels.most_terms().min(4);
+        let rows = capacity.rows * plan.ladder.most_terms().min(4);
         let largest = (capacity.pixels.max(rows).max(1) as u64 * 8).max(buffers::filter_bytes(plan));
         if largest > most {
             return Err(GpuError::Failed(format!(

@@ -1,15 +1,7 @@
-//! What finds the disparities that both eyes agree on, and which one does.
+//! What finds the disparities that both eyes agree on.
 
-#[cfg(feature = "gpu")]
-use std::sync::Arc;
-
-use super::cpu::CpuExecutor;
-#[cfg(feature = "gpu")]
-use super::gpu::GpuExecutor;
-#[cfg(feature = "gpu")]
-use crate::compute::device::Device;
+use crate::compute::GpuError;
 use crate::compute::team::Team;
-use crate::compute::{Backend, GpuError};
 
 /// Finds the disparities that both eyes agree on. All executors find the same, to the bit.
 pub trait Executor: Send {
@@ -29,107 +21,4 @@ pub trait Executor: Send {
         team: &mut Team,
         out: &mut [u16],
     ) -> Result<(), GpuError>;
-}
-
-pub(super) struct Executors {
-    threads: usize,
-    /// A GPU, and whether nothing else will do.
-    #[cfg(feature = "gpu")]
-    gpu: Option<(Arc<Device>, bool)>,
-}
-
-impl Executors {
-    /// Executors on one GPU or on the CPU, there for a team of `threads`.
-    ///
-    /// # Errors
-    /// A GPU was asked for and there is none that fits.
-    #[cfg(feature = "gpu")]
-    pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
-        if backend == Backend::Cpu {
-            return Ok(Self { threads, gpu: None });
-        }
-        let must = backend == Backend::Gpu || adapter.is_some();
-        match Device::open(backend == Backend::Auto, adapter) {
-            Ok(device) => Ok(Self { threads, gpu: Some((Arc::new(device), must)) }),
-            Err(error) if must => Err(error),
-            Err(error) => {
-                tracing::info!("matching on the CPU: {error}");
-                Ok(Self { threads, gpu: None })
-            }
-        }
-    }
-
-    /// Executors on the CPU, for a team of `threads`.
-    ///
-    /// # Errors
-    /// A GPU was asked for.
-    #[cfg(not(feature = "gpu"))]
-    pub fn new(backend: Backend, adapter: Option<&str>, threads: usize) -> Result<Self, GpuError> {
-        if backend == Backend::Gpu || adapter.is_some() { Err(GpuError::left_out()) } else { Ok(Self { threads }) }
-    }
-
-    /// An executor for pictures of `size` (columns, rows) and at least so many disparities, at most 256.
-    ///
-    /// # Errors
-    /// The GPU that was asked for has no room, or failed.
-    pub fn executor(&self, size: (usize, usize), disparities: usize) -> Result<Box<dyn Executor>, GpuError> {
-        #[cfg(feature = "gpu")]
-        if let Some((device, must)) = &self.gpu {
-            match GpuExecutor::new(device, size, disparities) {
-                Ok(gpu) => {
-                    let threads = self.threads;
-                    let cpu = move || Box::new(CpuExecutor::new(size, disparities, threads)) as Box<dyn Executor>;
-                    return Ok(Box::new(Fallback::new(Box::new(gpu), cpu)));
-                }
-                Err(error) if *must => return Err(error),
-                Err(error) => tracing::info!("matching on the CPU: {error}"),
-            }
-        }
-        Ok(Box::new(CpuExecutor::new(size, disparities, self.threads)))
-    }
-}
-
-/// One executor, and another one from the first fault of the GPU on.
-#[cfg(feature = "gpu")]
-struct Fallback {
-    now: Box<dyn Executor>,
-    /// What makes the other one, until it is needed.
-    other: Option<MakesExecutor>,
-}
-
-#[cfg(feature = "gpu")]
-type MakesExecutor = Box<dyn FnOnce() -> Box<dyn Executor> + Send>;
-
-#[cfg(feature = "gpu")]
-impl Fallback {
-    fn new(first: Box<dyn Executor>, other: impl FnOnce() -> Box<dyn Executor> + Send + 'static) -> Self {
-        Self { now: first, other: Some(Box::new(other)) }
-    }
-}
-
-#[cfg(feature = "gpu")]
-impl Executor for Fallback {
-    fn describe(&self) -> String {
-        self.now.describe()
-    }
-
-    fn winners(
-        &mut self,
-        eyes: [&[u8]; 2],
-        likely: Option<&[u16]>,
-        team: &mut Team,
-        out: &mut [u16],
-    ) -> Result<(), GpuError> {
-        match (self.now.winners(eyes, likely, team, out), self.other.take()) {
-            (Err(error), Some(other)) => {
-                tracing::warn!("{error}; the CPU matches from here on");
-                self.now = other();
-                self.now.winners(eyes, likely, team, out)
-            }
-            (found, other) => {
-                self.other = other;
-                found
-            }
-        }
-    }
 }

@@ -9,6 +9,7 @@ pub mod check;
 #[doc(hidden)]
 pub mod cpu;
 pub mod executor;
+mod executors;
 pub mod fixed;
 mod gaps;
 #[cfg(feature = "gpu")]
@@ -25,7 +26,8 @@ use std::iter;
 use std::sync::atomic::AtomicBool;
 
 use alike::Colors;
-use executor::{Executor, Executors};
+use executor::Executor;
+use executors::Executors;
 use prior::Prior;
 use tidy::Tidy;
 

@@ -1,9 +1,9 @@
 //! What one does to the picture itself: click, double-click, turn the wheel, drag.
 
-use egui::{Id, Pos2, Rect, Response, Sense, Ui, Vec2, pos2};
+use egui::{Id, Rect, Response, Sense, Ui};
 
-use super::Canvas;
 use super::marks::{self, Tilting};
+use super::place::Place;
 use super::state::{Action, Shown, State, tweak};
 use crate::depth::focus::FocusRule;
 use crate::look::Effect;
@@ -23,45 +23,6 @@ pub struct Gestures {
     ring: Option<([f32; 2], f64)>,
     /// Which of the marks of tilt-shift is being dragged.
     tilting: Option<Tilting>,
-}
-
-/// The picture on the screen, in points.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    pub rect: Rect,
-    /// Its own columns and rows.
-    pub size: Vec2,
-    /// Whether it is shown as a mirror does.
-    pub mirror: bool,
-}
-
-impl Place {
-    /// Of this canvas; `None` where there is no picture.
-    pub fn new(canvas: Canvas, pixels_per_point: f32, mirror: bool) -> Option<Self> {
-        let area = canvas.area;
-        if area.width == 0 || area.height == 0 || canvas.size.0 == 0 || canvas.size.1 == 0 {
-            return None;
-        }
-        let points = |pixels: u32| pixels as f32 / pixels_per_point;
-        let rect = Rect::from_min_size(
-            pos2(points(area.x), points(area.y)),
-            Vec2::new(points(area.width), points(area.height)),
-        );
-        Some(Self { rect, size: Vec2::new(canvas.size.0 as f32, canvas.size.1 as f32), mirror })
-    }
-
-    /// Where a point of the picture is on the screen; both of `at` are fractions.
-    pub fn point(&self, [x, y]: [f32; 2]) -> Pos2 {
-        let x = if self.mirror { 1.0 - x } else { x };
-        self.rect.min + Vec2::new(x, y) * self.rect.size()
-    }
-
-    /// What of the picture is there on the screen: fractions from 0 to 1.
-    pub fn fractions(&self, at: Pos2) -> [f32; 2] {
-        let at = (at - self.rect.min) / self.rect.size();
-        let x = if self.mirror { 1.0 - at.x } else { at.x };
-        [x, at.y].map(|fraction| fraction.clamp(0.0, 1.0))
-    }
 }
 
 impl Gestures {

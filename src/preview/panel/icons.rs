@@ -7,8 +7,8 @@ use egui::{
 };
 use egui::{Role, vec2};
 
-use super::parts::focus_ring;
 use super::theme::Colors;
+use super::theme::focus_ring;
 
 /// Side of a button that is an icon, in points.
 pub const SIDE: f32 = 26.0;

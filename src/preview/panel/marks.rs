@@ -4,7 +4,7 @@
 
 use egui::{Align2, CornerRadius, FontFamily, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
-use super::canvas::Place;
+use super::place::Place;
 use super::state::tweak::turned;
 use super::theme::{ON_PICTURE, SHADE, medium};
 use crate::look::Tilt;

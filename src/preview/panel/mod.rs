@@ -9,6 +9,7 @@ mod legend;
 mod marks;
 mod notes;
 mod parts;
+mod place;
 mod sections;
 mod sheet;
 #[cfg(test)]
@@ -24,7 +25,8 @@ use egui::{Event, Ui};
 use super::present::Area;
 use super::state::{Action, State};
 use super::{keys, meters, state, views};
-use canvas::{Gestures, Place};
+use canvas::Gestures;
+use place::Place;
 
 /// After so many seconds without pointer or keyboard the panel hides.
 const HIDES_AFTER_S: f64 = 4.0;

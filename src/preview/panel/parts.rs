@@ -3,11 +3,11 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, CornerRadius, DragValue, FontId, Layout, Rect, Response, RichText, Role, Sense, Slider,
-    SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+    Align, Align2, CornerRadius, DragValue, FontId, Layout, Rect, RichText, Role, Sense, Slider, SliderClamping,
+    Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
 };
 
-use super::theme::{Colors, ROW, medium};
+use super::theme::{Colors, ROW, focus_ring, medium};
 
 /// How a number is chosen.
 pub struct Number<'a> {
@@ -104,15 +104,6 @@ pub fn choose(
         }
     }
     clicked
-}
-
-/// A ring around what has the keyboard's focus.
-pub fn focus_ring(ui: &Ui, response: &Response, rect: Rect) {
-    if response.has_focus() {
-        let colors = Colors::here(ui);
-        let outside = StrokeKind::Outside;
-        ui.painter().rect_stroke(rect.expand(1.0), CornerRadius::same(7), Stroke::new(2.0, colors.text), outside);
-    }
 }
 
 /// A name and a switch. Whether it was turned.

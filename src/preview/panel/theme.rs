@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use egui::style::{HandleShape, ScrollStyle, Selection, WidgetVisuals};
 use egui::{
-    Color32, Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Shadow, Stroke, Style,
-    TextStyle, Theme, Vec2, Visuals,
+    Color32, Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Rect, Response, Shadow,
+    Stroke, StrokeKind, Style, TextStyle, Theme, Ui, Vec2, Visuals,
 };
 
 use crate::budget::Quality;
@@ -207,4 +207,13 @@ pub fn card(colors: &Colors) -> egui::Frame {
         .stroke(Stroke::new(1.0, colors.line))
         .corner_radius(CornerRadius::same(12))
         .inner_margin(Margin::same(PAD as i8))
+}
+
+/// A ring around what has the keyboard's focus.
+pub fn focus_ring(ui: &Ui, response: &Response, rect: Rect) {
+    if response.has_focus() {
+        let colors = Colors::here(ui);
+        let outside = StrokeKind::Outside;
+        ui.painter().rect_stroke(rect.expand(1.0), CornerRadius::same(7), Stroke::new(2.0, colors.text), outside);
+    }
 }

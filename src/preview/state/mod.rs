@@ -19,25 +19,12 @@ pub use history::History;
 
 use super::meters::Meters;
 use super::views::Legend;
+pub use super::views::Shown;
 use crate::knob::Knob;
 use crate::look::Look;
 use crate::look::presets::Preset;
-use crate::names::named;
-use crate::source::devices::Choice;
 
-named! {
-    /// What of a frame is shown.
-    pub enum Shown default Picture {
-        /// The picture
-        Picture = "picture",
-        /// Its depth, in colours
-        Depth = "depth",
-        /// Its circle of confusion
-        Coc = "coc",
-        /// The bins that it is split into
-        Bins = "bins",
-    }
-}
+use crate::source::devices::Choice;
 
 /// The source as it is now.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -14,9 +14,22 @@ pub use depth::share_of as depth_share;
 
 use crate::bokeh::Settings;
 use crate::frame::ColorImage;
+use crate::names::named;
 use crate::pipeline::View;
 
-use super::state::Shown;
+named! {
+    /// What of a frame is shown.
+    pub enum Shown default Picture {
+        /// The picture
+        Picture = "picture",
+        /// Its depth, in colours
+        Depth = "depth",
+        /// Its circle of confusion
+        Coc = "coc",
+        /// The bins that it is split into
+        Bins = "bins",
+    }
+}
 
 /// What the colours of a view mean.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use super::debug_pictures::{coc, grey, light};
 use crate::bokeh::cpu::CpuBokeh;
-use crate::bokeh::plan::{Bin, Compositing, Plan};
+use crate::bokeh::ladder::Compositing;
+use crate::bokeh::plan::{Bin, Plan};
 use crate::bokeh::{Bokeh, Probe};
 use crate::cli::error::CliError;
 use crate::cli::files::{refuse_overwrite, write_whole};

@@ -7,8 +7,9 @@ use egui::{Role, WidgetInfo, pos2};
 
 use super::Sheet;
 use crate::bokeh::aperture::{Aperture, Shape};
-use crate::preview::panel::parts::{Number, focus_ring, number};
+use crate::preview::panel::parts::{Number, number};
 use crate::preview::panel::theme::Colors;
+use crate::preview::panel::theme::focus_ring;
 
 /// Cells of a mask, and pixels of the picture of it: the window may be drawn without smoothing.
 const CELLS: usize = 28;

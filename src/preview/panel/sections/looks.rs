@@ -5,7 +5,7 @@ use egui::{Align2, CornerRadius, FontFamily, FontId, Rect, Role, Sense, TextEdit
 use super::Sheet;
 use crate::look::Effect;
 use crate::look::presets::Preset;
-use crate::preview::panel::parts::focus_ring;
+use crate::preview::panel::theme::focus_ring;
 use crate::preview::panel::theme::{Colors, medium};
 use crate::preview::state::Action;
 

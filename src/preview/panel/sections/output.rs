@@ -3,7 +3,8 @@
 use egui::{Align2, ComboBox, CornerRadius, Role, Sense, Stroke, TextStyle, Ui, Vec2, WidgetInfo, vec2};
 
 use super::Sheet;
-use crate::preview::panel::parts::{focus_ring, remark};
+use crate::preview::panel::parts::remark;
+use crate::preview::panel::theme::focus_ring;
 use crate::preview::panel::{icons, theme::Colors};
 use crate::preview::state::{Action, NO_VIRTUAL_CAMERA};
 

@@ -1,35 +1,46 @@
-//! The quality levels that an executor is made for, and what they need in common: filters for each, memory for the
-//! most demanding of them. Nothing is made when the level changes.
+//! The rungs that an executor is made for, and what they need in common: filters for each, memory for the most
+//! demanding of them. Nothing is made when the rung changes.
 
 use std::sync::Arc;
 
 use super::aperture::Mask;
 use super::bank::Bank;
 use super::low_rank::Decomposition;
-use super::plan::Compositing;
-use super::rung::{MOST_FULL_RADIUS_PX, MOST_RADIUS_PX, Rung, SCALES, rung};
+use super::rung::{LADDER, MOST_FULL_RADIUS_PX, MOST_RADIUS_PX, Rung, SCALES};
 use super::{Rank, Settings};
 use crate::budget::Quality;
 use crate::optics::CocKind;
 
+/// How the blurred bins become one picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compositing {
+    /// A pixel belongs to the bin of its own CoC; bins are stacked front to back.
+    Layers,
+    /// Every bin holds the whole picture; a pixel takes the bin of its own CoC (no depth edges to respect).
+    Select,
+    /// One bin at full scale, every pixel with exactly its own radius.
+    Gather,
+}
+
+/// A rung, and its filters.
 #[derive(Clone, Debug)]
-pub struct Level {
+pub struct Step {
     pub quality: Quality,
     pub rung: Rung,
-    /// Which of [`Levels::banks`] has its filters.
+    /// Which of [`Ladder::banks`] has its filters.
     pub bank: usize,
 }
 
-/// The levels of an executor, cheapest first, and their filters.
+/// The rungs of an executor, cheapest first, and their filters.
 #[derive(Clone, Debug)]
-pub struct Levels {
-    levels: Vec<Level>,
-    /// The filters, in units of bin pixels; levels share them where they can.
+pub struct Ladder {
+    steps: Vec<Step>,
+    /// The filters, in units of bin pixels; rungs share them where they can.
     pub banks: Vec<Arc<Bank>>,
 }
 
-impl Levels {
-    /// The levels of some settings: all of them where these are adaptive, else the one.
+impl Ladder {
+    /// The rungs of some settings: all of them where these are adaptive, else the one.
     pub fn new(settings: &Settings, mask: &Mask, compositing: Compositing) -> Self {
         let most_px = settings.far_max_px.max(settings.near_max_px);
         let coarsest = SCALES[SCALES.len() - 1] as f32;
@@ -37,8 +48,8 @@ impl Levels {
         let mut made: Vec<(Rank, f32)> = Vec::new();
         let mut banks = Vec::new();
         let wanted = |quality: &Quality| settings.adaptive || *quality == settings.quality;
-        let levels = Quality::ALL.into_iter().filter(wanted).map(|quality| {
-            let rung = rung(quality);
+        let steps = Quality::ALL.into_iter().filter(wanted).map(|quality| {
+            let rung = LADDER[quality as usize];
             let terms = if settings.coc == CocKind::Uniform { rung.even_rank } else { rung.rank };
             let rank = settings.rank.unwrap_or(Rank::Terms(terms));
             let bank_px = match settings.coc {
@@ -52,44 +63,44 @@ impl Levels {
                 banks.push(Arc::new(Bank::of(&svd, mask, rank, bank_px)));
                 banks.len() - 1
             });
-            Level { quality, rung, bank }
+            Step { quality, rung, bank }
         });
-        Self { levels: levels.collect(), banks }
+        Self { steps: steps.collect(), banks }
     }
 
-    /// The level of a quality, or the nearest one there is.
-    pub fn nearest(&self, quality: Quality) -> &Level {
-        let apart = |level: &&Level| (level.quality as usize).abs_diff(quality as usize);
-        self.levels.iter().min_by_key(apart).expect("there is at least one level")
+    /// The rung of a quality, or the nearest one there is.
+    pub fn nearest(&self, quality: Quality) -> &Step {
+        let apart = |step: &&Step| (step.quality as usize).abs_diff(quality as usize);
+        self.steps.iter().min_by_key(apart).expect("there is at least one rung")
     }
 
-    /// All levels, cheapest first.
-    pub fn iter(&self) -> impl Iterator<Item = &Level> {
-        self.levels.iter()
+    /// All rungs, cheapest first.
+    pub fn iter(&self) -> impl Iterator<Item = &Step> {
+        self.steps.iter()
     }
 
-    /// Most separable terms of any level.
+    /// Most separable terms of any rung.
     pub fn most_terms(&self) -> usize {
         self.banks.iter().map(|bank| bank.terms).max().unwrap_or(0)
     }
 
-    /// The largest reach of any level's filters, in bin pixels.
+    /// The largest reach of any rung's filters, in bin pixels.
     pub fn most_reach(&self) -> usize {
         self.banks.iter().map(|bank| bank.reach).max().unwrap_or(0)
     }
 
     /// Most bins on one side of the focal plane.
     pub fn most_bins_per_side(&self) -> usize {
-        self.levels.iter().map(|level| level.rung.bins_per_side as usize).max().unwrap_or(0)
+        self.steps.iter().map(|step| step.rung.bins_per_side as usize).max().unwrap_or(0)
     }
 
     /// Most bins of a side that may be at full scale.
     pub fn most_fine_bins(&self) -> usize {
-        self.levels.iter().map(|level| level.rung.fine_bins()).max().unwrap_or(0)
+        self.steps.iter().map(|step| step.rung.fine_bins()).max().unwrap_or(0)
     }
 
-    /// Whether any level fills in what near objects hide.
+    /// Whether any rung fills in what near objects hide.
     pub fn fill(&self) -> bool {
-        self.levels.iter().any(|level| level.rung.fill)
+        self.steps.iter().any(|step| step.rung.fill)
     }
 }

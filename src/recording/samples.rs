@@ -1,0 +1,29 @@
+//! What pixels are stored in.
+
+/// What a pixel is stored in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Samples {
+    /// 1 is grey, 3 colour; one more is transparency.
+    pub channels: usize,
+    /// Whether samples have 16 bits, high byte first, or 8.
+    pub are_wide: bool,
+}
+
+impl Samples {
+    pub fn has_color(self) -> bool {
+        self.channels >= 3
+    }
+
+    pub fn has_alpha(self) -> bool {
+        self.channels.is_multiple_of(2)
+    }
+
+    /// 16-bit grey.
+    pub fn is_depth(self) -> bool {
+        self.are_wide && self.channels == 1
+    }
+
+    pub fn bytes_per_pixel(self) -> usize {
+        self.channels * (1 + usize::from(self.are_wide))
+    }
+}
