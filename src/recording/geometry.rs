@@ -1,10 +1,9 @@
-//! What the `calib.txt` of a rectified pair says: in the form of Middlebury and ETH3D, or in that of KITTI.
+//! The geometry of a rectified pair, whatever form its `calib.txt` has.
 
 use std::path::Path;
 
 use super::error::RecordingError;
 use super::fault::GeometryFault;
-use super::{kitti, middlebury};
 use crate::files::input;
 use crate::optics::StereoRig;
 
@@ -26,21 +25,7 @@ pub struct Geometry {
 pub(super) type Wrong = (Option<u32>, GeometryFault);
 
 impl Geometry {
-    /// Reads a calibration; its form is told by its content. Of KITTI's four cameras those are taken in whose folder
-    /// the picture `left` is; where that tells nothing, the colour cameras 2 and 3, else 0 and 1.
-    ///
-    /// # Errors
-    /// It cannot be read, is of another kind, lacks a key, or has numbers that cannot be.
-    pub fn read(file: &Path, left: &Path) -> Result<Self, RecordingError> {
-        Self::read_as(file, |text| {
-            if middlebury::calib::is_one(text) {
-                middlebury::calib::parse(text)
-            } else {
-                kitti::calib::parse(text, kitti::camera_of(left))
-            }
-        })
-    }
-
+    /// Reads a file in one form.
     pub(super) fn read_as(file: &Path, parse: impl Fn(&str) -> Result<Self, Wrong>) -> Result<Self, RecordingError> {
         let text = input::read_text(file, input::MOST_CALIBRATION_BYTES)
             .map_err(RecordingError::io("read the calibration", file))?;

@@ -8,6 +8,7 @@ pub mod snapshot;
 pub mod still;
 pub mod tum;
 
+mod calib;
 mod coded;
 mod contents;
 mod decode;

@@ -3,7 +3,9 @@
 use glam::{UVec3, Vec3};
 
 use super::ray::Bounds;
-use super::shape::Distance;
+
+/// A signed distance in metres (a lower bound of it suffices), negative inside.
+pub type Distance = fn(Vec3) -> f32;
 
 /// Distances at the corners of cubic cells.
 #[derive(Clone, Debug)]

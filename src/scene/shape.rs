@@ -4,11 +4,8 @@ use std::sync::Arc;
 
 use glam::{Mat3, Vec2, Vec3};
 
-use super::grid::Grid;
+use super::grid::{Distance, Grid};
 use super::ray::{Bounds, Ray};
-
-/// A signed distance in metres (a lower bound of it suffices), negative inside.
-pub type Distance = fn(Vec3) -> f32;
 
 /// A closed or open surface.
 #[derive(Clone, Debug)]
