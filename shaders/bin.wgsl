@@ -10,12 +10,11 @@
 @group(0) @binding(5) var<storage, read_write> grid: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read> ranges: array<vec2<f32>>;
 
-const TILE = 16u;
 const HUGE: f32 = 3.0e38;
 
 // Of each pixel of the tile: its value, and coverage times |CoC|.
-var<workgroup> values: array<vec4<f32>, 256>;
-var<workgroup> cocs: array<f32, 256>;
+var<workgroup> values: array<vec4<f32>, TILE * TILE>;
+var<workgroup> cocs: array<f32, TILE * TILE>;
 // Whether any pixel that the tile is made of has a share.
 var<workgroup> some: atomic<u32>;
 
@@ -52,11 +51,11 @@ fn measure(k: u32, cell: vec2<u32>, first: vec2<u32>) {
 
 // Looks at the tiles of the picture that a tile of the bin is made of, one a thread.
 fn look(k: u32, tile: vec2<u32>, thread: u32) {
-    let across = (frame.size + SCENE_TILE - 1u) / SCENE_TILE;
+    let across = (frame.size + TILE - 1u) / TILE;
     let scale = bins[k].scale;
     let start = tile * TILE * scale;
-    let first = (start - min(start, vec2(scale / 2u))) / SCENE_TILE;
-    let last = min((start + TILE * scale + scale / 2u - 1u) / SCENE_TILE, across - 1u);
+    let first = (start - min(start, vec2(scale / 2u))) / TILE;
+    let last = min((start + TILE * scale + scale / 2u - 1u) / TILE, across - 1u);
     let count = last - first + 1u;
     let at = first + vec2(thread % count.x, thread / count.x);
     if at.y <= last.y {
@@ -90,7 +89,7 @@ fn averaged(k: u32, pixel: vec2<u32>) -> array<f32, 5> {
     return array(sum.r, sum.g, sum.b, sum.a, coc_sum);
 }
 
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(TILE, TILE)
 fn bin(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
        @builtin(local_invocation_id) local: vec3<u32>) {
     let place = place_of(workgroup, workgroups, vec2(TILE));

@@ -14,9 +14,9 @@
 @group(0) @binding(10) var<storage, read_write> filtered: array<u32>;
 
 // Columns that are held at a time; most filters need no more for a whole tile.
-const CHUNK = 128i;
+const CHUNK = 128u;
 
-var<workgroup> values: array<vec2<u32>, 512>;
+var<workgroup> values: array<vec2<u32>, CHUNK * ROWS_TILE_Y>;
 var<workgroup> some: atomic<u32>;
 
 fn extent_of(k: u32) -> vec2<u32> {
@@ -28,19 +28,20 @@ fn is_covered(k: u32, pixel: vec2<u32>) -> bool {
     return grid[2u * (bins[k].cells_at + cell.y * bins[k].cells.x + cell.x)].x > 0.0;
 }
 
-@compute @workgroup_size(64, 4)
+@compute @workgroup_size(ROWS_TILE_X, ROWS_TILE_Y)
 fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
              @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let place = place_of(workgroup, workgroups, ROWS_TILE);
+    let place = place_of(workgroup, workgroups, rows_tile());
     let k = place.bin;
     let size = bins[k].size;
-    let corner_pixel = place.tile * ROWS_TILE;
+    let corner_pixel = place.tile * rows_tile();
     let pixel = corner_pixel + local.xy;
     let reach = i32(bins[k].reach);
     let first = i32(corner_pixel.x) - reach;
-    let length = i32(ROWS_TILE.x) + 2 * reach;
+    let length = i32(ROWS_TILE_X) + 2 * reach;
+    let threads = i32(ROWS_TILE_X * ROWS_TILE_Y);
     // Where no cell within reach is covered, nothing comes of it.
-    for (var x = max(first, 0) / i32(CELL) + i32(thread); x * i32(CELL) < min(first + length, i32(size.x)); x += 256) {
+    for (var x = max(first, 0) / i32(CELL) + i32(thread); x * i32(CELL) < min(first + length, i32(size.x)); x += threads) {
         if place.some && is_covered(k, vec2(u32(x) * CELL, corner_pixel.y)) {
             atomicStore(&some, 1u);
         }
@@ -49,7 +50,7 @@ fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroup
     let here = atomicLoad(&some) == 1u;
     let inside = here && all(pixel < size);
     if place.some && thread == 0u {
-        filtered[bins[k].filtered_at + tile_of(pixel, size.x, ROWS_TILE)] = u32(here);
+        filtered[bins[k].filtered_at + tile_of(pixel, size.x, rows_tile())] = u32(here);
     }
     var corner: Corner;
     var taps: Taps;
@@ -61,12 +62,12 @@ fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroup
     var sum1 = vec4(0.0);
     var sum2 = vec4(0.0);
     var sum3 = vec4(0.0);
-    for (var at = 0; at < length; at += CHUNK) {
-        for (var n = i32(thread); here && n < 4 * CHUNK; n += 256) {
-            let x = u32(clamp(first + at + n % CHUNK, 0, i32(size.x) - 1));
-            let y = min(corner_pixel.y + u32(n / CHUNK), size.y - 1u);
+    for (var at = 0; at < length; at += i32(CHUNK)) {
+        for (var n = i32(thread); here && n < i32(CHUNK * ROWS_TILE_Y); n += threads) {
+            let x = u32(clamp(first + at + n % i32(CHUNK), 0, i32(size.x) - 1));
+            let y = min(corner_pixel.y + u32(n / i32(CHUNK)), size.y - 1u);
             var value = vec2(0u);
-            if at + n % CHUNK < length && is_covered(k, vec2(x, y)) {
+            if at + n % i32(CHUNK) < length && is_covered(k, vec2(x, y)) {
                 value = source[bins[k].pixels_at + y * size.x + x];
             }
             values[n] = value;
@@ -74,8 +75,8 @@ fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroup
         workgroupBarrier();
         // The pixel itself is value `own`; taps that lie in other chunks have their turn then.
         let own = i32(pixel.x) - first - at;
-        let line = i32(local.y) * CHUNK + own;
-        let last = select(-1 - own, min(taps.reach, CHUNK - 1 - own), inside);
+        let line = i32(local.y * CHUNK) + own;
+        let last = select(-1 - own, min(taps.reach, i32(CHUNK) - 1 - own), inside);
         for (var j = max(-taps.reach, -own); j <= last; j++) {
             let weight = tap_at(taps, corner.along, j);
             let value = unpacked(values[line + j]);

@@ -10,6 +10,15 @@ override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes of the bank lie evenly in each octave
 override OCTAVE_SHIFT: u32;         // bits of a float below those that tell the node within its octave
 
+// What a workgroup does, in pixels or whatever the pass goes over: squares, lines, tiles of a bin's rows and of its result.
+override TILE: u32;
+override SMALL_TILE: u32;
+override LINE: u32;
+override ROWS_TILE_X: u32;
+override ROWS_TILE_Y: u32;
+override RESULT_TILE_X: u32;
+override RESULT_TILE_Y: u32;
+
 const MAX_BINS = 13;
 
 // One frame.
@@ -57,10 +66,13 @@ struct Bin {
     has_lobes: u32,             // 1: its results are kept in the range of the colours around
 }
 
-// Tiles, in pixels: of the picture (ranges of CoC), of a bin's rows and of its result (whether anything is there).
-const SCENE_TILE = vec2(16u, 16u);
-const ROWS_TILE = vec2(64u, 4u);
-const RESULT_TILE = vec2(8u, 32u);
+fn rows_tile() -> vec2<u32> {
+    return vec2(ROWS_TILE_X, ROWS_TILE_Y);
+}
+
+fn result_tile() -> vec2<u32> {
+    return vec2(RESULT_TILE_X, RESULT_TILE_Y);
+}
 
 // A tile that a pixel lies in, row by row.
 fn tile_of(pixel: vec2<u32>, width: u32, tile: vec2<u32>) -> u32 {

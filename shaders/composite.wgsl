@@ -9,7 +9,7 @@
 
 // A pixel of a bin; nothing was written where nothing is.
 fn bin_at(k: u32, pixel: vec2<u32>) -> vec4<f32> {
-    if active_tiles[bins[k].active_at + tile_of(pixel, bins[k].size.x, RESULT_TILE)] == 0u {
+    if active_tiles[bins[k].active_at + tile_of(pixel, bins[k].size.x, result_tile())] == 0u {
         return vec4(0.0);
     }
     return unpacked(blurred[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x]);
@@ -104,7 +104,7 @@ fn color_of(index: u32) -> vec3<u32> {
 }
 
 // Four pixels, three words.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LINE)
 fn composite(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let quad = id.y * groups.x * 64u + id.x;
     let pixels = frame.size.x * frame.size.y;

@@ -6,7 +6,7 @@
 @group(0) @binding(3) var<storage, read_write> ranges: array<vec2<f32>>;
 @group(0) @binding(4) var<storage, read> known: array<f32>;
 
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(TILE, TILE)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
         @builtin(workgroup_id) tile: vec3<u32>, @builtin(num_workgroups) tiles: vec3<u32>) {
     let index = tile.y * tiles.x + tile.x;

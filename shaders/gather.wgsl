@@ -7,7 +7,7 @@
 @group(0) @binding(4) var<storage, read> node_reach: array<u32>;
 @group(0) @binding(5) var<storage, read_write> blurred: array<vec2<u32>>;
 
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(TILE, TILE)
 fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(id.xy >= frame.size) {
         return;

@@ -6,14 +6,14 @@
 @group(0) @binding(2) var<storage, read_write> hidden: array<f32>;
 @group(0) @binding(3) var<storage, read> ranges: array<vec2<f32>>;
 
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(TILE, TILE)
 fn hide(@builtin(global_invocation_id) id: vec3<u32>) {
     let size = (frame.size + 1u) / 2u;
     if any(id.xy >= size) {
         return;
     }
     var most = 0.0;
-    let nearest_px = ranges[tile_of(2u * id.xy, frame.size.x, SCENE_TILE)].x;
+    let nearest_px = ranges[tile_of(2u * id.xy, frame.size.x, vec2(TILE))].x;
     for (var sub = 0u; sub < 4u && step_at(frame.unhidden, nearest_px) < 1.0; sub++) {
         let at = min(2u * id.xy + vec2(sub % 2u, sub / 2u), frame.size - 1u);
         most = max(most, 1.0 - step_at(frame.unhidden, scene_unpacked(scene[at.y * frame.size.x + at.x], frame.most_px).w));

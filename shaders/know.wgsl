@@ -6,7 +6,7 @@
 @group(0) @binding(3) var<storage, read_write> pyramid: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> known: array<f32>;
 
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(TILE, TILE)
 fn know(@builtin(global_invocation_id) id: vec3<u32>) {
     let size = (frame.size + 1u) / 2u;
     if any(id.xy >= size) {

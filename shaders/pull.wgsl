@@ -1,6 +1,6 @@
 // Pass pull, of push-pull inpainting: one level of the pyramid to the next coarser one, known pixels only.
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(SMALL_TILE, SMALL_TILE)
 fn pull(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(id.xy >= level.coarse) {
         return;

@@ -7,7 +7,7 @@ fn neighbour(at: u32, limit: u32) -> u32 {
     return select(min(half + 1u, limit - 1u), half - min(half, 1u), at % 2u == 0u);
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(SMALL_TILE, SMALL_TILE)
 fn push(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(id.xy >= level.fine) {
         return;

@@ -59,7 +59,7 @@ fn around(k: u32, cell: vec2<u32>) -> Around {
     return Around(bin_radius_px(k, coc_px), select(vec3(0.0), low, some), select(vec3(0.0), high, some));
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(SMALL_TILE, SMALL_TILE)
 fn reach(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
          @builtin(local_invocation_id) local: vec3<u32>) {
     let place = place_of(workgroup, workgroups, vec2(8u));

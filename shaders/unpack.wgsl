@@ -33,7 +33,7 @@ fn coc_of(x: u32, y: u32) -> f32 {
     return clamp(frame.coc.x * (1.0 - ratio), -frame.coc.w, frame.coc.w);
 }
 
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(TILE, TILE)
 fn unpack(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
           @builtin(workgroup_id) tile: vec3<u32>, @builtin(num_workgroups) tiles: vec3<u32>) {
     if thread == 0u {

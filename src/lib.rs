@@ -31,7 +31,7 @@
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
 //! | 3 | `link`, [`budget`], [`stats`], [`recording`], `scene`, `v4l2` |
 //! | 2 | `compute`, [`calibration`] |
-//! | 1 | [`frame`], [`optics`], [`clock`], [`knob`], `files` |
+//! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
 //!
 //! Words: a *circle of confusion* (CoC) is a **signed radius in pixels** of the input picture, positive behind
@@ -48,6 +48,7 @@ pub mod capture;
 #[doc(hidden)]
 pub mod cli;
 pub mod clock;
+pub mod color;
 #[doc(hidden)]
 pub mod compute;
 pub mod computing;

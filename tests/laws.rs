@@ -4,10 +4,11 @@
 mod common;
 
 use bokehcam::bokeh::aperture::{Aperture, Shape};
-use bokehcam::bokeh::cpu::{CpuBokeh, linear_to_srgb, srgb_to_linear};
+use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Method, Rank, Settings};
 use bokehcam::budget::Quality;
+use bokehcam::color::{linear_to_srgb, srgb_to_linear};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};

@@ -7,10 +7,11 @@
 mod common;
 
 use bokehcam::bokeh::aperture::{Aperture, Picture, Shape};
-use bokehcam::bokeh::cpu::{CpuBokeh, srgb_to_linear};
+use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Method, Rank, Settings};
 use bokehcam::budget::Quality;
+use bokehcam::color::srgb_to_linear;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc, Ramp};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Modules of the crate by layer, the lowest first.
 const LAYERS: [&[&str]; 12] = [
     &["names"],
-    &["frame", "optics", "clock", "files", "knob"],
+    &["color", "frame", "optics", "clock", "files", "knob"],
     &["compute", "calibration"],
     &["link", "budget", "stats", "recording", "scene", "v4l2"],
     &["capture", "depth", "bokeh", "sink"],

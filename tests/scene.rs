@@ -1,9 +1,10 @@
 //! The renderer against the laws of optics, and the bundled recording against the renderer.
 
 use bokehcam::bokeh::aperture::{Aperture, Shape, lens_points};
+use bokehcam::color::encode_srgb;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::DepthCoc;
-use bokehcam::scene::{LinearImage, PointLight, Scene, ThinLens, View, encode_srgb};
+use bokehcam::scene::{LinearImage, PointLight, Scene, ThinLens, View};
 use glam::{DVec2, Vec3};
 
 const COC_AT_INFINITY_PX: f32 = 14.0;

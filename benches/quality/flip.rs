@@ -6,7 +6,7 @@
 
 use std::f32::consts::PI;
 
-use bokehcam::bokeh::cpu::srgb_to_linear;
+use bokehcam::color::srgb_to_linear;
 use bokehcam::frame::ColorImage;
 
 use super::picture::Plane;

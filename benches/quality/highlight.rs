@@ -1,6 +1,6 @@
 //! One lone light on a plain wall: what its disc looks like.
 
-use bokehcam::bokeh::cpu::srgb_to_linear;
+use bokehcam::color::srgb_to_linear;
 use bokehcam::frame::ColorImage;
 use glam::Vec2;
 

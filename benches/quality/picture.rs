@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::thread;
 
-use bokehcam::bokeh::cpu::{linear_to_srgb, srgb_to_linear};
+use bokehcam::color::{linear_to_srgb, srgb_to_linear};
 use bokehcam::frame::ColorImage;
 
 /// Red, green, blue in linear light, 1 = white; more is light that an 8-bit picture clips.

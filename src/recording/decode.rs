@@ -7,6 +7,7 @@ use super::depth_covers;
 use super::extras::Extras;
 use super::fault::PictureFault;
 use super::samples::Samples;
+use crate::color::luminance;
 use crate::frame::{ColorImage, DepthMap, GrayImage};
 
 /// Memory for decoding that is kept from frame to frame.
@@ -158,7 +159,7 @@ pub(super) fn grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
                 false => f32::from(pixel[channel]) / 255.0,
             };
             let luma = match samples.has_color() {
-                true => 0.2126 * sample(0) + 0.7152 * sample(1) + 0.0722 * sample(2),
+                true => luminance(sample(0), sample(1), sample(2)),
                 false => sample(0),
             };
             *grey = if samples.has_alpha() { luma * sample(samples.channels - 1) } else { luma };

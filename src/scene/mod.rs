@@ -16,7 +16,7 @@ mod render;
 mod shape;
 mod targets;
 
-pub use render::{LensPicture, LinearImage, ThinLens, View, encode_srgb};
+pub use render::{LensPicture, LinearImage, ThinLens, View};
 pub use targets::PointLight;
 
 use glam::Vec3;

@@ -6,6 +6,7 @@ use glam::{DVec2, Vec2, Vec3};
 
 use super::ray::Ray;
 use super::{Moment, Scene};
+use crate::color::encode_srgb;
 use crate::frame::{ColorImage, DepthMap};
 
 /// A camera: picture size, focal length, and which eye of a rectified pair.
@@ -102,13 +103,6 @@ pub struct LensPicture {
     pub clipped: LinearImage,
     /// The rays as bright as they are: what a real lens does.
     pub hdr: LinearImage,
-}
-
-/// Linear light, 1 = white, to an 8-bit sRGB value by the standard's formula; cut to 0..1 first.
-pub fn encode_srgb(linear: f32) -> u8 {
-    let x = linear.clamp(0.0, 1.0);
-    let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
-    (255.0 * encoded + 0.5) as u8
 }
 
 /// Where in its pixel ray `k` goes, in -0.5..0.5; ray 0 goes through the centre.

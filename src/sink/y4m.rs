@@ -10,8 +10,9 @@ use super::output::Output;
 use super::pipe::Pipe;
 use super::rate::frame_rate;
 use super::steady::{Place, Steady};
-use super::yuv::{Converter, Matrix};
+use super::yuv::Converter;
 use super::{Ending, Options, Sink, SinkError, check_size};
+use crate::color::Matrix;
 use crate::frame::ColorImage;
 
 /// A picture that stands for longer makes a file no longer than that.

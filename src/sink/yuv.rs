@@ -1,31 +1,8 @@
 //! 8-bit RGB to planar Y'CbCr 4:2:0 in limited range (Y 16..235, Cb and Cr 16..240), chroma sited in the middle of its
 //! 2 x 2 pixels, as the y4m tag `C420jpeg` says.
 
+use crate::color::Matrix;
 use crate::frame::ColorImage;
-
-/// Which luma weights a picture uses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Matrix {
-    /// Standard definition.
-    Bt601,
-    /// High definition.
-    Bt709,
-}
-
-impl Matrix {
-    /// What players assume of a picture that does not say: BT.709 from 720 rows on.
-    pub fn for_height(height: u32) -> Self {
-        if height >= 720 { Self::Bt709 } else { Self::Bt601 }
-    }
-
-    /// Luma weights of red and blue.
-    pub fn weights(self) -> (f64, f64) {
-        match self {
-            Self::Bt601 => (0.299, 0.114),
-            Self::Bt709 => (0.2126, 0.0722),
-        }
-    }
-}
 
 /// Fixed-point fractional bits of the coefficients; luma keeps within 32 bits, chroma sums four pixels and has two
 /// more.
@@ -41,8 +18,7 @@ pub struct Converter {
 impl Converter {
     /// Coefficients of `matrix`.
     pub fn new(matrix: Matrix) -> Self {
-        let (red, blue) = matrix.weights();
-        let green = 1.0 - red - blue;
+        let [red, green, blue] = matrix.weights();
         let fixed = |weights: [f64; 3], scale: f64| {
             weights.map(|weight| (weight * scale / 255.0 * f64::from(1 << BITS)).round() as i32)
         };

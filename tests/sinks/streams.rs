@@ -5,14 +5,15 @@ use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use bokehcam::sink::yuv::{Converter, Matrix};
+use bokehcam::color::Matrix;
+use bokehcam::sink::yuv::Converter;
 use bokehcam::sink::{Ending, Sink, Y4m};
 
 use crate::{PERIOD_NS, flat, open, options, picture};
 
 /// Back from limited-range planes to RGB by the definition of the matrix, in floating point.
 fn decode(matrix: Matrix, width: usize, height: usize, planes: &[u8]) -> Vec<[f64; 3]> {
-    let (kr, kb) = matrix.weights();
+    let [kr, _, kb] = matrix.weights();
     let half = width.div_ceil(2);
     let (luma, chroma) = planes.split_at(width * height);
     let (cb, cr) = chroma.split_at(half * height.div_ceil(2));

@@ -9,9 +9,10 @@ use pulp::{Simd, WithSimd};
 
 use super::rows::{STRIP, Slot};
 use super::tiles::{TILE_H, TILE_W, Tiles};
-use super::unpack::{Source, coc_row, compress, linear_to_srgb, luminance};
+use super::unpack::{Source, coc_row, compress};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, CELL, HINDMOST_COVERAGE, MAX_BINS, Plan};
+use crate::color::{encode_srgb, luminance};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, madd, store};
 
@@ -33,7 +34,7 @@ impl EncodeTable {
         let mut codes = Box::new([255; ENCODE_SIZE]);
         let half = |most: f32| (0..=ENCODE_STEPS).map(move |k| k as f32 / ENCODE_STEPS as f32 * most);
         for (code, light) in codes.iter_mut().zip(half(DARK).chain(half(1.0))) {
-            *code = (linear_to_srgb(light) * 255.0 + 0.5) as u8;
+            *code = encode_srgb(light);
         }
         Self(codes)
     }

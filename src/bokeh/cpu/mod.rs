@@ -37,7 +37,7 @@ use crate::compute::{Backend, simd};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
-pub use unpack::{compress, expand, linear_to_srgb, luminance, srgb_to_linear};
+pub use unpack::{compress, expand};
 
 /// Runs a plan on the CPU.
 pub struct CpuBokeh {

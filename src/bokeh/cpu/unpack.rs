@@ -2,22 +2,13 @@
 
 use pulp::Simd;
 
+use crate::color::luminance;
 use crate::compute::aligned::Line;
 use crate::compute::simd::madd;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
-/// Linear light of an sRGB code value in [0, 1] (IEC 61966-2-1).
-pub fn srgb_to_linear(code: f32) -> f32 {
-    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
-}
-
-/// sRGB code value in [0, 1] of linear light.
-pub fn linear_to_srgb(light: f32) -> f32 {
-    if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// [`srgb_to_linear`] of an 8-bit value as a polynomial, which vectors can evaluate: off by less than 3e-5, or 0.004
+/// [`srgb_to_linear`](crate::color::srgb_to_linear) of an 8-bit value as a polynomial, which vectors can evaluate: off by less than 3e-5, or 0.004
 /// of the step to the next code.
 #[inline(always)]
 pub fn decode<S: Simd>(code: u8) -> f32 {
@@ -28,12 +19,6 @@ pub fn decode<S: Simd>(code: u8) -> f32 {
         light = madd::<S>(light, x, *factor);
     }
     if x <= 0.04045 { x * (1.0 / 12.92) } else { light }
-}
-
-/// Luminance of linear light (Rec. 709 weights).
-#[inline(always)]
-pub fn luminance(r: f32, g: f32, b: f32) -> f32 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 /// What a colour of this luminance is multiplied by to recover its highlight; dark colours hardly change.
@@ -138,6 +123,7 @@ pub fn nearest(index: usize, pixels: usize, of: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::color::{linear_to_srgb, srgb_to_linear};
 
     #[test]
     fn expansion_is_undone_and_white_is_as_bright_as_said() {

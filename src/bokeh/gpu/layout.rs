@@ -3,16 +3,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::shaders::Bin;
+use super::shaders::{Bin, RESULT_TILE, ROWS_TILE};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan, SEGMENT};
 
 /// Columns of a tile of the CPU executor: both executors' grids are as wide, so that their cells agree.
 const GRID_ROUNDING: usize = 64;
-
-/// Pixels of a bin that a workgroup makes in `blur_rows` and in `blur_columns`: the tiles of `common.wgsl`.
-pub const ROWS_TILE: [usize; 2] = [64, 4];
-pub const RESULT_TILE: [usize; 2] = [8, 32];
 
 /// The bins of a frame.
 pub struct Layout {

@@ -3,19 +3,11 @@
 use std::ops::Range;
 
 use super::buffers::{Buffers, Filters, WORK_STRIDE, works};
-use super::layout::{Layout, RESULT_TILE, ROWS_TILE, tiles};
+use super::layout::{Layout, tiles};
 use super::readback::MAX_QUERIES;
-use super::shaders::{self, Bin, Work};
+use super::shaders::{self, Bin, LINE, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work};
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
 use crate::compute::device::{Device, Shader, in_two};
-
-/// Invocations of a workgroup in x and y, as the shaders declare them.
-const TILE: u32 = 16;
-const SMALL_TILE: u32 = 8;
-const LINE: u32 = 64;
-/// What a workgroup does of a bin: pixels of `bin`, edges of `reach`.
-const BIN_TILE: [usize; 2] = [16, 16];
-const REACH_TILE: [usize; 2] = [8, 8];
 
 /// Where each piece of work has its uniform `Work`.
 const NEAR: usize = 0;
@@ -231,12 +223,12 @@ impl Passes {
             run(&gather.step, gather.workgroups);
         } else {
             if !near.is_empty() {
-                run(&self.bin[NEAR], all(near, BIN_TILE, cells));
+                run(&self.bin[NEAR], all(near, [TILE as usize; 2], cells));
                 let fill = self.fill.iter().filter(|_| plan.fill);
                 fill.for_each(|fill| run(&fill.step, fill.workgroups));
             }
-            run(&self.bin[REST], all(rest, BIN_TILE, cells));
-            run(&self.reach, all(&layout.bins, REACH_TILE, |bin| [bin.edges, bin.cells[1]]));
+            run(&self.bin[REST], all(rest, [TILE as usize; 2], cells));
+            run(&self.reach, all(&layout.bins, [SMALL_TILE as usize; 2], |bin| [bin.edges, bin.cells[1]]));
             let groups = plan.bank.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];

@@ -1,7 +1,7 @@
 //! What the passes leave behind, for comparing the executors pass by pass.
 
 use super::GpuBokeh;
-use super::layout::RESULT_TILE;
+use super::shaders::RESULT_TILE;
 use crate::bokeh::plan::CELL;
 use crate::bokeh::{BokehError, Probe};
 use crate::compute::GpuError;

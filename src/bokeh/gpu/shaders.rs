@@ -43,8 +43,17 @@ pub const COMPOSITE: Shader = shader!("composite");
 pub const ALL: [Shader; 12] =
     [UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, KNOW, PULL, PUSH, FILL, COMPOSITE];
 
+/// Invocations of a workgroup in x and in y, for pictures and bins, and for what is smaller.
+pub const TILE: u32 = 16;
+pub const SMALL_TILE: u32 = 8;
+/// Invocations of a workgroup that goes along lines.
+pub const LINE: u32 = 64;
+/// Pixels of a bin that a workgroup makes in `blur_rows` and in `blur_columns`.
+pub const ROWS_TILE: [usize; 2] = [64, 4];
+pub const RESULT_TILE: [usize; 2] = [8, 32];
+
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 8] = [
+pub const CONSTANTS: [(&str, f64); 15] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("ANY_COLOR", ANY_COLOR as f64),
@@ -53,6 +62,13 @@ pub const CONSTANTS: [(&str, f64); 8] = [
     ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
+    ("TILE", TILE as f64),
+    ("SMALL_TILE", SMALL_TILE as f64),
+    ("LINE", LINE as f64),
+    ("ROWS_TILE_X", ROWS_TILE[0] as f64),
+    ("ROWS_TILE_Y", ROWS_TILE[1] as f64),
+    ("RESULT_TILE_X", RESULT_TILE[0] as f64),
+    ("RESULT_TILE_Y", RESULT_TILE[1] as f64),
 ];
 
 /// `Frame` of `common.wgsl`, where each field is explained.

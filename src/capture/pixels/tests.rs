@@ -1,7 +1,8 @@
 //! Against what the definitions say in floating point, with bytes that come from a generator.
 
 use super::*;
-use crate::v4l2::layout::{Matrix, Range};
+use crate::color::Matrix;
+use crate::v4l2::layout::Range;
 
 /// Numbers that look random: the same everywhere.
 pub(super) struct Random(pub u64);

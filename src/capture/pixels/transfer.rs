@@ -1,5 +1,6 @@
 //! Tables from what a camera's numbers mean to sRGB.
 
+use crate::color::linear_to_srgb;
 use crate::v4l2::layout::{Range, Transfer};
 
 /// A new byte for each byte.
@@ -21,15 +22,10 @@ pub(super) fn table(transfer: Transfer, range: Range) -> Option<Box<Table>> {
             Range::Full => code as f64 / 255.0,
             Range::Limited => ((code as f64 - 16.0) / 219.0).clamp(0.0, 1.0),
         };
-        let shown = to_linear.map_or(value, |power| srgb(value.powf(power)));
+        let shown = to_linear.map_or(value, |power| f64::from(linear_to_srgb(value.powf(power) as f32)));
         *byte = (shown * 255.0).round() as u8;
     }
     Some(table)
-}
-
-/// sRGB's curve, both ways from 0 to 1.
-fn srgb(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 //! Chroma comes with 8 fractional bits, colours leave with 5, so that every product fits and a colour is within one
 //! code of the exact one.
 
-use crate::v4l2::layout::{Matrix, Range};
+use crate::color::Matrix;
+use crate::v4l2::layout::Range;
 
 /// Fractional bits of colours before they are rounded.
 const COLOR_BITS: u32 = 5;
@@ -22,8 +23,7 @@ pub(super) struct Coefficients {
 
 impl Coefficients {
     pub(super) fn new(matrix: Matrix, range: Range) -> Self {
-        let (red, blue) = matrix.weights();
-        let green = 1.0 - red - blue;
+        let [red, green, blue] = matrix.weights();
         let (black, luma_scale, chroma_scale) = match range {
             Range::Limited => (16.0, 255.0 / 219.0, 255.0 / 224.0),
             Range::Full => (0.0, 1.0, 1.0),

@@ -2,6 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::color::srgb_to_linear;
+
 /// The union of two forms, blended over `width` metres.
 pub fn blend(a: f32, b: f32, width: f32) -> f32 {
     let h = (width - (a - b).abs()).max(0.0) / width;
@@ -55,9 +57,6 @@ pub fn step(low: f32, high: f32, x: f32) -> f32 {
 
 /// The linear colour of an sRGB code such as `0xff8800`.
 pub fn hex(code: u32) -> Vec3 {
-    let channel = |shift: u32| {
-        let x = ((code >> shift) & 255) as f32 / 255.0;
-        if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
-    };
+    let channel = |shift: u32| srgb_to_linear(((code >> shift) & 255) as f32 / 255.0);
     Vec3::new(channel(16), channel(8), channel(0))
 }

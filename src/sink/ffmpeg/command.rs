@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::container::Container;
 use super::process::output_within;
-use crate::sink::yuv::Matrix;
+use crate::color::Matrix;
 
 const PROGRAM: &str = "ffmpeg";
 
@@ -50,7 +50,8 @@ const VP9: &[&str] =
 pub(super) fn encode(format: &Format, part: &Path, height: u32) -> Command {
     let color = match Matrix::for_height(height) {
         Matrix::Bt601 => "smpte170m",
-        Matrix::Bt709 => "bt709",
+        // Players expect no other.
+        Matrix::Bt709 | Matrix::Bt2020 => "bt709",
     };
     // Tagged on the frames, for filters, and on the stream, for the muxer. 4:2:0 encoders refuse odd sizes.
     let filters = format!(

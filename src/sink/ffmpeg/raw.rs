@@ -4,8 +4,9 @@
 
 use std::io::{self, Write};
 
+use crate::color::Matrix;
 use crate::frame::ColorImage;
-use crate::sink::yuv::{Converter, Matrix};
+use crate::sink::yuv::Converter;
 
 /// Times are in microseconds.
 const TICK_NS: u64 = 1000;
@@ -82,6 +83,7 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8
     let color = match matrix {
         Matrix::Bt601 => 6,
         Matrix::Bt709 => 1,
+        Matrix::Bt2020 => 9,
     };
     let colour = within(
         &[0x55, 0xb0],

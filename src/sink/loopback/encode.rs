@@ -2,8 +2,9 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::color::Matrix;
 use crate::frame::ColorImage;
-use crate::sink::yuv::{Converter, Matrix};
+use crate::sink::yuv::Converter;
 use crate::v4l2::loopback::Layout;
 
 /// Encodes pictures of one layout.

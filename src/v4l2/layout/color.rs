@@ -3,17 +3,7 @@
 use v4l::v4l_sys as sys;
 
 use super::Family;
-
-/// Which weights make luma of red, green and blue.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Matrix {
-    /// Standard definition, JPEG, and what cameras give that do not say.
-    #[default]
-    Bt601,
-    Bt709,
-    /// Ultra high definition, non-constant luminance.
-    Bt2020,
-}
+use crate::color::Matrix;
 
 /// Which numbers stand for black and white.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,17 +27,6 @@ pub enum Transfer {
     Gamma(u8),
     /// High dynamic range (SMPTE 2084), of which no faithful 8-bit sRGB picture can be made.
     Pq,
-}
-
-impl Matrix {
-    /// Luma weights of red and blue; green has the rest.
-    pub fn weights(self) -> (f64, f64) {
-        match self {
-            Self::Bt601 => (0.299, 0.114),
-            Self::Bt709 => (0.2126, 0.0722),
-            Self::Bt2020 => (0.2627, 0.0593),
-        }
-    }
 }
 
 /// The colours of a format as V4L2 defines what it leaves open. SMPTE 240M, an early high definition, counts as BT.709.

@@ -6,7 +6,8 @@ mod fourcc;
 #[cfg(test)]
 mod tests;
 
-pub use color::{Matrix, Range, Transfer};
+pub use crate::color::Matrix;
+pub use color::{Range, Transfer};
 pub use fourcc::{Content, Family, FourCc, FourCcError};
 
 use v4l::v4l_sys as sys;

@@ -1,6 +1,7 @@
 //! A picture of one aperture's analysis: kernel and approximations above, signed differences below.
 
 use super::analysis::Analysis;
+use crate::color::encode_srgb;
 use crate::frame::ColorImage;
 
 /// Space around and between the panels, in pixels.
@@ -63,14 +64,7 @@ fn tap_color(tap: f64) -> [u8; 3] {
         let depth = (-tap / FULL_DIFFERENCE).min(1.0).sqrt();
         return BLUE.map(|channel| (channel * depth) as u8);
     }
-    [encode(tap); 3]
-}
-
-/// sRGB encoding of a linear intensity, so that the picture looks as the blur does.
-fn encode(linear: f64) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0).round() as u8
+    [encode_srgb(tap as f32); 3]
 }
 
 fn difference_color(difference: f64) -> [u8; 3] {

@@ -1,6 +1,7 @@
 //! Pictures of a blur's intermediates: light as the eye sees it, CoC in two colours, shares and radii in grey.
 
-use crate::bokeh::cpu::{compress, expand, linear_to_srgb, luminance};
+use crate::bokeh::cpu::{compress, expand};
+use crate::color::{encode_srgb, luminance};
 use crate::frame::ColorImage;
 
 /// CoC in front of the focal plane, in it, and behind it (ColorBrewer's RdBu, which the colour-blind can read).
@@ -44,7 +45,7 @@ pub fn light(width: usize, pixels: &[[f32; 4]], expansion: f32, scale: usize) ->
         let square = if expands { square * expand(square, expansion) } else { square };
         let over = [r, g, b].map(|light| (light + square * (1.0 - coverage)).max(0.0));
         let factor = if expands { compress(luminance(over[0], over[1], over[2]), expansion) } else { 1.0 };
-        over.map(|light| (linear_to_srgb((light * factor).min(1.0)) * 255.0 + 0.5) as u8)
+        over.map(|light| encode_srgb(light * factor))
     };
     picture(width, pixels.iter().enumerate().map(color))
 }
@@ -66,7 +67,7 @@ mod tests {
         let nothing = [[0.0; 4]; 17];
         for expansion in [f32::INFINITY, 1.1] {
             let image = light(17, &nothing, expansion, 1);
-            let squares = SQUARES.map(|light| (linear_to_srgb(light) * 255.0 + 0.5) as u8);
+            let squares = SQUARES.map(|light| encode_srgb(light));
             assert_eq!((image.rgb[0], image.rgb[16 * 3]), squares.into());
         }
         // Half of the light is code 188, and what is covered hides the board.
