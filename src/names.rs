@@ -7,7 +7,6 @@ pub trait Named: Copy + PartialEq + 'static {
     /// All values, in the order in which they are shown.
     const VALUES: &'static [Self];
 
-    /// The value's name.
     fn name(self) -> &'static str;
 
     /// What the value does, in a line.

@@ -4,7 +4,6 @@
 #[derive(Clone, Copy, Debug)]
 pub struct Window<const N: usize> {
     values: [f64; N],
-    /// Values held.
     len: usize,
     /// Where the next one goes.
     next: usize,

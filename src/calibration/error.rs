@@ -5,16 +5,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// Why a calibration cannot be used.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// The file cannot be read.
     #[error("cannot read the calibration {}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    Io { path: PathBuf, source: io::Error },
     /// The file is none of those that are known.
     #[error(
         "{}: not a stereo calibration: looked for M1 D1 M2 D2 R T (OpenCV), cam0 and cam1 (Kalibr) and T_BS (EuRoC); \
@@ -30,11 +26,9 @@ pub enum CalibrationError {
     /// Something in the file is wrong.
     #[error("{}: {fault}", Place(path, *line))]
     File {
-        /// The file.
         path: PathBuf,
         /// Line, from 1; 0 where it is about the whole file.
         line: usize,
-        /// What is wrong.
         fault: Fault,
     },
     /// Numbers that did not come from a file are wrong.
@@ -80,6 +74,7 @@ pub enum CalibrationError {
 }
 
 /// What can be wrong with an entry.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
     /// The file is no YAML.
@@ -87,34 +82,17 @@ pub enum Fault {
     Yaml(String),
     /// A key is missing.
     #[error("{key} is missing; {hint}")]
-    Missing {
-        /// The key.
-        key: String,
-        /// What to do.
-        hint: &'static str,
-    },
+    Missing { key: String, hint: &'static str },
     /// Something else stands where an entry of a certain kind belongs.
     #[error("{key} must be {expected}")]
-    Kind {
-        /// The key.
-        key: String,
-        /// What belongs there.
-        expected: &'static str,
-    },
+    Kind { key: String, expected: &'static str },
     /// What should be a number is none, or infinite.
     #[error("{key} holds {text:?} where a finite number belongs; calibrate again")]
-    NotFinite {
-        /// The key.
-        key: String,
-        /// What stands there.
-        text: String,
-    },
+    NotFinite { key: String, text: String },
     /// A matrix of the wrong size.
     #[error("{key} is {}x{}, and must be {expected}", found.0, found.1)]
     Dimensions {
-        /// The key.
         key: String,
-        /// Rows and columns.
         found: (usize, usize),
         /// Rows and columns that it must have.
         expected: &'static str,
@@ -122,7 +100,6 @@ pub enum Fault {
     /// A matrix whose data does not fill its rows and columns.
     #[error("{key} says {}x{}, and holds {found} numbers", said.0, said.1)]
     Data {
-        /// The key.
         key: String,
         /// Rows and columns that it says it has.
         said: (usize, usize),
@@ -132,7 +109,6 @@ pub enum Fault {
     /// Numbers that cannot be what they should be.
     #[error("{key} {what}; calibrate again")]
     Impossible {
-        /// The key.
         key: String,
         /// What is wrong with them.
         what: &'static str,
@@ -140,9 +116,7 @@ pub enum Fault {
     /// A model of camera or lens that is not known here.
     #[error("{key} {found:?} is not known here; known are {known}")]
     Model {
-        /// The key.
         key: String,
-        /// The model.
         found: String,
         /// The models that are known.
         known: &'static str,
@@ -152,10 +126,7 @@ pub enum Fault {
         "{key} has coefficients beyond k6 (thin prism, tilt) that are not 0, which are not known here; \
          calibrate without CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL"
     )]
-    Prism {
-        /// The key.
-        key: String,
-    },
+    Prism { key: String },
 }
 
 /// A file and, where one is to blame, a line.

@@ -10,7 +10,6 @@ use crate::files::input;
 /// Calibrations are nested three deep.
 const MOST_NESTED: usize = 32;
 
-/// A file, read.
 pub(super) struct File {
     path: PathBuf,
     root: Node,
@@ -56,12 +55,10 @@ impl File {
         Ok(Self { path: path.to_owned(), root })
     }
 
-    /// The file's name.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// All of it.
     pub fn root(&self) -> Value<'_> {
         Value { path: &self.path, key: "the file", line: 0, kind: &self.root.kind }
     }
@@ -153,7 +150,6 @@ impl<'a> Value<'a> {
         self.refuse(Fault::Kind { key: self.key(), expected })
     }
 
-    /// A single word.
     pub fn text(&self) -> Result<&'a str, CalibrationError> {
         match self.kind {
             Kind::Scalar(text) => Ok(text),

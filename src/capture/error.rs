@@ -7,6 +7,7 @@ use crate::recording::RecordingError;
 use crate::v4l2::live::OpenError;
 
 /// Why there is no frame.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum CaptureError {
     /// The recording's picture cannot be read.
@@ -18,7 +19,6 @@ pub enum CaptureError {
         end_s.map_or("its end".into(), |end_s| format!("{end_s} s"))
     )]
     EmptyRange {
-        /// The recording.
         source_name: String,
         /// Start of the range.
         start_s: f64,
@@ -29,32 +29,15 @@ pub enum CaptureError {
     },
     /// A picture size or rate that no frame can have.
     #[error("a synthetic camera cannot make {width} x {height} pixels at {fps} frames per second")]
-    Format {
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-        /// Frames per second.
-        fps: f64,
-    },
+    Format { width: u32, height: u32, fps: f64 },
     /// Side by side needs two halves.
     #[error(
         "--side-by-side: the pictures of {source_name} are {width}x{height}; two eyes beside each other need an even width"
     )]
-    NoHalves {
-        /// The source.
-        source_name: String,
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-    },
+    NoHalves { source_name: String, width: u32, height: u32 },
     /// Side by side needs one picture for both eyes.
     #[error("--side-by-side is for a source that gives both eyes in one picture, and {source_name} does not")]
-    NotOnePicture {
-        /// The source.
-        source_name: String,
-    },
+    NotOnePicture { source_name: String },
     /// Two eyes need one size.
     #[error(
         "{} gives {}x{} and {} {}x{}: both eyes need one size; choose one that both have with --size",
@@ -75,10 +58,5 @@ pub enum CaptureError {
     /// The camera gives no colours.
     #[cfg(feature = "camera")]
     #[error("{camera}: {source}")]
-    NoColor {
-        /// The camera.
-        camera: String,
-        /// Its format.
-        source: NoColor,
-    },
+    NoColor { camera: String, source: NoColor },
 }

@@ -15,6 +15,7 @@ use crate::sink::SinkError;
 use crate::source::SourceError;
 
 /// Why a command did not do what was asked for.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
     /// The arguments do not make sense together.
@@ -24,7 +25,6 @@ pub enum CliError {
     #[error("{}:{line}: {what}", path.display())]
     Settings {
         path: PathBuf,
-        /// Line, from 1.
         line: usize,
         /// What is wrong, and what is accepted.
         what: String,

@@ -241,7 +241,6 @@ impl DevicePicture {
         Self { device: device.device.clone(), size, buffer }
     }
 
-    /// Columns and rows.
     pub fn size(&self) -> (u32, u32) {
         self.size
     }

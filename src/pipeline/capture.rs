@@ -15,7 +15,6 @@ use crate::stats::{Cause, Histogram, Tally};
 /// A picture, and what the camera brought with it.
 pub(super) struct Shot {
     pub color: Pooled<ColorImage>,
-    /// Exact depth.
     pub depth: Option<Pooled<DepthMap>>,
     /// The other eye's picture.
     pub right: Option<Pooled<GrayImage>>,

@@ -28,7 +28,6 @@ pub enum Executor {
 
 /// An executor on its way to the blur stage. Each frame of the change brings it, so that it comes whichever frame does.
 pub(super) struct Swap {
-    /// Counts from 1.
     pub number: u64,
     /// Locked once when it is made and once when it is taken.
     executor: Mutex<Option<New>>,

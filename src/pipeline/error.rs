@@ -18,18 +18,15 @@ pub struct PipelineError {
 }
 
 /// What can end a run early.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
-    /// Capture failed.
     #[error(transparent)]
     Capture(#[from] CaptureError),
-    /// Depth failed.
     #[error(transparent)]
     Depth(#[from] DepthError),
-    /// The blur failed.
     #[error(transparent)]
     Bokeh(#[from] BokehError),
-    /// The sink failed.
     #[error(transparent)]
     Sink(#[from] SinkError),
     /// The blur needs depth that nobody has.
@@ -41,18 +38,11 @@ pub enum Fault {
     /// The executor broke its contract.
     #[error("the blur executor gave back another frame than the oldest, or none: please report this")]
     LostFrame,
-    /// A stage panicked.
     #[error("the {stage} stage panicked: {message}; please report this")]
-    Panic {
-        /// The stage.
-        stage: &'static str,
-        /// What it said.
-        message: String,
-    },
+    Panic { stage: &'static str, message: String },
     /// The system gave no thread.
     #[error("cannot start the thread of the {stage} stage: {cause}")]
     Thread {
-        /// The stage.
         stage: &'static str,
         /// What the system said.
         cause: io::Error,

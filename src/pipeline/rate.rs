@@ -7,7 +7,6 @@ use crate::optics::CocField;
 /// What there is time for: first depth is made with less effort, where its source has a choice, then for every second
 /// or third frame, and the others take it over.
 pub(super) struct Rate {
-    /// The cheapest first.
     rungs: Vec<Rung>,
     governor: Governor,
     budget_ns: u64,

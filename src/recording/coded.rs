@@ -38,7 +38,6 @@ enum Format {
 pub(super) enum Coded<'a> {
     /// Unpacked straight from the disk.
     Png(Box<png::Reader<BufReader<File>>>),
-    /// In memory.
     Jpeg(Box<JpegDecoder<Cursor<&'a [u8]>>>),
 }
 
@@ -72,7 +71,6 @@ impl<'a> Coded<'a> {
         Ok(coded)
     }
 
-    /// Columns and rows.
     pub(super) fn size(&self) -> (u32, u32) {
         match self {
             Self::Png(reader) => reader.info().size(),

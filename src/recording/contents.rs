@@ -43,7 +43,6 @@ pub(super) struct Listed {
 /// How depth is stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum DepthForm {
-    /// 16-bit pictures.
     Units(DepthUnits),
     /// Disparities in a PFM, as these eyes see them at the size of the colour pictures.
     Disparity(StereoRig),
@@ -62,7 +61,6 @@ pub(super) struct Folder {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) list: &'static str,
-    /// From 1.
     pub(super) line: u32,
 }
 

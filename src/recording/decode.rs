@@ -30,7 +30,6 @@ impl Scratch {
 /// What depth is stored in.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DepthUnits {
-    /// Units per metre.
     pub(super) scale: f32,
     /// A value that means unknown, besides 0.
     pub(super) invalid: Option<u16>,
@@ -39,11 +38,8 @@ pub(super) struct DepthUnits {
 /// What a picture is, as far as its header tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// It has colours.
     Color,
-    /// 16-bit grey.
     Depth,
-    /// 8-bit grey.
     Grey,
 }
 

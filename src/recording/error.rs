@@ -8,6 +8,7 @@ use crate::calibration::CalibrationError;
 use crate::files::folder::FolderError;
 
 /// Why a recording or a picture could not be read or written.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// The folder holds no list that any known layout starts from.
@@ -16,7 +17,6 @@ pub enum RecordingError {
          name the folder that holds them", dir.display()
     )]
     NotARecording {
-        /// The folder.
         dir: PathBuf,
         /// The files that would have made it a recording.
         looked_for: String,
@@ -24,7 +24,6 @@ pub enum RecordingError {
     /// The layout is known, and a list that it needs is missing.
     #[error("{}: the list {missing} is missing beside {present}; restore it (lines of `time file`)", dir.display())]
     MissingList {
-        /// The folder.
         dir: PathBuf,
         /// The list that is needed.
         missing: &'static str,
@@ -33,28 +32,20 @@ pub enum RecordingError {
     },
     /// A list has no entry.
     #[error("{}: the list names no picture; add lines of `time file`, or remove the list", list.display())]
-    EmptyList {
-        /// The list.
-        list: PathBuf,
-    },
+    EmptyList { list: PathBuf },
     /// A list has more entries than any recording.
     #[error("{}: the list has more than {most} lines; split the recording", list.display())]
     LongList {
-        /// The list.
         list: PathBuf,
         /// How many are read.
         most: usize,
     },
     /// A folder that is a list of its own has no picture.
     #[error("{}: no picture here has a number as its name, such as 000000.png; restore the pictures", folder.display())]
-    EmptyFolder {
-        /// The folder.
-        folder: PathBuf,
-    },
+    EmptyFolder { folder: PathBuf },
     /// One eye is there alone.
     #[error("{}: {missing} is missing beside {present}; restore the pictures of the other eye", dir.display())]
     MissingEye {
-        /// The folder.
         dir: PathBuf,
         /// The folder that is needed.
         missing: &'static str,
@@ -64,7 +55,6 @@ pub enum RecordingError {
     /// A picture of one eye has none of the other eye beside it.
     #[error("{}: no picture of this name in {other}; restore it, remove this one, or keep going", path.display())]
     NoPartner {
-        /// The picture.
         path: PathBuf,
         /// The folder of the other eye.
         other: &'static str,
@@ -72,7 +62,6 @@ pub enum RecordingError {
     /// There are pictures beyond the end of the list of times.
     #[error("{}: {times} times, and none for {picture}; complete the list, remove it, or keep going", list.display())]
     TooFewTimes {
-        /// The list.
         list: PathBuf,
         /// How many times it has.
         times: usize,
@@ -82,7 +71,6 @@ pub enum RecordingError {
     /// The calibration of a rectified pair cannot be used.
     #[error("{}{}: {fault}", file.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Geometry {
-        /// The calibration.
         file: PathBuf,
         /// Line number, from 1, where one line is at fault.
         line: Option<u32>,
@@ -95,7 +83,6 @@ pub enum RecordingError {
     /// A line of a list is wrong.
     #[error("{}:{line}: {fault}", list.display())]
     Line {
-        /// The list.
         list: PathBuf,
         /// Line number, from 1.
         line: u32,
@@ -107,17 +94,13 @@ pub enum RecordingError {
         "{}: cannot tell colour from depth: no line has a readable colour picture beside a 16-bit grey PNG; \
          add rgb.txt or depth.txt, or restore the pictures", list.display()
     )]
-    Columns {
-        /// The list.
-        list: PathBuf,
-    },
+    Columns { list: PathBuf },
     /// No depth map lies near any colour picture in time.
     #[error(
         "{}: no depth map lies within {} ms of any colour picture: are the lists of one recording, with times of one \
          clock? Correct the times, or remove depth.txt to use the colour alone", dir.display(), *tolerance_ns as f64 / 1e6
     )]
     NoPairs {
-        /// The folder.
         dir: PathBuf,
         /// Largest difference in time that makes a pair.
         tolerance_ns: u64,
@@ -128,7 +111,6 @@ pub enum RecordingError {
         dir.display(), *tolerance_ns as f64 / 1e6
     )]
     NoEyePairs {
-        /// The folder.
         dir: PathBuf,
         /// Largest difference in time that makes a pair.
         tolerance_ns: u64,
@@ -136,7 +118,6 @@ pub enum RecordingError {
     /// A picture that a list names is missing or wrong.
     #[error("{}:{line}: {}: {fault}", list.display(), file.display())]
     Listed {
-        /// The list.
         list: PathBuf,
         /// Line number, from 1.
         line: u32,
@@ -148,23 +129,16 @@ pub enum RecordingError {
     /// A picture is missing or wrong.
     #[error("{}: {fault}", path.display())]
     Picture {
-        /// The file.
         path: PathBuf,
         /// What is wrong with it.
         fault: PictureFault,
     },
     /// The recording has no depth, and it was asked for.
     #[error("{}: the recording has no depth; use an effect that needs none, or another source of depth", dir.display())]
-    NoDepth {
-        /// The folder.
-        dir: PathBuf,
-    },
+    NoDepth { dir: PathBuf },
     /// The recording has one eye, and the right one was asked for.
     #[error("{}: the recording has one eye, and stereo needs two; use another source of depth", dir.display())]
-    NoRight {
-        /// The folder.
-        dir: PathBuf,
-    },
+    NoRight { dir: PathBuf },
     /// A frame number beyond the end.
     #[error("frame {index} was asked for, and the recording has {len}, numbered from 0")]
     NoSuchFrame {
@@ -192,10 +166,7 @@ pub enum RecordingError {
     },
     /// A recording was finished before its first frame.
     #[error("{}: nothing was recorded: no frame came in; check the source", dir.display())]
-    NothingRecorded {
-        /// The folder.
-        dir: PathBuf,
-    },
+    NothingRecorded { dir: PathBuf },
     /// The folder of the output cannot be written.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -206,7 +177,6 @@ pub enum RecordingError {
         action: &'static str,
         /// To which file or folder.
         path: PathBuf,
-        /// Why not.
         cause: io::Error,
     },
 }

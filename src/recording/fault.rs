@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::MAX_SIDE_PX;
 
 /// What is wrong with a line of a list.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LineFault {
     /// The bytes are not text.
@@ -22,7 +23,6 @@ pub enum LineFault {
     /// Not a time in nanoseconds.
     #[error("{0:?} is not a time; write nanoseconds as a whole number, such as 1403715276262142976")]
     Nanoseconds(String),
-    /// Not a time.
     #[error("{0:?} is not a time; write seconds >= 0 as a decimal number, such as 1305031102.175304")]
     Time(String),
     /// The time repeats, or goes back.
@@ -40,6 +40,7 @@ pub enum LineFault {
 }
 
 /// What is wrong with the calibration of a rectified pair.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GeometryFault {
     /// The file is of another kind.
@@ -51,11 +52,9 @@ pub enum GeometryFault {
     /// A value is not what its key needs.
     #[error("{key}: {found:?} is not {expected}; correct the line")]
     Value {
-        /// The key.
         key: String,
         /// What a value of it is.
         expected: &'static str,
-        /// What is there.
         found: String,
     },
     /// Both eyes in one place see no depth.
@@ -81,6 +80,7 @@ pub enum GeometryFault {
 }
 
 /// What is wrong with a picture file.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureFault {
     /// There is no such file.
@@ -100,12 +100,7 @@ pub enum PictureFault {
     Format(&'static str),
     /// The header claims more than is decoded.
     #[error("its header claims {width}x{height} pixels, and at most {max}x{max} are read; scale it down", max = MAX_SIDE_PX)]
-    TooLarge {
-        /// Columns claimed.
-        width: u32,
-        /// Rows claimed.
-        height: u32,
-    },
+    TooLarge { width: u32, height: u32 },
     /// The file is larger than any picture that is read here.
     #[error("the file has {bytes} bytes, and at most {most_bytes} are read; convert it")]
     FileSize {
@@ -116,12 +111,7 @@ pub enum PictureFault {
     },
     /// The picture has no pixel.
     #[error("the picture has no pixel ({width}x{height}); export it again")]
-    NoPixel {
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-    },
+    NoPixel { width: u32, height: u32 },
     /// The data stops early.
     #[error("the file ends before the picture does; copy or export it again")]
     Truncated,

@@ -18,7 +18,6 @@ impl Samples {
         self.channels.is_multiple_of(2)
     }
 
-    /// 16-bit grey.
     pub fn is_depth(self) -> bool {
         self.are_wide && self.channels == 1
     }

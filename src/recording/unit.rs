@@ -12,7 +12,6 @@ pub(super) const KEYWORD: &str = "bokehcam map";
 /// What is in a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Meaning {
-    /// Depth in metres.
     Depth {
         /// Units of a PNG per metre, > 0.
         per_m: f32,

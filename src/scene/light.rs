@@ -31,7 +31,6 @@ pub struct Ambient {
 #[derive(Clone, Copy, Debug)]
 pub struct Shade {
     pub centre: Vec3,
-    /// Radius in metres.
     pub radius: f32,
     /// The part that it stands for: it does not shade that one.
     pub part: usize,

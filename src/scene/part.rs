@@ -14,7 +14,6 @@ use super::shape::Shape;
 pub struct Spot {
     /// The point, in metres.
     pub p: Vec3,
-    /// Outward unit normal.
     pub normal: Vec3,
     /// Surface coordinates of the shape.
     pub uv: Vec2,
@@ -73,7 +72,6 @@ pub type Paint = fn(&Spot) -> Surface;
 #[derive(Clone, Copy, Debug)]
 pub struct Material {
     pub paint: Paint,
-    /// Its colour, linear.
     pub tint: Vec3,
     /// Sets apart things of the same paint.
     pub seed: u32,

@@ -22,7 +22,6 @@ pub enum Shape {
     },
     Sphere {
         centre: Vec3,
-        /// Radius in metres.
         radius: f32,
     },
     /// A stretched ball: the points that `to_unit * (p - centre)` puts on the unit sphere.
@@ -40,7 +39,6 @@ pub enum Shape {
     },
     /// Two balls and the cone that touches both: a hair, a twig.
     Cone {
-        /// The first end.
         a: Vec3,
         b: Vec3,
         /// Radius at `a`, in metres.
@@ -52,7 +50,6 @@ pub enum Shape {
     Frustum {
         /// Middle of the lower rim.
         base: Vec3,
-        /// Height in metres.
         height: f32,
         /// Radius of the lower rim.
         low_radius: f32,
@@ -197,7 +194,6 @@ impl Shape {
 /// What a surface is like at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Skin {
-    /// Outward unit normal.
     pub normal: Vec3,
     pub uv: Vec2,
     /// Unit vector along a cone, or to the right of a quad.

@@ -13,7 +13,6 @@ use super::shape::{Shape, whole};
 pub struct PointLight {
     /// Middle, in metres (x right, y up, z away from the camera).
     pub centre_m: Vec3,
-    /// Radius in metres.
     pub radius_m: f32,
     /// Linear radiance, 1 = white.
     pub radiance: Vec3,

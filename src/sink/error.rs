@@ -11,6 +11,7 @@ const NOT_BUILT: &str = "this program was built without a window; build it with 
                          this name, ./window";
 
 /// Why a frame could not be written.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum SinkError {
     /// Not the name of a sink.
@@ -19,35 +20,22 @@ pub enum SinkError {
          - (y4m on standard output) or null",
         if cfg!(feature = "window") { "window, " } else { "" }
     )]
-    Target {
-        /// What was given.
-        name: String,
-    },
-    /// The output exists.
+    Target { name: String },
     #[error("{} exists; choose another name or overwrite it with --force", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
+    Exists { path: PathBuf },
     /// The folder cannot be written.
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// It failed, but what it had is kept.
     #[error("{error}; what there was until then is kept as {}", kept.display())]
     Kept {
-        /// Why it failed.
         error: Box<SinkError>,
         /// The file or folder.
         kept: PathBuf,
     },
     /// A defect of this program.
     #[error("{sink}: panicked: {what}; please report this")]
-    Panic {
-        /// Where frames went.
-        sink: String,
-        /// What it said.
-        what: String,
-    },
+    Panic { sink: String, what: String },
     /// The file system refused.
     #[error("cannot write {}: {cause}", path.display())]
     Write {
@@ -66,27 +54,17 @@ pub enum SinkError {
     },
     /// The PNG encoder refused.
     #[error("cannot write {} as PNG: {message}", path.display())]
-    Png {
-        /// The file.
-        path: PathBuf,
-        /// What it said.
-        message: String,
-    },
+    Png { path: PathBuf, message: String },
     /// The ffmpeg program is missing.
     #[error(
         "writing {} needs the program ffmpeg, which was not found: install the package ffmpeg, or write FILE.y4m",
         path.display()
     )]
-    NoFfmpeg {
-        /// The file.
-        path: PathBuf,
-    },
+    NoFfmpeg { path: PathBuf },
     /// The ffmpeg program failed.
     #[error("ffmpeg could not write {} ({status}): {}", path.display(), if said.is_empty() { "it said nothing" } else { said })]
     Ffmpeg {
-        /// The file.
         path: PathBuf,
-        /// How it ended.
         status: String,
         /// Its last lines, joined by ` | `.
         said: String,
@@ -101,10 +79,7 @@ pub enum SinkError {
     /// Built without virtual cameras.
     #[cfg(not(feature = "camera"))]
     #[error("{}: this program was built without cameras; build it with the feature camera", path.display())]
-    NoCamera {
-        /// The node.
-        path: PathBuf,
-    },
+    NoCamera { path: PathBuf },
 }
 
 impl SinkError {

@@ -46,12 +46,10 @@ impl Output {
         self.part.is_none()
     }
 
-    /// The name meanwhile.
     pub(super) fn part(&self) -> &Path {
         self.part.as_ref().map_or(&self.path, Part::part)
     }
 
-    /// The open file.
     pub(super) fn file(&self) -> io::Result<&File> {
         self.part.as_ref().map(Part::file).ok_or_else(|| ErrorKind::NotFound.into())
     }
@@ -89,7 +87,6 @@ impl Output {
         }
     }
 
-    /// Removes the file.
     pub(super) fn give_up(&mut self) {
         self.part = None;
     }

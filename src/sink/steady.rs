@@ -11,7 +11,6 @@ pub(super) struct Steady {
     first_ns: Option<u64>,
     /// Of the time since the first frame, so much was left out.
     left_out_ns: u64,
-    /// Pictures written.
     written: u64,
     /// Frames that were one too many.
     pub surplus: u64,

@@ -9,6 +9,7 @@ use crate::depth::DepthError;
 use crate::recording::RecordingError;
 
 /// Why a source cannot be opened.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// What is asked for does not make sense together.
@@ -17,22 +18,14 @@ pub enum SourceError {
     /// The calibration of a depth camera cannot be used.
     #[error("{}:{line}: {what}", path.display())]
     Registration {
-        /// The file.
         path: PathBuf,
-        /// Line, from 1.
         line: usize,
         /// What is wrong, and what is accepted.
         what: String,
     },
     /// A file cannot be read.
     #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The source failed.
+    Io { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Capture(#[from] CaptureError),
     /// It is no recording, or a faulty one.

@@ -127,7 +127,6 @@ fn camera(text: &str) -> Result<SourceName, String> {
 
 #[cfg(feature = "camera")]
 impl Named {
-    /// Its device node.
     pub fn node(&self) -> &Path {
         &self.node
     }

@@ -48,7 +48,6 @@ pub struct Control {
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     Integer,
-    /// 0 or 1.
     Boolean,
     /// One of several names.
     Menu,
@@ -59,7 +58,6 @@ pub enum Kind {
     /// Whole numbers of 64 bits.
     Integer64,
     String,
-    /// Bits.
     Bitmask,
     /// Tables and structures, which have no value that one could type.
     Compound,

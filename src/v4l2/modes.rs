@@ -94,12 +94,7 @@ pub enum Rates {
     /// These and no others, the fastest first.
     Discrete(Vec<Interval>),
     /// Every rate between two; in steps, where the driver has them.
-    Range {
-        /// The fastest.
-        shortest: Interval,
-        /// The slowest.
-        longest: Interval,
-    },
+    Range { shortest: Interval, longest: Interval },
 }
 
 /// Time from frame to frame: a fraction of seconds.
@@ -130,7 +125,6 @@ impl Interval {
         Self { numerator: 1000, denominator: (fps * 1000.0).round().max(1.0) as u32 }
     }
 
-    /// Frames per second.
     pub fn fps(self) -> f64 {
         f64::from(self.denominator) / f64::from(self.numerator)
     }

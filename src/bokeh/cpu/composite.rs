@@ -52,7 +52,6 @@ pub struct Composite<'a> {
     pub gathered: &'a [f32],
     /// Back to 8 bits.
     pub encode: &'a EncodeTable,
-    /// First row.
     pub y0: usize,
     /// Whole rows of RGB.
     pub out: &'a mut [u8],

@@ -93,7 +93,6 @@ impl Gather {
 struct Exact<'a> {
     /// Colour and coverage (1 everywhere), padded by the reach.
     pub source: &'a Rows<4>,
-    /// Columns and rows.
     pub size: (usize, usize),
     /// Kernels by node, `(2 r + 1)^2` taps each, far and turned; turned ones only where that makes a difference.
     pub kernels: &'a [[Vec<f32>; 2]],
@@ -180,7 +179,6 @@ impl WithSimd for GatherRow<'_> {
 struct GatherColumn<'a> {
     /// All rows of the horizontal pass.
     pub rows: &'a [f32],
-    /// Columns and rows.
     pub size: (usize, usize),
     pub bank: &'a Bank,
     /// Signed CoC of this row.

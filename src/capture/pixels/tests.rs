@@ -33,7 +33,6 @@ fn to_rgb([luma, cb, cr]: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
     [r, (y - red * r - blue * b) / (1.0 - red - blue), b].map(|color| color.clamp(0.0, 1.0) * 255.0)
 }
 
-/// The inverse.
 fn to_ycc(rgb: [f64; 3], matrix: Matrix, range: Range) -> [f64; 3] {
     let (red, blue) = match matrix {
         Matrix::Bt601 => (0.299, 0.114),

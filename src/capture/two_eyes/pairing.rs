@@ -46,7 +46,6 @@ impl Pairing {
         self.right_ns = Some(taken_ns);
     }
 
-    /// Forgets both.
     pub(super) fn clear(&mut self) {
         (self.left_ns, self.right_ns) = (None, None);
     }

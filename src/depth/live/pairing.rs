@@ -31,7 +31,6 @@ impl Pairing {
         self.next = (self.next + 1) % KEPT;
     }
 
-    /// Forgets all.
     pub(super) fn clear(&mut self) {
         self.taken_ns = [None; KEPT];
     }

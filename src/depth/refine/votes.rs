@@ -48,7 +48,6 @@ pub fn jump_at(jump: f32, v: f32) -> f32 {
 /// The votes for one pixel.
 #[derive(Debug, Default)]
 pub struct Votes {
-    /// Inverse depth.
     depth: Weights,
     weight: Weights,
     /// Least and largest inverse depth that has a vote.

@@ -36,7 +36,6 @@ pub enum Image<'a> {
 }
 
 impl Image<'_> {
-    /// Columns and rows.
     pub fn size(&self) -> (u32, u32) {
         match self {
             Self::Memory(picture) => picture.size(),

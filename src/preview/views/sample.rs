@@ -5,7 +5,6 @@ use crate::optics::{CocField, DepthCoc, Ramp};
 
 /// Where the CoC of a row comes from.
 pub enum Field<'a> {
-    /// One radius.
     Even(f32),
     Ramp(Ramp),
     /// Depth, which may have fewer pixels than the picture.

@@ -37,7 +37,6 @@ pub(super) struct Ended {
 }
 
 impl Process {
-    /// Starts it.
     pub(super) fn start(command: &mut Command, stop: &Arc<AtomicBool>) -> io::Result<Self> {
         let mut child = command.spawn()?;
         let (to, said) = mpsc::channel();

@@ -39,10 +39,7 @@ pub enum Family {
         apart: bool,
     },
     /// Three bytes a pixel.
-    Rgb24 {
-        /// Blue comes first.
-        swapped: bool,
-    },
+    Rgb24 { swapped: bool },
     /// A byte of luma a pixel.
     Grey,
     /// 16 bits a pixel, low byte first.
@@ -77,19 +74,15 @@ const TABLE: [(FourCc, Family); 19] = [
 impl FourCc {
     pub const MJPG: Self = Self(*b"MJPG");
     pub const JPEG: Self = Self(*b"JPEG");
-    /// Packed 4:2:2.
     pub const YUYV: Self = Self(*b"YUYV");
     /// Packed 4:2:2, chroma first.
     pub const UYVY: Self = Self(*b"UYVY");
     /// 4:2:0 with paired chroma.
     pub const NV12: Self = Self(*b"NV12");
-    /// Planar 4:2:0.
     pub const YU12: Self = Self(*b"YU12");
     pub const RGB3: Self = Self(*b"RGB3");
     pub const BGR3: Self = Self(*b"BGR3");
-    /// 8-bit brightness.
     pub const GREY: Self = Self(*b"GREY");
-    /// 16-bit depth.
     pub const Z16: Self = Self(*b"Z16 ");
     /// 16-bit brightness, in which some cameras give depth.
     pub const Y16: Self = Self(*b"Y16 ");

@@ -108,7 +108,6 @@ pub enum LayoutError {
         /// As the format has.
         expected: usize,
     },
-    /// Half pictures.
     #[error(
         "the device gives interlaced pictures (field order {0}), which are not supported; choose a progressive mode"
     )]

@@ -11,6 +11,7 @@ use crate::v4l2::node::NodeError;
 use crate::v4l2::queue::QueueError;
 
 /// Why a camera cannot be opened.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// No device is meant by the name.

@@ -9,7 +9,6 @@ pub struct Light {
     done: bool,
 }
 
-/// Exposure settles first.
 const SETTLE_NS: u64 = 1_000_000_000;
 const WINDOW_NS: u64 = 3_000_000_000;
 /// Less than this part of the stated rate is well below it.

@@ -12,9 +12,7 @@ pub struct Wish {
     pub content: Content,
     /// Width and height, in pixels.
     pub size_px: Option<(u32, u32)>,
-    /// Frames per second.
     pub fps: Option<f64>,
-    /// Pixel format.
     pub fourcc: Option<FourCc>,
 }
 
@@ -38,7 +36,6 @@ pub enum Wire {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
     pub queue: QueueKind,
-    /// Pixel format.
     pub fourcc: FourCc,
     /// Width and height, in pixels.
     pub size_px: (u32, u32),

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use crate::v4l2::holders::Holder;
 
 /// Why a node takes no frames.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Debug, thiserror::Error)]
 pub enum LoopbackError {
     /// There is no such node.
@@ -45,7 +46,6 @@ pub enum LoopbackError {
     )]
     Frozen {
         path: PathBuf,
-        /// Its pixel format.
         fourcc: String,
         width: u32,
         height: u32,

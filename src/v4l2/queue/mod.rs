@@ -45,7 +45,6 @@ pub struct Dequeued {
 /// Part of a plane, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Part {
-    /// Its first byte.
     pub start: usize,
     /// The byte after its last.
     pub end: usize,

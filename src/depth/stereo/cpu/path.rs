@@ -134,7 +134,6 @@ pub struct Rows<'a, const N: usize> {
     /// Grey values of the left picture, `[row][column]`: of the rows of the group that there are.
     pub luma: &'a [u8],
     pub width: usize,
-    /// P2.
     pub penalties: &'a Penalties,
     /// Of `2 * GROUP` paths.
     pub states: &'a mut States,
@@ -186,7 +185,6 @@ pub struct Columns<'a, const N: usize> {
     pub luma: (&'a [u8], usize),
     /// First column of the stripe, and one past its last.
     pub columns: (usize, usize),
-    /// P2.
     pub penalties: &'a Penalties,
     /// Of [`STRIPE`] paths; kept from group to group.
     pub states: &'a mut States,

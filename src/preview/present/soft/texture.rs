@@ -8,7 +8,6 @@ use egui::{Color32, ImageData, TextureFilter, TextureId, TextureWrapMode, Textur
 /// Parts of a texel that places are rounded to.
 const PARTS: f32 = 256.0;
 
-/// Premultiplied texels.
 #[derive(Debug)]
 pub struct Texture {
     size: [usize; 2],
