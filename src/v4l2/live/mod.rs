@@ -6,10 +6,10 @@ pub mod error;
 pub mod knobs;
 mod light;
 pub mod negotiate;
+mod recover;
 mod session;
 mod watchdog;
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 pub use error::OpenError;
@@ -19,13 +19,13 @@ pub use session::{Agreed, Setting};
 use address::Address;
 use light::Light;
 use session::Session;
-use watchdog::{Remedy, Watchdog};
+use watchdog::Watchdog;
 
 use crate::clock::Clock;
 use crate::v4l2::controls;
 use crate::v4l2::layout::Layout;
 use crate::v4l2::node;
-use crate::v4l2::queue::{Losses, Planes, QueueError};
+use crate::v4l2::queue::{Losses, Planes};
 
 /// A device node that gives frames.
 pub struct Live {
@@ -256,100 +256,6 @@ impl Live {
             None => "low light makes cameras expose longer, and a shared USB port slows them down".to_owned(),
         };
         tracing::warn!("{}: {fps:.1} frames a second instead of {}: {what}", self.name, self.agreed.interval);
-    }
-
-    /// The driver gave an error instead of a frame.
-    fn failed(&mut self, error: &QueueError) {
-        let now_ns = self.clock.now_ns();
-        if error::is_gone(error) {
-            self.watchdog.gone(now_ns);
-            self.say("it is gone (unplugged?); waiting for it to come back".to_owned());
-            self.close(State::Away { retry_ns: now_ns });
-            return;
-        }
-        tracing::debug!("{}: {error}", self.name);
-        self.clock.sleep_until_ns(now_ns + ERROR_NAP_NS);
-        let remedy = self.watchdog.error(self.clock.now_ns());
-        self.apply(remedy, &error.to_string());
-    }
-
-    fn apply(&mut self, remedy: Remedy, because: &str) {
-        let now_ns = self.clock.now_ns();
-        match remedy {
-            Remedy::Wait => {}
-            Remedy::Restart => {
-                self.say(format!("{because}; starting its stream again"));
-                let State::Streaming(session) = &mut self.state else { return };
-                session.queue.stop();
-                let started = session.queue.start();
-                self.watchdog.started(self.clock.now_ns());
-                self.light.restarted(self.clock.now_ns());
-                if let Err(error) = started {
-                    if error::is_gone(&error) {
-                        self.failed(&error);
-                    } else {
-                        let remedy = self.watchdog.remedy(now_ns);
-                        self.apply(remedy, &error.to_string());
-                    }
-                }
-            }
-            Remedy::Reopen(pause) => {
-                let again = match pause {
-                    Duration::ZERO => "opening it again".to_owned(),
-                    pause => format!("opening it again every {:.1} s", pause.as_secs_f32()),
-                };
-                self.say(format!("{because}; {again}"));
-                self.close(State::Away { retry_ns: now_ns + pause.as_nanos() as u64 });
-            }
-        }
-    }
-
-    fn reopen(&mut self) {
-        let opened = match self.find() {
-            Some(path) => Session::open(&path, &self.wish, &self.settings, Some(&self.agreed), &self.clock),
-            None => Err(OpenError::Gone(self.address.node().to_owned())),
-        };
-        let now_ns = self.clock.now_ns();
-        match opened {
-            Ok(session) => {
-                if session.agreed != self.agreed {
-                    tracing::warn!("{}: now it gives {}", self.name, session.agreed);
-                    self.agreed = session.agreed;
-                }
-                self.state = State::Streaming(Box::new(session));
-                self.watchdog.started(now_ns);
-                self.light.restarted(now_ns);
-            }
-            Err(error) if error.is_gone() => {
-                self.watchdog.gone(now_ns);
-                self.say("it is gone (unplugged?); waiting for it to come back".to_owned());
-                self.state = State::Away { retry_ns: now_ns + LOOK_NS };
-            }
-            Err(error) => {
-                self.watchdog.gone(now_ns);
-                let pause = match self.watchdog.remedy(now_ns) {
-                    Remedy::Reopen(pause) => pause.as_nanos() as u64,
-                    Remedy::Restart | Remedy::Wait => 0,
-                };
-                self.say(format!("{error}; trying again"));
-                self.state = State::Away { retry_ns: now_ns + pause.max(LOOK_NS) };
-            }
-        }
-    }
-
-    /// Where the device is now.
-    fn find(&mut self) -> Option<PathBuf> {
-        let now_ns = self.clock.now_ns();
-        let everywhere = now_ns.saturating_sub(self.searched_ns) >= SEARCH_NS;
-        if everywhere {
-            self.searched_ns = now_ns;
-        }
-        let before = self.address.node().to_owned();
-        let found = self.address.find(everywhere);
-        if let Some(path) = found.as_ref().filter(|path| **path != before) {
-            tracing::info!("{}: it is {} now", self.name, path.display());
-        }
-        found
     }
 
     fn close(&mut self, state: State) {

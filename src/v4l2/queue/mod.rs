@@ -3,6 +3,8 @@
 //! Every buffer is the kernel's (to fill, or filled) or ours; one of ours may hold the current frame. All are queued
 //! before the stream starts and go back as soon as they are read: a driver that has none drops frames.
 
+mod buffer;
+mod error;
 mod kernel;
 #[cfg(test)]
 mod model;
@@ -11,16 +13,14 @@ mod sequence;
 mod tests;
 
 use std::io;
-use std::ops::Deref;
 use std::time::Duration;
 
+pub use buffer::{Dequeued, Losses, MAX_PLANES, Part, Planes};
+pub use error::QueueError;
 pub use kernel::{Described, DeviceKernel, Kernel, Mapping, Span, Wake, Writer};
 pub use sequence::Sequence;
 
 use crate::clock::Clock;
-
-/// Most planes of a buffer.
-pub const MAX_PLANES: usize = v4l::v4l_sys::VIDEO_MAX_PLANES as usize;
 
 /// Buffers asked for. Fewer than four were seen to make drivers drop frames.
 const BUFFERS: u32 = 4;
@@ -28,92 +28,6 @@ const BUFFERS: u32 = 4;
 const LEAST_BUFFERS: u32 = 2;
 /// How often a refused buffer is offered again before the stream starts.
 const OFFERS: u32 = 3;
-
-/// A buffer that the kernel gave back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Dequeued {
-    pub index: u32,
-    pub sequence: u32,
-    /// When the frame was taken, on the system's monotonic clock, where the driver uses that.
-    pub stamp_ns: Option<u64>,
-    /// The driver says that its content is damaged.
-    pub flagged: bool,
-    /// What of each plane was filled.
-    pub parts: [Part; MAX_PLANES],
-}
-
-/// Part of a plane, in bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Part {
-    pub start: usize,
-    /// The byte after its last.
-    pub end: usize,
-}
-
-/// Frames that came and were not given out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Losses {
-    /// The driver dropped them.
-    pub missed: u64,
-    /// A newer one was there.
-    pub stale: u64,
-    /// Damaged, empty or cut short.
-    pub corrupt: u64,
-}
-
-impl Losses {
-    pub fn total(self) -> u64 {
-        self.missed + self.stale + self.corrupt
-    }
-}
-
-/// Why a queue cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum QueueError {
-    #[error("{step}: {source}")]
-    Refused {
-        /// What was asked for.
-        step: &'static str,
-        source: io::Error,
-    },
-    /// Too few to read one while another is filled.
-    #[error("the driver gives {granted} of {BUFFERS} buffers, and {LEAST_BUFFERS} are needed")]
-    TooFewBuffers {
-        /// As many as there are.
-        granted: u32,
-    },
-    /// A driver that breaks the rules.
-    #[error("the driver gave back buffer {0}, which it did not have")]
-    Foreign(u32),
-}
-
-impl QueueError {
-    fn at(step: &'static str) -> impl FnOnce(io::Error) -> Self {
-        move |source| Self::Refused { step, source }
-    }
-
-    /// What the driver said, where it said something.
-    pub fn source(&self) -> Option<&io::Error> {
-        match self {
-            Self::Refused { source, .. } => Some(source),
-            _ => None,
-        }
-    }
-}
-
-/// The planes of a frame, as far as they are filled.
-#[derive(Clone, Copy, Debug)]
-pub struct Planes<'a> {
-    planes: [&'a [u8]; MAX_PLANES],
-    count: usize,
-}
-
-impl<'a> Deref for Planes<'a> {
-    type Target = [&'a [u8]];
-    fn deref(&self) -> &Self::Target {
-        &self.planes[..self.count]
-    }
-}
 
 struct Slot<M> {
     memory: Vec<M>,
