@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::bokeh::{self, Backend, Bokeh, BokehError};
 #[cfg(feature = "window")]
 use crate::compute::device::Device;
-use crate::compute::team::cores;
+use crate::compute::thread_pool::cores;
 use crate::depth::DepthError;
 use crate::depth::stereo::{self, Matcher};
 

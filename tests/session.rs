@@ -18,8 +18,8 @@ use bokehcam::look::{Effect, Look, Patch, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
 use bokehcam::preview::services::{Opened, Services, Switch};
-use bokehcam::preview::session::{Heard, Session, Start};
-use bokehcam::preview::state::{Output, Request, Source, Told};
+use bokehcam::preview::session::{Session, SessionEvent, Start};
+use bokehcam::preview::state::{Output, Request, Source, Update};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::source::{self, devices::Choice};
 
@@ -96,7 +96,7 @@ impl Services for Small {
 struct Watched {
     session: Session,
     views: Option<Receiver<View>>,
-    told: Vec<Told>,
+    told: Vec<Update>,
     copied: Option<String>,
     executors: Arc<AtomicUsize>,
     written: Arc<Mutex<Vec<String>>>,
@@ -132,16 +132,16 @@ impl Watched {
     fn hear(&mut self) {
         while let Some(heard) = self.session.hear() {
             match heard {
-                Heard::Told(told) => self.told.push(told),
-                Heard::Views(views) => self.views = Some(views),
-                Heard::Copy(text) => self.copied = Some(text),
+                SessionEvent::Update(told) => self.told.push(told),
+                SessionEvent::Views(views) => self.views = Some(views),
+                SessionEvent::Copy(text) => self.copied = Some(text),
             }
         }
     }
 
     /// Waits until something was said; what was said before it is forgotten.
     #[track_caller]
-    fn until(&mut self, what: &str, is: impl Fn(&Told) -> bool) {
+    fn until(&mut self, what: &str, is: impl Fn(&Update) -> bool) {
         let began = Instant::now();
         loop {
             self.hear();
@@ -169,8 +169,8 @@ impl Watched {
     }
 }
 
-fn is_running(told: &Told, width: u32) -> bool {
-    matches!(told, Told::Source(Source::Running(running)) if running.size.0 == width)
+fn is_running(told: &Update, width: u32) -> bool {
+    matches!(told, Update::Source(Source::Running(running)) if running.size.0 == width)
 }
 
 fn radius_px(view: &View) -> f32 {
@@ -185,7 +185,7 @@ fn radius_px(view: &View) -> f32 {
 fn a_look_takes_effect_while_frames_go_on() {
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
-    watched.until("the note", |told| *told == Told::Note("a note".into()) || matches!(told, Told::Outputs(_)));
+    watched.until("the note", |told| *told == Update::Note("a note".into()) || matches!(told, Update::Outputs(_)));
     let first = watched.frame("a frame", |view| radius_px(view) == 2.0);
     assert!(first.picture.memory().is_some() && first.color.is_some() && first.depth.is_some());
     let made = watched.executors.load(Ordering::SeqCst);
@@ -210,9 +210,9 @@ fn a_look_takes_effect_while_frames_go_on() {
 #[test]
 fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     let mut watched = Watched::begin("nothing");
-    watched.until("why", |told| *told == Told::Source(Source::Lost("no such source: nothing".into())));
+    watched.until("why", |told| *told == Update::Source(Source::Lost("no such source: nothing".into())));
     watched.session.order(Request::Begin(Output { name: "film".into(), is_camera: false }));
-    watched.until("nothing to write", |told| matches!(told, Told::Note(line) if line.contains("no source")));
+    watched.until("nothing to write", |told| matches!(told, Update::Note(line) if line.contains("no source")));
     watched.session.order(Request::Open("32".into()));
     watched.until("it runs", |told| is_running(told, 32));
     watched.frame("a frame", |view| view.picture.size().0 == 32);
@@ -220,10 +220,10 @@ fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     watched.until("the other runs", |told| is_running(told, 48));
     watched.frame("a frame of the other", |view| view.picture.size().0 == 48);
     watched.session.order(Request::Open("24 then no more".into()));
-    watched.until("its end", |told| *told == Told::Source(Source::Ended));
+    watched.until("its end", |told| *told == Update::Source(Source::Ended));
     watched.session.order(Request::Open("24 then no more".into()));
     watched.until("it runs again", |told| is_running(told, 24));
-    watched.until("and ends", |told| *told == Told::Source(Source::Ended));
+    watched.until("and ends", |told| *told == Update::Source(Source::Ended));
     let report = watched.session.close().report.unwrap();
     assert!(report.frames.balance() && report.frames.captured == 2, "{:?}", report.frames);
 }
@@ -234,13 +234,13 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     watched.until("it runs", |told| is_running(told, 32));
     let output = |name: &str, is_camera| Output { name: name.into(), is_camera };
     watched.session.order(Request::Begin(output("full", false)));
-    watched.until("why not", |told| *told == Told::Note("the disk is full".into()));
-    watched.until("none is written", |told| *told == Told::Outputs(Vec::new()));
+    watched.until("why not", |told| *told == Update::Note("the disk is full".into()));
+    watched.until("none is written", |told| *told == Update::Outputs(Vec::new()));
     watched.session.order(Request::Begin(output("film", false)));
     watched.session.order(Request::Begin(output("camera", true)));
-    watched.until("two", |told| *told == Told::Outputs(vec![output("film", false), output("camera", true)]));
+    watched.until("two", |told| *told == Update::Outputs(vec![output("film", false), output("camera", true)]));
     watched.session.copy(vec![("split".into(), "0.5".into())]);
-    watched.until("the command", |told| matches!(told, Told::Note(line) if line.starts_with("Copied: show 32")));
+    watched.until("the command", |told| matches!(told, Update::Note(line) if line.starts_with("Copied: show 32")));
     watched.hear();
     assert_eq!(watched.copied.as_deref(), Some(r#"show 32 ["film", "camera"] [("split", "0.5")]"#));
     let has = |watched: &Watched, line: &str| watched.written.lock().unwrap().iter().any(|written| written == line);
@@ -251,11 +251,11 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     }
     watched.session.order(Request::End(output("film", false)));
     watched
-        .until("the film is complete", |told| matches!(told, Told::Note(line) if line.starts_with("film: complete")));
+        .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("film: complete")));
     // A recording ends with its source, and a virtual camera goes on with the next one.
     watched.session.order(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));
-    watched.until("one", |told| *told == Told::Outputs(vec![output("camera", true)]));
+    watched.until("one", |told| *told == Update::Outputs(vec![output("camera", true)]));
     while !has(&watched, "camera 48") {
         assert!(began.elapsed() < 2 * PATIENCE);
         std::thread::sleep(Duration::from_millis(5));
@@ -273,10 +273,10 @@ fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
         watched.until("it runs", |told| is_running(told, 32));
         watched.session.order(Request::Begin(Output { name: name.into(), is_camera: false }));
         if name == "fills up" {
-            watched.until("why", |told| matches!(told, Told::Trouble(line) if line.contains(why)));
-            watched.until("none is written", |told| *told == Told::Outputs(Vec::new()));
+            watched.until("why", |told| matches!(told, Update::Trouble(line) if line.contains(why)));
+            watched.until("none is written", |told| *told == Update::Outputs(Vec::new()));
         } else {
-            watched.until("it is written", |told| matches!(told, Told::Outputs(outputs) if outputs.len() == 1));
+            watched.until("it is written", |told| matches!(told, Update::Outputs(outputs) if outputs.len() == 1));
             watched.frame("a frame", |_| true);
         }
         let closed = watched.session.close();
@@ -295,7 +295,8 @@ fn a_recording_that_was_broken_off_is_found_at_the_next_start() {
     std::fs::write(at(".bokehcam-3.mp4.77-0.part"), "take").unwrap();
     std::fs::write(at(".holiday.mp4.77-0.part"), "mine").unwrap();
     let mut watched = Watched::begin_in("32", folder.path());
-    watched.until("it is told", |told| matches!(told, Told::Note(line) if line.contains("bokehcam-3.mp4.incomplete")));
+    watched
+        .until("it is told", |told| matches!(told, Update::Note(line) if line.contains("bokehcam-3.mp4.incomplete")));
     watched.session.close();
     assert_eq!(std::fs::read(at("bokehcam-3.mp4.incomplete")).unwrap(), b"take");
     assert_eq!(std::fs::read(at(".holiday.mp4.77-0.part")).unwrap(), b"mine");

@@ -7,7 +7,7 @@ mod common;
 use std::sync::Arc;
 
 use bokehcam::compute::device::Device;
-use bokehcam::compute::team::Team;
+use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::compute::{Backend, GpuError};
 use bokehcam::depth::stereo::cpu::CpuExecutor;
 use bokehcam::depth::stereo::executor::Executor;
@@ -46,7 +46,7 @@ fn pair(width: usize, height: usize, most: usize) -> [Vec<u8>; 2] {
 
 /// Both executors' winners of the pairs, one after the other, are the same; returns those of the last.
 fn same(device: &Arc<Device>, size: (usize, usize), disparities: usize, pairs: &[[Vec<u8>; 2]]) -> Vec<u16> {
-    let mut team = Team::new("test", 2);
+    let mut workers = ThreadPool::new("test", 2);
     let mut cpu = CpuExecutor::new(size, disparities, 2);
     let mut gpu = GpuExecutor::new(device, size, disparities).expect("room for a small picture");
     let mut found = [vec![1; size.0 * size.1], vec![2; size.0 * size.1]];
@@ -56,8 +56,8 @@ fn same(device: &Arc<Device>, size: (usize, usize), disparities: usize, pairs: &
     let likely: Vec<u16> = (0..size.0 * size.1).map(|_| (numbers.next() * (most + 1.0)) as u16).collect();
     let rounds = pairs.iter().flat_map(|pair| [(pair, None), (pair, Some(&*likely)), (pair, None)]);
     for (number, ([left, right], likely)) in rounds.enumerate() {
-        cpu.winners([left, right], likely, &mut team, &mut found[0]).expect("the CPU matches");
-        gpu.winners([left, right], likely, &mut team, &mut found[1]).expect("the GPU matches");
+        cpu.winners([left, right], likely, &mut workers, &mut found[0]).expect("the CPU matches");
+        gpu.winners([left, right], likely, &mut workers, &mut found[1]).expect("the GPU matches");
         let off = (0..found[0].len()).filter(|&k| found[0][k] != found[1][k]).collect::<Vec<_>>();
         if let Some(&first) = off.first() {
             let (x, y) = (first % size.0, first / size.0);
@@ -155,12 +155,12 @@ fn the_passes_of_a_pair_take_less_time_than_the_pair() {
         wanted.split('x').map(|number| number.parse().expect("COLUMNSxROWSxDISPARITIES")).collect();
     let (width, height, disparities) = (wanted[0], wanted[1], wanted[2]);
     let [left, right] = pair(width, height, disparities / 2);
-    let mut team = Team::new("test", 1);
+    let mut workers = ThreadPool::new("test", 1);
     let mut gpu = GpuExecutor::new(&device(), (width, height), disparities).expect("room for the picture");
     let mut out = vec![0; width * height];
     for _ in 0..5 {
         let started = std::time::Instant::now();
-        gpu.winners([&left, &right], None, &mut team, &mut out).expect("the GPU matches");
+        gpu.winners([&left, &right], None, &mut workers, &mut out).expect("the GPU matches");
         let (whole, passes) = (started.elapsed(), gpu.pass_times().collect::<Vec<_>>());
         eprintln!("{}: {whole:?} {passes:?}", gpu.describe());
         assert!(passes.iter().map(|(_, time)| *time).sum::<std::time::Duration>() <= whole);

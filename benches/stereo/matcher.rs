@@ -1,7 +1,7 @@
 //! The matchers under test.
 
 use bokehcam::compute::Backend;
-use bokehcam::compute::team::cores;
+use bokehcam::compute::thread_pool::cores;
 use bokehcam::depth::stereo::{self, Effort, Matcher, Settings};
 
 use super::Outcome;

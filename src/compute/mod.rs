@@ -1,11 +1,11 @@
-//! What the executors run on: a thread pool ([`team`]), vector instructions ([`simd`]), and a GPU ([`device`]).
+//! What the executors run on: a thread pool ([`thread_pool`]), vector instructions ([`simd`]), and a GPU ([`device`]).
 
 pub mod aligned;
 #[cfg(feature = "gpu")]
 pub mod device;
 pub mod memory;
 pub mod simd;
-pub mod team;
+pub mod thread_pool;
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};

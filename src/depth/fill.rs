@@ -7,7 +7,7 @@
 use std::ops::Range;
 use std::{iter, mem};
 
-use super::claim::Claimer;
+use super::guided_fill::GuidedHoleFill;
 use crate::frame::{ColorImage, DepthMap};
 
 /// Fills depth maps; owns the memory for it, and the last map that had any depth.
@@ -19,7 +19,7 @@ pub struct Filler {
     column_m: Vec<f32>,
     last_good: DepthMap,
     hole: Vec<bool>,
-    claimer: Claimer,
+    claimer: GuidedHoleFill,
 }
 
 impl Filler {

@@ -2,9 +2,9 @@
 //! holes ([`fill`]), and, for depth that was measured, one that agrees with the picture ([`refine`]).
 
 pub mod beside;
-mod claim;
 pub mod fill;
 pub mod focus;
+mod guided_fill;
 #[cfg(feature = "camera")]
 pub mod live;
 pub mod recorded;

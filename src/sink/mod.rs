@@ -130,7 +130,7 @@ pub struct Options {
     pub force: bool,
     /// Width and height of a virtual camera; `None`: those of the frames, the width made even.
     pub out_size: Option<(u32, u32)>,
-    /// Told by a virtual camera whether somebody watches.
+    /// Notice by a virtual camera whether somebody watches.
     pub demand: Option<Demand>,
     /// Once set, the run is to end: nobody is waited for any more who does nothing.
     pub stop: Arc<AtomicBool>,

@@ -33,7 +33,7 @@ pub struct Switchboard {
 
 /// What became of a member.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Told {
+pub struct Notice {
     /// The name that it was added by.
     pub member: String,
     /// What became of it.
@@ -64,7 +64,7 @@ pub enum Fate {
 #[error("the pictures have ended")]
 pub struct Over;
 
-type Tell = Arc<dyn Fn(Told) + Send + Sync>;
+type Tell = Arc<dyn Fn(Notice) + Send + Sync>;
 
 enum Asked {
     Add(Member),
@@ -77,7 +77,7 @@ const TICK: Duration = Duration::from_millis(100);
 impl Switch {
     /// A switch without members, and its handle. `name` is for the report. `tell` is called for each step in a member's
     /// life, among others on the thread that frames are on: it must be quick.
-    pub fn new(name: &str, tell: impl Fn(Told) + Send + Sync + 'static) -> (Self, Switchboard) {
+    pub fn new(name: &str, tell: impl Fn(Notice) + Send + Sync + 'static) -> (Self, Switchboard) {
         let (to, asked) = mpsc::channel();
         let switch = Self { name: name.into(), members: Vec::new(), asked, ending: Vec::new(), silent: Duration::ZERO };
         (switch, Switchboard { to, tell: Arc::new(tell) })
@@ -226,7 +226,7 @@ struct Life {
 
 impl Life {
     fn tell(&self, fate: Fate) {
-        (self.tell)(Told { member: self.name.clone(), fate });
+        (self.tell)(Notice { member: self.name.clone(), fate });
     }
 
     fn failed(mut self, why: &str) {

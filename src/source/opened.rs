@@ -14,7 +14,7 @@ use crate::capture::two_eyes::TwoEyes;
 use crate::capture::v4l2::V4l2Camera;
 #[cfg(feature = "camera")]
 use crate::clock::Clock;
-use crate::compute::team::cores;
+use crate::compute::thread_pool::cores;
 use crate::depth::DepthSource;
 use crate::depth::recorded::Recorded;
 use crate::frame::DepthMap;

@@ -24,7 +24,7 @@ const SETTLE: Duration = Duration::from_millis(60);
 
 /// What came of listening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum ReaderEvent {
     /// Whether there are readers now.
     Readers(bool),
     Nothing,
@@ -80,38 +80,38 @@ impl Audience {
     }
 
     /// Sleeps until the readers may have changed, but no longer than `patience` (`None`: for ever).
-    pub fn wait(&mut self, patience: Option<Duration>) -> Heard {
+    pub fn wait(&mut self, patience: Option<Duration>) -> ReaderEvent {
         match &self.opens {
             None => self.next_event(patience),
             Some(opens) => {
                 if !std::mem::take(&mut self.fresh) {
                     match self.sleep(opens, PollFlags::IN, patience) {
                         Woken::Ready => {}
-                        Woken::Late => return Heard::Nothing,
-                        Woken::Stop => return Heard::Stopped,
+                        Woken::Late => return ReaderEvent::Nothing,
+                        Woken::Stop => return ReaderEvent::Stopped,
                     }
                     if let Woken::Stop = self.sleep(&self.stop, PollFlags::empty(), Some(SETTLE)) {
-                        return Heard::Stopped;
+                        return ReaderEvent::Stopped;
                     }
                     drain(opens);
                 }
-                Heard::Readers(!other_holders(self.device.path()).is_empty())
+                ReaderEvent::Readers(!other_holders(self.device.path()).is_empty())
             }
         }
     }
 
-    fn next_event(&self, patience: Option<Duration>) -> Heard {
+    fn next_event(&self, patience: Option<Duration>) -> ReaderEvent {
         match self.sleep(&*self.device, PollFlags::PRI, patience) {
             Woken::Ready => {}
-            Woken::Late => return Heard::Nothing,
-            Woken::Stop => return Heard::Stopped,
+            Woken::Late => return ReaderEvent::Nothing,
+            Woken::Stop => return ReaderEvent::Stopped,
         }
         match self.device.dequeue_event() {
-            Ok(event) if event.kind == CLIENT_USAGE => Heard::Readers(event.data[..4] != [0; 4]),
-            Ok(_) => Heard::Nothing,
+            Ok(event) if event.kind == CLIENT_USAGE => ReaderEvent::Readers(event.data[..4] != [0; 4]),
+            Ok(_) => ReaderEvent::Nothing,
             Err(error) => match Errno::from_io_error(&error) {
-                Some(Errno::NOENT | Errno::AGAIN) => Heard::Nothing,
-                _ => Heard::Stopped,
+                Some(Errno::NOENT | Errno::AGAIN) => ReaderEvent::Nothing,
+                _ => ReaderEvent::Stopped,
             },
         }
     }
@@ -163,29 +163,29 @@ mod tests {
         let node = std::path::Path::new("/dev/full");
         let (mut audience, _stop) = listen(node);
         assert!(!audience.is_told());
-        assert_eq!(audience.wait(None), Heard::Readers(false));
+        assert_eq!(audience.wait(None), ReaderEvent::Readers(false));
         // Looked at and left: no reader.
         drop(std::fs::File::open(node).unwrap());
-        assert_eq!(audience.wait(Some(Duration::from_secs(20))), Heard::Readers(false));
-        assert_eq!(audience.wait(Some(Duration::from_millis(1))), Heard::Nothing);
+        assert_eq!(audience.wait(Some(Duration::from_secs(20))), ReaderEvent::Readers(false));
+        assert_eq!(audience.wait(Some(Duration::from_millis(1))), ReaderEvent::Nothing);
         let file = std::fs::File::open(node).unwrap();
         let mut reader = Command::new("sleep").arg("60").stdin(Stdio::from(file)).spawn().unwrap();
-        assert_eq!(audience.wait(Some(Duration::from_secs(20))), Heard::Readers(true));
+        assert_eq!(audience.wait(Some(Duration::from_secs(20))), ReaderEvent::Readers(true));
         reader.kill().unwrap();
         reader.wait().unwrap();
         let heard = std::iter::repeat_with(|| audience.wait(Some(Duration::from_secs(20))));
-        assert!(heard.take(3).any(|heard| heard == Heard::Readers(false)));
+        assert!(heard.take(3).any(|heard| heard == ReaderEvent::Readers(false)));
     }
 
     #[test]
     fn listening_ends_when_it_is_told_to() {
         let node = tempfile::NamedTempFile::new().unwrap();
         let (mut audience, stop) = listen(node.path());
-        assert!(matches!(audience.wait(None), Heard::Readers(_)));
+        assert!(matches!(audience.wait(None), ReaderEvent::Readers(_)));
         let began = Instant::now();
         let listener = std::thread::spawn(move || audience.wait(None));
         drop(stop);
-        assert_eq!(listener.join().unwrap(), Heard::Stopped);
+        assert_eq!(listener.join().unwrap(), ReaderEvent::Stopped);
         assert!(began.elapsed() < Duration::from_secs(20));
     }
 }

@@ -212,6 +212,7 @@ impl BinRows<'_> {
                     for p in 0..4 {
                         store::<V>(out, p * STRIP + x % STRIP, values[p]);
                     }
+                    // At full scale a pixel is its own mean: its colour counts whatever its share.
                     let mut own = None;
                     if self.ranged {
                         let [r, g, b, _] = &piece.0;
@@ -260,6 +261,7 @@ impl BinRows<'_> {
             let coverage = load::<V>(&means[3], x);
             let mut own = None;
             if self.ranged {
+                // Unpremultiplied; where hardly anything is, no colour is made of next to nothing.
                 let inverse = simd.div_f32s(one, simd.max_f32s(coverage, floor));
                 let mut colors = [inverse; 3];
                 for p in 0..3 {

@@ -107,7 +107,7 @@ impl Strip<'_> {
         }
     }
 
-    /// Finds which rows of cells get a result and which rows have to be filtered for it; false when none.
+    /// Most of a bin is empty: its surface covers part of the picture. Finds which rows of cells get a result and which rows have to be filtered for it; false when none.
     #[inline(always)]
     fn mark_active(&mut self) -> bool {
         let (across, down) = (self.reach.div_ceil(CELL), self.reach.div_ceil(CELL));
@@ -121,6 +121,7 @@ impl Strip<'_> {
             let reach = y.saturating_sub(down)..(y + down + 1).min(rows);
             let active = filtered[reach].iter().any(|&f| f);
             let was = std::mem::replace(&mut self.active[y], active);
+            // What the frame before left there; elsewhere there are zeros already.
             if was && !active {
                 let end = ((y + 1) * CELL).min(self.size.1);
                 self.out[y * CELL * 4 * STRIP..end * 4 * STRIP].fill(0.0);
@@ -173,6 +174,8 @@ impl Strip<'_> {
         let mut x = 0;
         while x < STRIP {
             let taps = self.taps::<R>(&self.bank.horizontal, first, &edges, x);
+            // The radius is linear between two edges, and the same at both nearly everywhere: then a tap is one number
+            // for the whole vector and not a vector of its own.
             let sums = if taps.steady {
                 along_row::<S, R, EVEN, false, P>(simd, &taps, &planes, x + pad)
             } else {
@@ -245,6 +248,7 @@ impl Strip<'_> {
             }
         }
         if first + R >= self.bank.terms {
+            // A bin that is whole was filtered without its coverage.
             if P == 3 {
                 sums[3] = simd.splat_f32s(1.0);
             }

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use super::rows::Rows;
 use super::unpack::Piece;
 use crate::bokeh::plan::Share;
-use crate::compute::team::{Shelf, Team};
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Planes of a level: premultiplied colour and CoC, and how much of it is known.
 const PLANES: usize = 5;
@@ -35,8 +35,8 @@ struct Level {
 pub struct Base<'a> {
     width: usize,
     stride: usize,
-    rows: Shelf<'a, f32>,
-    hidden: Shelf<'a, f32>,
+    rows: DisjointParts<'a, f32>,
+    hidden: DisjointParts<'a, f32>,
 }
 
 /// A band of the finest level.
@@ -82,20 +82,20 @@ impl Pyramid {
         Base {
             width,
             stride,
-            rows: Shelf::new(&mut level.rows.data, rows / 2 * row_len, first),
-            hidden: Shelf::new(&mut self.hidden, rows / 2 * width, second),
+            rows: DisjointParts::new(&mut level.rows.data, rows / 2 * row_len, first),
+            hidden: DisjointParts::new(&mut self.hidden, rows / 2 * width, second),
         }
     }
 
     /// Fills the holes once the finest level is laid.
-    pub fn fill(&mut self, team: &mut Team) {
-        self.know(team);
+    pub fn fill(&mut self, workers: &mut ThreadPool) {
+        self.know(workers);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
             let (width, stride, row_len) = (coarse.width, coarse.rows.stride, coarse.rows.row_len());
-            let rows = Shelf::new(&mut coarse.rows.data, PART * row_len, &mut self.taken[0]);
-            team.run(coarse.height.div_ceil(PART), &|part| {
+            let rows = DisjointParts::new(&mut coarse.rows.data, PART * row_len, &mut self.taken[0]);
+            workers.run(coarse.height.div_ceil(PART), &|part| {
                 for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
                     pull(fine, part * PART + k, row, stride, width);
                 }
@@ -105,8 +105,8 @@ impl Pyramid {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&mut fine[k - 1], &coarse[0]);
             let (width, stride, row_len) = (fine.width, fine.rows.stride, fine.rows.row_len());
-            let rows = Shelf::new(&mut fine.rows.data, PART * row_len, &mut self.taken[0]);
-            team.run(fine.height.div_ceil(PART), &|part| {
+            let rows = DisjointParts::new(&mut fine.rows.data, PART * row_len, &mut self.taken[0]);
+            workers.run(fine.height.div_ceil(PART), &|part| {
                 for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
                     push(coarse, part * PART + k, row, stride, width);
                 }
@@ -120,12 +120,12 @@ impl Pyramid {
     }
 
     /// Known is what nothing near touches, nor its neighbours.
-    fn know(&mut self, team: &mut Team) {
+    fn know(&mut self, workers: &mut ThreadPool) {
         let level = &mut self.levels[0];
         let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
         let hidden = &self.hidden;
-        let data = Shelf::new(&mut level.rows.data, PART * row_len, &mut self.taken[0]);
-        team.run(h.div_ceil(PART), &|part| {
+        let data = DisjointParts::new(&mut level.rows.data, PART * row_len, &mut self.taken[0]);
+        workers.run(h.div_ceil(PART), &|part| {
             for (k, planes) in data.part(part).chunks_exact_mut(row_len).enumerate() {
                 let (planes, known) = planes.split_at_mut((PLANES - 1) * stride);
                 let y = part * PART + k;

@@ -1,5 +1,10 @@
 //! The filters of the pass `blur` for one vector of pixels: along a row, down a column, and what keeps the result in
-//! range. Where every profile is even, taps at -j and j share one multiplication.
+//! range.
+//!
+//! A kernel of rank r is `K(y, x) = sum_i v_i(y) h_i(x)` (McGraw 2015, equation 2), so each term is one pass along rows
+//! and one down columns: 2 r taps a pixel for what takes their square otherwise. Where every profile is even, taps at -j
+//! and j share one multiplication. The loops are written for registers: a value is loaded once and used by all terms of
+//! its group, as loads and not multiplications are what these passes wait for.
 
 #![allow(clippy::needless_range_loop)] // Terms and planes index several arrays at once.
 
@@ -79,7 +84,8 @@ impl<const R: usize> Taps<'_, R> {
     }
 }
 
-/// The horizontal pass for one vector: every term of the group, every plane.
+/// The horizontal pass for one vector: every term of the group, every plane. The sums of all terms (at most 4 x 4 vectors)
+/// stay in registers while the taps go outwards, so that a value that all terms need is read once.
 #[inline(always)]
 pub fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, const P: usize>(
     simd: S,
@@ -115,7 +121,8 @@ pub fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, co
     sums
 }
 
-/// The vertical pass for `BLOCK` rows from `y` on that have the same taps.
+/// The vertical pass for `BLOCK` rows from `y` on that have the same taps: a row above or below belongs to the sums of
+/// all of them, so it is read once instead of `BLOCK` times.
 #[inline(always)]
 pub fn along_columns<S: Simd, const R: usize, const P: usize>(
     simd: S,
@@ -130,6 +137,7 @@ pub fn along_columns<S: Simd, const R: usize, const P: usize>(
     let mut sums = [[simd.splat_f32s(0.0); 4]; BLOCK];
     let reach = taps.reach as isize;
     for above in -reach..BLOCK as isize + reach {
+        // Beyond the picture its outermost row goes on; rows lie in a ring, a power of two of them.
         let inside = (y as isize + above).clamp(0, height as isize - 1) as usize;
         let row = &rows[(inside & last) * row_len..][..row_len];
         for r in 0..R {
@@ -151,7 +159,8 @@ pub fn along_columns<S: Simd, const R: usize, const P: usize>(
     sums
 }
 
-/// The vertical pass for one vector: the terms of the group summed, every plane.
+/// The vertical pass for one vector: the terms of the group summed, every plane. Unlike along a row the terms meet here,
+/// so one sum a plane suffices.
 #[inline(always)]
 pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, const P: usize>(
     simd: S,
@@ -163,7 +172,7 @@ pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool,
 ) -> [S::f32s; 4] {
     let row_len = R * 4 * STRIP;
     let weights = taps.at::<S, VARY>(simd, 0);
-    // A power of two of rows.
+    // Rows lie in a ring, a power of two of them.
     let last = rows.len() / row_len - 1;
     let here = &rows[(y & last) * row_len..][..row_len];
     let mut sums = [simd.splat_f32s(0.0); 4];

@@ -10,7 +10,7 @@ use super::unpack::{Source, coc_row};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::Plan;
 use crate::compute::simd::madd;
-use crate::compute::team::{Shelf, Team};
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Memory of the gathers.
 pub struct Gather {
@@ -47,7 +47,7 @@ impl Gather {
     /// Gathers a frame from the one bin that holds it.
     pub fn run(
         &mut self,
-        (team, arch): (&mut Team, Arch),
+        (workers, arch): (&mut ThreadPool, Arch),
         plan: &Plan,
         frame: &Source<'_>,
         strips: &Strips,
@@ -55,8 +55,8 @@ impl Gather {
     ) {
         let (size, bank) = ((plan.width, plan.height), &*plan.bank);
         let (stride, pad, row_len) = (self.source.stride, self.source.pad, self.source.row_len());
-        let rows = Shelf::new(&mut self.source.data, row_len, taken);
-        team.run(size.1, &|y| {
+        let rows = DisjointParts::new(&mut self.source.data, row_len, taken);
+        workers.run(size.1, &|y| {
             for (p, plane) in rows.part(y).chunks_exact_mut(stride).enumerate() {
                 for (strip, out) in plane[pad..pad + size.0].chunks_mut(STRIP).enumerate() {
                     out.copy_from_slice(&strips.row(strip, y)[p * STRIP..][..out.len()]);
@@ -65,25 +65,25 @@ impl Gather {
             }
         });
         let source = &self.source;
-        let coc = Shelf::new(&mut self.coc, size.0, taken);
-        team.run(size.1, &|y| coc_row(frame, y, 0, coc.part(y)));
+        let coc = DisjointParts::new(&mut self.coc, size.0, taken);
+        workers.run(size.1, &|y| coc_row(frame, y, 0, coc.part(y)));
         let coc = |y: usize| &self.coc[y * size.0..][..size.0];
         if plan.exact {
-            let out = Shelf::new(&mut self.result, 3 * size.0, taken);
+            let out = DisjointParts::new(&mut self.result, 3 * size.0, taken);
             let kernels = &self.kernels;
-            team.run(size.1, &|y| {
+            workers.run(size.1, &|y| {
                 arch.dispatch(Exact { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
             });
             return;
         }
         let rows = &mut self.rows[..bank.terms * 3 * size.0 * size.1];
-        let rows = Shelf::new(rows, bank.terms * 3 * size.0, taken);
-        team.run(size.1, &|y| {
+        let rows = DisjointParts::new(rows, bank.terms * 3 * size.0, taken);
+        workers.run(size.1, &|y| {
             arch.dispatch(GatherRow { source, width: size.0, bank, coc: coc(y), y, out: rows.part(y) });
         });
-        let out = Shelf::new(&mut self.result, 3 * size.0, taken);
+        let out = DisjointParts::new(&mut self.result, 3 * size.0, taken);
         let rows = &self.rows;
-        team.run(size.1, &|y| {
+        workers.run(size.1, &|y| {
             arch.dispatch(GatherColumn { rows, size, bank, coc: coc(y), y, out: out.part(y) });
         });
     }
@@ -110,6 +110,7 @@ impl WithSimd for Exact<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let (width, height) = self.size;
+        // Each pixel has a kernel of its own, so the vectors go along the kernel's rows and not over pixels.
         for x in 0..width {
             let node = self.bank.node(self.coc[x].abs());
             let reach = self.bank.node_reach[node] as usize;
@@ -159,6 +160,7 @@ impl WithSimd for GatherRow<'_> {
         for x in 0..self.width {
             let node = self.bank.node(self.coc[x].abs());
             let reach = self.bank.node_reach[node] as isize;
+            // In front of the focal plane a lens turns its aperture.
             let sign = if self.coc[x] < 0.0 { -1 } else { 1 };
             for t in 0..self.bank.terms {
                 let mut sum = [0.0f32; 3];
@@ -200,6 +202,7 @@ impl WithSimd for GatherColumn<'_> {
             let mut sum = [0.0f32; 3];
             for j in -reach..=reach {
                 let y = self.y.saturating_add_signed(j).min(height - 1);
+                // Made with the radii of row `y` there, not of this pixel: what a separable gather gets wrong.
                 let row = &self.rows[y * terms * 3 * width..][..terms * 3 * width];
                 let taps = &self.bank.vertical[self.bank.tap(node, sign * j)..][..terms];
                 for (t, tap) in taps.iter().enumerate() {

@@ -32,7 +32,7 @@ use super::plan::{CELL, MAX_BINS, Plan};
 use super::rung::SCALES;
 use super::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use crate::budget::Quality;
-use crate::compute::team::{Shelf, Team, cores};
+use crate::compute::thread_pool::{DisjointParts, ThreadPool, cores};
 use crate::compute::{Backend, simd};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
@@ -43,7 +43,7 @@ pub use unpack::{compress, expand};
 pub struct CpuBokeh {
     plan: Plan,
     arch: Arch,
-    team: Team,
+    workers: ThreadPool,
     encode: composite::EncodeTable,
     tiles: Tiles,
     slots: Vec<Slot>,
@@ -68,9 +68,9 @@ impl CpuBokeh {
     pub fn new(plan: Plan, threads: Option<usize>) -> Self {
         let threads = threads.unwrap_or_else(cores);
         let (width, height) = (plan.width, plan.height);
-        let team = Team::new("blur", threads);
+        let workers = ThreadPool::new("blur", threads);
         let slots: Vec<Slot> = (0..plan.slots()).map(|slot| Slot::new(&plan, slot)).collect();
-        let members = (0..team.threads())
+        let members = (0..workers.threads())
             .map(|_| Member {
                 coc: vec![0.0; width],
                 sums: BandSums::new(),
@@ -89,7 +89,7 @@ impl CpuBokeh {
             arch: Arch::new(),
             taken: flags(height.max(slots.len())),
             plan,
-            team,
+            workers,
             slots,
             gather,
             members,
@@ -139,14 +139,14 @@ impl CpuBokeh {
         lap("bin");
         if fills {
             if let Some(pyramid) = &mut self.pyramid {
-                pyramid.fill(&mut self.team);
+                pyramid.fill(&mut self.workers);
             }
             lap("fill");
             self.bin(&frame, true, true);
             lap("bin");
         }
         if let Some(gather) = &mut self.gather {
-            gather.run((&mut self.team, self.arch), &self.plan, &frame, &self.slots[0].source, &mut self.taken);
+            gather.run((&mut self.workers, self.arch), &self.plan, &frame, &self.slots[0].source, &mut self.taken);
             lap("gather");
         } else {
             self.reach();
@@ -165,9 +165,9 @@ impl CpuBokeh {
         let across = self.tiles.across;
         let layered = self.plan.compositing == Compositing::Layers;
         if layered {
-            let ranges = Shelf::new(&mut self.tiles.ranges, across, &mut self.taken);
+            let ranges = DisjointParts::new(&mut self.tiles.ranges, across, &mut self.taken);
             let arch = self.arch;
-            self.team.run_with(&mut self.members, self.tiles.down, &|member: &mut Member, row| {
+            self.workers.run_with(&mut self.members, self.tiles.down, &|member: &mut Member, row| {
                 arch.dispatch(Survey { source: frame, row, ranges: ranges.part(row), coc: &mut member.coc });
             });
         }
@@ -201,7 +201,7 @@ impl CpuBokeh {
         }
         let (arch, tiles) = (self.arch, &self.tiles);
         let bands = plan.height.div_ceil(rows);
-        let waits = Shelf::new(&mut self.waits[..bands * blocks], blocks, &mut self.taken);
+        let waits = DisjointParts::new(&mut self.waits[..bands * blocks], blocks, &mut self.taken);
         let behind = plan.unhidden();
         let nearest_px = plan.nearest_behind_px();
         let (base, filled) = match self.pyramid.as_mut().filter(|_| fills) {
@@ -209,7 +209,7 @@ impl CpuBokeh {
             Some(pyramid) => (Some(pyramid.base(rows)), None),
             None => (None, None),
         };
-        self.team.run_with(&mut self.members, bands, &|member: &mut Member, band| {
+        self.workers.run_with(&mut self.members, bands, &|member: &mut Member, band| {
             let hidden = match (&base, filled) {
                 (Some(base), _) => Hidden::Waits(behind, base.band(band, rows, plan.height)),
                 (_, Some(filled)) => Hidden::Filled(filled),
@@ -229,8 +229,8 @@ impl CpuBokeh {
 
     fn reach(&mut self) {
         let plan = &self.plan;
-        let parts = Shelf::new(&mut self.slots, 1, &mut self.taken);
-        self.team.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
+        let parts = DisjointParts::new(&mut self.slots, 1, &mut self.taken);
+        self.workers.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
             let bin = &plan.bins[part];
             for slot in parts.part(bin.slot).iter_mut().filter(|slot| slot.present) {
                 reach::reach(plan, bin, &slot.cells, &mut slot.edges, &mut member.reach);
@@ -248,7 +248,7 @@ impl CpuBokeh {
             shelves[k] = Some(StripShelves::new(&plan.bins[k], slot, parts));
             parts += strips;
         }
-        self.team.run_with(&mut self.members, parts, &|member: &mut Member, part| {
+        self.workers.run_with(&mut self.members, parts, &|member: &mut Member, part| {
             let all = shelves.iter().zip(&plan.bins).filter_map(|(shelf, bin)| shelf.as_ref().zip(Some(bin)));
             let Some((shelf, bin)) = all.filter(|(shelf, _)| shelf.first <= part).max_by_key(|(shelf, _)| shelf.first)
             else {
@@ -274,11 +274,11 @@ impl CpuBokeh {
 
     fn composite(&mut self, frame: &Source<'_>, out: &mut ColorImage) {
         let width = self.plan.width;
-        let out = Shelf::new(&mut out.rgb, TILE_H * width * 3, &mut self.taken);
+        let out = DisjointParts::new(&mut out.rgb, TILE_H * width * 3, &mut self.taken);
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
         let (plan, slots, tiles) = (&self.plan, &self.slots, &self.tiles);
         let (arch, encode) = (self.arch, &self.encode);
-        self.team.run(self.plan.height.div_ceil(TILE_H), &|part| {
+        self.workers.run(self.plan.height.div_ceil(TILE_H), &|part| {
             let y0 = part * TILE_H;
             let out = out.part(part);
             arch.dispatch(composite::Composite { plan, slots, tiles, frame, gathered, encode, y0, out });
@@ -312,6 +312,6 @@ impl Bokeh for CpuBokeh {
     }
 
     fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.team.threads(), simd::name(self.arch))
+        format!("cpu, {} threads, {}", self.workers.threads(), simd::name(self.arch))
     }
 }

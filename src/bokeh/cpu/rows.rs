@@ -118,6 +118,7 @@ impl Edges {
     #[inline(always)]
     pub fn at(&self, strip: usize, y: usize) -> [[f32; EDGE_VALUES]; STRIP_EDGES] {
         let along = (y as f32 - (CELL as f32 - 1.0) / 2.0) * (1.0 / CELL as f32);
+        // Above the first middle the first cell holds; a comparison, as `max` would ask for NaN, too.
         let along = if along < 0.0 { 0.0 } else { along };
         let above = (along as usize).min(self.height - 1);
         let share = along - above as f32;
@@ -162,6 +163,7 @@ impl Strips {
         let span = STRIP + 2 * pad;
         for at in (0..span).step_by(PIECE) {
             let x = (strip * STRIP + at) as isize - pad as isize;
+            // A piece lies in one strip; past the picture's last column there may be strips of which none is real.
             let inside = x.clamp(0, width as isize - 1) as usize;
             let row = self.row(inside / STRIP, y);
             for p in 0..4 {

@@ -6,13 +6,13 @@ use super::rows::{CELL_PLANES, Cells, Edges, STRIP_CELLS, STRIP_ROW, Slot, Strip
 use super::tiles::BLOCK;
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, CELL, Plan, Share};
-use crate::compute::team::Shelf;
+use crate::compute::thread_pool::DisjointParts;
 
 /// What the parts of the pass `bin` write for one bin.
 pub struct BinShelves<'a> {
-    source: Shelf<'a, f32>,
-    cells: Shelf<'a, f32>,
-    filled: Shelf<'a, bool>,
+    source: DisjointParts<'a, f32>,
+    cells: DisjointParts<'a, f32>,
+    filled: DisjointParts<'a, bool>,
     share: Option<Share>,
     scale: usize,
     size: (usize, usize),
@@ -31,9 +31,9 @@ impl<'a> BinShelves<'a> {
         let each = rows / bin.scale;
         let cells = each / CELL;
         Self {
-            source: Shelf::new(&mut slot.source.data[..used], cells * slot.source.across * STRIP_CELLS, first),
-            cells: Shelf::new(&mut slot.cells.data, cells * CELL_PLANES * slot.cells.width, second),
-            filled: Shelf::new(&mut slot.filled[..blocks * bin.height.div_ceil(CELL)], cells * blocks, third),
+            source: DisjointParts::new(&mut slot.source.data[..used], cells * slot.source.across * STRIP_CELLS, first),
+            cells: DisjointParts::new(&mut slot.cells.data, cells * CELL_PLANES * slot.cells.width, second),
+            filled: DisjointParts::new(&mut slot.filled[..blocks * bin.height.div_ceil(CELL)], cells * blocks, third),
             across: slot.source.across,
             rows: each,
             share: (plan.compositing == Compositing::Layers).then(|| plan.share(k)),
@@ -65,8 +65,8 @@ pub struct StripShelves<'a> {
     pub source: &'a Strips,
     pub cells: &'a Cells,
     pub edges: &'a Edges,
-    pub out: Shelf<'a, f32>,
-    pub active: Shelf<'a, bool>,
+    pub out: DisjointParts<'a, f32>,
+    pub active: DisjointParts<'a, bool>,
 }
 
 impl<'a> StripShelves<'a> {
@@ -79,8 +79,8 @@ impl<'a> StripShelves<'a> {
             source: &slot.source,
             cells: &slot.cells,
             edges: &slot.edges,
-            out: Shelf::new(&mut slot.out[..used], bin.height * STRIP_ROW, taken),
-            active: Shelf::new(&mut slot.active[..slot.source.across * down], down, taken_too),
+            out: DisjointParts::new(&mut slot.out[..used], bin.height * STRIP_ROW, taken),
+            active: DisjointParts::new(&mut slot.active[..slot.source.across * down], down, taken_too),
         }
     }
 }

@@ -21,7 +21,8 @@ pub const SUMS: usize = 5;
 /// A row of a block of the bin: the planes of a sum.
 pub type Means = Line<[[f32; PLANE]; SUMS]>;
 
-/// Adds a row's shares to two rows of sums.
+/// Adds a row's shares to two rows of sums. Down the picture the tent falls for one row of the bin while it rises for
+/// the next, so a row of the picture is read once and never kept: one pass makes any scale.
 #[inline(always)]
 pub fn sum_row<S: Simd>(
     simd: S,
@@ -75,7 +76,8 @@ impl<S: Simd> ShareAt<S> {
     }
 }
 
-/// The tent across: a row of sums at the bin's scale.
+/// The tent across: a row of sums at the bin's scale. Weights repeat every `S` columns, so rise and fall fit in one vector
+/// each, and what is left to add up are runs of `S` values.
 #[inline(always)]
 pub fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], columns: usize, means: &mut Means) {
     // The ascending half of the tent, and the descending one, as often as they fit.

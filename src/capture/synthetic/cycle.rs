@@ -20,7 +20,7 @@ const BREATH_S: f64 = 2.0;
 
 /// The frames of one period of the scene, those that there are.
 pub(super) struct Cycle {
-    shelf: Arc<Shelf>,
+    shelf: Arc<DisjointParts>,
     threads: usize,
     /// Kept frames from one captured frame to the next.
     step: f64,
@@ -34,7 +34,7 @@ pub(super) struct Cycle {
     round: bool,
 }
 
-struct Shelf {
+struct DisjointParts {
     scene: Scene,
     view: View,
     frames: Vec<OnceLock<(ColorImage, DepthMap)>>,
@@ -44,7 +44,7 @@ struct Shelf {
     over: AtomicBool,
 }
 
-impl Shelf {
+impl DisjointParts {
     fn render(&self, index: usize, threads: usize) {
         let time_s = index as f64 / self.frames.len() as f64 * self.scene.period_s();
         self.frames[index].get_or_init(|| {
@@ -77,7 +77,7 @@ impl Cycle {
         let most = (MOST_BYTES / (pixels * (3 + size_of::<f32>()))).max(1);
         let count = usize::try_from(frames).unwrap_or(most).clamp(1, most);
         let period_s = scene.period_s();
-        let shelf = Shelf {
+        let shelf = DisjointParts {
             scene,
             view,
             frames: (0..count).map(|_| OnceLock::new()).collect(),

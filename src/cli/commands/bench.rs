@@ -14,7 +14,7 @@ use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
 use crate::cli::terminal::print;
-use crate::compute::{Backend, Place, team::cores};
+use crate::compute::{Backend, Place, thread_pool::cores};
 use crate::computing::Computing;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;

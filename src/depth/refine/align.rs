@@ -65,6 +65,7 @@ impl Aligner {
             let Self { planes, edge, band, scratch, sure, nearby, front, moved } = self;
             sure.resize(inverse.len(), 0.0);
             arch.dispatch(FindBand { inverse, width, jump, edge, band, scratch });
+            // Only what moved in the round before can move its neighbours now.
             front.clear();
             if round == 0 {
                 front.extend((0..).zip(&*edge).filter(|(_, edge)| **edge).map(|(k, _)| k));
@@ -121,6 +122,7 @@ impl WithSimd for FindBand<'_> {
             for (((out, &here), &above), &below) in out.iter_mut().zip(row).zip(above).zip(below) {
                 *out = is_jump(here, above, jump) | is_jump(here, below, jump);
             }
+            // The same along the row; its ends have one neighbour.
             for (out, three) in out[1.min(width)..].iter_mut().zip(row.windows(3)) {
                 *out |= is_jump(three[1], three[0], jump) | is_jump(three[1], three[2], jump);
             }

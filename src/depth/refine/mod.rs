@@ -9,7 +9,7 @@
 mod align;
 mod planes;
 mod smooth;
-mod steady;
+mod temporal;
 mod upsample;
 mod votes;
 
@@ -17,7 +17,7 @@ use pulp::Arch;
 
 use self::align::Aligner;
 use self::smooth::Smoother;
-use self::steady::{Limits, Steadier};
+use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
 use crate::frame::{ColorImage, DepthMap};
@@ -41,7 +41,7 @@ pub struct Refiner {
     inverse: Vec<f32>,
     smoother: Smoother,
     aligner: Aligner,
-    steadier: Steadier,
+    steadier: TemporalFilter,
     /// Distance in focus over a metre.
     focus: Focus,
 }

@@ -130,6 +130,7 @@ impl Votes {
         let (mut near, mut far) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_moment, mut far_moment) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_low, mut far_high) = ([high; LANES], [low; LANES]);
+        // Selections instead of branches, and a sum per lane: so the loop becomes vector code.
         for k in 0..ROWS {
             let (depth, weight) = (&self.depth[k], &self.weight[k]);
             for lane in 0..LANES {

@@ -1,7 +1,7 @@
 //! What finds the disparities that both eyes agree on.
 
 use crate::compute::GpuError;
-use crate::compute::team::Team;
+use crate::compute::thread_pool::ThreadPool;
 
 /// Finds the disparities that both eyes agree on. All executors find the same, to the bit.
 pub trait Executor: Send {
@@ -18,7 +18,7 @@ pub trait Executor: Send {
         &mut self,
         eyes: [&[u8]; 2],
         likely: Option<&[u16]>,
-        team: &mut Team,
+        workers: &mut ThreadPool,
         out: &mut [u16],
     ) -> Result<(), GpuError>;
 }

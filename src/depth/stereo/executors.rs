@@ -9,7 +9,7 @@ use super::executor::Executor;
 use super::gpu::GpuExecutor;
 #[cfg(feature = "gpu")]
 use crate::compute::device::Device;
-use crate::compute::team::Team;
+use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{Backend, GpuError};
 
 pub(super) struct Executors {
@@ -20,7 +20,7 @@ pub(super) struct Executors {
 }
 
 impl Executors {
-    /// Executors on one GPU or on the CPU, there for a team of `threads`.
+    /// Executors on one GPU or on the CPU, there for a workers of `threads`.
     ///
     /// # Errors
     /// A GPU was asked for and there is none that fits.
@@ -40,7 +40,7 @@ impl Executors {
         }
     }
 
-    /// Executors on the CPU, for a team of `threads`.
+    /// Executors on the CPU, for a workers of `threads`.
     ///
     /// # Errors
     /// A GPU was asked for.
@@ -98,14 +98,14 @@ impl Executor for Fallback {
         &mut self,
         eyes: [&[u8]; 2],
         likely: Option<&[u16]>,
-        team: &mut Team,
+        workers: &mut ThreadPool,
         out: &mut [u16],
     ) -> Result<(), GpuError> {
-        match (self.now.winners(eyes, likely, team, out), self.other.take()) {
+        match (self.now.winners(eyes, likely, workers, out), self.other.take()) {
             (Err(error), Some(other)) => {
                 tracing::warn!("{error}; the CPU matches from here on");
                 self.now = other();
-                self.now.winners(eyes, likely, team, out)
+                self.now.winners(eyes, likely, workers, out)
             }
             (found, other) => {
                 self.other = other;

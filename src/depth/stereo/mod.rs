@@ -3,9 +3,9 @@
 //! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on, in whole numbers, so that
 //! all executors find the same ([`fixed`]); what is made of them is common to all (`tidy`).
 
-mod alike;
 mod border;
 pub mod check;
+mod color_similarity;
 #[doc(hidden)]
 pub mod cpu;
 pub mod executor;
@@ -25,13 +25,13 @@ mod tidy;
 use std::iter;
 use std::sync::atomic::AtomicBool;
 
-use alike::Colors;
+use color_similarity::Colors;
 use executor::Executor;
 use executors::Executors;
 use prior::Prior;
 use tidy::Tidy;
 
-use crate::compute::team::{Shelf, Team};
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 use crate::compute::{Backend, GpuError};
 use crate::frame::{ColorImage, DisparityMap, GrayImage};
 use crate::names::named;
@@ -122,13 +122,13 @@ pub enum MatchError {
 /// # Errors
 /// A GPU was asked for and there is none that fits, or it failed.
 pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> Result<Box<dyn Matcher>, MatchError> {
-    let team = Team::new("match", settings.threads);
-    let executors = Executors::new(backend, adapter, team.threads())?;
+    let workers = ThreadPool::new("match", settings.threads);
+    let executors = Executors::new(backend, adapter, workers.threads())?;
     let level = |effort| Level::new(settings, effort, &executors);
     Ok(Box::new(Matching {
         settings: *settings,
         levels: [level(Effort::Fast)?, level(Effort::Full)?],
-        team,
+        workers,
         small: [GrayImage::default(), GrayImage::default()],
         taken: iter::repeat_with(AtomicBool::default).take(settings.size.1 as usize).collect(),
     }))
@@ -139,7 +139,7 @@ const SPECKLE: u32 = 100;
 
 struct Matching {
     settings: Settings,
-    team: Team,
+    workers: ThreadPool,
     levels: [Level; 2],
     /// Left and right at half the size.
     small: [GrayImage; 2],
@@ -179,15 +179,15 @@ impl Level {
         eyes: [&GrayImage; 2],
         colors: Option<Colors>,
         speckle: u32,
-        team: &mut Team,
+        workers: &mut ThreadPool,
         into: Option<&mut [f32]>,
     ) -> Result<(), GpuError> {
         let Self { executor, prior, tidy, map, px } = self;
         let [luma, right] = eyes.map(|eye| &*eye.luma);
-        executor.winners([luma, right], prior.likely(luma), team, map)?;
+        executor.winners([luma, right], prior.likely(luma), workers, map)?;
         tidy.drop_islands(map, speckle);
         prior.keep(luma, map);
-        tidy.fill(map, luma, colors, team, into.unwrap_or(px));
+        tidy.fill(map, luma, colors, workers, into.unwrap_or(px));
         Ok(())
     }
 }
@@ -213,17 +213,17 @@ impl Matcher for Matching {
         }
         let colors = |every| color.map(|image| Colors { image, every });
         into.resize(left.width, left.height);
-        let Self { settings, team, levels, small, taken } = self;
+        let Self { settings, workers, levels, small, taken } = self;
         let level = &mut levels[settings.effort as usize];
         match settings.effort {
-            Effort::Full => level.find([left, right], colors(1), SPECKLE, team, Some(&mut into.px))?,
+            Effort::Full => level.find([left, right], colors(1), SPECKLE, workers, Some(&mut into.px))?,
             Effort::Fast => {
                 half::shrink(left, &mut small[0]);
                 half::shrink(right, &mut small[1]);
                 let [small_left, small_right] = &*small;
-                level.find([small_left, small_right], colors(2), SPECKLE / 4, team, None)?;
-                let (px, rows) = (&level.px, Shelf::new(&mut into.px, left.width as usize, taken));
-                team.run(left.height as usize, &|y| half::grow_row(left, small_left, px, y, rows.part(y)));
+                level.find([small_left, small_right], colors(2), SPECKLE / 4, workers, None)?;
+                let (px, rows) = (&level.px, DisjointParts::new(&mut into.px, left.width as usize, taken));
+                workers.run(left.height as usize, &|y| half::grow_row(left, small_left, px, y, rows.part(y)));
             }
         }
         Ok(())

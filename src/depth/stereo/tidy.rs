@@ -5,19 +5,19 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, WithSimd};
 
-use super::alike::{Alike, Colors};
 use super::border::Border;
+use super::color_similarity::{ColorSimilarity, Colors};
 use super::fixed::ONE;
 use super::gaps;
 use super::speckle::Speckles;
-use crate::compute::team::{Shelf, Team};
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Owns the memory for it.
 pub struct Tidy {
     width: usize,
     speckles: Speckles,
     border: Border,
-    alike: Alike,
+    alike: ColorSimilarity,
     taken: Vec<AtomicBool>,
     arch: Arch,
 }
@@ -29,7 +29,7 @@ impl Tidy {
             width,
             speckles: Speckles::new(width * height),
             border: Border::new((width, height)),
-            alike: Alike::default(),
+            alike: ColorSimilarity::default(),
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
             arch: Arch::new(),
         }
@@ -41,7 +41,14 @@ impl Tidy {
     }
 
     /// Fills the gaps of `map`, whose left picture is `luma`, and writes its median to `px`, in pixels, above 0.
-    pub fn fill(&mut self, map: &mut [u16], luma: &[u8], colors: Option<Colors>, team: &mut Team, px: &mut [f32]) {
+    pub fn fill(
+        &mut self,
+        map: &mut [u16],
+        luma: &[u8],
+        colors: Option<Colors>,
+        workers: &mut ThreadPool,
+        px: &mut [f32],
+    ) {
         let Self { width, border, alike, taken, arch, .. } = self;
         let (width, arch) = (*width, *arch);
         border.fill(map, luma, width);
@@ -51,8 +58,8 @@ impl Tidy {
         gaps::fill(map, width);
         let map = &*map;
         let height = map.len() / width;
-        let out = Shelf::new(px, width, taken);
-        team.run(height, &|y| {
+        let out = DisjointParts::new(px, width, taken);
+        workers.run(height, &|y| {
             let row = |y: usize| &map[y * width..(y + 1) * width];
             let rows = [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))];
             arch.dispatch(Median { rows, out: out.part(y) });

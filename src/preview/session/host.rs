@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 
 use super::live::{self, Live};
-use super::{Closed, Heard, News, Order, Start, Still};
+use super::{Closed, News, Order, SessionEvent, Start, Still};
 use crate::look::{Look, Patch};
 use crate::pipeline::{PipelineError, Wanted};
 use crate::preview::services::{Services, Switch};
-use crate::preview::state::{Output, Request, Source, Told};
+use crate::preview::state::{Output, Request, Source, Update};
 use crate::recording::snapshot::{self, Snapshot};
 use crate::sink;
-use crate::sink::switch::{Fate, Told as Written};
+use crate::sink::switch::{Fate, Notice as Written};
 use crate::stats::Report;
 
 /// What a session has and does.
@@ -140,14 +140,14 @@ impl Host {
                 self.tell_outputs();
             }
             Request::Control(name, value) => match self.services.turn(&name, value) {
-                Ok(controls) => self.news.tell(Told::Controls(controls)),
+                Ok(controls) => self.news.tell(Update::Controls(controls)),
                 Err(line) => self.news.note(line),
             },
             Request::Refresh => self.tell_choices(),
             Request::SavePreset(name, look) => match self.services.save_preset(&name, &look) {
                 Ok(()) => {
                     self.news.note(format!("saved as preset '{name}'"));
-                    self.news.tell(Told::Presets(self.services.presets()));
+                    self.news.tell(Update::Presets(self.services.presets()));
                 }
                 Err(line) => self.news.note(line),
             },
@@ -159,13 +159,13 @@ impl Host {
     fn tell_choices(&mut self) {
         let sources = self.services.sources();
         let virtual_cameras = self.services.virtual_cameras();
-        self.news.tell(Told::Choices { sources, virtual_cameras });
-        self.news.tell(Told::Presets(self.services.presets()));
+        self.news.tell(Update::Choices { sources, virtual_cameras });
+        self.news.tell(Update::Presets(self.services.presets()));
     }
 
     fn tell_outputs(&self) {
         self.wanted.need(!self.outputs.is_empty());
-        self.news.tell(Told::Outputs(self.outputs.clone()));
+        self.news.tell(Update::Outputs(self.outputs.clone()));
     }
 
     /// There is no source, and nothing is written any more; a virtual camera goes on with the next one.
@@ -174,18 +174,18 @@ impl Host {
             self.outputs.retain(|output| output.is_camera);
         }
         self.tell_outputs();
-        self.news.tell(Told::Source(source));
+        self.news.tell(Update::Source(source));
     }
 
     /// Opens the source and begins a run of it.
     fn open(&mut self) {
-        self.news.tell(Told::Source(Source::Opening));
+        self.news.tell(Update::Source(Source::Opening));
         let opened = match self.services.open(&self.source) {
             Ok(opened) => opened,
             Err(line) => return self.without_source(Source::Lost(line)),
         };
         self.source.clone_from(&opened.name);
-        self.news.tell(Told::Controls(opened.controls.clone()));
+        self.news.tell(Update::Controls(opened.controls.clone()));
         opened.notes.iter().for_each(|line| self.news.note(line));
         self.runs += 1;
         self.wanted.need(!self.outputs.is_empty());
@@ -207,7 +207,7 @@ impl Host {
             Ok((live, source)) => {
                 self.looks = VecDeque::from([(0, live.effective(&self.look))]);
                 self.live = Some(live);
-                self.news.tell(Told::Source(source));
+                self.news.tell(Update::Source(source));
                 // A recording ends with its source; a virtual camera goes on with the next one.
                 let first = !std::mem::replace(&mut self.began, true);
                 let outputs = std::mem::take(&mut self.outputs);
@@ -258,7 +258,7 @@ impl Host {
         let look = self.live.as_ref().map_or_else(|| self.look.clone(), |live| live.effective(&self.look));
         let command = self.services.command(&look, &self.source, &outputs, switches);
         self.news.note(format!("Copied: {command}"));
-        self.news.send(Heard::Copy(command));
+        self.news.send(SessionEvent::Copy(command));
     }
 
     fn wrote(&mut self, run: u64, Written { member, fate }: &Written) {
@@ -268,7 +268,7 @@ impl Host {
             Fate::Failed { why, .. } => {
                 tracing::error!("{why}");
                 self.failed.get_or_insert_with(|| why.clone());
-                self.news.tell(Told::Trouble(why.clone()));
+                self.news.tell(Update::Trouble(why.clone()));
                 // One of the same name may be written by the next run already.
                 if run == self.runs {
                     self.outputs.retain(|output| output.name != *member);

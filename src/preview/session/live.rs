@@ -8,14 +8,14 @@ use std::time::Instant;
 
 use super::super::services::{Opened, Services};
 use super::super::state::{Output, Running, Source};
-use super::{Heard, News};
+use super::{News, SessionEvent};
 use crate::bokeh;
 use crate::clock::Clock;
 use crate::link;
 use crate::look::Look;
 use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run, Wanted};
 use crate::sink::Sink;
-use crate::sink::switch::Told as Written;
+use crate::sink::switch::Notice as Written;
 use crate::sink::{Switch, Switchboard};
 use crate::stats::Report;
 
@@ -71,7 +71,7 @@ impl Live {
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), settings.keep_going);
         let wanted = Arc::clone(&settings.wanted);
-        news.send(Heard::Views(views));
+        news.send(SessionEvent::Views(views));
         let run = move || {
             pipeline::run(Run {
                 camera,

@@ -13,14 +13,14 @@ use std::time::{Duration, Instant};
 use host::Host;
 
 use super::services::{Services, Switch};
-use super::state::{Output, Request, Told};
+use super::state::{Output, Request, Update};
 use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
 use crate::look::Look;
 use crate::optics::CocField;
 use crate::pipeline::{PipelineError, View, Wanted};
-use crate::sink::switch::Told as Written;
+use crate::sink::switch::Notice as Written;
 use crate::stats::Report;
 
 /// An end that takes longer is told.
@@ -49,8 +49,8 @@ pub struct Start {
 }
 
 /// What comes from a session.
-pub enum Heard {
-    Told(Told),
+pub enum SessionEvent {
+    Update(Update),
     /// Frames of another run come from here.
     Views(Receiver<View>),
     /// A text for the clipboard.
@@ -96,7 +96,7 @@ enum Order {
 /// A session, as the window has it.
 pub struct Session {
     orders: mpsc::Sender<Order>,
-    heard: mpsc::Receiver<Heard>,
+    heard: mpsc::Receiver<SessionEvent>,
     thread: JoinHandle<Closed>,
 }
 
@@ -130,7 +130,7 @@ impl Session {
     }
 
     /// The next news, if there are any.
-    pub fn hear(&self) -> Option<Heard> {
+    pub fn hear(&self) -> Option<SessionEvent> {
         self.heard.try_recv().ok()
     }
 
@@ -155,22 +155,22 @@ impl Session {
 /// The way to the window.
 #[derive(Clone)]
 struct News {
-    told: mpsc::Sender<Heard>,
+    told: mpsc::Sender<SessionEvent>,
     wake: Wake,
 }
 
 impl News {
-    fn tell(&self, told: Told) {
-        self.send(Heard::Told(told));
+    fn tell(&self, told: Update) {
+        self.send(SessionEvent::Update(told));
     }
 
     fn note(&self, line: impl Into<String>) {
         let line = line.into();
         tracing::info!("{line}");
-        self.tell(Told::Note(line));
+        self.tell(Update::Note(line));
     }
 
-    fn send(&self, heard: Heard) {
+    fn send(&self, heard: SessionEvent) {
         let _ = self.told.send(heard);
         (self.wake)();
     }

@@ -90,7 +90,7 @@ pub enum Request {
 
 /// What the session tells the window.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub enum Update {
     /// The source is another one now.
     Source(Source),
     /// What can be chosen.

@@ -1,22 +1,22 @@
 //! What others tell, and what it makes of the state.
 
 use super::apply::NO_DEPTH;
-use super::{Request, Shown, Source, State, Told};
+use super::{Request, Shown, Source, State, Update};
 use crate::look::{Effect, Look};
 
 impl State {
     /// Takes note of what others tell; gives back another look where the source calls for one.
-    pub fn hear(&mut self, told: Told) -> Option<Request> {
+    pub fn hear(&mut self, told: Update) -> Option<Request> {
         match told {
-            Told::Source(source) => return self.source_is(source),
-            Told::Choices { sources, virtual_cameras } => {
+            Update::Source(source) => return self.source_is(source),
+            Update::Choices { sources, virtual_cameras } => {
                 (self.sources, self.virtual_cameras) = (sources, virtual_cameras);
             }
-            Told::Presets(presets) => self.presets = presets,
-            Told::Controls(controls) => self.controls = controls,
-            Told::Outputs(outputs) => self.outputs = outputs,
-            Told::Note(text) => self.note(text),
-            Told::Trouble(text) => self.trouble = Some(text),
+            Update::Presets(presets) => self.presets = presets,
+            Update::Controls(controls) => self.controls = controls,
+            Update::Outputs(outputs) => self.outputs = outputs,
+            Update::Note(text) => self.note(text),
+            Update::Trouble(text) => self.trouble = Some(text),
         }
         None
     }

@@ -13,7 +13,7 @@ mod switches;
 mod tests;
 pub mod tweak;
 
-pub use action::{Action, Request, Told};
+pub use action::{Action, Request, Update};
 pub use apply::{NO_DEPTH, NO_VIRTUAL_CAMERA};
 pub use history::History;
 

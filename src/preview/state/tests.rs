@@ -98,7 +98,7 @@ fn what_needs_depth_says_so_where_there_is_none() {
     let mut state = state();
     // What follows depth becomes tilt-shift, and the session is told.
     let toy = Look { effect: Effect::TiltShift, ..look() };
-    assert_eq!(state.hear(Told::Source(running(false))), Some(Request::Look(Box::new(toy.clone()))));
+    assert_eq!(state.hear(Update::Source(running(false))), Some(Request::Look(Box::new(toy.clone()))));
     for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
         let before = state.notes.len();
         assert_eq!(state.apply(action), []);
@@ -109,10 +109,10 @@ fn what_needs_depth_says_so_where_there_is_none() {
     assert_eq!(state.apply(Action::Preset("miniature".into())).len(), 1);
     assert_eq!(state.look.effect, Effect::TiltShift);
     // It follows depth again where there is some; a view of it goes back to the picture when the next source has none.
-    state.hear(Told::Source(running(true)));
+    state.hear(Update::Source(running(true)));
     assert_eq!(state.look.effect, Effect::Auto);
     state.apply(Action::Show(Shown::Depth));
-    state.hear(Told::Source(running(false)));
+    state.hear(Update::Source(running(false)));
     assert_eq!(state.shown, Shown::Picture);
 }
 
@@ -152,7 +152,7 @@ fn outputs_begin_once_and_end_once() {
     assert_eq!(state.apply(Action::Record(true)), [Request::Begin(recording.clone())]);
     assert_eq!(state.apply(Action::Record(true)), [], "twice at once");
     let named = Output { name: "clip.mp4".into(), is_camera: false };
-    state.hear(Told::Outputs(vec![named.clone()]));
+    state.hear(Update::Outputs(vec![named.clone()]));
     assert_eq!(state.recording(), Some(&named));
     assert_eq!(state.apply(Action::Record(false)), [Request::End(named)]);
     assert_eq!(state.apply(Action::Record(false)), []);
@@ -174,7 +174,7 @@ fn a_source_is_opened_lost_and_opened_again() {
     assert_eq!(state.apply(Action::Open("/dev/video0".into())), [Request::Open("/dev/video0".into())]);
     assert_eq!((&state.source, state.frozen, state.controls.len()), (&Source::Opening, false, 0));
     for end in [Source::Lost("unplugged".into()), Source::Ended] {
-        state.hear(Told::Source(end.clone()));
+        state.hear(Update::Source(end.clone()));
         assert_eq!(state.source, end);
         assert_eq!(state.apply(Action::Retry), [Request::Open("/dev/video0".into())]);
         assert_eq!(state.source, Source::Opening);
@@ -208,7 +208,7 @@ fn what_others_do_is_asked_of_them() {
 fn notes_are_few_and_numbered() {
     let mut state = state();
     for k in 0..20 {
-        state.hear(Told::Note(format!("note {k}")));
+        state.hear(Update::Note(format!("note {k}")));
     }
     let numbers: Vec<u64> = state.notes.iter().map(|note| note.number).collect();
     assert_eq!(numbers, [15, 16, 17, 18, 19, 20]);
@@ -218,9 +218,9 @@ fn notes_are_few_and_numbered() {
 #[test]
 fn what_went_wrong_stays_until_it_is_known() {
     let mut state = state();
-    state.hear(Told::Trouble("the disk is full".into()));
+    state.hear(Update::Trouble("the disk is full".into()));
     for k in 0..20 {
-        state.hear(Told::Note(format!("note {k}")));
+        state.hear(Update::Note(format!("note {k}")));
     }
     assert_eq!(state.trouble.as_deref(), Some("the disk is full"));
     assert_eq!(state.apply(Action::Dismiss), []);

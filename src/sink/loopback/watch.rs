@@ -6,7 +6,7 @@ use std::{io, mem};
 
 use crate::clock::Clock;
 use crate::link::demand::Demand;
-use crate::v4l2::audience::{Audience, Heard, Stop};
+use crate::v4l2::audience::{Audience, ReaderEvent, Stop};
 
 /// So long after its last reader went an output still counts as watched: calls open a camera more than once.
 const LINGER: Duration = Duration::from_millis(2500);
@@ -34,24 +34,24 @@ impl Drop for Watcher {
 }
 
 /// Holds a watch while there are readers, and for a while after. `wait` sleeps until something is heard.
-fn attend(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Duration>) -> Heard) {
+fn attend(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Duration>) -> ReaderEvent) {
     let mut watch = None;
     let mut leaves_ns: Option<u64> = None;
     loop {
         let patience = leaves_ns.map(|at_ns| Duration::from_nanos(at_ns.saturating_sub(clock.now_ns())));
         match wait(patience) {
-            Heard::Readers(true) => {
+            ReaderEvent::Readers(true) => {
                 leaves_ns = None;
                 if watch.is_none() {
                     tracing::info!("somebody watches");
                     watch = Some(demand.watch());
                 }
             }
-            Heard::Readers(false) if watch.is_some() => {
+            ReaderEvent::Readers(false) if watch.is_some() => {
                 leaves_ns.get_or_insert(clock.now_ns() + LINGER.as_nanos() as u64);
             }
-            Heard::Readers(false) | Heard::Nothing => {}
-            Heard::Stopped => return,
+            ReaderEvent::Readers(false) | ReaderEvent::Nothing => {}
+            ReaderEvent::Stopped => return,
         }
         if leaves_ns.is_some_and(|at_ns| clock.now_ns() >= at_ns) {
             tracing::info!("nobody watches");
@@ -69,19 +69,19 @@ mod tests {
 
     /// Plays what is heard, and when: each after so long, but not beyond what the listener is ready to wait. Returns
     /// for each whether the demand was watched when it was waited for, and for how long.
-    fn play(heard: &[(Duration, Heard)]) -> Vec<(bool, Option<Duration>)> {
+    fn play(heard: &[(Duration, ReaderEvent)]) -> Vec<(bool, Option<Duration>)> {
         let (demand, clock) = (Demand::new(), Clock::manual());
         let mut left = heard.iter();
         let mut seen = Vec::new();
         let mut next = left.next().copied();
         attend(&demand, &clock, |patience| {
             seen.push((demand.is_watched(), patience));
-            let Some((after, what)) = next else { return Heard::Stopped };
+            let Some((after, what)) = next else { return ReaderEvent::Stopped };
             match patience {
                 Some(patience) if patience < after => {
                     next = Some((after - patience, what));
                     clock.advance_ns(patience.as_nanos() as u64);
-                    Heard::Nothing
+                    ReaderEvent::Nothing
                 }
                 _ => {
                     next = left.next().copied();
@@ -97,10 +97,10 @@ mod tests {
     #[test]
     fn a_reader_is_watched_for_at_once_and_for_a_while_after() {
         let seen = play(&[
-            (Duration::ZERO, Heard::Readers(false)),
-            (60 * SECOND, Heard::Readers(true)),
-            (60 * SECOND, Heard::Readers(false)),
-            (60 * SECOND, Heard::Readers(true)),
+            (Duration::ZERO, ReaderEvent::Readers(false)),
+            (60 * SECOND, ReaderEvent::Readers(true)),
+            (60 * SECOND, ReaderEvent::Readers(false)),
+            (60 * SECOND, ReaderEvent::Readers(true)),
         ]);
         assert_eq!(
             seen,
@@ -111,13 +111,13 @@ mod tests {
     #[test]
     fn who_comes_back_in_time_is_not_missed_and_nobody_makes_it_longer() {
         let seen = play(&[
-            (Duration::ZERO, Heard::Readers(true)),
-            (SECOND, Heard::Readers(false)),
-            (SECOND, Heard::Readers(true)),
-            (SECOND, Heard::Readers(false)),
-            (SECOND, Heard::Readers(false)),
-            (SECOND, Heard::Nothing),
-            (60 * SECOND, Heard::Readers(false)),
+            (Duration::ZERO, ReaderEvent::Readers(true)),
+            (SECOND, ReaderEvent::Readers(false)),
+            (SECOND, ReaderEvent::Readers(true)),
+            (SECOND, ReaderEvent::Readers(false)),
+            (SECOND, ReaderEvent::Readers(false)),
+            (SECOND, ReaderEvent::Nothing),
+            (60 * SECOND, ReaderEvent::Readers(false)),
         ]);
         let left = |ms| Some(Duration::from_millis(ms));
         let wanted = [

@@ -61,7 +61,7 @@ impl Sink for Fake {
     }
 }
 
-fn switch() -> (Box<Switch>, Switchboard, Receiver<Told>) {
+fn switch() -> (Box<Switch>, Switchboard, Receiver<Notice>) {
     let (to, told) = mpsc::channel();
     let (switch, board) = Switch::new("window", move |what| drop(to.send(what)));
     (Box::new(switch), board, told)
@@ -76,7 +76,7 @@ fn put(switch: &mut Switch, numbers: std::ops::Range<u8>) {
 }
 
 /// All that was told until now, members' names in their order.
-fn all(told: &Receiver<Told>) -> Vec<(String, Fate)> {
+fn all(told: &Receiver<Notice>) -> Vec<(String, Fate)> {
     let mut all: Vec<_> = told.try_iter().map(|told| (told.member, told.fate)).collect();
     all.sort_by(|a, b| a.0.cmp(&b.0));
     all

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, WithSimd};
 
-use crate::compute::team::{Shelf, Team};
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Bits of a pixel.
 const BITS: usize = 24;
@@ -52,17 +52,17 @@ impl Census {
     }
 
     /// Looks at `luma`. `taken` has a flag for every row and border row.
-    pub fn see(&mut self, luma: &[u8], team: &mut Team, arch: Arch, taken: &mut [AtomicBool]) {
+    pub fn see(&mut self, luma: &[u8], workers: &mut ThreadPool, arch: Arch, taken: &mut [AtomicBool]) {
         let Self { width, height, mirrored, stride, .. } = *self;
         let padded_stride = width + 2 * REACH;
-        let rows = Shelf::new(&mut self.padded, padded_stride, taken);
-        team.run(height + 2 * REACH, &|row| {
+        let rows = DisjointParts::new(&mut self.padded, padded_stride, taken);
+        workers.run(height + 2 * REACH, &|row| {
             let y = row.saturating_sub(REACH).min(height - 1);
             pad(&luma[y * width..(y + 1) * width], mirrored, rows.part(row));
         });
         let padded = &*self.padded;
-        let codes = Shelf::new(&mut self.codes, stride * PLANES, taken);
-        team.run(height, &|y| {
+        let codes = DisjointParts::new(&mut self.codes, stride * PLANES, taken);
+        workers.run(height, &|y| {
             let window = &padded[y * padded_stride..(y + 2 * REACH + 1) * padded_stride];
             arch.dispatch(Row { window, width, mirrored, out: codes.part(y) });
         });

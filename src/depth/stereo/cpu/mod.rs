@@ -23,7 +23,7 @@ use super::penalty::Penalties;
 use crate::compute::GpuError;
 use crate::compute::aligned::Aligned;
 use crate::compute::simd;
-use crate::compute::team::{Shelf, Team};
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Rows whose values lie side by side, `[column][row][disparity]`, as one part of the work.
 const GROUP: usize = 4;
@@ -84,13 +84,19 @@ impl CpuExecutor {
         }
     }
 
-    fn match_range<const N: usize>(&mut self, left: &[u8], likely: Option<&[u16]>, team: &mut Team, out: &mut [u16]) {
+    fn match_range<const N: usize>(
+        &mut self,
+        left: &[u8],
+        likely: Option<&[u16]>,
+        workers: &mut ThreadPool,
+        out: &mut [u16],
+    ) {
         let groups = self.height.div_ceil(GROUP);
         for first in (0..groups).step_by(self.chunk) {
             let groups = (first, self.chunk.min(groups - first));
-            self.along_rows::<N>(groups, left, likely, team);
-            self.along_columns::<N>(groups, left, team);
-            self.win::<N>(groups, team, out);
+            self.along_rows::<N>(groups, left, likely, workers);
+            self.along_columns::<N>(groups, left, workers);
+            self.win::<N>(groups, workers, out);
         }
     }
 
@@ -105,15 +111,16 @@ impl CpuExecutor {
         (first, groups): (usize, usize),
         left: &[u8],
         likely: Option<&[u16]>,
-        team: &mut Team,
+        workers: &mut ThreadPool,
     ) {
         let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
         let [cost_taken, sum_taken] = &mut self.taken;
-        let costs = Shelf::new(&mut self.costs[..groups * group], group, cost_taken);
-        let sums = Shelf::new(&mut self.sums[..groups * group], group, sum_taken);
+        let costs = DisjointParts::new(&mut self.costs[..groups * group], group, cost_taken);
+        let sums = DisjointParts::new(&mut self.sums[..groups * group], group, sum_taken);
         let (census, penalties) = ((&self.left, &self.right), &self.penalties);
-        team.run_with(&mut self.members, groups, &|member, part| {
+        workers.run_with(&mut self.members, groups, &|member, part| {
             let y = (first + part) * GROUP;
+            // Costs are sums over three rows, so one above and one below the group are read, too.
             let mut codes = [[[&[][..]; census::PLANES]; 2]; cost::ROWS];
             for (k, codes) in codes.iter_mut().enumerate() {
                 let y = (y + k).saturating_sub(1).min(height - 1);
@@ -132,14 +139,20 @@ impl CpuExecutor {
     }
 
     /// Adds the path down the groups, which leaves the sums of all where the costs were.
-    fn along_columns<const N: usize>(&mut self, (first, groups): (usize, usize), left: &[u8], team: &mut Team) {
+    fn along_columns<const N: usize>(
+        &mut self,
+        (first, groups): (usize, usize),
+        left: &[u8],
+        workers: &mut ThreadPool,
+    ) {
         let (width, height, arch, group, stripes) = (self.width, self.height, self.arch, self.group(), self.stripes);
         let stripe_len = group / stripes;
         let [cost_taken, state_taken] = &mut self.taken;
         let (sums, penalties) = (&*self.sums, &self.penalties);
-        let costs = Shelf::new(&mut self.costs[..groups * group], stripe_len, cost_taken);
-        let states = Shelf::new(&mut self.states, 1, state_taken);
-        team.run(stripes, &|stripe| {
+        let costs = DisjointParts::new(&mut self.costs[..groups * group], stripe_len, cost_taken);
+        let states = DisjointParts::new(&mut self.states, 1, state_taken);
+        // Downwards a row needs the one above it: stripes of columns are what threads can share out.
+        workers.run(stripes, &|stripe| {
             let states = &mut states.part(stripe)[0];
             for k in 0..groups {
                 let y = (first + k) * GROUP;
@@ -158,12 +171,12 @@ impl CpuExecutor {
     }
 
     /// The winners of the groups.
-    fn win<const N: usize>(&mut self, (first, groups): (usize, usize), team: &mut Team, out: &mut [u16]) {
+    fn win<const N: usize>(&mut self, (first, groups): (usize, usize), workers: &mut ThreadPool, out: &mut [u16]) {
         let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
         let rows = first * GROUP..((first + groups) * GROUP).min(height);
         let sums = &self.costs;
-        let out = Shelf::new(&mut out[rows.start * width..rows.end * width], GROUP * width, &mut self.taken[0]);
-        team.run_with(&mut self.members, groups, &|member, part| {
+        let out = DisjointParts::new(&mut out[rows.start * width..rows.end * width], GROUP * width, &mut self.taken[0]);
+        workers.run_with(&mut self.members, groups, &|member, part| {
             let sums = &sums[part * group..(part + 1) * group];
             arch.dispatch(Winners::<N> { sums, width, eyes: &mut member.eyes, out: out.part(part) });
         });
@@ -179,20 +192,20 @@ impl Executor for CpuExecutor {
         &mut self,
         [left, right]: [&[u8]; 2],
         likely: Option<&[u16]>,
-        team: &mut Team,
+        workers: &mut ThreadPool,
         out: &mut [u16],
     ) -> Result<(), GpuError> {
         let Self { arch, taken, .. } = self;
-        self.left.see(left, team, *arch, &mut taken[0]);
-        self.right.see(right, team, *arch, &mut taken[0]);
+        self.left.see(left, workers, *arch, &mut taken[0]);
+        self.right.see(right, workers, *arch, &mut taken[0]);
         match self.disparities {
-            16 => self.match_range::<16>(left, likely, team, out),
-            32 => self.match_range::<32>(left, likely, team, out),
-            64 => self.match_range::<64>(left, likely, team, out),
-            96 => self.match_range::<96>(left, likely, team, out),
-            128 => self.match_range::<128>(left, likely, team, out),
-            192 => self.match_range::<192>(left, likely, team, out),
-            _ => self.match_range::<256>(left, likely, team, out),
+            16 => self.match_range::<16>(left, likely, workers, out),
+            32 => self.match_range::<32>(left, likely, workers, out),
+            64 => self.match_range::<64>(left, likely, workers, out),
+            96 => self.match_range::<96>(left, likely, workers, out),
+            128 => self.match_range::<128>(left, likely, workers, out),
+            192 => self.match_range::<192>(left, likely, workers, out),
+            _ => self.match_range::<256>(left, likely, workers, out),
         }
         Ok(())
     }

@@ -18,7 +18,7 @@ use super::fixed;
 use super::penalty::Penalties;
 use crate::compute::GpuError;
 use crate::compute::device::{Device, Shader, in_two};
-use crate::compute::team::Team;
+use crate::compute::thread_pool::ThreadPool;
 
 /// What a workgroup does, as the shaders declare it: pixels a side of `stereo_census`, columns of `stereo_cost`, and
 /// pixels of `stereo_winners`.
@@ -143,7 +143,7 @@ impl Executor for GpuExecutor {
         &mut self,
         [left, right]: [&[u8]; 2],
         likely: Option<&[u16]>,
-        _: &mut Team,
+        _: &mut ThreadPool,
         out: &mut [u16],
     ) -> Result<(), GpuError> {
         let Self { device, .. } = &*self;

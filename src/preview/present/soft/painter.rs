@@ -6,7 +6,7 @@ use pulp::Arch;
 
 use super::controls::Overlay;
 use super::picture::{Scaler, Scratch};
-use crate::compute::team::{self, Shelf, Team};
+use crate::compute::thread_pool::{self, DisjointParts, ThreadPool};
 use crate::frame::ColorImage;
 use crate::preview::present::{Area, Controls, Drawing, Image};
 
@@ -27,7 +27,7 @@ pub struct Painter {
     overlay: Overlay,
     scaler: Scaler,
     /// The threads, once they are needed.
-    team: Option<Team>,
+    workers: Option<ThreadPool>,
     scratch: Vec<Scratch>,
     taken: Vec<AtomicBool>,
     around: Around,
@@ -51,7 +51,7 @@ impl Painter {
             size: (0, 0),
             overlay: Overlay::default(),
             scaler: Scaler::default(),
-            team: None,
+            workers: None,
             scratch: vec![Scratch::default()],
             taken: Vec::new(),
             around: Around::default(),
@@ -87,7 +87,7 @@ impl Painter {
             }
             _ => None,
         };
-        let Self { arch, size: (width, _), overlay, scaler, team, scratch, taken, .. } = self;
+        let Self { arch, size: (width, _), overlay, scaler, workers, scratch, taken, .. } = self;
         let (arch, width, overlay, scaler) = (*arch, *width, &*overlay, &*scaler);
         let window = Window { arch, width, overlay, scaler, drawing, picture, around };
         let bands = pixels.len().div_ceil(width * BAND);
@@ -97,10 +97,11 @@ impl Painter {
             }
         };
         if is_much(drawing) {
-            let team = team.get_or_insert_with(|| Team::new("present", (team::cores() / 2).min(MOST_THREADS)));
-            scratch.resize_with(team.threads(), Scratch::default);
-            let shelf = Shelf::new(pixels, width * BAND, taken);
-            team.run_with(scratch, bands, &|scratch, part| band(scratch, part, shelf.part(part)));
+            let workers =
+                workers.get_or_insert_with(|| ThreadPool::new("present", (thread_pool::cores() / 2).min(MOST_THREADS)));
+            scratch.resize_with(workers.threads(), Scratch::default);
+            let shelf = DisjointParts::new(pixels, width * BAND, taken);
+            workers.run_with(scratch, bands, &|scratch, part| band(scratch, part, shelf.part(part)));
         } else {
             for (part, pixels) in pixels.chunks_mut(width * BAND).enumerate() {
                 band(&mut scratch[0], part, pixels);

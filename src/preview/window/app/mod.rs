@@ -24,7 +24,7 @@ use crate::optics::CocField;
 use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
 use crate::preview::panel::Panel;
-use crate::preview::session::{Closed, Heard, Session, Wake};
+use crate::preview::session::{Closed, Session, SessionEvent, Wake};
 use crate::preview::state::{Shown, Source, State};
 use crate::preview::views::Views;
 use crate::stats::WindowUse;
@@ -153,19 +153,19 @@ impl App {
         let mut changed = false;
         while let Some(heard) = self.session.hear() {
             match heard {
-                Heard::Views(views) => {
+                SessionEvent::Views(views) => {
                     self.heard_at = Instant::now();
                     // It was of another source.
                     self.snapshot_due = false;
                     self.views = Some(views);
                     self.state.meters.restart();
                 }
-                Heard::Copy(text) => {
+                SessionEvent::Copy(text) => {
                     if let Some(gfx) = &mut self.gfx {
                         gfx.input.set_clipboard_text(text);
                     }
                 }
-                Heard::Told(told) => {
+                SessionEvent::Update(told) => {
                     if let Some(look) = self.state.hear(told) {
                         self.session.order(look);
                     }

@@ -1,4 +1,4 @@
-//! The thread pool: a fixed team of threads that share out the parts of one pass at a time.
+//! The thread pool: a fixed workers of threads that share out the parts of one pass at a time.
 //!
 //! A pass is over when every part is done; a member that sleeps through it is not waited for. Nothing is allocated
 //! and no lock is taken. It needs `unsafe` because the threads outlive the borrow of the work they are handed; `run` is
@@ -14,8 +14,8 @@ use std::thread::{self, JoinHandle, Thread};
 /// One part of a pass: called with the number of the member that does it, and the part's number.
 type Work<'a> = &'a (dyn Fn(usize, usize) + Sync + 'a);
 
-/// The threads. The thread that calls [`Team::run`] works as one of them.
-pub struct Team {
+/// The threads. The thread that calls [`ThreadPool::run`] works as one of them.
+pub struct ThreadPool {
     shared: Arc<Shared>,
     members: Vec<JoinHandle<()>>,
 }
@@ -65,8 +65,8 @@ pub fn cores() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-impl Team {
-    /// A team of `threads` (at least 1), the caller included; `name` is what the others are called, with a number.
+impl ThreadPool {
+    /// A workers of `threads` (at least 1), the caller included; `name` is what the others are called, with a number.
     pub fn new(name: &str, threads: usize) -> Self {
         let shared = Arc::new(Shared {
             gate: AtomicU64::new(0),
@@ -95,7 +95,7 @@ impl Team {
         self.members.len() + 1
     }
 
-    /// Calls `work` once with each of `0..parts`, spread over the team, and returns when all are done.
+    /// Calls `work` once with each of `0..parts`, spread over the workers, and returns when all are done.
     ///
     /// # Panics
     /// When a part panicked, after the others are done.
@@ -103,15 +103,15 @@ impl Team {
         self.run_members(parts, &|_, part| work(part));
     }
 
-    /// As [`Team::run`], with scratch memory of its own for every member: `scratch` has one for each thread.
+    /// As [`ThreadPool::run`], with scratch memory of its own for every member: `scratch` has one for each thread.
     ///
     /// # Panics
-    /// As [`Team::run`], and when `scratch` is too short.
+    /// As [`ThreadPool::run`], and when `scratch` is too short.
     pub fn run_with<S: Send>(&mut self, scratch: &mut [S], parts: usize, work: &(dyn Fn(&mut S, usize) + Sync)) {
         assert!(scratch.len() >= self.threads(), "every thread needs its scratch");
         let base = Base(scratch.as_mut_ptr());
         self.run_members(parts, &|member, part| {
-            // SAFETY: `member` is below the team's size, which `scratch` covers, and each member is one thread that
+            // SAFETY: `member` is below the workers's size, which `scratch` covers, and each member is one thread that
             // does one part at a time; so nobody else holds this element, and `scratch` is borrowed throughout.
             work(unsafe { &mut *base.at(member) }, part);
         });
@@ -201,7 +201,7 @@ impl Shared {
     }
 }
 
-impl Drop for Team {
+impl Drop for ThreadPool {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
         for member in self.members.drain(..) {
@@ -214,8 +214,8 @@ impl Drop for Team {
 
 /// Rows of a picture that several parts write at once, each its own.
 ///
-/// Hands out `&mut` slices of one allocation by index; [`Shelf::part`] is safe because each index can be taken once.
-pub struct Shelf<'a, T> {
+/// Hands out `&mut` slices of one allocation by index; [`DisjointParts::part`] is safe because each index can be taken once.
+pub struct DisjointParts<'a, T> {
     base: *mut T,
     length: usize,
     each: usize,
@@ -223,9 +223,9 @@ pub struct Shelf<'a, T> {
 }
 
 // SAFETY: a part goes to one taker only (`taken`), and `T: Send` may move between threads.
-unsafe impl<T: Send> Sync for Shelf<'_, T> {}
+unsafe impl<T: Send> Sync for DisjointParts<'_, T> {}
 
-impl<'a, T> Shelf<'a, T> {
+impl<'a, T> DisjointParts<'a, T> {
     /// Splits `data` into parts of `each` values (the last may be shorter); `taken` has a flag for every part.
     pub fn new(data: &'a mut [T], each: usize, taken: &'a mut [AtomicBool]) -> Self {
         let parts = data.len().div_ceil(each.max(1));
@@ -258,11 +258,11 @@ mod tests {
     #[test]
     fn every_part_is_done_once() {
         for threads in [1, 2, 5] {
-            let mut team = Team::new("test", threads);
+            let mut workers = ThreadPool::new("test", threads);
             for parts in [0, 1, 2, 7, 100] {
                 for _ in 0..if cfg!(miri) { 5 } else { 200 } {
                     let done: Vec<AtomicUsize> = (0..parts).map(|_| AtomicUsize::new(0)).collect();
-                    team.run(parts, &|part| {
+                    workers.run(parts, &|part| {
                         done[part].fetch_add(1, Ordering::Relaxed);
                     });
                     assert!(done.iter().all(|d| d.load(Ordering::Relaxed) == 1));
@@ -272,12 +272,12 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_in_a_part_reaches_the_caller_and_the_team_lives_on() {
-        let mut team = Team::new("test", 3);
-        let result = catch_unwind(AssertUnwindSafe(|| team.run(8, &|part| assert_ne!(part, 5))));
+    fn a_panic_in_a_part_reaches_the_caller_and_the_pool_lives_on() {
+        let mut workers = ThreadPool::new("test", 3);
+        let result = catch_unwind(AssertUnwindSafe(|| workers.run(8, &|part| assert_ne!(part, 5))));
         assert!(result.is_err());
         let sum = AtomicUsize::new(0);
-        team.run(10, &|part| {
+        workers.run(10, &|part| {
             sum.fetch_add(part, Ordering::Relaxed);
         });
         assert_eq!(sum.load(Ordering::Relaxed), 45);
@@ -297,11 +297,11 @@ mod tests {
     #[test]
     fn nobody_leaves_a_pass_while_members_work_whatever_is_thrown() {
         for caller_throws in [true, false] {
-            let mut team = Team::new("test", 2);
+            let mut workers = ThreadPool::new("test", 2);
             let caller = thread::current().id();
             let (both, done) = (AtomicUsize::new(0), AtomicBool::new(false));
             let result = catch_unwind(AssertUnwindSafe(|| {
-                team.run(2, &|_| {
+                workers.run(2, &|_| {
                     // One part each.
                     both.fetch_add(1, Ordering::Relaxed);
                     while both.load(Ordering::Relaxed) < 2 {
@@ -317,10 +317,10 @@ mod tests {
             assert!(done.load(Ordering::Relaxed), "the pass is over for all");
             assert!(result.is_err());
             let sum = AtomicUsize::new(0);
-            team.run(10, &|part| {
+            workers.run(10, &|part| {
                 sum.fetch_add(part, Ordering::Relaxed);
             });
-            assert_eq!(sum.load(Ordering::Relaxed), 45, "the team lives on");
+            assert_eq!(sum.load(Ordering::Relaxed), 45, "the workers lives on");
         }
     }
 
@@ -328,7 +328,7 @@ mod tests {
     fn parts_beyond_any_address_are_not_handed_out() {
         let mut data = [0u8; 4];
         let mut flags: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
-        let shelf = Shelf::new(&mut data, 1 << (usize::BITS - 1), &mut flags);
+        let shelf = DisjointParts::new(&mut data, 1 << (usize::BITS - 1), &mut flags);
         assert_eq!(shelf.part(0).len(), 4);
         // Twice this size wraps to 0.
         let second = catch_unwind(AssertUnwindSafe(|| shelf.part(2).len())).unwrap_err();
@@ -339,7 +339,7 @@ mod tests {
     fn a_shelf_hands_out_each_part_once() {
         let mut data = vec![0; 10];
         let mut flags: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
-        let shelf = Shelf::new(&mut data, 3, &mut flags);
+        let shelf = DisjointParts::new(&mut data, 3, &mut flags);
         shelf.part(3).fill(7);
         assert_eq!(shelf.part(0).len(), 3);
         assert!(catch_unwind(AssertUnwindSafe(|| shelf.part(0).len())).is_err());

@@ -19,7 +19,7 @@ const LONGEST: f32 = 0.12;
 
 /// Decides by colour which holes belong to the nearer side; owns the memory for it.
 #[derive(Debug, Default)]
-pub struct Claimer {
+pub struct GuidedHoleFill {
     claims_m: Vec<f32>,
     /// The holes line by line.
     marks: Vec<bool>,
@@ -39,7 +39,7 @@ impl Line {
     }
 }
 
-impl Claimer {
+impl GuidedHoleFill {
     /// Moves holes (`hole`, one flag a pixel) of a map that was filled from behind to the near side that has their
     /// colour, along rows and then, for what is left, along columns; what was moved is no hole any more. Does nothing
     /// when the picture has another size than the map.
@@ -170,7 +170,7 @@ mod tests {
             color.rgb[3 * k..3 * k + 3].copy_from_slice(if x < 45 { &[40, 30, 25] } else { &[180, 190, 185] });
         }
         let mut hole: Vec<bool> = (0..(width * height) as usize).map(|k| (40..48).contains(&(k % 80))).collect();
-        Claimer::default().claim(&mut map, &mut hole, &color);
+        GuidedHoleFill::default().claim(&mut map, &mut hole, &color);
         for (k, &metres) in map.metres.iter().enumerate() {
             assert_eq!(metres, if k % 80 < 45 { 1.0 } else { 3.0 }, "column {}", k % 80);
         }
@@ -181,7 +181,7 @@ mod tests {
         let mut map = DepthMap { width: 9, height: 3, metres: [1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0].repeat(3) };
         let before = map.clone();
         let mut hole = [false, false, false, true, true, true, false, false, false].repeat(3);
-        let mut claimer = Claimer::default();
+        let mut claimer = GuidedHoleFill::default();
         claimer.claim(&mut map, &mut hole, &ColorImage::new(9, 3));
         assert_eq!(map, before);
         claimer.claim(&mut map, &mut hole, &ColorImage::new(3, 1));

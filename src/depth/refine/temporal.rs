@@ -31,7 +31,7 @@ pub struct Limits {
 
 /// Steadies maps of inverse depth; remembers the last frame.
 #[derive(Debug, Default)]
-pub struct Steadier {
+pub struct TemporalFilter {
     width: usize,
     time_ns: u64,
     /// Inverse depth as it was given out; empty before the first frame.
@@ -47,7 +47,7 @@ pub struct Steadier {
     looks: Vec<f32>,
 }
 
-impl Steadier {
+impl TemporalFilter {
     /// The unit of inverse depth has become so many times smaller.
     pub fn rescale(&mut self, times: f32) {
         self.mean.iter_mut().for_each(|v| *v *= times);

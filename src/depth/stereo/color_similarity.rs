@@ -75,7 +75,7 @@ impl AddAssign for Tally {
 
 /// Fills by colour; owns the memory for it.
 #[derive(Debug, Default)]
-pub struct Alike {
+pub struct ColorSimilarity {
     /// Known pixels by colour and class of disparity.
     tallies: Vec<[Tally; CLASSES]>,
     /// Known pixels by colour.
@@ -86,7 +86,7 @@ pub struct Alike {
     seen: Vec<u16>,
 }
 
-impl Alike {
+impl ColorSimilarity {
     /// Corrects the pixels of `map` that were filled, those left of column `first` of their row.
     pub fn correct(&mut self, map: &mut [u16], width: usize, first: &[usize], colors: Colors) {
         self.take_memory(map.len());
@@ -200,7 +200,7 @@ mod tests {
             };
         }
         let mut map: Vec<u16> = (0..width * height).map(|k| if is_near(k % width) { NEAR } else { FAR }).collect();
-        Alike::default().correct(&mut map, width, &vec![UNSEEN; height], Colors { image: &image, every });
+        ColorSimilarity::default().correct(&mut map, width, &vec![UNSEEN; height], Colors { image: &image, every });
         map
     }
 
@@ -229,13 +229,13 @@ mod tests {
         let half: Vec<u16> = (0..width * height).map(|k| if k % width < 40 { FAR } else { NEAR }).collect();
         let mut map = half.clone();
         let colors = Colors { image: &image, every: 1 };
-        Alike::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
+        ColorSimilarity::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
         assert_eq!(map, half);
         image.rgb.fill(100);
         let mut map: Vec<u16> = (0..width * height).map(|k| if k % width < UNSEEN { FAR } else { NEAR }).collect();
         let before = map.clone();
         let colors = Colors { image: &image, every: 1 };
-        Alike::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
+        ColorSimilarity::default().correct(&mut map, width, &vec![UNSEEN; height], colors);
         assert_eq!(map, before);
     }
 
@@ -244,7 +244,7 @@ mod tests {
         let (width, height) = SIZE;
         let image = ColorImage { width: 80, height: 40, rgb: GREEN.repeat(width * height) };
         let first = vec![UNSEEN; height];
-        let mut alike = Alike::default();
+        let mut alike = ColorSimilarity::default();
         for surface in [NEAR, FAR] {
             let mut map: Vec<u16> =
                 (0..width * height).map(|k| if k % width < UNSEEN { 30 * ONE } else { surface }).collect();
