@@ -14,7 +14,7 @@ const BUCKETS: usize = 8 * PER_OCTAVE;
 const BUCKET_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - PER_OCTAVE.ilog2();
 /// The bits of 1.0, where the buckets begin.
 const FIRST: u32 = FOCUS_BORDER_PX.to_bits() >> BUCKET_SHIFT;
-/// About as many samples are taken across a frame.
+/// At least as many samples are taken across a frame that has them, and less than twice as many.
 const SAMPLES_ACROSS: usize = 320;
 /// A bin more must lower the spread of `ln |c|` within the bins by this much, as variance times share of the picture.
 const BIN_COST: f64 = 0.002;
@@ -84,7 +84,7 @@ impl Counts {
             let [n, a, b] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
             if n > 0.0 { (b - a * a / n).max(0.0) } else { 0.0 }
         };
-        // best[j][e]: least cost of buckets 0..e in j + 1 pieces, and where the last of them begins.
+        // best[j][to]: least cost of buckets first..to in j + 1 pieces, and where the last of them begins.
         let mut best = [[(f64::INFINITY, 0usize); BUCKETS + 1]; MAX_PIECES];
         for (to, best) in best[0].iter_mut().enumerate().take(last + 2).skip(first + 1) {
             *best = (spread(first, to), first);

@@ -1,4 +1,4 @@
-//! The thread pool: a fixed workers of threads that share out the parts of one pass at a time.
+//! The thread pool: a fixed number of threads that share out the parts of one pass at a time.
 //!
 //! A pass is over when every part is done; a member that sleeps through it is not waited for. Nothing is allocated
 //! and no lock is taken. It needs `unsafe` because the threads outlive the borrow of the work they are handed; `run` is
@@ -66,7 +66,7 @@ pub fn cores() -> usize {
 }
 
 impl ThreadPool {
-    /// A workers of `threads` (at least 1), the caller included; `name` is what the others are called, with a number.
+    /// A pool of `threads` (at least 1), the caller included; `name` is what the others are called, with a number.
     pub fn new(name: &str, threads: usize) -> Self {
         let shared = Arc::new(Shared {
             gate: AtomicU64::new(0),
@@ -90,12 +90,12 @@ impl ThreadPool {
         Self { shared, members }
     }
 
-    /// Threads at work, the caller included.
-    pub fn threads(&self) -> usize {
+    /// Number of threads in the pool, the caller included: fewer than asked for where the system gave no more.
+    pub fn thread_count(&self) -> usize {
         self.members.len() + 1
     }
 
-    /// Calls `work` once with each of `0..parts`, spread over the workers, and returns when all are done.
+    /// Calls `work` once with each of `0..parts`, spread over the threads, and returns when all are done.
     ///
     /// # Panics
     /// When a part panicked, after the others are done.
@@ -108,10 +108,10 @@ impl ThreadPool {
     /// # Panics
     /// As [`ThreadPool::run`], and when `scratch` is too short.
     pub fn run_with<S: Send>(&mut self, scratch: &mut [S], parts: usize, work: &(dyn Fn(&mut S, usize) + Sync)) {
-        assert!(scratch.len() >= self.threads(), "every thread needs its scratch");
+        assert!(scratch.len() >= self.thread_count(), "every thread needs its scratch");
         let base = Base(scratch.as_mut_ptr());
         self.run_members(parts, &|member, part| {
-            // SAFETY: `member` is below the workers's size, which `scratch` covers, and each member is one thread that
+            // SAFETY: `member` is below the pool's size, which `scratch` covers, and each member is one thread that
             // does one part at a time; so nobody else holds this element, and `scratch` is borrowed throughout.
             work(unsafe { &mut *base.at(member) }, part);
         });
@@ -320,7 +320,7 @@ mod tests {
             workers.run(10, &|part| {
                 sum.fetch_add(part, Ordering::Relaxed);
             });
-            assert_eq!(sum.load(Ordering::Relaxed), 45, "the workers lives on");
+            assert_eq!(sum.load(Ordering::Relaxed), 45, "the pool lives on");
         }
     }
 

@@ -69,9 +69,10 @@ fn clear_cells(cells: &mut CellSums) {
     }
 }
 
-/// Adds a vector of bin pixels to the cells: coverage and coverage times |CoC|, and with `own` the range of colours.
+/// Adds a vector of bin pixels to the sums of a row of cells, column by column: coverage and coverage times |CoC|, and with
+/// `own` the lowest and highest colour.
 #[inline(always)]
-fn note<V: Simd>(simd: V, cells: &mut CellSums, x: usize, sums: [V::f32s; 2], own: Option<[V::f32s; 3]>) {
+fn accumulate_columns<V: Simd>(simd: V, cells: &mut CellSums, x: usize, sums: [V::f32s; 2], own: Option<[V::f32s; 3]>) {
     let cells = &mut cells.0;
     for p in 0..2 {
         let sum = simd.add_f32s(load::<V>(&cells[p], x), sums[p]);
@@ -219,7 +220,7 @@ impl BinRows<'_> {
                         let at = MARGIN + x;
                         own = Some([load::<V>(r, at), load::<V>(g, at), load::<V>(b, at)]);
                     }
-                    note(simd, &mut sums.cells, x, [values[3], values[4]], own);
+                    accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
                 }
                 let blocks = self.blocks();
                 self.filled[row / CELL * blocks + block] = true;
@@ -269,7 +270,7 @@ impl BinRows<'_> {
                 }
                 own = Some(colors);
             }
-            note(simd, &mut sums.cells, x, [coverage, load::<V>(&means[4], x)], own);
+            accumulate_columns(simd, &mut sums.cells, x, [coverage, load::<V>(&means[4], x)], own);
         }
         self.close_cells::<S>((block, columns), row, sums);
     }

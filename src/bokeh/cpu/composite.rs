@@ -1,7 +1,8 @@
 //! Pass `composite`: the blurred bins, front to back, become one picture; back to 8-bit sRGB.
 //!
-//! The pixels of one view tile the picture, so the coverages of two bins are disjoint, not independent: a bin fills
-//! what is left, and what stays open at the end is filled in proportion.
+//! The pixels of one view tile the picture, so the coverages of two bins are disjoint, not independent: among the near
+//! bins, and among the others, a bin fills what is left. The near ones lie over the others; what stays open takes the
+//! colour of the hindmost.
 
 #![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
 
@@ -23,7 +24,7 @@ pub const CHUNK: usize = 128;
 const ENCODE_STEPS: usize = 1 << 12;
 /// Light below this has a half of its own, as steep as the curve is there.
 const DARK: f32 = 1.0 / 16.0;
-/// Entries of the table: two halves and a last step, in whole powers of two.
+/// Entries of the table: two halves of `ENCODE_STEPS + 1`, and up to a power of two, so that an index is masked.
 const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
 
 /// Linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then all of it.

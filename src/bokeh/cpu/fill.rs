@@ -212,7 +212,8 @@ impl Behind<'_> {
     }
 }
 
-/// Averages four pixels; knowing a little is spread, so that the coarsest level knows something if anyone does.
+/// Reduces by two: the sum of four pixels weighed by how far each is known, made a mean where that is more than 1. Less
+/// than that adds up from level to level, so that the coarsest one knows something if any pixel does.
 fn pull(fine: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
     let (above, below) = (fine.rows.row(2 * y), (2 * y + 1 < fine.height).then(|| fine.rows.row(2 * y + 1)));
     for p in 0..PLANES {
@@ -233,8 +234,8 @@ fn pull(fine: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
     known[..width].iter_mut().for_each(|known| *known = if *known > 1.0 { 1.0 } else { *known });
 }
 
-/// Fills what the finer level does not know from the coarser one: linear interpolation, three parts of the coarse pixel
-/// above this one and one of its neighbour, each way.
+/// Fills what the finer level does not know from the coarser one, bilinearly: 3/4 of the coarse pixel that covers this one
+/// and 1/4 of the neighbour nearest to it, each way.
 fn push(coarse: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
     let side = |at: usize, limit: usize| {
         let neighbour = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { at / 2 + 1 };

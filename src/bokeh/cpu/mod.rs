@@ -70,7 +70,7 @@ impl CpuBokeh {
         let (width, height) = (plan.width, plan.height);
         let workers = ThreadPool::new("blur", threads);
         let slots: Vec<Slot> = (0..plan.slots()).map(|slot| Slot::new(&plan, slot)).collect();
-        let members = (0..workers.threads())
+        let members = (0..workers.thread_count())
             .map(|_| Member {
                 coc: vec![0.0; width],
                 sums: BandSums::new(),
@@ -312,6 +312,6 @@ impl Bokeh for CpuBokeh {
     }
 
     fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.workers.threads(), simd::name(self.arch))
+        format!("cpu, {} threads, {}", self.workers.thread_count(), simd::name(self.arch))
     }
 }

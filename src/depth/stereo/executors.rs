@@ -20,7 +20,7 @@ pub(super) struct Executors {
 }
 
 impl Executors {
-    /// Executors on one GPU or on the CPU, there for a workers of `threads`.
+    /// Executors on one GPU or on the CPU, for a pool of `threads`.
     ///
     /// # Errors
     /// A GPU was asked for and there is none that fits.
@@ -40,7 +40,7 @@ impl Executors {
         }
     }
 
-    /// Executors on the CPU, for a workers of `threads`.
+    /// Executors on the CPU, for a pool of `threads`.
     ///
     /// # Errors
     /// A GPU was asked for.

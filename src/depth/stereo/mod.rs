@@ -123,7 +123,7 @@ pub enum MatchError {
 /// A GPU was asked for and there is none that fits, or it failed.
 pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> Result<Box<dyn Matcher>, MatchError> {
     let workers = ThreadPool::new("match", settings.threads);
-    let executors = Executors::new(backend, adapter, workers.threads())?;
+    let executors = Executors::new(backend, adapter, workers.thread_count())?;
     let level = |effort| Level::new(settings, effort, &executors);
     Ok(Box::new(Matching {
         settings: *settings,

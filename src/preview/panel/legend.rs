@@ -56,7 +56,7 @@ pub fn show(ui: &Ui, state: &State) {
             for index in 0..count {
                 let (column, row) = (index / rows.max(1), index % rows.max(1));
                 let at = inner.min + vec2(inner.width() / 2.0 * column as f32, 24.0 + 20.0 * row as f32);
-                bin(painter, &colors, at, index, &high_px[..count]);
+                draw_bin_entry(painter, &colors, at, index, &high_px[..count]);
             }
         }
     }
@@ -91,7 +91,7 @@ fn tick(painter: &Painter, colors: &Colors, bar: Rect, x: f32, label: &str) {
     painter.galley(pos2(left, bar.bottom() + 5.0), galley, colors.text);
 }
 
-fn bin(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usize, high_px: &[f32]) {
+fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usize, high_px: &[f32]) {
     let [r, g, b] = BIN_COLORS[index % BIN_COLORS.len()];
     let swatch = Rect::from_min_size(at, Vec2::new(22.0, 15.0));
     painter.rect_filled(swatch, egui::CornerRadius::same(3), Color32::from_rgb(r, g, b));

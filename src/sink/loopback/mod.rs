@@ -124,6 +124,7 @@ impl Sink for Loopback {
         }
     }
 
+    /// Once nobody watches, the still card takes the place of the last frame.
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         if self.rests() && !self.shows_card {
             self.show_card()?;

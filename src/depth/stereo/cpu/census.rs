@@ -51,8 +51,9 @@ impl Census {
         }
     }
 
-    /// Looks at `luma`. `taken` has a flag for every row and border row.
-    pub fn see(&mut self, luma: &[u8], workers: &mut ThreadPool, arch: Arch, taken: &mut [AtomicBool]) {
+    /// Computes the census transform of `luma`, rows in parallel; `taken` has a flag for every row and border row, as each is
+    /// written by one thread.
+    pub fn compute(&mut self, luma: &[u8], workers: &mut ThreadPool, arch: Arch, taken: &mut [AtomicBool]) {
         let Self { width, height, mirrored, stride, .. } = *self;
         let padded_stride = width + 2 * REACH;
         let rows = DisjointParts::new(&mut self.padded, padded_stride, taken);

@@ -196,8 +196,8 @@ impl Executor for CpuExecutor {
         out: &mut [u16],
     ) -> Result<(), GpuError> {
         let Self { arch, taken, .. } = self;
-        self.left.see(left, workers, *arch, &mut taken[0]);
-        self.right.see(right, workers, *arch, &mut taken[0]);
+        self.left.compute(left, workers, *arch, &mut taken[0]);
+        self.right.compute(right, workers, *arch, &mut taken[0]);
         match self.disparities {
             16 => self.match_range::<16>(left, likely, workers, out),
             32 => self.match_range::<32>(left, likely, workers, out),

@@ -99,7 +99,7 @@ impl Painter {
         if is_much(drawing) {
             let workers =
                 workers.get_or_insert_with(|| ThreadPool::new("present", (thread_pool::cores() / 2).min(MOST_THREADS)));
-            scratch.resize_with(workers.threads(), Scratch::default);
+            scratch.resize_with(workers.thread_count(), Scratch::default);
             let shelf = DisjointParts::new(pixels, width * BAND, taken);
             workers.run_with(scratch, bands, &|scratch, part| band(scratch, part, shelf.part(part)));
         } else {
