@@ -8,6 +8,8 @@ mod faults;
 mod kitti;
 #[path = "recording/layout.rs"]
 mod layout;
+#[path = "recording/maps.rs"]
+mod maps;
 #[path = "recording/middlebury.rs"]
 mod middlebury;
 #[path = "recording/real.rs"]

@@ -7,6 +7,7 @@ use bokehcam::pipeline::{Fault, Pace, run};
 use bokehcam::sink::{Ending, Null};
 
 use crate::fakes::*;
+use crate::setup::*;
 
 #[test]
 fn lossless_delivers_every_frame_however_slow_a_stage_is() {

@@ -15,7 +15,8 @@ use bokehcam::optics::CocField;
 use bokehcam::pipeline::{Change, Executor, Pace, Run, View, Wanted, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 
-use super::fakes::{FakeSink, Received, SIZE, Trouble, fake_camera, simple, uniform};
+use crate::fakes::{FakeSink, Received, SIZE, Trouble};
+use crate::setup::{fake_camera, simple, uniform};
 
 /// Blurs nothing, but knows the one radius that it was made for.
 struct Made {

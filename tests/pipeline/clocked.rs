@@ -20,7 +20,8 @@ use bokehcam::pipeline::{Change, Executor, Pace, Run, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::stats::{Cause, Report};
 
-use crate::fakes::{SIZE, dof_with, simple};
+use crate::fakes::SIZE;
+use crate::setup::{dof_with, simple};
 
 const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 40 * MS;

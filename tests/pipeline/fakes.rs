@@ -1,27 +1,20 @@
 //! Stages that do little, and that badly when told so; and a run of them.
 
-use std::cell::Cell;
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::Duration;
 
 use bokehcam::bokeh::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
-use bokehcam::budget::Quality;
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
-use bokehcam::clock::Clock;
 use bokehcam::compute::Backend;
 use bokehcam::compute::GpuError;
-use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
-use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{Pace, PipelineError, Progress, Run, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
-use bokehcam::stats::Report;
 
 pub const SIZE: (u32, u32) = (6, 4);
 pub const PERIOD_NS: u64 = 1_000_000;
@@ -115,7 +108,7 @@ impl Camera for FakeCamera {
 }
 
 /// Depth of 1 m plus the frame's number, with a hole.
-pub struct FakeDepth(Trouble);
+pub struct FakeDepth(pub Trouble);
 
 impl DepthSource for FakeDepth {
     fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
@@ -249,120 +242,6 @@ impl Sink for FakeSink {
     }
 }
 
-/// A run of fakes, good in every way until told otherwise.
-pub struct Setup {
-    pub frames: usize,
-    pub corrupt_every: usize,
-    pub brings: Brings,
-    pub camera: Trouble,
-    pub depth: Option<Trouble>,
-    pub bokeh: Option<FakeBokeh>,
-    pub sink: Trouble,
-    pub closes_at: usize,
-    pub finish_fails: bool,
-    pub look: Look,
-    pub pace: Pace,
-    pub keep_going: bool,
-    pub stop_after: u64,
-}
-
-/// A blur that follows depth, cut at `max_coc_px`.
-pub fn dof_with(focus: FocusRule, max_coc_px: f32) -> Look {
-    Look {
-        focus,
-        strength: Strength::AtInfinity(8.0),
-        max_coc_px: Some(max_coc_px),
-        quality: Some(Quality::Fast),
-        ..Look::plain(Effect::Dof)
-    }
-}
-
-pub fn dof() -> Look {
-    dof_with(FocusRule::Point { x: 0.0, y: 0.0 }, 20.0)
-}
-
-/// One radius everywhere.
-pub fn uniform(radius_px: f32) -> Look {
-    Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Fast), ..Look::plain(Effect::Blur) }
-}
-
-pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {
-    FakeBokeh { capacity, held: VecDeque::new(), submitted: 0, trouble, collect_fails: false, loses_frames: false }
-}
-
-impl Setup {
-    pub fn new(frames: usize, pace: Pace) -> Self {
-        Self {
-            frames,
-            corrupt_every: NEVER,
-            brings: Brings::Color,
-            camera: Trouble::default(),
-            depth: Some(Trouble::default()),
-            bokeh: Some(fake_bokeh(2, Trouble::default())),
-            sink: Trouble::default(),
-            closes_at: NEVER,
-            finish_fails: false,
-            look: dof(),
-            pace,
-            keep_going: false,
-            stop_after: u64::MAX,
-        }
-    }
-
-    /// Runs, and checks what holds for every run.
-    pub fn run(self) -> (Result<Report, PipelineError>, Received) {
-        let received = Received::default();
-        let stop = AtomicBool::new(false);
-        let last = Cell::new(None::<Progress>);
-        let result = run(Run {
-            camera: Box::new(FakeCamera {
-                frames: self.frames,
-                next: 0,
-                corrupt_every: self.corrupt_every,
-                brings: self.brings,
-                trouble: self.camera,
-            }),
-            depth: self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _),
-            bokeh: self.bokeh.map(|bokeh| Box::new(bokeh) as _),
-            look: self.look,
-            adaptive: false,
-            measured: false,
-            changes: None,
-            sink: Box::new(FakeSink {
-                received: received.clone(),
-                trouble: self.sink,
-                closes_at: self.closes_at,
-                finish_fails: self.finish_fails,
-            }),
-            pace: self.pace,
-            budget_ns: 500_000,
-            keep_going: self.keep_going,
-            demand: None,
-            mirror: false,
-            wanted: None,
-            view: None,
-            clock: Clock::system(),
-            stop: &stop,
-            progress: &|progress| {
-                last.set(Some(progress));
-                if progress.delivered >= self.stop_after {
-                    stop.store(true, Ordering::Relaxed);
-                }
-            },
-        });
-        let report = match &result {
-            Ok(report) => report,
-            Err(error) => &error.report,
-        };
-        assert!(report.frames.balance(), "{:?}", report.frames);
-        assert_eq!(report.frames.delivered, received.count());
-        assert!(received.numbers().is_sorted_by(|a, b| a < b), "frames keep their order");
-        assert_eq!(last.get().map_or(0, |progress| progress.delivered), received.count());
-        assert!(received.ending().is_some(), "the output is completed, whatever happens");
-        (result, received)
-    }
-}
-
 /// Waits with its first frame until the camera is through with all of its own.
 pub struct GatedSink(pub Arc<AtomicUsize>, pub usize);
 
@@ -393,13 +272,4 @@ impl Camera for LiveCamera {
         self.1.fetch_add(1, Ordering::SeqCst);
         self.0.next(shot)
     }
-}
-
-pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a AtomicBool, pace: Pace) -> Run<'a> {
-    let run = Run::new(camera, None, Look::plain(Effect::None), sink, stop).unwrap();
-    Run { look: uniform(3.0), pace, budget_ns: PERIOD_NS, ..run }
-}
-
-pub fn fake_camera(frames: usize) -> FakeCamera {
-    FakeCamera { frames, next: 0, corrupt_every: NEVER, brings: Brings::Color, trouble: Trouble::default() }
 }

@@ -8,7 +8,8 @@ use bokehcam::compute::Backend;
 use bokehcam::look::Look;
 use bokehcam::pipeline::{Pace, Run, run};
 
-use crate::fakes::{FakeBokeh, FakeSink, NEVER, Received, Trouble, fake_bokeh, fake_camera, simple, uniform};
+use crate::fakes::{FakeBokeh, FakeSink, NEVER, Received, Trouble};
+use crate::setup::{fake_bokeh, fake_camera, simple, uniform};
 
 /// Gives back what it has when it fails.
 struct Gpu(FakeBokeh);

@@ -7,6 +7,7 @@ use bokehcam::pipeline::{Fault, Pace, run};
 use bokehcam::sink::{Ending, Options, Sink, Target, Tee};
 
 use crate::fakes::*;
+use crate::setup::*;
 
 #[test]
 fn the_fault_of_a_stage_is_the_error_of_the_run() {

@@ -14,6 +14,7 @@ use bokehcam::pipeline::{Fault, Pace, Run, run};
 use bokehcam::sink::Null;
 
 use crate::fakes::*;
+use crate::setup::*;
 
 #[test]
 fn depth_comes_with_the_frame_it_belongs_to() {

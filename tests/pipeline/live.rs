@@ -12,7 +12,8 @@ use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::pipeline::{Pace, Run, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 
-use crate::fakes::{PERIOD_NS, SIZE, dof};
+use crate::fakes::{PERIOD_NS, SIZE};
+use crate::setup::dof;
 
 /// A camera that is opened by asking for a frame; it counts how often.
 struct Sleeper {

@@ -11,4 +11,5 @@ mod live;
 #[path = "../common/planes.rs"]
 mod planes;
 mod replay;
+mod setup;
 mod stereo;

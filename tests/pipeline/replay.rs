@@ -18,6 +18,7 @@ use bokehcam::recording::{Options, Recording};
 use bokehcam::sink::{Sink, Target};
 
 use crate::fakes::*;
+use crate::setup::*;
 
 const FRAMES: usize = 10;
 const STEP_NS: u64 = 40_000_000;

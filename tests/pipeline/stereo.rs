@@ -20,6 +20,7 @@ use bokehcam::stats::Cause;
 
 use crate::fakes::*;
 use crate::planes;
+use crate::setup::*;
 
 fn fake_sink(received: &Received) -> Box<FakeSink> {
     let (received, trouble) = (received.clone(), Trouble::default());

@@ -67,7 +67,7 @@ mod tests {
         let nothing = [[0.0; 4]; 17];
         for expansion in [f32::INFINITY, 1.1] {
             let image = light(17, &nothing, expansion, 1);
-            let squares = SQUARES.map(|light| encode_srgb(light));
+            let squares = SQUARES.map(encode_srgb);
             assert_eq!((image.rgb[0], image.rgb[16 * 3]), squares.into());
         }
         // Half of the light is code 188, and what is covered hides the board.

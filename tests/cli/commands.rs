@@ -1,0 +1,287 @@
+//! What each command does with good arguments.
+
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+
+use super::{Ran, bokehcam, run};
+
+/// A recording of three small frames in `home`.
+fn recording(home: &Path) -> String {
+    let folder = home.join("recording").to_str().unwrap().to_string();
+    let args = ["record", "synthetic", "--size", "64x48", "--frames", "3", "--to", &folder];
+    let ran: Ran = bokehcam(home, &args).output().unwrap().into();
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+    folder
+}
+
+#[test]
+fn a_recording_becomes_pictures_and_a_report_that_adds_up() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let (out, report) = (home.path().join("out/"), home.path().join("report.json"));
+    // A driver asked for a GPU may write to stderr itself.
+    let (sink, json) = (out.to_str().unwrap(), report.to_str().unwrap());
+    let args = ["stream", &recording, "--backend", "cpu", "--to", sink, "--report", json];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("3 of 3 frames delivered"), "{}", ran.stderr);
+
+    let json: serde_json::Value = serde_json::from_slice(&fs::read(&report).unwrap()).unwrap();
+    assert_eq!((&json["frames"]["captured"], &json["frames"]["delivered"]), (&3.into(), &3.into()));
+    assert_eq!(json["quality"]["balanced"], 1.0);
+    let original = image::open(Path::new(&recording).join("rgb/000001.png")).unwrap().to_rgb8();
+    let blurred = image::open(out.join("000001.png")).unwrap().to_rgb8();
+    assert_eq!(original.dimensions(), blurred.dimensions());
+    assert_ne!(original, blurred);
+
+    let again: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert!(again.code == 1 && again.stderr.contains("--force"), "{}", again.stderr);
+}
+
+#[test]
+fn depth_can_come_from_another_recording() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let stream = |flags: &[&str]| -> Ran {
+        let args = ["stream", &recording, "--backend", "cpu", "--to", "null"];
+        bokehcam(home.path(), &[&args, flags].concat()).output().unwrap().into()
+    };
+    let ran = stream(&["--depth", &recording]);
+    assert!(ran.code == 0 && ran.stderr.starts_with("3 of 3 frames delivered"), "{}", ran.stderr);
+    for (flags, said) in [
+        (&["--depth", &recording, "--effect", "blur"][..], "only --effect dof"),
+        (&["--depth-calibration", "c.toml"], "--depth-calibration is for a depth camera"),
+    ] {
+        let ran = stream(flags);
+        assert!(ran.code == 2 && ran.stderr.contains(said), "{}", ran.stderr);
+    }
+    let ran = stream(&["--depth", "no such camera"]);
+    assert!(ran.code != 0 && ran.stderr.starts_with("error: --depth"), "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+}
+
+#[test]
+fn effect_none_passes_frames_through_and_mirror_turns_them() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let out = home.path().join("out/");
+    let args = ["stream", &recording, "--to", out.to_str().unwrap(), "--effect", "none", "--mirror", "--start", "0.03"];
+    let ran: Ran = bokehcam(home.path(), &[&args[..], &["-q"]].concat()).output().unwrap().into();
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let original = image::open(Path::new(&recording).join("rgb/000001.png")).unwrap().to_rgb8();
+    let mirrored = image::open(out.join("000000.png")).unwrap().fliph().to_rgb8();
+    assert!(original == mirrored, "the second frame, mirrored, comes first");
+}
+
+#[test]
+fn one_picture_is_blurred_by_each_effect_and_its_file_is_safe() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let image = format!("{recording}/rgb/000000.png");
+    let depth = format!("{recording}/depth/000000.png");
+    let out = home.path().join("out.png");
+    let render = |more: &[&str]| -> Ran {
+        let args = [&["render", &image, "--out", out.to_str().unwrap()], more].concat();
+        bokehcam(home.path(), &args).output().unwrap().into()
+    };
+    let mut seen = vec![image::open(&image).unwrap().to_rgb8()];
+    for more in [
+        &["--depth-map", &depth][..],
+        &["--effect", "blur", "--coc-at-infinity", "5", "--force"],
+        &["--effect", "tilt-shift", "--coc-at-infinity", "5", "--force"],
+    ] {
+        let ran = render(more);
+        assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+        let result = image::open(&out).unwrap().to_rgb8();
+        assert!(seen.iter().all(|other| *other != result), "{more:?} is something of its own");
+        seen.push(result);
+    }
+    let refused = render(&["--effect", "none"]);
+    assert!(refused.code == 1 && refused.stderr.contains("--force"), "{}", refused.stderr);
+    assert!(image::open(&out).unwrap().to_rgb8() == seen[3], "what was there stays");
+    let passed = render(&["--effect", "none", "--force"]);
+    assert_eq!(passed.code, 0, "{}", passed.stderr);
+    assert!(image::open(&out).unwrap().to_rgb8() == seen[0]);
+}
+
+#[test]
+fn an_aperture_can_be_a_picture() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let cat = home.path().join("cat.png");
+    image::GrayImage::from_fn(9, 9, |x, _| image::Luma([if x < 3 { 255 } else { 0 }])).save(&cat).unwrap();
+    let aperture = format!("image:{}", cat.display());
+    let args = ["stream", &recording, "--to", "null", "--aperture", &aperture];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+
+    let args = ["stream", &recording, "--to", "null", "--aperture", "image:nowhere.png"];
+    let ran: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert!(ran.code == 1 && ran.stderr.contains("nowhere.png"), "{}", ran.stderr);
+}
+
+#[test]
+fn bench_measures_every_combination() {
+    let args = ["bench", "--sizes", "64x48,17x13", "--coc", "2,4", "--threads", "1,2", "--frames", "3", "--json"];
+    let ran = run(&[&args[..], &["--backend", "cpu"]].concat());
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let lines: Vec<serde_json::Value> = ran.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 8);
+    for line in &lines {
+        let time = |key: &str| line[key].as_f64().unwrap();
+        assert!(0.0 < time("p50_ms") && time("p50_ms") <= time("p95_ms") && time("p95_ms") <= time("max_ms"), "{line}");
+    }
+    assert!(lines[0]["executor"].as_str().unwrap().contains("1 thread"), "{}", lines[0]);
+}
+
+#[test]
+fn y4m_on_standard_output_is_nothing_but_y4m() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let output = bokehcam(home.path(), &["stream", &recording, "--to", "-"]).output().unwrap();
+    assert!(output.status.success());
+    let header_end = output.stdout.iter().position(|&byte| byte == b'\n').unwrap() + 1;
+    assert!(output.stdout.starts_with(b"YUV4MPEG2 W64 H48 "));
+    assert_eq!(output.stdout.len() - header_end, 3 * ("FRAME\n".len() + 64 * 48 * 3 / 2));
+}
+
+#[test]
+#[cfg(feature = "camera")]
+fn a_virtual_camera_that_is_not_there_is_refused_with_the_way_to_make_one() {
+    let refused = run(&["stream", "synthetic", "--size", "64x48", "--frames", "1", "--to", "/dev/video199"]);
+    assert_eq!((refused.code, refused.stdout.as_str(), refused.stderr.lines().count()), (1, "", 1));
+    assert!(refused.stderr.contains("sudo modprobe v4l2loopback devices=1 video_nr=199"), "{}", refused.stderr);
+}
+
+#[test]
+fn one_stream_goes_to_several_sinks() {
+    let home = tempfile::tempdir().unwrap();
+    let file = home.path().join("a.y4m");
+    let args = ["stream", "synthetic", "--size", "16x12", "--frames", "2", "--effect", "none", "--quiet", "--to", "-"];
+    let output = bokehcam(home.path(), &args).arg("--to").arg(&file).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.stdout.windows(6).filter(|bytes| bytes == b"FRAME\n").count(), 2);
+    assert_eq!(fs::read(&file).unwrap(), output.stdout);
+}
+
+#[test]
+fn completions_name_the_commands_in_each_shell() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = run(&["completions", shell]);
+        assert_eq!(script.code, 0);
+        for word in ["aperture", "config", "dump", "intensity", "tilt-shift"] {
+            assert!(script.stdout.contains(word), "{shell}: {word}");
+        }
+    }
+}
+
+#[test]
+fn a_reader_that_leaves_is_no_failure() {
+    let home = tempfile::tempdir().unwrap();
+    let mut child =
+        bokehcam(home.path(), &["completions", "bash"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let ran = child.wait_with_output().unwrap();
+    assert!(ran.status.success());
+    assert_eq!(ran.stderr, b"");
+}
+
+#[test]
+fn the_aperture_analysis_is_whole_and_is_not_overwritten_unasked() {
+    let home = tempfile::tempdir().unwrap();
+    let out = home.path().join("kernels");
+    let args = ["aperture", "--apertures", "disc,star:5", "--size", "33", "--out", out.to_str().unwrap()];
+    let first: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!((first.code, first.stdout.as_str()), (0, ""), "{}", first.stderr);
+    let mut files: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    files.sort();
+    assert_eq!(files, ["aperture.json", "disc.png", "errors.svg", "star-5.png"]);
+    let table: serde_json::Value = serde_json::from_slice(&fs::read(out.join("aperture.json")).unwrap()).unwrap();
+    // McGraw's kernels: 33 taps, hard rim; the disc has 18.7 % at rank 2.
+    let disc = &table["apertures"][0];
+    assert_eq!(disc["aperture"], "disc");
+    assert_eq!(disc["singular_values"].as_array().unwrap().len(), 33);
+    let error = disc["ranks"][1]["truncation_error"].as_f64().unwrap();
+    assert!((error - 0.187).abs() < 0.003, "{error}");
+    let sheet = image::open(out.join("star-5.png")).unwrap().to_rgb8();
+    assert!(sheet.pixels().any(|pixel| pixel.0 == [255; 3]), "the kernel is white");
+
+    fs::write(out.join("disc.png"), "mine").unwrap();
+    let second: Ran = bokehcam(home.path(), &args).output().unwrap().into();
+    assert_eq!(second.code, 1);
+    assert!(second.stderr.contains("exists") && second.stderr.contains("--force"), "{}", second.stderr);
+    assert_eq!(fs::read(out.join("disc.png")).unwrap(), b"mine");
+
+    let third: Ran = bokehcam(home.path(), &[&args[..], &["--force"]].concat()).output().unwrap().into();
+    assert_eq!(third.code, 0, "{}", third.stderr);
+    assert_ne!(fs::read(out.join("disc.png")).unwrap(), b"mine");
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 4, "no leftovers");
+}
+
+#[cfg(feature = "camera")]
+#[test]
+fn devices_are_listed_or_the_way_to_help_is_named() {
+    let (text, json) = (run(&["devices"]), run(&["devices", "--json", "--controls"]));
+    assert_eq!((text.code, json.code, json.stderr.as_str()), (0, 0, ""), "{}", text.stderr);
+    let list: serde_json::Value = serde_json::from_str(&json.stdout).unwrap();
+    let told: Vec<_> =
+        ["cameras", "virtual_cameras"].iter().flat_map(|group| list[group].as_array().unwrap()).collect();
+    for device in &told {
+        let path = device["path"].as_str().unwrap();
+        assert!(path.starts_with("/dev/") && text.stdout.contains(path), "{device}");
+        assert!(device["formats"].is_array() && device["controls"].is_array(), "{device}");
+    }
+    if told.is_empty() {
+        assert_eq!((text.stdout.as_str(), text.stderr.lines().count()), ("", 1));
+        assert!(text.stderr.contains("bokehcam doctor"), "{}", text.stderr);
+    }
+}
+
+#[cfg(feature = "camera")]
+#[test]
+fn a_device_that_is_not_there_costs_one_line() {
+    for (name, said) in [
+        ("no camera has this name", "there is no camera 'no camera has this name'"),
+        ("/dev/video4711", "there is no camera '/dev/video4711'"),
+        ("/dev/null", "no video device"),
+        ("/etc/passwd", "no device node"),
+    ] {
+        let ran = run(&["devices", name]);
+        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{name}");
+        assert!(ran.stderr.contains(said) && ran.stderr.lines().count() == 1, "{}", ran.stderr);
+    }
+}
+
+#[cfg(feature = "camera")]
+#[test]
+fn the_doctor_has_a_fix_for_what_is_not_good() {
+    let (text, json) = (run(&["doctor"]), run(&["doctor", "--json"]));
+    let told: serde_json::Value = serde_json::from_str(&json.stdout).unwrap();
+    let findings = told["findings"].as_array().unwrap();
+    for about in ["camera", "virtual camera", "blur", "programs"] {
+        assert!(findings.iter().any(|finding| finding["about"] == about), "{about}: {told}");
+    }
+    for finding in findings {
+        assert_eq!(finding["level"] == "good", finding["fix"].is_null(), "{finding}");
+        assert!(text.stdout.contains(finding["found"].as_str().unwrap()), "{finding}: {}", text.stdout);
+    }
+    let missing = |about| findings.iter().any(|finding| finding["about"] == about && finding["level"] == "missing");
+    let ready = !missing("camera") && !missing("virtual camera");
+    assert_eq!(told["ready"], ready);
+    for ran in [&text, &json] {
+        assert_eq!((ran.code, ran.stderr.lines().count()), if ready { (0, 0) } else { (1, 1) }, "{}", ran.stderr);
+    }
+    let kernel = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap();
+    assert!(text.stdout.lines().next().unwrap().contains(kernel.trim()), "{}", text.stdout);
+}
+
+#[cfg(not(feature = "camera"))]
+#[test]
+fn without_cameras_the_commands_about_them_say_so() {
+    for command in ["devices", "doctor"] {
+        let ran = run(&[command]);
+        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""));
+        assert!(ran.stderr.contains("built without cameras"), "{}", ran.stderr);
+    }
+}

@@ -1,0 +1,139 @@
+//! A run of fakes, and looks for it.
+
+use std::cell::Cell;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use bokehcam::budget::Quality;
+use bokehcam::capture::{Brings, Camera};
+use bokehcam::clock::Clock;
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::look::{Effect, Look, Strength};
+use bokehcam::pipeline::{Pace, PipelineError, Progress, Run, run};
+use bokehcam::sink::Sink;
+use bokehcam::stats::Report;
+
+use super::fakes::*;
+
+/// A run of fakes, good in every way until told otherwise.
+pub struct Setup {
+    pub frames: usize,
+    pub corrupt_every: usize,
+    pub brings: Brings,
+    pub camera: Trouble,
+    pub depth: Option<Trouble>,
+    pub bokeh: Option<FakeBokeh>,
+    pub sink: Trouble,
+    pub closes_at: usize,
+    pub finish_fails: bool,
+    pub look: Look,
+    pub pace: Pace,
+    pub keep_going: bool,
+    pub stop_after: u64,
+}
+
+/// A blur that follows depth, cut at `max_coc_px`.
+pub fn dof_with(focus: FocusRule, max_coc_px: f32) -> Look {
+    Look {
+        focus,
+        strength: Strength::AtInfinity(8.0),
+        max_coc_px: Some(max_coc_px),
+        quality: Some(Quality::Fast),
+        ..Look::plain(Effect::Dof)
+    }
+}
+
+pub fn dof() -> Look {
+    dof_with(FocusRule::Point { x: 0.0, y: 0.0 }, 20.0)
+}
+
+/// One radius everywhere.
+pub fn uniform(radius_px: f32) -> Look {
+    Look { strength: Strength::AtInfinity(radius_px), quality: Some(Quality::Fast), ..Look::plain(Effect::Blur) }
+}
+
+pub fn fake_bokeh(capacity: usize, trouble: Trouble) -> FakeBokeh {
+    FakeBokeh { capacity, held: VecDeque::new(), submitted: 0, trouble, collect_fails: false, loses_frames: false }
+}
+
+impl Setup {
+    pub fn new(frames: usize, pace: Pace) -> Self {
+        Self {
+            frames,
+            corrupt_every: NEVER,
+            brings: Brings::Color,
+            camera: Trouble::default(),
+            depth: Some(Trouble::default()),
+            bokeh: Some(fake_bokeh(2, Trouble::default())),
+            sink: Trouble::default(),
+            closes_at: NEVER,
+            finish_fails: false,
+            look: dof(),
+            pace,
+            keep_going: false,
+            stop_after: u64::MAX,
+        }
+    }
+
+    /// Runs, and checks what holds for every run.
+    pub fn run(self) -> (Result<Report, PipelineError>, Received) {
+        let received = Received::default();
+        let stop = AtomicBool::new(false);
+        let last = Cell::new(None::<Progress>);
+        let result = run(Run {
+            camera: Box::new(FakeCamera {
+                frames: self.frames,
+                next: 0,
+                corrupt_every: self.corrupt_every,
+                brings: self.brings,
+                trouble: self.camera,
+            }),
+            depth: self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _),
+            bokeh: self.bokeh.map(|bokeh| Box::new(bokeh) as _),
+            look: self.look,
+            adaptive: false,
+            measured: false,
+            changes: None,
+            sink: Box::new(FakeSink {
+                received: received.clone(),
+                trouble: self.sink,
+                closes_at: self.closes_at,
+                finish_fails: self.finish_fails,
+            }),
+            pace: self.pace,
+            budget_ns: 500_000,
+            keep_going: self.keep_going,
+            demand: None,
+            mirror: false,
+            wanted: None,
+            view: None,
+            clock: Clock::system(),
+            stop: &stop,
+            progress: &|progress| {
+                last.set(Some(progress));
+                if progress.delivered >= self.stop_after {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            },
+        });
+        let report = match &result {
+            Ok(report) => report,
+            Err(error) => &error.report,
+        };
+        assert!(report.frames.balance(), "{:?}", report.frames);
+        assert_eq!(report.frames.delivered, received.count());
+        assert!(received.numbers().is_sorted_by(|a, b| a < b), "frames keep their order");
+        assert_eq!(last.get().map_or(0, |progress| progress.delivered), received.count());
+        assert!(received.ending().is_some(), "the output is completed, whatever happens");
+        (result, received)
+    }
+}
+
+pub fn simple<'a>(camera: Box<dyn Camera>, sink: Box<dyn Sink>, stop: &'a AtomicBool, pace: Pace) -> Run<'a> {
+    let run = Run::new(camera, None, Look::plain(Effect::None), sink, stop).unwrap();
+    Run { look: uniform(3.0), pace, budget_ns: PERIOD_NS, ..run }
+}
+
+pub fn fake_camera(frames: usize) -> FakeCamera {
+    FakeCamera { frames, next: 0, corrupt_every: NEVER, brings: Brings::Color, trouble: Trouble::default() }
+}
