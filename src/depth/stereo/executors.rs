@@ -9,6 +9,7 @@ use super::executor::Executor;
 use super::gpu::GpuExecutor;
 #[cfg(feature = "gpu")]
 use crate::compute::device::Device;
+#[cfg(feature = "gpu")]
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{Backend, GpuError};
 
