@@ -7,7 +7,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::table::{Values, is_setting, nearest_setting, parse_flags};
 use crate::cli::error::CliError;
-use crate::cli::log::one_line;
+use crate::cli::log::{one_line, printable};
 use crate::files::input;
 use crate::look::{self, SETTINGS, presets};
 #[cfg(feature = "window")]
@@ -46,7 +46,8 @@ impl SettingsFile {
         let refuse = |(at, what): (usize, String)| CliError::Settings {
             path: path.to_owned(),
             line: text[..at.min(text.len())].matches('\n').count() + 1,
-            what,
+            // Keys and values are others' texts.
+            what: printable(&what, &[]).into_owned(),
         };
         let keys = DeTable::parse(text).map_err(|error| {
             refuse((error.span().map_or(0, |span| span.start), error.message().replace('\n', ", ")))
@@ -147,7 +148,7 @@ fn values<'a>(
     let mut values = Values::new();
     for Entry { name, at, value } in entries {
         if !is_setting(name) {
-            let hint = nearest_setting(name).map_or(String::new(), |near| format!(", did you mean {near}?"));
+            let hint = nearest_setting(name).map_or(";".to_owned(), |near| format!(", did you mean {near}?"));
             let what = format!("there is no setting '{name}'{hint} `bokehcam config dump` shows them all");
             return Err((at, what));
         }
@@ -213,6 +214,8 @@ mod tests {
         assert!(refusal("[rim]\nx = 1\n").contains("must be a text, a number"));
         let both = refusal("coc-at-infinity = 10\nf-number = 2\n");
         assert!(both.starts_with("c.toml:2: ") && both.contains("--coc-at-infinity"), "{both}");
+        let foreign = refusal("\"\\u001b[31mrim\\ri\" = 1\n");
+        assert!(foreign.contains("no setting '\\u{1b}[31mrim\\ri';"), "{foreign}");
         for text in [unknown, value, both] {
             assert!(!text.contains('\n'), "{text}");
         }
