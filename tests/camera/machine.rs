@@ -1,8 +1,10 @@
 //! The machine's devices, loaded anew for each test, and what tests do with them.
 
 use std::fs;
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{self, Receiver};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
@@ -26,7 +28,7 @@ const VIVID: &str = "n_devs=1 node_types=0x1 num_inputs=2 input_types=0xc vid_ca
 
 /// Nothing takes so long: this is against a hang. How long things do take is printed, and no test asks for less: the
 /// machine is emulated, and others use it as well.
-const HANG: Duration = Duration::from_secs(120);
+pub const HANG: Duration = Duration::from_secs(120);
 
 static ALONE: Mutex<()> = Mutex::new(());
 
@@ -113,6 +115,22 @@ impl Stream {
             nodes().iter().any(|node| node.path == Path::new(VIRTUAL) && node.captures)
         });
         stream
+    }
+
+    /// Its frames, of this size, where it writes them to standard output: each as it is asked for, none kept ready.
+    pub fn frames(&mut self, (width, height): (usize, usize)) -> Receiver<()> {
+        let mut stdout = BufReader::new(self.0.0.as_mut().unwrap().stdout.take().unwrap());
+        let (told, frames) = mpsc::sync_channel(0);
+        std::thread::spawn(move || {
+            stdout.read_until(b'\n', &mut Vec::new()).unwrap();
+            let mut frame = vec![0; "FRAME\n".len() + width * height + 2 * width.div_ceil(2) * height.div_ceil(2)];
+            // Who asks for no more lets the program go on to its end.
+            let mut asked = true;
+            while stdout.read_exact(&mut frame).is_ok() {
+                asked = asked && told.send(()).is_ok();
+            }
+        });
+        frames
     }
 
     /// Waits for its end, or ends it with Ctrl-C; it must have done well. Gives its report.
