@@ -106,7 +106,7 @@ fn color_of(index: u32) -> vec3<u32> {
 // Four pixels, three words.
 @compute @workgroup_size(LINE)
 fn composite(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let quad = id.y * groups.x * 64u + id.x;
+    let quad = id.y * groups.x * LINE + id.x;
     let pixels = frame.size.x * frame.size.y;
     if 4u * quad >= pixels {
         return;

@@ -62,9 +62,9 @@ fn around(k: u32, cell: vec2<u32>) -> Around {
 @compute @workgroup_size(SMALL_TILE, SMALL_TILE)
 fn reach(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
          @builtin(local_invocation_id) local: vec3<u32>) {
-    let place = place_of(workgroup, workgroups, vec2(8u));
+    let place = place_of(workgroup, workgroups, vec2(SMALL_TILE));
     let k = place.bin;
-    let edge = place.tile * 8u + local.xy;
+    let edge = place.tile * SMALL_TILE + local.xy;
     if !place.some || any(edge >= extent_of(k)) {
         return;
     }
