@@ -19,7 +19,7 @@ pub struct Filler {
     column_m: Vec<f32>,
     last_good: DepthMap,
     hole: Vec<bool>,
-    claimer: GuidedHoleFill,
+    guided: GuidedHoleFill,
 }
 
 impl Filler {
@@ -56,7 +56,7 @@ impl Filler {
         let any = self.hole.iter().any(|&hole| hole) && self.hole.iter().any(|&hole| !hole);
         self.fill(map);
         if any {
-            self.claimer.claim(map, &mut self.hole, color);
+            self.guided.claim(map, &mut self.hole, color);
             self.last_good.metres.copy_from_slice(&map.metres);
         }
     }

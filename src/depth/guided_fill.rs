@@ -181,10 +181,10 @@ mod tests {
         let mut map = DepthMap { width: 9, height: 3, metres: [1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0].repeat(3) };
         let before = map.clone();
         let mut hole = [false, false, false, true, true, true, false, false, false].repeat(3);
-        let mut claimer = GuidedHoleFill::default();
-        claimer.claim(&mut map, &mut hole, &ColorImage::new(9, 3));
+        let mut guided = GuidedHoleFill::default();
+        guided.claim(&mut map, &mut hole, &ColorImage::new(9, 3));
         assert_eq!(map, before);
-        claimer.claim(&mut map, &mut hole, &ColorImage::new(3, 1));
+        guided.claim(&mut map, &mut hole, &ColorImage::new(3, 1));
         assert_eq!(map, before);
     }
 }

@@ -107,7 +107,8 @@ impl Strip<'_> {
         }
     }
 
-    /// Most of a bin is empty: its surface covers part of the picture. Finds which rows of cells get a result and which rows have to be filtered for it; false when none.
+    /// Most of a bin is empty: its surface covers part of the picture. Finds which rows of cells get a result and which
+    /// rows have to be filtered for it; false when none.
     #[inline(always)]
     fn mark_active(&mut self) -> bool {
         let (across, down) = (self.reach.div_ceil(CELL), self.reach.div_ceil(CELL));

@@ -41,7 +41,7 @@ pub struct Refiner {
     inverse: Vec<f32>,
     smoother: Smoother,
     aligner: Aligner,
-    steadier: TemporalFilter,
+    temporal: TemporalFilter,
     /// Distance in focus over a metre.
     focus: Focus,
 }
@@ -66,7 +66,7 @@ impl Refiner {
     /// metre before the first call.
     pub fn focus_at(&mut self, focus_m: f32) {
         if DepthMap::is_known(focus_m) && focus_m != self.focus.0 {
-            self.steadier.rescale(focus_m / self.focus.0);
+            self.temporal.rescale(focus_m / self.focus.0);
             self.focus = Focus(focus_m);
         }
     }
@@ -80,9 +80,9 @@ impl Refiner {
         self.unknown.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
         self.filler.fill_by(map, color);
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
-            return self.steadier.forget();
+            return self.temporal.forget();
         }
-        let Self { arch, unknown, inverse, smoother, aligner, steadier, focus: Focus(focus_m), .. } = self;
+        let Self { arch, unknown, inverse, smoother, aligner, temporal, focus: Focus(focus_m), .. } = self;
         let focus_m = *focus_m;
         let (arch, width) = (*arch, map.width as usize);
         inverse.clear();
@@ -93,7 +93,7 @@ impl Refiner {
         let jump = JUMP.max(JUMP_SIGMAS * noise);
         aligner.align(arch, inverse, unknown, &color.rgb, width, jump);
         let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
-        steadier.steady(arch, inverse, &color.rgb, width, time_ns, limits);
+        temporal.steady(arch, inverse, &color.rgb, width, time_ns, limits);
         for (z_m, &v) in map.metres.iter_mut().zip(&*inverse) {
             *z_m = focus_m / v;
         }

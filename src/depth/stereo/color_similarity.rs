@@ -244,11 +244,11 @@ mod tests {
         let (width, height) = SIZE;
         let image = ColorImage { width: 80, height: 40, rgb: GREEN.repeat(width * height) };
         let first = vec![UNSEEN; height];
-        let mut alike = ColorSimilarity::default();
+        let mut similarity = ColorSimilarity::default();
         for surface in [NEAR, FAR] {
             let mut map: Vec<u16> =
                 (0..width * height).map(|k| if k % width < UNSEEN { 30 * ONE } else { surface }).collect();
-            alike.correct(&mut map, width, &first, Colors { image: &image, every: 1 });
+            similarity.correct(&mut map, width, &first, Colors { image: &image, every: 1 });
             assert_eq!(map, vec![surface; width * height]);
         }
     }

@@ -17,7 +17,7 @@ pub struct Tidy {
     width: usize,
     speckles: Speckles,
     border: Border,
-    alike: ColorSimilarity,
+    similarity: ColorSimilarity,
     taken: Vec<AtomicBool>,
     arch: Arch,
 }
@@ -29,7 +29,7 @@ impl Tidy {
             width,
             speckles: Speckles::new(width * height),
             border: Border::new((width, height)),
-            alike: ColorSimilarity::default(),
+            similarity: ColorSimilarity::default(),
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
             arch: Arch::new(),
         }
@@ -49,11 +49,11 @@ impl Tidy {
         workers: &mut ThreadPool,
         px: &mut [f32],
     ) {
-        let Self { width, border, alike, taken, arch, .. } = self;
+        let Self { width, border, similarity, taken, arch, .. } = self;
         let (width, arch) = (*width, *arch);
         border.fill(map, luma, width);
         if let Some(colors) = colors {
-            alike.correct(map, width, border.first(), colors);
+            similarity.correct(map, width, border.first(), colors);
         }
         gaps::fill(map, width);
         let map = &*map;

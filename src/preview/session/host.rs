@@ -12,7 +12,7 @@ use crate::preview::services::{Services, Switch};
 use crate::preview::state::{Output, Request, Source, Update};
 use crate::recording::snapshot::{self, Snapshot};
 use crate::sink;
-use crate::sink::switch::{Fate, Notice as Written};
+use crate::sink::switch::{Fate, Notice};
 use crate::stats::Report;
 
 /// What a session has and does.
@@ -261,7 +261,7 @@ impl Host {
         self.news.send(SessionEvent::Copy(command));
     }
 
-    fn wrote(&mut self, run: u64, Written { member, fate }: &Written) {
+    fn wrote(&mut self, run: u64, Notice { member, fate }: &Notice) {
         match fate {
             Fate::Began => self.news.note(format!("writing to {member}")),
             Fate::Completed { frames } => self.news.note(format!("{member}: complete, {frames} frames")),

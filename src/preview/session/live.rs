@@ -15,7 +15,7 @@ use crate::link;
 use crate::look::Look;
 use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run, Wanted};
 use crate::sink::Sink;
-use crate::sink::switch::Notice as Written;
+use crate::sink::switch::Notice;
 use crate::sink::{Switch, Switchboard};
 use crate::stats::Report;
 
@@ -53,7 +53,7 @@ impl Live {
         settings: &Settings,
         services: &mut dyn Services,
         news: &News,
-        wrote: impl Fn(Written) + Send + Sync + 'static,
+        wrote: impl Fn(Notice) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
         let Opened { name, source, .. } = opened;

@@ -20,7 +20,7 @@ use crate::link::Receiver;
 use crate::look::Look;
 use crate::optics::CocField;
 use crate::pipeline::{PipelineError, View, Wanted};
-use crate::sink::switch::Notice as Written;
+use crate::sink::switch::Notice;
 use crate::stats::Report;
 
 /// An end that takes longer is told.
@@ -87,7 +87,7 @@ enum Order {
     Save(Box<Still>),
     Copy(Vec<Switch>),
     /// What became of an output of the run of this number.
-    Wrote(u64, Written),
+    Wrote(u64, Notice),
     /// The run of this number ended.
     Ended(u64, Box<Result<Report, PipelineError>>),
     Close,

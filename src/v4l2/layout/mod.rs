@@ -6,7 +6,7 @@ mod fourcc;
 #[cfg(test)]
 mod tests;
 
-pub use crate::color::Matrix;
+use crate::color::Matrix;
 pub use color::{Range, Transfer};
 pub use fourcc::{Content, Family, FourCc, FourCcError};
 
