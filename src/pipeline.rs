@@ -180,7 +180,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         frame,
         repeats,
     } = &mut timings;
-    let most = most(executor.as_deref());
+    let finest = finest_quality(executor.as_deref());
     let quality = run.look.quality_rule(run.adaptive);
     let live_ns = (pace == Pace::Realtime).then_some(info.period_ns);
     let (began_ns, cpu_ns) = (clock.now_ns(), clock::cpu_ns());
@@ -233,7 +233,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let blur = blur::Stage {
         executor,
         late: live_ns.map(quality::LateRule::new),
-        picker: quality::Picker::new(quality, most, run.budget_ns, live_ns),
+        picker: quality::Picker::new(quality, finest, run.budget_ns, live_ns),
         rule: quality,
         about: &mut about,
         outs: &outs,
@@ -288,7 +288,7 @@ fn link<T>(pace: Pace) -> (Sender<T>, Receiver<T>) {
 }
 
 /// The finest level that an executor is given as the time allows.
-fn most(executor: Option<&dyn Bokeh>) -> Quality {
+fn finest_quality(executor: Option<&dyn Bokeh>) -> Quality {
     // On the processor a finer level takes twice the time for half a decibel, and other programs need it, too.
     match executor.map(Bokeh::backend) {
         Some(Backend::Cpu) => Quality::Balanced,

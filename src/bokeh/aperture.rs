@@ -169,7 +169,8 @@ fn ramp(radius: f64, edge: f64, rim: f64) -> f64 {
     if rim <= 0.0 { f64::from(u8::from(radius <= edge)) } else { ((edge - radius) / rim + 0.5).clamp(0.0, 1.0) }
 }
 
-/// The heart (x^2 + y^2 - 1)^3 = x^2 y^3, turned upright for y down and scaled into the unit disc.
+/// Radius of the heart (x^2 + y^2 - 1)^3 = x^2 y^3 in direction `angle`, upright for y down and scaled to fit the square
+/// from -1 to 1; found by bisection. Never 0, so that one may divide by it.
 fn heart_outline(angle: f64) -> f64 {
     const SCALE: f64 = 1.0 / 1.25;
     let (sin, cos) = (-(angle.sin()), angle.cos());
@@ -177,6 +178,7 @@ fn heart_outline(angle: f64) -> f64 {
         let (x, y) = (r * cos, r * sin);
         (x * x + y * y - 1.0).powi(3) <= x * x * y.powi(3)
     };
+    // Its farthest points lie 1.42 from the centre.
     let (mut low, mut high) = (0.0, 1.6);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);

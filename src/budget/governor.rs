@@ -60,16 +60,16 @@ pub struct Governor {
     /// Time over cost, in nanoseconds, of the last frames, whatever their rung.
     loads: Window<LOADS>,
     /// The same of the last frames at this rung alone.
-    own: Window<LEARN_FROM>,
+    rung_loads: Window<LEARN_FROM>,
     /// The load at the rung before, until it has been learnt from.
     came_from: Option<f64>,
     last_ns: u64,
     /// Frames of nothing but surplus so far, and the finest rung that all of them would have allowed.
     surplus: u32,
-    allowed: usize,
+    surplus_rung: usize,
     patience: u32,
     /// Frames since the rung changed, and whether that was upwards.
-    since: u32,
+    frames_at_rung: u32,
     went_up: bool,
 }
 
@@ -89,13 +89,13 @@ impl Governor {
             rungs: ladder.len(),
             rung: start,
             loads: Window::default(),
-            own: Window::default(),
+            rung_loads: Window::default(),
             came_from: None,
             last_ns: 0,
             surplus: 0,
-            allowed: start,
+            surplus_rung: start,
             patience: PATIENCE,
-            since: 0,
+            frames_at_rung: 0,
             went_up: false,
         }
     }
@@ -131,20 +131,21 @@ impl Governor {
         if rung != self.rung {
             return;
         }
-        self.own.push(load);
-        self.since = self.since.saturating_add(1);
-        if self.own.len() == LEARN_FROM {
+        self.rung_loads.push(load);
+        self.frames_at_rung = self.frames_at_rung.saturating_add(1);
+        if self.rung_loads.len() == LEARN_FROM {
             self.learn();
         }
-        if self.went_up && self.since >= REGRET * self.patience {
+        if self.went_up && self.frames_at_rung >= REGRET * self.patience {
             // The step up has held.
             (self.patience, self.went_up) = (PATIENCE, false);
         }
         let budget_ns = budget_ns as f64;
         let now = ABOVE_MEDIAN * self.loads.median(5);
-        let over = self.high(LOADS, HIGH).max(now);
-        if self.own.len() >= LEARN_LEAST && over * self.costs[self.rung] > KEEP * budget_ns {
-            let to = self.finest(over, AIM_DOWN * budget_ns);
+        let high_load = self.high(LOADS, HIGH).max(now);
+        // A rung is not judged by a frame or two of its own.
+        if self.rung_loads.len() >= LEARN_LEAST && high_load * self.costs[self.rung] > KEEP * budget_ns {
+            let to = self.finest(high_load, AIM_DOWN * budget_ns);
             if to < self.rung {
                 return self.change(to);
             }
@@ -154,10 +155,10 @@ impl Governor {
             self.surplus = 0;
             return;
         }
-        self.allowed = if self.surplus == 0 { to } else { self.allowed.min(to) };
+        self.surplus_rung = if self.surplus == 0 { to } else { self.surplus_rung.min(to) };
         self.surplus += 1;
         if self.surplus >= self.patience {
-            self.change(self.allowed);
+            self.change(self.surplus_rung);
         }
     }
 
@@ -173,22 +174,22 @@ impl Governor {
 
     fn change(&mut self, to: usize) {
         self.learn();
-        if to < self.rung && self.went_up && self.since < REGRET * self.patience {
+        if to < self.rung && self.went_up && self.frames_at_rung < REGRET * self.patience {
             self.patience = (2 * self.patience).min(MOST_PATIENCE);
         }
-        self.came_from = (!self.own.is_empty()).then(|| self.own.median(5));
+        self.came_from = (!self.rung_loads.is_empty()).then(|| self.rung_loads.median(5));
         self.went_up = to > self.rung;
-        (self.rung, self.since, self.surplus) = (to, 0, 0);
-        self.own.clear();
+        (self.rung, self.frames_at_rung, self.surplus) = (to, 0, 0);
+        self.rung_loads.clear();
     }
 
     /// The load before and after a change should be the same: what is not, is the cost's fault, at least in part.
     fn learn(&mut self) {
-        if self.own.len() < LEARN_LEAST {
+        if self.rung_loads.len() < LEARN_LEAST {
             return;
         }
         let Some(before) = self.came_from.take() else { return };
-        let (rung, ratio) = (self.rung, self.own.median(LEARN_FROM) / before);
+        let (rung, ratio) = (self.rung, self.rung_loads.median(LEARN_FROM) / before);
         let (least, most) = (self.given[rung] / LEARN_MOST, self.given[rung] * LEARN_MOST);
         // The ladder stays one: a rung is no cheaper than those below it.
         let below = if rung > 0 { self.costs[rung - 1] } else { 0.0 };
@@ -199,9 +200,9 @@ impl Governor {
     /// Keeps the rung and the costs, and forgets what the load was.
     fn forget(&mut self) {
         self.loads.clear();
-        self.own.clear();
+        self.rung_loads.clear();
         self.came_from = None;
-        (self.surplus, self.since, self.went_up, self.patience) = (0, 0, false, PATIENCE);
+        (self.surplus, self.frames_at_rung, self.went_up, self.patience) = (0, 0, false, PATIENCE);
     }
 }
 

@@ -66,11 +66,12 @@ struct Pending {
 }
 
 impl Stage<'_> {
+    /// Runs until the frames end or nobody takes the results, with as many frames in hand as the executor has room for.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Ready>>, mut to: Sender<Frame<Blurred>>) -> Ended {
         let mut executor = self.executor.take();
         let mut backends = executor.as_deref().map(Bokeh::backends);
         let mut pending = VecDeque::with_capacity(MOST_IN_FLIGHT);
-        let mut swapped = 0;
+        let mut last_swap = 0;
         loop {
             let capacity = executor.as_ref().map_or(1, |executor| executor.capacity().max(1));
             let next = match pending.len() {
@@ -84,8 +85,9 @@ impl Stage<'_> {
             // With nothing to submit, there is time to wait for what was.
             let mut wait = next.is_none();
             if let Some(mut frame) = next {
-                if let Some(swap) = frame.item.swap.take().filter(|swap| swap.number != swapped) {
-                    swapped = swap.number;
+                if let Some(swap) = frame.item.swap.take().filter(|swap| swap.number != last_swap) {
+                    // Later frames carry the same one: only the first counts. What the old executor has goes out before.
+                    last_swap = swap.number;
                     while let Some(old) = executor.as_mut().filter(|_| !pending.is_empty()) {
                         if !self.collect(&mut **old, &mut pending, true, &mut to)? {
                             return Ok(());
@@ -95,7 +97,7 @@ impl Stage<'_> {
                         executor = new;
                         backends = executor.as_deref().map(Bokeh::backends);
                         self.rule = quality;
-                        self.picker = self.picker.with(quality, super::most(executor.as_deref()));
+                        self.picker = self.picker.with(quality, super::finest_quality(executor.as_deref()));
                     }
                 }
                 let Some(executor) = &mut executor else {
@@ -115,7 +117,7 @@ impl Stage<'_> {
                 }
                 if backends.replace(executor.backends()) != Some(executor.backends()) {
                     (self.about.backend, self.about.adapter) = (executor.backends().into(), executor.describe());
-                    self.picker = self.picker.with(self.rule, super::most(Some(&**executor)));
+                    self.picker = self.picker.with(self.rule, super::finest_quality(Some(&**executor)));
                 }
             }
         }

@@ -55,7 +55,7 @@ pub(super) fn header(path: &Path) -> Result<((u32, u32), Kind), PictureFault> {
 }
 
 /// Decodes to 8-bit RGB; grey is repeated, transparency ignored, 16 bits rounded to 8. With `expected`, a picture of
-/// another size is refused before it is decoded. Gives what the file has besides.
+/// another size is refused before it is decoded. Returns its colour profile, its EXIF, and what was lost.
 pub(super) fn color(
     path: &Path,
     expected: Option<(u32, u32)>,

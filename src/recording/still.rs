@@ -211,27 +211,28 @@ pub fn photo_format(path: &Path) -> Result<PhotoFormat, RecordingError> {
 }
 
 /// Writes a 16-bit grey `.png` of `depth_scale` units per metre, where 0 is unknown and so is what lies beyond 65535
-/// units; or a `.pfm` of metres as they are. Both say so.
+/// units; or a `.pfm` of metres as they are. Either file says in its metadata that it holds depth (the `.png` its scale,
+/// too), so that it is read back without an option.
 ///
 /// # Errors
 /// As [`write_color`]; the scale is not a number > 0.
 pub fn write_depth(path: &Path, depth: &DepthMap, depth_scale: f32, force: bool) -> Result<(), RecordingError> {
     check_depth_scale(depth_scale)?;
-    let says = Meaning::Depth { per_m: depth_scale };
+    let meaning = Meaning::Depth { per_m: depth_scale };
     let mut file = Vec::new();
     let encoded = match map_format(path)? {
         MapFormat::Pfm => {
-            pfm::write(depth.width, depth.height, &depth.metres, says, &mut file);
+            pfm::write(depth.width, depth.height, &depth.metres, meaning, &mut file);
             Ok(())
         }
-        MapFormat::Png => encode::depth_png(depth, depth_scale, Some(says), &mut Vec::new(), &mut file),
+        MapFormat::Png => encode::depth_png(depth, depth_scale, Some(meaning), &mut Vec::new(), &mut file),
     };
     write(path, encoded, &file, force)
 }
 
 /// Writes a 16-bit grey `.png` of 256 units per pixel, where 0 is unknown and so is what lies beyond 65535 units
-/// (KITTI); or a `.pfm` of pixels, where infinity is unknown (Middlebury). Both say so; the `.png` says, too, how the eyes
-/// stand that see it, where they are given.
+/// (KITTI); or a `.pfm` of pixels, where infinity is unknown (Middlebury). Either file says in its metadata that it holds
+/// disparity; the `.png` has focal length and baseline, too, where a `rig` is given.
 ///
 /// # Errors
 /// As [`write_color`].
@@ -241,16 +242,16 @@ pub fn write_disparity(
     rig: Option<StereoRig>,
     force: bool,
 ) -> Result<(), RecordingError> {
-    let says = Meaning::Disparity { rig };
+    let meaning = Meaning::Disparity { rig };
     let mut file = Vec::new();
     let encoded = match map_format(path)? {
         MapFormat::Pfm => {
             let or_infinity = |&px: &f32| if DepthMap::is_known(px) { px } else { f32::INFINITY };
             let px: Vec<f32> = disparity.px.iter().map(or_infinity).collect();
-            pfm::write(disparity.width, disparity.height, &px, says, &mut file);
+            pfm::write(disparity.width, disparity.height, &px, meaning, &mut file);
             Ok(())
         }
-        MapFormat::Png => encode::disparity_png(disparity, says, &mut file),
+        MapFormat::Png => encode::disparity_png(disparity, meaning, &mut file),
     };
     write(path, encoded, &file, force)
 }

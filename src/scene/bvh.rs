@@ -85,20 +85,21 @@ impl Bvh {
     }
 
     /// The nearest shape that the ray meets before `t_max`: `t` and the shape's index.
-    pub fn meet(&self, shapes: &[Shape], ray: &Ray, mut t_max: f32) -> Option<(f32, u32)> {
+    pub fn intersect(&self, shapes: &[Shape], ray: &Ray, mut t_max: f32) -> Option<(f32, u32)> {
         let mut found = None;
+        // One entry a level of the tree at most, and one: trees over scenes of hundreds of shapes have some 20.
         let mut stack = [0u32; 64];
-        let mut depth = usize::from(!self.nodes.is_empty());
-        while depth > 0 {
-            depth -= 1;
-            let index = stack[depth];
+        let mut stacked = usize::from(!self.nodes.is_empty());
+        while stacked > 0 {
+            stacked -= 1;
+            let index = stack[stacked];
             let node = &self.nodes[index as usize];
             if node.bounds.span(ray, t_max).is_none() {
                 continue;
             }
             if node.count > 0 {
                 for place in &self.order[node.first as usize..(node.first + node.count) as usize] {
-                    if let Some(t) = shapes[*place as usize].meet(ray, t_max) {
+                    if let Some(t) = shapes[*place as usize].intersect(ray, t_max) {
                         (t_max, found) = (t, Some((t, *place)));
                     }
                 }
@@ -106,9 +107,9 @@ impl Bvh {
                 // The child that the ray comes to first is taken first: it is last on the stack.
                 let (near, far) =
                     if ray.direction[node.axis] > 0.0 { (index + 1, node.first) } else { (node.first, index + 1) };
-                stack[depth] = far;
-                stack[depth + 1] = near;
-                depth += 2;
+                stack[stacked] = far;
+                stack[stacked + 1] = near;
+                stacked += 2;
             }
         }
         found
@@ -135,8 +136,8 @@ mod tests {
         let mut hits = 0;
         for _ in 0..2000 {
             let ray = Ray::new(Vec3::ZERO, point(1.0) + Vec3::Z);
-            let every = shapes.iter().filter_map(|s| s.meet(&ray, f32::INFINITY)).fold(f32::INFINITY, f32::min);
-            let found = tree.meet(&shapes, &ray, f32::INFINITY).map_or(f32::INFINITY, |hit| hit.0);
+            let every = shapes.iter().filter_map(|s| s.intersect(&ray, f32::INFINITY)).fold(f32::INFINITY, f32::min);
+            let found = tree.intersect(&shapes, &ray, f32::INFINITY).map_or(f32::INFINITY, |hit| hit.0);
             assert_eq!(found, every);
             hits += usize::from(every.is_finite());
         }

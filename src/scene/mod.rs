@@ -98,14 +98,14 @@ struct Hit {
 }
 
 impl Moment<'_> {
-    fn meet(&self, ray: &Ray) -> Option<Hit> {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut hit: Option<Hit> = None;
         for (part, (group, pose)) in self.scene.parts.iter().zip(&self.poses).enumerate() {
             let t_max = hit.map_or(f32::INFINITY, |h| h.t);
             if self.boxes[part].span(ray, t_max).is_none() {
                 continue;
             }
-            let found = group.tree.meet(&group.shapes, &pose.ray_to_local(ray), t_max);
+            let found = group.tree.intersect(&group.shapes, &pose.ray_to_local(ray), t_max);
             if let Some((t, shape)) = found {
                 hit = Some(Hit { t, part, shape: shape as usize });
             }
@@ -115,7 +115,7 @@ impl Moment<'_> {
 
     /// The linear radiance that comes along the ray, and the depth where it comes from.
     fn look(&self, ray: &Ray) -> (Vec3, f32) {
-        match self.meet(ray) {
+        match self.intersect(ray) {
             Some(hit) => (self.radiance(ray, hit), hit.t),
             None => (self.scene.nothing, 0.0),
         }

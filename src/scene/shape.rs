@@ -108,9 +108,9 @@ impl Shape {
 
     /// The first `t` in `0..t_max` at which the ray meets the surface from outside (from either side for open
     /// shapes).
-    pub fn meet(&self, ray: &Ray, t_max: f32) -> Option<f32> {
+    pub fn intersect(&self, ray: &Ray, t_max: f32) -> Option<f32> {
         let t = match *self {
-            Shape::Quad { centre, right, up, cut } => meet_quad(ray, centre, right, up, cut)?,
+            Shape::Quad { centre, right, up, cut } => intersect_quad(ray, centre, right, up, cut)?,
             Shape::Sphere { centre, radius } => {
                 let (p, along_m) = ray.near(centre);
                 let h = radius * radius - (p - centre).length_squared();
@@ -130,12 +130,12 @@ impl Shape {
                 }
                 (along_m - b / a - (h / a).sqrt()) / ray.length
             }
-            Shape::Cuboid { centre, axes, half } => meet_cuboid(ray, centre, axes, half)?,
-            Shape::Cone { a, b, radius_a, radius_b } => meet_cone(ray, a, b, radius_a, radius_b)? / ray.length,
+            Shape::Cuboid { centre, axes, half } => intersect_cuboid(ray, centre, axes, half)?,
+            Shape::Cone { a, b, radius_a, radius_b } => intersect_cone(ray, a, b, radius_a, radius_b)? / ray.length,
             Shape::Frustum { base, height, low_radius, high_radius } => {
-                meet_frustum(ray, base, height, low_radius, high_radius)?
+                intersect_frustum(ray, base, height, low_radius, high_radius)?
             }
-            Shape::Field { distance, bounds, ref guide } => meet_field(ray, distance, &bounds, guide, t_max)?,
+            Shape::Field { distance, bounds, ref guide } => intersect_field(ray, distance, &bounds, guide, t_max)?,
         };
         (t > 0.0 && t < t_max).then_some(t)
     }
@@ -204,14 +204,14 @@ fn quad_uv(q: Vec3, right: Vec3, up: Vec3) -> Vec2 {
     Vec2::new(q.dot(right) / right.length_squared(), q.dot(up) / up.length_squared())
 }
 
-fn meet_quad(ray: &Ray, centre: Vec3, right: Vec3, up: Vec3, cut: fn(Vec2) -> bool) -> Option<f32> {
+fn intersect_quad(ray: &Ray, centre: Vec3, right: Vec3, up: Vec3, cut: fn(Vec2) -> bool) -> Option<f32> {
     let normal = right.cross(up);
     let t = (centre - ray.origin).dot(normal) / ray.direction.dot(normal);
     let uv = quad_uv(ray.at(t) - centre, right, up);
     (t.is_finite() && uv.abs().max_element() <= 1.0 && cut(uv)).then_some(t)
 }
 
-fn meet_cuboid(ray: &Ray, centre: Vec3, axes: Mat3, half: Vec3) -> Option<f32> {
+fn intersect_cuboid(ray: &Ray, centre: Vec3, axes: Mat3, half: Vec3) -> Option<f32> {
     let inverse = (axes.transpose() * ray.direction).recip();
     let middle = (axes.transpose() * (centre - ray.origin)) * inverse;
     let reach = half * inverse.abs();
@@ -220,7 +220,7 @@ fn meet_cuboid(ray: &Ray, centre: Vec3, axes: Mat3, half: Vec3) -> Option<f32> {
 }
 
 /// Metres along the ray to a cone with round ends.
-fn meet_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> Option<f32> {
+fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> Option<f32> {
     let (origin, along_m) = ray.near(0.5 * (a + b));
     let (ab, oa, ob, d) = (b - a, origin - a, origin - b, ray.unit);
     let shrink = radius_a - radius_b;
@@ -247,7 +247,7 @@ fn meet_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> Optio
     t.is_finite().then_some(along_m + t)
 }
 
-fn meet_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_radius: f32) -> Option<f32> {
+fn intersect_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_radius: f32) -> Option<f32> {
     let (start, along_m) = ray.near(base + 0.5 * height * Vec3::Y);
     let (o, d) = (start - base, ray.unit);
     let slope = (high_radius - low_radius) / height;
@@ -266,7 +266,7 @@ fn meet_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_radius
         .find(|t| *t > 0.0)
 }
 
-fn meet_field(ray: &Ray, distance: Distance, bounds: &Bounds, guide: &Grid, t_max: f32) -> Option<f32> {
+fn intersect_field(ray: &Ray, distance: Distance, bounds: &Bounds, guide: &Grid, t_max: f32) -> Option<f32> {
     let (mut t, leave) = bounds.span(ray, t_max)?;
     for _ in 0..FIELD_STEPS {
         let p = ray.at(t);

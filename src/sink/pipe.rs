@@ -1,4 +1,4 @@
-//! Writing to who may not read: nobody waits there for ever.
+//! Writes to a pipe whose reader may stall, without blocking for ever.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Write};
@@ -52,7 +52,7 @@ impl Write for Pipe {
         let Some(chunk_bytes) = self.chunk_bytes else { return self.file.write(bytes) };
         let began = Instant::now();
         loop {
-            if has_room(&self.file)? {
+            if wait_for_room(&self.file)? {
                 match self.file.write(&bytes[..bytes.len().min(chunk_bytes)]) {
                     Err(error) if error.kind() == ErrorKind::WouldBlock => {}
                     written => return written,
@@ -69,8 +69,8 @@ impl Write for Pipe {
     }
 }
 
-/// Waits for room, but not long.
-fn has_room(file: &File) -> io::Result<bool> {
+/// Waits up to [`TICK`] for room; gives back whether there is any.
+fn wait_for_room(file: &File) -> io::Result<bool> {
     let mut ends = [PollFd::new(file, PollFlags::OUT)];
     let tick = Timespec { tv_sec: 0, tv_nsec: TICK.as_nanos() as i64 };
     match poll(&mut ends, Some(&tick)) {

@@ -175,7 +175,7 @@ impl Places {
                 Ok(_) => Err(NodeError::NotADevice(path)),
                 // Whoever opens it learns why it cannot be looked at.
                 Err(error) if error.kind() != io::ErrorKind::NotFound => Ok(path),
-                Err(_) => Err(none(name, &self.nodes())),
+                Err(_) => Err(not_found(name, &self.nodes())),
             };
         }
         let number = name.parse::<u32>().ok().map(|number| self.dev.join(format!("video{number}")));
@@ -231,9 +231,8 @@ fn by_card<'a>(name: &str, nodes: &'a [Node]) -> Result<&'a Node, NodeError> {
         nodes.iter().filter(fits).collect()
     };
     let candidates = [Kind::Capture, Kind::Virtual].into_iter().map(named).find(|found| !found.is_empty());
-    match candidates.as_deref() {
-        _ if name.is_empty() => Err(none(name, nodes)),
-        None => Err(none(name, nodes)),
+    match candidates.as_deref().filter(|_| !name.is_empty()) {
+        None => Err(not_found(name, nodes)),
         Some([only]) => Ok(only),
         Some(several) => {
             let candidates = several.iter().map(|node| node.with_link()).collect();
@@ -242,7 +241,7 @@ fn by_card<'a>(name: &str, nodes: &'a [Node]) -> Result<&'a Node, NodeError> {
     }
 }
 
-fn none(name: &str, nodes: &[Node]) -> NodeError {
+fn not_found(name: &str, nodes: &[Node]) -> NodeError {
     let there = nodes.iter().filter(|node| node.captures).map(ToString::to_string).collect();
     NodeError::None { name: name.to_owned(), there }
 }

@@ -61,16 +61,22 @@ impl WithSimd for Band<'_> {
 }
 
 impl Band<'_> {
+    /// Adds one block of columns to every bin that it contributes to. In the first pass a block in which anything is hidden
+    /// does the bins in front alone, and waits for the fill with the others; the second pass ([`Hidden::Filled`]) does
+    /// those blocks.
     #[inline(always)]
     fn block<V: Simd>(&mut self, simd: V, block: usize) {
-        let columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
-        let rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
-        let (again, waits) = match &self.hidden {
+        // One tile more on every side: a cell's means take in pixels of its neighbours.
+        let tile_columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
+        let tile_rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
+        let (second_pass, waits) = match &self.hidden {
             Hidden::Nothing => (false, false),
-            Hidden::Waits(behind, _) => (false, self.tiles.lack(behind, columns.clone(), rows.clone())),
+            Hidden::Waits(behind, _) => {
+                (false, self.tiles.any_outside(behind, tile_columns.clone(), tile_rows.clone()))
+            }
             Hidden::Filled(_) => (true, false),
         };
-        if again && !self.waits[block] {
+        if second_pass && !self.waits[block] {
             return;
         }
         self.waits[block] = waits;
@@ -82,8 +88,10 @@ impl Band<'_> {
             let front = |share: &Share| share.behind.0 <= 0.0;
             *active = match &bin.share {
                 None => true,
-                Some(share) if waits => front(share) && self.tiles.meet(share, columns.clone(), rows.clone()),
-                Some(share) => again || self.tiles.meet(share, columns.clone(), rows.clone()),
+                Some(share) if waits => {
+                    front(share) && self.tiles.any_within(share, tile_columns.clone(), tile_rows.clone())
+                }
+                Some(share) => second_pass || self.tiles.any_within(share, tile_columns.clone(), tile_rows.clone()),
             };
             if *active {
                 reach = reach.max(bin.scale as isize / 2);

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::filter::{BLOCK, Taps, along_column, along_columns, along_row, keep_in_range};
+use super::filter::{BLOCK, Taps, along_column, along_column_block, along_row, keep_in_range};
 use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_ROW, Strips};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
@@ -145,20 +145,21 @@ impl Strip<'_> {
             for above in next.max(y.saturating_sub(self.reach))..(y + self.reach + BLOCK).min(self.size.1) {
                 let row = &mut scratch[above % ring * row_len..][..row_len];
                 if self.scratch.filtered[above / CELL] {
-                    self.row::<S, R, EVEN, P>(simd, first, above, row);
+                    self.filter_row::<S, R, EVEN, P>(simd, first, above, row);
                 } else {
                     row.fill(0.0);
                 }
                 next = above + 1;
             }
             let rows = y..(y + BLOCK).min(self.size.1);
-            self.columns::<S, R, EVEN, P>(simd, first, rows, &scratch[..ring * row_len]);
+            self.filter_columns::<S, R, EVEN, P>(simd, first, rows, &scratch[..ring * row_len]);
         }
         self.scratch.rows = scratch;
     }
 
+    /// The horizontal pass over row `y`: `R` terms from `first` on, all planes of each in turn in `out`.
     #[inline(always)]
-    fn row<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
+    fn filter_row<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
         &mut self,
         simd: S,
         first: usize,
@@ -166,6 +167,7 @@ impl Strip<'_> {
         out: &mut [f32],
     ) {
         let mut line = std::mem::take(&mut self.scratch.line);
+        // The source's rows are copied `PIECE` columns at a time.
         let pad = self.reach.next_multiple_of(PIECE);
         let span = STRIP + 2 * pad;
         self.source.line(self.strip, y, self.size.0, pad, &mut line);
@@ -192,8 +194,9 @@ impl Strip<'_> {
         self.scratch.line = line;
     }
 
+    /// The vertical pass for the rows `ys` of the result, from the ring of filtered `rows`.
     #[inline(always)]
-    fn columns<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
+    fn filter_columns<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
         &mut self,
         simd: S,
         first: usize,
@@ -211,7 +214,7 @@ impl Strip<'_> {
                     same &= taps.steady && taps.left == shared.left;
                 }
                 if same {
-                    let sums = along_columns::<S, R, P>(simd, &shared, rows, ys.start, x, self.size.1);
+                    let sums = along_column_block::<S, R, P>(simd, &shared, rows, ys.start, x, self.size.1);
                     for k in 0..BLOCK {
                         let y = ys.start + k;
                         self.finish::<S, R, P>(simd, first, (x, y), sums[k], &edges.at(strip, y));

@@ -22,6 +22,7 @@ pub struct Pyramid {
     levels: Vec<Level>,
     /// How far a pixel of the finest level is covered by something near.
     hidden: Vec<f32>,
+    /// Which parts are handed out, for the two that are written at once: `rows` and `hidden`. As many as there can be.
     taken: [Vec<AtomicBool>; 2],
 }
 
@@ -89,7 +90,7 @@ impl Pyramid {
 
     /// Fills the holes once the finest level is laid.
     pub fn fill(&mut self, workers: &mut ThreadPool) {
-        self.know(workers);
+        self.finish_base(workers);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
@@ -120,7 +121,7 @@ impl Pyramid {
     }
 
     /// Known is what nothing near touches, nor its neighbours.
-    fn know(&mut self, workers: &mut ThreadPool) {
+    fn finish_base(&mut self, workers: &mut ThreadPool) {
         let level = &mut self.levels[0];
         let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
         let hidden = &self.hidden;

@@ -121,10 +121,11 @@ pub fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, co
     sums
 }
 
-/// The vertical pass for `BLOCK` rows from `y` on that have the same taps: a row above or below belongs to the sums of
-/// all of them, so it is read once instead of `BLOCK` times.
+/// The vertical pass for one vector of columns and `BLOCK` rows from `y` on that have the same taps, the same along the
+/// vector: a row above or below belongs to the sums of all of them, so it is read once instead of `BLOCK` times. `R` terms;
+/// `P` planes, 3 without coverage and else 4.
 #[inline(always)]
-pub fn along_columns<S: Simd, const R: usize, const P: usize>(
+pub fn along_column_block<S: Simd, const R: usize, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     rows: &[f32],
@@ -133,20 +134,20 @@ pub fn along_columns<S: Simd, const R: usize, const P: usize>(
     height: usize,
 ) -> [[S::f32s; 4]; BLOCK] {
     let row_len = R * 4 * STRIP;
-    let last = rows.len() / row_len - 1;
+    let ring_mask = rows.len() / row_len - 1;
     let mut sums = [[simd.splat_f32s(0.0); 4]; BLOCK];
     let reach = taps.reach as isize;
-    for above in -reach..BLOCK as isize + reach {
+    for offset in -reach..BLOCK as isize + reach {
         // Beyond the picture its outermost row goes on; rows lie in a ring, a power of two of them.
-        let inside = (y as isize + above).clamp(0, height as isize - 1) as usize;
-        let row = &rows[(inside & last) * row_len..][..row_len];
+        let inside = (y as isize + offset).clamp(0, height as isize - 1) as usize;
+        let row = &rows[(inside & ring_mask) * row_len..][..row_len];
         for r in 0..R {
             let mut values = [simd.splat_f32s(0.0); P];
             for p in 0..P {
                 values[p] = load::<S>(row, (r * 4 + p) * STRIP + x);
             }
             for k in 0..BLOCK {
-                let j = above - k as isize;
+                let j = offset - k as isize;
                 if j.abs() <= reach {
                     let weight = simd.splat_f32s(taps.table[taps.left.wrapping_add_signed(j * taps.step) + r]);
                     for p in 0..P {
@@ -173,8 +174,8 @@ pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool,
     let row_len = R * 4 * STRIP;
     let weights = taps.at::<S, VARY>(simd, 0);
     // Rows lie in a ring, a power of two of them.
-    let last = rows.len() / row_len - 1;
-    let here = &rows[(y & last) * row_len..][..row_len];
+    let ring_mask = rows.len() / row_len - 1;
+    let here = &rows[(y & ring_mask) * row_len..][..row_len];
     let mut sums = [simd.splat_f32s(0.0); 4];
     for r in 0..R {
         for p in 0..P {
@@ -182,8 +183,8 @@ pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool,
         }
     }
     for j in 1..=taps.reach {
-        let below = &rows[((y + j).min(height - 1) & last) * row_len..][..row_len];
-        let above = &rows[(y.saturating_sub(j) & last) * row_len..][..row_len];
+        let below = &rows[((y + j).min(height - 1) & ring_mask) * row_len..][..row_len];
+        let above = &rows[(y.saturating_sub(j) & ring_mask) * row_len..][..row_len];
         let weights = taps.at::<S, VARY>(simd, j as isize);
         let opposite = if EVEN { weights } else { taps.at::<S, VARY>(simd, -(j as isize)) };
         for r in 0..R {

@@ -180,7 +180,7 @@ impl CpuBokeh {
         for k in 0..self.plan.bins.len() {
             let bin = &self.plan.bins[k];
             let slot = &mut self.slots[bin.slot];
-            let meets = || self.tiles.meet(&self.plan.share(k), 0..self.tiles.across, 0..self.tiles.down);
+            let meets = || self.tiles.any_within(&self.plan.share(k), 0..self.tiles.across, 0..self.tiles.down);
             slot.present = !layered || (fills && !bin.near) || meets();
             slot.shape(&self.plan, bin);
         }

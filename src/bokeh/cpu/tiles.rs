@@ -55,7 +55,7 @@ impl Tiles {
     }
 
     /// Whether any CoC of some tiles does not have the whole share.
-    pub fn lack(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
+    pub fn any_outside(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
         let columns = columns.start.min(self.across)..columns.end.min(self.across);
         (rows.start..rows.end.min(self.down)).any(|row| {
             let at = row * self.across;
@@ -64,7 +64,7 @@ impl Tiles {
     }
 
     /// Whether any CoC of some tiles has a share; columns and rows of tiles are cut at the picture's end.
-    pub fn meet(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
+    pub fn any_within(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
         let columns = columns.start.min(self.across)..columns.end.min(self.across);
         (rows.start..rows.end.min(self.down)).any(|row| {
             let at = row * self.across;

@@ -18,7 +18,7 @@ pub trait Eye: Send {
     /// As [`Camera::info`].
     fn info(&self) -> SourceInfo;
 
-    /// As [`Camera::next`], waiting no longer than `patience`; frames have the time they were taken at.
+    /// As [`Camera::next`], waiting no longer than `patience`; `captured_ns` of the frame is set.
     fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured;
 
     /// As [`Camera::rest`].

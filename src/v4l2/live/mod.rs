@@ -4,7 +4,7 @@
 mod address;
 pub mod error;
 pub mod knobs;
-mod light;
+mod low_rate;
 pub mod negotiate;
 mod recover;
 mod session;
@@ -17,7 +17,7 @@ pub use negotiate::Wish;
 pub use session::{Agreed, Setting};
 
 use address::Address;
-use light::Light;
+use low_rate::LowRateCheck;
 use session::Session;
 use watchdog::Watchdog;
 
@@ -37,7 +37,7 @@ pub struct Live {
     agreed: Agreed,
     state: State,
     watchdog: Watchdog,
-    light: Light,
+    low_rate: LowRateCheck,
     losses: Losses,
     /// The first frame was asked for.
     begun: bool,
@@ -69,6 +69,7 @@ pub enum Next {
     },
     /// Frames that nobody will see. Each is told once, before the frame that follows them.
     Lost(Losses),
+    /// No frame yet, or the device is away: ask again.
     Waiting,
 }
 
@@ -115,7 +116,7 @@ impl Live {
             agreed,
             state: State::Streaming(Box::new(session)),
             watchdog: Watchdog::new(agreed.interval.period_ns(), now_ns),
-            light: Light::new(agreed.interval.fps(), now_ns),
+            low_rate: LowRateCheck::new(agreed.interval.fps(), now_ns),
             losses: Losses::default(),
             begun: false,
             given: false,
@@ -152,7 +153,7 @@ impl Live {
                     // Frames that came while the program got ready are nobody's loss.
                     session.queue.begin();
                     self.watchdog.started(self.clock.now_ns());
-                    self.light.restarted(self.clock.now_ns());
+                    self.low_rate.restarted(self.clock.now_ns());
                 }
                 // One that waits because losses were told before it.
                 if session.queue.current().is_none() {
@@ -179,11 +180,11 @@ impl Live {
                 self.reopen();
             }
         }
-        self.tell()
+        self.report()
     }
 
     /// What there is to say: losses first.
-    fn tell(&mut self) -> Next {
+    fn report(&mut self) -> Next {
         if let State::Streaming(session) = &mut self.state {
             add(&mut self.losses, session.queue.take_losses());
         }
@@ -237,14 +238,14 @@ impl Live {
         let told = if session.is_loopback() {
             None
         } else {
-            self.light.frames(1 + losses.stale + losses.corrupt, losses.missed, now_ns)
+            self.low_rate.frames(1 + losses.stale + losses.corrupt, losses.missed, now_ns)
         };
         if let Some(fps) = told {
-            self.complain_of_light(fps);
+            self.warn_of_low_rate(fps);
         }
     }
 
-    fn complain_of_light(&self, fps: f64) {
+    fn warn_of_low_rate(&self, fps: f64) {
         let State::Streaming(session) = &self.state else { return };
         const CONTROL: &str = "exposure_dynamic_framerate";
         let controls = controls::list(session.device()).unwrap_or_default();

@@ -35,7 +35,7 @@ impl Live {
                 session.queue.stop();
                 let started = session.queue.start();
                 self.watchdog.started(self.clock.now_ns());
-                self.light.restarted(self.clock.now_ns());
+                self.low_rate.restarted(self.clock.now_ns());
                 if let Err(error) = started {
                     if error::is_gone(&error) {
                         self.failed(&error);
@@ -70,7 +70,7 @@ impl Live {
                 }
                 self.state = State::Streaming(Box::new(session));
                 self.watchdog.started(now_ns);
-                self.light.restarted(now_ns);
+                self.low_rate.restarted(now_ns);
             }
             Err(error) if error.is_gone() => {
                 self.watchdog.gone(now_ns);

@@ -14,6 +14,8 @@ mod marker {
     pub const EXTENDED: u8 = 0xC1;
     pub const PROGRESSIVE: u8 = 0xC2;
     pub const DHT: u8 = 0xC4;
+    /// For private use in arithmetic coding; without content.
+    pub const TEM: u8 = 0x01;
     pub const JPG: u8 = 0xC8;
     pub const DAC: u8 = 0xCC;
     pub const RST: std::ops::RangeInclusive<u8> = 0xD0..=0xD7;
@@ -142,19 +144,19 @@ impl Frame {
     }
 }
 
-/// The marker that `rest` begins with: its code, it with its content, and what follows. None at the end.
+/// The next marker in `rest`, whatever comes before it: its code, the segment with the marker, and what follows. `None` if
+/// there is none or it is cut short.
 fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
-    // A marker may be preceded by fill bytes; anything else between segments is passed over.
     let at = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xFF))?;
     let (code, after) = (rest[at + 1], &rest[at + 2..]);
-    if matches!(code, marker::SOI | marker::EOI | 0x01) || marker::RST.contains(&code) {
+    if matches!(code, marker::SOI | marker::EOI | marker::TEM) || marker::RST.contains(&code) {
         return Some((code, &rest[at..at + 2], after));
     }
     let &[high, low] = after.first_chunk()?;
+    // The length counts its own two bytes; less is damage.
     let length = usize::from(u16::from_be_bytes([high, low])).max(2);
-    // Cut short within a header: as if it were not there.
-    let end = after.get(length..)?;
-    Some((code, &rest[at..at + 2 + length], end))
+    let following = after.get(length..)?;
+    Some((code, &rest[at..at + 2 + length], following))
 }
 
 /// Copies coded bits up to the next marker that ends them; returns what follows, from that marker on, and the number

@@ -116,7 +116,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
         note("the pictures are rectified by the calibration: the result is that of the rectified left picture".into());
     }
     let left = luma_of(&color);
-    let disparities = command.disparities(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
+    let disparities = command.disparity_range(geometry.and_then(|geometry| geometry.disparities), size.0, &note)?;
     let (adapter, threads) = (command.adapter.clone(), command.threads);
     let computing = Computing { backend: command.backend, adapter, threads };
     let mut matcher = computing.matcher(disparities, command.effort, size)?;
@@ -218,8 +218,9 @@ impl DepthCommand {
         }
     }
 
-    /// How many disparities are tried on pictures of `width` columns, of which the calibration may have `stated` some.
-    fn disparities(&self, stated: Option<u32>, width: u32, note: &dyn Fn(String)) -> Result<u32, CliError> {
+    /// How many disparities are searched in pictures `width` px wide: what `--max-disparity` says, else what the calibration
+    /// has `stated`, else [`DISPARITIES`]; never more than fit. A multiple of 16, as the matcher takes them.
+    fn disparity_range(&self, stated: Option<u32>, width: u32, note: &dyn Fn(String)) -> Result<u32, CliError> {
         // A disparity is less than the width.
         let most = (width.saturating_sub(1) / 16 * 16).min(Settings::MOST_DISPARITIES);
         if most == 0 {

@@ -189,7 +189,7 @@ impl Inside {
         }
         for (k, bin) in plan.bins.iter().enumerate() {
             self.look_at(bokeh, k, bin);
-            self.plan.bins.push(entry(bokeh, (k, bin), &coc_px, depth, field));
+            self.plan.bins.push(bin_entry(bokeh, (k, bin), &coc_px, depth, field));
         }
     }
 
@@ -234,8 +234,8 @@ impl Inside {
     }
 }
 
-/// A bin in numbers.
-fn entry(
+/// The statistics of bin `k` for `plan.json`.
+fn bin_entry(
     bokeh: &CpuBokeh,
     (k, bin): (usize, &Bin),
     coc_px: &[f32],
@@ -243,7 +243,7 @@ fn entry(
     field: &CocField,
 ) -> BinEntry {
     let share = bokeh.plan().share(k);
-    // A bin of the comparison methods, or the only one, has everything.
+    // The only bin of the gather has every pixel; elsewhere a pixel belongs to the bin that has most of it.
     let belongs = |coc_px: f32| bokeh.plan().compositing == Compositing::Gather || share.at(coc_px) > 0.5;
     let content = || coc_px.iter().copied().filter(|&coc_px| belongs(coc_px));
     let depth_m = match (field, depth) {

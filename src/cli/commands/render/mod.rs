@@ -182,7 +182,8 @@ fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Opt
     Ok((color, extras, depth))
 }
 
-/// Depth from a file, in metres, or where the file has disparity without distances in those of assumed eyes.
+/// Depth in metres from a file of depth or disparity. Disparity of unknown eyes becomes depth that is right but for its
+/// scale, which is an error where the look needs real metres.
 fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
     let name = file.display();
     let options::Depth { depth_scale, depth_invalid, .. } = command.depth;

@@ -102,6 +102,7 @@ struct Row<'a> {
 impl WithSimd for Row<'_> {
     type Output = ();
     #[inline(always)]
+    // No vectors by hand: the call lets the compiler make them of these loops, as wide as the processor has them.
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { window, width, mirrored, out } = self;
         let stride = width + 2 * REACH;
@@ -111,6 +112,7 @@ impl WithSimd for Row<'_> {
             out.fill(0);
             for bit in 0..8 {
                 let (column, row) = neighbour(plane * 8 + bit);
+                // A mirrored row has its neighbours mirrored back, so that bits of both pictures mean the same.
                 let column = if mirrored { 2 * REACH - column } else { column };
                 let beside = &window[row * stride + column..][..width];
                 for ((code, &beside), &center) in out.iter_mut().zip(beside).zip(center) {

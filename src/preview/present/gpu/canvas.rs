@@ -104,7 +104,7 @@ impl Canvas {
         let pictures = [picture, before.unwrap_or_else(|| self.uploads[1].clone())];
         let window = self.window(drawing);
         self.device.queue.write_buffer(&self.window, 0, bytemuck::bytes_of(&window));
-        let bound = self.bind(pictures);
+        let bound = self.bind_group_index(pictures);
 
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut submitted = self.overlay.upload(&self.device, &mut encoder, size);
@@ -175,8 +175,9 @@ impl Canvas {
         self.uploads[k].clone()
     }
 
-    /// The index of these buffers' bindings.
-    fn bind(&mut self, pictures: [wgpu::Buffer; 2]) -> usize {
+    /// The index in `bound` of the bind group of these buffers, made if it is not there yet. Good until the next call, which
+    /// may empty a full list.
+    fn bind_group_index(&mut self, pictures: [wgpu::Buffer; 2]) -> usize {
         if let Some(bound) = self.bound.iter().position(|bound| bound.pictures == pictures) {
             return bound;
         }

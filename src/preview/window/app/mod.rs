@@ -30,7 +30,7 @@ use crate::preview::views::Views;
 use crate::stats::WindowUse;
 
 /// Instruments are laid out anew this often.
-const INSTRUMENTS: Duration = Duration::from_millis(200);
+const INSTRUMENTS_PERIOD: Duration = Duration::from_millis(200);
 /// A stop from outside is seen after this time at the latest.
 const LOOK_UP: Duration = Duration::from_millis(250);
 /// After so long without a frame, and so many periods of the source, the person is told.
@@ -54,7 +54,7 @@ pub(super) struct App {
     views: Option<Receiver<View>>,
     view: Option<View>,
     /// Whether `view` was not on the screen yet.
-    is_new: bool,
+    view_is_new: bool,
     made: Views,
     /// What `made` shows.
     drawn: Shown,
@@ -108,7 +108,7 @@ impl App {
             rung,
             views: None,
             view: None,
-            is_new: false,
+            view_is_new: false,
             made: Views::default(),
             drawn: Shown::default(),
             settings: None,
@@ -194,7 +194,7 @@ impl App {
                 _ => None,
             };
             self.view = Some(view);
-            self.is_new = true;
+            self.view_is_new = true;
             changed = true;
             if self.snapshot_due {
                 self.snapshot();
@@ -294,8 +294,8 @@ impl ApplicationHandler<()> for App {
         let Some(gfx) = &mut self.gfx else { return };
         match &event {
             WindowEvent::RedrawRequested => {
-                let instruments = self.state.instruments && self.is_new && self.laid_out.elapsed() >= INSTRUMENTS;
-                if instruments || self.layout_at.is_some_and(|at| at <= Instant::now()) {
+                let due = self.state.instruments && self.view_is_new && self.laid_out.elapsed() >= INSTRUMENTS_PERIOD;
+                if due || self.layout_at.is_some_and(|at| at <= Instant::now()) {
                     self.lay_out(events);
                 }
                 return self.draw(events);
@@ -303,6 +303,7 @@ impl ApplicationHandler<()> for App {
             WindowEvent::CloseRequested => return events.exit(),
             WindowEvent::Occluded(hidden) => {
                 self.covered = *hidden;
+                // What waits while nobody can see it is no latency.
                 self.input_at = None;
                 return self.ask_for_redraw();
             }

@@ -103,7 +103,7 @@ impl App {
         let hidden = self.is_hidden();
         let Some(gfx) = self.gfx.as_mut().filter(|_| !hidden) else { return };
         let shown = self.state.shown;
-        if let Some(view) = self.view.as_ref().filter(|_| self.is_new || self.drawn != shown) {
+        if let Some(view) = self.view.as_ref().filter(|_| self.view_is_new || self.drawn != shown) {
             self.made.draw(shown, view, self.settings.as_ref());
             self.drawn = shown;
             self.state.legend = self.made.legend();
@@ -135,7 +135,7 @@ impl App {
             self.state.note(GPU_FAILED);
         }
         let now_ns = self.clock.now_ns();
-        if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.is_new)) {
+        if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.view_is_new)) {
             self.state.meters.presented(view, now_ns, now_ns - began_ns);
         }
         if let Some(input_at) = self.input_at.take() {

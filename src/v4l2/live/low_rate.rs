@@ -2,7 +2,7 @@
 
 /// Measures a camera's rate.
 #[derive(Debug)]
-pub struct Light {
+pub struct LowRateCheck {
     nominal_fps: f64,
     /// Frames of the present window, and when it began.
     window: Option<(u64, u64)>,
@@ -14,7 +14,7 @@ const WINDOW_NS: u64 = 3_000_000_000;
 /// Less than this part of the stated rate is well below it.
 const WELL_BELOW: f64 = 0.75;
 
-impl Light {
+impl LowRateCheck {
     /// Of a camera that says it gives so many frames per second, and starts at `now_ns`.
     pub fn new(nominal_fps: f64, now_ns: u64) -> Self {
         Self { nominal_fps, window: Some((0, now_ns + SETTLE_NS)), done: false }
@@ -56,10 +56,10 @@ mod tests {
 
     /// What is told of a camera of 30 fps that gives `fps` for so many seconds, missing one of `missing`.
     fn told(fps: f64, seconds: f64, missing: Option<u64>) -> Vec<f64> {
-        let mut light = Light::new(30.0, 0);
+        let mut check = LowRateCheck::new(30.0, 0);
         let frames = (0..(fps * seconds) as u64).filter_map(|frame| {
             let missed = missing.is_some_and(|missing| frame % missing == 0);
-            light.frames(1, u64::from(missed), (frame as f64 / fps * 1e9) as u64)
+            check.frames(1, u64::from(missed), (frame as f64 / fps * 1e9) as u64)
         });
         frames.collect()
     }
