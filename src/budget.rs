@@ -1,4 +1,4 @@
-//! Time and what it buys: the quality ladder, and the governor that picks its rung.
+//! The time budget: the quality ladder, and the governor that picks its rung.
 
 mod governor;
 mod quality;

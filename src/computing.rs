@@ -50,7 +50,7 @@ impl Computing {
         bokeh::create(settings, size, self.backend, self.adapter.as_deref(), self.threads)
     }
 
-    /// A matcher of pairs of `size` pixels that tries so many `disparities`.
+    /// A stereo matcher for pairs of `size` pixels that tries so many `disparities`.
     ///
     /// # Errors
     /// There is no such GPU.

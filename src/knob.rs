@@ -1,17 +1,17 @@
-//! What of a camera a person turns.
+//! Camera controls that a person can adjust.
 
-/// A control with a number that a person understands: brightness, exposure, white balance, zoom, focus and the like.
+/// A camera control with a numeric value that a person understands: brightness, exposure, white balance, zoom, focus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Knob {
-    /// Its name as tools write it: `exposure_time_absolute`.
+    /// Its name as `v4l2-ctl` writes it: `exposure_time_absolute`.
     pub name: String,
-    /// What it is set to.
+    /// Its current value.
     pub value: i64,
     /// Least and largest value, and the step between, at least 1.
     pub range: (i64, i64, i64),
-    /// Names of the values of a menu, by value; empty otherwise.
+    /// Value and name of each menu item; empty for other controls.
     pub menu: Vec<(i64, String)>,
-    /// Whether it is on (1) or off (0).
+    /// Whether it is boolean: 0 is off, 1 is on.
     pub switch: bool,
     /// Whether it can be changed now, and has an effect.
     pub active: bool,

@@ -13,21 +13,21 @@ pub trait Named: Copy + PartialEq + 'static {
     fn help(self) -> &'static str;
 }
 
-/// The value that is called `text`.
+/// Parses the name of a value.
 ///
 /// # Errors
-/// There is none: the names that there are.
+/// No value has this name: the message lists the names that are accepted.
 pub fn parse<T: Named>(text: &str) -> Result<T, String> {
     T::VALUES.iter().copied().find(|value| value.name() == text).ok_or_else(|| {
         let mut accepted = String::from("use ");
         for (k, value) in T::VALUES.iter().enumerate() {
-            let before = match k {
+            let separator = match k {
                 0 => "",
                 _ if k + 1 == T::VALUES.len() => " or ",
                 _ => ", ",
             };
             // Writing to a String cannot fail.
-            let _ = write!(accepted, "{before}{}", value.name());
+            let _ = write!(accepted, "{separator}{}", value.name());
         }
         accepted
     })

@@ -103,8 +103,8 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Every frame of `camera`, blurred as `look` says, into `sink`, as fast as it goes. `depth` gives their depth, in metres
-    /// as it was measured, where the look follows depth and the camera does not bring it. `stop` ends it.
+    /// A run of every frame of `camera`, blurred as `look` says, into `sink`, as fast as it goes. `depth` gives their
+    /// measured depth in metres where the look follows depth and the camera does not bring it. `stop` ends the run.
     ///
     /// # Errors
     /// The blur is too wide for the pictures, or there is no such GPU.
@@ -148,10 +148,10 @@ struct Frame<T> {
     item: T,
 }
 
-/// Runs the pipeline to the end of its frames, its sink, or the stop flag, and completes the output, whatever came between.
+/// Runs the pipeline until its frames or its sink end or the stop flag is set, and completes the output in any case.
 ///
 /// # Errors
-/// The fault of the stage that failed; a panic is one. The output then has the frames until there. The error carries the
+/// The fault of the stage that failed; a panic is one. The output then has the frames until there. The error has the
 /// report.
 pub fn run(run: Run) -> Result<Report, PipelineError> {
     let Run { camera, depth: source, bokeh: executor, mut sink, pace, clock, .. } = run;
@@ -184,6 +184,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let quality = run.look.quality_rule(run.adaptive);
     let live_ns = (pace == Pace::Realtime).then_some(info.period_ns);
     let (began_ns, cpu_ns) = (clock.now_ns(), clock::cpu_ns());
+    // Set when any stage ends, so that capture does, too.
     let over = AtomicBool::new(false);
     let in_blur = match (&executor, &run.changes) {
         (_, Some(_)) => MOST_IN_FLIGHT,
@@ -296,7 +297,7 @@ fn finest_quality(executor: Option<&dyn Bokeh>) -> Quality {
     }
 }
 
-/// Hands a frame on; gives back whether there is anybody to take more.
+/// Hands a frame on, and counts an older one that it displaced; returns whether there is anybody to take more.
 fn hand_on<T>(to: &mut Sender<Frame<T>>, frame: Frame<T>, tally: &Tally) -> bool {
     match to.send(frame) {
         Ok(None) => true,
@@ -311,6 +312,7 @@ fn hand_on<T>(to: &mut Sender<Frame<T>>, frame: Frame<T>, tally: &Tally) -> bool
 
 type Ended = Result<(), Fault>;
 
+/// Starts the thread of a stage.
 fn spawn<'scope>(
     scope: &'scope Scope<'scope, '_>,
     stage: &'static str,

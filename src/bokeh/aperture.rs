@@ -103,29 +103,31 @@ impl Aperture {
         Mask { size, extent, values }
     }
 
-    /// Transmittance at a point in units of the aperture's radius.
+    /// Transmittance, 0 to 1, at a point in units of the aperture's radius, with a soft edge of width `rim`.
     fn transmittance(&self, x: f64, y: f64, rim: f64) -> f64 {
         let radius = x.hypot(y);
         if let Shape::Picture(picture) = &self.shape {
-            return picture.sample(x, y, rim) * self.radial(radius.min(1.0));
+            return picture.sample(x, y, rim) * self.radial_intensity(radius.min(1.0));
         }
-        let outline = self.outline(y.atan2(x));
-        let mut value = ramp(radius, outline, rim) * self.radial((radius / outline).min(1.0));
+        let outline = self.outline_radius(y.atan2(x));
+        let mut value = ramp(radius, outline, rim) * self.radial_intensity((radius / outline).min(1.0));
         if let Shape::Ring { inner } = self.shape
             && inner > 0.0
         {
+            // A rim wider than the hole would close it.
             value *= 1.0 - ramp(radius, f64::from(inner), rim.min(f64::from(inner)));
         }
         value
     }
 
     /// Distance of the outline from the centre in the direction `angle` (radians, clockwise from +x as y is down).
-    fn outline(&self, angle: f64) -> f64 {
+    fn outline_radius(&self, angle: f64) -> f64 {
         match self.shape {
             Shape::Disc | Shape::Ring { .. } | Shape::Picture(_) => 1.0,
             Shape::Polygon { blades, rotation_deg, curvature } => {
                 let (half, bend) = (PI / f64::from(blades.max(3)), f64::from(curvature).clamp(0.0, 1.0));
                 let from_corner = (angle - PI - f64::from(rotation_deg).to_radians()).rem_euclid(2.0 * half);
+                // The polar form of the straight edge between two corners, bent towards the circle.
                 half.cos() / (from_corner - half).cos() * (1.0 - bend) + bend
             }
             Shape::Heart => heart_outline(angle),
@@ -139,15 +141,16 @@ impl Aperture {
         }
     }
 
-    /// Radial intensity at `t` = 0 (centre) to 1 (outline).
-    fn radial(&self, t: f64) -> f64 {
+    /// Radial intensity at `t` = 0 (centre) to 1 (outline). Even a full soap bubble keeps 15 % in its centre.
+    fn radial_intensity(&self, t: f64) -> f64 {
         let strength = f64::from(self.intensity).clamp(-1.0, 1.0);
         if strength >= 0.0 { 1.0 - strength * t * t } else { 1.0 + strength * (1.0 - t.powi(4)) * 0.85 }
     }
 }
 
 impl Picture {
-    /// Box average of the picture over a square of side `rim`, zero outside of it.
+    /// Transmittance at a point in units of the aperture's radius: the mean over a square of side `rim`, which softens
+    /// the picture. It is black all around.
     fn sample(&self, x: f64, y: f64, rim: f64) -> f64 {
         const TAPS: i32 = 3;
         let half_px = f64::from(self.width.max(self.height)) / 2.0;
@@ -169,8 +172,8 @@ fn ramp(radius: f64, edge: f64, rim: f64) -> f64 {
     if rim <= 0.0 { f64::from(u8::from(radius <= edge)) } else { ((edge - radius) / rim + 0.5).clamp(0.0, 1.0) }
 }
 
-/// Radius of the heart (x^2 + y^2 - 1)^3 = x^2 y^3 in direction `angle`, upright for y down and scaled to fit the square
-/// from -1 to 1; found by bisection. Never 0, so that one may divide by it.
+/// Radius of the heart (x^2 + y^2 - 1)^3 = x^2 y^3 in direction `angle`, upright for y down and scaled to fit the
+/// square from -1 to 1; found by bisection. Never 0, so that one may divide by it.
 fn heart_outline(angle: f64) -> f64 {
     const SCALE: f64 = 1.0 / 1.25;
     let (sin, cos) = (-(angle.sin()), angle.cos());
@@ -207,14 +210,15 @@ impl Mask {
 /// shape (Vogel's spiral, those outside left out). A pixel `p` sees depth `z` at `p + c(z) u`, so that a far highlight
 /// shows the shape upright.
 pub fn lens_points(aperture: &Aperture, count: usize) -> Vec<glam::DVec2> {
-    let golden = PI * (3.0 - 5f64.sqrt());
+    let golden_angle = PI * (3.0 - 5f64.sqrt());
     let open = |p: &glam::DVec2| aperture.transmittance(p.x, p.y, 0.0) > 0.5;
     let spiral = |n: usize| {
         (0..n).map(move |k| {
             let radius = ((k as f64 + 0.5) / n as f64).sqrt();
-            glam::DVec2::from_angle((k as f64 * golden) % TAU) * radius
+            glam::DVec2::from_angle((k as f64 * golden_angle) % TAU) * radius
         })
     };
+    // The open share of the disc: the spiral has to be so much denser for `count` points to be left.
     let share = spiral(4096).filter(open).count().max(1) as f64 / 4096.0;
     spiral((count as f64 / share).round() as usize).filter(open).map(|p| -p).collect()
 }

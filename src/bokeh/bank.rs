@@ -10,8 +10,8 @@ use super::low_rank::Decomposition;
 /// Filters are tabulated at every `1 / STEPS_PER_PX` of a pixel of radius, up to twice [`OCTAVES_FROM_PX`].
 pub const STEPS_PER_PX: f32 = 16.0;
 
-/// From this radius on each octave has as many nodes, so that a step is the same share of the radius: what a table takes
-/// grows with the largest radius, and not with its square. A power of two.
+/// From this radius on every octave has equally many nodes, so that a step is the same share of the radius: the table's
+/// size grows with the largest radius, and not with its square. A power of two.
 pub const OCTAVES_FROM_PX: f32 = 16.0;
 
 /// Nodes of an octave: the step of [`STEPS_PER_PX`] goes on in the first one.
@@ -48,14 +48,14 @@ impl Bank {
         Self::of(&Decomposition::of(mask), mask, rank, max_radius_px)
     }
 
-    /// The same where the mask's decomposition is there already.
+    /// As [`Bank::new`], with the decomposition of `mask` at hand.
     pub fn of(svd: &Decomposition, mask: &Mask, rank: Rank, max_radius_px: f32) -> Self {
         let terms = match rank {
             Rank::Terms(n) => (n as usize).clamp(1, svd.numerical_rank()),
             Rank::Full => svd.numerical_rank(),
         };
         let n = svd.size;
-        // A tap at +j gathers what lies at +j, and so draws the aperture turned; read the profiles backwards.
+        // A tap at +j gathers what lies at +j, which draws the aperture turned; reversed profiles draw it upright.
         let cumulate = |profile: &[f64]| -> Vec<f64> {
             std::iter::once(0.0)
                 .chain(profile.iter().rev().scan(0.0, |sum, x| {
@@ -66,6 +66,7 @@ impl Bank {
         };
         let across: Vec<_> = (0..terms).map(|t| cumulate(&svd.v[t * n..][..n])).collect();
         let mut down: Vec<_> = (0..terms).map(|t| cumulate(&svd.u[t * n..][..n])).collect();
+        // The vertical taps have the singular values, and what makes all taps sum to 1.
         let total: f64 = (0..terms).map(|t| svd.sigma[t] * across[t][n] * down[t][n]).sum();
         for (t, profile) in down.iter_mut().enumerate() {
             profile.iter_mut().for_each(|x| *x *= svd.sigma[t] / total);
@@ -85,12 +86,13 @@ impl Bank {
             vertical: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
         };
         for node in 0..nodes {
+            // At radius 0, tap 0 takes the whole profile.
             let radius_px = (f64::from(node_radius_px(node)) * mask.extent).max(1e-6);
             for j in -(reach as i64)..=reach as i64 {
                 let (left, right) = ((j as f64 - 0.5) / radius_px, (j as f64 + 0.5) / radius_px);
                 for t in 0..terms {
-                    bank.horizontal.push((read(&across[t], right) - read(&across[t], left)) as f32);
-                    bank.vertical.push((read(&down[t], right) - read(&down[t], left)) as f32);
+                    bank.horizontal.push((cumulative_at(&across[t], right) - cumulative_at(&across[t], left)) as f32);
+                    bank.vertical.push((cumulative_at(&down[t], right) - cumulative_at(&down[t], left)) as f32);
                 }
             }
         }
@@ -154,7 +156,7 @@ fn nodes_up_to(radius_px: f32) -> usize {
 }
 
 /// The cumulative profile at `x` in [-1, 1], linear between its nodes, constant outside.
-fn read(cumulative: &[f64], x: f64) -> f64 {
+fn cumulative_at(cumulative: &[f64], x: f64) -> f64 {
     let last = cumulative.len() - 1;
     let at = ((x + 1.0) * 0.5 * last as f64).clamp(0.0, last as f64);
     let index = (at as usize).min(last - 1);

@@ -1,52 +1,52 @@
-//! The blur goes on when the GPU does not: on the CPU, from the oldest frame in flight on.
+//! Goes over to another executor (the CPU) when the GPU fails, from the oldest frame in flight on.
 
 use std::collections::VecDeque;
 
 use super::{Bokeh, BokehError, Finished, Job};
 use crate::compute::{Backend, GpuError};
 
-/// What makes an executor.
+/// Makes the executor to go over to.
 pub type Makes = Box<dyn FnOnce() -> Box<dyn Bokeh> + Send>;
 
-/// Runs one executor, and another one from the first fault of the GPU on. No frame is lost: those that the first had in
-/// flight are blurred anew.
+/// Runs one executor until its GPU fails, then another. No frame is lost: those in flight at the failure are blurred
+/// again by the other one.
 pub struct Fallback {
-    now: Box<dyn Bokeh>,
-    /// What makes the other one, until it is needed.
+    current: Box<dyn Bokeh>,
+    /// Makes the other executor; `None` once that runs.
     other: Option<Makes>,
-    /// What ran before, and why it does no more.
-    before: Option<String>,
-    /// Frames that wait for room.
+    /// The error of the first executor, once it has failed.
+    failure: Option<String>,
+    /// Frames that no executor has yet, oldest first: after a failure there may be more than the other one takes.
     waiting: VecDeque<Job>,
 }
 
 impl Fallback {
     /// Runs `first`, and what `other` makes once `first` fails.
     pub fn new(first: Box<dyn Bokeh>, other: Makes) -> Self {
-        Self { now: first, other: Some(other), before: None, waiting: VecDeque::new() }
+        Self { current: first, other: Some(other), failure: None, waiting: VecDeque::new() }
     }
 
-    /// Goes over to the other executor, if there still is one.
-    fn fall(&mut self, error: GpuError) -> Result<(), BokehError> {
+    /// Goes over to the other executor, or returns the error where that has happened already.
+    fn switch_over(&mut self, error: GpuError) -> Result<(), BokehError> {
         let Some(other) = self.other.take() else { return Err(error.into()) };
         tracing::warn!("{error}; the CPU blurs from here on");
-        let mut waiting: VecDeque<Job> = std::iter::from_fn(|| self.now.take_back()).collect();
+        let mut waiting: VecDeque<Job> = std::iter::from_fn(|| self.current.take_back()).collect();
         waiting.append(&mut self.waiting);
         self.waiting = waiting;
-        self.before = Some(format!("{error}"));
-        // The first goes, and with it what it has of the GPU's memory, before the other one comes.
-        self.now = Box::new(Nothing);
-        self.now = other();
+        self.failure = Some(format!("{error}"));
+        // Drops the first executor, and with it its GPU memory, before the other one allocates its own.
+        self.current = Box::new(Placeholder);
+        self.current = other();
         Ok(())
     }
 
-    /// Begins what waits, as far as there is room.
-    fn feed(&mut self) -> Result<(), BokehError> {
-        while self.now.in_flight() < self.now.capacity()
+    /// Submits waiting frames while the executor has room.
+    fn submit_waiting(&mut self) -> Result<(), BokehError> {
+        while self.current.in_flight() < self.current.capacity()
             && let Some(job) = self.waiting.pop_front()
         {
-            match self.now.submit(job) {
-                Err(BokehError::Gpu(error)) => self.fall(error)?,
+            match self.current.submit(job) {
+                Err(BokehError::Gpu(error)) => self.switch_over(error)?,
                 done => done?,
             }
         }
@@ -57,54 +57,55 @@ impl Fallback {
 impl Bokeh for Fallback {
     fn submit(&mut self, job: Job) -> Result<(), BokehError> {
         self.waiting.push_back(job);
-        self.feed()
+        self.submit_waiting()
     }
 
     fn collect(&mut self, wait: bool) -> Result<Option<Finished>, BokehError> {
+        // After a failure, the next turn submits its frames to the other executor.
         loop {
-            self.feed()?;
-            match self.now.collect(wait) {
-                Err(BokehError::Gpu(error)) => self.fall(error)?,
+            self.submit_waiting()?;
+            match self.current.collect(wait) {
+                Err(BokehError::Gpu(error)) => self.switch_over(error)?,
                 done => return done,
             }
         }
     }
 
     fn take_back(&mut self) -> Option<Job> {
-        self.now.take_back().or_else(|| self.waiting.pop_front())
+        self.current.take_back().or_else(|| self.waiting.pop_front())
     }
 
     fn in_flight(&self) -> usize {
-        self.now.in_flight() + self.waiting.len()
+        self.current.in_flight() + self.waiting.len()
     }
 
     fn capacity(&self) -> usize {
-        self.now.capacity()
+        self.current.capacity()
     }
 
     fn backend(&self) -> Backend {
-        self.now.backend()
+        self.current.backend()
     }
 
     fn backends(&self) -> &'static str {
-        match &self.before {
+        match &self.failure {
             Some(_) => "gpu, then cpu",
-            None => self.now.backends(),
+            None => self.current.backends(),
         }
     }
 
     fn describe(&self) -> String {
-        match &self.before {
-            Some(before) => format!("{before}; then {}", self.now.describe()),
-            None => self.now.describe(),
+        match &self.failure {
+            Some(failure) => format!("{failure}; then {}", self.current.describe()),
+            None => self.current.describe(),
         }
     }
 }
 
-/// In place of the first executor while the other one is made.
-struct Nothing;
+/// Stands in for the executor while the first one is dropped and the other one made.
+struct Placeholder;
 
-impl Bokeh for Nothing {
+impl Bokeh for Placeholder {
     fn submit(&mut self, _: Job) -> Result<(), BokehError> {
         Ok(())
     }

@@ -1,5 +1,5 @@
-//! The rungs that an executor is made for, and what they need in common: filters for each, memory for the most
-//! demanding of them. Nothing is made when the rung changes.
+//! The rungs that an executor is made for: the filters of each, and the maxima that size the memory they share.
+//! Nothing is allocated when the rung changes.
 
 use std::sync::Arc;
 
@@ -40,26 +40,28 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// The rungs of some settings: all of them where these are adaptive, else the one.
+    /// Makes the filters of all rungs where the settings are adaptive, else of [`Settings::quality`] alone.
     pub fn new(settings: &Settings, mask: &Mask, compositing: Compositing) -> Self {
-        let most_px = settings.far_max_px.max(settings.near_max_px);
+        let max_px = settings.far_max_px.max(settings.near_max_px);
         let coarsest = SCALES[SCALES.len() - 1] as f32;
         let svd = Decomposition::of(mask);
-        let mut made: Vec<(Rank, f32)> = Vec::new();
+        let mut bank_keys: Vec<(Rank, f32)> = Vec::new();
         let mut banks = Vec::new();
         let wanted = |quality: &Quality| settings.adaptive || *quality == settings.quality;
         let steps = Quality::ALL.into_iter().filter(wanted).map(|quality| {
             let rung = LADDER[quality as usize];
             let terms = if settings.coc == CocKind::Uniform { rung.even_rank } else { rung.rank };
             let rank = settings.rank.unwrap_or(Rank::Terms(terms));
+            // The largest radius in bin pixels: bins are reduced until it is below a limit, as far as scales go.
             let bank_px = match settings.coc {
-                _ if compositing == Compositing::Gather => most_px,
-                _ if settings.rank == Some(Rank::Full) => most_px.min((most_px / coarsest).max(MOST_FULL_RADIUS_PX)),
-                CocKind::Uniform => most_px / rung.even_scale(most_px) as f32,
-                _ => most_px.min((most_px / coarsest).max(MOST_RADIUS_PX)),
+                // At full scale.
+                _ if compositing == Compositing::Gather => max_px,
+                _ if settings.rank == Some(Rank::Full) => max_px.min((max_px / coarsest).max(MOST_FULL_RADIUS_PX)),
+                CocKind::Uniform => max_px / rung.even_scale(max_px) as f32,
+                _ => max_px.min((max_px / coarsest).max(MOST_RADIUS_PX)),
             };
-            let bank = made.iter().position(|&like| like == (rank, bank_px)).unwrap_or_else(|| {
-                made.push((rank, bank_px));
+            let bank = bank_keys.iter().position(|&key| key == (rank, bank_px)).unwrap_or_else(|| {
+                bank_keys.push((rank, bank_px));
                 banks.push(Arc::new(Bank::of(&svd, mask, rank, bank_px)));
                 banks.len() - 1
             });

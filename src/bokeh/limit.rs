@@ -11,12 +11,12 @@ const MOST_EXACT_PX: f32 = 128.0;
 /// What preparing and blurring a picture takes at most, at the finest quality with refined depth
 /// (`docs/reliability.md` has the measurements).
 const BYTES_PER_PIXEL: u64 = 90;
-/// Below this nothing is asked: the estimate leaves out what does not grow with the picture.
-const SMALL_PX: u64 = 16 << 20;
+/// Pictures of up to so many pixels are not checked: the estimate leaves out what does not grow with the picture.
+const UNCHECKED_PIXELS: u64 = 16 << 20;
 
 impl Settings {
     /// The largest CoC radius that makes a difference to pictures of `size` (width, height), in pixels: their diagonal,
-    /// or less where the method bears no more.
+    /// or the method's limit where that is lower.
     pub fn most_radius_px(&self, size: (u32, u32)) -> f32 {
         let diagonal_px = (size.0 as f32).hypot(size.1 as f32).ceil();
         diagonal_px.min(match (self.coc, self.method, self.rank) {
@@ -26,28 +26,29 @@ impl Settings {
         })
     }
 
-    /// These settings, with radii cut to what pictures of `size` bear.
+    /// These settings, with radii clamped to [`Settings::most_radius_px`].
     pub(super) fn within(&self, size: (u32, u32)) -> Self {
         let most_px = self.most_radius_px(size);
-        let cut = |radius_px: f32| radius_px.max(0.0).min(most_px);
-        Self { far_max_px: cut(self.far_max_px), near_max_px: cut(self.near_max_px), ..self.clone() }
+        // `max` turns NaN into 0.
+        let clamped = |radius_px: f32| radius_px.max(0.0).min(most_px);
+        Self { far_max_px: clamped(self.far_max_px), near_max_px: clamped(self.near_max_px), ..self.clone() }
     }
 
-    /// Whether pictures of `size` (width, height) can be blurred so.
+    /// Whether pictures of `size` (width, height) can be blurred with these settings.
     ///
     /// # Errors
     /// [`BokehError::Memory`], [`BokehError::TooWide`].
     pub fn check(&self, size: (u32, u32)) -> Result<(), BokehError> {
         let pixels = u64::from(size.0) * u64::from(size.1);
         let needed = pixels * BYTES_PER_PIXEL;
-        if pixels > SMALL_PX
+        if pixels > UNCHECKED_PIXELS
             && let Some(free) = memory::free_bytes()
             && needed > free
         {
             return Err(BokehError::Memory { size, needed_mb: needed >> 20, free_mb: free >> 20 });
         }
         let most_px = self.most_radius_px(size);
-        // Not a number is beyond any.
+        // NaN is refused, too.
         let is_beyond = |radius_px: &f32| radius_px.partial_cmp(&most_px).is_none_or(|order| order.is_gt());
         let Some(radius_px) = [self.far_max_px, self.near_max_px].into_iter().find(is_beyond) else { return Ok(()) };
         let by_method = (self.coc, self.method) == (CocKind::Depth, Method::Gather);

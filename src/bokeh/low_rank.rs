@@ -20,6 +20,7 @@ pub struct Decomposition {
 
 /// Two columns count as orthogonal below this cosine.
 const ORTHOGONAL: f64 = 1e-12;
+/// Only a safeguard: Jacobi rotations converge quadratically, in far fewer sweeps.
 const MAX_SWEEPS: usize = 40;
 
 impl Decomposition {
@@ -29,6 +30,7 @@ impl Decomposition {
         // Row i of `work` is column i of the mask; rotating rows against each other makes them orthogonal.
         let mut work: Vec<f64> = (0..n * n).map(|k| mask.values[(k % n) * n + k / n]).collect();
         let mut v: Vec<f64> = (0..n * n).map(|k| f64::from(u8::from(k % n == k / n))).collect();
+        // Rows this small are rounding noise (a singular value of 0), and would be rotated against each other forever.
         let floor = work.iter().map(|x| x * x).sum::<f64>() * 1e-30;
         for _ in 0..MAX_SWEEPS {
             let mut rotated = false;
@@ -41,6 +43,7 @@ impl Decomposition {
                 break;
             }
         }
+        // Row i of `work` is now sigma_i u_i, and row i of `v` has taken part in all of its rotations.
         let mut order: Vec<(usize, f64)> = work.chunks(n).map(norm).enumerate().collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
         let mut result =
@@ -73,13 +76,14 @@ impl Decomposition {
         (square(&self.sigma[rank.min(self.size)..]) / square(&self.sigma)).sqrt()
     }
 
-    /// The number of terms beyond which nothing is left but rounding.
+    /// How many terms matter, at least 1: filters are `f32`, in whose rounding smaller singular values drown.
     pub fn numerical_rank(&self) -> usize {
         self.sigma.iter().take_while(|&&s| s > 1e-7 * self.sigma[0]).count().max(1)
     }
 }
 
-/// Rotates rows `i` and `j` of `work` (and of `v` alongside) until they are orthogonal; tells whether it had to.
+/// Rotates rows `i < j` of `work`, and those of `v` with them, so that they become orthogonal. False where they already
+/// are, or where their dot product is at most `floor`.
 fn orthogonalise(work: &mut [f64], v: &mut [f64], n: usize, i: usize, j: usize, floor: f64) -> bool {
     let (head, tail) = work.split_at_mut(j * n);
     let (a, b) = (&mut head[i * n..][..n], &mut tail[..n]);
@@ -92,6 +96,7 @@ fn orthogonalise(work: &mut [f64], v: &mut [f64], n: usize, i: usize, j: usize, 
     if ab * ab <= ORTHOGONAL * ORTHOGONAL * aa * bb || ab * ab <= floor * floor {
         return false;
     }
+    // The smaller root of t^2 + 2 zeta t - 1 = 0: a turn of at most 45 degrees, for which the sweeps converge.
     let zeta = (bb - aa) / (2.0 * ab);
     let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
     let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();

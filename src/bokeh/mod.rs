@@ -101,7 +101,7 @@ pub struct Settings {
     pub highlights: f32,
     /// Rung of the quality ladder.
     pub quality: Quality,
-    /// Whether frames may say another one ([`Job::quality`]): the executor is then made for all of them.
+    /// Whether each frame may choose its own rung ([`Job::quality`]): the executor is then made for all of them.
     pub adaptive: bool,
     /// Largest CoC radius behind the focal plane, in pixels.
     pub far_max_px: f32,
@@ -119,11 +119,11 @@ pub struct Job {
     pub depth: Option<Pooled<DepthMap>>,
     /// The radius of every pixel.
     pub coc: CocField,
-    /// The rung of the quality ladder; of an executor made for one ([`Settings::adaptive`]), that one holds.
+    /// The rung of the quality ladder; ignored unless the settings are [`adaptive`](Settings::adaptive).
     pub quality: Quality,
     /// Where the result is wanted.
     pub place: Place,
-    /// Where it goes in memory; resized to the picture's size.
+    /// Buffer for the result in memory; resized to the picture's size.
     pub out: Pooled<ColorImage>,
 }
 
@@ -131,7 +131,7 @@ pub struct Job {
 pub struct Finished {
     /// The job's ticket.
     pub ticket: u64,
-    /// The result, where it was wanted; who computes elsewhere leaves it in memory.
+    /// The result, at [`Job::place`]; in memory where the CPU made it, or the GPU had no picture to leave it in.
     pub picture: Picture,
     /// The job's picture.
     pub color: Pooled<ColorImage>,
@@ -149,6 +149,7 @@ pub struct PassTimes {
 }
 
 impl PassTimes {
+    /// More than the distinct passes of any executor.
     const CAPACITY: usize = 16;
 
     /// No pass yet.
@@ -229,12 +230,13 @@ pub enum BokehError {
     Gpu(#[from] GpuError),
 }
 
-/// What a pass has left behind of the last frame: vectors of four values.
+/// Which intermediate result of the last frame to read, as vectors of four values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Probe {
     /// After `bin`, per pixel of a bin: premultiplied r, g, b and coverage.
     Bin(usize),
-    /// After `reach`, per row of cells and edge: radius in bin pixels and lowest r, g, b; highest r, g, b and nothing.
+    /// After `reach`, two vectors per row of cells and edge of a segment: radius in bin pixels and lowest r, g, b;
+    /// highest r, g, b and an unused value.
     Reach(usize),
     /// After `blur`, per pixel of a bin: premultiplied r, g, b and coverage.
     Blur(usize),
@@ -245,8 +247,8 @@ pub enum Probe {
 /// `adapter` is part of a GPU adapter's name; `threads` is for the CPU executor, all cores when `None`.
 ///
 /// # Errors
-/// The blur is too wide ([`Settings::check`]); a GPU was asked for and there is none that fits, or it failed. One that
-/// fails later is no error: the CPU goes on.
+/// The blur is too wide ([`Settings::check`]); a GPU was asked for and there is none that fits, or it failed. A GPU
+/// that fails later is no error: the CPU takes over.
 pub fn create(
     settings: &Settings,
     size: (u32, u32),
@@ -288,6 +290,7 @@ pub fn create_on(
     Ok(with_fallback(gpu, plan, threads))
 }
 
+/// The GPU executor with the CPU to take over: its buffers are allocated only when the GPU fails.
 #[cfg(feature = "gpu")]
 fn with_fallback(gpu: gpu::GpuBokeh, plan: plan::Plan, threads: Option<usize>) -> Box<dyn Bokeh> {
     let cpu = move || Box::new(cpu::CpuBokeh::new(plan, threads)) as Box<dyn Bokeh>;
@@ -302,11 +305,11 @@ pub trait Bokeh: Send {
     /// Starts one frame.
     ///
     /// # Errors
-    /// The frame does not fit the plan, or the device failed; the frame is then gone, unless [`Bokeh::take_back`] has it.
+    /// The frame does not fit the plan, or the device failed; it is then gone, unless [`Bokeh::take_back`] returns it.
     fn submit(&mut self, job: Job) -> Result<(), BokehError>;
 
-    /// Gives back the oldest frame in flight, or one that was just refused, as it was submitted: after an error, so that
-    /// another executor can blur it. Nothing where all is collected, or the frame is gone.
+    /// After an error, takes back the oldest frame in flight, or the one just refused, as it was submitted: another
+    /// executor can blur it. `None` when there is no such frame (any more).
     fn take_back(&mut self) -> Option<Job> {
         None
     }

@@ -6,7 +6,7 @@ use crate::link::pool::Pooled;
 
 /// A picture in memory, on the device that made it, or in both.
 pub struct Picture {
-    /// The memory, which goes back to its pool either way.
+    /// Has the picture's size; its pixels only where `in_memory`.
     image: Pooled<ColorImage>,
     in_memory: bool,
     device: Option<Pooled<DevicePicture>>,
@@ -33,7 +33,7 @@ impl Picture {
         self.in_memory.then_some(&*self.image)
     }
 
-    /// The same, to be changed: what is on a device stays as it is.
+    /// The picture to be changed, where it is in memory; a copy on a device does not change with it.
     pub fn memory_mut(&mut self) -> Option<&mut ColorImage> {
         self.in_memory.then_some(&mut *self.image)
     }

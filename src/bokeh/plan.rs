@@ -2,7 +2,7 @@
 //!
 //! Filters and memory are fixed per picture size and settings; the quality may change from frame to frame where the
 //! settings are adaptive ([`Plan::set_quality`]), and the bins follow each frame's depth ([`Plan::split`]).
-//! Both executors run a frame pass by pass, under these names (the CPU's `bin` reads the picture itself and so unpacks):
+//! Both executors run a frame pass by pass, under these names (the CPU's `bin` unpacks the picture itself):
 //!
 //! 1. `unpack`: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC.
 //! 2. `bin`: every bin's share of each pixel, premultiplied, averaged down to the bin's scale.
@@ -32,13 +32,14 @@ pub const MAX_BINS: usize = 13;
 /// A bin pixel with less coverage than this has no colour of its own.
 pub const COVERAGE_FLOOR: f32 = 1e-3;
 
-/// From this coverage on, a bin counts as wholly there when the hindmost is looked for.
+/// From this coverage on, a bin counts fully when the colour of the hindmost is worked out.
 pub const HINDMOST_COVERAGE: f32 = 0.8;
 
-/// No colour is brighter: the range of a bin whose filters have no lobes that a range would have to cut.
+/// No colour is brighter: a range that cuts nothing, for bins whose filters do not overshoot.
 pub const ANY_COLOR: f32 = 1e20;
 
-/// Weight of far cells in a local radius, so that there is one wherever the filter finds anything at all.
+/// The least weight, along an axis, of a cell within reach in a local radius, which so exists wherever a filter finds
+/// anything.
 pub const FAR_WEIGHT: f32 = 0.02;
 
 /// A range of signed CoC, and how it is filtered.
@@ -99,6 +100,7 @@ pub struct Plan {
     /// Largest CoC radius behind the focal plane and in front of it.
     max_px: [f32; 2],
     counts: Counts,
+    /// Behind the focal plane and in front of it, outwards.
     pieces: [Vec<Piece>; 2],
 }
 
@@ -151,7 +153,7 @@ impl Plan {
         self.lay_out_pieces();
     }
 
-    /// The bins where they do not follow from a frame's depth.
+    /// The bins of a uniform radius or of a ramp; with depth there is one until [`Plan::split`] has seen a frame.
     fn lay_out_pieces(&mut self) {
         let [far_px, near_px] = self.max_px;
         let [far, near] = &mut self.pieces;
@@ -160,16 +162,16 @@ impl Plan {
         self.focus_px = far_px.max(near_px);
         match self.coc {
             CocKind::Ramp => {
-                far.extend(even_pieces(far_px, self.rung.bins_per_side));
+                far.extend(geometric_pieces(far_px, self.rung.bins_per_side));
                 self.focus_px = far.first().map_or(self.focus_px, |piece| piece.border_px);
             }
             CocKind::Uniform => far.push(Piece { border_px: 0.0, low_px: far_px, high_px: far_px }),
             CocKind::Depth => {}
         }
-        self.lay_out();
+        self.lay_out_bins();
     }
 
-    /// Splits the CoC of a frame into bins, where that follows from its depth.
+    /// Splits the CoC of a frame into bins where it follows depth and bins are layers; else they stay.
     pub fn split(&mut self, depth: Option<&DepthMap>, coc: &CocField) {
         if self.compositing != Compositing::Layers {
             return;
@@ -182,16 +184,16 @@ impl Plan {
         let sides = [false, true].into_iter().zip(&mut self.pieces);
         let inner_px = sides.map(|(near, pieces)| self.counts.pieces(near, &self.rung, near_from_px, pieces));
         self.focus_px = inner_px.fold(0.0, f32::max).min(self.max_px[0].max(self.max_px[1]));
-        self.lay_out();
+        self.lay_out_bins();
     }
 
-    /// The bins of the current pieces.
-    fn lay_out(&mut self) {
+    /// Makes the bins of the current pieces, front to back. A bin always has the slot of its place, whatever the level:
+    /// 0 in focus, then those behind, outwards, then those in front.
+    fn lay_out_bins(&mut self) {
         let [far, near] = &self.pieces;
-        // The same memory for the same place, whatever the level.
-        let side = self.ladder.most_bins_per_side();
-        let first = |pieces: &[Piece]| pieces.first().map_or(f32::INFINITY, |piece| piece.border_px);
-        let beyond = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
+        let per_side = self.ladder.most_bins_per_side();
+        let inner_px = |pieces: &[Piece]| pieces.first().map_or(f32::INFINITY, |piece| piece.border_px);
+        let outer_px = |pieces: &[Piece], k: usize| pieces.get(k + 1).map_or(f32::INFINITY, |piece| piece.border_px);
         let bin = |(low_px, high_px): (f32, f32), content: (f32, f32), slot: usize| {
             let scale = match self.compositing {
                 Compositing::Gather => 1,
@@ -214,38 +216,41 @@ impl Plan {
         self.bins.clear();
         for (k, piece) in near.iter().enumerate().rev() {
             let content = (piece.low_px, piece.high_px.min(self.max_px[1]));
-            self.bins.push(bin((-beyond(near, k), -piece.border_px), content, 1 + side + k));
+            self.bins.push(bin((-outer_px(near, k), -piece.border_px), content, 1 + per_side + k));
         }
-        if first(far) > 0.0 {
-            self.bins.push(bin((-first(near), first(far)), (0.0, self.focus_px), 0));
+        // A uniform radius, whose border is 0, leaves nothing in focus.
+        if inner_px(far) > 0.0 {
+            self.bins.push(bin((-inner_px(near), inner_px(far)), (0.0, self.focus_px), 0));
         }
         for (k, piece) in far.iter().enumerate() {
             let content = (piece.low_px, piece.high_px.min(self.max_px[0]));
             let low_px = if piece.border_px > 0.0 { piece.border_px } else { f32::NEG_INFINITY };
-            self.bins.push(bin((low_px, beyond(far, k)), content, 1 + k));
+            self.bins.push(bin((low_px, outer_px(far, k)), content, 1 + k));
         }
     }
 
-    /// Whether a bin's filters are truncated so far that it shows: small ones have hardly more terms than are kept.
+    /// Whether truncation makes a bin's filters overshoot visibly. Small filters keep nearly all of their terms: even
+    /// ones have `reach + 1`, others `2 reach + 1`.
     pub fn has_lobes(&self, bin: &Bin) -> bool {
         let reach = self.bin_reach(bin);
         self.bank.terms < if self.bank.even { reach } else { 2 * reach }
     }
 
-    /// The least scale that a bin in this slot can have, at any level.
+    /// The finest scale that a bin in this slot can have, at any level: far from focus, layers are always reduced.
     pub fn least_scale(&self, slot: usize) -> usize {
         let side = self.ladder.most_bins_per_side();
         let fine = slot == 0 || (slot - 1) % side.max(1) < self.ladder.most_fine_bins();
         if self.full_scale || fine || self.compositing != Compositing::Layers { 1 } else { 2 }
     }
 
-    /// Memories for bins that an executor needs, whatever the level.
+    /// How many slots for bins an executor needs, whatever the level.
     pub fn slots(&self) -> usize {
         match self.coc {
             CocKind::Depth if self.compositing == Compositing::Gather => 1,
             CocKind::Depth => 1 + 2 * self.ladder.most_bins_per_side(),
             CocKind::Ramp if self.pieces[0].is_empty() => 1,
             CocKind::Ramp => 1 + self.ladder.most_bins_per_side(),
+            // Its one bin is in slot 1.
             CocKind::Uniform => 2,
         }
     }
@@ -255,12 +260,12 @@ impl Plan {
         self.bank.node_reach[self.bank.node(bin.max_radius_px)] as usize
     }
 
-    /// The bin that uses a slot, in this frame.
+    /// The index of the bin that uses a slot, in this frame.
     pub fn bin_in(&self, slot: usize) -> Option<usize> {
         self.bins.iter().position(|bin| bin.slot == slot)
     }
 
-    /// Cells around a cell whose content can reach it (and the whole segment it is read for).
+    /// How many cells away content can reach a cell, and the whole segment that its radius is read for.
     pub fn reach_cells(&self, bin: &Bin) -> usize {
         (self.bin_reach(bin) + SEGMENT).div_ceil(CELL)
     }
@@ -276,13 +281,13 @@ impl Plan {
         Share::new(index.checked_sub(1).and_then(|front| self.border(front)), self.border(index))
     }
 
-    /// No CoC behind the near bins is below this: there, they take no share any more.
+    /// The signed CoC, <= 0, from which on the near bins take no share: what is filled in behind them is not below it.
     pub fn nearest_behind_px(&self) -> f32 {
         self.bins.iter().rfind(|bin| bin.near).map_or(0.0, |bin| bin.high_px * (1.0 - HAND_OVER))
     }
 
-    /// How much of a pixel counts as what lies behind the near bins. Just in front of their border that is still the
-    /// pixel itself: a surface that comes nearer hides nothing but its own continuation.
+    /// How much of a pixel the bins behind the near ones take as it is; the rest counts as hidden and is filled in.
+    /// Just in front of the border that is all of it: a surface that comes nearer hides only its own continuation.
     pub fn unhidden(&self) -> Share {
         let near = self.bins.iter().filter(|bin| bin.near).count();
         let border_px = near.checked_sub(1).map(|last| self.bins[last].high_px);
@@ -304,8 +309,9 @@ const HAND_OVER: f32 = 0.15;
 /// What has this many times the CoC of the near bins' border, or more, hides what is behind it.
 const HIDDEN_FROM: f32 = 1.5;
 
-/// Pieces of a ramp: geometric, as a blur's look goes with the ratio.
-fn even_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {
+/// Splits the radii of a ramp into pieces of one ratio, as a blur's look goes with the ratio; none where the largest
+/// radius is hardly above that of the bin in focus.
+fn geometric_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {
     let ratio = max_px / FOCUS_BORDER_PX;
     let border_px = move |k: u32| FOCUS_BORDER_PX * ratio.powf(k as f32 / bins as f32);
     (0..if ratio > 1.3 { bins } else { 0 }).map(move |k| Piece {

@@ -16,8 +16,8 @@ pub const FOCUS_BORDER_PX: f32 = 1.0;
 /// What a rung trades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rung {
-    /// The time of a frame beside that of the default rung: as measured for a person before a room, on two cores. Other
-    /// pictures and machines differ; whoever asks for more had better learn.
+    /// Time of a frame relative to the default rung's, measured on two cores with a person in a room. Other pictures
+    /// and machines differ: a first estimate, from which the governor learns.
     pub cost: f64,
     /// Separable terms of each bin's filters.
     pub rank: u32,
@@ -25,15 +25,15 @@ pub struct Rung {
     pub bins_per_side: u32,
     /// Radius in front of the focal plane below which everything belongs to the bin in focus.
     pub near_from_px: f32,
-    /// The same as a share of the largest radius behind, where that is more: a nose is no layer of its own.
+    /// The same as a share of the largest radius behind; the larger holds, so that a nose is no layer of its own.
     pub near_from_share: f32,
     /// Smallest radius in a bin, in pixels of the picture, from which it is filtered at each of [`SCALES`].
     pub scale_from_px: [f32; SCALES.len()],
     /// Whether what near objects hide is filled in.
     pub fill: bool,
-    /// Separable terms where one radius holds for the whole picture: there every pixel shows what is left out.
+    /// Separable terms where one radius holds for the whole picture: more, as every pixel shows the missing ones there.
     pub even_rank: u32,
-    /// There, the picture is reduced until the radius has no more bin pixels than this.
+    /// Where one radius holds for the whole picture, it is reduced until that has no more bin pixels than this.
     pub even_radius_px: f32,
 }
 
@@ -97,19 +97,20 @@ pub const COSTS: [f64; LADDER.len()] = {
     costs
 };
 
-/// The finest scale at which a radius has at most so many bin pixels, or the coarsest there is.
+/// The finest scale at which a radius has at most `most_px` bin pixels, or the coarsest there is.
 pub fn scale_within(radius_px: f32, most_px: f32) -> usize {
     let fits = SCALES.into_iter().find(|&scale| radius_px <= most_px * scale as f32);
     fits.unwrap_or(SCALES[SCALES.len() - 1])
 }
 
 impl Rung {
-    /// Bins of a side that may be at full scale.
+    /// Bins of a side that may be at full scale, where filters cost most: about a third.
     pub fn fine_bins(&self) -> usize {
         (self.bins_per_side as usize + 1) / 3
     }
 
-    /// The coarsest scale at which radii from `low_px` on keep their shape and those up to `high_px` stay cheap.
+    /// The scale of a bin with radii from `low_px` to `high_px`: the coarsest at which the small ones keep their shape,
+    /// or a coarser one that keeps the large ones cheap.
     pub fn scale(&self, low_px: f32, high_px: f32) -> usize {
         let fits = SCALES.into_iter().zip(self.scale_from_px).rev().find(|&(_, from_px)| low_px >= from_px);
         fits.map_or(1, |(scale, _)| scale).max(scale_within(high_px, MOST_RADIUS_PX))

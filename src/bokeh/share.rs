@@ -12,6 +12,7 @@ pub struct Share {
 impl Share {
     /// Borders as CoC and slope of the hand-over; `None` where there is no bin beyond.
     pub fn new(front: Option<(f32, f32)>, behind: Option<(f32, f32)>) -> Self {
+        // Beyond any CoC.
         Self { front: front.unwrap_or((-1e30, 1.0)), behind: behind.unwrap_or((1e30, 1.0)) }
     }
 
@@ -21,15 +22,16 @@ impl Share {
         step(self.front, coc_px) - step(self.behind, coc_px)
     }
 
-    /// Whether any CoC in a range has a share.
+    /// Whether any CoC in a range has a share above 0.
     pub fn meets(&self, (low_px, high_px): (f32, f32)) -> bool {
         step(self.front, high_px) > 0.0 && step(self.behind, low_px) < 1.0
     }
 }
 
+/// A linear step from 0 to 1, 0.5 at the border. Comparisons instead of `clamp` become single vector instructions.
 #[inline(always)]
-fn step((at, slope): (f32, f32), coc_px: f32) -> f32 {
-    let value = (coc_px - at) * slope + 0.5;
+fn step((border_px, slope): (f32, f32), coc_px: f32) -> f32 {
+    let value = (coc_px - border_px) * slope + 0.5;
     let value = if value > 0.0 { value } else { 0.0 };
     if value < 1.0 { value } else { 1.0 }
 }

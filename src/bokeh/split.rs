@@ -1,6 +1,5 @@
-//! Depth slicing by histogram: where a frame's CoC is split into bins: where few pixels lie, so that a surface stays in
-//! one piece and two surfaces do not share a bin. A flat background then costs one bin, however wide the range that the
-//! lens could reach.
+//! Depth slicing by histogram: splits a frame's CoC into bins where few pixels lie, so that a surface stays in one
+//! piece and two surfaces do not share a bin. A flat background then costs one bin, however wide the possible range.
 
 use super::rung::{FOCUS_BORDER_PX, Rung};
 use crate::frame::DepthMap;
@@ -10,13 +9,14 @@ use crate::optics::DepthCoc;
 const PER_OCTAVE: usize = 16;
 /// Buckets on one side of the focal plane: `|c|` from 1 px to 256 px, and beyond in the last.
 const BUCKETS: usize = 8 * PER_OCTAVE;
-/// Bits of a float below those that tell the bucket.
+/// Shifted right by this, the bits of a float number the buckets: its exponent, and the top bits of its mantissa.
 const BUCKET_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - PER_OCTAVE.ilog2();
-/// The bits of 1.0, where the buckets begin.
+/// The shifted bits of the radius at which bucket 0 begins.
 const FIRST: u32 = FOCUS_BORDER_PX.to_bits() >> BUCKET_SHIFT;
-/// At least as many samples are taken across a frame that has them, and less than twice as many.
+/// Samples across a frame that has as many columns: at least this many, and less than twice as many.
 const SAMPLES_ACROSS: usize = 320;
-/// A bin more must lower the spread of `ln |c|` within the bins by this much, as variance times share of the picture.
+/// What one more bin costs: by this much it must lower the sum over all bins of the variance of `ln |c|` within a bin
+/// times its share of the picture.
 const BIN_COST: f64 = 0.002;
 /// This share of a bin's pixels may have a smaller radius than its scale is made for.
 const STRAY: f32 = 0.02;
@@ -31,10 +31,12 @@ pub struct Piece {
     pub high_px: f32,
 }
 
-/// The CoC of a frame, counted.
+/// The histogram of a frame's CoC.
 #[derive(Clone, Debug)]
 pub struct Counts {
+    /// Samples per bucket of `|c|`, behind and in front of the focal plane; those in focus are in no bucket.
     sides: [[u32; BUCKETS]; 2],
+    /// All samples, those in focus included.
     samples: u32,
 }
 
@@ -54,6 +56,7 @@ impl Counts {
             for &metres in row.iter().step_by(step) {
                 let coc_px = lens.coc_px(metres);
                 let bucket = (coc_px.abs().to_bits() >> BUCKET_SHIFT).wrapping_sub(FIRST);
+                // In focus, below bucket 0, the difference wraps.
                 if bucket < 1 << 16 {
                     self.sides[usize::from(coc_px < 0.0)][(bucket as usize).min(BUCKETS - 1)] += 1;
                 }
@@ -62,8 +65,9 @@ impl Counts {
         }
     }
 
-    /// The pieces of one side, from the focal plane outwards: at most as many as the rung has bins. Returns the largest
-    /// radius of what is left to the bin in focus. In front that has everything up to `near_from_px`.
+    /// Splits one side into `pieces`, from the focal plane outwards, at most as many as the rung has bins: dynamic
+    /// programming finds the cheapest ones. Returns the largest radius, in pixels, that is left to the bin in focus,
+    /// which in front keeps everything up to `near_from_px`.
     pub fn pieces(&self, near: bool, rung: &Rung, near_from_px: f32, pieces: &mut Vec<Piece>) -> f32 {
         pieces.clear();
         let side = &self.sides[usize::from(near)];
@@ -74,38 +78,40 @@ impl Counts {
         if last < first {
             return edge_px(last + 1);
         }
-        // Sums of counts, of counts times ln |c| and of counts times its square, up to each bucket.
+        // Sums of shares of the picture, and of these times ln |c| and times its square, up to each bucket. A constant
+        // factor of |c| (1.04: within the bucket) changes no variance.
         let mut sums = [[0.0f64; 3]; BUCKETS + 1];
         for (k, &n) in side.iter().enumerate() {
-            let (n, at) = (f64::from(n) / f64::from(self.samples), (f64::from(edge_px(k)) * 1.04).ln());
-            sums[k + 1] = [sums[k][0] + n, sums[k][1] + n * at, sums[k][2] + n * at * at];
+            let (share, log) = (f64::from(n) / f64::from(self.samples), (f64::from(edge_px(k)) * 1.04).ln());
+            sums[k + 1] = [sums[k][0] + share, sums[k][1] + share * log, sums[k][2] + share * log * log];
         }
-        let spread = |from: usize, to: usize| {
-            let [n, a, b] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
-            if n > 0.0 { (b - a * a / n).max(0.0) } else { 0.0 }
+        // Variance of ln |c| in some buckets, times their share of the picture.
+        let variance = |from: usize, to: usize| {
+            let [share, sum, squares] = std::array::from_fn(|p| sums[to][p] - sums[from][p]);
+            if share > 0.0 { (squares - sum * sum / share).max(0.0) } else { 0.0 }
         };
         // best[j][to]: least cost of buckets first..to in j + 1 pieces, and where the last of them begins.
         let mut best = [[(f64::INFINITY, 0usize); BUCKETS + 1]; MAX_PIECES];
         for (to, best) in best[0].iter_mut().enumerate().take(last + 2).skip(first + 1) {
-            *best = (spread(first, to), first);
+            *best = (variance(first, to), first);
         }
         for j in 1..bins {
             for to in first + j + 1..=last + 1 {
                 for from in first + j..to {
-                    // Bins at full scale are dear: only the first ones may be.
+                    // A piece begins with pixels. Only the first ones may need full scale, which is expensive.
                     if side[from] == 0 || j >= rung.fine_bins() && edge_px(from) < rung.scale_from_px[1] {
                         continue;
                     }
-                    let cost = best[j - 1][from].0 + spread(from, to) + BIN_COST;
+                    let cost = best[j - 1][from].0 + variance(from, to) + BIN_COST;
                     if cost < best[j][to].0 {
                         best[j][to] = (cost, from);
                     }
                 }
             }
         }
-        let count = (0..bins).min_by(|&a, &b| best[a][last + 1].0.total_cmp(&best[b][last + 1].0)).unwrap_or(0);
+        let last_piece = (0..bins).min_by(|&a, &b| best[a][last + 1].0.total_cmp(&best[b][last + 1].0)).unwrap_or(0);
         let mut to = last + 1;
-        for j in (0..=count).rev() {
+        for j in (0..=last_piece).rev() {
             let from = best[j][to].1;
             pieces.push(self.piece(side, from, to));
             to = from;
@@ -114,20 +120,22 @@ impl Counts {
         pieces.first().map_or(FOCUS_BORDER_PX, |piece| piece.border_px)
     }
 
-    /// The piece of buckets `from..to`.
+    /// The piece of buckets `from..to`, with its border in the empty buckets before it.
     fn piece(&self, side: &[u32; BUCKETS], from: usize, to: usize) -> Piece {
         let total: u32 = side[from..to].iter().sum();
         let first = (from..to).find(|&k| side[k] > 0).unwrap_or(from);
         let mut strays = (STRAY * total as f32) as u32;
+        // The first bucket that is not made of strays alone.
         let low = (from..to).find(|&k| {
-            let within = side[k] <= strays;
+            let is_stray = side[k] <= strays;
             strays = strays.saturating_sub(side[k]);
-            !within
+            !is_stray
         });
         let high = (from..to).rposition(|k| side[k] > 0).map_or(from, |k| from + k);
-        let before = (0..first).rev().find(|&k| side[k] > 0).map_or(0, |k| k + 1);
+        // The border is the geometric mean of the gap's ends, but not far out where the gap is wide.
+        let gap = (0..first).rev().find(|&k| side[k] > 0).map_or(0, |k| k + 1);
         Piece {
-            border_px: (edge_px(before) * edge_px(first)).sqrt().min(2.5 * edge_px(before)),
+            border_px: (edge_px(gap) * edge_px(first)).sqrt().min(2.5 * edge_px(gap)),
             low_px: edge_px(low.unwrap_or(first)),
             high_px: edge_px(high + 1),
         }

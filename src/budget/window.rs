@@ -1,11 +1,11 @@
-//! The last few values of a measurement, and where they lie.
+//! The last few values of a measurement, and their percentiles.
 
-/// The last `N` values, in fixed memory.
+/// The last `N` values, in a ring buffer.
 #[derive(Clone, Copy, Debug)]
 pub struct Window<const N: usize> {
     values: [f64; N],
     len: usize,
-    /// Where the next one goes.
+    /// Index of the next value to write, which holds the oldest once the buffer is full.
     next: usize,
 }
 
@@ -16,7 +16,7 @@ impl<const N: usize> Default for Window<N> {
 }
 
 impl<const N: usize> Window<N> {
-    /// Adds a value, and forgets the oldest of more than `N`.
+    /// Adds a value; beyond `N`, it replaces the oldest.
     pub fn push(&mut self, value: f64) {
         self.values[self.next] = value;
         self.next = (self.next + 1) % N;

@@ -1,4 +1,4 @@
-//! The entries that files of all kinds have: cameras, lenses, rotations.
+//! Entries that all formats have, as checked values: cameras, lenses, rotations, sizes.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
@@ -8,14 +8,14 @@ use super::yaml::Value;
 
 /// How far a matrix may be from a rotation: calibrations are written with few digits.
 const ROTATION_TOLERANCE: f64 = 1e-3;
-/// Focal lengths of cameras in pixels.
+/// Plausible focal lengths in pixels.
 const FOCALS_PX: std::ops::Range<f64> = 1.0..1e6;
 
 fn impossible(value: Value<'_>, what: &'static str) -> CalibrationError {
     value.refuse(Fault::Impossible { key: value.key(), what })
 }
 
-/// Focal lengths and principal point, if they can be such.
+/// Focal lengths and principal point in pixels, refused where they are implausible.
 pub(super) fn pinhole(value: Value<'_>, [fu, fv, cu, cv]: [f64; 4]) -> Result<(DVec2, DVec2), CalibrationError> {
     if ![fu, fv].iter().all(|focal_px| FOCALS_PX.contains(focal_px)) {
         return Err(impossible(value, "has a focal length that is not between 1 and a million pixels"));
@@ -26,7 +26,7 @@ pub(super) fn pinhole(value: Value<'_>, [fu, fv, cu, cv]: [f64; 4]) -> Result<(D
     Ok((DVec2::new(fu, fv), DVec2::new(cu, cv)))
 }
 
-/// The same from a 3x3 camera matrix.
+/// As [`pinhole`], from a 3x3 camera matrix.
 pub(super) fn camera_matrix(value: Value<'_>) -> Result<(DVec2, DVec2), CalibrationError> {
     let [fu, skew, cu, zero, fv, cv, below @ ..] = value.numbers::<9>(3, "3x3")?;
     if skew != 0.0 || zero != 0.0 || below != [0.0, 0.0, 1.0] {
@@ -35,11 +35,11 @@ pub(super) fn camera_matrix(value: Value<'_>) -> Result<(DVec2, DVec2), Calibrat
     pinhole(value, [fu, fv, cu, cv])
 }
 
-/// The lens of a model (radial-tangential where none is named) with the coefficients `value`.
+/// The distortion with the coefficients `value`, of the lens model that is named, or else radial-tangential.
 pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<Distortion, CalibrationError> {
     let name = model.map(|model| model.text()).transpose()?.unwrap_or("radial-tangential");
     let matrix = value.matrix()?;
-    let dimensions = |expected| {
+    let wrong_size = |expected| {
         let found = (matrix.rows, matrix.cols);
         value.refuse(Fault::Dimensions { key: value.key(), found, expected })
     };
@@ -47,19 +47,20 @@ pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<D
     match name.to_ascii_lowercase().replace('_', "-").as_str() {
         "radial-tangential" | "radtan" | "plumb-bob" | "rational-polynomial" | "opencv" | "pinhole" => {
             if !is_vector || ![4, 5, 8, 12, 14].contains(&matrix.data.len()) {
-                return Err(dimensions("a vector of 4, 5, 8, 12 or 14 (k1 k2 p1 p2 k3 ...)"));
+                return Err(wrong_size("a vector of 4, 5, 8, 12 or 14 (k1 k2 p1 p2 k3 ...)"));
             }
-            let (known, unknown) = matrix.data.split_at(matrix.data.len().min(8));
-            if unknown.iter().any(|&coefficient| coefficient != 0.0) {
+            // The first 8 are k1 to k6, p1 and p2; any others belong to a thin prism or a tilted sensor.
+            let (used, unsupported) = matrix.data.split_at(matrix.data.len().min(8));
+            if unsupported.iter().any(|&coefficient| coefficient != 0.0) {
                 return Err(value.refuse(Fault::Prism { key: value.key() }));
             }
             let mut all = [0.0; 8];
-            all[..known.len()].copy_from_slice(known);
+            all[..used.len()].copy_from_slice(used);
             Ok(Distortion::RadialTangential(all))
         }
         "equidistant" | "fisheye" | "kannala-brandt" | "opencv-fisheye" => {
             let all = matrix.data.as_slice().try_into().ok().filter(|_| is_vector);
-            all.map(Distortion::Equidistant).ok_or_else(|| dimensions("a vector of 4 (k1 k2 k3 k4)"))
+            all.map(Distortion::Equidistant).ok_or_else(|| wrong_size("a vector of 4 (k1 k2 k3 k4)"))
         }
         "none" => Ok(Distortion::RadialTangential([0.0; 8])),
         _ => {
@@ -70,11 +71,11 @@ pub(super) fn distortion(model: Option<Value<'_>>, value: Value<'_>) -> Result<D
     }
 }
 
-/// A rotation from its nine numbers, row by row; small errors are taken out.
+/// The exact rotation next to nine numbers, row by row, which may be off by rounding.
 pub(super) fn rotation(value: Value<'_>, rows: &[f64; 9]) -> Result<DMat3, CalibrationError> {
     let matrix = DMat3::from_cols_array(rows).transpose();
-    let off = matrix * matrix.transpose() - DMat3::IDENTITY;
-    if off.to_cols_array().iter().any(|part| part.abs() > ROTATION_TOLERANCE) || matrix.determinant() < 0.0 {
+    let deviation = matrix * matrix.transpose() - DMat3::IDENTITY;
+    if deviation.to_cols_array().iter().any(|part| part.abs() > ROTATION_TOLERANCE) || matrix.determinant() < 0.0 {
         return Err(impossible(value, "is not a rotation (rows of length 1, at right angles, right-handed)"));
     }
     Ok(DMat3::from_quat(DQuat::from_mat3(&matrix).normalize()))
@@ -104,8 +105,8 @@ pub(super) fn side(value: Value<'_>, number: f64) -> Result<u32, CalibrationErro
     Ok(number as u32)
 }
 
-/// A translation between two eyes, if they are two.
-pub(super) fn apart(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
+/// `translation` from eye to eye, refused where it is 0.
+pub(super) fn nonzero(value: Value<'_>, translation: DVec3) -> Result<DVec3, CalibrationError> {
     if translation.length() < 1e-9 {
         return Err(impossible(value, "puts both cameras in one place (a baseline of 0)"));
     }

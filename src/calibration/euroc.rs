@@ -21,15 +21,17 @@ pub fn read(left: &Path, right: &Path) -> Result<StereoCalibration, CalibrationE
     from_files(&File::open(left)?, &File::open(right)?)
 }
 
+/// As [`read`], from the parsed files.
 pub(super) fn from_files(left: &File, right: &File) -> Result<StereoCalibration, CalibrationError> {
     let poses = [body_from_camera(left.root())?, body_from_camera(right.root())?];
     let [(left_rotation, left_place), (right_rotation, right_place)] = poses;
-    let to_right = right_rotation.transpose();
-    let place = right.root().need("T_BS", HINT)?;
+    // Poses lead from camera to body: left to right is the left one, then the inverse of the right one.
+    let body_to_right = right_rotation.transpose();
+    let right_pose = right.root().need("T_BS", HINT)?;
     Ok(StereoCalibration {
         eyes: [eye(left.root())?, eye(right.root())?],
-        rotation: to_right * left_rotation,
-        translation_m: entries::apart(place, to_right * (left_place - right_place))?,
+        rotation: body_to_right * left_rotation,
+        translation_m: entries::nonzero(right_pose, body_to_right * (left_place - right_place))?,
         given: None,
         assumed_mm: false,
     })
@@ -39,6 +41,7 @@ fn body_from_camera(file: Value<'_>) -> Result<(DMat3, DVec3), CalibrationError>
     entries::pose(file.need("T_BS", HINT)?)
 }
 
+/// The camera that `file` describes.
 fn eye(file: Value<'_>) -> Result<Eye, CalibrationError> {
     pinhole_only(file)?;
     let intrinsics = file.need("intrinsics", HINT)?;

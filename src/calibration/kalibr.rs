@@ -11,19 +11,22 @@ use super::{Eye, StereoCalibration, entries};
 /// What to do where a key is missing.
 const HINT: &str = "name the camchain that kalibr_calibrate_cameras wrote for both cameras";
 
+/// The calibration of the first two cameras of a chain.
 pub(super) fn from_file(file: &File) -> Result<StereoCalibration, CalibrationError> {
     let cameras = [file.root().need("cam0", HINT)?, file.root().need("cam1", HINT)?];
+    // From the axes of cam0 ("cn minus 1") to those of cam1.
     let pose = cameras[1].need("T_cn_cnm1", HINT)?;
     let (rotation, translation_m) = entries::pose(pose)?;
     Ok(StereoCalibration {
         eyes: [eye(cameras[0])?, eye(cameras[1])?],
         rotation,
-        translation_m: entries::apart(pose, translation_m)?,
+        translation_m: entries::nonzero(pose, translation_m)?,
         given: None,
         assumed_mm: false,
     })
 }
 
+/// The camera under `cam0` or `cam1`.
 fn eye(camera: Value<'_>) -> Result<Eye, CalibrationError> {
     pinhole_only(camera)?;
     let intrinsics = camera.need("intrinsics", HINT)?;

@@ -9,11 +9,12 @@ use super::{Distortion, Eye};
 
 /// Rays further than this from the axis are left out: a flat picture of them would have no end.
 const WIDEST_DEG: f64 = 80.0;
-/// Angle between the rays at which a lens is asked whether it still spreads them.
+/// Angle between the rays at which [`Distortion::reach`] samples the model.
 const STEP_DEG: f64 = 0.1;
 
 impl Distortion {
-    /// Distance from the axis that the lens gives to a ray at the distance `radius`, on the plane at distance 1.
+    /// The distorted distance from the axis of a ray at the undistorted distance `radius`, both on the plane at
+    /// distance 1, without the tangential part.
     fn radial(&self, radius: f64) -> f64 {
         match *self {
             Self::RadialTangential([k1, k2, _, _, k3, k4, k5, k6]) => {
@@ -59,7 +60,8 @@ impl Distortion {
         if length >= self.radial(reach) {
             return point * (reach / length);
         }
-        // The radial part by halving, which always converges; the little that the tangential part adds by Newton.
+        // The radial part by bisection, which always converges, to a billionth of the reach; the little that the
+        // tangential part adds by Newton's method.
         let (mut near, mut far) = (0.0, reach);
         for _ in 0..30 {
             let middle = (near + far) / 2.0;
@@ -71,6 +73,7 @@ impl Distortion {
             let slope = |step: DVec2| (self.distort(guess + step) - self.distort(guess - step)) / (2.0 * DELTA);
             let slopes = DMat2::from_cols(slope(DVec2::X * DELTA), slope(DVec2::Y * DELTA));
             let next = guess + slopes.inverse() * (point - self.distort(guess));
+            // A step this long leaves the neighbourhood in which the method converges.
             if !next.is_finite() || (next - guess).length() > 0.1 {
                 break;
             }

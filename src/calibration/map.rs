@@ -10,13 +10,13 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::frame::{ColorImage, GrayImage};
 
-/// Weights are in parts of this.
+/// 1 in fixed point: fractions and weights are in parts of this.
 const ONE: u32 = 256;
 /// Where the second fraction begins.
 const DOWN_SHIFT: u32 = 16;
-/// Marks a pixel that sees nothing.
+/// Marks a pixel that sees nothing: the sign bit, which no fractions reach.
 const NOWHERE: u32 = 1 << 31;
-/// Pixels that are gathered before they are weighted.
+/// Pixels that are gathered before they are weighted: the weighting alone is vector code.
 const BLOCK: usize = 64;
 /// Bytes of a colour pixel.
 const RGB: usize = 3;
@@ -113,6 +113,7 @@ impl Map {
         self.arch.dispatch(Gray { starts, fractions, from: &from.luma, stride: self.size.0 as usize, into });
     }
 
+    /// The starts and fractions of the pixels in `rows`.
     fn rows(&self, rows: Range<usize>) -> (&[u32], &[u32]) {
         let width = self.size.0 as usize;
         let pixels = rows.start * width..rows.end * width;
@@ -128,12 +129,13 @@ fn weights(fractions: u32) -> [u32; 4] {
     [ONE + both - across - down, across - both, down - both, both]
 }
 
-/// All bits, or none where nothing is seen.
+/// A mask of all bits, or of none for [`NOWHERE`].
 #[inline(always)]
-fn seen(fractions: u32) -> u32 {
+fn seen_mask(fractions: u32) -> u32 {
     !((fractions as i32 >> 31) as u32)
 }
 
+/// Resamples grey pixels; `stride` is the bytes of a row.
 struct Gray<'a> {
     starts: &'a [u32],
     fractions: &'a [u32],
@@ -150,6 +152,7 @@ impl WithSimd for Gray<'_> {
         let mut corners = [0_u32; BLOCK];
         for ((starts, fractions), into) in blocks.zip(self.into.chunks_mut(BLOCK)) {
             for (corners, &start) in corners.iter_mut().zip(starts) {
+                // The four neighbours in one word.
                 let four = &self.from[start as usize..][..self.stride + 2];
                 *corners = u32::from_le_bytes([four[0], four[1], four[self.stride], four[self.stride + 1]]);
             }
@@ -157,12 +160,13 @@ impl WithSimd for Gray<'_> {
                 let [a, b, c, d] = weights(fractions);
                 let upper = (corners & 0xFF) * a + (corners >> 8 & 0xFF) * b;
                 let lower = (corners >> 16 & 0xFF) * c + (corners >> 24) * d;
-                *into = (((upper + lower + ONE / 2) / ONE) & seen(fractions)) as u8;
+                *into = (((upper + lower + ONE / 2) / ONE) & seen_mask(fractions)) as u8;
             }
         }
     }
 }
 
+/// As [`Gray`], for sRGB pixels.
 struct Color<'a> {
     starts: &'a [u32],
     fractions: &'a [u32],
@@ -175,7 +179,7 @@ impl WithSimd for Color<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        /// Red and blue of a pixel in 32 bits, with room for the weights.
+        /// Red and blue of a pixel, each with 8 free bits above it, so that one product weights both.
         const RED_BLUE: u32 = 0x00FF_00FF;
         let blocks = self.starts.chunks(BLOCK).zip(self.fractions.chunks(BLOCK));
         let (mut uppers, mut lowers, mut pixels) = ([0_u64; BLOCK], [0_u64; BLOCK], [0_u32; BLOCK]);
@@ -200,9 +204,10 @@ impl WithSimd for Color<'_> {
                     + (four[1] & RED_BLUE) * b
                     + (four[2] & RED_BLUE) * c
                     + (four[3] & RED_BLUE) * d;
+                // Sums are 256 times too large. Red and blue are shifted back; green belongs 8 bits up, where it is.
                 let green = (green + ONE / 2) & 0xFF00;
                 let others = (others + (ONE / 2 * 0x1_0001)) >> 8 & RED_BLUE;
-                *pixel = (green | others) & seen(fractions);
+                *pixel = (green | others) & seen_mask(fractions);
             }
             for (into, pixel) in into.iter_mut().zip(&pixels) {
                 let [red, green, blue, _] = pixel.to_le_bytes();
@@ -212,7 +217,7 @@ impl WithSimd for Color<'_> {
     }
 }
 
-/// The eight bytes from `at` on.
+/// The eight bytes from `at` on, the first one lowest.
 #[inline(always)]
 fn eight(bytes: &[u8], at: usize) -> u64 {
     bytes[at..].first_chunk().map_or(0, |&eight| u64::from_le_bytes(eight))

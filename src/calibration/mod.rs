@@ -85,14 +85,14 @@ pub fn load(paths: &[&Path]) -> Result<StereoCalibration, CalibrationError> {
     if !opencv::is_known(&files) {
         return Err(CalibrationError::Unknown(paths[0].to_owned()));
     }
-    if let (true, Some(other)) = (files.len() == 1 && opencv::is_half(&files), beside(paths[0])) {
+    if let (true, Some(other)) = (files.len() == 1 && opencv::is_partial(&files), companion(paths[0])) {
         files.push(yaml::File::open(&other)?);
     }
     opencv::from_files(&files)
 }
 
-/// The other one of `intrinsics` and `extrinsics`, where it is there.
-fn beside(path: &Path) -> Option<PathBuf> {
+/// The file beside `path` with `extrinsic` for `intrinsic` in its name, or the other way round, if there is one.
+fn companion(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let other = if name.contains("intrinsic") {
         name.replace("intrinsic", "extrinsic")
@@ -103,13 +103,13 @@ fn beside(path: &Path) -> Option<PathBuf> {
 }
 
 impl StereoCalibration {
-    /// Rotation of either eye by half of what they differ in: to be applied in the right eye's axes, and its inverse in
-    /// the left one's.
+    /// Half of the rotation between the eyes: applied in the right eye's axes, and its inverse in the left one's, it
+    /// makes both look the same way.
     fn half_turn(&self) -> DMat3 {
         DMat3::from_quat(DQuat::from_scaled_axis(DQuat::from_mat3(&self.rotation).to_scaled_axis() * -0.5))
     }
 
-    /// The left camera's place seen by the right one once both look the same way, in metres.
+    /// The left camera's place in the right one's axes after [`Self::half_turn`], in metres.
     fn halfway_m(&self) -> DVec3 {
         self.half_turn() * self.translation_m
     }
@@ -138,8 +138,8 @@ impl StereoCalibration {
         }
     }
 
-    /// The calibration for pictures of `size` (columns, rows): scaled where the aspect is the same, and where it names
-    /// no size taken for that of the pictures if the principal points lie in their middle half.
+    /// The calibration for pictures of `size` (columns, rows): scaled to it where the aspect is the same. One that
+    /// names no size is taken to be for `size` if the principal points lie in the middle half of the pictures.
     ///
     /// # Errors
     /// Neither holds.
@@ -152,6 +152,7 @@ impl StereoCalibration {
             eye.center_px = scaled_px(eye.center_px, scale);
             if let Some(given) = &mut scaled.given {
                 given.centers_px[side] = scaled_px(given.centers_px[side], scale);
+                // Both eyes share one focal length: it is scaled once.
                 if side == 0 {
                     given.focal_px *= scale;
                 }
@@ -170,8 +171,8 @@ impl StereoCalibration {
         let (width, height) = size;
         match self.eyes[0].size {
             None => notes.push(format!("the calibration names no picture size; taken as {width}x{height}")),
-            Some(own) if own != size => {
-                notes.push(format!("the calibration is for {}x{}; scaled to {width}x{height}", own.0, own.1));
+            Some(from) if from != size => {
+                notes.push(format!("the calibration is for {}x{}; scaled to {width}x{height}", from.0, from.1));
             }
             Some(_) => {}
         }
@@ -185,17 +186,18 @@ fn scaled_px(point_px: DVec2, scale: DVec2) -> DVec2 {
 }
 
 impl Eye {
-    /// Scale along columns and rows from the pictures it was calibrated with to those of `size`.
+    /// Scale along columns and rows from the pictures it was calibrated with to those of `size`; 1 where their size is
+    /// not known and may be `size`.
     fn scale_to(&self, size: (u32, u32)) -> Result<DVec2, CalibrationError> {
         let sides = |(width, height): (u32, u32)| DVec2::new(f64::from(width), f64::from(height));
-        let Some(own) = self.size else {
-            let part = self.center_px / sides(size);
-            let is_plausible = part.min_element() >= 0.25 && part.max_element() <= 0.75;
+        let Some(calibrated) = self.size else {
+            let share = self.center_px / sides(size);
+            let is_plausible = share.min_element() >= 0.25 && share.max_element() <= 0.75;
             let refusal = CalibrationError::NoSize { center_px: self.center_px.into(), found: size };
             return if is_plausible { Ok(DVec2::ONE) } else { Err(refusal) };
         };
-        let scale = sides(size) / sides(own);
+        let scale = sides(size) / sides(calibrated);
         let is_same = (scale.x / scale.y - 1.0).abs() <= SAME_ASPECT;
-        if is_same { Ok(scale) } else { Err(CalibrationError::Shape { calibrated: own, found: size }) }
+        if is_same { Ok(scale) } else { Err(CalibrationError::Shape { calibrated, found: size }) }
     }
 }

@@ -10,7 +10,8 @@ use super::{Eye, StereoCalibration, entries};
 
 /// A baseline longer than this is in millimetres: no rig of metres is that wide.
 const WIDEST_M: f64 = 2.0;
-/// How far the rectification may be from the pose that it belongs to.
+/// How far the rectification may be from the pose that it belongs to: numbers of the rotation, and the translation
+/// relative to its length.
 const SAME_POSE: f64 = 0.02;
 /// What to do where a camera is missing.
 const CAMERA_HINT: &str = "name the file with M1 D1 M2 D2 (intrinsics.yml) as well";
@@ -40,6 +41,7 @@ const LENSES: [Names; 2] = [
 ];
 const ROTATION: Names = &["r", "rotation", "rotationmatrix"];
 const TRANSLATION: Names = &["t", "translation", "translationvector"];
+/// R1 and R2, which rotate each eye into the rectified axes.
 const TURNS: [Names; 2] = [&["r1", "rectificationleft", "rleft"], &["r2", "rectificationright", "rright"]];
 const PROJECTIONS: [Names; 2] = [&["p1", "projectionleft", "pleft"], &["p2", "projectionright", "pright"]];
 const MODEL: Names = &["distortionmodel"];
@@ -57,38 +59,40 @@ fn need<'a>(files: &'a [File], names: Names, key: &str, hint: &'static str) -> R
     find(files, names).ok_or_else(missing)
 }
 
-/// Whether the files are such ones at all.
+/// Whether the files have entries of this format.
 pub(super) fn is_known(files: &[File]) -> bool {
     CAMERAS.into_iter().chain(TURNS).any(|names| find(files, names).is_some())
         || (find(files, ROTATION).is_some() && find(files, TRANSLATION).is_some())
 }
 
 /// Whether cameras or pose are missing, which a second file may have.
-pub(super) fn is_half(files: &[File]) -> bool {
+pub(super) fn is_partial(files: &[File]) -> bool {
     find(files, CAMERAS[0]).is_none() || (find(files, ROTATION).is_none() && find(files, TURNS[0]).is_none())
 }
 
-/// The calibration in `files`, at least one.
+/// The calibration in `files`, at least one. The pose is R and T, or else follows from R1 R2 P1 P2; where both are
+/// there they must agree.
 pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, CalibrationError> {
     let size = size(files)?;
     let eyes = [eye(files, 0, size)?, eye(files, 1, size)?];
-    let mut given = given(files)?;
+    let mut given = given_rectification(files)?;
     let (rotation, translation) = match given {
         Some((ref given, shift)) if find(files, ROTATION).is_none() => {
-            let to_right = given.rotations[1].transpose();
-            (to_right * given.rotations[0], to_right * DVec3::new(shift, 0.0, 0.0))
+            // From the left eye to the rectified axes, and back to the right eye.
+            let rectified_to_right = given.rotations[1].transpose();
+            (rectified_to_right * given.rotations[0], rectified_to_right * DVec3::new(shift, 0.0, 0.0))
         }
         _ => {
             let (rotation, place) = (need(files, ROTATION, "R", POSE_HINT)?, need(files, TRANSLATION, "T", POSE_HINT)?);
             let translation = DVec3::from_array(place.numbers::<3>(3, "3x1")?);
-            (entries::rotation(rotation, &rotation.numbers::<9>(3, "3x3")?)?, entries::apart(place, translation)?)
+            (entries::rotation(rotation, &rotation.numbers::<9>(3, "3x3")?)?, entries::nonzero(place, translation)?)
         }
     };
     if let Some((given, shift)) = &given {
-        let turn = given.rotations[1] * rotation - given.rotations[0];
-        let place = given.rotations[1] * translation - DVec3::new(*shift, 0.0, 0.0);
-        let is_same = turn.to_cols_array().iter().all(|part| part.abs() < SAME_POSE);
-        if !is_same || place.length() > SAME_POSE * translation.length() {
+        let turn_error = given.rotations[1] * rotation - given.rotations[0];
+        let shift_error = given.rotations[1] * translation - DVec3::new(*shift, 0.0, 0.0);
+        let is_same = turn_error.to_cols_array().iter().all(|part| part.abs() < SAME_POSE);
+        if !is_same || shift_error.length() > SAME_POSE * translation.length() {
             let value = need(files, TURNS[1], "R2", POSE_HINT)?;
             let what = "does not belong to R and T: R2 R must be R1, and R2 T along the columns by P2";
             return Err(value.refuse(Fault::Impossible { key: value.key(), what }));
@@ -108,6 +112,7 @@ pub(super) fn from_files(files: &[File]) -> Result<StereoCalibration, Calibratio
     })
 }
 
+/// Columns and rows of the pictures, from either spelling; `None` where the files do not say.
 fn size(files: &[File]) -> Result<Option<(u32, u32)>, CalibrationError> {
     if let (Some(width), Some(height)) = (find(files, WIDTH), find(files, HEIGHT)) {
         let side = |value: Value<'_>| entries::side(value, value.count()?.into());
@@ -139,8 +144,9 @@ fn projection(files: &[File], side: usize) -> Result<Projection<'_>, Calibration
     Ok(Projection { value, focal_px, center_px, shift: DVec2::new(across, down) })
 }
 
-/// R1 R2 P1 P2, where there are any of them, and the right eye's shift along the columns, in the file's unit.
-fn given(files: &[File]) -> Result<Option<(Rectification, f64)>, CalibrationError> {
+/// The rectification by R1 R2 P1 P2, and how far points shift along the columns from the left eye to the right one, in
+/// the file's unit; `None` where the files have none of the four.
+fn given_rectification(files: &[File]) -> Result<Option<(Rectification, f64)>, CalibrationError> {
     if TURNS.into_iter().chain(PROJECTIONS).all(|names| find(files, names).is_none()) {
         return Ok(None);
     }
@@ -156,6 +162,7 @@ fn given(files: &[File]) -> Result<Option<(Rectification, f64)>, CalibrationErro
     if right.shift.y.abs() > right.shift.x.abs() {
         return Err(CalibrationError::NotBeside("above"));
     }
+    // P2's fourth column is in pixels: focal length times translation.
     let shift = right.shift.x / focal_px.x;
     if shift.abs() < 1e-9 {
         return Err(impossible("puts both cameras in one place (a baseline of 0)"));

@@ -14,9 +14,10 @@ use crate::optics::StereoRig;
 const LEAST_FOCAL: f64 = 0.7;
 /// The rectified focal length is at most this many times the cameras' own: beyond, both see too little in common.
 const MOST_FOCAL: f64 = 3.0;
-/// Points along each border of a picture that are followed into the rectified one.
+/// Points along each border of a picture that are projected into the rectified one.
 const BORDER_POINTS: u32 = 256;
-/// Rays flatter than this against the rectified plane are taken to be here.
+/// Least z, after rotation, of a ray with z = 1: flatter ones would meet the rectified plane next to infinity, or
+/// behind.
 const FLATTEST: f64 = 0.1;
 
 /// How both eyes are turned, and what a pinhole then sees.
@@ -64,9 +65,10 @@ impl Rectification {
             return Ok(given);
         }
         let half_turn = calibration.half_turn();
+        // Seen from the right eye the left one then lies along -x.
         let onto_rows = DMat3::from_quat(DQuat::from_rotation_arc(halfway_m.normalize(), DVec3::NEG_X));
         let rotations = [onto_rows * half_turn.transpose(), onto_rows * half_turn];
-        let (focal_px, center_px) = window(&calibration.eyes, &rotations, size)?;
+        let (focal_px, center_px) = common_window(&calibration.eyes, &rotations, size)?;
         let focal_px = DVec2::splat(focal_px);
         Ok(Self { rotations, focal_px, centers_px: [center_px; 2], baseline_m: calibration.baseline_m() })
     }
@@ -96,30 +98,34 @@ impl Rectification {
     }
 }
 
-/// Focal length and principal point of the largest window within what both eyes see.
-fn window(eyes: &[Eye; 2], rotations: &[DMat3; 2], size: (u32, u32)) -> Result<(f64, DVec2), CalibrationError> {
+/// Focal length and principal point, in pixels, of the largest window of the pictures' aspect within what both eyes
+/// see.
+fn common_window(eyes: &[Eye; 2], rotations: &[DMat3; 2], size: (u32, u32)) -> Result<(f64, DVec2), CalibrationError> {
     let last_px = DVec2::new(f64::from(size.0) - 1.0, f64::from(size.1) - 1.0);
-    let (mut least, mut most) = (DVec2::NEG_INFINITY, DVec2::INFINITY);
+    // Corners of the window on the rectified plane at distance 1: no border point of either picture may lie inside.
+    let (mut low, mut high) = (DVec2::NEG_INFINITY, DVec2::INFINITY);
     for (eye, rotation) in eyes.iter().zip(rotations) {
         let reach = eye.distortion.reach();
-        let seen = |pixel_px: DVec2| {
+        let rectified = |pixel_px: DVec2| {
             let direction = *rotation * eye.ray(pixel_px, reach).extend(1.0);
             direction.truncate() / direction.z.max(FLATTEST)
         };
         for k in 0..=BORDER_POINTS {
             let along_px = last_px * f64::from(k) / f64::from(BORDER_POINTS);
-            least.x = least.x.max(seen(DVec2::new(0.0, along_px.y)).x);
-            most.x = most.x.min(seen(DVec2::new(last_px.x, along_px.y)).x);
-            least.y = least.y.max(seen(DVec2::new(along_px.x, 0.0)).y);
-            most.y = most.y.min(seen(DVec2::new(along_px.x, last_px.y)).y);
+            low.x = low.x.max(rectified(DVec2::new(0.0, along_px.y)).x);
+            high.x = high.x.min(rectified(DVec2::new(last_px.x, along_px.y)).x);
+            low.y = low.y.max(rectified(DVec2::new(along_px.x, 0.0)).y);
+            high.y = high.y.min(rectified(DVec2::new(along_px.x, last_px.y)).y);
         }
     }
-    let extent = most - least;
-    let own_px = eyes.iter().map(|eye| eye.focal_px.element_sum()).sum::<f64>() / 4.0;
+    let extent = high - low;
+    let mean_focal_px = eyes.iter().map(|eye| eye.focal_px.element_sum()).sum::<f64>() / 4.0;
+    // The focal length at which the picture just fits into the extent.
     let needed_px = (last_px / extent).max_element();
-    if extent.min_element() <= 0.0 || needed_px > own_px * MOST_FOCAL {
+    if extent.min_element() <= 0.0 || needed_px > mean_focal_px * MOST_FOCAL {
         return Err(CalibrationError::Apart);
     }
-    let focal_px = needed_px.max(own_px * LEAST_FOCAL);
-    Ok((focal_px, last_px / 2.0 - focal_px * (least + most) / 2.0))
+    let focal_px = needed_px.max(mean_focal_px * LEAST_FOCAL);
+    // The window's middle comes to the picture's.
+    Ok((focal_px, last_px / 2.0 - focal_px * (low + high) / 2.0))
 }

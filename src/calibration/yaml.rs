@@ -1,4 +1,4 @@
-//! YAML as calibrations are written in, with the line of every entry for what is wrong there.
+//! YAML as calibrations use it, with the line of every entry, for error messages.
 
 use std::path::{Path, PathBuf};
 
@@ -7,9 +7,10 @@ use saphyr_parser::{Event, Parser, ScanError};
 use super::error::{CalibrationError, Fault};
 use crate::files::input;
 
-/// Calibrations are nested three deep.
+/// Lists and maps within each other, at most; calibrations need three.
 const MOST_NESTED: usize = 32;
 
+/// A parsed file.
 pub(super) struct File {
     path: PathBuf,
     root: Node,
@@ -47,7 +48,7 @@ impl File {
         // OpenCV's first line `%YAML:1.0` is no directive of YAML: as a comment it disturbs nobody.
         let commented = text.trim_start_matches('\u{feff}').strip_prefix('%').map(|rest| format!("#{rest}"));
         let text = commented.as_deref().unwrap_or(text);
-        let root = tree(text).map_err(|(line, what)| CalibrationError::File {
+        let root = parse_tree(text).map_err(|(line, what)| CalibrationError::File {
             path: path.to_owned(),
             line,
             fault: Fault::Yaml(what),
@@ -64,9 +65,10 @@ impl File {
     }
 }
 
-/// The first document of `text`; else the line and what is wrong with it.
-fn tree(text: &str) -> Result<Node, (usize, String)> {
+/// Parses the first document of `text`, an empty map where there is none. Fails with the line and what is wrong there.
+fn parse_tree(text: &str) -> Result<Node, (usize, String)> {
     let fault = |error: ScanError| (error.marker().line(), error.info().replace('\n', " "));
+    // Lists and maps that have begun and not ended, the innermost last.
     let mut open: Vec<Node> = Vec::new();
     for event in Parser::new_from_str(text) {
         let (event, span) = event.map_err(fault)?;
@@ -96,7 +98,7 @@ fn tree(text: &str) -> Result<Node, (usize, String)> {
             None => return Ok(done),
             Some(Kind::List(list)) => list.push(done),
             Some(Kind::Map(map)) => match map.last_mut() {
-                // A key waits for its value as an entry without one: a list that never ends up there.
+                // A key without its value yet has a placeholder at line 0, which no parsed entry has.
                 Some((_, value)) if value.line == 0 => *value = done,
                 _ => match done.kind {
                     Kind::Scalar(key) => map.push((key, Node { line: 0, kind: Kind::List(Vec::new()) })),
@@ -119,12 +121,12 @@ pub(super) struct Value<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// The error that `fault` is here.
+    /// The error for `fault` in this file and line.
     pub fn refuse(&self, fault: Fault) -> CalibrationError {
         CalibrationError::File { path: self.path.to_owned(), line: self.line, fault }
     }
 
-    /// What it is called.
+    /// Its key, for messages.
     pub fn key(&self) -> String {
         self.key.to_owned()
     }
@@ -146,19 +148,19 @@ impl<'a> Value<'a> {
         self.get(key).ok_or_else(|| self.refuse(Fault::Missing { key: key.into(), hint }))
     }
 
-    fn expect(&self, expected: &'static str) -> CalibrationError {
+    fn wrong_kind(&self, expected: &'static str) -> CalibrationError {
         self.refuse(Fault::Kind { key: self.key(), expected })
     }
 
     pub fn text(&self) -> Result<&'a str, CalibrationError> {
         match self.kind {
             Kind::Scalar(text) => Ok(text),
-            _ => Err(self.expect("one word")),
+            _ => Err(self.wrong_kind("one word")),
         }
     }
 
     fn number(&self) -> Result<f64, CalibrationError> {
-        let Kind::Scalar(text) = self.kind else { return Err(self.expect("a list of numbers")) };
+        let Kind::Scalar(text) = self.kind else { return Err(self.wrong_kind("a list of numbers")) };
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
         number.ok_or_else(|| {
             let short = text.chars().take(20).collect();
@@ -168,7 +170,7 @@ impl<'a> Value<'a> {
 
     /// A whole number, >= 0.
     pub fn count(&self) -> Result<u32, CalibrationError> {
-        self.text()?.trim_end_matches(".0").parse().map_err(|_| self.expect("a whole number"))
+        self.text()?.trim_end_matches(".0").parse().map_err(|_| self.wrong_kind("a whole number"))
     }
 
     fn items(&self) -> Option<impl Iterator<Item = Value<'a>>> {
@@ -190,7 +192,7 @@ impl<'a> Value<'a> {
             return Ok(Matrix { rows, cols, data });
         }
         let mut matrix = Matrix { rows: 0, cols: 1, data: Vec::new() };
-        for item in self.items().ok_or_else(|| self.expect("a matrix or a list of numbers"))? {
+        for item in self.items().ok_or_else(|| self.wrong_kind("a matrix or a list of numbers"))? {
             let before = matrix.data.len();
             match item.items() {
                 Some(row) => {
@@ -202,7 +204,7 @@ impl<'a> Value<'a> {
             }
             let cols = matrix.data.len() - before;
             if matrix.rows > 0 && cols != matrix.cols {
-                return Err(self.expect("a matrix with rows of one length"));
+                return Err(self.wrong_kind("a matrix with rows of one length"));
             }
             (matrix.rows, matrix.cols) = (matrix.rows + 1, cols);
         }

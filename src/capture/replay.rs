@@ -33,7 +33,7 @@ pub struct Replay {
     right_eye: bool,
     looped: bool,
     limit: Option<u64>,
-    /// Frames passed so far.
+    /// Frames read or passed over so far, over all laps.
     position: u64,
     /// Good frames of this lap: a loop without any would never end.
     good: u64,
@@ -49,12 +49,12 @@ impl Replay {
         let first_from = |s: f64| (0..len).find(|&frame| recording.time_ns(frame) as f64 >= s * 1e9).unwrap_or(len);
         let lap = first_from(part.start_s)..part.end_s.map_or(len, first_from);
         if lap.is_empty() {
-            let last_ns = len.checked_sub(1).map_or(0, |last| recording.time_ns(last) + recording.period_ns());
+            let end_ns = len.checked_sub(1).map_or(0, |last| recording.time_ns(last) + recording.period_ns());
             return Err(CaptureError::EmptyRange {
                 source_name: name.to_owned(),
                 start_s: part.start_s,
                 end_s: part.end_s,
-                length_s: last_ns as f64 / 1e9,
+                length_s: end_ns as f64 / 1e9,
             });
         }
         let lap_ns = recording.time_ns(lap.end - 1) - recording.time_ns(lap.start) + recording.period_ns();
@@ -78,7 +78,7 @@ impl Replay {
         Self { right_eye: true, ..self }
     }
 
-    /// Frames to come in all, if there is an end.
+    /// Frames in all, over all laps; `None` where there is no end.
     fn total(&self) -> Option<u64> {
         let lap = (!self.looped).then_some(self.lap.len() as u64);
         lap.into_iter().chain(self.limit).min()
@@ -92,7 +92,7 @@ impl Replay {
         let lap_len = self.lap.len() as u64;
         let index = self.lap.start + (self.position % lap_len) as usize;
         let in_lap_ns = self.recording.time_ns(index) - self.recording.time_ns(self.lap.start);
-        // Ten years played again for centuries: the end of time is an end.
+        // Media time beyond 64 bits ends the loop.
         let time_ns = (self.position / lap_len).checked_mul(self.lap_ns)?.checked_add(in_lap_ns)?;
         Some(Stamp { index, time_ns, captured_ns: None })
     }
@@ -113,6 +113,7 @@ impl Camera for Replay {
     fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
         let Some(stamp) = self.stamp() else { return Ok(Captured::End) };
         if stamp.index == self.lap.start {
+            // A whole lap without a good frame.
             if self.position > 0 && self.good == 0 {
                 return Ok(Captured::End);
             }
@@ -137,7 +138,7 @@ impl Camera for Replay {
         let from = self.position;
         while self.stamp().is_some_and(|stamp| stamp.time_ns < until_ns) {
             self.position += 1;
-            // Not known to be bad.
+            // It counts as good: it is not known to be bad.
             self.good += 1;
         }
         self.position - from

@@ -19,9 +19,9 @@ pub struct Format {
     pub frames: Option<u64>,
     /// Threads that render, > 0.
     pub threads: usize,
-    /// Frames of the scene's motion (which repeats itself after [`Scene::period_s`]) that are rendered once and kept, so
-    /// that they are played at the full rate for ever, on any machine; fewer where they would take more than 128 MiB.
-    /// Which one is shown when depends on how many there are yet. `None` renders every frame anew.
+    /// Frames of the scene's motion (which repeats itself after [`Scene::period_s`]) that are rendered once and kept,
+    /// so that any machine plays them at the full rate; fewer where they would take more than 128 MiB. Which one is
+    /// shown when depends on how many are rendered yet. `None` renders every frame anew.
     pub cycle: Option<u64>,
 }
 

@@ -1,4 +1,4 @@
-//! A camera that is there: frames as they come, whatever happens to it.
+//! A V4L2 camera: frames as they come, also after it was unplugged or has changed its mode.
 
 use std::time::Duration;
 
@@ -24,10 +24,11 @@ pub struct V4l2Camera {
     scratch: ColorImage,
     fit: Fit,
     times: MediaTime,
-    /// Frames given so far, and how many there may be.
+    /// Frames given so far.
     given: u64,
-    /// To be told, one cause at a time.
+    /// Losses that are still to be reported, one cause at a time.
     losses: Losses,
+    /// Whether a warning about undecodable frames was logged.
     complained: bool,
 }
 
@@ -68,7 +69,7 @@ impl V4l2Camera {
 
     /// As [`Camera::next`], waiting no longer than `patience`.
     pub fn next_within(&mut self, patience: Duration, color: &mut ColorImage) -> Captured {
-        if let Some(lost) = self.told() {
+        if let Some(lost) = self.next_loss() {
             return lost;
         }
         if self.info.frames.is_some_and(|frames| self.given >= frames) {
@@ -81,7 +82,7 @@ impl V4l2Camera {
             Next::Frame { captured_ns } => captured_ns,
             Next::Lost(losses) => {
                 self.losses = losses;
-                return self.told().unwrap_or(Captured::Waiting);
+                return self.next_loss().unwrap_or(Captured::Waiting);
             }
             Next::Waiting => return Captured::Waiting,
         };
@@ -99,9 +100,11 @@ impl V4l2Camera {
         })
     }
 
-    /// Decodes the current frame into `color`; whether that went well.
+    /// Decodes the current frame into `color`. Returns false where it cannot be decoded, which is logged the first
+    /// time.
     fn decode(&mut self, color: &mut ColorImage) -> bool {
         let layout = self.live.layout();
+        // The camera may have come back with another layout.
         if layout != self.decoder.layout() {
             match Decoder::new(layout) {
                 Ok(decoder) => self.decoder = decoder,
@@ -121,7 +124,7 @@ impl V4l2Camera {
         decoded.map_or_else(|error| self.complain(&error), |()| true)
     }
 
-    /// Says once why frames cannot be decoded. A live camera's damaged frames do not end a run.
+    /// Logs once why frames cannot be decoded, and returns false. A live camera's damaged frames do not end a run.
     fn complain(&mut self, error: &dyn std::error::Error) -> bool {
         if !self.complained {
             tracing::warn!("{}: {error}; going on without such frames", self.live.name());
@@ -130,8 +133,8 @@ impl V4l2Camera {
         false
     }
 
-    /// The next kind of loss to be told.
-    fn told(&mut self) -> Option<Captured> {
+    /// Takes the next cause of loss that is to be reported, with its count.
+    fn next_loss(&mut self) -> Option<Captured> {
         let Losses { missed, stale, corrupt } = &mut self.losses;
         let causes = [(missed, Cause::Driver), (stale, Cause::Evicted), (corrupt, Cause::Corrupt)];
         let (count, cause) = causes.into_iter().find(|(count, _)| **count > 0)?;

@@ -110,7 +110,7 @@ impl From<RecordingError> for CliError {
 }
 
 impl CliError {
-    /// For `map_err`: the same with the file's name.
+    /// For `map_err`: adds the file's path to an I/O error.
     pub fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |source| CliError::Io { path, source }
@@ -135,7 +135,7 @@ impl CliError {
         if self.is_wrong_argument() { ExitCode::from(2) } else { ExitCode::FAILURE }
     }
 
-    /// Whether the reader of our output went away, which is no failure of ours.
+    /// Whether its cause is that the reader of our output went away, as in `... | head`: that is no failure.
     pub fn is_broken_pipe(&self) -> bool {
         let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(self);
         while let Some(error) = cause {

@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all.
+//! Output files: what may be overwritten, and writing them whole or not at all.
 
 use std::fs;
 use std::path::Path;
@@ -9,6 +9,8 @@ use crate::files::{place, whole};
 use crate::sink::Target;
 use crate::stats::Report;
 
+/// Refuses to replace files, unless with `--force`.
+///
 /// # Errors
 /// [`CliError::Exists`] when one of `paths` exists and `force` is not given.
 pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bool) -> Result<(), CliError> {
@@ -18,6 +20,8 @@ pub fn refuse_overwrite<'a>(paths: impl IntoIterator<Item = &'a Path>, force: bo
     }
 }
 
+/// Refuses to write over what is read, whatever links lead there.
+///
 /// # Errors
 /// [`CliError::Usage`] when `target`, which the option `what` names, is `source`, lies in it, or holds it.
 pub fn refuse_source(what: &str, target: &Path, source: &Path) -> Result<(), CliError> {
@@ -53,13 +57,13 @@ pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
     }
 }
 
-/// Where a report goes that is to be printed.
+/// The `--report` path that means standard output.
 const STDOUT: &str = "-";
 
-/// Whether a report can be written to `path`, before there is any.
+/// Checks before a run that its report may be written to `path`.
 ///
 /// # Errors
-/// It exists, and may not be overwritten; or it is standard output, where the frames go.
+/// The file exists and may not be overwritten, or both the report and the frames go to standard output.
 pub fn check_report(path: Option<&Path>, force: bool, targets: &[Target]) -> Result<(), CliError> {
     match path {
         Some(path) if path != STDOUT => refuse_overwrite([path], force),

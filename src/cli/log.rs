@@ -20,11 +20,11 @@ use super::screen::Screen;
 static JSON: AtomicBool = AtomicBool::new(false);
 static QUIET: AtomicBool = AtomicBool::new(false);
 
-/// The way to stderr.
+/// The only writer to stderr, shared by all threads.
 pub fn screen() -> &'static Screen {
     static SCREEN: OnceLock<Screen> = OnceLock::new();
-    let missing = |lines: u64| line("WARN", &format!("{lines} lines are missing: the terminal took none for too long"));
-    SCREEN.get_or_init(|| Screen::new(io::stderr(), missing))
+    let lost = |lines: u64| encoded("WARN", &format!("{lines} lines are missing: the terminal took none for too long"));
+    SCREEN.get_or_init(|| Screen::new(io::stderr(), lost))
 }
 
 /// Chooses how messages are written: also for what is wrong before the arguments are understood.
@@ -32,13 +32,14 @@ pub fn write_as(format: LogFormat) {
     JSON.store(format == LogFormat::Json, Ordering::Relaxed);
 }
 
-/// Starts log lines: warnings, or as `-v`, `-q` and `RUST_LOG` say.
+/// Installs the logger. Its level comes from `RUST_LOG`, else from `-v` or `-q`, else it is that of warnings.
 pub fn start(global: &Global) {
     write_as(global.log_format);
     QUIET.store(global.quiet, Ordering::Relaxed);
     let level = match (global.quiet, global.verbose) {
         (true, _) => "error",
-        // What others grumble about is seldom for who uses this; the window's frame does where no desktop answers.
+        // Warnings of other crates are rarely of use to the user. sctk_adwaita, which draws window frames, even logs
+        // errors wherever no desktop portal answers.
         (_, 0) => "bokehcam=warn,sctk_adwaita=off,error",
         (_, 1) => "bokehcam=info,warn",
         (_, _) => "bokehcam=debug,info",
@@ -47,7 +48,7 @@ pub fn start(global: &Global) {
     let no_color = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(LogLines);
     let log = log.with_ansi(io::stderr().is_terminal() && !no_color);
-    // A second log in one process changes nothing.
+    // It fails if there is a logger already, as in tests; that one stays.
     let _ = match global.log_format {
         LogFormat::Text => log.try_init(),
         LogFormat::Json => log.json().try_init(),
@@ -59,7 +60,7 @@ pub fn say(text: &str) {
     message("INFO", text);
 }
 
-/// A warning, unless only what went wrong is to be told.
+/// A warning, unless `--quiet` is given.
 pub fn warn(what: &str) {
     if QUIET.load(Ordering::Relaxed) {
         return;
@@ -79,18 +80,17 @@ pub fn error(what: &str) {
 }
 
 fn message(level: &str, text: &str) {
-    screen().print(line(level, text).as_bytes());
+    screen().print(encoded(level, text).as_bytes());
 }
 
-/// A message with its end, as text or JSON.
-fn line(level: &str, text: &str) -> String {
+/// A message as it is printed, with its line end: as text, or as a JSON object in the logger's own form.
+fn encoded(level: &str, text: &str) -> String {
     if !JSON.load(Ordering::Relaxed) {
         return format!("{}\n", printable(text, &['\n']));
     }
     let mut timestamp = String::new();
-    // Without a clock there is no time to tell.
+    // It fails only without a clock: then the time stays empty.
     let _ = SystemTime.format_time(&mut Writer::new(&mut timestamp));
-    // As the log's own lines are.
     let object = json!({"timestamp": timestamp, "level": level, "fields": {"message": text}, "target": "bokehcam"});
     format!("{object}\n")
 }
@@ -100,41 +100,43 @@ pub fn flush() {
     screen().flush();
 }
 
-/// Tells of a panic as of anything else: a thread that panics must not wait for the terminal, and its neighbours for it.
+/// Makes panics go through [`screen`], too: a thread that panics must neither wait for the terminal nor keep others
+/// waiting for it.
 pub fn tell_of_panics() {
     std::panic::set_hook(Box::new(|panic| {
+        // It is caught, and becomes an error that is reported elsewhere.
         if crate::compute::catches() {
             return;
         }
         let thread = std::thread::current();
         let backtrace = std::backtrace::Backtrace::capture();
-        let told = format!("thread '{}' {panic}", thread.name().unwrap_or("unnamed"));
+        let text = format!("thread '{}' {panic}", thread.name().unwrap_or("unnamed"));
         match backtrace.status() {
-            std::backtrace::BacktraceStatus::Captured => message("ERROR", &format!("{told}\n{backtrace}")),
-            _ => message("ERROR", &told),
+            std::backtrace::BacktraceStatus::Captured => message("ERROR", &format!("{text}\n{backtrace}")),
+            _ => message("ERROR", &text),
         }
     }));
 }
 
-/// `text` with control characters, and those that turn the direction of writing, as a program would spell them; but
-/// `keep`. Names of files and devices are others' texts, and a terminal obeys what it is sent.
+/// Escapes, as in Rust source, control characters and those that change the direction of writing, except `keep`: names
+/// of files and devices may hold anything, and a terminal obeys what it is sent.
 pub fn printable<'a>(text: &'a str, keep: &[char]) -> Cow<'a, str> {
-    let turns = |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    let acts = |c: char| (c.is_control() || turns(c) || matches!(c, '\u{2028}' | '\u{2029}')) && !keep.contains(&c);
-    if !text.contains(acts) {
+    let is_bidi = |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let risky = |c: char| (c.is_control() || is_bidi(c) || matches!(c, '\u{2028}' | '\u{2029}')) && !keep.contains(&c);
+    if !text.contains(risky) {
         return text.into();
     }
-    let mut spelt = String::with_capacity(text.len() + 8);
+    let mut escaped = String::with_capacity(text.len() + 8);
     for c in text.chars() {
-        if acts(c) { spelt.extend(c.escape_default()) } else { spelt.push(c) }
+        if risky(c) { escaped.extend(c.escape_default()) } else { escaped.push(c) }
     }
-    spelt.into()
+    escaped.into()
 }
 
-/// Makes a line of each event of the log.
+/// Collects each event of the logger in one [`LogLine`].
 struct LogLines;
 
-/// One event; sent when it is whole.
+/// The text of one event, printed as a whole when it is dropped.
 struct LogLine(Vec<u8>);
 
 impl MakeWriter<'_> for LogLines {
@@ -159,28 +161,29 @@ impl Write for LogLine {
 impl Drop for LogLine {
     fn drop(&mut self) {
         let text = String::from_utf8_lossy(&self.0);
-        // The log's own colours begin with an escape; those of others' texts it spells itself.
+        // The logger's colours need the escape character; it has already escaped those in the texts it was given.
         let line = printable(text.trim_end_matches('\n'), &['\x1b']);
         screen().print(format!("{line}\n").as_bytes());
     }
 }
 
-/// What clap says in paragraphs, in one line and without the usage.
+/// clap's message of several paragraphs as one line, without its usage and help hints.
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
-    let told = text
+    let lines = text
         .lines()
         .map(str::trim)
         .filter(|line| !line.is_empty() && !line.starts_with("Usage:") && !line.starts_with("For more information"));
     let mut sentence = String::new();
-    for line in told {
-        let joint = match sentence.chars().last() {
+    for line in lines {
+        let separator = match sentence.chars().last() {
             None => "",
             Some(':') => " ",
+            // A list of possible values belongs to what is before it.
             Some(_) if line.starts_with('[') => " ",
             Some(_) => "; ",
         };
-        sentence.push_str(joint);
+        sentence.push_str(separator);
         sentence.push_str(line.strip_prefix("error: ").unwrap_or(line));
     }
     sentence

@@ -31,6 +31,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     code
 }
 
+/// Parses the arguments and runs the command; what it logs may still be waiting to be printed afterwards.
 fn run_to_end(args: &[OsString]) -> ExitCode {
     let fail = |error: &CliError| {
         log::error(&match error.is_wrong_argument() {

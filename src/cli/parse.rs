@@ -23,7 +23,7 @@ impl From<clap::Error> for Refusal {
     }
 }
 
-/// A command line, and what stands behind it.
+/// A parsed command line, and the settings that come from elsewhere.
 pub struct Parsed {
     pub cli: Cli,
     pub matches: ArgMatches,
@@ -31,7 +31,7 @@ pub struct Parsed {
     pub layers: Layers,
 }
 
-/// Reads arguments, with what the environment, a preset and the settings file say.
+/// Parses arguments together with the environment, preset, snapshot and settings file that apply.
 pub fn parse(args: &[OsString]) -> Result<Parsed, Refusal> {
     let command = table::with_environment(Cli::command());
     // Once without the settings file, to learn its name and the preset's; then again with their values as defaults.
@@ -43,11 +43,11 @@ pub fn parse(args: &[OsString]) -> Result<Parsed, Refusal> {
     Ok(Parsed { cli: Cli::from_arg_matches(&matches)?, matches, file, layers })
 }
 
-/// The settings file, as the command needs it.
+/// Loads the settings file, with the exceptions of `config save` and `config dump`.
 fn settings_for(given: &ArgMatches, chosen: Option<&Path>) -> Result<SettingsFile, CliError> {
     let config = given.subcommand_matches("config").and_then(ArgMatches::subcommand_name);
     match (config, chosen) {
-        // It will be made.
+        // `config save` creates the file that is named.
         (Some("save"), Some(path)) if path.symlink_metadata().is_err() => return Ok(SettingsFile::default()),
         (Some("dump"), _) => save::refuse_redirect(chosen)?,
         _ => {}

@@ -1,4 +1,4 @@
-//! What users write, read without running a command: for the fuzz targets, who know no other way in.
+//! Entry points for the fuzz targets: parse what users write, without running a command.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -11,10 +11,10 @@ use super::settings::arguments::joined;
 use super::settings::dump;
 use super::settings::file::SettingsFile;
 
-/// The settings that a command line stands for, as `config dump` prints them; nothing for other commands.
+/// Parses a command line. For `config dump` returns what that would print, for other commands an empty text.
 ///
 /// # Errors
-/// It is refused: the message, as it is printed.
+/// The command line is refused: the message that would be printed.
 pub fn arguments(args: &[OsString]) -> Result<String, String> {
     let parsed = parse(&joined(args.iter().cloned())).map_err(|refusal| {
         let message = match refusal {
@@ -31,10 +31,10 @@ pub fn arguments(args: &[OsString]) -> Result<String, String> {
     })
 }
 
-/// Reads the text of a settings file, and each preset in it.
+/// Parses the text of a settings file, and looks up each preset in it.
 ///
 /// # Errors
-/// As the program says it.
+/// It is no settings file.
 pub fn settings(path: &Path, text: &str) -> Result<(), CliError> {
     let file = SettingsFile::parse(path, text)?;
     for name in file.presets.keys() {

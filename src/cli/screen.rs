@@ -1,7 +1,8 @@
-//! The one way to standard error: a thread that prints lines and draws the bar, so that nobody else waits for a terminal.
+//! The one way to standard error: a thread that prints lines and draws the progress bar, so that no other one waits.
 //!
 //! A terminal may stop taking text for as long as it likes (Ctrl-S, a suspended remote shell, a reader of a pipe that
-//! stands still). Then that thread alone waits; lines queue up, and those for which there is no room are counted.
+//! stands still). Then that thread alone waits; lines queue up, and those that find the queue full are dropped and
+//! counted.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -12,35 +13,38 @@ use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
 
-/// Lines that may wait.
-const ROOM: usize = 1024;
-/// Time from one picture of the bar to the next.
-const DRAW: Duration = Duration::from_millis(100);
-/// A write that takes longer than this is not waited for at the end.
-const PATIENCE: Duration = Duration::from_millis(400);
-/// How often is looked whether everything is printed.
-const GLANCE: Duration = Duration::from_millis(2);
+/// Entries that may wait in the queue.
+const QUEUE_CAPACITY: usize = 1024;
+/// Time between two redraws of the bar.
+const REDRAW_INTERVAL: Duration = Duration::from_millis(100);
+/// A write that takes longer than this is not waited for in [`Screen::flush`].
+const STALL_TIMEOUT: Duration = Duration::from_millis(400);
+/// Time between two looks at whether everything is printed.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 /// Prints lines and one bar on a thread of its own.
 pub struct Screen {
-    to: Option<SyncSender<Entry>>,
+    /// `None` where the thread could not be started: whoever prints then writes (and waits) by itself.
+    queue: Option<SyncSender<Entry>>,
     shared: Arc<Shared>,
 }
 
-/// How far a command is: written by who does the work, read by who draws it.
+/// Progress of a command: written by the thread that works, read by the one that draws the bar.
 #[derive(Debug, Default)]
 pub struct Count {
     done: AtomicU64,
+    /// Set when the bar is to go.
     over: AtomicBool,
 }
 
 impl Count {
-    /// So many are done.
+    /// Sets how many are done.
     pub fn set(&self, done: u64) {
         self.done.store(done, Ordering::Relaxed);
     }
 }
 
+/// What is sent to the printing thread.
 enum Entry {
     /// Whole lines, with their ends.
     Text(Vec<u8>),
@@ -52,65 +56,64 @@ enum Entry {
 
 #[derive(Default)]
 struct Shared {
-    /// Entries that were accepted.
+    /// Entries that were offered to the queue.
     sent: AtomicU64,
-    /// Entries that are done with.
+    /// Entries that were printed or dropped: [`Screen::flush`] waits until it reaches `sent`.
     done: AtomicU64,
-    /// Lines for which there was no room.
+    /// Texts that were dropped because the queue was full.
     lost: AtomicU64,
-    /// Odd while something is being printed, counted up at its beginning and its end.
+    /// Counted up at the beginning and at the end of every write: odd while one is going on.
     prints: AtomicU64,
 }
 
 impl Screen {
-    /// Prints to `out`; `missing` is the line that tells how many lines found no room. Where the system has no thread for
-    /// that, nothing is queued, and who prints waits.
-    pub fn new(out: impl Write + Send + 'static, missing: fn(u64) -> String) -> Self {
+    /// Starts a thread that prints to `out`; `lost_notice` makes the line that tells how many lines were dropped.
+    pub fn new(out: impl Write + Send + 'static, lost_notice: fn(u64) -> String) -> Self {
         let shared = Arc::new(Shared::default());
-        let (to, from) = sync_channel(ROOM);
-        let printer = Printer { out, missing, bar: None, shared: Arc::clone(&shared) };
-        let thread = thread::Builder::new().name("terminal".into()).spawn(move || printer.run(&from));
-        Self { to: thread.is_ok().then_some(to), shared }
+        let (queue, entries) = sync_channel(QUEUE_CAPACITY);
+        let printer = Printer { out, lost_notice, bar: None, shared: Arc::clone(&shared) };
+        let thread = thread::Builder::new().name("terminal".into()).spawn(move || printer.run(&entries));
+        Self { queue: thread.is_ok().then_some(queue), shared }
     }
 
-    /// Prints whole lines, with their ends, unless too many wait already. Never waits.
+    /// Queues whole lines, with their ends, or drops them if the queue is full. Never waits.
     pub fn print(&self, lines: &[u8]) {
-        match &self.to {
+        match &self.queue {
             Some(_) => self.send(Entry::Text(lines.to_vec())),
-            // What cannot be told to anybody is no reason to fail.
+            // A closed standard error is no reason to fail.
             None => drop(io::stderr().write_all(lines)),
         }
     }
 
-    /// Draws a bar from now on; gives back what it shows.
+    /// Draws `bar` from now on; returns the count that it shows.
     pub fn begin(&self, bar: ProgressBar) -> Arc<Count> {
         let count = Arc::new(Count::default());
-        if self.to.is_some() {
+        if self.queue.is_some() {
             self.send(Entry::Bar(bar, Arc::clone(&count)));
         }
         count
     }
 
-    /// Removes the bar that shows this.
+    /// Removes the bar that shows `count`.
     pub fn end(&self, count: &Count) {
         count.over.store(true, Ordering::Relaxed);
-        // Without room for it, it is seen with the next entry.
-        if self.to.is_some() {
+        // If the queue is full, the bar goes with the next entry that is printed.
+        if self.queue.is_some() {
             self.send(Entry::NoBar);
         }
     }
 
-    /// Waits until everything is printed, but not for a terminal that takes nothing.
+    /// Waits until everything sent so far is printed; gives up on a terminal that takes nothing for [`STALL_TIMEOUT`].
     pub fn flush(&self) {
         let Shared { sent, done, prints, .. } = &*self.shared;
         let last = sent.load(Ordering::Acquire);
-        let mut stands = (prints.load(Ordering::Relaxed), Instant::now());
+        let mut last_change = (prints.load(Ordering::Relaxed), Instant::now());
         while done.load(Ordering::Acquire) < last {
-            thread::sleep(GLANCE);
-            let print = prints.load(Ordering::Relaxed);
-            if print != stands.0 {
-                stands = (print, Instant::now());
-            } else if print % 2 == 1 && stands.1.elapsed() > PATIENCE {
+            thread::sleep(POLL_INTERVAL);
+            let now = prints.load(Ordering::Relaxed);
+            if now != last_change.0 {
+                last_change = (now, Instant::now());
+            } else if now % 2 == 1 && last_change.1.elapsed() > STALL_TIMEOUT {
                 return;
             }
         }
@@ -120,46 +123,49 @@ impl Screen {
         let is_text = matches!(entry, Entry::Text(_));
         // Counted first, so that `flush` never believes too early that everything is printed.
         self.shared.sent.fetch_add(1, Ordering::AcqRel);
-        if self.to.as_ref().is_none_or(|to| to.try_send(entry).is_err()) {
+        if self.queue.as_ref().is_none_or(|queue| queue.try_send(entry).is_err()) {
+            // What is dropped is done, or `flush` would wait for it.
             self.shared.done.fetch_add(1, Ordering::AcqRel);
             self.shared.lost.fetch_add(u64::from(is_text), Ordering::Relaxed);
         }
     }
 }
 
-/// What the thread has.
+/// The state of the printing thread.
 struct Printer<W> {
     out: W,
-    missing: fn(u64) -> String,
+    lost_notice: fn(u64) -> String,
     bar: Option<(ProgressBar, Arc<Count>)>,
     shared: Arc<Shared>,
 }
 
 impl<W: Write> Printer<W> {
-    fn run(mut self, from: &Receiver<Entry>) {
+    /// Prints entries until the [`Screen`] is gone, and redraws the bar, if there is one, every [`REDRAW_INTERVAL`].
+    fn run(mut self, entries: &Receiver<Entry>) {
         loop {
             let next = match &self.bar {
-                Some(_) => from.recv_timeout(DRAW),
-                None => from.recv().map_err(|_| RecvTimeoutError::Disconnected),
+                Some(_) => entries.recv_timeout(REDRAW_INTERVAL),
+                None => entries.recv().map_err(|_| RecvTimeoutError::Disconnected),
             };
             if matches!(next, Err(RecvTimeoutError::Disconnected)) {
                 return;
             }
             self.shared.prints.fetch_add(1, Ordering::Relaxed);
-            self.take(next.ok());
+            self.handle(next.ok());
+            // Once it has caught up, so that one notice covers all lines lost meanwhile.
             if self.shared.done.load(Ordering::Acquire) == self.shared.sent.load(Ordering::Acquire) {
-                self.own_up();
+                self.report_lost();
             }
             self.shared.prints.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Prints an entry, or where there is none, draws the bar again.
-    fn take(&mut self, entry: Option<Entry>) {
+    /// Prints an entry; without one (the redraw interval is over) redraws the bar.
+    fn handle(&mut self, entry: Option<Entry>) {
         if let Some((bar, _)) = self.bar.take_if(|(_, count)| count.over.load(Ordering::Relaxed)) {
             bar.finish_and_clear();
         }
-        let waited_for = entry.is_some();
+        let was_sent = entry.is_some();
         match entry {
             Some(Entry::Text(lines)) => self.print(&lines),
             Some(Entry::Bar(bar, count)) => self.bar = Some((bar, count)),
@@ -171,12 +177,12 @@ impl<W: Write> Printer<W> {
                 }
             }
         }
-        if waited_for {
+        if was_sent {
             self.shared.done.fetch_add(1, Ordering::AcqRel);
         }
     }
 
-    /// Prints lines where the bar was; it comes again below them.
+    /// Prints lines where the bar is, and draws the bar again below them.
     fn print(&mut self, lines: &[u8]) {
         let Self { out, bar, .. } = self;
         // A closed standard error is no reason to fail.
@@ -187,11 +193,11 @@ impl<W: Write> Printer<W> {
         }
     }
 
-    /// Tells of lines for which there was no room.
-    fn own_up(&mut self) {
+    /// Prints how many lines were dropped since the last notice.
+    fn report_lost(&mut self) {
         let lost = self.shared.lost.swap(0, Ordering::Relaxed);
         if lost > 0 {
-            self.print((self.missing)(lost).as_bytes());
+            self.print((self.lost_notice)(lost).as_bytes());
         }
     }
 }
@@ -242,7 +248,7 @@ mod tests {
         let terminal = Stopped::default();
         let screen = Screen::new(terminal.clone(), |lines| format!("{lines} lines are missing\n"));
         let count = screen.begin(ProgressBar::hidden());
-        let lines = 2 * ROOM;
+        let lines = 2 * QUEUE_CAPACITY;
         for line in 0..lines {
             screen.print(format!("{line}\n").as_bytes());
             count.set(line as u64);

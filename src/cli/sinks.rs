@@ -9,7 +9,7 @@ use crate::files::{place, whole};
 use crate::sink::{Options, Sink, Target, Tee};
 use crate::source::{DepthChoice, SourceName};
 
-/// Whether what was asked of the sinks fits together, and leaves `source` alone.
+/// Refuses sinks (and a report) that collide with each other or with what is read, and options that need other sinks.
 ///
 /// # Errors
 /// Two of them, or one and the report, write to one place; one writes to what is read; an option needs a virtual camera
@@ -18,16 +18,16 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
     let usage = |text: String| Err(CliError::Usage(text));
     let Streaming { stream, blur, .. } = parts;
     let devices = source.devices();
-    let depth = match &blur.depth {
+    let depth_folder = match &blur.depth {
         DepthChoice::Folder(folder) => Some(folder.as_path()),
         _ => None,
     };
-    for (at, target) in targets.iter().enumerate() {
-        for read in source.folder().into_iter().chain(depth) {
+    for (index, target) in targets.iter().enumerate() {
+        for read in source.folder().into_iter().chain(depth_folder) {
             let path = target.path().filter(|_| !target.is_camera());
             path.map_or(Ok(()), |path| refuse_source("--to", path, read))?;
         }
-        if targets[..at].iter().any(|other| other.collides_with(target)) {
+        if targets[..index].iter().any(|other| other.collides_with(target)) {
             return usage(format!("--to {target}: given twice; each sink needs a place of its own"));
         }
         if devices.iter().any(|device| target.is_device(device)) {
@@ -35,14 +35,15 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
         }
     }
     if let Some(report) = &stream.report {
-        let is_there =
+        let is_report =
             |target: &&Target| target.path().is_some_and(|path| place::resolved(path) == place::resolved(report));
-        if let Some(target) = targets.iter().find(is_there) {
+        if let Some(target) = targets.iter().find(is_report) {
             return usage(format!("--report {}: --to {target} goes there, too; name another file", report.display()));
         }
         let is_json = report.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
-        let replaces = !is_json && report.exists();
-        for read in source.folder().into_iter().chain(depth).filter(|_| replaces) {
+        // A report may lie in a recording's folder, but not replace one of its files, of which none is JSON.
+        let may_replace = !is_json && report.exists();
+        for read in source.folder().into_iter().chain(depth_folder).filter(|_| may_replace) {
             refuse_source("--report", report, read)?;
         }
     }
@@ -62,13 +63,13 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
     }
 }
 
-/// Whether the report of a run can be written, before there is one.
+/// Checks before a run that its report can be written.
 ///
 /// # Errors
 /// Its folder cannot be written.
 pub fn try_report(path: Option<&Path>) -> Result<(), CliError> {
     match path {
-        // It may be a pipe, and is not opened twice.
+        // With a part file beside it: opening the path itself would disturb the reader of a pipe.
         Some(path) if path != "-" => whole::Part::create(path).map(drop).map_err(CliError::io(path)),
         _ => Ok(()),
     }

@@ -21,9 +21,9 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, CliError> {
     /// What shells expect of a program that SIGINT ended.
     const INTERRUPTED: i32 = 130;
     let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
+    let already_stopping = Arc::clone(&stop);
     let handler = move || {
-        if asked.swap(true, Ordering::Relaxed) {
+        if already_stopping.swap(true, Ordering::Relaxed) {
             std::process::exit(INTERRUPTED);
         }
         say("stopping after the frames in hand; Ctrl-C again aborts");
@@ -51,7 +51,7 @@ impl Progress {
         Self(Some((screen, screen.begin(bar))))
     }
 
-    /// So many frames are delivered.
+    /// Sets how many frames are delivered.
     pub fn delivered(&self, frames: u64) {
         self.0.iter().for_each(|(_, count)| count.set(frames));
     }
@@ -63,7 +63,7 @@ impl Drop for Progress {
     }
 }
 
-/// Prints to standard output.
+/// Prints to standard output, with what a terminal would obey escaped.
 ///
 /// # Errors
 /// Nobody reads, or it is full.

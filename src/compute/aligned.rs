@@ -9,6 +9,7 @@ const LINE: usize = 64;
 #[derive(Default)]
 pub struct Aligned<T = f32> {
     memory: Vec<T>,
+    /// The first value that begins a cache line.
     start: usize,
     length: usize,
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::{GpuError, catching};
 
-/// A pass: the name of its entry point and file, and its source.
+/// A compute shader: the name of its entry point and file, and its source.
 #[derive(Clone, Copy, Debug)]
 pub struct Shader {
     pub name: &'static str,
@@ -13,7 +13,7 @@ pub struct Shader {
     pub source: &'static str,
 }
 
-/// Longest that a device may take over what it was given; one in software is slow, but does not hang.
+/// How long a device may take before it counts as hung; one in software is slow, but does not hang.
 const PATIENCE: Duration = Duration::from_secs(10);
 const PATIENCE_WITH_SOFTWARE: Duration = Duration::from_secs(60);
 
@@ -30,6 +30,7 @@ pub struct Device {
     /// Whether passes can be timed.
     pub timestamps: bool,
     patience: Duration,
+    /// The first thing that went wrong.
     fault: Arc<Mutex<Option<String>>>,
 }
 
@@ -82,19 +83,19 @@ impl Device {
         };
         let (on_error, on_loss) = (report(&fault), report(&fault));
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| on_error(error.to_string())));
-        // At the ordinary end, by dropping it, nobody is left to ask.
+        // Dropping the device calls this, too; then nobody is left to read the fault.
         device.set_device_lost_callback(move |_, message| on_loss(format!("device lost: {message}")));
         let patience = if infos[best].device_type == wgpu::DeviceType::Cpu { PATIENCE_WITH_SOFTWARE } else { PATIENCE };
         Ok(Self { instance, adapter, device, queue, name, timestamps, patience, fault })
     }
 
-    /// The same, which may take this long over what it is given.
+    /// The same device, which may take so long before it counts as hung.
     #[must_use]
     pub fn with_patience(self, patience: Duration) -> Self {
         Self { patience, ..self }
     }
 
-    /// A pass with its `override` constants.
+    /// The pipeline of a shader with its `override` constants; its bind group layout follows from the source.
     pub fn pipeline(&self, Shader { name, source }: Shader, constants: &[(&str, f64)]) -> wgpu::ComputePipeline {
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(name),
@@ -110,7 +111,7 @@ impl Device {
         })
     }
 
-    /// The buffers of a pass, in the order of its bindings.
+    /// The bind group 0 of a pipeline: `buffers` at bindings 0, 1 and so on.
     pub fn bindings<'a>(
         &self,
         pipeline: &wgpu::ComputePipeline,
@@ -119,7 +120,7 @@ impl Device {
         self.bound(&pipeline.get_bind_group_layout(0), buffers)
     }
 
-    /// Buffers in the order of a layout's bindings.
+    /// A bind group of a layout: `buffers` at bindings 0, 1 and so on.
     pub fn bound<'a>(
         &self,
         layout: &wgpu::BindGroupLayout,
@@ -134,8 +135,8 @@ impl Device {
         })
     }
 
-    /// Copies bytes to a buffer whatever their number, from the byte `at` on, which begins a word: the device takes
-    /// whole words only.
+    /// Copies any number of bytes to a buffer, from byte `at` on, a multiple of 4. A device takes whole words only, so
+    /// the last one is padded with zeros.
     pub fn upload(&self, buffer: &wgpu::Buffer, at: u64, bytes: &[u8]) {
         let (words, rest) = bytes.split_at(bytes.len() & !3);
         self.queue.write_buffer(buffer, at, words);
@@ -146,7 +147,7 @@ impl Device {
         }
     }
 
-    /// Does something whose refusal concerns nobody else: it is not what [`Device::check`] finds.
+    /// Does something that the device may refuse: that error is returned, and [`Device::check`] does not find it.
     ///
     /// # Errors
     /// The device refused something of it.
@@ -159,7 +160,7 @@ impl Device {
         }
     }
 
-    /// Lets what the device has done be known: calls back who waits for it. With `until`, waits for that.
+    /// Runs the callbacks of what the device has done. With `until`, first waits for that submission.
     ///
     /// # Errors
     /// The device failed, or took too long.
@@ -179,13 +180,13 @@ impl Device {
         self.check()
     }
 
-    /// Waits until `done` after what it waits for was submitted.
+    /// Waits until `done`, which a callback of finished work makes true.
     ///
     /// # Errors
     /// As for [`Device::poll`].
     pub fn wait_for(&self, done: impl Fn() -> bool) -> Result<(), GpuError> {
         let began = Instant::now();
-        // Another thread that uses the device has found it done, and is about to say so.
+        // The work is done: another thread that polls the device is about to run the callback.
         while !done() {
             self.check()?;
             if began.elapsed() > self.patience {
@@ -196,8 +197,9 @@ impl Device {
         Ok(())
     }
 
+    /// Counts the device as hung.
     fn give_up(&self) {
-        // Freeing it would wait for what never comes.
+        // Leaked: freeing them would wait for the device.
         std::mem::forget((self.instance.clone(), self.device.clone(), self.queue.clone()));
         note(&self.fault, format!("no answer for {:.0} s", self.patience.as_secs_f64()));
     }
@@ -214,7 +216,7 @@ impl Device {
     }
 }
 
-/// Keeps the first fault.
+/// Records a fault, unless there is one already.
 fn note(fault: &Mutex<Option<String>>, message: String) {
     fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
 }
@@ -249,13 +251,13 @@ impl DevicePicture {
         &self.buffer
     }
 
-    /// Whether that is this device's memory.
+    /// Whether the picture is in the memory of `device`.
     pub fn is_on(&self, device: &Device) -> bool {
         self.device == device.device
     }
 }
 
-/// So many workgroups in rows and columns, as a device limits both; a few more are left over.
+/// Workgroups in x and y, as a device may limit both to 65,535: `workgroups` in all, or a few more.
 pub fn in_two(workgroups: u32) -> [u32; 2] {
     let down = workgroups.div_ceil(32_768).max(1);
     [workgroups.div_ceil(down), down]
@@ -271,6 +273,7 @@ fn has_gpu_node() -> bool {
             .any(|node| std::path::Path::new(node).exists())
 }
 
+/// The order in which adapters are preferred: the least first.
 fn preference(info: &wgpu::AdapterInfo) -> u32 {
     match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -280,6 +283,7 @@ fn preference(info: &wgpu::AdapterInfo) -> u32 {
     }
 }
 
+/// Name, kind and driver of an adapter.
 fn describe(info: &wgpu::AdapterInfo) -> String {
     let kind = match info.device_type {
         wgpu::DeviceType::Cpu => "software",

@@ -8,15 +8,16 @@ use rustix::process::{Resource, getrlimit};
 /// control groups. `None` where the system does not say.
 pub fn free_bytes() -> Option<u64> {
     let info = fs::read_to_string("/proc/meminfo").ok()?;
-    let free = kilobytes(&info, "MemAvailable:")? + kilobytes(&info, "SwapFree:").unwrap_or(0);
+    let free = bytes_of(&info, "MemAvailable:")? + bytes_of(&info, "SwapFree:").unwrap_or(0);
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let own =
-        getrlimit(Resource::As).current.map(|most| most.saturating_sub(kilobytes(&status, "VmSize:").unwrap_or(0)));
-    Some([own, group_bytes()].into_iter().flatten().fold(free, u64::min))
+    let own_limit =
+        getrlimit(Resource::As).current.map(|most| most.saturating_sub(bytes_of(&status, "VmSize:").unwrap_or(0)));
+    Some([own_limit, cgroup_bytes()].into_iter().flatten().fold(free, u64::min))
 }
 
-/// What the control group of this process (version 2) leaves; those above it are at least as wide, as a rule.
-fn group_bytes() -> Option<u64> {
+/// What the limit of this process's control group (version 2) leaves. Those of the groups above it are not read: as a
+/// rule, they are no tighter.
+fn cgroup_bytes() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     let group = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
     let number =
@@ -24,8 +25,8 @@ fn group_bytes() -> Option<u64> {
     Some(number("memory.max")?.saturating_sub(number("memory.current")?))
 }
 
-/// The number of a line of /proc, `NAME:   123 kB`, in bytes.
-fn kilobytes(text: &str, name: &str) -> Option<u64> {
+/// The number in a line of /proc that begins with `name`, as in `NAME:   123 kB`, in bytes.
+fn bytes_of(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     Some(line.trim().trim_end_matches(" kB").parse::<u64>().ok()? << 10)
 }

@@ -67,19 +67,20 @@ impl GpuError {
 }
 
 thread_local! {
+    /// Whether the thread is in [`catching`].
     static CATCHES: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Does what makes an error known by a panic; nothing is given back then. What it used must be done with.
+/// Calls what reports an error by panicking: `None` if it does. What it was changing must not be used afterwards.
 pub fn catching<T>(work: impl FnOnce() -> T) -> Option<T> {
     let before = CATCHES.replace(true);
     let done = catch_unwind(AssertUnwindSafe(work));
     CATCHES.set(before);
-    // What was thrown may throw again when it is dropped.
+    // The payload is leaked, as dropping it may panic again.
     done.map_err(std::mem::forget).ok()
 }
 
-/// Whether this thread's panics are errors that are told of otherwise.
+/// Whether a panic of this thread is only an error, which the caller of [`catching`] reports: no crash to log.
 pub fn catches() -> bool {
     CATCHES.get()
 }

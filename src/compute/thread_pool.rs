@@ -55,9 +55,8 @@ const EPOCH: u64 = 1 << 16;
 /// Turns of waiting before a member goes to sleep: about as long as the gap between two passes of a frame.
 const SPINS: u32 = 4_000;
 
-// SAFETY: `work` is written only by the thread in `run` (`&mut self`, so there is one) while the gate is closed and
-// nobody is at work, and read only by members that entered through the open gate; the gate's release/acquire pairs
-// order the two.
+// SAFETY: `work` is written only by the thread in `run` (`&mut self`: there is one) with the gate closed and nobody at
+// work, and read only by members that entered through the open gate; its release/acquire pairs order the two.
 unsafe impl Sync for Shared {}
 
 /// Threads that run at once on this machine, at least 1.
@@ -117,6 +116,7 @@ impl ThreadPool {
         });
     }
 
+    /// Opens the gate for a pass, takes parts like a member, and returns once all are done and nobody is at work.
     fn run_members(&mut self, parts: usize, work: Work<'_>) {
         if self.members.is_empty() || parts < 2 {
             return (0..parts).for_each(|part| work(0, part));
@@ -151,9 +151,10 @@ impl ThreadPool {
 }
 
 impl Shared {
+    /// What a member's thread runs: enters each pass once, if it is awake in time, until the pool is dropped.
     fn serve(&self, member: usize) {
         self.started.fetch_add(1, Ordering::Relaxed);
-        let mut seen = 0;
+        let mut last_epoch = 0;
         loop {
             let mut turns = 0;
             let gate = loop {
@@ -161,7 +162,7 @@ impl Shared {
                     return;
                 }
                 let gate = self.gate.load(Ordering::Relaxed);
-                if gate & OPEN != 0 && gate / EPOCH != seen {
+                if gate & OPEN != 0 && gate / EPOCH != last_epoch {
                     break gate;
                 }
                 turns += 1;
@@ -171,7 +172,7 @@ impl Shared {
             if self.gate.compare_exchange(gate, gate + 1, Ordering::Acquire, Ordering::Relaxed).is_err() {
                 continue;
             }
-            seen = gate / EPOCH;
+            last_epoch = gate / EPOCH;
             // SAFETY: entered through the open gate, so `run` neither writes the cell nor returns until we leave.
             if let Some(pass) = unsafe { *self.work.get() } {
                 self.take_parts(member, pass);
@@ -181,6 +182,7 @@ impl Shared {
         }
     }
 
+    /// Does parts of a pass until none is left; notes a panic instead of passing it on.
     fn take_parts(&self, member: usize, pass: Pass) {
         let work = AssertUnwindSafe(|| {
             loop {
@@ -192,7 +194,7 @@ impl Shared {
             }
         });
         if let Err(thrown) = catch_unwind(work) {
-            // That may panic, and then a member would never leave, or `run` would while members are at work.
+            // Dropping it may panic: a member would then never leave, or `run` would with members at work.
             if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(thrown))) {
                 std::mem::forget(again);
             }
@@ -212,9 +214,8 @@ impl Drop for ThreadPool {
     }
 }
 
-/// Rows of a picture that several parts write at once, each its own.
-///
-/// Hands out `&mut` slices of one allocation by index; [`DisjointParts::part`] is safe because each index can be taken once.
+/// A slice in equal parts that several threads write at once, each its own: hands out `&mut` slices by index.
+/// [`DisjointParts::part`] is safe because each index can be taken once.
 pub struct DisjointParts<'a, T> {
     base: *mut T,
     length: usize,

@@ -1,4 +1,4 @@
-//! Recorded depth beside colours from elsewhere: paired by media time, over and over.
+//! Recorded depth for colours from another source: paired by media time, played in a loop.
 
 use super::{DepthError, DepthSource, Seen};
 use crate::frame::DepthMap;
@@ -8,8 +8,9 @@ use crate::recording::{Recording, Scratch};
 pub struct Beside {
     recording: Recording,
     scratch: Scratch,
+    /// Media time of one loop: from the first frame to the end of the last.
     lap_ns: u64,
-    /// The picture that was read last.
+    /// Index of the picture that `map` holds; `None` after a failed read, which leaves `map` unspecified.
     last: Option<usize>,
     map: DepthMap,
 }
@@ -27,7 +28,7 @@ impl Beside {
         Ok(Self { recording, scratch: Scratch::default(), lap_ns, last: None, map: DepthMap::default() })
     }
 
-    /// The frame of the recording that is shown at media time `time_ns`.
+    /// Index of the recording's frame that is shown at media time `time_ns`, by binary search within the loop.
     fn index_at(&self, time_ns: u64) -> usize {
         let in_lap_ns = time_ns % self.lap_ns.max(1);
         let (mut low, mut high) = (0, self.recording.len());
@@ -42,6 +43,7 @@ impl Beside {
 impl DepthSource for Beside {
     fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         let index = self.index_at(stamp.time_ns);
+        // Colours at a higher rate show one depth picture several times: it is decoded once.
         if self.last != Some(index) {
             self.last = None;
             self.recording.read_depth(index, &mut self.scratch, &mut self.map)?;

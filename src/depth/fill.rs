@@ -18,6 +18,7 @@ pub struct Filler {
     /// Nearest known depth above, then below, per column.
     column_m: Vec<f32>,
     last_good: DepthMap,
+    /// Which pixels were unknown before filling.
     hole: Vec<bool>,
     guided: GuidedHoleFill,
 }
@@ -39,30 +40,32 @@ impl Filler {
             }
             return;
         }
-        // After the first round every row and column that had a known depth is full. The rest crosses such a row, so
-        // that one more round fills it.
-        if !self.round(map) {
-            self.round(map);
+        // After the first pass every row and column that had a known depth is full. What is left crosses such a row, so
+        // that one more pass fills it.
+        if !self.fill_pass(map) {
+            self.fill_pass(map);
         }
         self.last_good.resize(map.width, map.height);
         self.last_good.metres.copy_from_slice(&map.metres);
     }
 
-    /// As [`Filler::fill`], and then by the colours of the picture that belongs to the map: what beside a near object
-    /// was filled from behind but looks like the object becomes part of it.
+    /// As [`Filler::fill`], then corrected by `color`, the picture of the map: a filled pixel that took the
+    /// background's depth but looks like the near object beside it takes the object's depth.
     pub fn fill_by(&mut self, map: &mut DepthMap, color: &ColorImage) {
         self.hole.clear();
         self.hole.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
-        let any = self.hole.iter().any(|&hole| hole) && self.hole.iter().any(|&hole| !hole);
+        // Without a hole there is nothing to correct, and without a known depth no object to compare with.
+        let is_mixed = self.hole.iter().any(|&hole| hole) && self.hole.iter().any(|&hole| !hole);
         self.fill(map);
-        if any {
+        if is_mixed {
             self.guided.claim(map, &mut self.hole, color);
             self.last_good.metres.copy_from_slice(&map.metres);
         }
     }
 
-    /// One round of four scans; returns whether the map is full now.
-    fn round(&mut self, map: &mut DepthMap) -> bool {
+    /// Gives each hole the farthest of the nearest known depths above, below, left and right. Returns whether the map
+    /// is full now: a pixel whose row and column hold no known depth stays unknown.
+    fn fill_pass(&mut self, map: &mut DepthMap) -> bool {
         let width = map.width as usize;
         self.filled.resize(map.metres.len(), 0.0);
         self.column_m.resize(width, 0.0);
@@ -98,16 +101,16 @@ impl Filler {
     }
 }
 
-/// Pixels that are looked at together.
-const MANY: usize = 16;
+/// Known pixels are skipped in blocks of this size, whose test is vector code.
+const SKIP_BLOCK: usize = 16;
 
-/// The runs of unknown depths in a row.
+/// The column ranges of the runs of unknown depths in a row.
 fn holes(row: &[f32]) -> impl Iterator<Item = Range<usize>> {
     let mut next = 0;
     iter::from_fn(move || {
-        // Most pixels are known: many at a time.
-        let all_known = |some: &[f32]| some.iter().fold(true, |all, &z_m| all & DepthMap::is_known(z_m));
-        next += MANY * row[next..].chunks_exact(MANY).take_while(|some| all_known(some)).count();
+        // Most pixels are known. `&` instead of an early exit, so that a block becomes vector code.
+        let all_known = |block: &[f32]| block.iter().fold(true, |all, &z_m| all & DepthMap::is_known(z_m));
+        next += SKIP_BLOCK * row[next..].chunks_exact(SKIP_BLOCK).take_while(|block| all_known(block)).count();
         let start = next + row[next..].iter().position(|&z_m| !DepthMap::is_known(z_m))?;
         next = start + row[start..].iter().position(|&z_m| DepthMap::is_known(z_m)).unwrap_or(row.len() - start);
         Some(start..next)

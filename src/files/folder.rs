@@ -1,9 +1,10 @@
-//! Folders whose files belong together, such as the pictures of one run: what was there stays until all of the new is whole.
+//! Folders whose files belong together, such as the pictures of one run: what was there stays until all of the new is
+//! whole.
 //!
-//! A list of its own in the folder, [`LIST`], says which files were written by us, one name a line: others are never
-//! touched. Into an empty folder files are written as they come, each whole. Where there is something already, they go into
-//! a hidden folder within, which is renamed when they are whole: from then on the swap is done, or done with by who opens
-//! the folder next. While it is open the folder is locked.
+//! The list [`LIST`] in the folder says which files were written by us, one name a line: others are never touched. Into
+//! an empty folder files are written directly, each whole. Otherwise they go into a hidden folder within, [`PART`],
+//! which is renamed once all are whole, and then swapped with the old files. A swap that is interrupted is completed
+//! when the folder is opened next. While it is open the folder is locked.
 
 mod list;
 mod swap;
@@ -24,6 +25,7 @@ use super::whole::{self, Part};
 pub const LIST: &str = ".bokehcam";
 /// Where files wait that will replace others.
 pub const PART: &str = ".bokehcam.part";
+/// What [`PART`] is renamed to once all of its files are whole.
 const WHOLE: &str = ".bokehcam.whole";
 
 /// Why a folder cannot be written.
@@ -68,8 +70,8 @@ pub struct Set<'a> {
 pub struct Folder {
     /// Its name without a slash at the end.
     path: PathBuf,
-    /// Where files go meanwhile, if not into the folder itself.
-    beside: Option<PathBuf>,
+    /// The hidden folder within that files go into, if not into the folder itself.
+    staging: Option<PathBuf>,
     list: List,
     /// Keeps others out as long as it is open.
     lock: File,
@@ -93,8 +95,8 @@ impl Folder {
         }
         recover(&path, set)?;
         let mut names = fs::read_dir(&path).map_err(write())?.map(|entry| entry.map(|entry| entry.file_name()));
-        let others = names.find(|name| name.as_ref().map_or(true, |name| name != LIST)).transpose().map_err(write())?;
-        let beside = match others {
+        let other = names.find(|name| name.as_ref().map_or(true, |name| name != LIST)).transpose().map_err(write())?;
+        let staging = match other {
             None => None,
             Some(_) if !replace => return Err(FolderError::NotEmpty { path }),
             Some(_) => {
@@ -104,8 +106,8 @@ impl Folder {
                 Some(part)
             }
         };
-        let list = List::create(beside.as_ref().unwrap_or(&path))?;
-        Ok(Self { path, beside, list, lock, ended: false })
+        let list = List::create(staging.as_ref().unwrap_or(&path))?;
+        Ok(Self { path, staging, list, lock, ended: false })
     }
 
     /// The folder's name in the end.
@@ -113,14 +115,14 @@ impl Folder {
         &self.path
     }
 
-    /// Files that are in it.
+    /// Number of files that were put into it.
     pub fn files(&self) -> u64 {
         self.list.len()
     }
 
     /// Whether files that were there go when the new ones are whole.
     pub fn replaces(&self) -> bool {
-        self.beside.is_some()
+        self.staging.is_some()
     }
 
     /// Starts the file of this name, whose subfolder is made where it is missing. [`Folder::put`] takes it.
@@ -129,9 +131,9 @@ impl Folder {
     /// The folder is gone, or cannot be written.
     pub fn begin(&self, name: &str) -> Result<Part, FolderError> {
         self.check_there()?;
-        let path = self.place().join(name);
+        let path = self.target().join(name);
         if let Some((subfolder, _)) = name.rsplit_once('/') {
-            make_subfolder(&self.place().join(subfolder))?;
+            make_subfolder(&self.target().join(subfolder))?;
         }
         Part::create(&path).map_err(FolderError::write(&path))
     }
@@ -142,31 +144,31 @@ impl Folder {
     /// Something of its name has appeared, or it cannot be written; the folder is then as it was.
     pub fn put(&mut self, part: Part) -> Result<(), FolderError> {
         let path = part.path().to_owned();
-        let name = path.strip_prefix(self.place()).ok().and_then(Path::to_str).unwrap_or_default().to_owned();
+        let name = path.strip_prefix(self.target()).ok().and_then(Path::to_str).unwrap_or_default().to_owned();
         part.commit_unsynced().map_err(|cause| match cause.kind() {
             ErrorKind::AlreadyExists => FolderError::Foreign { path: path.clone() },
             _ => FolderError::Write { path: path.clone(), cause },
         })?;
         self.list.add(&name).inspect_err(|_| {
-            // What the list does not have would be nobody's; the list's error is the one to tell.
+            // A file that is not on the list would never be replaced; the list's error is the one to report.
             let _ = fs::remove_file(&path);
         })
     }
 
-    /// All is whole: it takes the place of the files that an earlier run wrote, as far as the list has them. Gives their
-    /// number.
+    /// Ends a complete set of files: they replace those on the list of an earlier run, whose number is given.
     ///
     /// # Errors
-    /// Something foreign has appeared, which stays, and what was written is kept as `NAME.incomplete`; or the files could
-    /// not be moved, which is then done when the folder is opened again.
+    /// Something foreign has appeared, which stays, and what was written is kept as `NAME.incomplete`; or the files
+    /// could not be moved, which is then done when the folder is opened again.
     pub fn finish(mut self) -> Result<u64, FolderError> {
         self.check_there()?;
         self.sync()?;
         self.ended = true;
-        let Some(part) = self.beside.take() else {
-            self.tidy_up();
+        let Some(part) = self.staging.take() else {
+            self.remove_empty_list();
             return Ok(0);
         };
+        // A new file may replace nothing but what the old list has.
         let checked = list::read(&part).and_then(|new| {
             let old = list::read(&self.path)?;
             new.iter().filter(|name| !old.contains(name)).try_for_each(|name| {
@@ -184,8 +186,8 @@ impl Folder {
         swap(&self.path)
     }
 
-    /// The files are not all that there should be: what was there stays, and the new files are kept as
-    /// `NAME.incomplete`, whose name is given. Into an empty folder they were written themselves, and stay.
+    /// Ends an incomplete set of files: what was there stays, and the new files are kept as `NAME.incomplete`, whose
+    /// path is given. If the folder was empty, the new files stay in it.
     ///
     /// # Errors
     /// They cannot be renamed, and stay in a hidden folder within.
@@ -193,22 +195,23 @@ impl Folder {
         self.end()
     }
 
+    /// [`Folder::cut`], also for [`Drop`].
     fn end(&mut self) -> Result<Option<PathBuf>, FolderError> {
         self.ended = true;
         self.check_there()?;
-        // What is not synced is more than nothing.
+        // Files that cannot be synced are kept as well.
         let _ = self.sync();
-        match self.beside.take() {
+        match self.staging.take() {
             Some(part) if self.list.len() > 0 => keep(&part, &self.path).map(Some),
             Some(part) => fs::remove_dir_all(&part).map(|()| None).map_err(FolderError::write(&part)),
             None => {
-                self.tidy_up();
+                self.remove_empty_list();
                 Ok(None)
             }
         }
     }
 
-    /// All files at once: to wait for the disk after each would be longer than a camera waits.
+    /// Syncs all files at once: waiting for the disk after each would take longer than a camera waits.
     fn sync(&self) -> Result<(), FolderError> {
         syncfs(&self.lock).map_err(|error| FolderError::write(&self.path)(error.into()))
     }
@@ -218,12 +221,12 @@ impl Folder {
         if state.nlink() == 0 { Err(FolderError::Gone { path: self.path.clone() }) } else { Ok(()) }
     }
 
-    fn place(&self) -> &Path {
-        self.beside.as_ref().unwrap_or(&self.path)
+    /// The folder that files are written into now.
+    fn target(&self) -> &Path {
+        self.staging.as_ref().unwrap_or(&self.path)
     }
 
-    /// A list of nothing says nothing.
-    fn tidy_up(&self) {
+    fn remove_empty_list(&self) {
         if self.list.len() == 0 {
             let _ = fs::remove_file(self.path.join(LIST));
         }

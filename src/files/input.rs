@@ -13,7 +13,7 @@ pub const MOST_TEXT_BYTES: u64 = 64 << 20;
 /// Most bytes of a calibration: they have a few thousand.
 pub const MOST_CALIBRATION_BYTES: u64 = 1 << 20;
 
-/// Most bytes of a settings file: every setting in a thousand presets.
+/// Most bytes of a settings file: enough for every setting in a thousand presets.
 pub const MOST_SETTINGS_BYTES: u64 = 1 << 20;
 
 /// Opens a regular file for reading, links followed. Never waits, as opening a pipe would.
@@ -60,7 +60,7 @@ fn refuse_beyond(most_bytes: u64, bytes: u64) -> io::Result<()> {
     Err(io::Error::new(io::ErrorKind::FileTooLarge, what))
 }
 
-/// What this is instead of a regular file.
+/// The kind of a file that is no regular one, in words.
 fn unlike_file(kind: FileType) -> Option<&'static str> {
     match kind {
         _ if kind.is_file() => None,

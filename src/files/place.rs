@@ -1,4 +1,4 @@
-//! Where a path leads, whatever links are on the way.
+//! Where a path leads, with links resolved.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt;
@@ -15,11 +15,11 @@ pub fn resolved(path: &Path) -> PathBuf {
     }
 }
 
-/// Whether one of two files or folders is the other one, or lies in it: what is written to one may then cost the other.
+/// Whether one of two files or folders is the other one, or lies in it: writing to one may then damage the other.
 /// Neither need exist.
 pub fn overlap(one: &Path, other: &Path) -> bool {
     let [one, other] = [one, other].map(resolved);
-    // One folder may be mounted in two places.
+    // Paths do not tell when one folder is mounted in two places: device and inode do.
     let identity = |path: &Path| fs::metadata(path).ok().map(|there| (there.dev(), there.ino()));
     let holds = |outer: &Path, inner: &Path| {
         let outer_is = identity(outer);

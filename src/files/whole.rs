@@ -1,7 +1,7 @@
 //! Files that appear under their name only when they are whole: written beside it, synced, then renamed.
 //!
-//! The part file is hidden, has a name that no other process has, is never opened through a link, and is locked while it
-//! is being written: one that can be locked was left behind by a process that died.
+//! The part file is hidden, has a name that no other process uses, is never opened through a link, and is locked while
+//! it is being written: one that can be locked was left behind by a process that died.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -17,7 +17,9 @@ const SUFFIX: &str = ".part";
 /// A file under construction. Dropping it removes what was written.
 #[derive(Debug)]
 pub struct Part {
+    /// The name in the end.
     path: PathBuf,
+    /// The hidden name meanwhile.
     part: PathBuf,
     file: File,
     /// Whether there is anything left to remove.
@@ -35,7 +37,7 @@ impl Part {
             let part = folder.join(part_name(name));
             let file = File::create_new(&part)?;
             flock(&file, FlockOperation::NonBlockingLockExclusive)?;
-            // Whoever looked for parts left behind may have taken it for one before it was locked.
+            // Before it was locked, another process may have taken it for one left behind, and removed it.
             if part.symlink_metadata().is_ok() {
                 return Ok(Self { path: path.to_owned(), part, file, open: true });
             }
@@ -56,8 +58,8 @@ impl Part {
         &self.file
     }
 
-    /// Gives the file its name once it is safely on the disk. With `replace`, it takes the place of what is there, in one
-    /// step, and has its permissions.
+    /// Gives the file its name once it is safely on the disk. With `replace`, it takes the place of what is there, in
+    /// one step, and has its permissions.
     ///
     /// # Errors
     /// [`ErrorKind::AlreadyExists`] without `replace`, or what the system says. The part is then removed.
@@ -79,7 +81,7 @@ impl Part {
         sync_folder(&self.path)
     }
 
-    /// As [`Part::commit`] without replacing, and without waiting for the disk: who calls this syncs the file system later.
+    /// As [`Part::commit`] without replacing, and without waiting for the disk: the caller syncs the file system later.
     ///
     /// # Errors
     /// As for [`Part::commit`].
@@ -94,7 +96,7 @@ impl Part {
     /// # Errors
     /// What the system says. The part is then left where it is.
     pub fn keep_incomplete(mut self) -> io::Result<PathBuf> {
-        // Whatever happens from here on, what is there is more than nothing; so is what is not synced.
+        // From here on it is never removed, not even if it cannot be synced or renamed.
         self.open = false;
         let _ = self.file.sync_all();
         keep_incomplete(&self.part, &self.path)
@@ -129,7 +131,7 @@ pub fn rename(from: &Path, to: &Path, replace: bool) -> io::Result<()> {
         return fs::rename(from, to);
     }
     match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
-        // Some file systems know no such rename.
+        // Some file systems do not support NOREPLACE.
         Err(rustix::io::Errno::INVAL | rustix::io::Errno::NOSYS) => match to.symlink_metadata() {
             Ok(_) => Err(ErrorKind::AlreadyExists.into()),
             Err(_) => fs::rename(from, to),
@@ -174,19 +176,20 @@ pub fn all_left_behind(folder: &Path) -> io::Result<Vec<(PathBuf, OsString)>> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let name = entry.file_name();
-        let Some(of) = name_of_part(&name).filter(|_| entry.file_type().is_ok_and(|kind| kind.is_file())) else {
+        let Some(final_name) = name_of_part(&name).filter(|_| entry.file_type().is_ok_and(|kind| kind.is_file()))
+        else {
             continue;
         };
         let is_free = |file: File| flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok();
         if super::input::open(&entry.path()).is_ok_and(is_free) {
-            found.push((entry.path(), of.to_owned()));
+            found.push((entry.path(), final_name.to_owned()));
         }
     }
     found.sort();
     Ok(found)
 }
 
-/// Sees to it that a file's name is safely on the disk.
+/// Syncs the folder of `path`, so that the file's name is safely on the disk, too.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     let (folder, _) = split(path)?;
     // Not every file system syncs folders; the file itself is on the disk.
@@ -194,6 +197,7 @@ pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
+/// Folder and file name.
 fn split(path: &Path) -> io::Result<(&Path, &OsStr)> {
     let name = path.file_name().ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "this names no file"))?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -209,7 +213,7 @@ fn part_name(name: &OsStr) -> OsString {
     part
 }
 
-/// The name in the end, if this is that of a part.
+/// The name that a part will have in the end; `None` if the name is not of the form of [`part_name`].
 fn name_of_part(part: &OsStr) -> Option<&OsStr> {
     let part = part.as_bytes().strip_prefix(b".")?.strip_suffix(SUFFIX.as_bytes())?;
     let (name, numbers) = part.split_at(part.iter().rposition(|&byte| byte == b'.')?);

@@ -5,7 +5,7 @@
 //! atomic swap. Wake-ups are not lost, for three reasons:
 //!
 //! - A bell that was rung stays rung until one waiter has silenced it, and nobody falls asleep on a rung bell: the
-//!   kernel looks at the word again, under the lock that the waker takes as well, and returns at once if it has changed.
+//!   kernel looks at the word again, under the lock that the waker takes, too, and returns at once if it has changed.
 //! - Sleepers stand behind the word [`ASLEEP`], which only [`Bell::ring`] replaces, and who replaces it wakes them all.
 //!   So while the bell is [`RUNG`] or [`SILENT`], whoever waits is awake or being woken, and will look at the word.
 //! - What was done before ringing is seen by whoever silences that ring or a later one: each ring is a release, the
@@ -51,22 +51,22 @@ impl Bell {
         self.wait_until(None);
     }
 
-    /// The same, but no longer than `patience`; gives back whether the bell was rung.
+    /// As [`Bell::wait`], but no longer than `patience`; returns whether the bell was rung.
     pub(super) fn wait_timeout(&self, patience: Duration) -> bool {
         // A time that the clock cannot tell never comes.
         self.wait_until(Instant::now().checked_add(patience))
     }
 
-    /// The same, but not past `deadline`.
+    /// Sleeps until the bell is rung, and silences it, but not past `deadline`; returns whether the bell was rung.
     pub(super) fn wait_until(&self, deadline: Option<Instant>) -> bool {
         loop {
             // Acquire: sees what was done before the ring that is silenced here. A failure reads nothing of anybody's.
             if self.state.compare_exchange(RUNG, SILENT, Ordering::Acquire, Ordering::Relaxed).is_ok() {
                 return true;
             }
-            // Relaxed: only tells that there is somebody to wake.
-            let found = self.state.compare_exchange(SILENT, ASLEEP, Ordering::Relaxed, Ordering::Relaxed);
-            if found == Err(RUNG) {
+            // Relaxed: only tells that there is somebody to wake. Where it was rung in between, silence it instead.
+            let announced = self.state.compare_exchange(SILENT, ASLEEP, Ordering::Relaxed, Ordering::Relaxed);
+            if announced == Err(RUNG) {
                 continue;
             }
             let patience = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
@@ -90,7 +90,7 @@ impl Sleepers {
         Self
     }
 
-    /// Sleeps unless `word` has another value than `expected`; until woken, for `patience`, or for nothing.
+    /// Sleeps if `word` is `expected`: until woken, for `patience` at most, or shorter for no reason.
     fn sleep(&self, word: &AtomicU32, expected: u32, patience: Option<Duration>) {
         use rustix::thread::futex::{Flags, Timespec, wait};
         // A time that the kernel cannot count waits for as long as it can.
@@ -126,10 +126,10 @@ impl Sleepers {
             tv_sec: patience.as_secs().try_into().unwrap_or(i64::MAX),
             tv_nsec: patience.subsec_nanos().into(),
         });
-        let until = patience.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
+        let timeout = patience.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
         let wait = libc::FUTEX_WAIT | libc::FUTEX_PRIVATE_FLAG;
         // SAFETY: `futex` with these arguments reads the word and the time, which live until it returns.
-        unsafe { libc::syscall(libc::SYS_futex, word.as_ptr(), wait, expected, until) };
+        unsafe { libc::syscall(libc::SYS_futex, word.as_ptr(), wait, expected, timeout) };
     }
 
     fn wake(&self, word: &AtomicU32) {

@@ -1,5 +1,4 @@
-//! On-demand capture: whether anybody watches the output: told by sinks, asked by capture, which lets the camera rest
-//! while nobody does.
+//! On-demand capture: sinks tell whether anybody watches the output; while nobody does, capture lets the camera rest.
 
 use std::time::Duration;
 

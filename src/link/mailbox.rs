@@ -29,6 +29,7 @@ pub(super) struct Sender<T> {
 }
 
 impl<T> Sender<T> {
+    /// Puts `item` in and wakes the receiver; returns the older item if that was not received.
     pub(super) fn send(&mut self, item: T) -> Result<Option<T>, Abandoned> {
         // Relaxed: nothing is read on its account. Seen late, one more item lies in the slot, which drops it.
         if self.ends.abandoned.load(Ordering::Relaxed) {
@@ -71,6 +72,7 @@ impl<T> Receiver<T> {
         self.reader.take()
     }
 
+    /// Sleeps until there is an item, the sender is gone and its last item was received, or `deadline` has passed.
     fn recv_until(&mut self, deadline: Option<Instant>) -> Received<T> {
         loop {
             if let Some(item) = self.reader.take() {

@@ -54,6 +54,7 @@ pub const LOSSLESS_ITEMS: usize = 2;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received<T> {
     Item(T),
+    /// None came in time.
     Nothing,
     /// The sender is gone and nothing is pending.
     Ended,

@@ -30,7 +30,8 @@ use crate::optics::{CocField, CocKind};
 pub const COC_AT_INFINITY_PER_HEIGHT: f32 = 1.0 / 45.0;
 /// Largest CoC radius in front of or behind the focal plane, as a fraction of the picture's height.
 pub const MAX_COC_PER_HEIGHT: f32 = 0.06;
-/// No CoC radius is larger, in pixels: pictures have sides up to 16384 px. What a picture bears is its diagonal.
+/// Largest CoC radius that settings accept, in pixels: pictures have sides up to 16384 px. For one picture, more than
+/// its diagonal makes no difference.
 pub const MOST_RADIUS_PX: f32 = 20_000.0;
 
 /// At which rungs of the quality ladder frames are blurred.
@@ -38,7 +39,7 @@ pub const MOST_RADIUS_PX: f32 = 20_000.0;
 pub enum QualityRule {
     /// All at one rung.
     Fixed(Quality),
-    /// As the time there is allows, from this rung on; the executor is made for all of them.
+    /// As the time allows, beginning at this rung; the executor is made for all of them.
     Auto(Quality),
 }
 
@@ -88,7 +89,7 @@ impl Default for Look {
             // Rank 3 is then as good as rank 7 of a hard disc.
             rim: 0.2,
             rank: None,
-            // It invents light.
+            // Off, as it invents light.
             highlights: 0.0,
             quality: None,
         }
@@ -96,7 +97,7 @@ impl Default for Look {
 }
 
 impl Look {
-    /// Everything as it is where nothing is said, with this effect.
+    /// The default look with another effect.
     pub fn plain(effect: Effect) -> Self {
         Self { effect, ..Self::default() }
     }
@@ -121,7 +122,7 @@ impl Look {
         }
     }
 
-    /// The setting that needs distances in metres, if there is one, as it is written.
+    /// A setting that needs depth in metres, if there is one, as a flag: for the message that depth is only relative.
     pub fn needs_metres(&self) -> Option<String> {
         match (self.focus, self.strength) {
             (FocusRule::Metres(metres), _) => Some(format!("--focus {metres}")),
@@ -131,14 +132,14 @@ impl Look {
         }
     }
 
-    /// All settings of one frame, as it was blurred: those that give the same picture of the same colours and depth.
-    /// `coc` is the frame's, which knows where the focus was, and `quality` its rung, if it was blurred.
+    /// The look that blurs one frame again as it was blurred, given its colours and depth. `coc` is the frame's, which
+    /// has the distance of its focus, and `quality` its rung, if it was blurred.
     pub fn of_frame(&self, coc: &CocField, quality: Option<Quality>) -> Self {
         let focus = match coc {
             CocField::Depth(lens) => FocusRule::Metres(lens.focus_m),
             CocField::Uniform { .. } | CocField::Ramp(_) => self.focus,
         };
-        // Without its depth it cannot be repeated.
+        // Not `auto`, which becomes tilt-shift where the depth is missing.
         let effect = if self.effect.follows_depth() { Effect::Dof } else { self.effect };
         Self { effect, focus, quality: quality.or(self.quality), ..self.clone() }
     }
@@ -148,7 +149,7 @@ impl Look {
     pub fn settings(&self, size: (u32, u32), adaptive: bool) -> Option<bokeh::Settings> {
         let coc = self.coc_kind()?;
         let max_px = self.max_coc_px(size);
-        let far_max_px = self.even_px(size).min(max_px);
+        let far_max_px = self.at_infinity_px(size).min(max_px);
         let near_max_px = if coc == CocKind::Depth { max_px } else { 0.0 };
         Some(bokeh::Settings {
             coc,
@@ -164,19 +165,19 @@ impl Look {
         })
     }
 
-    /// By how much a picture of `size` pixels is blurred.
+    /// Where the CoC of a frame of `size` pixels comes from.
     pub fn coc_rule(&self, size: (u32, u32)) -> CocRule {
         let max_coc_px = self.max_coc_px(size);
-        let even_px = self.even_px(size).min(max_coc_px);
+        let radius_px = self.at_infinity_px(size).min(max_coc_px);
         match self.coc_kind() {
             None => CocRule::Fixed(CocField::Uniform { radius_px: 0.0 }),
-            Some(CocKind::Uniform) => CocRule::Fixed(CocField::Uniform { radius_px: even_px }),
-            Some(CocKind::Ramp) => CocRule::Fixed(CocField::Ramp(self.tilt.ramp(size, even_px))),
+            Some(CocKind::Uniform) => CocRule::Fixed(CocField::Uniform { radius_px }),
+            Some(CocKind::Ramp) => CocRule::Fixed(CocField::Ramp(self.tilt.ramp(size, radius_px))),
             Some(CocKind::Depth) => CocRule::Depth {
                 focus: self.focus,
                 lens: match self.strength {
                     Strength::Lens(lens) => CocAtInfinity::Lens(lens),
-                    _ => CocAtInfinity::Px(self.even_px(size)),
+                    _ => CocAtInfinity::Px(self.at_infinity_px(size)),
                 },
                 range_m: self.focus_range_m,
                 max_coc_px,
@@ -202,23 +203,23 @@ impl Look {
     }
 
     /// CoC radius at infinity in pixels, where it does not depend on a focus that is yet to be found.
-    fn even_px(&self, (width, height): (u32, u32)) -> f32 {
+    fn at_infinity_px(&self, (width, height): (u32, u32)) -> f32 {
         match (self.strength, self.focus) {
             (Strength::Default, _) => height as f32 * COC_AT_INFINITY_PER_HEIGHT,
             (Strength::Percent(percent), _) => height as f32 * percent / 100.0,
             (Strength::AtInfinity(radius_px), _) => radius_px,
             (Strength::Lens(lens), FocusRule::Metres(focus_m)) => lens.coc_at_infinity_px(focus_m, width),
-            // Whatever the lens may give: the largest CoC is the bound.
+            // The focus is not known yet: callers take the largest CoC as the bound.
             (Strength::Lens(_), _) => f32::INFINITY,
         }
     }
 
-    /// Largest CoC radius, in pixels. Without depth no point is nearer than the focal plane, and the strength that
-    /// was asked for holds unless `--max-coc` is given, too.
+    /// Largest CoC radius, in pixels. A strength that was asked for holds even above the default limit, unless
+    /// `--max-coc` is given, too.
     fn max_coc_px(&self, size: (u32, u32)) -> f32 {
         let by_height_px = size.1 as f32 * MAX_COC_PER_HEIGHT;
         self.max_coc_px.unwrap_or(match self.strength {
-            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.even_px(size)),
+            Strength::AtInfinity(_) | Strength::Percent(_) => by_height_px.max(self.at_infinity_px(size)),
             Strength::Default | Strength::Lens(_) => by_height_px,
         })
     }

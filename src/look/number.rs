@@ -9,7 +9,7 @@ pub(crate) fn number_in(text: &str, low: f32, high: f32) -> Option<f32> {
     text.trim().parse().ok().filter(|number| (low..=high).contains(number))
 }
 
-/// A parser of numbers within `range`.
+/// A parser of numbers within `range`, its ends included.
 pub fn within(range: RangeInclusive<f32>) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync + 'static {
     let (low, high) = range.into_inner();
     move |text| number_in(text, low, high).ok_or_else(|| format!("use a number from {low} to {high}"))
@@ -18,7 +18,7 @@ pub fn within(range: RangeInclusive<f32>) -> impl Fn(&str) -> Result<f32, String
 /// A parser of finite numbers above 0.
 ///
 /// # Errors
-/// It is none.
+/// `text` is no such number.
 pub fn above_zero(text: &str) -> Result<f32, String> {
     number_in(text, 0.0, f32::MAX).filter(|number| *number > 0.0).ok_or_else(|| "use a number above 0".to_string())
 }
@@ -26,7 +26,7 @@ pub fn above_zero(text: &str) -> Result<f32, String> {
 /// A parser of finite numbers from 0.
 ///
 /// # Errors
-/// It is none.
+/// `text` is no such number.
 pub fn not_negative(text: &str) -> Result<f32, String> {
     number_in(text, 0.0, f32::MAX).ok_or_else(|| "use a number from 0".to_string())
 }
@@ -49,7 +49,7 @@ impl<T> OrAuto<T> {
         }
     }
 
-    /// A parser of what `parse` does, and of `auto`.
+    /// The parser `parse`, which takes `auto` as well. Errors of parsers say what is accepted.
     pub fn parser(
         parse: impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static,
     ) -> impl Fn(&str) -> Result<Self, String> + Clone + Send + Sync + 'static {

@@ -1,4 +1,4 @@
-//! Changes of a look: settings by their names, laid upon another look.
+//! Changes of a look: settings by their names, applied to another look.
 
 use std::collections::BTreeMap;
 
@@ -52,7 +52,7 @@ impl Patch {
     /// Settings by their names.
     ///
     /// # Errors
-    /// One is none of a look, or has no such value: its name, and what is wrong.
+    /// A look has no such setting, or that has no such value: the name of the setting, and what is wrong.
     pub fn parse<'a>(settings: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Self, (String, String)> {
         let mut patch = Self::default();
         for (name, text) in settings {
@@ -62,13 +62,13 @@ impl Patch {
         Ok(patch)
     }
 
-    /// What it says, by name, in the order of [`SETTINGS`]. Numbers are as short as they can be and give the same value
-    /// back.
+    /// Names and values of the settings that it sets, in the order of [`SETTINGS`]. Numbers are as short as they can be
+    /// and parse to the same value.
     pub fn values(&self) -> Vec<Value> {
         SETTINGS.iter().filter_map(|setting| Some((setting.name, (setting.get)(self)?))).collect()
     }
 
-    /// What it says that `other` does not.
+    /// Without the settings that have the same value in `other`.
     pub fn beside(mut self, other: &Self) -> Self {
         let is_same = |setting: &&Setting| (setting.get)(&self) == (setting.get)(other);
         let same: Vec<&Setting> = SETTINGS.iter().filter(is_same).collect();
@@ -103,8 +103,8 @@ impl Patch {
         }
         match (&self.aperture, &look.aperture.shape) {
             (None, _) => {}
-            // It is not read again.
-            (Some(ApertureName::Image(file)), Shape::Picture(there)) if there.file.as_ref() == Some(file) => {}
+            // The base has this picture already: it is not read again.
+            (Some(ApertureName::Image(file)), Shape::Picture(picture)) if picture.file.as_ref() == Some(file) => {}
             (Some(name), _) => look.aperture.shape = name.load()?,
         }
         if let Some(intensity) = self.intensity {
@@ -119,7 +119,8 @@ impl Patch {
         Ok(look)
     }
 
-    /// The strength at infinity or by a lens; a lens that is there keeps the numbers that are not set.
+    /// The strength after this patch: by a lens if it sets any number of one, of which `before` may give the others;
+    /// else the CoC at infinity.
     fn strength(&self, before: Strength) -> Result<Strength, LookError> {
         let (f_number, focal_length_mm, sensor_width_mm) = (self.f_number, self.focal_length_mm, self.sensor_width_mm);
         if f_number.or(focal_length_mm).or(sensor_width_mm).is_none() {

@@ -9,12 +9,12 @@ pub struct Preset {
     pub name: String,
     /// Its settings.
     pub patch: Patch,
-    /// Whether it is the person's own.
+    /// Whether the user made it; else it is built in.
     pub own: bool,
 }
 
-/// The built-in presets, in the order in which they are shown. What they do not set stays: where the focus is, how finely it
-/// is blurred, what depth is fitted to.
+/// The built-in presets, in the order in which they are shown. What they do not set stays: where the focus is, how
+/// finely it is blurred, what depth is fitted to.
 const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
     (
         "portrait",
@@ -54,7 +54,7 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 5] = [
             ("focus-range", "0"),
         ],
     ),
-    // The whole of a thing in the hand, and of the hand.
+    // A sharp range of 0.3 m: a thing in the hand, and the hand.
     (
         "product",
         &[

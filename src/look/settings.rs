@@ -81,6 +81,7 @@ macro_rules! settings {
 /// A value's name, and what it does.
 pub type Choice = (&'static str, &'static str);
 
+/// Names and help of all values of an enumeration.
 fn names_of<T: Named>() -> Vec<Choice> {
     T::VALUES.iter().map(|value| (value.name(), value.help())).collect()
 }
@@ -133,9 +134,9 @@ pub fn setting(name: &str) -> Option<&'static Setting> {
     SETTINGS.iter().find(|setting| setting.name == name)
 }
 
-/// The settings of a lens, which together set aside the strength at infinity.
+/// The settings of a lens, which replace the strength at infinity.
 const OF_A_LENS: [&str; 3] = ["f-number", "focal-length", "sensor-width"];
-/// The strength at infinity, which sets aside those of a lens.
+/// The strength at infinity, which replaces the settings of a lens.
 const AT_INFINITY: &str = "coc-at-infinity";
 
 impl Setting {
@@ -148,12 +149,12 @@ impl Setting {
         }
     }
 
-    /// Whether this is one of those that say how strong the blur is, of which each sets aside others.
+    /// Whether it sets how strong the blur is: at infinity or by a lens, of which one excludes the other.
     pub fn is_strength(&self) -> bool {
         !self.excludes().is_empty()
     }
 
-    /// Its value where nothing is said, unless that is [computed](Setting::computed).
+    /// Its default value, unless that is [computed](Setting::computed).
     pub fn default(&self) -> Option<String> {
         (self.get)(&Patch::of(&Look::default())).filter(|_| !self.computed)
     }

@@ -10,7 +10,7 @@ use crate::optics::Lens;
 /// How strong the blur is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strength {
-    /// A fraction of the picture's height.
+    /// A CoC radius at infinity of [`COC_AT_INFINITY_PER_HEIGHT`](super::COC_AT_INFINITY_PER_HEIGHT).
     Default,
     /// CoC radius at infinity, in pixels.
     AtInfinity(f32),

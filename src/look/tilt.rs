@@ -20,6 +20,7 @@ impl FromStr for Tilt {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         let mut parts = text.split(':');
+        // The next part, or its default where the text ends; `None` if it is no number from `low` to `high`.
         let mut next = |low, high, default| match parts.next() {
             None => Some(default),
             Some(part) => part.trim().parse().ok().filter(|number| (low..=high).contains(number)),
@@ -47,6 +48,7 @@ impl Tilt {
     pub fn ramp(&self, (width, height): (u32, u32), max_px: f32) -> Ramp {
         let (width, height) = (width as f32, height as f32);
         let (sin, cos) = self.angle_deg.to_radians().sin_cos();
+        // Across the band; straight down at 0 degrees.
         let normal = glam::Vec2::new(-sin, cos);
         let offset_px = normal.dot(glam::Vec2::new(width / 2.0, height * self.center_y));
         let half_band_px = height * self.band / 2.0;

@@ -82,11 +82,11 @@ impl Stage<'_> {
                 len if len < capacity => from.try_recv(),
                 _ => None,
             };
-            // With nothing to submit, there is time to wait for what was.
+            // Nothing to submit: wait for a frame that was submitted.
             let mut wait = next.is_none();
             if let Some(mut frame) = next {
                 if let Some(swap) = frame.item.swap.take().filter(|swap| swap.number != last_swap) {
-                    // Later frames carry the same one: only the first counts. What the old executor has goes out before.
+                    // Later frames carry the same one: only the first counts. What the old executor has goes out first.
                     last_swap = swap.number;
                     while let Some(old) = executor.as_mut().filter(|_| !pending.is_empty()) {
                         if !self.collect(&mut **old, &mut pending, true, &mut to)? {
@@ -115,6 +115,7 @@ impl Stage<'_> {
                 if !self.collect(&mut **executor, &mut pending, wait, &mut to)? {
                     return Ok(());
                 }
+                // It has moved to another backend (GPU to processor): finest quality and times are others there.
                 if backends.replace(executor.backends()) != Some(executor.backends()) {
                     (self.about.backend, self.about.adapter) = (executor.backends().into(), executor.describe());
                     self.picker = self.picker.with(self.rule, super::finest_quality(Some(&**executor)));
@@ -123,7 +124,7 @@ impl Stage<'_> {
         }
     }
 
-    /// Hands a frame on as it is; gives back whether there is anybody to take more.
+    /// Hands a frame on unblurred, unless it is late; returns whether there is anybody to take more.
     fn pass(&mut self, frame: Frame<Ready>, to: &mut Sender<Frame<Blurred>>) -> bool {
         let Frame { ticket, stamp, trace, item: Ready { color, depth, coc, .. } } = frame;
         if self.is_late(&ticket, self.clock.now_ns(), 0) {
@@ -135,7 +136,7 @@ impl Stage<'_> {
         hand_on(to, Frame { ticket, stamp, trace, item }, self.tally)
     }
 
-    /// Begins a frame, unless it is too late for that.
+    /// Gives a frame to the executor, unless it is too late for that; returns whether it did.
     fn submit(
         &mut self,
         executor: &mut dyn Bokeh,
@@ -144,7 +145,7 @@ impl Stage<'_> {
     ) -> Result<bool, Fault> {
         let Frame { ticket, stamp, trace, item: Ready { color, depth, coc, .. } } = frame;
         let began_ns = self.clock.now_ns();
-        // Behind those that are under way.
+        // The frame waits for those that are under way.
         let expected_ns = self.picker.expected_ns() * (pending.len() as u64 + 1);
         if self.is_late(&ticket, began_ns, expected_ns) {
             self.tally.dropped(ticket, Cause::Late);
@@ -161,8 +162,8 @@ impl Stage<'_> {
         }
     }
 
-    /// Hands on the oldest frame that is done, if there is one; with `wait`, there is. Gives back whether there is
-    /// anybody to take more.
+    /// Hands on the oldest frame if it is done; with `wait`, waits until it is. Returns whether there is anybody to
+    /// take more.
     fn collect(
         &mut self,
         executor: &mut dyn Bokeh,
@@ -192,6 +193,7 @@ impl Stage<'_> {
         self.late.as_mut().is_some_and(|late| late.is_late(ticket.captured_ns, now_ns, expected_ns))
     }
 
+    /// Counts the frame that failed, if it is known; returns the fault.
     fn failed(&self, frame: Option<Pending>, fault: Fault) -> Fault {
         if let Some(frame) = frame {
             self.tally.dropped(frame.ticket, Cause::Failed);
@@ -199,7 +201,7 @@ impl Stage<'_> {
         fault
     }
 
-    /// Counts what a frame took; gives back how long its blur did.
+    /// Records the times of a finished frame; returns how long its blur took.
     fn measure(&mut self, done: &Pending, passes: &PassTimes, capacity: usize) -> u64 {
         let now_ns = self.clock.now_ns();
         let mut in_passes_ns = 0;
@@ -208,6 +210,7 @@ impl Stage<'_> {
             self.times.passes.add(name, time_ns);
             in_passes_ns += time_ns;
         }
+        // An executor that times no passes is measured from outside.
         let blur_ns = if in_passes_ns == 0 { now_ns - done.began_ns } else { in_passes_ns };
         self.times.blur.add(blur_ns);
         self.times.rungs.add(done.quality.name());

@@ -27,6 +27,7 @@ pub(super) struct Stage<'a> {
     pub keep_going: bool,
     /// `None` captures whether anybody watches or not.
     pub demand: Option<Demand>,
+    /// The user's stop, and the end of any stage.
     pub stop: [&'a AtomicBool; 2],
     pub colors: &'a Pool<ColorImage>,
     pub depths: &'a Pool<DepthMap>,
@@ -37,16 +38,18 @@ pub(super) struct Stage<'a> {
 }
 
 impl Stage<'_> {
+    /// Captures until the camera ends, a stop is set, or nobody takes the frames.
     pub(super) fn run(mut self, mut to: Sender<Frame<Shot>>) -> Ended {
         let stopped = || self.stop.iter().any(|stop| stop.load(Ordering::Relaxed));
+        // For a camera that brings neither: they stay empty.
         let (mut no_depth, mut no_right) = (DepthMap::default(), GrayImage::default());
         let mut complained = false;
         while !stopped() {
             if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
                 self.camera.rest();
-                let since_ns = self.clock.now_ns();
+                let rest_began_ns = self.clock.now_ns();
                 demand.wait(PATIENCE);
-                self.pacer.rested(self.clock.now_ns() - since_ns);
+                self.pacer.rested(self.clock.now_ns() - rest_began_ns);
                 continue;
             }
             self.tally.lost(self.pacer.skip(&mut *self.camera), Cause::Driver);
@@ -63,6 +66,7 @@ impl Stage<'_> {
                 Captured::Frame(stamp) => {
                     let read_ns = (self.clock.now_ns() - began_ns).saturating_sub(self.camera.waited_ns());
                     self.times.add(read_ns);
+                    // A live camera stamps its frames; stored ones are captured when they are due.
                     let captured_ns = match stamp.captured_ns {
                         Some(captured_ns) => captured_ns,
                         None => self.pacer.wait(stamp.time_ns, read_ns, stopped),

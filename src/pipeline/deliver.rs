@@ -13,9 +13,10 @@ use crate::stats::{Cause, Histogram, Tally, Ticket};
 
 pub(super) struct Stage<'a> {
     pub sink: &'a mut dyn Sink,
-    /// Who looks at the frames besides.
+    /// A viewer that is sent every frame as well.
     pub view: Option<Sender<View>>,
     pub mirror: bool,
+    /// Frames to be captured in all, where that is known.
     pub total: Option<u64>,
     pub progress: &'a dyn Fn(Progress),
     pub tally: &'a Tally,
@@ -27,15 +28,20 @@ pub(super) struct Stage<'a> {
 
 pub(super) struct Times<'a> {
     pub sink: &'a mut Histogram,
+    /// From capture to delivery.
     pub latency: &'a mut Histogram,
+    /// From one delivery to the next.
     pub frame: &'a mut Histogram,
+    /// Pictures shown again, as no new one came.
     pub repeats: &'a mut u64,
 }
 
 impl Stage<'_> {
+    /// Delivers frames until they end, the sink wants no more, or the viewer is gone.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Blurred>>) -> Ended {
         let mut last_ns = None;
-        let mut viewed = None;
+        // Ticket of the frame that was sent to the viewer last, where that decides whether it was delivered.
+        let mut at_viewer = None;
         loop {
             let Frame { ticket, stamp, trace, item: mut frame } = match self.next(&mut from) {
                 Received::Item(frame) => frame,
@@ -74,16 +80,17 @@ impl Stage<'_> {
                 self.times.frame.add(now_ns - last_ns);
             }
             let captured_ns = ticket.captured_ns;
-            // Where the viewer alone takes frames, one is delivered once it did.
-            let taken = frame.picture.memory().is_some() && self.sink.keeps();
-            let (sunk, kept) = if self.view.is_none() || taken { (Some(ticket), None) } else { (None, Some(ticket)) };
-            sunk.into_iter().for_each(|ticket| self.tally.delivered(ticket));
+            // What the sink does not keep is delivered once the viewer took it.
+            let kept = frame.picture.memory().is_some() && self.sink.keeps();
+            let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
+            done.into_iter().for_each(|ticket| self.tally.delivered(ticket));
             if let Some(view) = &mut self.view {
                 let Blurred { picture, color, depth, coc } = frame;
                 let frames = self.tally.frames();
                 let item = View { picture, color, depth, coc, stamp, captured_ns, trace, frames };
                 match view.send(item) {
-                    Ok(displaced) => self.looked_at(displaced.is_none(), std::mem::replace(&mut viewed, kept)),
+                    // A displaced frame is the one before, which the viewer did not take.
+                    Ok(displaced) => self.count_viewed(displaced.is_none(), std::mem::replace(&mut at_viewer, open)),
                     // Nobody knows the fate of this frame, nor of the one before: they stay in flight.
                     Err(link::Abandoned) => return Ok(()),
                 }
@@ -96,13 +103,13 @@ impl Stage<'_> {
                 total: self.total,
             });
         }
-        // What lies there at the end is still looked at.
-        self.looked_at(true, viewed);
+        // The viewer still takes the last one.
+        self.count_viewed(true, at_viewer);
         Ok(())
     }
 
-    /// What became of the frame before.
-    fn looked_at(&self, taken: bool, ticket: Option<Ticket>) {
+    /// Counts a frame whose delivery was up to the viewer: delivered if that took it, else evicted.
+    fn count_viewed(&self, taken: bool, ticket: Option<Ticket>) {
         match ticket {
             Some(ticket) if taken => self.tally.delivered(ticket),
             Some(ticket) => self.tally.dropped(ticket, Cause::Evicted),
@@ -110,6 +117,7 @@ impl Stage<'_> {
         }
     }
 
+    /// The next frame; `Nothing` when the sink is to repeat its last picture before one comes.
     fn next<T>(&self, from: &mut Receiver<T>) -> Received<T> {
         match self.sink.hold() {
             Some(hold) => from.recv_timeout(hold),

@@ -17,7 +17,7 @@ use crate::look::Look;
 use crate::optics::CocField;
 use crate::stats::{Cause, Histogram, Tally};
 
-/// Without a frame for so long, nobody watches: a depth camera may rest.
+/// After this time without a frame nobody watches: a depth camera may rest.
 const IDLE: Duration = Duration::from_secs(3);
 
 /// All that the blur needs of a frame.
@@ -47,10 +47,12 @@ pub(super) struct Stage<'a> {
     /// How well and how often depth is made; `None` makes it as well as can be, for every frame.
     pub rate: Option<Rate>,
     pub times: &'a mut Histogram,
+    /// Counts frames that took over the depth of the one before.
     pub held: &'a mut u64,
 }
 
 impl Stage<'_> {
+    /// Runs until the frames end or nobody takes the results. Changes of the blur take effect between frames.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
         let mut coc = CocMaker::new(self.look.coc_rule(self.size), self.finish(&self.look));
         let mut complained = false;
@@ -78,14 +80,18 @@ impl Stage<'_> {
                 }
             }
             let began_ns = self.clock.now_ns();
+            // A CoC that is the same for every frame needs no depth.
             let made = match coc.fixed() {
                 Some(field) => Ok((None, field)),
-                None => self.see(&mut coc, (depth, right), &mut color, stamp).map(|(map, field)| (Some(map), field)),
+                None => self
+                    .depth_and_coc(&mut coc, (depth, right), &mut color, stamp)
+                    .map(|(map, field)| (Some(map), field)),
             };
             let (depth, coc) = match made {
                 Ok(made) => made,
                 Err(fault) => {
                     let (cause, goes_on) = match &fault {
+                        // A depth camera that has given no map yet soon will.
                         Fault::Depth(DepthError::Unpaired { .. }) => (Cause::Unpaired, true),
                         Fault::Depth(_) => (Cause::Corrupt, self.keep_going),
                         _ => (Cause::Failed, false),
@@ -116,7 +122,7 @@ impl Stage<'_> {
     }
 
     /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more.
-    fn see(
+    fn depth_and_coc(
         &mut self,
         coc: &mut CocMaker,
         (brought, right): (Option<Pooled<DepthMap>>, Option<Pooled<GrayImage>>),
@@ -144,6 +150,7 @@ impl Stage<'_> {
         Ok((map, field))
     }
 
+    /// A depth map from the source, made with as much effort as there is time for.
     fn read(&mut self, seen: Seen) -> Result<Pooled<DepthMap>, Fault> {
         let Some(source) = &mut self.source else {
             return Err(Fault::NoDepth { source_name: self.source_name.to_owned() });

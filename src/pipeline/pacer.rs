@@ -1,5 +1,5 @@
-//! Pacing of replay, real time for stored frames: each waits for its media time, and those that cannot make theirs are
-//! passed over, as a camera would have overwritten them.
+//! Replays stored frames in real time: each waits for its media time, and those that would miss theirs are passed over,
+//! as a camera would have overwritten them.
 
 use crate::capture::Camera;
 use crate::clock::Clock;
@@ -13,7 +13,7 @@ pub(super) struct Pacer {
     period_ns: u64,
     /// When media time 0 was or will be; known with the first frame.
     epoch_ns: Option<u64>,
-    /// What reading a frame took lately.
+    /// Time to read a frame: a moving average.
     read_ns: u64,
 }
 

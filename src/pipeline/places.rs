@@ -4,8 +4,9 @@ use crate::link::LOSSLESS_ITEMS;
 
 /// Room for buffers along the way, so that no stage waits for one that another has no need to give back.
 pub(super) struct Places {
+    /// Frames that the executor has in hand at once; 0 where nothing blurs.
     pub in_blur: usize,
-    /// Whether a viewer is given what the sink was, and what it was made of.
+    /// Whether a viewer is sent every picture, and what it was made of.
     pub viewed: bool,
 }
 
@@ -15,10 +16,12 @@ pub(super) const MOST_IN_FLIGHT: usize = 4;
 impl Places {
     /// A link's items, and the one that it displaces or that waits for room.
     const LINK: usize = LOSSLESS_ITEMS + 1;
+    /// The one that a stage is working on.
     const HAND: usize = 1;
 
     pub fn colors(&self) -> usize {
-        // Where nothing blurs, the captured pictures themselves go on to the sink.
+        // Three stages with the links behind them, and the last stage: where nothing blurs, the captured pictures
+        // themselves go on to the sink.
         3 * (Self::HAND + Self::LINK) + Self::HAND + self.in_blur + self.views()
     }
 
@@ -36,6 +39,7 @@ impl Places {
         2 * Self::HAND + Self::LINK
     }
 
+    /// Blurred pictures: with the executor, the blur and the deliver stage, and in the link between those.
     pub fn outs(&self) -> usize {
         if self.in_blur == 0 { 0 } else { self.in_blur + 2 * Self::HAND + Self::LINK + self.views() }
     }

@@ -1,22 +1,23 @@
-//! The play-out delay against jitter, when pictures are shown: a steady while after they were captured, so that they
-//! come as evenly as they were taken.
+//! The play-out delay against jitter: pictures are shown a steady time after they were captured, so that they come as
+//! evenly as they were taken.
 //!
-//! Work takes now longer, now less long; a picture that is ready early waits for the others' sake. The wait follows
-//! what pictures need: nearly all are ready in time, and none waits longer than the age that a picture may have.
+//! The time that the stages need varies, so a picture that is ready early waits. The delay adapts to that time: nearly
+//! all pictures are ready before it has passed, and none is kept until it is too old.
 
-/// This share of the pictures is ready in time; the others are shown as soon as they are.
+/// Share of the pictures that are to be ready in time; the others are shown as soon as they are ready.
 const IN_TIME: f64 = 0.97;
-/// The delay falls by this much with every picture that was ready in time; how it rises follows from the share. In
-/// periods, as all that follows.
+/// Fall of the delay with every picture that was ready in time, in periods like all that follows.
 const FALL: f64 = 0.0006;
+/// Its rise with every other picture: both balance when the share [`IN_TIME`] is ready in time.
 const RISE: f64 = FALL * IN_TIME / (1.0 - IN_TIME);
-/// It rises faster where much is missing, but never by more: one picture alone may be late for no reason.
+/// If a picture was very late, the delay rises by this share of its lateness instead.
 const RISE_SHARE: f64 = 0.25;
-const MOST_RISE: f64 = 0.09;
-/// No picture is kept until it is older than this; the rest of two periods is left for the sink. Nor the first ones,
-/// which tell little of those to come, beyond the second number.
-const MOST: f64 = 1.85;
-const MOST_AT_FIRST: f64 = 1.0;
+/// But never by more than this, since a single picture may be late by accident.
+const MAX_RISE: f64 = 0.09;
+/// Longest delay; the rest of two periods is left for the sink.
+const MAX_DELAY: f64 = 1.85;
+/// Longest delay to begin with: the first picture tells little of those to come.
+const MAX_FIRST_DELAY: f64 = 1.0;
 
 /// The delay from capture to output.
 pub(super) struct Playout {
@@ -31,14 +32,16 @@ impl Playout {
         Self { period_ns: period_ns as f64, delay: None }
     }
 
-    /// When the picture that was captured at `captured_ns` and is ready now is to be shown.
+    /// When to show the picture that was captured at `captured_ns` and is ready now: in the past if it is late. Adapts
+    /// the delay.
     pub(super) fn due_ns(&mut self, captured_ns: u64, now_ns: u64) -> u64 {
         let age = now_ns.saturating_sub(captured_ns) as f64 / self.period_ns;
-        let delay = self.delay.get_or_insert(age.min(MOST_AT_FIRST));
+        let delay = self.delay.get_or_insert(age.min(MAX_FIRST_DELAY));
         let due_ns = captured_ns + (*delay * self.period_ns) as u64;
-        let missing = age - *delay;
-        *delay += if missing > 0.0 { (RISE_SHARE * missing).clamp(RISE.min(missing), MOST_RISE) } else { -FALL };
-        *delay = delay.clamp(0.0, MOST);
+        let late_by = age - *delay;
+        // At least by `RISE`, but not beyond what this picture needed.
+        *delay += if late_by > 0.0 { (RISE_SHARE * late_by).clamp(RISE.min(late_by), MAX_RISE) } else { -FALL };
+        *delay = delay.clamp(0.0, MAX_DELAY);
         due_ns
     }
 }
@@ -85,12 +88,12 @@ mod tests {
     fn one_late_picture_delays_the_others_by_little() {
         let (_, ages) = play((0..300).map(|frame| if frame == 100 { 300 * MS } else { 15 * MS }));
         assert!(ages[150..].iter().all(|&age| age <= 45 * MS), "{:?}", ages.iter().max());
-        assert!(ages[299] <= 15 * MS + 10 * (MOST_RISE * PERIOD_NS as f64) as u64);
+        assert!(ages[299] <= 15 * MS + 10 * (MAX_RISE * PERIOD_NS as f64) as u64);
     }
 
     #[test]
     fn nobody_waits_beyond_the_age_that_is_allowed() {
         let (_, ages) = play((0..500).map(|frame| if frame < 250 { 200 * MS } else { 10 * MS }));
-        assert!(ages[260..].iter().all(|&age| age as f64 <= MOST * PERIOD_NS as f64 + 1.0));
+        assert!(ages[260..].iter().all(|&age| age as f64 <= MAX_DELAY * PERIOD_NS as f64 + 1.0));
     }
 }

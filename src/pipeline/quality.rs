@@ -6,9 +6,9 @@ use crate::look::QualityRule;
 
 /// Periods after capture at which a frame is to be delivered at the latest.
 const DEADLINE_PERIODS: u64 = 2;
-/// Of that, what the blur may count on in tenths: the rest is for the way to the sink and for bad luck.
+/// Tenths of that by which the blur is to be done: the rest is for the way to the sink and for bad luck.
 const DEADLINE_TENTHS: u64 = 8;
-/// Ages that are looked at.
+/// Frames whose ages are remembered: three seconds at 30 fps.
 const AGES: usize = 90;
 
 /// Picks the quality of each frame by the time there is.
@@ -24,26 +24,27 @@ pub(super) struct Picker {
 
 impl Picker {
     /// Frames may take `budget_ns`; where they come every `period_ns` in real time, there is a deadline, too. None is
-    /// blurred more finely than `most` unless that was asked for.
-    pub(super) fn new(rule: QualityRule, most: Quality, budget_ns: u64, period_ns: Option<u64>) -> Self {
-        let (rungs, governor) = Self::of(rule, most);
+    /// blurred more finely than `finest` unless that was asked for.
+    pub(super) fn new(rule: QualityRule, finest: Quality, budget_ns: u64, period_ns: Option<u64>) -> Self {
+        let (rungs, governor) = Self::rungs_and_governor(rule, finest);
         let deadline_ns = period_ns.map(|period_ns| DEADLINE_PERIODS * period_ns * DEADLINE_TENTHS / 10);
         Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default() }
     }
 
     /// The same under another rule, for another executor. What was learnt of the time that rungs take holds no more.
-    pub(super) fn with(&self, rule: QualityRule, most: Quality) -> Self {
-        let (rungs, governor) = Self::of(rule, most);
+    pub(super) fn with(&self, rule: QualityRule, finest: Quality) -> Self {
+        let (rungs, governor) = Self::rungs_and_governor(rule, finest);
         let &Self { budget_ns, deadline_ns, .. } = self;
         Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default() }
     }
 
-    fn of(rule: QualityRule, most: Quality) -> (&'static [Quality], Governor) {
+    /// The qualities that `rule` allows, cheapest first, and a governor that climbs them.
+    fn rungs_and_governor(rule: QualityRule, finest: Quality) -> (&'static [Quality], Governor) {
         let at = |quality: Quality| quality as usize;
         match rule {
             QualityRule::Fixed(quality) => (&Quality::ALL[at(quality)..=at(quality)], Governor::new(&[1.0], 0)),
             QualityRule::Auto(start) => {
-                (&Quality::ALL[..=at(most)], Governor::new(&COSTS[..=at(most)], at(start.min(most))))
+                (&Quality::ALL[..=at(finest)], Governor::new(&COSTS[..=at(finest)], at(start.min(finest))))
             }
         }
     }
@@ -81,9 +82,11 @@ impl Picker {
 /// newer one already or soon. But rather ten pictures a second, old as they are, than none.
 pub(super) struct LateRule {
     period_ns: u64,
+    /// When a frame was last found not to be late.
     last_passed_ns: Option<u64>,
 }
 
+/// After this time without a blurred frame, even a late one is blurred.
 const STARVED_NS: u64 = 100_000_000;
 
 impl LateRule {
@@ -91,8 +94,8 @@ impl LateRule {
         Self { period_ns, last_passed_ns: None }
     }
 
-    /// Whether the blur of a frame that was captured at `captured_ns` shall not begin now, where it is expected to take
-    /// `expected_ns`.
+    /// Whether not to blur a frame that was captured at `captured_ns` and whose blur is expected to take `expected_ns`.
+    /// A frame that is not late is taken to be blurred.
     pub(super) fn is_late(&mut self, captured_ns: u64, now_ns: u64, expected_ns: u64) -> bool {
         let age_ns = now_ns.saturating_sub(captured_ns);
         // Younger than a period, it is the newest there is.

@@ -1,25 +1,27 @@
-//! How well, and for how many frames, depth is made: the ladder of the depth stage.
+//! With how much effort depth is made, and how many frames share a map: the ladder of the depth stage.
 
 use crate::budget::{Governor, Sample};
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
-/// What there is time for: first depth is made with less effort, where its source has a choice, then for every second
-/// or third frame, and the others take it over.
+/// Picks what there is time for: where time is short, depth is first made with less effort, if its source has a choice,
+/// then for every second or third frame only, and the others take it over.
 pub(super) struct Rate {
+    /// Cheapest first.
     rungs: Vec<Rung>,
     governor: Governor,
     budget_ns: u64,
     /// Frames since depth was made, that one included.
     age: usize,
-    /// What was made last, where the next frame may be given it, too.
+    /// The CoC of the last depth, while later frames may share both.
     last: Option<CocField>,
+    /// The depth that goes with it.
     map: DepthMap,
 }
 
 #[derive(Clone, Copy)]
 struct Rung {
-    /// Frames that share a depth.
+    /// Number of frames that share a depth map.
     frames: usize,
     effort: usize,
 }
@@ -30,8 +32,8 @@ impl Rate {
     pub(super) fn new(budget_ns: u64, efforts: &[f64]) -> Self {
         let cheapest = efforts.first().copied().unwrap_or(1.0);
         let shared = [3, 2].map(|frames| (Rung { frames, effort: 0 }, cheapest / frames as f64));
-        let own = efforts.iter().enumerate().map(|(effort, &cost)| (Rung { frames: 1, effort }, cost));
-        let (rungs, costs): (Vec<Rung>, Vec<f64>) = shared.into_iter().chain(own).unzip();
+        let unshared = efforts.iter().enumerate().map(|(effort, &cost)| (Rung { frames: 1, effort }, cost));
+        let (rungs, costs): (Vec<Rung>, Vec<f64>) = shared.into_iter().chain(unshared).unzip();
         let governor = Governor::new(&costs, costs.len() - 1);
         Self { rungs, governor, budget_ns, age: 0, last: None, map: DepthMap::default() }
     }
@@ -45,7 +47,7 @@ impl Rate {
         self.rungs[self.governor.rung()]
     }
 
-    /// The CoC of the last depth where the next frame is given both; counts the frame.
+    /// Counts a frame; returns the CoC of the last depth if the frame is given both, `None` if it needs its own.
     pub(super) fn holds(&mut self) -> Option<CocField> {
         if self.age >= self.rung().frames {
             self.last = None;
@@ -64,12 +66,13 @@ impl Rate {
         copy(&self.map, into);
     }
 
-    /// Depth was made, and took so long.
+    /// Depth was made in `took_ns`, until `at_ns`: tells the governor, and keeps it if later frames may share it.
     pub(super) fn made(&mut self, (map, field): (&DepthMap, CocField), took_ns: u64, at_ns: u64) {
         self.age = 1;
+        // Its share for each of the frames.
         let took_ns = took_ns / self.rung().frames as u64;
         self.governor.note(Sample { rung: self.governor.rung(), took_ns, at_ns }, self.budget_ns);
-        // The first one, too: no later frame shall be the one that takes the memory.
+        // The first one in any case: then the memory is allocated, and not during a later frame.
         if self.rung().frames > 1 || self.map.metres.is_empty() {
             copy(map, &mut self.map);
             self.last = Some(field);

@@ -17,8 +17,8 @@ pub enum Depth {
     Final(DepthMap),
 }
 
-/// What a picture is blurred by: the radius of every pixel, and the depth map (if it was measured, with holes filled, and
-/// refined if the look asks for that) if that needs it.
+/// What `color` is blurred by: the circle of confusion of every pixel, and the depth map if that follows depth. A
+/// measured map is returned with its holes filled, and refined if the look asks for it.
 ///
 /// # Errors
 /// [`BokehError::NoDepth`] when the blur follows depth and there is none.
@@ -40,7 +40,7 @@ pub fn prepared(
     }
 }
 
-/// The picture `color` in `look`, and what blurred it; as it is where the effect is none.
+/// Blurs the picture `color` as `look` says; returns it and what blurred it. It is unchanged where the effect is none.
 ///
 /// # Errors
 /// The blur follows depth and there is none, is too wide for the picture, or there is no such GPU.

@@ -1,4 +1,4 @@
-//! The keys: one table of what each does. The help shows it, and the panel acts by it.
+//! Key bindings: one table, which the help shows and the panel acts by.
 
 use egui::{Event, Key, Modifiers};
 
@@ -12,17 +12,18 @@ pub struct Chord {
     pub key: Key,
     /// Whether Ctrl is held.
     pub ctrl: bool,
-    /// Whether Shift is held; signs that need it on some keyboards are the same with and without.
+    /// Whether Shift is held. Counts only for letters: some keyboards need it for other signs.
     pub shift: bool,
 }
 
 /// What a key does.
 pub struct Binding {
+    /// Any of these triggers it.
     pub chords: &'static [Chord],
     /// What the help calls them.
     pub keys: &'static str,
     pub does: &'static str,
-    /// Whether it goes on while the key is held.
+    /// Whether it repeats while the key is held.
     pub repeats: bool,
     make: fn(&State, Context) -> Option<Action>,
 }
@@ -39,7 +40,7 @@ pub struct Group {
 pub struct Context {
     /// Rows of the picture; some blur is a share of them.
     pub height_px: u32,
-    /// Which of its chords it was.
+    /// Index of the pressed chord in [`Binding::chords`].
     pub chord: usize,
 }
 
@@ -57,26 +58,29 @@ const fn ctrl_shift(key: Key) -> Chord {
 
 type Make = fn(&State, Context) -> Option<Action>;
 
+/// A binding that acts once per press.
 const fn once(chords: &'static [Chord], keys: &'static str, does: &'static str, make: Make) -> Binding {
     Binding { chords, keys, does, repeats: false, make }
 }
 
+/// A binding that repeats while the key is held.
 const fn held(chords: &'static [Chord], keys: &'static str, does: &'static str, make: Make) -> Binding {
     Binding { chords, keys, does, repeats: true, make }
 }
 
+/// Changes the look; `None` if that leaves it as it is. Changes of one `stroke` are undone together.
 fn look(state: &State, stroke: &'static str, change: impl FnOnce(&mut Look)) -> Option<Action> {
     let mut look = state.look.clone();
     change(&mut look);
     (look != state.look).then(|| Action::Look { look: Box::new(look), stroke: Some(stroke) })
 }
 
-/// One thing is shown, or else the picture.
+/// Toggles between a view and the picture.
 fn show(state: &State, shown: Shown) -> Option<Action> {
     Some(Action::Show(if state.shown == shown { Shown::Picture } else { shown }))
 }
 
-/// Which way the second of two keys goes, against the first.
+/// The direction of a pair of opposite keys: -1 for the first chord, 1 for the second.
 fn way(context: Context) -> f32 {
     if context.chord.is_multiple_of(2) { -1.0 } else { 1.0 }
 }
@@ -211,6 +215,7 @@ pub const GROUPS: [Group; 5] = [
             once(&[key(Key::F), key(Key::F11)], "F, F11", "full screen", |state, _| {
                 Some(Action::FullScreen(!state.full_screen))
             }),
+            // Minus twice, because `way` goes by pairs; without Shift, Plus is Equals on many keyboards.
             held(
                 &[ctrl(Key::Minus), ctrl(Key::Plus), ctrl(Key::Minus), ctrl(Key::Equals)],
                 "Ctrl+−  Ctrl++",
@@ -229,25 +234,26 @@ pub const GROUPS: [Group; 5] = [
     },
 ];
 
-/// Keys that belong to the control in focus, where one is.
+/// Whether the control that has the focus uses this key itself.
 fn is_for_controls(chord: Chord) -> bool {
     let keys = [Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Space, Key::Escape];
     !chord.ctrl && keys.contains(&chord.key)
 }
 
-/// Letters, whose capitals are others; other signs are themselves wherever they are on a keyboard.
+/// Whether the key is a letter. Only then do Shift and Alt matter: other signs may need them on some keyboards.
 fn is_letter(key: Key) -> bool {
     key.name().len() == 1 && key.name().chars().all(|c| c.is_ascii_alphabetic())
 }
 
 impl Chord {
+    /// Whether this chord was pressed.
     fn is(self, pressed: Key, modifiers: Modifiers) -> bool {
         let shift = !is_letter(self.key) || self.shift == modifiers.shift;
         self.key == pressed && self.ctrl == modifiers.ctrl && shift && (!modifiers.alt || !is_letter(self.key))
     }
 }
 
-/// What the key in `event` does, if it is one of these. While a control is `focused`, some keys are its own.
+/// The action that is bound to the key in `event`, if any. While a control is `focused`, it keeps some keys to itself.
 pub fn action(event: &Event, state: &State, height_px: u32, focused: bool) -> Option<Action> {
     let Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { return None };
     let bindings = GROUPS.iter().flat_map(|group| group.bindings);

@@ -6,16 +6,17 @@ use crate::stats::{Frames, Histogram};
 
 /// Frames that the instruments look back on.
 pub const FRAMES: usize = 240;
+/// A nanosecond in milliseconds.
 const MS: f64 = 1e-6;
-/// A change of a stage's mean counts for this much of it: single frames jump.
+/// Weight of a new frame in the moving means of the stages, which single frames shall not make jump.
 const EASE: f64 = 0.08;
-/// Passes of a blur that are told apart.
+/// The most passes of a blur that are listed.
 const PASSES: usize = 16;
 
 /// One frame, for the graph.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bar {
-    /// Its blur, in milliseconds.
+    /// Time of its blur, in milliseconds.
     pub blur_ms: f32,
     /// From the presented frame before to this one, in milliseconds.
     pub interval_ms: f32,
@@ -26,6 +27,7 @@ pub struct Bar {
 /// The last frames, and totals of all.
 #[derive(Clone, Debug)]
 pub struct Meters {
+    /// A ring buffer: `held` frames, and the index of the next one to write.
     bars: [Bar; FRAMES],
     held: usize,
     next: usize,
@@ -33,18 +35,20 @@ pub struct Meters {
     reaction_ms: Window<FRAMES>,
     stages: Stages,
     frames: Frames,
+    /// When the last frame was presented, and when the preview started.
     last_ns: Option<u64>,
     begun_ns: Option<u64>,
     totals: Totals,
 }
 
-/// Mean times of the last frames, in milliseconds.
+/// Moving means of the stages' times, in milliseconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stages {
     pub decode_ms: f64,
     pub depth_ms: f64,
     pub blur_ms: f64,
     pub present_ms: f64,
+    /// Of these, the first `seen` are in use.
     passes: [(&'static str, f64); PASSES],
     seen: usize,
 }
@@ -98,24 +102,25 @@ impl Default for Meters {
 }
 
 impl Meters {
-    /// The preview began at `now_ns`: the first frame is measured from here.
+    /// The preview started at `now_ns`: the time to the first frame counts from here.
     pub fn begin(&mut self, now_ns: u64) {
         self.begun_ns.get_or_insert(now_ns);
     }
 
-    /// Another source: what was measured of the last frames is no more. Totals stay.
+    /// Forgets the last frames, for another source. Totals stay.
     pub fn restart(&mut self) {
         let (begun_ns, totals) = (self.begun_ns, std::mem::take(&mut self.totals));
         *self = Self { begun_ns, totals, ..Self::default() };
     }
 
-    /// A frame is on the screen since `now_ns` of the run's clock; drawing it took `present_ns`. Allocates nothing.
+    /// Counts a frame that was presented at `now_ns` of the run's clock, which took `present_ns`. Allocates nothing.
     pub fn presented(&mut self, view: &View, now_ns: u64, present_ns: u64) {
         let latency_ns = now_ns.saturating_sub(view.captured_ns);
         self.count(&view.trace, now_ns, latency_ns, present_ns);
         self.frames = view.frames;
     }
 
+    /// Adds a presented frame to the totals, the graph and the means.
     fn count(&mut self, trace: &Trace, now_ns: u64, latency_ns: u64, present_ns: u64) {
         self.totals.presented += 1;
         self.totals.latency.add(latency_ns);
@@ -135,13 +140,13 @@ impl Meters {
         self.stages.add(trace, present_ns, self.held == 1);
     }
 
-    /// The person did something, and the picture showed it this much later.
+    /// Counts an input whose effect was on the screen this much later.
     pub fn reacted(&mut self, after_ns: u64) {
         self.totals.reaction.add(after_ns);
         self.reaction_ms.push(after_ns as f64 * MS);
     }
 
-    /// A run with something to see.
+    /// Fills the meters with a plausible run, for pictures of the instruments.
     #[cfg(test)]
     pub fn fill_for_looks(&mut self) {
         let rungs = [Quality::Balanced, Quality::High, Quality::Fast, Quality::Balanced];
@@ -191,9 +196,10 @@ impl Meters {
         &self.totals
     }
 
-    /// The numbers of the last frames. This sorts: a few times a second is enough.
+    /// The numbers of the last frames. To be called a few times a second, as it sorts.
     pub fn summary(&self) -> Summary {
         let spread = |window: &Window<FRAMES>| [0.5, 0.99].map(|p| window.percentile(FRAMES, p));
+        // The first frame has no interval.
         let intervals = self.bars().map(|bar| f64::from(bar.interval_ms)).filter(|&ms| ms > 0.0);
         let (count, sum_ms) = intervals.fold((0.0, 0.0), |(count, sum), ms| (count + 1.0, sum + ms));
         Summary {
@@ -205,9 +211,10 @@ impl Meters {
 }
 
 impl Stages {
+    /// Moves the means towards the times of a frame; the first frame sets them.
     fn add(&mut self, trace: &Trace, present_ns: u64, first: bool) {
-        let share = if first { 1.0 } else { EASE };
-        let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS - *mean_ms) * share;
+        let weight = if first { 1.0 } else { EASE };
+        let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS - *mean_ms) * weight;
         ease(&mut self.decode_ms, trace.decode_ns);
         ease(&mut self.depth_ms, trace.depth_ns);
         ease(&mut self.blur_ms, trace.blur_ns);
@@ -215,7 +222,7 @@ impl Stages {
         for (name, time) in trace.passes.iter() {
             let ms = time.as_secs_f64() * 1e3;
             match self.passes[..self.seen].iter_mut().find(|pass| pass.0 == name) {
-                Some(pass) => pass.1 += (ms - pass.1) * share,
+                Some(pass) => pass.1 += (ms - pass.1) * weight,
                 None if self.seen < PASSES => {
                     self.passes[self.seen] = (name, ms);
                     self.seen += 1;

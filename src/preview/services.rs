@@ -1,5 +1,4 @@
-//! What a session needs of the system: sources, outputs, executors, and the settings file. Errors are one line for the
-//! person.
+//! What a session needs of the system: sources, outputs, executors, and the settings file. Errors are one line of text.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -10,7 +9,7 @@ use crate::look::{Look, presets::Preset};
 use crate::sink::Sink;
 use crate::source::{Source, devices::Choice};
 
-/// An option of the command line that is none of the look: its name and its value.
+/// An option of the command line that is not part of the look: its name and its value.
 pub type Switch = (String, String);
 
 /// A source that was opened.
@@ -21,16 +20,16 @@ pub struct Opened {
     pub source: Source,
     /// Lines for the person: what was assumed, what is missing and where to get it.
     pub notes: Vec<String>,
-    /// The camera's knobs, where it has any.
+    /// The camera's controls, such as exposure, if it has any.
     pub controls: Vec<Knob>,
 }
 
 /// What a session needs of the system.
 pub trait Services: Send {
-    /// What could be opened, now.
+    /// The sources that can be opened now.
     fn sources(&mut self) -> Vec<Choice>;
 
-    /// Virtual cameras that could be written to, now.
+    /// The virtual cameras that can be written to now.
     fn virtual_cameras(&mut self) -> Vec<Choice>;
 
     /// Opens a source; an empty name is the first camera there is, else the synthetic scene.
@@ -39,7 +38,7 @@ pub trait Services: Send {
     /// It cannot be opened.
     fn open(&mut self, name: &str) -> Result<Opened, String>;
 
-    /// Turns a knob of the camera that was opened last; gives back all of them.
+    /// Sets a control of the camera that was opened last; gives back all of its controls.
     ///
     /// # Errors
     /// The camera refuses.
@@ -51,8 +50,8 @@ pub trait Services: Send {
     /// There is no such GPU.
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String>;
 
-    /// Opens an output: a virtual camera or a file, for pictures of `size` pixels every `period_ns`, which end once `stop`
-    /// is set.
+    /// Opens an output: a virtual camera or a file, for pictures of `size` pixels every `period_ns`, which end once
+    /// `stop` is set.
     ///
     /// # Errors
     /// It cannot be opened.

@@ -1,4 +1,4 @@
-//! [`Services`] of this system.
+//! [`Services`] by the operating system: real cameras, files and GPUs.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -14,10 +14,10 @@ use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
 use crate::source::{Kind, Options, Source, SourceName};
 
-/// What is said when there is nothing to look at but our own scene.
+/// Shown when there is no camera, and the synthetic scene takes its place.
 const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
                          `bokehcam doctor` says what is missing.";
-/// What is called so needs no camera.
+/// The source that needs no camera.
 const SYNTHETIC: &str = "synthetic";
 
 /// Opens everything as the command line would.
@@ -30,19 +30,20 @@ pub struct System {
     pub device: Option<Arc<Device>>,
     /// Width and height of virtual cameras; `None`: those of the frames.
     pub out_size: Option<(u32, u32)>,
+    /// Overwrite what exists.
     pub force: bool,
     /// Where settings are kept.
     pub settings: Box<dyn SettingsStore>,
-    /// The source that was asked for at the start.
+    /// The source that was opened first: it stays on the list, even if it is no camera.
     first: Option<Choice>,
-    /// Knobs that were turned, by name.
+    /// Values of the camera's knobs that were turned, by name.
     turned: BTreeMap<String, i64>,
     /// The camera that was opened last, where it has knobs.
     camera: Option<String>,
 }
 
 impl System {
-    /// Nothing is open yet; there is no GPU, and nothing is overwritten.
+    /// A system without a GPU that overwrites nothing; nothing is open yet.
     pub fn new(options: Options, look: Look, settings: Box<dyn SettingsStore>) -> Self {
         Self {
             options,
@@ -57,12 +58,14 @@ impl System {
         }
     }
 
+    /// Opens a source to be played for as long as the window is open, with depth whether or not the look needs it.
     fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
         let mut options = self.options.clone();
         options.cycle = true;
+        // Only recordings repeat this way: the synthetic scene cycles.
         options.frames.repeat &= source_name.kind() == Kind::Recording;
-        // Of depth the window may make use later.
+        // The window may switch to an effect that needs depth later.
         let look = Look { effect: Effect::Auto, ..self.look.clone() };
         let source = Source::open(&source_name, &options, Some(&look)).map_err(|error| error.to_string())?;
         Ok((source, source_name))
@@ -85,9 +88,9 @@ impl Services for System {
 
     fn open(&mut self, name: &str) -> Result<Opened, String> {
         let mut notes = Vec::new();
-        let first = devices::cameras().into_iter().next();
+        let first_camera = devices::cameras().into_iter().next();
         let name = match name {
-            "" => first.map_or_else(
+            "" => first_camera.map_or_else(
                 || {
                     notes.push(NO_CAMERA.to_owned());
                     SYNTHETIC.to_owned()
@@ -113,7 +116,7 @@ impl Services for System {
 
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
         let threads = self.options.computing.threads;
-        // One that failed stays so.
+        // A device that failed does not recover.
         let made = match self.device.as_ref().filter(|device| device.check().is_ok()) {
             Some(device) => bokeh::create_on(settings, size, Arc::clone(device), threads),
             None => bokeh::create(settings, size, Backend::Cpu, None, threads),
@@ -137,7 +140,7 @@ impl Services for System {
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
         let mut switches = match outputs {
             [] => switches.to_vec(),
-            // They are the window's own.
+            // A command that writes to outputs has no window to set options of.
             _ => Vec::new(),
         };
         if !self.turned.is_empty() {

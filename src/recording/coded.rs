@@ -20,7 +20,7 @@ use crate::files::input;
 /// Far more than a photograph of 8192 x 8192 pixels takes.
 const MAX_JPEG_BYTES: u64 = 96 << 20;
 
-/// The same, of a float map.
+/// The largest float map that is accepted: 4 bytes a pixel, and room for a header.
 const MAX_PFM_BYTES: u64 = 4 * (MAX_SIDE_PX as u64 * MAX_SIDE_PX as u64) + 4096;
 
 /// Memory that a PNG's texts and profiles may take, which are not shown.
@@ -51,7 +51,7 @@ pub(super) struct Run {
 impl<'a> Coded<'a> {
     /// Opens a PNG or JPEG; `memory` takes the file where it has to be read as a whole.
     pub(super) fn open(path: &Path, memory: &'a mut Vec<u8>) -> Result<Self, PictureFault> {
-        let (mut file, format) = recognised(path)?;
+        let (mut file, format) = open_detected(path)?;
         let coded = match format {
             Some(Format::Png) => Self::Png(Box::new(png_decoder(file)?.read_info().map_err(png_fault)?)),
             Some(Format::Jpeg) => {
@@ -90,7 +90,8 @@ impl<'a> Coded<'a> {
         }
     }
 
-    /// Unpacks 8-bit RGB as it is stored; nothing else has a shorter way than [`Coded::runs`].
+    /// Decodes a picture of 8-bit RGB (no other samples) into `into`, a JPEG without the copy that [`Coded::runs`]
+    /// makes.
     pub(super) fn rgb(self, memory: &mut Vec<u8>, into: &mut [u8]) -> Result<Extras, PictureFault> {
         match self {
             Self::Jpeg(mut decoder) if decoder.color_type() == ColorType::Rgb8 => {
@@ -109,7 +110,8 @@ impl<'a> Coded<'a> {
         }
     }
 
-    /// Unpacks the picture, run by run of [`Samples`]; `memory` is working memory.
+    /// Decodes the picture and calls `each` for every run of pixels with its bytes, laid out as [`Samples`] say: a row
+    /// of a PNG, or a whole JPEG. `memory` is working memory.
     pub(super) fn runs(
         mut self,
         memory: &mut Vec<u8>,
@@ -125,9 +127,9 @@ impl<'a> Coded<'a> {
                     reader.read_row(memory).map_err(png_fault)?.ok_or(PictureFault::Truncated)?;
                     each(run, &memory[..pixels * bytes_per_pixel]);
                 }
-                // Past the last row the coded data is checked.
+                // Reading beyond the last row has the decoder check the end of the coded data.
                 reader.read_row(memory).map_err(png_fault)?;
-                // What follows may describe the picture; without it the pixels are none the worse.
+                // Metadata may follow the pixels; a fault in it is no reason to refuse them.
                 let _ = reader.finish();
                 Ok(Extras::of_png(reader.info()))
             }
@@ -144,11 +146,12 @@ impl<'a> Coded<'a> {
 
 /// Columns and rows, and the samples, of a PNG or JPEG. No more than its header is read.
 pub(super) fn header(path: &Path) -> Result<((u32, u32), Samples), PictureFault> {
-    let (file, format) = recognised(path)?;
+    let (file, format) = open_detected(path)?;
     let (size, samples) = match format {
         Some(Format::Png) => {
             let mut decoder = png_decoder(file)?;
             let info = decoder.read_header_info().map_err(png_fault)?;
+            // A palette is expanded to RGB.
             let channels = if info.color_type == png::ColorType::Indexed { 3 } else { info.color_type.samples() };
             (info.size(), Samples { channels, are_wide: info.bit_depth == png::BitDepth::Sixteen })
         }
@@ -161,23 +164,24 @@ pub(super) fn header(path: &Path) -> Result<((u32, u32), Samples), PictureFault>
 
 /// The content of a PFM.
 pub(super) fn read_pfm<'a>(path: &Path, memory: &'a mut Vec<u8>) -> Result<&'a [u8], PictureFault> {
-    match recognised(path)? {
+    match open_detected(path)? {
         (file, Some(Format::Pfm)) => read_from_start(file, MAX_PFM_BYTES, memory),
         _ => Err(PictureFault::Format("grey PFM")),
     }
 }
 
-/// What a PNG has before its pixels.
+/// Header and metadata that a PNG has before its pixels.
 pub(super) fn png_info(path: &Path) -> Result<png::Info<'static>, PictureFault> {
-    let (file, format) = recognised(path)?;
+    let (file, format) = open_detected(path)?;
     if format != Some(Format::Png) {
         return Err(PictureFault::Format("PNG"));
     }
     Ok(png_decoder(file)?.read_info().map_err(png_fault)?.info().clone())
 }
 
-/// Opens a regular file, from its beginning, and tells its format.
-fn recognised(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
+/// Opens a regular file and detects its format by its first bytes; `None` is one that is not read. The file is left at
+/// its start.
+fn open_detected(path: &Path) -> Result<(File, Option<Format>), PictureFault> {
     let mut file = input::open(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound | ErrorKind::NotADirectory => PictureFault::Missing,
         ErrorKind::InvalidInput => PictureFault::NotAFile,
@@ -224,7 +228,7 @@ fn png_decoder(file: File) -> Result<png::Decoder<BufReader<File>>, PictureFault
     let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), png::Limits { bytes: MAX_METADATA_BYTES });
     // Palettes and fewer than 8 bits become plain samples.
     decoder.set_transformations(png::Transformations::EXPAND);
-    // Before memory is taken for a row.
+    // Checked before memory is allocated for a row.
     let (width, height) = decoder.read_header_info().map_err(png_fault)?.size();
     check_size(width, height)?;
     Ok(decoder)

@@ -11,22 +11,23 @@ use crate::optics::StereoRig;
 
 /// A layout: how it is recognised, and how it is read.
 pub(super) struct Layout {
-    /// As it is called.
+    /// For users, such as `TUM RGB-D`.
     pub(super) name: &'static str,
-    /// What makes a folder one, for messages.
+    /// The files by which it is recognised, for messages.
     pub(super) looked_for: &'static str,
-    /// Whether the folder is one.
+    /// Whether the folder has this layout.
     pub(super) is_in: fn(&Path) -> bool,
     /// Reads what lists and calibrations there are.
     pub(super) open: fn(&Folder, &Options) -> Result<Contents, RecordingError>,
 }
 
-/// What a folder holds.
+/// What opening a layout yields.
 #[derive(Debug)]
 pub(super) struct Contents {
     pub(super) frames: Vec<Listed>,
     pub(super) depth: Option<DepthForm>,
     pub(super) pair: Option<Pair>,
+    /// How many disparities to search, from 0, where that is stated: a multiple of 16.
     pub(super) disparities: Option<u32>,
     pub(super) unpaired: Unpaired,
 }
@@ -44,7 +45,7 @@ pub(super) struct Listed {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum DepthForm {
     Units(DepthUnits),
-    /// Disparities in a PFM, as these eyes see them at the size of the colour pictures.
+    /// Disparities in a PFM; the rig is that of the colour pictures at their size.
     Disparity(StereoRig),
 }
 
@@ -67,9 +68,9 @@ pub(super) struct Place {
 /// A picture, and where it is named.
 #[derive(Clone, Debug)]
 pub(super) struct Source {
-    /// Nothing where the folder itself is the list.
+    /// `None` if no list names it: it was found in its folder.
     pub(super) place: Option<Place>,
-    /// Relative to the folder.
+    /// Relative to the folder of the recording. Only pictures with a `place` have a fault.
     pub(super) file: Result<PathBuf, LineFault>,
 }
 
@@ -79,7 +80,7 @@ impl Folder {
         let path = self.root.join(source.file(&self.dir)?);
         // A path that cannot be resolved cannot be read either, and reading says why.
         let path = path.canonicalize().unwrap_or(path);
-        if path.starts_with(&self.root) { Ok(path) } else { Err(source.wrong(&self.dir, PictureFault::Outside)) }
+        if path.starts_with(&self.root) { Ok(path) } else { Err(source.error(&self.dir, PictureFault::Outside)) }
     }
 }
 
@@ -97,8 +98,8 @@ impl Source {
         })
     }
 
-    /// The error that the picture has `fault`.
-    pub(super) fn wrong(&self, dir: &Path, fault: PictureFault) -> RecordingError {
+    /// The error for a picture that has `fault`, with the place where it is named.
+    pub(super) fn error(&self, dir: &Path, fault: PictureFault) -> RecordingError {
         let file = self.file.clone().unwrap_or_default();
         match self.place {
             Some(Place { list, line }) => RecordingError::Listed { list: dir.join(list), line, file, fault },
@@ -121,7 +122,7 @@ pub(super) fn numbered_pictures(folder: &Path) -> Result<Vec<String>, RecordingE
     let entries = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
     let entries: Vec<_> = entries.map_err(RecordingError::io("list", folder))?;
     let mut names: Vec<_> = entries.into_iter().filter_map(|name| name.into_string().ok()).filter(is_picture).collect();
-    // Numbers without leading zeros, too, come in their order.
+    // Shorter names first: numbers without leading zeros are in order, too.
     names.sort_unstable_by(|a, b| (a.len(), a).cmp(&(b.len(), b)));
     if names.is_empty() { Err(RecordingError::EmptyFolder { folder: folder.to_owned() }) } else { Ok(names) }
 }

@@ -1,4 +1,4 @@
-//! From PNG and JPEG files to pixels. The format is told by the content.
+//! From PNG and JPEG files to pixels. The format is recognised by the content.
 
 use std::path::Path;
 
@@ -13,10 +13,11 @@ use crate::frame::{ColorImage, DepthMap, GrayImage};
 /// Memory for decoding that is kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// A file that has to be read as a whole.
+    /// Content of a file that has to be read as a whole: a JPEG or PFM.
     file: Vec<u8>,
-    /// A row, or all rows where they come all at once.
+    /// A row of a PNG, or all rows of a JPEG.
     pixels: Vec<u8>,
+    /// A right picture before it becomes luma.
     right: ColorImage,
 }
 
@@ -27,9 +28,10 @@ impl Scratch {
     }
 }
 
-/// What depth is stored in.
+/// How depth is stored in 16-bit pictures.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DepthUnits {
+    /// Units per metre, > 0.
     pub(super) scale: f32,
     /// A value that means unknown, besides 0.
     pub(super) invalid: Option<u16>,
@@ -88,14 +90,15 @@ fn wide(pixel: &[u8], channel: usize) -> u16 {
     u16::from_be_bytes([pixel[2 * channel], pixel[2 * channel + 1]])
 }
 
-/// Decodes what a right eye saw to luma, just as that of a left one is made of its colour. A picture of another size
-/// than the `left` one is refused before it is decoded.
+/// Decodes a right picture to luma, computed from its colour as that of the left one. A picture of another size than
+/// the `left` one is refused before it is decoded.
 pub(super) fn right_luma(
     path: &Path,
     left: (u32, u32),
     scratch: &mut Scratch,
     into: &mut GrayImage,
 ) -> Result<(), PictureFault> {
+    // Moved out, since `color` needs the rest of the scratch memory.
     let mut right = std::mem::take(&mut scratch.right);
     let decoded = color(path, Some(left), scratch, &mut right);
     if decoded.is_ok() {
@@ -134,14 +137,15 @@ pub(super) fn depth(
         let pixels = into.metres[run.first..].iter_mut().step_by(run.step);
         for (metres, bytes) in pixels.zip(row.as_chunks().0) {
             let value = u16::from_be_bytes(*bytes);
-            let read = f32::from(value) / units.scale;
-            *metres = if Some(value) == units.invalid || !DepthMap::is_known(read) { 0.0 } else { read };
+            let depth_m = f32::from(value) / units.scale;
+            *metres = if Some(value) == units.invalid || !DepthMap::is_known(depth_m) { 0.0 } else { depth_m };
         }
     })?;
     Ok(())
 }
 
-/// Decodes to grey, 0 to 1 as stored (not linearised): the luma of a colour, and darker as it is more transparent.
+/// Decodes to columns, rows and grey values, 0 to 1 as stored (not linearised): luma for a colour picture, multiplied
+/// by the alpha if there is one.
 pub(super) fn grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
     let mut scratch = Scratch::default();
     let coded = Coded::open(path, &mut scratch.file)?;

@@ -19,12 +19,12 @@ pub(super) fn color_png(image: &ColorImage, file: &mut Vec<u8>) -> ImageResult<(
     photo_png(image, &Extras::default(), file)
 }
 
-/// The same, with what goes with the picture.
+/// Appends `image` to `file` as PNG, with its colour profile and EXIF.
 pub(super) fn photo_png(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>) -> ImageResult<()> {
     write_image(PngEncoder::new_with_quality(file, CompressionType::Fast, FILTER), image, extras)
 }
 
-/// Appends `image` to `file` as JPEG, with what goes with it.
+/// Appends `image` to `file` as JPEG, with its colour profile and EXIF.
 pub(super) fn photo_jpeg(image: &ColorImage, extras: &Extras, file: &mut Vec<u8>) -> ImageResult<()> {
     write_image(JpegEncoder::new_with_quality(file, JPEG_QUALITY), image, extras)
 }
@@ -39,32 +39,34 @@ fn write_image(mut encoder: impl ImageEncoder, image: &ColorImage, extras: &Extr
     encoder.write_image(&image.rgb, image.width, image.height, ExtendedColorType::Rgb8)
 }
 
-/// Appends `depth` to `file` as 16-bit grey PNG of `depth_scale` units per metre; `units` is working memory. With `says`
-/// the file says so.
+/// Appends `depth` to `file` as 16-bit grey PNG of `depth_scale` units per metre, with `meaning` as a text chunk if
+/// given; `units` is working memory.
 pub(super) fn depth_png(
     depth: &DepthMap,
     depth_scale: f32,
-    says: Option<Meaning>,
+    meaning: Option<Meaning>,
     units: &mut Vec<u8>,
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
-    wide_png(depth.size(), &depth.metres, depth_scale, says, units, file)
+    png_16bit(depth.size(), &depth.metres, depth_scale, meaning, units, file)
 }
 
-/// Appends `disparity` to `file` as 16-bit grey PNG of [`DISPARITY_SCALE`] units per pixel, which says so.
+/// Appends `disparity` to `file` as 16-bit grey PNG of [`DISPARITY_SCALE`] units per pixel, with `meaning` as a text
+/// chunk.
 pub(super) fn disparity_png(
     disparity: &DisparityMap,
-    says: Meaning,
+    meaning: Meaning,
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
-    wide_png(disparity.size(), &disparity.px, DISPARITY_SCALE, Some(says), &mut Vec::new(), file)
+    png_16bit(disparity.size(), &disparity.px, DISPARITY_SCALE, Some(meaning), &mut Vec::new(), file)
 }
 
-fn wide_png(
+/// Appends `values` (`height` x `width`, row-major) to `file` as 16-bit grey PNG of `scale` units per 1.0, 0 = unknown.
+fn png_16bit(
     (width, height): (u32, u32),
     values: &[f32],
     scale: f32,
-    says: Option<Meaning>,
+    meaning: Option<Meaning>,
     units: &mut Vec<u8>,
     file: &mut Vec<u8>,
 ) -> Result<(), png::EncodingError> {
@@ -75,7 +77,7 @@ fn wide_png(
     encoder.set_depth(png::BitDepth::Sixteen);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Paeth);
-    if let Some(meaning) = says {
+    if let Some(meaning) = meaning {
         encoder.add_text_chunk(unit::KEYWORD.to_owned(), meaning.text())?;
     }
     let mut writer = encoder.write_header()?;
@@ -87,13 +89,13 @@ fn wide_png(
 /// value; what is known and less than one unit stays known.
 fn in_units(value: f32, scale: f32) -> u16 {
     let units = (value * scale).round();
-    if DepthMap::is_known(value) && value <= most(scale) { units.clamp(1.0, MOST_UNITS) as u16 } else { 0 }
+    if DepthMap::is_known(value) && value <= largest(scale) { units.clamp(1.0, MOST_UNITS) as u16 } else { 0 }
 }
 
 const MOST_UNITS: f32 = u16::MAX as f32;
 
-/// The largest value that is written at `scale` units.
-pub(super) fn most(scale: f32) -> f32 {
+/// The largest value that is written at `scale` units per 1.0: one that still rounds to 65535.
+pub(super) fn largest(scale: f32) -> f32 {
     (MOST_UNITS + 0.499) / scale
 }
 

@@ -7,17 +7,17 @@ use super::fault::GeometryFault;
 use crate::files::input;
 use crate::optics::StereoRig;
 
-/// A difference of the two focal lengths, as a share of one, that rounding explains.
+/// Relative difference of the two focal lengths that is taken for rounding.
 const FOCAL_TOLERANCE: f64 = 1e-3;
 
 /// The geometry of a rectified pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
-    /// The eyes.
+    /// Focal length, baseline and difference of the principal points.
     pub rig: StereoRig,
-    /// Columns and rows of the pictures that the numbers belong to, where that is said.
+    /// Columns and rows of the pictures that it is for, where that is stated.
     pub size: Option<(u32, u32)>,
-    /// How many disparities there may be, from 0, where that is said: a multiple of 16.
+    /// How many disparities to search, from 0, where that is stated: a multiple of 16.
     pub disparities: Option<u32>,
 }
 
@@ -25,20 +25,21 @@ pub struct Geometry {
 pub(super) type Wrong = (Option<u32>, GeometryFault);
 
 impl Geometry {
-    /// Reads a file in one form.
+    /// Reads a calibration file in the format of `parse`.
     pub(super) fn read_as(file: &Path, parse: impl Fn(&str) -> Result<Self, Wrong>) -> Result<Self, RecordingError> {
         let text = input::read_text(file, input::MOST_CALIBRATION_BYTES)
             .map_err(RecordingError::io("read the calibration", file))?;
         parse(&text).map_err(|(line, fault)| RecordingError::Geometry { file: file.to_owned(), line, fault })
     }
 
-    /// The same, read from `file`, for pictures of `size`, which may be larger or smaller.
+    /// The geometry scaled to pictures of `size`, larger or smaller. `file` is where it is from, for the message.
     ///
     /// # Errors
     /// They are of another aspect.
     pub fn fitted(mut self, file: &Path, size: (u32, u32)) -> Result<Self, RecordingError> {
         let Some(of) = self.size.filter(|&of| of != size) else { return Ok(self) };
         let [width, height, of_width, of_height] = [size.0, size.1, of.0, of.1].map(u64::from);
+        // Cross-multiplied aspect ratios, equal within a pixel.
         if (width * of_height).abs_diff(height * of_width) > of_width.max(of_height).max(width).max(height) {
             let fault = GeometryFault::Size { of, pictures: size };
             return Err(RecordingError::Geometry { file: file.to_owned(), line: None, fault });
@@ -46,13 +47,14 @@ impl Geometry {
         let zoom = size.0 as f32 / of.0 as f32;
         self.rig.focal_px *= zoom;
         self.rig.doffs_px *= zoom;
-        self.disparities = self.disparities.map(|most| ((most as f32 * zoom).ceil() as u32).next_multiple_of(16));
+        self.disparities = self.disparities.map(|count| ((count as f32 * zoom).ceil() as u32).next_multiple_of(16));
         self.size = Some(size);
         Ok(self)
     }
 }
 
-/// Eyes of these focal lengths (left, right), the columns of whose principal points differ by `doffs_px`.
+/// A rectified rig of two focal lengths (left, right) and `doffs_px`, the column of the right principal point less that
+/// of the left one. Fails if the focal lengths differ or the baseline is not > 0.
 pub(super) fn rig(focal_px: [f64; 2], doffs_px: f64, baseline_m: f64) -> Result<StereoRig, GeometryFault> {
     let [left_px, right_px] = focal_px;
     if (left_px - right_px).abs() > FOCAL_TOLERANCE * left_px {
@@ -63,13 +65,15 @@ pub(super) fn rig(focal_px: [f64; 2], doffs_px: f64, baseline_m: f64) -> Result<
     }
     let rig =
         StereoRig { focal_px: left_px as f32, baseline_m: baseline_m as f32, doffs_px: doffs_px as f32, metric: true };
+    // As `f32`, a tiny baseline is 0.
     if rig.baseline_m > 0.0 { Ok(rig) } else { Err(GeometryFault::NoBaseline) }
 }
 
-/// The numbers in `text`, between white space, brackets, commas and semicolons; nothing where a word is no number.
+/// The `N` numbers in `text`, separated by white space, brackets, commas and semicolons. `None` if their count is
+/// another, or one is not a finite number.
 pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
-    let is_between = |c: char| c.is_whitespace() || matches!(c, '[' | ']' | ';' | ',');
-    let words = text.split(is_between).filter(|word| !word.is_empty());
+    let is_separator = |c: char| c.is_whitespace() || matches!(c, '[' | ']' | ';' | ',');
+    let words = text.split(is_separator).filter(|word| !word.is_empty());
     let numbers: Option<Vec<f64>> =
         words.map(|word| word.parse().ok().filter(|number: &f64| number.is_finite())).collect();
     numbers?.try_into().ok()

@@ -11,7 +11,8 @@ const MAX_SEGMENTS: usize = 1000;
 /// Bytes outside of segments that are passed over before the frame.
 const MAX_STRAY_BYTES: usize = 1 << 16;
 
-/// Columns and rows, and the samples, that the frame of a JPEG claims; `file` stands at its beginning.
+/// Reads size (columns, rows) and samples from the frame header (SOF segment) of a JPEG; no pixel is decoded. `file` is
+/// at its start.
 pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u32), Samples), PictureFault> {
     fn read<const N: usize>(file: &mut impl Read) -> Result<[u8; N], PictureFault> {
         let mut bytes = [0; N];
@@ -21,40 +22,43 @@ pub(super) fn header(file: &mut BufReader<impl Read + Seek>) -> Result<((u32, u3
         })?;
         Ok(bytes)
     }
-    let [mut high, mut marker] = read(file)?;
+    // A marker is FF and a code.
+    let [mut prefix, mut code] = read(file)?;
     let mut stray_bytes = 0;
     for _ in 0..MAX_SEGMENTS {
         // Any FF may pad a marker; other bytes between segments are passed over.
-        while high != 0xFF || matches!(marker, 0 | 0xFF) {
-            (high, [marker]) = (marker, read(file)?);
+        while prefix != 0xFF || matches!(code, 0 | 0xFF) {
+            (prefix, [code]) = (code, read(file)?);
             stray_bytes += 1;
             if stray_bytes > MAX_STRAY_BYTES {
                 return Err(PictureFault::Damaged("no frame where one should be".into()));
             }
         }
-        match marker {
-            // Neither a beginning nor a restart has a length.
+        match code {
+            // TEM, RSTn and SOI are markers alone, without a segment.
             0x01 | 0xD0..=0xD8 => {}
-            // A frame, and not one of the tables with numbers among those of frames.
-            0xC0..=0xCF if !matches!(marker, 0xC4 | 0xC8 | 0xCC) => {
+            // SOFn; DHT, JPG and DAC lie in the same range. Length and precision come before the size.
+            0xC0..=0xCF if !matches!(code, 0xC4 | 0xC8 | 0xCC) => {
                 let [_, _, _, y, y_low, x, x_low, components] = read(file)?;
                 let size = [[x, x_low], [y, y_low]].map(|bytes| u32::from(u16::from_be_bytes(bytes)));
-                // What has four channels is shown in three.
+                // CMYK is decoded to RGB.
                 let channels = if components == 1 { 1 } else { 3 };
                 return Ok((size.into(), Samples { channels, are_wide: false }));
             }
+            // EOI or SOS.
             0xD9 | 0xDA => return Err(PictureFault::Damaged("no frame before its data".into())),
             _ => {
+                // The length counts its own two bytes.
                 let length = i64::from(u16::from_be_bytes(read(file)?));
                 file.seek_relative((length - 2).max(0))?;
             }
         }
-        [high, marker] = read(file)?;
+        [prefix, code] = read(file)?;
     }
     Err(PictureFault::Damaged(format!("more than {MAX_SEGMENTS} segments before its frame")))
 }
 
-/// Whether the markers of a JPEG lead to its end marker.
+/// Whether following the segments of a JPEG leads to its end marker (EOI), which a file that was cut short lacks.
 pub(super) fn is_whole(bytes: &[u8]) -> bool {
     const START: u8 = 0xD8;
     const END: u8 = 0xD9;
@@ -69,7 +73,7 @@ pub(super) fn is_whole(bytes: &[u8]) -> bool {
         rest = match marker {
             END => return true,
             START | 0x01 => after,
-            // A segment says its length, so that what looks like a marker inside it is passed over.
+            // Skipped by its length: its content may look like markers.
             _ => {
                 let Some(&[high, low]) = after.first_chunk() else { return false };
                 let Some(next) = after.get(usize::from(u16::from_be_bytes([high, low]))..) else { return false };

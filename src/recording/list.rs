@@ -1,4 +1,4 @@
-//! Lists of pictures: which was taken when.
+//! Lists of pictures and their times: text files with one entry a line.
 
 use std::ops::RangeInclusive;
 use std::path::{Component, Path, PathBuf};
@@ -15,16 +15,16 @@ const MOST_ENTRIES: usize = 1_000_000;
 /// Faulty text is quoted in messages up to this length.
 const QUOTED_CHARS: usize = 40;
 
-/// A time and a file.
+/// A picture and its time.
 #[derive(Debug)]
 pub(super) struct Entry {
-    /// Nanoseconds; nothing where there is no time that can be used, and then `source` has the fault.
+    /// Nanoseconds; `None` if no usable time is known. If a line states a wrong one, `source` has the fault.
     pub(super) time_ns: Option<u64>,
     pub(super) source: Source,
 }
 
 impl Entry {
-    /// What a line says; without a time, it is faulty.
+    /// The entry of a line. A fault of its time takes the place of the file, since reading the file is what reports it.
     pub(super) fn new(place: Place, time_ns: Result<u64, LineFault>, file: Result<PathBuf, LineFault>) -> Self {
         match time_ns {
             Ok(time_ns) => Self { time_ns: Some(time_ns), source: Source { place: Some(place), file } },
@@ -33,7 +33,7 @@ impl Entry {
     }
 }
 
-/// Reads the list `list` in `dir`, each line of which `parse` understands.
+/// Reads the list `list` in `dir`; `parse` turns the place and text of a line into an entry.
 ///
 /// # Errors
 /// It cannot be read, has no line, or has more than [`MOST_ENTRIES`].
@@ -44,7 +44,7 @@ pub(super) fn read<T>(
 ) -> Result<Vec<T>, RecordingError> {
     let path = dir.join(list);
     let bytes = input::read(&path, input::MOST_TEXT_BYTES).map_err(RecordingError::io("read the list", &path))?;
-    // Each takes far more memory than its line takes on the disk.
+    // Counted before parsing: an entry takes far more memory than its line.
     if lines(&bytes).nth(MOST_ENTRIES).is_some() {
         return Err(RecordingError::LongList { list: path, most: MOST_ENTRIES });
     }
@@ -60,41 +60,42 @@ pub(super) fn refuse_faults<'a>(
     entries.try_for_each(|entry| entry.source.file(dir).map(|_| ()))
 }
 
-/// Takes the time from entries that break the order of times. As few as possible are given up: one wrong time far
-/// ahead does not cost all that follow it, and of equal times the first is kept.
-pub(super) fn give_up_disorder<'a>(entries: impl Iterator<Item = &'a mut Entry>) {
+/// Clears the times that break the increasing order or lie more than ten years from most others, and marks their
+/// entries as faulty. As few as possible are cleared: one wrong time far ahead does not cost all that follow it, and of
+/// equal times the first is kept.
+pub(super) fn clear_unordered_times<'a>(entries: impl Iterator<Item = &'a mut Entry>) {
     let entries: Vec<_> = entries.filter(|entry| entry.time_ns.is_some()).collect();
     let times: Vec<_> = entries.iter().filter_map(|entry| entry.time_ns).collect();
-    let is_kept = longest_increase(&times);
+    let is_kept = longest_increasing(&times);
     let kept: Vec<_> = times.iter().zip(&is_kept).filter(|(_, is_kept)| **is_kept).map(|(&time, _)| time).collect();
-    let age = most_of_an_age(&kept);
+    let range = busiest_range(&kept);
     for (entry, is_kept) in entries.into_iter().zip(is_kept) {
-        if is_kept && entry.time_ns.is_some_and(|time| age.contains(&time)) {
+        if is_kept && entry.time_ns.is_some_and(|time| range.contains(&time)) {
             continue;
         }
         entry.time_ns = None;
         match &entry.source.file {
             _ if !is_kept => entry.source.file = Err(LineFault::OutOfOrder),
             Ok(_) => entry.source.file = Err(LineFault::TooFar),
-            // What is wrong with the file says more.
+            // A fault that is known already says more.
             Err(_) => {}
         }
     }
 }
 
-/// From when to when the most of some increasing times lie that are no further apart than a recording is long.
-fn most_of_an_age(times: &[u64]) -> RangeInclusive<u64> {
-    let within = |&first_ns: &u64| first_ns..=first_ns.saturating_add(MOST_LENGTH_NS);
-    let count = |age: &RangeInclusive<u64>| {
-        times.partition_point(|time| time <= age.end()) - times.partition_point(|time| time < age.start())
+/// The range of [`MOST_LENGTH_NS`] that holds the most of some increasing times; of equally good ones the first.
+fn busiest_range(times: &[u64]) -> RangeInclusive<u64> {
+    let range_from = |&first_ns: &u64| first_ns..=first_ns.saturating_add(MOST_LENGTH_NS);
+    let count = |range: &RangeInclusive<u64>| {
+        times.partition_point(|time| time <= range.end()) - times.partition_point(|time| time < range.start())
     };
-    // Of equal ones the first.
-    times.iter().map(within).rev().max_by_key(count).unwrap_or(0..=0)
+    // `max_by_key` takes the last of equal ones.
+    times.iter().map(range_from).rev().max_by_key(count).unwrap_or(0..=0)
 }
 
 /// Marks a longest strictly increasing subsequence (patience sorting, from the end).
-fn longest_increase(times: &[u64]) -> Vec<bool> {
-    // heads[k] begins the run of k + 1 elements that leaves the most room before it.
+fn longest_increasing(times: &[u64]) -> Vec<bool> {
+    // heads[k]: of all increasing runs of k + 1 elements found so far, the first element of the one that starts latest.
     let mut heads: Vec<usize> = Vec::new();
     let mut next = vec![None; times.len()];
     for (index, &time) in times.iter().enumerate().rev() {
@@ -116,6 +117,7 @@ fn longest_increase(times: &[u64]) -> Vec<bool> {
 
 /// Numbers, from 1, and texts of the lines that are neither blank nor comments.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, LineFault>)> {
+    // Some editors begin UTF-8 with a byte order mark.
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let lines = (1..).zip(bytes.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii));
     lines
@@ -123,7 +125,7 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u32, Result<&str, Lin
         .map(|(line, text)| (line, str::from_utf8(text).map_err(|_| LineFault::NotUtf8)))
 }
 
-/// A file name that stays in its folder, as far as its text tells.
+/// The path of a file name that stays in its folder, as far as its text tells: links are resolved when it is opened.
 pub(super) fn inside(file: &str) -> Result<PathBuf, LineFault> {
     if file.contains(char::is_control) {
         return Err(LineFault::FileName(quoted(file)));
@@ -142,7 +144,7 @@ mod tests {
     use super::*;
 
     fn kept(times: &[u64]) -> Vec<u64> {
-        times.iter().zip(longest_increase(times)).filter(|(_, is_kept)| *is_kept).map(|(&time, _)| time).collect()
+        times.iter().zip(longest_increasing(times)).filter(|(_, is_kept)| *is_kept).map(|(&time, _)| time).collect()
     }
 
     #[test]
@@ -156,17 +158,17 @@ mod tests {
 
     #[test]
     fn a_date_of_another_age_costs_only_itself() {
-        assert_eq!(most_of_an_age(&[]), 0..=0);
-        assert_eq!(most_of_an_age(&[7, 8]), 7..=7 + MOST_LENGTH_NS);
+        assert_eq!(busiest_range(&[]), 0..=0);
+        assert_eq!(busiest_range(&[7, 8]), 7..=7 + MOST_LENGTH_NS);
         let now_ns = 5 * MOST_LENGTH_NS;
-        assert_eq!(most_of_an_age(&[0, now_ns, now_ns + 9, u64::MAX]), now_ns..=now_ns + MOST_LENGTH_NS);
-        assert_eq!(most_of_an_age(&[0, u64::MAX]), 0..=MOST_LENGTH_NS);
+        assert_eq!(busiest_range(&[0, now_ns, now_ns + 9, u64::MAX]), now_ns..=now_ns + MOST_LENGTH_NS);
+        assert_eq!(busiest_range(&[0, u64::MAX]), 0..=MOST_LENGTH_NS);
     }
 
     #[test]
     fn the_first_of_equal_times_is_kept() {
-        assert_eq!(longest_increase(&[1, 2, 2, 3]), [true, true, false, true]);
-        assert_eq!(longest_increase(&[4, 4, 4]), [true, false, false]);
+        assert_eq!(longest_increasing(&[1, 2, 2, 3]), [true, true, false, true]);
+        assert_eq!(longest_increasing(&[4, 4, 4]), [true, false, false]);
     }
 
     #[test]

@@ -43,8 +43,8 @@ use contents::{DepthForm, Folder, Layout, Source};
 /// The layouts that are read, in the order in which they are looked for.
 const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middlebury::LAYOUT];
 
-/// Pictures with more columns or rows are refused from their header, before memory is taken for them. Reading the largest
-/// takes at most four times the 192 MiB that its RGB has.
+/// Pictures with more columns or rows are refused by their header, before memory is allocated. Reading the largest
+/// takes at most four times the 192 MiB of its RGB.
 const MAX_SIDE_PX: u32 = 8192;
 
 /// How to read a recording.
@@ -68,7 +68,7 @@ impl Default for Options {
     }
 }
 
-/// What the lists name and no frame has, for want of a partner near enough in time.
+/// Listed pictures that belong to no frame, since no partner is near enough in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unpaired {
     /// Colour pictures.
@@ -79,14 +79,14 @@ pub struct Unpaired {
     pub right: usize,
 }
 
-/// How the two eyes of a recording stand.
+/// Stereo geometry of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pair {
     /// The pictures are rectified, and this is their geometry.
     Rectified(StereoRig),
     /// The pictures are as the cameras took them; with this they can be rectified.
     Raw(Box<StereoCalibration>),
-    /// The recording does not say.
+    /// The recording has no calibration.
     Unstated,
 }
 
@@ -195,12 +195,12 @@ impl Recording {
         self.depth.is_some()
     }
 
-    /// Whether the frames have a right eye, and how it stands.
+    /// The stereo geometry, if the frames have a right picture.
     pub fn pair(&self) -> Option<&Pair> {
         self.pair.as_ref()
     }
 
-    /// How many disparities there may be, from 0, where the recording says so: a multiple of 16.
+    /// How many disparities to search, from 0, where the recording says so: a multiple of 16.
     pub fn disparities(&self) -> Option<u32> {
         self.disparities
     }
@@ -220,7 +220,7 @@ impl Recording {
         let path = self.folder.locate(source)?;
         decode::color(&path, Some(self.size), scratch, into)
             .map(drop)
-            .map_err(|fault| source.wrong(&self.folder.dir, fault))
+            .map_err(|fault| source.error(&self.folder.dir, fault))
     }
 
     /// Reads the depth of frame `index` in metres, 0 = unknown, into `into`. It covers the view of the colour picture
@@ -239,10 +239,10 @@ impl Recording {
             DepthForm::Units(units) => decode::depth(&path, *units, Some(self.size), scratch, into),
             DepthForm::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, self.size, scratch, into),
         };
-        read.map_err(|fault| source.wrong(&self.folder.dir, fault))
+        read.map_err(|fault| source.error(&self.folder.dir, fault))
     }
 
-    /// Reads what the right eye saw of frame `index`, of [`Recording::size`], as luma into `into`.
+    /// Reads the right picture of frame `index`, of [`Recording::size`], as luma into `into`.
     ///
     /// # Errors
     /// As [`Recording::read_color`]; also where the recording has one eye only.
@@ -253,7 +253,7 @@ impl Recording {
         // Without a right picture, the line of the left one is at fault.
         let source = frame.right.as_ref().unwrap_or(&frame.color);
         let path = self.folder.locate(source)?;
-        decode::right_luma(&path, self.size, scratch, into).map_err(|fault| source.wrong(&self.folder.dir, fault))
+        decode::right_luma(&path, self.size, scratch, into).map_err(|fault| source.error(&self.folder.dir, fault))
     }
 
     fn frame(&self, index: usize) -> Result<&Frame, RecordingError> {
@@ -261,7 +261,7 @@ impl Recording {
     }
 }
 
-/// What makes a folder a recording, in all layouts.
+/// The files that make a folder a recording, for each layout: for messages.
 fn looked_for() -> String {
     LAYOUTS.map(|layout| format!("{} ({})", layout.looked_for, layout.name)).join(", ")
 }
@@ -269,13 +269,14 @@ fn looked_for() -> String {
 /// The size of the first colour picture that has a readable header; if none has, what is wrong with the first.
 fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> Result<(u32, u32), RecordingError> {
     let mut first_error = None;
+    // A list may name one unreadable file many times: it is opened once.
     let mut unreadable = HashSet::new();
     for source in colors {
         let size = folder.locate(source).and_then(|path| {
             if unreadable.contains(&path) {
                 return Ok(None);
             }
-            let header = decode::header(&path).map_err(|fault| source.wrong(&folder.dir, fault));
+            let header = decode::header(&path).map_err(|fault| source.error(&folder.dir, fault));
             unreadable.insert(path);
             header.map(|(size, _)| Some(size))
         });
@@ -292,6 +293,7 @@ fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> 
 fn depth_covers(depth: (u32, u32), color: (u32, u32)) -> bool {
     let (depth_width, depth_height) = (u64::from(depth.0), u64::from(depth.1));
     let (width, height) = (u64::from(color.0), u64::from(color.1));
+    // Cross-multiplied aspect ratios: one pixel of the depth map changes them by at most the longer colour side.
     let skew = (depth_width * height).abs_diff(depth_height * width);
     (1..=width).contains(&depth_width) && (1..=height).contains(&depth_height) && skew <= width.max(height)
 }

@@ -1,4 +1,4 @@
-//! Pairing by nearest time.
+//! Pairing of two lists of pictures by nearest time.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -6,6 +6,7 @@ use std::collections::BinaryHeap;
 use super::contents::Source;
 use super::list::Entry;
 
+/// The list that a time is from, and its index there.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Stream {
     Color(usize),
@@ -14,7 +15,7 @@ enum Stream {
 
 /// Entries with their partners.
 pub(super) struct Paired {
-    /// Those that have a partner, and faulty ones, to be counted where they are read.
+    /// Those that have a partner, and those without a time, which stay as frames that fail to read.
     pub(super) frames: Vec<(Entry, Option<Source>)>,
     /// How many of the first list were left over.
     pub(super) left_over: usize,
@@ -22,12 +23,13 @@ pub(super) struct Paired {
     pub(super) others_left_over: usize,
 }
 
-/// Pairs two lists by [`nearest`] time.
+/// Pairs two lists by [`nearest`] time. Entries with a time and without a partner are counted and left out.
 pub(super) fn join(entries: Vec<Entry>, others: Vec<Entry>, tolerance_ns: u64) -> Paired {
     let times = |entries: &[Entry]| entries.iter().filter_map(|entry| entry.time_ns).collect::<Vec<_>>();
     let mut partners = nearest(&times(&entries), &times(&others), tolerance_ns).into_iter();
 
     let mut paired = Paired { frames: Vec::new(), left_over: 0, others_left_over: others.len() };
+    // `nearest` counts only entries with a time.
     let mut timed: Vec<_> =
         others.into_iter().filter(|other| other.time_ns.is_some()).map(|other| Some(other.source)).collect();
     for entry in entries {
@@ -56,7 +58,7 @@ fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<
     let mut merged: Vec<_> = colors.chain(depths).collect();
     merged.sort_unstable();
 
-    // Neighbours among those not yet paired; the ends point beyond the list.
+    // A linked list of those not yet paired; its ends point beyond `merged`.
     let len = merged.len();
     let mut before: Vec<usize> = (0..len).map(|at| at.wrapping_sub(1)).collect();
     let mut after: Vec<usize> = (1..=len).collect();
@@ -83,6 +85,7 @@ fn nearest(color_ns: &[u64], depth_ns: &[u64], tolerance_ns: u64) -> Vec<Option<
         }
         partners[color] = Some(depth);
         (is_paired[left], is_paired[right]) = (true, true);
+        // The neighbours on either side of the pair become neighbours of each other.
         let (outer_left, outer_right) = (before[left], after[right]);
         if let Some(next) = after.get_mut(outer_left) {
             *next = outer_right;

@@ -16,15 +16,16 @@ pub(super) fn is_named(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pfm"))
 }
 
-/// Reads metres, or what else the file says that it holds; what is unknown becomes 0.
+/// Reads the values as stored, unknown ones as 0, and their meaning where the file states it (else the caller decides).
 pub(super) fn read(path: &Path) -> Result<(DepthMap, Option<Meaning>), PictureFault> {
     let mut map = DepthMap::default();
-    let ((width, height), says) = parse(Scratch::default().read_pfm(path)?, &mut map.metres)?;
+    let ((width, height), meaning) = parse(Scratch::default().read_pfm(path)?, &mut map.metres)?;
     (map.width, map.height) = (width, height);
-    Ok((map, says))
+    Ok((map, meaning))
 }
 
-/// Reads disparities that `rig` turns into metres. They cover a colour picture of `color` pixels, for which `rig` is.
+/// Reads disparities and converts them to metres. `rig` is for the colour picture of `color` pixels (columns, rows),
+/// whose view the disparity map must cover.
 pub(super) fn read_disparity_as_depth(
     path: &Path,
     rig: &StereoRig,
@@ -37,6 +38,7 @@ pub(super) fn read_disparity_as_depth(
         return Err(PictureFault::DepthSize { found, color });
     }
     (into.width, into.height) = found;
+    // The map's disparities are in its own pixels, and the rig is in those of the colour picture.
     let zoom = color.0 as f32 / found.0 as f32;
     for value in &mut into.metres {
         *value = if DepthMap::is_known(*value) { rig.depth_m(*value * zoom) } else { 0.0 };
@@ -44,7 +46,8 @@ pub(super) fn read_disparity_as_depth(
     Ok(())
 }
 
-/// Columns and rows, what the file says that it holds, and the values, top row first; what is unknown becomes 0.
+/// Parses a PFM into `values`, top row first, unknown ones as 0. Gives columns and rows, and the meaning if the file
+/// states it.
 fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Meaning>), PictureFault> {
     let mut rest = bytes;
     let magic = word(&mut rest)?;
@@ -59,8 +62,8 @@ fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Mean
     let height = number(word(&mut rest)?)?;
     check_size(width, height)?;
     // Only the sign is used: negative means that the low byte comes first.
-    let written = word(&mut rest)?;
-    let scale: f32 = number(written)?;
+    let scale_text = word(&mut rest)?;
+    let scale: f32 = number(scale_text)?;
     let row_bytes = width as usize * 4;
     let data = rest.get(..row_bytes * height as usize).ok_or(PictureFault::Truncated)?;
 
@@ -69,7 +72,7 @@ fn parse(bytes: &[u8], values: &mut Vec<f32>) -> Result<((u32, u32), Option<Mean
     let read = rows.flat_map(|row| row.as_chunks().0).map(|&bytes| from_bytes(bytes));
     values.clear();
     values.extend(read.map(|value| if DepthMap::is_known(value) { value } else { 0.0 }));
-    Ok(((width, height), Meaning::of_pfm_scale(written)))
+    Ok(((width, height), Meaning::of_pfm_scale(scale_text)))
 }
 
 /// The next word of the header. Exactly one white space ends it, since pixels may follow.
@@ -86,10 +89,10 @@ fn number<T: std::str::FromStr>(word: &str) -> Result<T, PictureFault> {
     word.parse().map_err(|_| PictureFault::Damaged(format!("{short:?} in its header is not a number")))
 }
 
-/// Appends `values` (`height` x `width`, row-major), which mean what it says, to `file`.
-pub(super) fn write(width: u32, height: u32, values: &[f32], says: Meaning, file: &mut Vec<u8>) {
+/// Appends `values` (`height` x `width`, row-major) to `file` as a little-endian PFM that states their `meaning`.
+pub(super) fn write(width: u32, height: u32, values: &[f32], meaning: Meaning, file: &mut Vec<u8>) {
     // Writing to memory does not fail.
-    let _ = write!(file, "Pf\n{width} {height}\n{}\n", says.pfm_scale());
+    let _ = write!(file, "Pf\n{width} {height}\n{}\n", meaning.pfm_scale());
     for row in values.chunks_exact(width.max(1) as usize).rev() {
         file.extend(row.iter().flat_map(|value| value.to_le_bytes()));
     }

@@ -1,6 +1,6 @@
-//! What pixels are stored in.
+//! How the pixels of a picture file are stored.
 
-/// What a pixel is stored in.
+/// Channels and bit depth of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Samples {
     /// 1 is grey, 3 colour; one more is transparency.

@@ -1,7 +1,7 @@
-//! Snapshots: a blurred picture that says how it was made, and what it was made of beside it.
+//! Snapshots: a blurred picture with its settings inside, and beside it the files that it was made from.
 //!
-//! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`. `NAME-color.png` is the picture
-//! before the blur, `NAME-depth.pfm` its depth as the blur had it, in metres.
+//! `NAME.png` holds the settings as a text (keyword [`KEYWORD`]) of lines `--flag=value`. `NAME-color.png` is the
+//! picture before the blur, `NAME-depth.pfm` its depth as the blur had it, in metres.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -65,11 +65,11 @@ fn write(path: &Path, snapshot: &Snapshot, png: &[u8]) -> Result<(), RecordingEr
         return Err(RecordingError::Exists { path: taken.to_owned() });
     }
     write_color(&color, snapshot.color, false)?;
-    // Nothing is replaced, so what was written is ours; others may write here at the same time.
-    let mut own = vec![&color];
+    // Only these are removed on failure: another process may write files of the same names.
+    let mut written_files = vec![&color];
     let depth_written = snapshot.depth.map_or(Ok(()), |map| {
         write_depth(&depth, map, 1.0, false)?;
-        own.push(&depth);
+        written_files.push(&depth);
         Ok(())
     });
     let written = depth_written.and_then(|()| {
@@ -79,18 +79,17 @@ fn write(path: &Path, snapshot: &Snapshot, png: &[u8]) -> Result<(), RecordingEr
         })
     });
     if written.is_err() {
-        // The first failure is the one to tell.
-        own.into_iter().for_each(|file| drop(fs::remove_file(file)));
+        // The first failure is the one to report.
+        written_files.into_iter().for_each(|file| drop(fs::remove_file(file)));
     }
     written
 }
 
-/// What follows the name of the picture in those of the files beside it.
+/// What the names of the files beside a snapshot have in place of `.png`.
 const COLOR: &str = "-color.png";
 const DEPTH: &str = "-depth.pfm";
 
-/// The picture before the blur and its depth, as they are called beside the snapshot `path`. The depth need not be
-/// there.
+/// Paths of the files beside the snapshot `path`: the picture before the blur, and its depth, which need not exist.
 pub fn sources(path: &Path) -> (PathBuf, PathBuf) {
     (beside(path, COLOR), beside(path, DEPTH))
 }
@@ -109,6 +108,7 @@ pub fn settings(path: &Path) -> Result<Vec<(String, String)>, RecordingError> {
     text(path).and_then(|text| parse(&text)).map_err(RecordingError::picture(path))
 }
 
+/// Names and values of the lines `--name=value`.
 fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
     let setting = |line: &str| {
         let (name, value) = line.strip_prefix("--")?.split_once('=')?;
@@ -121,14 +121,14 @@ fn parse(text: &str) -> Result<Vec<(String, String)>, PictureFault> {
     text.lines().filter(|line| !line.trim().is_empty()).map(parsed).collect()
 }
 
-/// The text under our keyword.
+/// The settings in a PNG as text.
 fn text(path: &Path) -> Result<String, PictureFault> {
     let info = coded::png_info(path)?;
     let fault = coded::png_fault;
     if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == KEYWORD) {
         return chunk.get_text().map_err(fault);
     }
-    // As other programs write it anew.
+    // Programs that save the file again may store the text in another kind of chunk.
     let plain = info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD);
     let packed = info.compressed_latin1_text.iter().find(|chunk| chunk.keyword == KEYWORD);
     match (plain, packed) {
@@ -138,6 +138,7 @@ fn text(path: &Path) -> Result<String, PictureFault> {
     }
 }
 
+/// Appends the blurred picture to `file` as PNG, with the settings as text.
 fn encode(snapshot: &Snapshot, file: &mut Vec<u8>) -> Result<(), png::EncodingError> {
     let lines = snapshot.settings.iter().map(|(name, value)| format!("--{name}={value}\n"));
     let mut encoder = png::Encoder::new(file, snapshot.picture.width, snapshot.picture.height);

@@ -1,30 +1,31 @@
-//! When the frames of a recording are due.
+//! Times and period of the frames of a recording.
 
-/// Taken where a recording does not tell: 30 frames per second.
+/// The period of recordings with fewer than two known times: 30 frames per second.
 const DEFAULT_PERIOD_NS: u64 = 33_333_333;
 
-/// Ten years. No recording is longer, so that what is reckoned with its times and periods stays far from the end of
-/// the numbers.
+/// Ten years, the longest that a recording may be: keeps arithmetic with times and periods far from overflow.
 pub(super) const MOST_LENGTH_NS: u64 = 10 * 366 * 24 * 3600 * 1_000_000_000;
 
-/// Median distance of strictly increasing times.
+/// Median distance of strictly increasing times; [`DEFAULT_PERIOD_NS`] if there are fewer than two.
 pub(super) fn median_period_ns(times_ns: impl Iterator<Item = u64> + Clone) -> u64 {
     let mut periods_ns: Vec<u64> = times_ns.clone().skip(1).zip(times_ns).map(|(next, time)| next - time).collect();
     let middle = periods_ns.len() / 2;
     if periods_ns.is_empty() { DEFAULT_PERIOD_NS } else { *periods_ns.select_nth_unstable(middle).1 }
 }
 
-/// A time for every frame, in nanoseconds after the first, strictly increasing, hardly beyond [`MOST_LENGTH_NS`]. Frames whose time is unknown are
-/// spread evenly between their neighbours, or follow one period apart at the ends. The known times increase strictly.
+/// A time for every frame, in nanoseconds after the first, strictly increasing, hardly beyond [`MOST_LENGTH_NS`].
+/// Frames whose time is unknown are spread evenly between their neighbours, or follow one period apart at the ends. The
+/// known times increase strictly.
 pub(super) fn fill(times_ns: &[Option<u64>]) -> Vec<u64> {
     let known: Vec<(usize, u64)> =
         times_ns.iter().enumerate().filter_map(|(index, &time)| Some((index, time?))).collect();
     let period_ns = i128::from(median_period_ns(known.iter().map(|&(_, time)| time)));
     let estimate_ns = |index: usize| {
-        let at = |(known, time): (usize, u64)| (i128::from(time), index as i128 - known as i128);
+        // The time of a known frame, and how many frames after it this one is.
+        let anchor = |(known, time): (usize, u64)| (i128::from(time), index as i128 - known as i128);
         let next = known.partition_point(|&(known, _)| known < index);
-        let before = next.checked_sub(1).map(|last| at(known[last]));
-        match (before, known.get(next).copied().map(at)) {
+        let before = next.checked_sub(1).map(|last| anchor(known[last]));
+        match (before, known.get(next).copied().map(anchor)) {
             (Some((time, offset)), Some((next_time, next_offset))) => {
                 time + (next_time - time) * offset / (offset - next_offset)
             }
@@ -33,13 +34,13 @@ pub(super) fn fill(times_ns: &[Option<u64>]) -> Vec<u64> {
         }
     };
     let start_ns = estimate_ns(0);
-    let mut least_ns = 0;
+    let mut earliest_ns = 0;
     (0..times_ns.len())
         .map(|index| {
             let time_ns = u64::try_from(estimate_ns(index) - start_ns).unwrap_or(u64::MAX);
             // More frames than nanoseconds between two times push the later ones on.
-            let time_ns = time_ns.min(MOST_LENGTH_NS).max(least_ns);
-            least_ns = time_ns + 1;
+            let time_ns = time_ns.min(MOST_LENGTH_NS).max(earliest_ns);
+            earliest_ns = time_ns + 1;
             time_ns
         })
         .collect()

@@ -1,5 +1,5 @@
-//! What the numbers of a map file mean, as far as the file says. Ours do, in ways that leave others able to read them: a PNG
-//! by a text (keyword [`KEYWORD`]), a PFM by how the number 1 of its scale is written.
+//! Whether a map file holds depth or disparity, and in which unit. Our files say so where other programs ignore it: a
+//! PNG in a text chunk (keyword [`KEYWORD`]), a PFM by the spelling of its scale, whose value is always 1.
 
 use crate::optics::StereoRig;
 
@@ -9,7 +9,7 @@ pub const DISPARITY_SCALE: f32 = 256.0;
 /// The keyword of the text in a PNG.
 pub(super) const KEYWORD: &str = "bokehcam map";
 
-/// What is in a map.
+/// Quantity and unit of the values in a map file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Meaning {
     Depth {
@@ -18,13 +18,13 @@ pub(super) enum Meaning {
     },
     /// Disparity in pixels of the map.
     Disparity {
-        /// The eyes that see it, where they are known.
+        /// The stereo rig that measured it, where it is known.
         rig: Option<StereoRig>,
     },
 }
 
 impl Meaning {
-    /// The text of a PNG.
+    /// The text for a PNG. A rig that is only assumed is left out: its distances are not real.
     pub(super) fn text(&self) -> String {
         match self {
             Self::Depth { per_m } => format!("depth units_per_metre={per_m}"),
@@ -36,7 +36,7 @@ impl Meaning {
         }
     }
 
-    /// The text read; nothing where it says nothing that can be.
+    /// Parses the text of a PNG; `None` if it is not one of ours, or has values that are impossible.
     pub(super) fn of_text(text: &str) -> Option<Self> {
         let mut words = text.split_ascii_whitespace();
         let kind = words.next()?;
@@ -62,7 +62,8 @@ impl Meaning {
         }
     }
 
-    /// The scale of a PFM: low byte first, and 1, since some readers multiply by it.
+    /// The scale of a PFM. Its value is -1: negative for little-endian, and 1 since some readers multiply by it. Only
+    /// the spelling tells the kinds apart.
     pub(super) fn pfm_scale(&self) -> &'static str {
         match self {
             Self::Depth { .. } => "-1000e-3",
@@ -70,9 +71,10 @@ impl Meaning {
         }
     }
 
-    /// What the scale of a PFM says, if it is one of ours. It has no room for the eyes.
+    /// The meaning of a PFM whose scale is spelled as ours. There is no room in it for a rig.
     pub(super) fn of_pfm_scale(scale: &str) -> Option<Self> {
-        [Self::Depth { per_m: 1.0 }, Self::Disparity { rig: None }].into_iter().find(|own| own.pfm_scale() == scale)
+        let meanings = [Self::Depth { per_m: 1.0 }, Self::Disparity { rig: None }];
+        meanings.into_iter().find(|meaning| meaning.pfm_scale() == scale)
     }
 }
 

@@ -3,18 +3,19 @@
 use super::ray::{Bounds, Ray};
 use super::shape::Shape;
 
-/// The shapes of one part, in an order that the tree's leaves are ranges of.
+/// A bounding volume hierarchy over the shapes of one part, whose leaves are ranges of `order`.
 #[derive(Clone, Debug, Default)]
 pub struct Bvh {
     nodes: Vec<Node>,
-    /// Index of the shape at each place of the order.
+    /// Indices of the shapes.
     order: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: Bounds,
-    /// First place in `order` of a leaf; index of the second child of an inner node, the first being the next node.
+    /// Where a leaf begins in `order`. For an inner node, the index of its second child; the first one is the next
+    /// node.
     first: u32,
     /// Shapes in a leaf; 0 for an inner node.
     count: u32,
@@ -22,7 +23,9 @@ struct Node {
     axis: usize,
 }
 
-const LEAF: usize = 3;
+/// Nodes of at most this many shapes are leaves.
+const LEAF_SHAPES: usize = 3;
+/// Slices of equal width between which a node may be split.
 const BUCKETS: usize = 12;
 
 impl Bvh {
@@ -41,10 +44,12 @@ impl Bvh {
         self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
     }
 
+    /// Adds the nodes for `order[start..end]`, and reorders that range by them. Splits along the longest axis, where the
+    /// surface area heuristic (sum of area times number of shapes of both sides) is least.
     fn split(&mut self, boxes: &[Bounds], start: usize, end: usize) {
-        let of = |place: &u32| boxes[*place as usize];
-        let bounds = self.order[start..end].iter().map(of).fold(Bounds::EMPTY, Bounds::join);
-        let centres = self.order[start..end].iter().map(of).fold(Bounds::EMPTY, |all, b| {
+        let box_of = |shape: &u32| boxes[*shape as usize];
+        let bounds = self.order[start..end].iter().map(box_of).fold(Bounds::EMPTY, Bounds::join);
+        let centres = self.order[start..end].iter().map(box_of).fold(Bounds::EMPTY, |all, b| {
             let c = b.centre();
             all.join(Bounds { low: c, high: c })
         });
@@ -58,15 +63,15 @@ impl Bvh {
         };
         let index = self.nodes.len();
         self.nodes.push(Node { bounds, first: start as u32, count: (end - start) as u32, axis });
-        if end - start <= LEAF || extent[axis] <= 0.0 {
+        if end - start <= LEAF_SHAPES || extent[axis] <= 0.0 {
             return;
         }
         let bucket = |b: &Bounds| {
             (((b.centre()[axis] - centres.low[axis]) / extent[axis] * BUCKETS as f32) as usize).min(BUCKETS - 1)
         };
         let mut filled = [(Bounds::EMPTY, 0usize); BUCKETS];
-        for place in &self.order[start..end] {
-            let b = of(place);
+        for shape in &self.order[start..end] {
+            let b = box_of(shape);
             let slot = &mut filled[bucket(&b)];
             *slot = (slot.0.join(b), slot.1 + 1);
         }
@@ -76,8 +81,9 @@ impl Bvh {
         };
         let cost_at = |at: usize| cost(&filled[..at]) + cost(&filled[at..]);
         let Some(at) = (1..BUCKETS).min_by(|a, b| cost_at(*a).total_cmp(&cost_at(*b))) else { return };
-        self.order[start..end].sort_by_key(|place| bucket(&of(place)));
+        self.order[start..end].sort_by_key(|shape| bucket(&box_of(shape)));
         let middle = start + filled[..at].iter().map(|s| s.1).sum::<usize>();
+        // An inner node from here on: its first child comes right after it.
         self.nodes[index].count = 0;
         self.split(boxes, start, middle);
         self.nodes[index].first = self.nodes.len() as u32;
@@ -98,9 +104,9 @@ impl Bvh {
                 continue;
             }
             if node.count > 0 {
-                for place in &self.order[node.first as usize..(node.first + node.count) as usize] {
-                    if let Some(t) = shapes[*place as usize].intersect(ray, t_max) {
-                        (t_max, found) = (t, Some((t, *place)));
+                for shape in &self.order[node.first as usize..(node.first + node.count) as usize] {
+                    if let Some(t) = shapes[*shape as usize].intersect(ray, t_max) {
+                        (t_max, found) = (t, Some((t, *shape)));
                     }
                 }
             } else {

@@ -1,4 +1,4 @@
-//! A distance function sampled once: what walks through it many times reads it instead of computing it.
+//! A signed distance function sampled on a grid, which is faster to read many times than the function is to compute.
 
 use glam::{UVec3, Vec3};
 
@@ -36,7 +36,7 @@ impl Grid {
         self.cell_m
     }
 
-    /// About the distance at `p` in metres: off by less than a cell.
+    /// The distance at `p` in metres, interpolated: off by less than a cell. Outside, the way to the grid is added.
     #[inline]
     pub fn gap_m(&self, p: Vec3) -> f32 {
         let inside = p.clamp(self.bounds.low, self.bounds.high);

@@ -16,7 +16,7 @@ pub struct Light {
     pub power: Vec3,
     /// Radius of the lamp over its distance: how soft its shadows are.
     pub softness: f32,
-    /// Within this distance, in metres, a part's own form throws its shadow on the part.
+    /// Parts cast shadows on themselves only if the light is nearer than this, in metres.
     pub casts_within_m: f32,
 }
 
@@ -63,12 +63,13 @@ pub struct Form<'a> {
     pub normal: Vec3,
 }
 
-/// Light that contributes less than this is not worth a shadow.
+/// Light that contributes less than this (1 = white) gets no shadow: it would not be seen.
 const FAINT: f32 = 0.03;
 /// Balls further away than this shade nothing, in metres.
 const SHADE_REACH_M: f32 = 0.7;
 
-/// The radiance towards the eye.
+/// The radiance that the point sends to the eye: reflected lamps and ambient light, and its own emission. `form` is
+/// that of its part, which hides light from itself.
 pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>) -> Vec3 {
     let surface = &lit.surface;
     let near = |s: &Shade| s.part != lit.part && s.centre.distance_squared(lit.p) < SHADE_REACH_M * SHADE_REACH_M;
@@ -84,18 +85,20 @@ pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>)
         let to_light = light.position - lit.p;
         let distance_m = to_light.length();
         let direction = to_light / distance_m;
+        // No brighter than at 10 cm.
         let strength = light.power / (distance_m * distance_m).max(0.01);
         let (lambert, lobe) = reflection(surface, direction, lit.to_eye);
         if (lambert + lobe) * strength.max_element() <= 0.0 {
             continue;
         }
+        // Cavities that only the paint knows of hide some of each lamp, too.
         let mut seen = 0.4 + 0.6 * surface.open;
         if lambert.max(lobe) * strength.max_element() > FAINT {
             if shaded {
-                seen *= shades_pass(lit, direction, distance_m, light.softness);
+                seen *= shades_visibility(lit, direction, distance_m, light.softness);
             }
             if let (true, Some(f)) = (distance_m < light.casts_within_m && seen > 0.01, form) {
-                seen *= form_passes(&f, (f.to_local)(direction), distance_m, light.softness);
+                seen *= form_visibility(&f, (f.to_local)(direction), distance_m, light.softness);
             }
         }
         diffuse += strength * (lambert * seen);
@@ -104,12 +107,12 @@ pub fn shine(lit: &Lit, lights: &[Light], ambient: &Ambient, form: Option<Form>)
     surface.albedo * diffuse + highlight + surface.emission
 }
 
-/// The shares of a lamp's light that are scattered and mirrored to the eye.
+/// The shares of a lamp's light that are reflected to the eye diffusely, and in the highlight (Blinn and Phong's).
 fn reflection(surface: &Surface, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
     let half = (to_light + to_eye).normalize_or_zero();
     let facing = surface.normal.dot(to_light);
     if surface.fibre != Vec3::ZERO {
-        // Kajiya and Kay's thread: bright across, dark along.
+        // Kajiya and Kay's model of hair: bright across the fibre, dark along.
         let across = |v: Vec3| (1.0 - surface.fibre.dot(v).powi(2)).max(0.0).sqrt();
         let around = ((facing + 0.6) / 1.6).clamp(0.0, 1.0);
         return (across(to_light) * around, surface.gloss * across(half).powf(surface.shine) * around);
@@ -119,13 +122,15 @@ fn reflection(surface: &Surface, to_light: Vec3, to_eye: Vec3) -> (f32, f32) {
         return (lambert, 0.0);
     }
     let lobe = surface.normal.dot(half).max(0.0).powf(surface.shine);
+    // Stronger at grazing angles, as by Fresnel; it fades in where the surface begins to face the lamp.
     let edge = 1.0 + 3.0 * (1.0 - half.dot(to_eye).max(0.0)).powi(5);
     (lambert, surface.gloss * lobe * edge * facing.min(0.25) * 4.0)
 }
 
-/// How much of the surroundings the part's own form leaves open.
+/// How much of the surroundings the part's own form leaves open, 0 to 1: ambient occlusion by how much smaller the
+/// distances along the normal are than the way there.
 fn openness(form: &Form) -> f32 {
-    // What is finer than the grid it cannot tell: taps start at one and a half cells.
+    // Cells along the normal, and weights. The grid has no detail finer than a cell: they start at one and a half.
     let taps = [(1.5, 1.0), (4.0, 0.7), (10.0, 0.45), (24.0, 0.28)].map(|(n, weight)| (n * form.grid.cell_m(), weight));
     let (mut hidden, mut total) = (0.0, 0.0);
     for (reach_m, weight) in taps {
@@ -136,8 +141,8 @@ fn openness(form: &Form) -> f32 {
     (1.0 - 1.15 * hidden / total).max(0.0)
 }
 
-/// The share of a lamp that is seen past the part's own form, after Quilez's soft shadows.
-fn form_passes(form: &Form, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
+/// The share of a lamp that is seen past the part's own form, 0 to 1, after Quilez's soft shadows.
+fn form_visibility(form: &Form, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
     let reach_m = distance_m.min(1.2);
     let cell_m = form.grid.cell_m();
     let start = form.p + 0.7 * cell_m * form.normal;
@@ -156,8 +161,8 @@ fn form_passes(form: &Form, direction: Vec3, distance_m: f32, softness: f32) -> 
     smooth(seen)
 }
 
-/// The share of a lamp that is seen past the balls.
-fn shades_pass(lit: &Lit, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
+/// The share of a lamp that is seen past the [`Shade`]s of other parts, 0 to 1.
+fn shades_visibility(lit: &Lit, direction: Vec3, distance_m: f32, softness: f32) -> f32 {
     let mut seen = 1.0;
     for shade in lit.shades.iter().filter(|s| s.part != lit.part) {
         let to_shade = shade.centre - lit.p;
@@ -171,7 +176,7 @@ fn shades_pass(lit: &Lit, direction: Vec3, distance_m: f32, softness: f32) -> f3
     seen
 }
 
-/// How much of the surroundings the balls leave open.
+/// How much of the surroundings the [`Shade`]s of other parts leave open, 0 to 1.
 fn shades_openness(lit: &Lit) -> f32 {
     let mut open = 1.0;
     for shade in lit.shades.iter().filter(|s| s.part != lit.part) {
@@ -183,6 +188,7 @@ fn shades_openness(lit: &Lit) -> f32 {
     open
 }
 
+/// The smoothstep of `x` in 0..1.
 fn smooth(x: f32) -> f32 {
     x * x * (3.0 - 2.0 * x)
 }

@@ -30,8 +30,8 @@ pub struct Scene {
     parts: Vec<Part>,
     lights: Vec<Light>,
     ambient: Ambient,
-    /// Radiance where there is nothing.
-    nothing: Vec3,
+    /// Radiance of rays that hit nothing.
+    background: Vec3,
     focus_m: f32,
     period_s: f64,
 }
@@ -84,7 +84,7 @@ impl Scene {
 struct Moment<'a> {
     scene: &'a Scene,
     poses: Vec<Pose>,
-    /// Around each part, in the world.
+    /// Bounding box of each part, in the world.
     boxes: Vec<Bounds>,
     shades: Vec<Shade>,
 }
@@ -98,6 +98,7 @@ struct Hit {
 }
 
 impl Moment<'_> {
+    /// The nearest hit along the ray.
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut hit: Option<Hit> = None;
         for (part, (group, pose)) in self.scene.parts.iter().zip(&self.poses).enumerate() {
@@ -117,29 +118,32 @@ impl Moment<'_> {
     fn look(&self, ray: &Ray) -> (Vec3, f32) {
         match self.intersect(ray) {
             Some(hit) => (self.radiance(ray, hit), hit.t),
-            None => (self.scene.nothing, 0.0),
+            None => (self.scene.background, 0.0),
         }
     }
 
+    /// The linear radiance that the surface at `hit` sends back along the ray. Shading is done in the world, the paint
+    /// and the part's own form are in the part's frame.
     fn radiance(&self, ray: &Ray, hit: Hit) -> Vec3 {
         let (part, pose) = (&self.scene.parts[hit.part], &self.poses[hit.part]);
         let (shape, material) = (&part.shapes[hit.shape], &part.materials[hit.shape]);
         let p = ray.at(hit.t);
         let local = pose.to_local(p);
-        let mut skin = shape.surface(local);
+        let mut point = shape.surface(local);
         // Open shapes are seen from both sides.
-        if (pose.turn * skin.normal).dot(ray.unit) > 0.0 {
-            skin.normal = -skin.normal;
+        if (pose.turn * point.normal).dot(ray.unit) > 0.0 {
+            point.normal = -point.normal;
         }
         let spot = Spot {
             p: local,
-            normal: skin.normal,
-            uv: skin.uv,
-            tangent: skin.tangent,
+            normal: point.normal,
+            uv: point.uv,
+            tangent: point.tangent,
             tint: material.tint,
             seed: material.seed,
         };
         let mut surface = (material.paint)(&spot);
+        // A surface that reflects nothing needs no shadows.
         if surface.albedo == Vec3::ZERO && surface.gloss <= 0.0 {
             return surface.emission;
         }
@@ -147,7 +151,7 @@ impl Moment<'_> {
         surface.fibre = pose.turn * surface.fibre;
         let lit = Lit { p, to_eye: -ray.unit, surface, part: hit.part, shades: &self.shades };
         let to_local = |direction: Vec3| pose.turn.transpose() * direction;
-        let form = part.form.as_deref().map(|grid| Form { grid, to_local: &to_local, p: local, normal: skin.normal });
+        let form = part.form.as_deref().map(|grid| Form { grid, to_local: &to_local, p: local, normal: point.normal });
         light::shine(&lit, &self.scene.lights, &self.scene.ambient, form)
     }
 }

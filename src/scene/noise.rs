@@ -73,6 +73,7 @@ pub fn fractal(mut p: Vec3, octaves: u32) -> f32 {
         sum += weight * value(p);
         total += weight;
         weight *= 0.5;
+        // Not quite twice, and shifted, so that the cells of the octaves do not coincide.
         p = p * 2.03 + Vec3::splat(17.3);
     }
     sum / total

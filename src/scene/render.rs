@@ -108,15 +108,16 @@ pub struct LensPicture {
 /// Where in its pixel ray `k` goes, in -0.5..0.5; ray 0 goes through the centre.
 fn pinhole_jitter(k: u32) -> Vec2 {
     // The plane's most even additive sequence (after M. Roberts' R2).
-    fraction(k, 0.754_877_666_246_692_8, 0.569_840_290_998_053_3)
+    additive_sequence(k, 0.754_877_666_246_692_8, 0.569_840_290_998_053_3)
 }
 
 /// As [`pinhole_jitter`], with steps that share no rhythm with the lens points of the same number.
 fn lens_jitter(k: u32) -> Vec2 {
-    fraction(k, std::f64::consts::SQRT_2, 1.732_050_807_568_877_2)
+    additive_sequence(k, std::f64::consts::SQRT_2, 1.732_050_807_568_877_2)
 }
 
-fn fraction(k: u32, step_x: f64, step_y: f64) -> Vec2 {
+/// Point `k` of an additive sequence (of multiples of the steps modulo 1), in -0.5..0.5.
+fn additive_sequence(k: u32, step_x: f64, step_y: f64) -> Vec2 {
     let wrap = |step: f64| ((f64::from(k) * step + 0.5).fract() - 0.5) as f32;
     Vec2::new(wrap(step_x), wrap(step_y))
 }
@@ -143,7 +144,7 @@ impl Scene {
         let jitter: Vec<Vec2> = (0..samples_per_pixel.max(1)).map(pinhole_jitter).collect();
         let width = view.width as usize;
         let rows = color.rgb.chunks_exact_mut(3 * width).zip(depth.metres.chunks_exact_mut(width)).enumerate();
-        share(rows, threads, |(row, (bytes, metres))| {
+        for_each_parallel(rows, threads, |(row, (bytes, metres))| {
             for (column, (bytes, metres)) in bytes.chunks_exact_mut(3).zip(metres).enumerate() {
                 let (light, depth_m) = moment.pinhole_pixel(view, Vec2::new(column as f32, row as f32), &jitter);
                 bytes.copy_from_slice(&light.to_array().map(encode_srgb));
@@ -169,7 +170,7 @@ impl Scene {
             .collect();
         let width = view.width as usize;
         let rows = picture.clipped.rgb.chunks_exact_mut(width).zip(picture.hdr.rgb.chunks_exact_mut(width));
-        share(rows.enumerate(), threads, |(row, (clipped, hdr))| {
+        for_each_parallel(rows.enumerate(), threads, |(row, (clipped, hdr))| {
             for (column, (clipped, hdr)) in clipped.iter_mut().zip(hdr).enumerate() {
                 let centre = Vec2::new(column as f32, row as f32);
                 for (jitter, lens_m) in &samples {
@@ -186,6 +187,7 @@ impl Scene {
 }
 
 impl Moment<'_> {
+    /// The mean of the pixel's rays, each cut to white, and the depth along the first one, through the centre.
     fn pinhole_pixel(&self, view: &View, centre: Vec2, jitter: &[Vec2]) -> (Vec3, f32) {
         let (mut sum, mut depth_m) = (Vec3::ZERO, 0.0);
         for (k, offset) in jitter.iter().enumerate() {
@@ -199,11 +201,11 @@ impl Moment<'_> {
     }
 }
 
-/// Does `work` for every item, on `threads` threads of which this one is one.
-fn share<T: Send>(items: impl Iterator<Item = T> + Send, threads: usize, work: impl Fn(T) + Sync) {
+/// Does `work` for every item on `threads` threads, of which the caller's is one.
+fn for_each_parallel<T: Send>(items: impl Iterator<Item = T> + Send, threads: usize, work: impl Fn(T) + Sync) {
     let items = Mutex::new(items);
     let run = || {
-        // The lock is held for the hand-out alone.
+        // The block releases the lock before the work begins.
         while let Some(item) = { items.lock().unwrap_or_else(PoisonError::into_inner).next() } {
             work(item);
         }

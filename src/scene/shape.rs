@@ -140,19 +140,22 @@ impl Shape {
         (t > 0.0 && t < t_max).then_some(t)
     }
 
-    /// The outward unit normal at `p` on the surface, and surface coordinates: `u`, `v` in -1..1 for a quad, the
-    /// way along (0..1) and the direction along a cone in `tangent`; zero where a shape has none.
-    pub fn surface(&self, p: Vec3) -> Skin {
-        let skin =
-            |normal: Vec3| Skin { normal: normal.normalize_or(Vec3::NEG_Z), uv: Vec2::ZERO, tangent: Vec3::ZERO };
+    /// The outward unit normal at the surface's point `p`, and surface coordinates: `u`, `v` in -1..1 for a quad, the
+    /// way along (0..1) for a cone, angle and height (0..1) for a frustum, else zero.
+    pub fn surface(&self, p: Vec3) -> SurfacePoint {
+        let plain = |normal: Vec3| SurfacePoint {
+            normal: normal.normalize_or(Vec3::NEG_Z),
+            uv: Vec2::ZERO,
+            tangent: Vec3::ZERO,
+        };
         match *self {
-            Shape::Quad { centre, right, up, .. } => Skin {
+            Shape::Quad { centre, right, up, .. } => SurfacePoint {
                 normal: right.cross(up).normalize_or(Vec3::NEG_Z),
                 uv: quad_uv(p - centre, right, up),
                 tangent: right.normalize_or(Vec3::X),
             },
-            Shape::Sphere { centre, .. } => skin(p - centre),
-            Shape::Ellipsoid { centre, to_unit } => skin(to_unit.transpose() * (to_unit * (p - centre))),
+            Shape::Sphere { centre, .. } => plain(p - centre),
+            Shape::Ellipsoid { centre, to_unit } => plain(to_unit.transpose() * (to_unit * (p - centre))),
             Shape::Cuboid { centre, axes, half } => {
                 let q = axes.transpose() * (p - centre) / half;
                 let a = q.abs();
@@ -163,7 +166,7 @@ impl Shape {
                 } else {
                     Vec3::Z
                 };
-                skin(axes * (axis * q.signum()))
+                plain(axes * (axis * q.signum()))
             }
             Shape::Cone { a, b, radius_a, radius_b } => {
                 let ab = b - a;
@@ -172,28 +175,29 @@ impl Shape {
                 let normal = (p - a - along * ab).normalize_or(Vec3::NEG_Z) * ab.length()
                     + ab.normalize_or_zero() * (radius_a - radius_b);
                 let tangent = ab.normalize_or(Vec3::Y);
-                Skin { uv: Vec2::new(along, 0.0), tangent, ..skin(normal) }
+                SurfacePoint { uv: Vec2::new(along, 0.0), tangent, ..plain(normal) }
             }
             Shape::Frustum { base, height, low_radius, high_radius } => {
                 let q = p - base;
                 let side = Vec3::new(q.x, 0.0, q.z).normalize_or(Vec3::X);
                 let lean = (low_radius - high_radius) / height;
-                Skin { uv: Vec2::new(q.z.atan2(q.x), q.y / height), ..skin(side + lean * Vec3::Y) }
+                SurfacePoint { uv: Vec2::new(q.z.atan2(q.x), q.y / height), ..plain(side + lean * Vec3::Y) }
             }
             Shape::Field { distance, .. } => {
+                // Half the way between the samples, in metres: finer than any feature of a form.
                 let e = 2e-4;
                 // Four corners of a cube give the gradient with the fewest evaluations.
                 let corners =
                     [Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::ONE];
-                skin(corners.into_iter().map(|k| k * distance(p + e * k)).sum())
+                plain(corners.into_iter().map(|k| k * distance(p + e * k)).sum())
             }
         }
     }
 }
 
-/// What a surface is like at a point.
+/// Normal and coordinates of a surface at one of its points.
 #[derive(Clone, Copy, Debug)]
-pub struct Skin {
+pub struct SurfacePoint {
     pub normal: Vec3,
     pub uv: Vec2,
     /// Unit vector along a cone, or to the right of a quad.
@@ -211,6 +215,7 @@ fn intersect_quad(ray: &Ray, centre: Vec3, right: Vec3, up: Vec3, cut: fn(Vec2) 
     (t.is_finite() && uv.abs().max_element() <= 1.0 && cut(uv)).then_some(t)
 }
 
+/// The slab test in the box's own axes.
 fn intersect_cuboid(ray: &Ray, centre: Vec3, axes: Mat3, half: Vec3) -> Option<f32> {
     let inverse = (axes.transpose() * ray.direction).recip();
     let middle = (axes.transpose() * (centre - ray.origin)) * inverse;
@@ -219,7 +224,7 @@ fn intersect_cuboid(ray: &Ray, centre: Vec3, axes: Mat3, half: Vec3) -> Option<f
     (enter <= leave && enter > 0.0).then_some(enter)
 }
 
-/// Metres along the ray to a cone with round ends.
+/// Metres along the ray to a cone with round ends (I. Quilez's rounded cone): first its side, then the two balls.
 fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> Option<f32> {
     let (origin, along_m) = ray.near(0.5 * (a + b));
     let (ab, oa, ob, d) = (b - a, origin - a, origin - b, ray.unit);
@@ -234,6 +239,7 @@ fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> 
         return None;
     }
     let t = (-h.sqrt() - k1) / k2;
+    // Where along the axis the side is met: the balls take over beyond both rims.
     let y = m1 - radius_a * shrink + t * m2;
     if y > 0.0 && y < side {
         return Some(along_m + t);
@@ -247,6 +253,7 @@ fn intersect_cone(ray: &Ray, a: Vec3, b: Vec3, radius_a: f32, radius_b: f32) -> 
     t.is_finite().then_some(along_m + t)
 }
 
+/// The first of the two points on the infinite cone that lies between the rims; the inside counts as well.
 fn intersect_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_radius: f32) -> Option<f32> {
     let (start, along_m) = ray.near(base + 0.5 * height * Vec3::Y);
     let (o, d) = (start - base, ray.unit);
@@ -266,6 +273,8 @@ fn intersect_frustum(ray: &Ray, base: Vec3, height: f32, low_radius: f32, high_r
         .find(|t| *t > 0.0)
 }
 
+/// Sphere tracing: in steps of the distance, by the guide as long as it is safely away from the surface, which saves
+/// computing the distance function.
 fn intersect_field(ray: &Ray, distance: Distance, bounds: &Bounds, guide: &Grid, t_max: f32) -> Option<f32> {
     let (mut t, leave) = bounds.span(ray, t_max)?;
     for _ in 0..FIELD_STEPS {

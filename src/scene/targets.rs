@@ -26,7 +26,7 @@ impl Scene {
             let shape = Shape::Sphere { centre: light.centre_m, radius: light.radius_m };
             part.add(shape, Material::new(glow, light.radiance));
         }
-        bare(part, lights.first().map_or(1.0, |light| light.centre_m.z))
+        dark_scene(part, lights.first().map_or(1.0, |light| light.centre_m.z))
     }
 
     /// A mottled wall that faces the camera, shines by itself, and fills every view narrower than 120 degrees.
@@ -36,16 +36,17 @@ impl Scene {
         let shape =
             Shape::Quad { centre: depth_m * Vec3::Z, right: size_m * Vec3::X, up: size_m * Vec3::Y, cut: whole };
         part.add(shape, Material::new(mottle, Vec3::ONE));
-        bare(part, depth_m)
+        dark_scene(part, depth_m)
     }
 }
 
-fn bare(part: Part, focus_m: f32) -> Scene {
+/// A scene of one part without lights: what is seen shines by itself.
+fn dark_scene(part: Part, focus_m: f32) -> Scene {
     Scene {
         parts: vec![part.built()],
         lights: Vec::new(),
         ambient: Ambient { above: Vec3::ZERO, below: Vec3::ZERO },
-        nothing: Vec3::ZERO,
+        background: Vec3::ZERO,
         focus_m,
         period_s: 1.0,
     }
@@ -56,6 +57,7 @@ fn glow(spot: &Spot) -> Surface {
 }
 
 fn mottle(spot: &Spot) -> Surface {
+    // By direction, so that the mottles have the same size in the picture at every depth.
     let p = 25.0 * spot.p / spot.p.z.max(1e-3);
     let radiance = Vec3::new(noise::fractal(p, 3), noise::fractal(p + 7.0, 3), noise::fractal(p + 13.0, 3));
     Surface { emission: 0.1 + 0.8 * radiance, ..Surface::matt(spot, Vec3::ZERO) }

@@ -2,15 +2,15 @@
 
 use crate::frame::ColorImage;
 
-/// Background at the top and at the bottom, and the sign; sRGB.
+/// Background at the top and at the bottom, and the icon; sRGB.
 const TOP: [f32; 3] = [44.0, 48.0, 56.0];
 const BOTTOM: [f32; 3] = [24.0, 26.0, 31.0];
-const SIGN: [f32; 3] = [150.0, 158.0, 170.0];
+const ICON: [f32; 3] = [150.0, 158.0, 170.0];
 
 /// A camera that is crossed out, in the middle of a dark picture: the camera is off.
 pub fn draw(picture: &mut ColorImage) {
     let (width, height) = (picture.width as usize, picture.height as usize);
-    // The sign's unit: it is about four wide and two high.
+    // The icon is about four units wide and two high.
     let unit_px = 0.09 * width.min(height) as f32;
     let middle = (width as f32 / 2.0, height as f32 / 2.0);
     for (y, row) in picture.rgb.chunks_exact_mut((3 * width).max(1)).enumerate() {
@@ -18,38 +18,38 @@ pub fn draw(picture: &mut ColorImage) {
         let behind: [f32; 3] = std::array::from_fn(|channel| TOP[channel] + (BOTTOM[channel] - TOP[channel]) * down);
         for (x, pixel) in row.as_chunks_mut::<3>().0.iter_mut().enumerate() {
             let at = ((x as f32 + 0.5 - middle.0) / unit_px, (y as f32 + 0.5 - middle.1) / unit_px);
-            // Signed distances in pixels, outside positive: half a pixel to either side is the edge's softness.
-            let cover = (0.5 - sign(at) * unit_px).clamp(0.0, 1.0);
+            // The edge is antialiased over a pixel: half of one to either side.
+            let cover = (0.5 - icon_distance(at) * unit_px).clamp(0.0, 1.0);
             *pixel = std::array::from_fn(|channel| {
-                (behind[channel] + (SIGN[channel] - behind[channel]) * cover).round() as u8
+                (behind[channel] + (ICON[channel] - behind[channel]) * cover).round() as u8
             });
         }
     }
 }
 
-/// Signed distance to the crossed-out camera, in units: its body, its lens at the right, and a stroke across that
-/// stands clear of both.
-fn sign(at: (f32, f32)) -> f32 {
-    let body = rectangle((at.0 + 0.55, at.1), (1.35, 1.0), 0.3);
-    // A trapezium that opens to the right.
+/// Signed distance to the crossed-out camera, in units, negative inside: its body, its lens at the right, and a stroke
+/// across with a gap to both.
+fn icon_distance(at: (f32, f32)) -> f32 {
+    let body = rectangle_distance((at.0 + 0.55, at.1), (1.35, 1.0), 0.3);
+    // A trapezium that opens to the right; 0.9 makes a distance of the height above a sloping side.
     let beside = at.0 - 1.0;
     let lens = (-beside).max(beside - 0.9).max((at.1.abs() - 0.3 - 0.5 * beside.clamp(0.0, 0.9)) * 0.9);
-    let stroke = segment(at, (-2.0, -1.55), (2.0, 1.55));
+    let stroke = segment_distance(at, (-2.0, -1.55), (2.0, 1.55));
     body.min(lens).max(0.34 - stroke).min(stroke - 0.13)
 }
 
 /// Signed distance to a rectangle around the origin with rounded corners.
-fn rectangle(at: (f32, f32), half: (f32, f32), corner: f32) -> f32 {
+fn rectangle_distance(at: (f32, f32), half: (f32, f32), corner: f32) -> f32 {
     let (x, y) = (at.0.abs() - half.0 + corner, at.1.abs() - half.1 + corner);
     x.max(0.0).hypot(y.max(0.0)) + x.max(y).min(0.0) - corner
 }
 
-/// Distance to a line from `from` to `to`.
-fn segment(at: (f32, f32), from: (f32, f32), to: (f32, f32)) -> f32 {
-    let (along, across) = ((to.0 - from.0, to.1 - from.1), (at.0 - from.0, at.1 - from.1));
-    let part = (across.0 * along.0 + across.1 * along.1) / (along.0 * along.0 + along.1 * along.1);
-    let part = part.clamp(0.0, 1.0);
-    (across.0 - part * along.0).hypot(across.1 - part * along.1)
+/// Distance to the line segment from `from` to `to`.
+fn segment_distance(at: (f32, f32), from: (f32, f32), to: (f32, f32)) -> f32 {
+    let (line, offset) = ((to.0 - from.0, to.1 - from.1), (at.0 - from.0, at.1 - from.1));
+    let along = (offset.0 * line.0 + offset.1 * line.1) / (line.0 * line.0 + line.1 * line.1);
+    let along = along.clamp(0.0, 1.0);
+    (offset.0 - along * line.0).hypot(offset.1 - along * line.1)
 }
 
 #[cfg(test)]

@@ -52,17 +52,18 @@ pub enum Ending {
 
 /// Takes finished frames, in order.
 ///
-/// Dropping a sink without [`Sink::finish`] gives up its output: no file gets its name, but frames that it has are kept.
+/// Dropping a sink without [`Sink::finish`] gives up its output: no file gets its name, but frames that it has are
+/// kept.
 pub trait Sink: Send {
-    /// Takes one frame, which was taken at `time_ns` by the clock of its source, later than the one before. `Break` says
-    /// that the reader at the other end has gone and wants no more, not even this one.
+    /// Takes one frame, which was captured at `time_ns` by the clock of its source, later than the one before. `Break`
+    /// says that the reader at the other end has gone; it did not get this frame.
     ///
     /// # Errors
     /// The frame could not be written. A file then takes no more; what it had is kept, and the error says where.
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError>;
 
-    /// How long a live output may go without a picture from now on; after that, [`Sink::repeat`] is called, again and
-    /// again. `None` for everything that keeps what it was given.
+    /// How long a live output may go without a picture from now on; whenever that has passed, [`Sink::repeat`] is
+    /// called. `None` for everything that stores frames.
     fn hold(&self) -> Option<Duration> {
         None
     }
@@ -76,10 +77,11 @@ pub trait Sink: Send {
         Ok(ControlFlow::Continue(false))
     }
 
-    /// A frame goes by that is not in memory, and so cannot be given.
+    /// Called in place of [`Sink::put`] for a frame that is not in CPU memory: a preview alone gets it.
     fn pass_by(&mut self) {}
 
-    /// Whether anything becomes of the frames it is given now; otherwise, where there is a viewer, only that counts.
+    /// Whether frames that are put now go anywhere. While they do not, a frame counts as delivered once a preview shows
+    /// it.
     fn keeps(&self) -> bool {
         true
     }
@@ -87,8 +89,8 @@ pub trait Sink: Send {
     /// Completes the output after the last frame. One that was cut short replaces nothing.
     ///
     /// # Errors
-    /// The output could not be completed; what there is of it is then kept, and the error says where. One that has failed
-    /// before says nothing again.
+    /// The output could not be completed; what there is of it is then kept, and the error says where. An error of
+    /// before is not reported again.
     fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
         let _ = ending;
         Ok(())

@@ -1,4 +1,4 @@
-//! A file that a sink writes, and what becomes of it at the end.
+//! The file of a sink: gets its name when it is complete, and is kept under another if it cannot be.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
@@ -20,8 +20,8 @@ pub(super) struct Output {
 }
 
 impl Output {
-    /// Prepares to write `path`; missing folders above it are made. What a run that was killed left of it is kept, which is
-    /// logged.
+    /// Prepares to write `path`; missing folders above it are made. What a run that was killed left of it is kept,
+    /// which is logged.
     pub(super) fn create(path: &Path, force: bool) -> Result<Self, SinkError> {
         if !force && path.symlink_metadata().is_ok() {
             return Err(SinkError::Exists { path: path.to_owned() });
@@ -41,11 +41,12 @@ impl Output {
         &self.path
     }
 
-    /// Whether it has its name, or was kept or removed.
+    /// Whether it was completed, kept or removed.
     pub(super) fn has_ended(&self) -> bool {
         self.part.is_none()
     }
 
+    /// Where it is meanwhile.
     pub(super) fn part(&self) -> &Path {
         self.part.as_ref().map_or(&self.path, Part::part)
     }
@@ -54,19 +55,20 @@ impl Output {
         self.part.as_ref().map(Part::file).ok_or_else(|| ErrorKind::NotFound.into())
     }
 
-    /// Another file has the same frames in a better form.
+    /// Goes on with a file that has the same frames in a better form.
     pub(super) fn replace(&mut self, part: Part) {
-        // The one before is removed.
+        // Dropping the old part removes it.
         self.part = Some(part);
     }
 
-    /// The file is complete: gives it its name. One that was cut short replaces nothing.
+    /// Gives the finished file its name, or keeps it under another. One that was cut short replaces nothing.
     pub(super) fn complete(&mut self, ending: Ending) -> Result<(), SinkError> {
         let Some(mut part) = self.part.take() else { return Ok(()) };
         let replace = self.force && ending == Ending::Whole;
         let Err(cause) = part.try_commit(replace) else { return Ok(()) };
-        let is_there = cause.kind() == ErrorKind::AlreadyExists;
-        if is_there && self.force {
+        let is_name_taken = cause.kind() == ErrorKind::AlreadyExists;
+        // Only a recording that was cut short gets here with `force`: it is no error that the old one stays.
+        if is_name_taken && self.force {
             let (kept, path) = (keep(part), self.path.display());
             tracing::warn!(
                 "{path} stays as it was: what was to replace it was cut short, and is kept as {}",
@@ -75,24 +77,26 @@ impl Output {
             return Ok(());
         }
         let path = self.path.clone();
-        let error = if is_there { SinkError::Exists { path } } else { SinkError::Write { path, cause } };
-        Err(self.kept(part, error))
+        let error = if is_name_taken { SinkError::Exists { path } } else { SinkError::Write { path, cause } };
+        Err(self.keep_if_frames(part, error))
     }
 
-    /// Nothing can be written any more: keeps what there is, and adds to the error where.
+    /// Ends the file after a write error: keeps what there is, and adds to the error where.
     pub(super) fn failed(&mut self, error: SinkError) -> SinkError {
         match self.part.take() {
-            Some(part) => self.kept(part, error),
+            Some(part) => self.keep_if_frames(part, error),
             None => error,
         }
     }
 
+    /// Removes what was written.
     pub(super) fn give_up(&mut self) {
         self.part = None;
     }
 
-    fn kept(&self, part: Part, error: SinkError) -> SinkError {
-        // An encoder may have taken frames and written none.
+    /// Keeps a part that has frames, and adds to the error where; removes any other.
+    fn keep_if_frames(&self, part: Part, error: SinkError) -> SinkError {
+        // An encoder may have taken frames and not written any yet.
         let has_frames = self.frames > 0 && part.file().metadata().is_ok_and(|file| file.len() > 0);
         if !has_frames {
             return error;
@@ -110,20 +114,21 @@ impl Drop for Output {
     }
 }
 
-/// Where the part is in the end.
+/// Renames the part to `NAME.incomplete`, and gives where it is then: its hidden name if that failed.
 fn keep(part: Part) -> PathBuf {
     let hidden = part.part().to_owned();
     part.keep_incomplete().unwrap_or(hidden)
 }
 
-/// Keeps what runs that were killed left of `path`; gives the names.
+/// Keeps what runs that were killed left of `path`; gives the new names.
 fn recover(path: &Path) -> Result<Vec<PathBuf>, SinkError> {
-    // One may write into folders that one must not list.
+    // A folder may be writable without being readable.
     let left = whole::left_behind(path).unwrap_or_default();
     let kept = left.into_iter().map(|part| keep_or_remove(&part, path));
     kept.filter_map(Result::transpose).collect::<Result<_, _>>().map_err(SinkError::write(path))
 }
 
+/// Renames a part that was left behind to `path` with `.incomplete`, and gives that name; removes an empty one.
 fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
     let done = match part.metadata().map(|part| part.len()) {
         Ok(0) => fs::remove_file(part).map(|()| None),
@@ -131,14 +136,14 @@ fn keep_or_remove(part: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
         Err(error) => Err(error),
     };
     match done {
-        // Somebody else was here at the same time.
+        // Another process did the same at the same time.
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         done => done,
     }
 }
 
-/// Keeps the videos that runs that were killed left in a folder, each as `NAME.incomplete`; gives the names. Those whose name
-/// is none of `is_ours` are left alone, and so is what cannot be renamed.
+/// Keeps the videos that killed runs left unfinished in a folder, each as `NAME.incomplete`; gives the new names.
+/// Videos whose `NAME` does not satisfy `is_ours` are left alone, and so is what cannot be renamed.
 pub fn recover_all(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let left = whole::all_left_behind(folder).unwrap_or_default().into_iter();
     let ours = left.filter(|(_, name)| name.to_str().is_some_and(&is_ours));

@@ -12,19 +12,19 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::Errno;
 
-/// Once the run is to stop, a reader that takes nothing for so long is left.
+/// How long a reader that takes nothing is waited for once the run is to stop.
 pub(super) const LAST_PATIENCE: Duration = Duration::from_secs(1);
-/// So often it is looked whether to go on waiting.
+/// How often a blocked writer checks whether to go on waiting.
 const TICK: Duration = Duration::from_millis(50);
-/// A pipe that has room has room for so much (`PIPE_BUF`).
+/// Room that a pipe has at least when `poll` says that it has any (`PIPE_BUF`): writing so much does not block.
 const ROOM_BYTES: usize = 4096;
 
 /// A writer that waits for room only as long as that makes sense; then writing fails with [`ErrorKind::TimedOut`].
 pub struct Pipe {
     file: File,
-    /// What is written at once; `None` writes everything and never waits, as into a file.
+    /// Most bytes of one `write` call; `None` for a file, which is written without waiting for room.
     chunk_bytes: Option<usize>,
-    /// Whether to go on waiting, after nothing was taken for so long.
+    /// Whether to go on waiting, after nothing was taken for the given time.
     waits_on: Box<dyn FnMut(Duration) -> bool + Send>,
 }
 
@@ -33,14 +33,14 @@ impl Pipe {
     pub(super) fn stdout(stop: &Arc<AtomicBool>) -> io::Result<Self> {
         let file = File::from(io::stdout().as_fd().try_clone_to_owned()?);
         let kind = file.metadata()?.file_type();
-        // Others write to it, too: its flags are not ours to change.
+        // Not made non-blocking, since it may be shared with other processes: small writes do not block either.
         let chunk_bytes = (kind.is_fifo() || kind.is_socket() || kind.is_char_device()).then_some(ROOM_BYTES);
         let stop = Arc::clone(stop);
         let waits_on = move |blocked: Duration| !stop.load(Ordering::Relaxed) || blocked < LAST_PATIENCE;
         Ok(Self { file, chunk_bytes, waits_on: Box::new(waits_on) })
     }
 
-    /// The end of a pipe that is ours alone.
+    /// The end of a pipe that is ours alone, which is made non-blocking.
     pub(super) fn own(end: OwnedFd, waits_on: impl FnMut(Duration) -> bool + Send + 'static) -> io::Result<Self> {
         fcntl_setfl(&end, fcntl_getfl(&end)? | OFlags::NONBLOCK)?;
         Ok(Self { file: File::from(end), chunk_bytes: Some(usize::MAX), waits_on: Box::new(waits_on) })

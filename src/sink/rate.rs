@@ -1,11 +1,12 @@
 //! Frame rates as the fractions that formats and drivers take.
 
-/// Frames per second as a fraction: the whole and the NTSC (n * 1000 / 1001) rates where the period is as good as
-/// theirs, else thousandths, or nanoseconds for the slowest.
+/// Frames per second as numerator and denominator: a whole or NTSC rate (n * 1000 / 1001) if the period is within
+/// rounding of it, else in thousandths; for less than one per second by the period in whole milliseconds.
 pub(super) fn frame_rate(period_ns: u64) -> (u64, u64) {
     let period_ns = period_ns.max(1);
     let per_second = 1e9 / period_ns as f64;
     let whole = per_second.round();
+    // Whole and NTSC rates are 1e-3 apart; this leaves room for rounded periods.
     let near = |rate: f64| rate >= 1.0 && (per_second / rate - 1.0).abs() < 2e-4;
     let ntsc = (per_second * 1.001).round();
     if near(whole) {

@@ -1,64 +1,67 @@
-//! One constant rate from frames that come when they do.
+//! Constant frame rate from frames that come at uneven times.
 
 use std::time::Duration;
 
-/// Where a frame goes in a stream of constant rate, such that the stream takes as long as the frames did.
+/// Decides which frames of a stream of constant rate are repeated or left out, so that it lasts as long as the frames
+/// did.
 #[derive(Debug)]
 pub(super) struct Steady {
-    /// Pictures per second, as a fraction.
+    /// Pictures per second, as numerator and denominator.
     rate: (u64, u64),
     longest_still: Duration,
     first_ns: Option<u64>,
-    /// Of the time since the first frame, so much was left out.
+    /// Time that is missing from the stream, because long gaps were cut.
     left_out_ns: u64,
+    /// Pictures in the stream, repeated ones included.
     written: u64,
-    /// Frames that were one too many.
+    /// Frames that were left out.
     pub surplus: u64,
 }
 
-/// Where a frame belongs.
+/// What to do with a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
-    /// It comes after the last picture was written so many times again.
+    /// Write the last picture again this many times, then the frame.
     After(u64),
-    /// A long gap was made shorter: as before, and so long it was.
+    /// The same after a gap of this length, which was too long to be filled.
     AfterGap(u64, Duration),
-    /// Its place is taken: it comes too soon after the one before.
+    /// Leave it out: it comes too soon after the one before.
     Taken,
 }
 
-/// A picture may be off by this share of a period before one is repeated or left out: unevenness is no drift.
+/// A frame may be early or late by this share of a period before one is left out or repeated: more than jitter.
 const MOST_OFF: f64 = 0.75;
 
 impl Steady {
-    /// A stream of `rate`; a picture that stands longer than `longest_still` does not make it longer than that.
+    /// A stream of `rate`, in which no picture is repeated for longer than `longest_still`.
     pub(super) fn new(rate: (u64, u64), longest_still: Duration) -> Self {
         Self { rate, longest_still, first_ns: None, left_out_ns: 0, written: 0, surplus: 0 }
     }
 
-    /// No picture stands longer.
+    /// Longest time for which one picture is repeated.
     pub(super) fn longest_still(&self) -> Duration {
         self.longest_still
     }
 
-    /// Where the frame of `time_ns` goes.
+    /// What to do with the next frame, which was captured at `time_ns`.
     pub(super) fn place(&mut self, time_ns: u64) -> Place {
         let first_ns = *self.first_ns.get_or_insert(time_ns);
-        let per_ns = self.rate.0 as f64 / (self.rate.1 as f64 * 1e9);
-        let since_ns = time_ns.saturating_sub(first_ns).saturating_sub(self.left_out_ns);
-        let ahead = since_ns as f64 * per_ns - self.written as f64;
-        if ahead < -MOST_OFF {
+        let pictures_per_ns = self.rate.0 as f64 / (self.rate.1 as f64 * 1e9);
+        let elapsed_ns = time_ns.saturating_sub(first_ns).saturating_sub(self.left_out_ns);
+        // In periods: 0 is on time for the next picture of the stream, more is late.
+        let late = elapsed_ns as f64 * pictures_per_ns - self.written as f64;
+        if late < -MOST_OFF {
             self.surplus += 1;
             return Place::Taken;
         }
-        let missing = (ahead + 1.0 - MOST_OFF).floor().max(0.0) as u64;
-        let most = (self.longest_still.as_nanos() as f64 * per_ns).ceil() as u64;
-        self.written += missing.min(most) + 1;
-        if missing <= most {
+        let missing = (late + 1.0 - MOST_OFF).floor().max(0.0) as u64;
+        let most_repeats = (self.longest_still.as_nanos() as f64 * pictures_per_ns).ceil() as u64;
+        self.written += missing.min(most_repeats) + 1;
+        if missing <= most_repeats {
             return Place::After(missing);
         }
-        self.left_out_ns += ((missing - most) as f64 / per_ns) as u64;
-        Place::AfterGap(most, Duration::from_nanos((missing as f64 / per_ns) as u64))
+        self.left_out_ns += ((missing - most_repeats) as f64 / pictures_per_ns) as u64;
+        Place::AfterGap(most_repeats, Duration::from_nanos((missing as f64 / pictures_per_ns) as u64))
     }
 }
 

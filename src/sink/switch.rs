@@ -19,7 +19,7 @@ pub struct Switch {
     members: Vec<Member>,
     asked: Receiver<Asked>,
     ending: Vec<JoinHandle<Result<(), SinkError>>>,
-    /// How long there was no picture, counted in what [`Sink::hold`] said.
+    /// How long there was no picture, by the times that [`Sink::hold`] gave.
     silent: Duration,
 }
 
@@ -71,7 +71,7 @@ enum Asked {
     Remove(String),
 }
 
-/// After so long without a picture it is looked whether something was asked.
+/// How often requests are looked for while there are no pictures.
 const TICK: Duration = Duration::from_millis(100);
 
 impl Switch {
@@ -83,6 +83,7 @@ impl Switch {
         (switch, Switchboard { to, tell: Arc::new(tell) })
     }
 
+    /// Adds and removes members as was asked by a [`Switchboard`] since the last call.
     fn take_orders(&mut self) {
         while let Ok(asked) = self.asked.try_recv() {
             let name = match &asked {
@@ -99,7 +100,7 @@ impl Switch {
         }
     }
 
-    /// Gives something to each member.
+    /// Calls `give` for each member, and takes out those that fail or whose reader has gone.
     fn each<T>(&mut self, mut give: impl FnMut(&mut Member) -> Result<ControlFlow<(), T>, SinkError>) {
         let mut at = 0;
         while at < self.members.len() {
@@ -122,17 +123,17 @@ impl Switch {
             }
             Ok(ending) => life.ended(sink.finish(ending)),
         };
-        // Where there can be no thread, both are dropped, which tells that the member was given up.
+        // If no thread can be started, sink and life are dropped, which tells that the member was given up.
         self.ending.extend(thread::Builder::new().name("output".into()).spawn(end));
     }
 
-    /// Takes all members out at once, and waits for them: the slowest one says how long that takes.
+    /// Takes out all members, and waits until they are completed, which they are in parallel.
     fn end(&mut self, ending: Ending) -> Result<(), SinkError> {
         self.take_orders();
         while !self.members.is_empty() {
             self.take_out(0, Ok(ending));
         }
-        // One that panicked was told of when it fell.
+        // A panic was told when its thread dropped the member's life.
         let ended: Vec<_> = self.ending.drain(..).flat_map(JoinHandle::join).collect();
         ended.into_iter().collect()
     }
@@ -150,12 +151,14 @@ impl Sink for Switch {
         Ok(ControlFlow::Continue(()))
     }
 
+    /// Until the first member is due, but never longer than a tick: requests must be seen.
     fn hold(&self) -> Option<Duration> {
         let due = self.members.iter().filter_map(|member| member.sink.hold()).min();
         Some(due.map_or(TICK, |due| due.saturating_sub(self.silent).min(TICK)))
     }
 
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+        // Called once that has passed.
         self.silent += self.hold().unwrap_or_default();
         self.take_orders();
         let due = self.members.iter().filter_map(|member| member.sink.hold()).min();
@@ -220,6 +223,7 @@ struct Member {
 struct Life {
     name: String,
     frames: u64,
+    /// Whether its end was told.
     over: bool,
     tell: Tell,
 }
@@ -234,6 +238,7 @@ impl Life {
         self.tell(Fate::Failed { frames: self.frames, why: why.into() });
     }
 
+    /// Tells how completing the member went, and gives that back.
     fn ended(mut self, ended: Result<(), SinkError>) -> Result<(), SinkError> {
         match &ended {
             Ok(()) => {

@@ -52,7 +52,7 @@ impl FromStr for Target {
     }
 }
 
-/// Whether a name is that of a device, or of one that is not there yet.
+/// Whether this is a character device, or the name of a video device that is not there yet.
 fn is_device(path: &Path) -> bool {
     let number = path.to_str().and_then(|name| name.strip_prefix("/dev/video"));
     number.is_some_and(|number| number.bytes().all(|digit| digit.is_ascii_digit()))

@@ -7,13 +7,13 @@ use std::time::Duration;
 use super::{Ending, Sink, SinkError};
 use crate::frame::ColorImage;
 
-/// Gives every frame to each of its sinks, in turn. One whose reader has gone is completed and left out from then on; when
-/// all are, so has this one's. One that fails is left out, too, which is logged, and is an error in the end; a live one ends
-/// the run.
+/// Gives every frame to each of its sinks, in turn. One whose reader has gone is completed and removed; once all are,
+/// [`Sink::put`] says `Break`. One that fails is removed, too, which is logged, and its error is returned at the end;
+/// the error of a live one is returned at once, which ends the run.
 pub struct Tee {
     sinks: Vec<Named>,
     name: String,
-    /// Of the first one that failed.
+    /// The error of the first one that failed.
     failed: Option<SinkError>,
 }
 
@@ -30,7 +30,8 @@ impl Tee {
         Self { sinks: names.into_iter().zip(sinks).collect(), name, failed: None }
     }
 
-    /// `Continue` says whether any of them showed something.
+    /// Calls `give` for each sink, and removes those that fail or whose reader has gone. `Continue` says whether any of
+    /// them showed something.
     fn each(&mut self, mut give: impl FnMut(&mut dyn Sink) -> Flow) -> Flow {
         let (mut at, mut any) = (0, false);
         while at < self.sinks.len() {
@@ -43,16 +44,16 @@ impl Tee {
                 }
                 Ok(ControlFlow::Break(())) => {
                     if let Err(error) = end(self.sinks.remove(at), Ending::Whole) {
-                        self.leave_out(error);
+                        self.note_failure(error);
                     }
                 }
                 Err(error) => {
-                    // It has failed: what it had, it has kept.
+                    // Not finished: a sink that fails has kept its output itself.
                     drop(self.sinks.remove(at));
                     if is_live {
                         return Err(error);
                     }
-                    self.leave_out(error);
+                    self.note_failure(error);
                 }
             }
         }
@@ -63,7 +64,8 @@ impl Tee {
         }
     }
 
-    fn leave_out(&mut self, error: SinkError) {
+    /// Logs an error while other sinks go on, and keeps the first one for the end.
+    fn note_failure(&mut self, error: SinkError) {
         if !self.sinks.is_empty() {
             tracing::error!("{error}; going on without it");
         }
@@ -75,7 +77,7 @@ fn end((name, sink): Named, ending: Ending) -> Result<(), SinkError> {
     guarded(&name, || sink.finish(ending))
 }
 
-/// Makes an error of a panic: the others are whole.
+/// Makes an error of a panic, so that the other sinks can go on.
 fn guarded<T>(name: &str, call: impl FnOnce() -> Result<T, SinkError>) -> Result<T, SinkError> {
     catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));

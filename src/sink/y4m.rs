@@ -15,9 +15,9 @@ use super::{Ending, Options, Sink, SinkError, check_size};
 use crate::color::Matrix;
 use crate::frame::ColorImage;
 
-/// A picture that stands for longer makes a file no longer than that.
+/// Longest gap between frames that a file fills by repeating the last picture; longer ones are cut to this.
 const LONGEST_STILL: Duration = Duration::from_secs(10);
-/// And a stream: by as much, whoever watches it is behind from then on.
+/// The same for a stream, whose viewer falls behind by as much.
 const LONGEST_STILL_LIVE: Duration = Duration::from_secs(1);
 
 /// A y4m stream into anything that takes bytes: 4:2:0, limited range, BT.709 from 720 rows on, else BT.601.
@@ -38,10 +38,10 @@ pub struct Y4m<W: Write> {
 impl<W: Write> Y4m<W> {
     /// A stream into `to`, which `name` stands for in messages. The header goes out with the first frame.
     pub fn new(to: W, name: &Path, options: &Options) -> Self {
-        Self::of(to, name, options, LONGEST_STILL_LIVE)
+        Self::with_longest_still(to, name, options, LONGEST_STILL_LIVE)
     }
 
-    fn of(to: W, name: &Path, options: &Options, longest_still: Duration) -> Self {
+    fn with_longest_still(to: W, name: &Path, options: &Options, longest_still: Duration) -> Self {
         let (width, height) = options.size;
         let (rate, scale) = frame_rate(options.period_ns);
         let header = format!("YUV4MPEG2 W{width} H{height} F{rate}:{scale} Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n");
@@ -57,7 +57,8 @@ impl<W: Write> Y4m<W> {
         }
     }
 
-    /// Writes a frame that was taken at `time_ns`: where it is due, after the one before was repeated.
+    /// Writes a frame that was captured at `time_ns`. To keep the rate constant, the picture before it is repeated
+    /// where frames are missing, and a frame that comes too early is left out.
     ///
     /// # Errors
     /// The frame has another size, or writing failed.
@@ -104,6 +105,7 @@ impl<W: Write> Y4m<W> {
         Ok(self.to)
     }
 
+    /// Ends the stream; one without frames gets its header.
     fn complete(&mut self) -> Result<(), SinkError> {
         if self.steady.surplus > 0 {
             let (name, surplus) = (self.name.display(), self.steady.surplus);
@@ -126,8 +128,8 @@ impl Y4m<Pipe> {
     }
 }
 
-/// Whether this only says that nobody reads any more, and if so, in what way.
-fn left(error: &SinkError) -> Option<ErrorKind> {
+/// The kind of an error that only says that the reader has gone (`BrokenPipe`) or takes nothing any more (`TimedOut`).
+fn reader_gone(error: &SinkError) -> Option<ErrorKind> {
     let SinkError::Write { cause, .. } = error else { return None };
     Some(cause.kind()).filter(|kind| matches!(kind, ErrorKind::BrokenPipe | ErrorKind::TimedOut))
 }
@@ -136,20 +138,20 @@ fn left(error: &SinkError) -> Option<ErrorKind> {
 impl<W: Write + Send> Sink for Y4m<W> {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         match self.write(frame, time_ns) {
-            Err(error) if left(&error) == Some(ErrorKind::TimedOut) => {
+            Err(error) if reader_gone(&error) == Some(ErrorKind::TimedOut) => {
                 tracing::warn!("{}: its reader does not read, and the last picture is not whole", self.name.display());
-                // Nor may the header be, and nothing can follow.
+                // The header may be cut as well: it must not be written again at the end.
                 self.header.clear();
                 Ok(ControlFlow::Break(()))
             }
-            Err(error) if left(&error).is_some() => Ok(ControlFlow::Break(())),
+            Err(error) if reader_gone(&error).is_some() => Ok(ControlFlow::Break(())),
             written => written.map(ControlFlow::Continue),
         }
     }
 
     fn finish(mut self: Box<Self>, _: Ending) -> Result<(), SinkError> {
         match self.complete() {
-            Err(error) if left(&error).is_some() => Ok(()),
+            Err(error) if reader_gone(&error).is_some() => Ok(()),
             done => done,
         }
     }
@@ -173,12 +175,12 @@ impl Y4mFile {
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
         let output = Output::create(path, options.force)?;
         let file = output.file().and_then(File::try_clone).map_err(SinkError::write(path))?;
-        Ok(Self { stream: Y4m::of(file, path, options, LONGEST_STILL), output })
+        Ok(Self { stream: Y4m::with_longest_still(file, path, options, LONGEST_STILL), output })
     }
 
-    /// Keeps the whole pictures alone.
+    /// Ends the file after a write error: cuts off an incomplete picture, and keeps the whole ones.
     fn failed(&mut self, error: SinkError) -> SinkError {
-        // If it cannot be cut, players pass over what is not whole.
+        // If that fails, players skip the incomplete picture.
         let _ = self.stream.to.set_len(self.stream.whole_bytes);
         self.output.failed(error)
     }

@@ -53,6 +53,7 @@ impl Converter {
             let (upper, lower) = rows.split_at(3 * width);
             let lower = if lower.is_empty() { upper } else { lower };
             for (((upper, lower), cb), cr) in upper.chunks(6).zip(lower.chunks(6)).zip(cb).zip(cr) {
+                // The only pixel, at an odd edge.
                 let right = upper.len() - 3;
                 let sum = |channel: usize| {
                     [upper[channel], upper[right + channel], lower[channel], lower[right + channel]]

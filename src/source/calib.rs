@@ -1,5 +1,4 @@
-//! What `--calib` names, alike in every command: how two eyes stand whose pictures are a rectified pair already, or how
-//! to make them one.
+//! The calibration files of `--calib`: the geometry of an already rectified stereo pair, or how to rectify a raw one.
 
 use std::path::{Path, PathBuf};
 
@@ -11,12 +10,12 @@ use crate::recording::geometry::Geometry;
 pub enum Eyes {
     /// Their pictures are rectified: a `calib.txt` of Middlebury, ETH3D or KITTI.
     Rectified {
-        /// How they stand, for the pictures at hand.
+        /// Their geometry, scaled to the pictures at hand.
         geometry: Geometry,
-        /// Columns and rows of the pictures that it was made for, where that is said.
+        /// Columns and rows of the pictures that the calibration was made for, where the file says so.
         made_for: Option<(u32, u32)>,
     },
-    /// They are not, and this tells how they become so: OpenCV's, Kalibr's or EuRoC's.
+    /// Their pictures are raw, and this tells how to rectify them: OpenCV's, Kalibr's or EuRoC's.
     Raw(Box<StereoCalibration>),
 }
 
@@ -28,6 +27,7 @@ pub fn read(files: &[PathBuf], pictures: &Path, size: (u32, u32)) -> Result<Eyes
     let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     match (calibration::load(&paths), &paths[..]) {
         (Ok(calibration), _) => Ok(Eyes::Raw(Box::new(calibration))),
+        // Not recognised, and not named as YAML: perhaps a `calib.txt`. A broken `.yml` keeps its own error.
         (Err(error), [file]) if !is_yaml(file) && is_of_another_kind(&error) => {
             let stated = Geometry::read(file, pictures)?;
             Ok(Eyes::Rectified { geometry: stated.fitted(file, size)?, made_for: stated.size })

@@ -1,4 +1,4 @@
-//! Cameras, virtual cameras and knobs, as there are now. A build without cameras has none.
+//! The cameras, virtual cameras and camera controls of this machine, as they are now. A build without cameras has none.
 
 use super::SourceName;
 use crate::knob::Knob;
@@ -44,7 +44,7 @@ fn choices(kind: Kind) -> Vec<Choice> {
     node::nodes().into_iter().filter(of_kind).map(choice).collect()
 }
 
-/// The camera of a source whose knobs can be turned: one has its own; two have to see alike.
+/// The camera whose controls can be changed while `source` runs; none of a pair, whose pictures have to stay alike.
 pub fn camera_of(source: &SourceName) -> Option<String> {
     match source {
         #[cfg(feature = "camera")]
@@ -53,7 +53,7 @@ pub fn camera_of(source: &SourceName) -> Option<String> {
     }
 }
 
-/// The knobs of a camera; none where it has none, or does not tell.
+/// The controls of a camera; empty where it has none, or they cannot be listed (which is logged).
 pub fn knobs(camera: &str) -> Vec<Knob> {
     #[cfg(feature = "camera")]
     return knobs::list(camera).unwrap_or_else(|error| {
@@ -67,7 +67,7 @@ pub fn knobs(camera: &str) -> Vec<Knob> {
     };
 }
 
-/// Turns a knob of a camera; gives back all of them.
+/// Sets a control of a camera; returns all its controls, since others may change with it.
 ///
 /// # Errors
 /// The camera refuses: one line for the person.

@@ -1,4 +1,4 @@
-//! Depth from elsewhere than the source: a recording's, or a depth camera's.
+//! External depth for a source: from another recording, or from a depth camera.
 
 use super::opened::depth_of;
 use super::{DepthChoice, DepthFrom, Options, Source, SourceError, Wanted, options};
@@ -8,18 +8,18 @@ use crate::depth::DepthSource;
 use crate::depth::beside::Beside;
 use crate::recording::Recording;
 
-/// Gives `source` the depth that was chosen, where that is not its own and the effect needs it.
+/// Gives `source` the depth that `--depth` names, where that is a folder or a depth camera; else returns it unchanged.
 ///
 /// # Errors
 /// It cannot be opened, or an option does not apply to it.
-pub(super) fn beside(source: Source, wanted: &Wanted, clock: &Clock) -> Result<Source, SourceError> {
-    let Options { depth, depth_choice: from, .. } = wanted.options;
-    if depth.depth_calibration.is_some() && !matches!(from, DepthChoice::Device(_)) {
+pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock) -> Result<Source, SourceError> {
+    let Options { depth, depth_choice: choice, .. } = wanted.options;
+    if depth.depth_calibration.is_some() && !matches!(choice, DepthChoice::Device(_)) {
         return SourceError::usage(
             "--depth-calibration is for a depth camera: name it with --depth, such as --depth /dev/video2",
         );
     }
-    if !from.is_elsewhere() {
+    if !choice.is_elsewhere() {
         return Ok(source);
     }
     if !wanted.uses_depth() {
@@ -28,30 +28,31 @@ pub(super) fn beside(source: Source, wanted: &Wanted, clock: &Clock) -> Result<S
     if source.camera.info().brings == Brings::Depth {
         return SourceError::usage("the source knows its depth: leave --depth out");
     }
-    let mut first = None;
-    let (opened, depth_from): (Box<dyn DepthSource>, _) = match from {
+    let mut first_depth = None;
+    let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
             let recording = Recording::open(folder, &wanted.reading())?;
             let depth_from = depth_of(&recording);
-            first = wanted.first_depth(&recording);
+            first_depth = wanted.first_depth(&recording);
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
-        DepthChoice::Device(name) => (device(name, depth, clock)?, DepthFrom::Units),
+        DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthFrom::Units),
     };
-    Ok(Source { depth: Some(opened), depth_from, first_depth: first, ..source })
+    Ok(Source { depth: Some(external), depth_from, first_depth, ..source })
 }
 
+/// Opens the depth camera `name` with the scale and registration that the options state.
 #[cfg(feature = "camera")]
-fn device(name: &str, depth: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
+fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
     use super::registration;
     use crate::depth::live::{LiveDepth, Units};
     use crate::v4l2::live::OpenError;
-    let registration = depth.depth_calibration.as_deref().map(registration::load).transpose()?;
-    let units = Units { per_m: depth.live_scale(), invalid: depth.depth_invalid };
+    let registration = options.depth_calibration.as_deref().map(registration::load).transpose()?;
+    let units = Units { per_m: options.live_scale(), invalid: options.depth_invalid };
     match LiveDepth::open(name, units, registration, clock.clone()) {
         Ok(camera) => Ok(Box::new(camera)),
-        // A slip of the pen, as like as not.
+        // Probably a mistyped keyword or folder.
         Err(error @ OpenError::Name(_)) => Err(SourceError::Usage(format!(
             "--depth {name}: {error}; or use auto, recorded, stereo, none or a folder with a recording"
         ))),
@@ -60,7 +61,7 @@ fn device(name: &str, depth: &options::Depth, clock: &Clock) -> Result<Box<dyn D
 }
 
 #[cfg(not(feature = "camera"))]
-fn device(name: &str, _: &options::Depth, _: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
+fn open_depth_camera(name: &str, _: &options::Depth, _: &Clock) -> Result<Box<dyn DepthSource>, SourceError> {
     Err(SourceError::Usage(format!(
         "--depth {name}: there is no such folder, and this build leaves cameras out (feature `camera`)"
     )))

@@ -1,4 +1,4 @@
-//! From the options about two eyes to depth from them.
+//! Sets up depth from two eyes: their geometry from options, calibration or recording, then rectifier and matcher.
 
 use std::path::Path;
 
@@ -14,19 +14,19 @@ use crate::look::Look;
 use crate::optics::StereoRig;
 use crate::recording::Pair;
 
-/// What two eyes are.
+/// What is known of two eyes, enough to match their pictures.
 enum Stated {
     /// Their pictures are a rectified pair.
     Rectified(StereoRig),
-    /// They are not; this makes them one.
+    /// The pictures need this rectification.
     Raw(Box<Rectifier>),
 }
 
 impl options::Stereo {
-    /// Refuses what is about two eyes, for a source that has one.
+    /// Refuses the options about two eyes, for a source with only one.
     ///
     /// # Errors
-    /// There is such an option.
+    /// One of them is given.
     pub fn refuse(&self) -> Result<(), SourceError> {
         let given = [
             (self.rectified, "--rectified"),
@@ -43,7 +43,7 @@ impl options::Stereo {
         }
     }
 
-    /// The geometry that the options spell out.
+    /// The stereo geometry that `--focal-px`, `--baseline-m` and `--doffs-px` state, if they are given.
     fn rig(&self) -> Result<Option<StereoRig>, SourceError> {
         match (self.focal_px, self.baseline_m) {
             (Some(focal_px), Some(baseline_m)) => {
@@ -54,8 +54,9 @@ impl options::Stereo {
         }
     }
 
-    /// What the two eyes are: what the options state, else what the source says. Nothing is guessed.
-    fn state(&self, pair: &Pair, source_name: &str, size: (u32, u32)) -> Result<Stated, SourceError> {
+    /// How the two eyes stand: by the numbers in the options, else by `--calib`, else by what the source states
+    /// (`pair`). Whether pictures are rectified is never guessed: matching raw ones gives plausible but wrong depth.
+    fn resolve_pair(&self, pair: &Pair, source_name: &str, size: (u32, u32)) -> Result<Stated, SourceError> {
         if let Some(rig) = self.rig()? {
             return match (self.rectified, pair) {
                 (true, _) | (false, Pair::Rectified(_)) => Ok(Stated::Rectified(rig)),
@@ -66,16 +67,17 @@ impl options::Stereo {
                 )),
             };
         }
-        let read = match self.calib.is_empty() {
+        let from_file = match self.calib.is_empty() {
             true => None,
             false => Some(match calib::read(&self.calib, Path::new(source_name), size)? {
                 Eyes::Rectified { geometry, .. } => Pair::Rectified(geometry.rig),
                 Eyes::Raw(calibration) => Pair::Raw(calibration),
             }),
         };
-        match read.as_ref().unwrap_or(pair) {
+        match from_file.as_ref().unwrap_or(pair) {
             Pair::Rectified(rig) => Ok(Stated::Rectified(*rig)),
             Pair::Raw(calibration) => {
+                // Rectified by others from this calibration: only its geometry is needed.
                 let stated = if self.rectified {
                     Stated::Rectified(Rectification::of(calibration, size)?.rig())
                 } else {
@@ -95,7 +97,8 @@ impl options::Stereo {
     }
 }
 
-/// Depth from the two eyes of the source `info`, of which `pair` is known; of `disparities` where that is known, too.
+/// Sets up stereo matching for the source `info`. `pair` is what the source states of its eyes, and `disparities` how
+/// many occur in it, where that is known.
 ///
 /// # Errors
 /// It is not stated what they are, a calibration cannot be used, or there is no such GPU.
@@ -106,8 +109,8 @@ pub fn open(
     options: &options::Stereo,
     computing: &Computing,
 ) -> Result<StereoDepth, SourceError> {
-    let stated = options.state(pair, &info.name, info.size)?;
-    let disparities = options.max_disparity.unwrap_or_else(|| settled(disparities, info.size.0));
+    let stated = options.resolve_pair(pair, &info.name, info.size)?;
+    let disparities = options.max_disparity.unwrap_or_else(|| default_disparities(disparities, info.size.0));
     let matcher = computing.matcher(disparities, Effort::Full, info.size)?;
     let (depth, how) = match stated {
         Stated::Raw(rectifier) => {
@@ -116,9 +119,9 @@ pub fn open(
         Stated::Rectified(rig) => (StereoDepth::of_rectified(&info.name, rig, matcher, disparities), "rectified"),
     };
     let StereoRig { focal_px, baseline_m, doffs_px, metric } = *depth.rig();
-    let known = if metric { "" } else { ", assumed" };
+    let note = if metric { "" } else { ", assumed" };
     tracing::info!(
-        "{}: a pair, {how}: focal length {focal_px:.1} px, eyes {baseline_m:.4} m apart, doffs {doffs_px:.2} px{known}; \
+        "{}: a pair, {how}: focal length {focal_px:.1} px, eyes {baseline_m:.4} m apart, doffs {doffs_px:.2} px{note}; \
          {disparities} disparities ({})",
         info.name,
         depth.describe()
@@ -126,7 +129,7 @@ pub fn open(
     Ok(depth)
 }
 
-/// Refuses a focus in metres where the eyes tell no distances.
+/// Refuses a look that needs metres where the geometry of the eyes is only assumed.
 ///
 /// # Errors
 /// The focus or the lens needs metres, and `rig` has none.
@@ -139,7 +142,7 @@ pub fn check_focus(rig: &StereoRig, look: &Look) -> Result<(), SourceError> {
 }
 
 /// Disparities to try: as many as are known to occur, else those of a tenth of the picture's width.
-fn settled(known: Option<u32>, width_px: u32) -> u32 {
+fn default_disparities(known: Option<u32>, width_px: u32) -> u32 {
     known.unwrap_or(width_px.div_ceil(10)).next_multiple_of(16).clamp(16, Settings::MOST_DISPARITIES)
 }
 
@@ -151,10 +154,10 @@ mod tests {
     fn disparities_are_as_many_as_known_or_a_tenth_of_the_width() {
         let cases = [(Some(60), 640, 64), (Some(64), 640, 64), (Some(290), 640, 256), (Some(3), 640, 16)];
         for (known, width_px, disparities) in cases {
-            assert_eq!(settled(known, width_px), disparities);
+            assert_eq!(default_disparities(known, width_px), disparities);
         }
         for (width_px, disparities) in [(40, 16), (640, 64), (641, 80), (1280, 128), (4000, 256)] {
-            assert_eq!(settled(None, width_px), disparities);
+            assert_eq!(default_disparities(None, width_px), disparities);
         }
     }
 }

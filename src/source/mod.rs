@@ -59,7 +59,7 @@ pub struct Source {
     pub camera: Box<dyn Camera>,
     /// Gives their depth, where the camera does not.
     pub depth: Option<Box<dyn DepthSource>>,
-    /// The eyes that depth comes from, where it comes from two.
+    /// Geometry of the two eyes, where depth is matched from them.
     pub rig: Option<StereoRig>,
     /// What depth comes from.
     pub depth_from: DepthFrom,
@@ -74,46 +74,49 @@ pub struct Options {
     pub frames: Frames,
     /// How depth pictures are read.
     pub depth: options::Depth,
-    /// What is said of its two eyes.
+    /// Layout and geometry of its two eyes.
     pub stereo: options::Stereo,
     /// Where depth comes from.
     pub depth_choice: DepthChoice,
-    /// What matches its two eyes.
+    /// What runs the stereo matching.
     pub computing: Computing,
-    /// Faulty lines of a recording's lists become frames that fail.
+    /// Faulty lines in a recording's frame lists become frames that fail, instead of an error on opening.
     pub keep_going: bool,
     /// The synthetic scene repeats itself, so that it can be played smoothly.
     pub cycle: bool,
 }
 
-/// How a source is opened, and what its depth is for; `None` for itself.
+/// What the caller of [`Source::open`] asked for.
 struct Wanted<'a> {
     options: &'a Options,
+    /// The look that the depth is for; `None` where depth is wanted for its own sake, as for recording it.
     look: Option<&'a Look>,
 }
 
-/// Refinement of depth from two eyes, unless it is chosen: it knows nothing of how matching errs, but steadies it.
+/// Whether depth from two eyes is refined by default: refinement does not model the errors of stereo matching, but
+/// makes its depth steadier.
 const REFINES_STEREO: bool = true;
 
 impl Source {
-    /// Opens a source.
+    /// Opens a source. `look` decides whether depth is needed; without one, any depth there is gets opened.
     ///
     /// # Errors
     /// It cannot be read, it has no frame between `--start` and `--end`, or an option does not apply to it.
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
         let wanted = Wanted { options, look };
-        elsewhere::beside(Self::open_own(name, &wanted)?, &wanted, &Clock::system())
+        elsewhere::with_external_depth(Self::open_with_own_depth(name, &wanted)?, &wanted, &Clock::system())
     }
 
-    /// A camera of one's own, and what gives depth to its frames, in metres.
+    /// A source from a camera that the caller has opened; `depth` gives depth in metres for its frames.
     pub fn of(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
         let has_depth = depth.is_some() || camera.info().brings == Brings::Depth;
         let depth_from = if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing };
         Self { camera, depth, rig: None, depth_from, first_depth: None }
     }
 
-    /// Opens a source with its own depth.
-    fn open_own(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
+    /// Opens a source with the depth it has by itself: recorded, exact, or matched from its two eyes. Depth from
+    /// another device or recording is added by [`elsewhere::with_external_depth`].
+    fn open_with_own_depth(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
         let Options { frames, stereo, depth_choice, computing, .. } = wanted.options;
         name.check(frames)?;
         wanted.check_effect()?;
@@ -143,7 +146,7 @@ impl Source {
                 )));
             }
             stereo.refuse()?;
-        } else if wanted.matches(source.depth.is_some()) {
+        } else if wanted.uses_stereo(source.depth.is_some()) {
             let depth = eyes::open(&info, &source.pair, source.disparities, stereo, computing)?;
             let rig = *depth.rig();
             if let Some(look) = wanted.look {
@@ -162,15 +165,15 @@ impl Source {
         self.depth.is_some() || self.camera.info().brings == Brings::Depth
     }
 
-    /// A look as far as this source allows it, opened with these options.
+    /// A look adapted to this source, which was opened with `options`.
     ///
     /// # Errors
-    /// It needs depth that there is not, or a distance of focus.
+    /// As for [`fitting_look`].
     pub fn fitting_look(&self, look: &Look, options: &Options) -> Result<Look, SourceError> {
         fitting_look(look, &options.depth_choice, self.has_depth())
     }
 
-    /// Whether its depth was measured, so that refining it makes it better.
+    /// Whether its depth was measured (and not computed exactly), so that refinement improves it.
     pub fn is_measured(&self) -> bool {
         self.depth.is_some() && (self.rig.is_none() || REFINES_STEREO)
     }
@@ -193,11 +196,12 @@ impl Wanted<'_> {
         self.look.is_none_or(|look| look.effect.follows_depth())
     }
 
-    /// The first depth map of a recording, where the focus is in metres. A faulty one is told in its turn.
+    /// The first depth map of a recording, to compare with a focus in metres; `None` where the look has no such focus.
+    /// A faulty map is no error here: it is reported when the frame is read.
     pub fn first_depth(&self, recording: &Recording) -> Option<DepthMap> {
-        let is_compared = self.look.is_some_and(|look| matches!(look.focus, FocusRule::Metres(_)));
+        let has_distance = self.look.is_some_and(|look| matches!(look.focus, FocusRule::Metres(_)));
         let mut map = DepthMap::default();
-        let is_compared = is_compared && recording.has_depth();
+        let is_compared = has_distance && recording.has_depth();
         let read = is_compared.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
         read.ok().map(|()| map)
     }
@@ -210,8 +214,9 @@ impl Wanted<'_> {
         Ok(())
     }
 
-    /// Whether two eyes are matched, where there are two, and depth of another kind or not.
-    fn matches(&self, has_depth: bool) -> bool {
+    /// Whether depth comes from stereo matching, if the source has two eyes; `has_depth` tells whether it has depth of
+    /// another kind, which `auto` prefers.
+    fn uses_stereo(&self, has_depth: bool) -> bool {
         match self.options.depth_choice {
             DepthChoice::Stereo => true,
             DepthChoice::Auto => self.uses_depth() && !has_depth,
@@ -220,10 +225,10 @@ impl Wanted<'_> {
     }
 }
 
-/// The look as far as a source with depth or without allows it.
+/// The look adapted to a source with or without depth: without, depth of field becomes tilt-shift.
 ///
 /// # Errors
-/// It needs depth that there is not, or a distance of focus.
+/// The look needs depth that there is not, or its lens needs a focus distance.
 pub fn fitting_look(look: &Look, depth: &DepthChoice, has_depth: bool) -> Result<Look, SourceError> {
     let uses_depth = has_depth && *depth != DepthChoice::None;
     if look.effect == Effect::Dof && !uses_depth {

@@ -1,4 +1,4 @@
-//! What frames come from, as it is written.
+//! The names of sources, as users write them: cameras, folders of recordings, and `synthetic`.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use super::{Frames, SourceError, near};
 
-/// What frames come from.
+/// What kind of source frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A camera, or two.
@@ -18,11 +18,11 @@ pub enum Kind {
     Synthetic,
 }
 
-/// A camera: how it was called, and the node that this means now.
+/// A camera: the name that the user gave, and the device node that it was resolved to.
 #[cfg(feature = "camera")]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
-    /// As it is written.
+    /// As the user wrote it.
     pub name: String,
     node: PathBuf,
 }
@@ -76,15 +76,16 @@ fn sources() -> &'static str {
     }
 }
 
-/// What is said where there is no folder of a name that looks like one's.
+/// The message for a path that is no folder, with a suggestion if a sibling has a similar name.
 fn no_folder(text: &str) -> String {
     let hint =
         near::folder(Path::new(text)).map_or(String::new(), |near| format!(", did you mean {}?", near.display()));
     format!("there is no such folder{hint}; use {}", sources())
 }
 
+/// Parses the name of one camera, or of two as `LEFT,RIGHT`; the message of an error suggests similar names.
 #[cfg(feature = "camera")]
-fn camera(text: &str) -> Result<SourceName, String> {
+fn parse_cameras(text: &str) -> Result<SourceName, String> {
     let named = |name: &str| {
         let node = crate::v4l2::node::resolve(name)?;
         Ok(Named { name: name.to_owned(), node })
@@ -93,11 +94,12 @@ fn camera(text: &str) -> Result<SourceName, String> {
         Some(near) => Err(format!("{error}; or did you mean the folder {}? Use {}", near.display(), sources())),
         None => Err(format!("{error}; use {}", sources())),
     };
-    // A camera's own name may have commas, too.
-    let alone = match named(text) {
+    // First as one camera: its own name may contain commas, too.
+    let not_one_camera = match named(text) {
         Ok(camera) => return Ok(SourceName::Camera(camera)),
         Err(error) => error,
     };
+    // For the same reason, any comma may be the one between the two names.
     let halves = |(at, _): (usize, &str)| (&text[..at], &text[at + 1..]);
     let pairs = || text.match_indices(',').map(halves);
     for (left, right) in pairs() {
@@ -110,13 +112,14 @@ fn camera(text: &str) -> Result<SourceName, String> {
         }
     }
     match pairs().next() {
-        None => refuse(alone),
-        Some((left, right)) => refuse(named(left).and_then(|_| named(right)).err().unwrap_or(alone)),
+        None => refuse(not_one_camera),
+        // Reports the half that is no camera.
+        Some((left, right)) => refuse(named(left).and_then(|_| named(right)).err().unwrap_or(not_one_camera)),
     }
 }
 
 #[cfg(not(feature = "camera"))]
-fn camera(text: &str) -> Result<SourceName, String> {
+fn parse_cameras(text: &str) -> Result<SourceName, String> {
     let what = if text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
         "this build leaves cameras out (feature `camera`)"
     } else {
@@ -133,10 +136,10 @@ impl Named {
 }
 
 impl SourceName {
-    /// The source of this name. A folder's name need not be text.
+    /// Parses the name of a source. A folder's path need not be UTF-8.
     ///
     /// # Errors
-    /// There is none: what there could be.
+    /// It names no source: the message says what is accepted.
     pub fn from_os(name: &OsStr) -> Result<Self, String> {
         let path = Path::new(name);
         match name.to_str() {
@@ -144,7 +147,7 @@ impl SourceName {
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() => Err(format!("it is no folder: use {}", sources())),
             Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
-            Some(text) => camera(text),
+            Some(text) => parse_cameras(text),
             None => Err(no_folder(&path.display().to_string())),
         }
     }
@@ -159,18 +162,18 @@ impl SourceName {
         }
     }
 
-    /// Whether the options that choose a part of a recording apply.
+    /// Refuses the options that choose a part of a recording, where this is none.
     ///
     /// # Errors
-    /// One is given, and it is no recording.
-    pub fn check(&self, source: &Frames) -> Result<(), SourceError> {
+    /// Such an option is given, and this is no recording.
+    pub fn check(&self, frames: &Frames) -> Result<(), SourceError> {
         let what = match self {
             SourceName::Folder(_) => return Ok(()),
             SourceName::Synthetic => "synthetic",
             #[cfg(feature = "camera")]
             SourceName::Camera(_) | SourceName::Cameras(_) => "a camera",
         };
-        if source.start.is_none() && source.end.is_none() && !source.repeat {
+        if frames.start.is_none() && frames.end.is_none() && !frames.repeat {
             return Ok(());
         }
         Err(SourceError::Usage(format!(
@@ -178,7 +181,7 @@ impl SourceName {
         )))
     }
 
-    /// The folder that frames come from.
+    /// The folder of a recording.
     pub fn folder(&self) -> Option<&Path> {
         match self {
             SourceName::Folder(folder) => Some(folder),
@@ -186,7 +189,7 @@ impl SourceName {
         }
     }
 
-    /// The devices that frames come from.
+    /// The device nodes of its cameras.
     pub fn devices(&self) -> Vec<&Path> {
         match self {
             SourceName::Synthetic | SourceName::Folder(_) => Vec::new(),

@@ -1,19 +1,19 @@
-//! Names like one that was mistyped.
+//! Suggestions for mistyped folder names.
 
 use std::path::{Path, PathBuf};
 
-/// How alike two names are at least, 0 to 1, for one to be meant by the other.
-const ALIKE: f64 = 0.8;
+/// Least Jaro-Winkler similarity (0 to 1) of a name that is suggested: one or two slips in a word of usual length.
+const SIMILAR: f64 = 0.8;
 
-/// The folder nearest in name to `path`, beside where that would be.
+/// The existing sibling of `path` that is a folder of the most similar name, if any is similar enough.
 pub fn folder(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let parent = path.parent().unwrap_or(Path::new(""));
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let folders = std::fs::read_dir(listed).ok()?.filter_map(|entry| entry.ok()).filter(|entry| entry.path().is_dir());
-    let likeness = |other: &str| strsim::jaro_winkler(&name.to_lowercase(), &other.to_lowercase());
+    let similarity = |other: &str| strsim::jaro_winkler(&name.to_lowercase(), &other.to_lowercase());
     let names = folders.filter_map(|folder| folder.file_name().into_string().ok());
-    let rated = names.map(|other| (likeness(&other), other)).filter(|(alike, _)| *alike >= ALIKE);
+    let rated = names.map(|other| (similarity(&other), other)).filter(|(similarity, _)| *similarity >= SIMILAR);
     rated.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| parent.join(other))
 }
 

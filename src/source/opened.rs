@@ -1,4 +1,4 @@
-//! Sources with their own depth, if they have any.
+//! Opens the camera, recording or scene that a name means, and its recorded depth.
 
 use std::sync::Arc;
 
@@ -28,22 +28,23 @@ const SYNTHETIC_SIZE: (u32, u32) = (640, 480);
 /// Frame rate of the synthetic scene.
 const SYNTHETIC_FPS: f64 = 30.0;
 
-/// A source before its two eyes, if it has two, are looked at.
+/// An opened source before stereo matching is set up for it.
 pub(super) struct Opened {
     pub camera: Box<dyn Camera>,
     pub depth: Option<Box<dyn DepthSource>>,
     pub depth_from: DepthFrom,
     pub first_depth: Option<DepthMap>,
-    /// What it says of its two eyes.
+    /// What the source states of its two eyes.
     pub pair: Pair,
-    /// The disparities that occur in it.
+    /// How many disparities occur in it, where a recording states that.
     pub disparities: Option<u32>,
 }
 
 impl Opened {
+    /// Opens the source; of a pair, the right eye is read only where stereo matching will use it.
     pub fn open(name: &SourceName, wanted: &Wanted) -> Result<Self, SourceError> {
         let Options { frames, .. } = wanted.options;
-        let of = |camera| Self {
+        let without_depth = |camera| Self {
             camera,
             depth: None,
             depth_from: DepthFrom::Nothing,
@@ -60,9 +61,10 @@ impl Opened {
                     fps,
                     frames: frames.frames,
                     threads: cores(),
+                    // After so many frames the scene is where it began.
                     cycle: wanted.options.cycle.then(|| (Scene::portrait().period_s() * fps) as u64),
                 })?;
-                Ok(of(Box::new(camera)))
+                Ok(without_depth(Box::new(camera)))
             }
             SourceName::Folder(folder) => {
                 let recording = Arc::new(Recording::open(folder, &wanted.reading())?);
@@ -75,7 +77,7 @@ impl Opened {
                 };
                 let mut camera = Replay::new(Arc::clone(&recording), &name, &part)?;
                 let pair = recording.pair().cloned();
-                if pair.is_some() && wanted.matches(recording.has_depth()) {
+                if pair.is_some() && wanted.uses_stereo(recording.has_depth()) {
                     camera = camera.with_right_eye();
                 }
                 let disparities = recording.disparities();
@@ -91,25 +93,25 @@ impl Opened {
                     first_depth,
                     pair: pair.unwrap_or(Pair::Unstated),
                     disparities,
-                    ..of(Box::new(camera))
+                    ..without_depth(Box::new(camera))
                 })
             }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {
                 let camera = V4l2Camera::open(&camera.name, wish(frames), frames.control.clone(), frames.frames)?;
-                Ok(of(Box::new(camera)))
+                Ok(without_depth(Box::new(camera)))
             }
             #[cfg(feature = "camera")]
             SourceName::Cameras([left, right]) => {
                 let open = |eye: &name::Named| V4l2Camera::open(&eye.name, wish(frames), frames.control.clone(), None);
                 let eyes = TwoEyes::new(open(left)?, open(right)?, Clock::system(), frames.frames)?;
-                Ok(of(Box::new(eyes)))
+                Ok(without_depth(Box::new(eyes)))
             }
         }
     }
 }
 
-/// What the depth of a recording is.
+/// Whether a recording has depth, and in metres or in units of its own.
 pub(super) fn depth_of(recording: &Recording) -> DepthFrom {
     match recording.has_depth() {
         false => DepthFrom::Nothing,

@@ -16,7 +16,7 @@ use crate::v4l2::{FourCc, live::Setting};
 
 /// Units of a 16-bit depth picture per metre: the TUM convention.
 pub const DEPTH_SCALE: f32 = 5000.0;
-/// The same of depth cameras, most of which give millimetres.
+/// Units of a depth camera per metre: most give millimetres.
 #[cfg(feature = "camera")]
 const LIVE_DEPTH_SCALE: f32 = 1000.0;
 
@@ -180,6 +180,7 @@ impl FromStr for Size {
     }
 }
 
+/// Parses `NAME=VALUE`; whether the camera has such a control is only known once it is open.
 #[cfg(feature = "camera")]
 fn control(text: &str) -> Result<Setting, String> {
     let parts = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));

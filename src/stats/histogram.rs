@@ -44,10 +44,10 @@ impl Histogram {
     /// 0 without samples.
     pub fn percentile_ns(&self, p: f64) -> u64 {
         let rank = ((p * self.samples as f64).ceil() as u64).clamp(1, self.samples.max(1));
-        let mut below = 0;
+        let mut cumulative = 0;
         for (index, &count) in self.counts.iter().enumerate() {
-            below += count;
-            if below >= rank {
+            cumulative += count;
+            if cumulative >= rank {
                 return middle_ns(index).min(self.max_ns);
             }
         }
@@ -55,6 +55,7 @@ impl Histogram {
     }
 }
 
+/// The index of the bucket that counts `time_ns`.
 fn bucket(time_ns: u64) -> usize {
     let time_ns = time_ns.min((1 << MAX_BITS) - 1);
     // Below SPLIT the buckets are single nanoseconds.
@@ -62,6 +63,7 @@ fn bucket(time_ns: u64) -> usize {
     ((time_ns >> shift) + (u64::from(shift) << SPLIT_BITS)) as usize
 }
 
+/// The time in the middle of a bucket.
 fn middle_ns(bucket: usize) -> u64 {
     let bucket = bucket as u64;
     let shift = (bucket >> SPLIT_BITS).saturating_sub(1);

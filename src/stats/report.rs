@@ -7,7 +7,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::{Frames, Histogram, Timings};
 
-/// What a run was, as resolved.
+/// What a run was made of, after all defaults were resolved.
 #[derive(Clone, Debug, Default)]
 pub struct About {
     /// `cpu`, `gpu` or `none`.
@@ -59,7 +59,7 @@ pub struct Report {
     pub elapsed_s: f64,
     /// Processor time that the program used meanwhile, all threads together, in seconds.
     pub cpu_s: f64,
-    /// What was on the screen, where there was a window.
+    /// What the window showed, where there was one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<WindowUse>,
     /// What made this report.
@@ -82,7 +82,7 @@ pub struct WindowUse {
 }
 
 impl WindowUse {
-    /// Sums up what was measured.
+    /// Sums up what a window measured.
     pub fn new(presented: u64, first_frame_ns: Option<u64>, [latency, reaction, present]: [&Histogram; 3]) -> Self {
         Self {
             presented,
@@ -139,7 +139,7 @@ pub struct Versions {
 }
 
 impl Report {
-    /// Sums up a run. The accounting law is checked here: a breach is a defect of this program, and logged as such.
+    /// Sums up a run. Frame counts that do not [balance](Frames::balance) are a bug of this program, which is logged.
     pub fn new(frames: Frames, timings: &Timings, about: About) -> Self {
         if !frames.balance() {
             tracing::error!(?frames, "the frames do not add up: please report this");
@@ -191,7 +191,7 @@ impl Report {
     }
 }
 
-/// Milliseconds to three decimals: the histograms know no more.
+/// Milliseconds, rounded to three decimals: the histograms are no more precise.
 fn ms(time_ns: u64) -> f64 {
     (time_ns as f64 / 1e3).round() / 1e3
 }

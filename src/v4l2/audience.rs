@@ -19,7 +19,7 @@ use super::holders::other_holders;
 
 /// The module's event "client usage"; its data begin with a `u32`: 1 while a reader streams, else 0.
 const CLIENT_USAGE: u32 = PRIVATE_START + 0x08E0_0000 + 1;
-/// A program that looks what cameras there are opens and closes each of them; it is no reader.
+/// Time from an opening to the look at who holds the node: a program that only lists cameras has closed it by then.
 const SETTLE: Duration = Duration::from_millis(60);
 
 /// What came of listening.
@@ -36,9 +36,9 @@ pub enum ReaderEvent {
 #[derive(Debug)]
 pub struct Audience {
     device: Arc<Device>,
-    /// Where the module does not tell: told when the node is opened or closed.
+    /// Where the module sends no events: an inotify watch for the node being opened or closed.
     opens: Option<OwnedFd>,
-    /// How things stand was not told yet.
+    /// With `opens`: the first answer was not given yet, and needs no waiting.
     fresh: bool,
     stop: OwnedFd,
 }
@@ -59,14 +59,14 @@ impl Audience {
     /// # Errors
     /// Neither the module tells of its readers nor the system who opens the node.
     pub fn new(device: Arc<Device>) -> io::Result<(Self, Stop)> {
-        let told = device.subscribe(CLIENT_USAGE, SEND_INITIAL);
-        let opens = match told {
+        let subscribed = device.subscribe(CLIENT_USAGE, SEND_INITIAL);
+        let opens = match subscribed {
             Ok(()) => None,
             Err(_) => {
-                let ear = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;
+                let watch = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;
                 let flags = inotify::WatchFlags::OPEN | inotify::WatchFlags::CLOSE;
-                inotify::add_watch(&ear, device.path(), flags)?;
-                Some(ear)
+                inotify::add_watch(&watch, device.path(), flags)?;
+                Some(watch)
             }
         };
         let stop = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?;
@@ -90,6 +90,7 @@ impl Audience {
                         Woken::Late => return ReaderEvent::Nothing,
                         Woken::Stop => return ReaderEvent::Stopped,
                     }
+                    // No flags: only a stop ends this pause early.
                     if let Woken::Stop = self.sleep(&self.stop, PollFlags::empty(), Some(SETTLE)) {
                         return ReaderEvent::Stopped;
                     }
@@ -100,6 +101,7 @@ impl Audience {
         }
     }
 
+    /// Waits for the module's next event; an event of another kind is [`ReaderEvent::Nothing`].
     fn next_event(&self, patience: Option<Duration>) -> ReaderEvent {
         match self.sleep(&*self.device, PollFlags::PRI, patience) {
             Woken::Ready => {}
@@ -110,18 +112,20 @@ impl Audience {
             Ok(event) if event.kind == CLIENT_USAGE => ReaderEvent::Readers(event.data[..4] != [0; 4]),
             Ok(_) => ReaderEvent::Nothing,
             Err(error) => match Errno::from_io_error(&error) {
+                // Woken for nothing: no event is pending.
                 Some(Errno::NOENT | Errno::AGAIN) => ReaderEvent::Nothing,
                 _ => ReaderEvent::Stopped,
             },
         }
     }
 
+    /// Polls `on` for `flags`, and for the stop, no longer than `patience` (`None`: for ever).
     fn sleep(&self, on: impl AsFd, flags: PollFlags, patience: Option<Duration>) -> Woken {
         let patience = patience.and_then(|patience| Timespec::try_from(patience).ok());
-        let mut ends = [PollFd::new(&on, flags), PollFd::new(&self.stop, PollFlags::IN)];
-        match poll(&mut ends, patience.as_ref()) {
+        let mut fds = [PollFd::new(&on, flags), PollFd::new(&self.stop, PollFlags::IN)];
+        match poll(&mut fds, patience.as_ref()) {
             Ok(0) | Err(Errno::INTR) => Woken::Late,
-            Ok(_) if ends[1].revents().is_empty() && ends[0].revents().intersects(flags) => Woken::Ready,
+            Ok(_) if fds[1].revents().is_empty() && fds[0].revents().intersects(flags) => Woken::Ready,
             // Neither what was waited for nor the end: the node is gone.
             _ => Woken::Stop,
         }
@@ -134,7 +138,7 @@ enum Woken {
     Stop,
 }
 
-/// What the events were does not matter: the node's holders are looked up after them.
+/// Discards all pending inotify events: what they were does not matter, as the holders are looked up afterwards.
 fn drain(opens: &OwnedFd) {
     let mut events = [0_u8; 1024];
     while rustix::io::read(opens, &mut events).is_ok_and(|bytes| bytes > 0) {}

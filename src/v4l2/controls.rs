@@ -1,4 +1,4 @@
-//! A camera's own settings, such as exposure: what there is, what it is set to, and setting it by name.
+//! A camera's own settings, such as exposure (V4L2 controls): listing them, reading them, and setting them by name.
 
 mod value;
 
@@ -23,19 +23,19 @@ pub struct Control {
     pub id: u32,
     /// What values it takes.
     pub kind: Kind,
-    /// The least value; of a text, its least length in bytes.
+    /// The least value; for a text, its least length in bytes.
     pub minimum: i64,
-    /// The largest value; of a bit mask, all bits; of a text, its largest length in bytes.
+    /// The largest value; for a bit mask, all its bits; for a text, its largest length in bytes.
     pub maximum: i64,
-    /// From one value to the next, at least 1.
+    /// Distance from one value to the next, at least 1.
     pub step: u64,
-    /// What the driver begins with.
+    /// The driver's default value.
     pub default: i64,
     /// The items of a menu. Numbers may be missing between.
     pub items: Vec<Item>,
-    /// What it is set to. Nothing where it cannot be read, or cannot be written down.
+    /// Its present value; `None` if it cannot be read or has no single value (a button, a table).
     pub value: Option<Value>,
-    /// Whether it only tells something.
+    /// Whether it can be read but not set.
     pub read_only: bool,
     /// Whether it has no effect now, because another control overrides it.
     pub inactive: bool,
@@ -71,7 +71,7 @@ pub struct Item {
     pub name: String,
 }
 
-/// Names that changed with the kernel (5.14): whoever writes one means the other where that is what there is.
+/// Old and new names of the controls that Linux 5.14 renamed: either name finds whichever the device has.
 const RENAMED: [(&str, &str); 5] = [
     ("exposure_auto", "auto_exposure"),
     ("exposure_auto_priority", "exposure_dynamic_framerate"),
@@ -86,7 +86,7 @@ pub const LOW_LIGHT: &str = "exposure_dynamic_framerate";
 /// All controls of a device with their values, in the driver's order. A device without any has an empty list.
 ///
 /// # Errors
-/// What the system says, if that is more than that there are no more.
+/// The error of the system that broke the listing off, other than the one that ends it.
 pub fn list(device: &Device) -> io::Result<Vec<Control>> {
     const NEXT: u32 = sys::V4L2_CTRL_FLAG_NEXT_CTRL | sys::V4L2_CTRL_FLAG_NEXT_COMPOUND;
     let (mut controls, mut last, mut faults) = (Vec::new(), 0, 0);
@@ -95,15 +95,15 @@ pub fn list(device: &Device) -> io::Result<Vec<Control>> {
         query.id = last | NEXT;
         match device.query_control(&mut query) {
             Ok(()) => {
-                // A driver that does not know how to go on would be asked for ever.
+                // A driver that ignores the flags of `NEXT` gives the same control again and again.
                 if query.id <= last {
                     return Ok(controls);
                 }
                 last = query.id;
-                controls.extend(control(device, &query));
+                controls.extend(describe(device, &query));
             }
-            // Some firmware fails at single controls.
-            Err(error) if error.raw_os_error() == Some(EIO) && faults < MOST_FAULTS => {
+            // Some firmware fails at single controls, whose id is not told: go on id by id.
+            Err(error) if error.raw_os_error() == Some(EIO) && faults < MAX_FAULTS => {
                 faults += 1;
                 last += 1;
             }
@@ -116,7 +116,8 @@ pub fn list(device: &Device) -> io::Result<Vec<Control>> {
 const EIO: i32 = 5;
 const EINVAL: i32 = 22;
 const ENOTTY: i32 = 25;
-const MOST_FAULTS: u32 = 64;
+/// After so many failures the whole device is taken to fail.
+const MAX_FAULTS: u32 = 64;
 
 /// The control of this name, also under its former or later name.
 pub fn find<'a>(controls: &'a [Control], name: &str) -> Option<&'a Control> {
@@ -153,15 +154,15 @@ pub fn set(device: &Device, name: &str, value: &str) -> Result<Option<Value>, Co
     Ok(read(device, control).ok().flatten())
 }
 
-/// Nothing for what is no control: a heading, or one that this device only pretends to have.
-fn control(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control> {
+/// The control that a query found, with its menu and present value; `None` for a class heading or a disabled control.
+fn describe(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control> {
     let label = text(&query.name.map(c_char::cast_unsigned));
     let flag = |flag| query.flags & flag != 0;
     if flag(sys::V4L2_CTRL_FLAG_DISABLED) || query.type_ == sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_CTRL_CLASS {
         return None;
     }
     let mut control = Control {
-        name: variable(&label),
+        name: tool_name(&label),
         label,
         id: query.id,
         kind: kind(query),
@@ -184,9 +185,10 @@ fn control(device: &Device, query: &sys::v4l2_query_ext_ctrl) -> Option<Control>
 }
 
 fn kind(query: &sys::v4l2_query_ext_ctrl) -> Kind {
-    let table = query.nr_of_dims > 0;
+    let is_array = query.nr_of_dims > 0;
     match query.type_ {
-        _ if table => Kind::Compound,
+        // The type is that of its elements.
+        _ if is_array => Kind::Compound,
         sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_INTEGER => Kind::Integer,
         sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_BOOLEAN => Kind::Boolean,
         sys::v4l2_ctrl_type_V4L2_CTRL_TYPE_MENU => Kind::Menu,
@@ -199,14 +201,16 @@ fn kind(query: &sys::v4l2_query_ext_ctrl) -> Kind {
     }
 }
 
-/// A name as one types it: letters and digits in lower case, and one underscore for all between.
-fn variable(label: &str) -> String {
+/// The name that `v4l2-ctl` makes of a driver's label: letters and digits in lower case, one underscore for each run of
+/// other characters.
+fn tool_name(label: &str) -> String {
     let words = label.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("_")
 }
 
+/// The items of a menu; none for other kinds. The driver refuses the numbers that its menu leaves out.
 fn items(device: &Device, control: &Control) -> Vec<Item> {
-    /// More than any menu has; a driver's mistake must not take for ever.
+    /// More than any menu has: bounds the loop whatever range a driver states.
     const MOST_ITEMS: i64 = 1024;
     if !matches!(control.kind, Kind::Menu | Kind::IntegerMenu) {
         return Vec::new();
@@ -224,21 +228,22 @@ fn items(device: &Device, control: &Control) -> Vec<Item> {
     (control.minimum..=control.maximum.min(control.minimum.saturating_add(MOST_ITEMS))).filter_map(item).collect()
 }
 
-/// Bytes that a text of this largest length takes; nothing where no text is so long.
-fn room(maximum: i64) -> Option<usize> {
-    /// More than any text has; a driver's mistake must not take all memory.
+/// Size of the buffer for a text of at most `maximum` bytes, its final zero included; `None` if no text is so long.
+fn text_buffer_bytes(maximum: i64) -> Option<usize> {
+    /// More than any text has: bounds the memory whatever length a driver states.
     const MOST_BYTES: usize = 1 << 16;
     usize::try_from(maximum).ok().filter(|&bytes| bytes < MOST_BYTES).map(|bytes| bytes + 1)
 }
 
+/// The present value of a control; `None` for kinds that have no single value.
 fn read(device: &Device, control: &Control) -> io::Result<Option<Value>> {
     let mut exchanged: sys::v4l2_ext_control = zeroed();
     exchanged.id = control.id;
     match control.kind {
         Kind::Button | Kind::Compound => return Ok(None),
         Kind::String => {
-            let Some(room) = room(control.maximum) else { return Ok(None) };
-            let mut bytes = vec![0u8; room];
+            let Some(length) = text_buffer_bytes(control.maximum) else { return Ok(None) };
+            let mut bytes = vec![0u8; length];
             exchanged.size = bytes.len() as u32;
             exchanged.__bindgen_anon_1.string = bytes.as_mut_ptr().cast();
             exchange(device, vidioc::VIDIOC_G_EXT_CTRLS as Request, &mut exchanged)?;
@@ -262,7 +267,7 @@ fn read(device: &Device, control: &Control) -> io::Result<Option<Value>> {
 fn write(device: &Device, control: &Control, value: &Value) -> io::Result<()> {
     let mut exchanged: sys::v4l2_ext_control = zeroed();
     exchanged.id = control.id;
-    // Outlives the call, which reads it.
+    // Declared here so that it outlives the call, which reads it through a pointer.
     let mut bytes = Vec::new();
     match (value, control.kind) {
         (Value::Text(text), _) => {
@@ -272,13 +277,14 @@ fn write(device: &Device, control: &Control, value: &Value) -> io::Result<()> {
             exchanged.__bindgen_anon_1.string = bytes.as_mut_ptr().cast();
         }
         (Value::Number(number), Kind::Integer64) => exchanged.__bindgen_anon_1.value64 = *number,
-        // A bit mask's highest bit is the sign here.
+        // Truncates as intended: bit 31 of a bit mask is the sign of the kernel's `i32`.
         (Value::Number(number), _) => exchanged.__bindgen_anon_1.value = *number as i32,
     }
     exchange(device, vidioc::VIDIOC_S_EXT_CTRLS as Request, &mut exchanged)
 }
 
-/// Reads or sets one control. Where that is a text, the caller's bytes hold it.
+/// Reads or sets one control: `request` is `VIDIOC_G_EXT_CTRLS` or `VIDIOC_S_EXT_CTRLS`. A text lies in the caller's
+/// buffer, to which `control` points.
 fn exchange(device: &Device, request: Request, control: &mut sys::v4l2_ext_control) -> io::Result<()> {
     let mut controls: sys::v4l2_ext_controls = zeroed();
     controls.count = 1;
@@ -304,14 +310,14 @@ mod tests {
             ("S_VIDEO--2", "s_video_2"),
             ("", ""),
         ] {
-            assert_eq!(variable(label), name);
+            assert_eq!(tool_name(label), name);
         }
     }
 
     #[test]
     fn the_room_for_a_text_is_bounded() {
-        assert_eq!([0, 31, 65_535].map(room), [Some(1), Some(32), Some(65_536)]);
-        assert_eq!([-1, 65_536, 1 << 40, i64::MAX].map(room), [None; 4]);
+        assert_eq!([0, 31, 65_535].map(text_buffer_bytes), [Some(1), Some(32), Some(65_536)]);
+        assert_eq!([-1, 65_536, 1 << 40, i64::MAX].map(text_buffer_bytes), [None; 4]);
     }
 
     #[test]

@@ -36,7 +36,7 @@ macro_rules! ioctls {
     };
 }
 
-/// What a driver is given whose answer lies all in it.
+/// An argument of an ioctl that holds its whole answer: the driver follows no pointer out of it.
 trait Flat {
     /// Whether the driver follows no pointer in this value.
     fn is_flat(&self) -> bool {
@@ -102,9 +102,9 @@ impl Device {
     #[allow(unsafe_code)]
     pub unsafe fn ioctl<T>(&self, request: Request, argument: &mut T) -> io::Result<()> {
         loop {
-            let at: *mut T = argument;
+            let pointer: *mut T = argument;
             // SAFETY: the descriptor is open, and the caller vouches for the argument.
-            let done = unsafe { v4l::v4l2::ioctl(self.fd.as_raw_fd(), request as _, at.cast::<c_void>()) };
+            let done = unsafe { v4l::v4l2::ioctl(self.fd.as_raw_fd(), request as _, pointer.cast::<c_void>()) };
             match done {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 done => return done,

@@ -1,4 +1,4 @@
-//! Events of a device: something to be told without asking again and again.
+//! Events of a device (V4L2's event interface): subscribing to them and taking them.
 
 use std::ffi::c_ulong;
 use std::io;
@@ -7,7 +7,7 @@ use v4l::v4l_sys as sys;
 
 use super::device::{Device, Request, zeroed};
 
-/// Tell at once how things stand, not only what changes (`V4L2_EVENT_SUB_FL_SEND_INITIAL`).
+/// Send an event with the present state at once, not only when it changes (`V4L2_EVENT_SUB_FL_SEND_INITIAL`).
 pub const SEND_INITIAL: u32 = sys::V4L2_EVENT_SUB_FL_SEND_INITIAL;
 /// The first number that a driver may give an event of its own.
 pub const PRIVATE_START: u32 = sys::V4L2_EVENT_PRIVATE_START;
@@ -22,7 +22,7 @@ const fn number<T>(direction: c_ulong, place: c_ulong) -> Request {
     direction << 30 | (size_of::<T>() as c_ulong) << 16 | (b'V' as c_ulong) << 8 | place
 }
 
-/// What a device has to tell.
+/// An event of a device (`struct v4l2_event`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
     pub kind: u32,

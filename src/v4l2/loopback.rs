@@ -1,4 +1,4 @@
-//! The module v4l2loopback: nodes that show to others, as a camera's, the frames that are written to them.
+//! Virtual cameras of the kernel module v4l2loopback: what is written to a node is read by others as a camera's frames.
 
 mod error;
 
@@ -25,7 +25,7 @@ const OUTPUT: u32 = sys::v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_OUTPUT;
 /// The module's control `keep_format`.
 const KEEP_FORMAT: u32 = sys::V4L2_CID_BASE | 0xf000;
 /// How long a write may wait for room; no version of the module has made one wait so far.
-const ROOM: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
+const WRITE_PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 
 /// How the pixels of a frame lie in memory; all without gaps between rows or planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +68,7 @@ impl Layout {
         }
     }
 
+    /// Whether frames of this size can be laid out so: sides along which pixels share their colour must be even.
     fn takes(self, (width, height): (u32, u32)) -> bool {
         match self {
             Self::Yuyv => width.is_multiple_of(2),
@@ -96,26 +97,27 @@ pub fn buffers() -> Option<u32> {
 const MOST_BUFFERS: u32 = 32;
 
 impl Output {
-    /// Opens a node and starts to stream to it: YUYV of `size` (the width even) in BT.601 and limited range, which is
-    /// what readers take every picture for, `rate` frames in each of which `scale` seconds. Where a reader or a control
-    /// has fixed the format, that is taken as it is: see [`Output::layout`] and [`Output::size`].
+    /// Opens a node and starts to stream YUYV to it, in BT.601 and limited range, as readers assume of every picture:
+    /// `size` pixels (the width even), `rate / scale` frames per second. Where a reader or a control has fixed the
+    /// format, that one is used instead: see [`Output::layout`] and [`Output::size`].
     ///
     /// # Errors
     /// It is no free node of the module, or its fixed format cannot be written.
     pub fn open(path: &Path, size: (u32, u32), (rate, scale): (u64, u64)) -> Result<Self, LoopbackError> {
         let device = Device::open(path).map_err(|cause| refused(path, cause))?;
-        let mut about: sys::v4l2_capability = zeroed();
-        if device.query_capability(&mut about).is_err() {
+        let mut capability: sys::v4l2_capability = zeroed();
+        if device.query_capability(&mut capability).is_err() {
             return Err(LoopbackError::NoVideo { path: path.to_owned() });
         }
-        let card = text(&about.card);
-        if text(&about.driver) != DRIVER {
+        let card = text(&capability.card);
+        if text(&capability.driver) != DRIVER {
             return Err(LoopbackError::NotLoopback { path: path.to_owned(), card });
         }
-        let can = |what: u32| about.device_caps & what != 0;
-        // A node with exclusive_caps no longer takes frames once it has a writer, unless its format is kept.
+        let can = |any: u32| capability.device_caps & any != 0;
+        // With exclusive_caps, a node that announces capture but no output has a writer, unless its format is kept.
         let has_writer = can(sys::V4L2_CAP_VIDEO_CAPTURE) && !can(sys::V4L2_CAP_VIDEO_OUTPUT) && !keeps_format(&device);
-        // Versions before 0.14 let others write as well, and without exclusive_caps do not even show that they do.
+        // Versions before 0.14 let several programs write, and without exclusive_caps do not show that one does: the
+        // lock at least keeps out another run of this program.
         let locked = flock(&device, FlockOperation::NonBlockingLockExclusive);
         if has_writer || locked.is_err_and(|error| error == Errno::WOULDBLOCK) {
             return Err(LoopbackError::Taken { path: path.to_owned(), by: other_holders(path) });
@@ -126,15 +128,16 @@ impl Output {
         let (layout, size) = set_format(&device, size)?;
         let mut parameters: sys::v4l2_streamparm = zeroed();
         parameters.type_ = OUTPUT;
-        let small = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
-        parameters.parm.output.timeperframe = sys::v4l2_fract { numerator: small(scale), denominator: small(rate) };
-        // For readers that ask; the frames come when they are written.
+        let saturated = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
+        parameters.parm.output.timeperframe =
+            sys::v4l2_fract { numerator: saturated(scale), denominator: saturated(rate) };
+        // Only tells readers that ask: frames come when they are written.
         if let Err(error) = device.set_parameters(&mut parameters) {
             tracing::debug!("{}: the frame rate cannot be set: {error}", path.display());
         }
         match device.stream_on(&mut (OUTPUT as i32)) {
-            // Versions up to 0.13 forget that they take frames if this is left out, when the node is closed. Those
-            // from 0.14 on want buffers first, and begin by themselves with the first frame.
+            // Up to 0.13 a node that is closed without this call having been made takes no frames any more. From 0.14
+            // on the call wants buffers first (EINVAL), and the first write starts the stream.
             Err(error) if Errno::from_io_error(&error) != Some(Errno::INVAL) => {
                 return Err(busy_or(&device, "the stream cannot be started", error));
             }
@@ -162,8 +165,7 @@ impl Output {
         self.size
     }
 
-    /// Shows one frame in place of all that readers may still find there: a reader that comes is first given what lies
-    /// in the module's buffers, however old.
+    /// Writes one frame into every buffer of the module: a new reader is first given what lies there, however old.
     ///
     /// # Errors
     /// The system refused.
@@ -193,9 +195,9 @@ impl Output {
                 Err(Errno::INTR) => {}
                 Err(Errno::AGAIN) if !waited => {
                     waited = true;
-                    let mut room = [PollFd::from_borrowed_fd(self.device.as_fd(), PollFlags::OUT)];
-                    // Whatever comes of it, the next write tells.
-                    let _ = poll(&mut room, Some(&ROOM));
+                    let mut fds = [PollFd::from_borrowed_fd(self.device.as_fd(), PollFlags::OUT)];
+                    // Room, a timeout or an error: the next write tells which.
+                    let _ = poll(&mut fds, Some(&WRITE_PATIENCE));
                 }
                 Err(Errno::BUSY) => return Err(busy_or(&self.device, "a frame cannot be written", Errno::BUSY.into())),
                 Err(error) => return Err(failed(error.into())),
@@ -211,6 +213,8 @@ impl Drop for Output {
     }
 }
 
+/// Sets YUYV of `size` as the node's format; returns the layout and size that hold then, which are others where the
+/// format is fixed.
 fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)), LoopbackError> {
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = OUTPUT;
@@ -232,33 +236,33 @@ fn set_format(device: &Device, size: (u32, u32)) -> Result<(Layout, (u32, u32)),
     let refused = |cause| busy_or(device, "its format cannot be set", cause);
     match device.set_format(&mut format) {
         Err(error) if Errno::from_io_error(&error) == Some(Errno::BUSY) => {
-            // Versions 0.13 refuse what differs from a format that is fixed; whoever has a writer refuses this, too.
+            // 0.13 refuses every format but the one that is fixed. A node that has a writer refuses that one, too.
             device.get_format(&mut format).map_err(refused)?;
             device.set_format(&mut format).map_err(refused)?;
         }
         done => done.map_err(refused)?,
     }
-    // What setting gives back is not always what was set: some versions say the buffer's size instead of the frame's.
+    // Asked for, since some versions answer the call above with the buffer's size instead of the frame's.
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = OUTPUT;
     device.get_format(&mut format).map_err(refused)?;
     // SAFETY: for this type of buffer the driver fills in this field.
     #[allow(unsafe_code)]
-    let set = unsafe { format.fmt.pix };
-    let size = (set.width, set.height);
-    match Layout::of(set.pixelformat).filter(|layout| layout.takes(size) && set.width > 0 && set.height > 0) {
-        Some(layout) if layout.frame_bytes(size) == set.sizeimage as usize => Ok((layout, size)),
+    let pix = unsafe { format.fmt.pix };
+    let size = (pix.width, pix.height);
+    match Layout::of(pix.pixelformat).filter(|layout| layout.takes(size) && pix.width > 0 && pix.height > 0) {
+        Some(layout) if layout.frame_bytes(size) == pix.sizeimage as usize => Ok((layout, size)),
         _ => Err(LoopbackError::Frozen {
             path: device.path().to_owned(),
-            fourcc: String::from_utf8_lossy(&set.pixelformat.to_le_bytes()).into_owned(),
-            width: set.width,
-            height: set.height,
+            fourcc: String::from_utf8_lossy(&pix.pixelformat.to_le_bytes()).into_owned(),
+            width: pix.width,
+            height: pix.height,
             by: other_holders(device.path()),
         }),
     }
 }
 
-/// Whether the module's control of this name is set: the format then stays when nobody writes.
+/// Whether the module's control `keep_format` is set: the format then stays when nobody writes.
 fn keeps_format(device: &Device) -> bool {
     let mut control = sys::v4l2_control { id: KEEP_FORMAT, value: 0 };
     device.get_control(&mut control).is_ok() && control.value != 0
@@ -271,13 +275,13 @@ fn refused(path: &Path, cause: io::Error) -> LoopbackError {
         Some(Errno::NOENT | Errno::NOTDIR | Errno::NODEV | Errno::NXIO) => LoopbackError::Missing { path },
         Some(Errno::ACCESS | Errno::PERM) => LoopbackError::Denied { path },
         Some(Errno::ISDIR) => LoopbackError::NoVideo { path },
-        // As many have it open as may.
+        // The module's limit of openers is reached.
         Some(Errno::BUSY) => LoopbackError::Taken { by: other_holders(&path), path },
         _ => LoopbackError::System { path, doing: "it cannot be opened", cause },
     }
 }
 
-/// The module says that something is wrong, in many ways, when another writer has the node.
+/// Why the node refused what was tried (`doing`): the module has several errors for a node with another writer.
 fn busy_or(device: &Device, doing: &'static str, cause: io::Error) -> LoopbackError {
     let path = device.path().to_owned();
     let by = other_holders(&path);

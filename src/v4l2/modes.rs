@@ -113,11 +113,12 @@ impl Interval {
         (numerator > 0 && denominator > 0).then_some(Self { numerator, denominator })
     }
 
-    /// The interval of a rate, to a thousandth of a frame per second; 29.97 and its kin as the fractions that they are.
+    /// The interval of a rate, to a thousandth of a frame per second; NTSC rates such as 29.97 are exact (1001/30000).
     pub fn from_fps(fps: f64) -> Self {
-        let whole = (fps * 1.001).round();
-        if (fps - whole / 1.001).abs() < 0.004 && (fps - fps.round()).abs() > 0.004 {
-            return Self { numerator: 1001, denominator: (whole * 1000.0) as u32 };
+        let nominal = (fps * 1.001).round();
+        // Tolerant enough that 23.98, too, means 24000/1001 frames per second.
+        if (fps - nominal / 1.001).abs() < 0.004 && (fps - fps.round()).abs() > 0.004 {
+            return Self { numerator: 1001, denominator: (nominal * 1000.0) as u32 };
         }
         if (fps - fps.round()).abs() < 1e-6 {
             return Self { numerator: 1, denominator: fps.round().max(1.0) as u32 };
@@ -194,7 +195,7 @@ impl fmt::Display for Sizes {
 }
 
 impl Rates {
-    /// The offered interval next to `wanted`; `None` where the driver does not tell.
+    /// The offered interval nearest to `wanted`; `None` where the driver does not tell.
     pub fn nearest(&self, wanted: Interval) -> Option<Interval> {
         // By ratio: 1/30 and 333333/10000000 are the same rate.
         let distance = |interval: &Interval| (interval.fps() / wanted.fps()).ln().abs();
@@ -208,8 +209,8 @@ impl Rates {
     }
 }
 
-/// No driver offers as many entries of anything; a list that is longer has no end.
-const ENDLESS: u32 = 512;
+/// Bound of every list: no driver offers as many entries, so a longer one would never end.
+const MAX_ENTRIES: u32 = 512;
 
 /// What `device` offers on all its capture queues, in the order of the driver. Empty where it captures nothing.
 ///
@@ -218,10 +219,10 @@ const ENDLESS: u32 = 512;
 pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
     let mut capability = zeroed::<sys::v4l2_capability>();
     device.query_capability(&mut capability)?;
-    let own = own_caps(&capability);
+    let caps = own_caps(&capability);
     let mut found = Vec::new();
-    for queue in QueueKind::ALL.into_iter().filter(|queue| own & queue.capability() != 0) {
-        for index in 0..ENDLESS {
+    for queue in QueueKind::ALL.into_iter().filter(|queue| caps & queue.capability() != 0) {
+        for index in 0..MAX_ENTRIES {
             let mut format = zeroed::<sys::v4l2_fmtdesc>();
             (format.index, format.type_) = (index, queue.buffer_type());
             if device.enum_format(&mut format).is_err() {
@@ -242,7 +243,7 @@ pub fn modes(device: &Device) -> io::Result<Vec<FormatModes>> {
 /// The sizes of a format, each with its rates.
 fn sizes(device: &Device, fourcc: FourCc) -> Sizes {
     let mut discrete = Vec::new();
-    for index in 0..ENDLESS {
+    for index in 0..MAX_ENTRIES {
         let mut entry = zeroed::<sys::v4l2_frmsizeenum>();
         (entry.index, entry.pixel_format) = (index, fourcc.to_u32());
         if device.enum_frame_size(&mut entry).is_err() {
@@ -266,7 +267,7 @@ enum SizeEntry {
     Range { min_px: (u32, u32), max_px: (u32, u32), step_px: (u32, u32) },
 }
 
-/// What an entry of the list of sizes says; nothing where its type is unknown or its size empty.
+/// The size or range of sizes in an entry of the driver's list; `None` where its type is unknown or its size empty.
 fn size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
     // SAFETY: every member of the union is made of integers, for which all bits are values.
     #[allow(unsafe_code)]
@@ -289,10 +290,10 @@ fn size_entry(entry: &sys::v4l2_frmsizeenum) -> Option<SizeEntry> {
     (largest.0 > 0 && largest.1 > 0).then_some(found)
 }
 
-/// The rates of a format at a size.
+/// The rates of a format at a size, as the driver lists them.
 pub fn rates(device: &Device, fourcc: FourCc, size_px: (u32, u32)) -> Rates {
     let mut discrete = Vec::new();
-    for index in 0..ENDLESS {
+    for index in 0..MAX_ENTRIES {
         let mut entry = zeroed::<sys::v4l2_frmivalenum>();
         (entry.index, entry.pixel_format, (entry.width, entry.height)) = (index, fourcc.to_u32(), size_px);
         if device.enum_frame_interval(&mut entry).is_err() {

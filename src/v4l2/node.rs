@@ -105,6 +105,7 @@ pub fn resolve(name: &str) -> Result<PathBuf, NodeError> {
 
 /// Where the system keeps its nodes.
 struct Places {
+    /// The folder of sysfs with a folder for each node.
     class: PathBuf,
     dev: PathBuf,
 }
@@ -116,7 +117,9 @@ impl Default for Places {
 }
 
 impl Places {
+    /// See [`nodes`].
     fn nodes(&self) -> Vec<Node> {
+        // From both: a container may lack either.
         let mut names: Vec<(u32, String)> = [&self.class, &self.dev]
             .into_iter()
             .flat_map(|folder| names_in(folder))
@@ -133,7 +136,7 @@ impl Places {
         names.iter().filter_map(|(index, name)| self.node(*index, name, &links)).collect()
     }
 
-    /// Nothing when the device went away meanwhile.
+    /// Describes the node `name`; `None` if its device went away meanwhile. `links` are pairs of a target and its link.
     fn node(&self, index: u32, name: &str, links: &[(PathBuf, PathBuf)]) -> Option<Node> {
         let (path, class) = (self.dev.join(name), self.class.join(name));
         let read = |file: &str| fs::read_to_string(class.join(file)).unwrap_or_default().trim().to_owned();
@@ -167,13 +170,14 @@ impl Places {
         Some(node)
     }
 
+    /// See [`resolve`].
     fn resolve(&self, name: &str) -> Result<PathBuf, NodeError> {
         if name.contains('/') {
             let path = PathBuf::from(name);
             return match fs::metadata(&path) {
                 Ok(metadata) if metadata.file_type().is_char_device() => Ok(path),
                 Ok(_) => Err(NodeError::NotADevice(path)),
-                // Whoever opens it learns why it cannot be looked at.
+                // Taken as it is: opening it will tell why it cannot be examined.
                 Err(error) if error.kind() != io::ErrorKind::NotFound => Ok(path),
                 Err(_) => Err(not_found(name, &self.nodes())),
             };
@@ -189,18 +193,20 @@ impl Places {
 }
 
 impl Node {
+    /// Fills in what the driver says of the node.
     fn describe(&mut self, capability: &sys::v4l2_capability) {
         self.card = text(&capability.card);
         self.driver = text(&capability.driver);
         self.bus = text(&capability.bus_info);
         let caps = own_caps(capability);
         let can = |any: u32| caps & any != 0;
-        let frames = can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE);
-        self.captures = frames && can(sys::V4L2_CAP_STREAMING);
+        let has_frames = can(sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE);
+        self.captures = has_frames && can(sys::V4L2_CAP_STREAMING);
         self.outputs = can(sys::V4L2_CAP_VIDEO_OUTPUT | sys::V4L2_CAP_VIDEO_OUTPUT_MPLANE);
         self.kind = if self.driver == LOOPBACK_DRIVER {
             Kind::Virtual
         } else if can(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
+            // Its queues are the two ends of one conversion: frames come out only for those that go in.
             (self.captures, self.outputs) = (false, false);
             Kind::MemoryToMemory
         } else if self.captures {
@@ -218,12 +224,15 @@ impl Node {
 /// What v4l2loopback calls itself, in all versions.
 pub const LOOPBACK_DRIVER: &str = "v4l2 loopback";
 
-/// The text in a field of the kernel's: up to the first zero. Bytes that are no UTF-8 become replacement characters.
+/// The text in a field of a kernel structure, up to its first zero byte and trimmed. Bytes that are no UTF-8 become
+/// replacement characters.
 pub fn text(field: &[u8]) -> String {
     let end = field.iter().position(|byte| *byte == 0).unwrap_or(field.len());
     String::from_utf8_lossy(&field[..end]).trim().to_owned()
 }
 
+/// The one node that frames can be taken from whose card's name contains `name`, case aside. Virtual cameras are looked
+/// at only if no real one matches.
 fn by_card<'a>(name: &str, nodes: &'a [Node]) -> Result<&'a Node, NodeError> {
     let wanted = name.to_lowercase();
     let named = |kind| -> Vec<&Node> {
@@ -247,7 +256,7 @@ fn not_found(name: &str, nodes: &[Node]) -> NodeError {
 }
 
 impl Node {
-    /// For choosing among devices of the same name.
+    /// As displayed, with its first link: tells devices of the same name apart.
     fn with_link(&self) -> String {
         let mut line = self.to_string();
         if let Some(link) = self.links.first() {
@@ -281,7 +290,8 @@ pub fn usb_of(node: &Path) -> Option<Usb> {
     usb(&Places::default().class.join(node.file_name()?))
 }
 
-/// The USB device that a node of the class belongs to: `device` leads to its interface, which lies in its folder.
+/// The USB device of the node whose folder in sysfs is `class`: `device` there links to a USB interface, whose parent
+/// folder is that of the USB device.
 fn usb(class: &Path) -> Option<Usb> {
     let interface = fs::canonicalize(class.join("device")).ok()?;
     let read = |file: &str| Some(fs::read_to_string(interface.parent()?.join(file)).ok()?.trim().to_owned());

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::filter::{BLOCK, Taps, along_column, along_column_block, along_row, keep_in_range};
+use super::filter::{BLOCK_ROWS, Taps, along_column, along_column_block, along_row, keep_in_range};
 use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_ROW, Strips};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
@@ -45,9 +45,10 @@ pub struct Strip<'a> {
     pub scratch: &'a mut Scratch,
 }
 
-/// Rows of the horizontal filters' results that are kept: those that a column of this reach needs, in a power of two.
-fn ring(reach: usize) -> usize {
-    (2 * reach + BLOCK).next_power_of_two()
+/// Rows of the horizontal filters' results that are kept: as many as a block of rows needs, up to a power of two, so
+/// that an index is masked.
+fn ring_rows(reach: usize) -> usize {
+    (2 * reach + BLOCK_ROWS).next_power_of_two()
 }
 
 /// Memory of one thread for the pass `blur`.
@@ -65,7 +66,7 @@ impl Scratch {
     pub fn new(plan: &Plan) -> Self {
         let reach = plan.ladder.most_reach();
         Self {
-            rows: Aligned::zeros(ring(reach) * GROUP.min(plan.ladder.most_terms()) * STRIP_ROW),
+            rows: Aligned::zeros(ring_rows(reach) * GROUP.min(plan.ladder.most_terms()) * STRIP_ROW),
             line: Aligned::zeros(4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
@@ -81,9 +82,9 @@ impl WithSimd for Strip<'_> {
         }
         // A whole bin covers every pixel, and that needs no filter.
         if self.whole {
-            self.groups::<S, 3>(simd);
+            self.filter_groups::<S, 3>(simd);
         } else {
-            self.groups::<S, 4>(simd);
+            self.filter_groups::<S, 4>(simd);
         }
     }
 }
@@ -91,24 +92,24 @@ impl WithSimd for Strip<'_> {
 impl Strip<'_> {
     /// Filters `P` planes, a group of terms at a time.
     #[inline(always)]
-    fn groups<S: Simd, const P: usize>(&mut self, simd: S) {
+    fn filter_groups<S: Simd, const P: usize>(&mut self, simd: S) {
         let terms = self.bank.terms;
         for first in (0..terms).step_by(GROUP) {
             match ((terms - first).min(GROUP), self.bank.even) {
-                (1, true) => self.group::<S, 1, true, P>(simd, first),
-                (2, true) => self.group::<S, 2, true, P>(simd, first),
-                (3, true) => self.group::<S, 3, true, P>(simd, first),
-                (_, true) => self.group::<S, 4, true, P>(simd, first),
-                (1, false) => self.group::<S, 1, false, P>(simd, first),
-                (2, false) => self.group::<S, 2, false, P>(simd, first),
-                (3, false) => self.group::<S, 3, false, P>(simd, first),
-                (_, false) => self.group::<S, 4, false, P>(simd, first),
+                (1, true) => self.filter_group::<S, 1, true, P>(simd, first),
+                (2, true) => self.filter_group::<S, 2, true, P>(simd, first),
+                (3, true) => self.filter_group::<S, 3, true, P>(simd, first),
+                (_, true) => self.filter_group::<S, 4, true, P>(simd, first),
+                (1, false) => self.filter_group::<S, 1, false, P>(simd, first),
+                (2, false) => self.filter_group::<S, 2, false, P>(simd, first),
+                (3, false) => self.filter_group::<S, 3, false, P>(simd, first),
+                (_, false) => self.filter_group::<S, 4, false, P>(simd, first),
             }
         }
     }
 
-    /// Most of a bin is empty: its surface covers part of the picture. Finds which rows of cells get a result and which
-    /// rows have to be filtered for it; false when none.
+    /// Finds the rows of cells that get a result (`active`), and those whose rows have to be filtered for it: most of a
+    /// bin is empty, as its surface covers part of the picture. False when nothing reaches the strip.
     #[inline(always)]
     fn mark_active(&mut self) -> bool {
         let (across, down) = (self.reach.div_ceil(CELL), self.reach.div_ceil(CELL));
@@ -122,7 +123,7 @@ impl Strip<'_> {
             let reach = y.saturating_sub(down)..(y + down + 1).min(rows);
             let active = filtered[reach].iter().any(|&f| f);
             let was = std::mem::replace(&mut self.active[y], active);
-            // What the frame before left there; elsewhere there are zeros already.
+            // Clears what the previous frame left there; elsewhere there are zeros already.
             if was && !active {
                 let end = ((y + 1) * CELL).min(self.size.1);
                 self.out[y * CELL * 4 * STRIP..end * 4 * STRIP].fill(0.0);
@@ -133,25 +134,25 @@ impl Strip<'_> {
 
     /// Filters `R` terms from `first` on: all rows, then all columns.
     #[inline(always)]
-    fn group<S: Simd, const R: usize, const EVEN: bool, const P: usize>(&mut self, simd: S, first: usize) {
+    fn filter_group<S: Simd, const R: usize, const EVEN: bool, const P: usize>(&mut self, simd: S, first: usize) {
         let mut scratch = std::mem::take(&mut self.scratch.rows);
-        let (row_len, ring) = (R * STRIP_ROW, ring(self.reach));
-        let mut next = 0;
-        for y in (0..self.size.1).step_by(BLOCK) {
+        let (row_len, ring) = (R * STRIP_ROW, ring_rows(self.reach));
+        let mut next_y = 0;
+        for y in (0..self.size.1).step_by(BLOCK_ROWS) {
             if !self.active[y / CELL] {
                 continue;
             }
             // A ring of rows, no more than the columns reach, stays in the nearest caches.
-            for above in next.max(y.saturating_sub(self.reach))..(y + self.reach + BLOCK).min(self.size.1) {
-                let row = &mut scratch[above % ring * row_len..][..row_len];
-                if self.scratch.filtered[above / CELL] {
-                    self.filter_row::<S, R, EVEN, P>(simd, first, above, row);
+            for source_y in next_y.max(y.saturating_sub(self.reach))..(y + self.reach + BLOCK_ROWS).min(self.size.1) {
+                let row = &mut scratch[source_y % ring * row_len..][..row_len];
+                if self.scratch.filtered[source_y / CELL] {
+                    self.filter_row::<S, R, EVEN, P>(simd, first, source_y, row);
                 } else {
                     row.fill(0.0);
                 }
-                next = above + 1;
+                next_y = source_y + 1;
             }
-            let rows = y..(y + BLOCK).min(self.size.1);
+            let rows = y..(y + BLOCK_ROWS).min(self.size.1);
             self.filter_columns::<S, R, EVEN, P>(simd, first, rows, &scratch[..ring * row_len]);
         }
         self.scratch.rows = scratch;
@@ -170,7 +171,7 @@ impl Strip<'_> {
         // The source's rows are copied `PIECE` columns at a time.
         let pad = self.reach.next_multiple_of(PIECE);
         let span = STRIP + 2 * pad;
-        self.source.line(self.strip, y, self.size.0, pad, &mut line);
+        self.source.copy_line(self.strip, y, self.size.0, pad, &mut line);
         let plane = |p: usize| &line[p * span..][..span];
         let planes = [plane(0), plane(1), plane(2), plane(3)];
         let edges = self.edges.at(self.strip, y);
@@ -205,8 +206,8 @@ impl Strip<'_> {
     ) {
         for x in (0..STRIP).step_by(S::F32_LANES) {
             let (table, edges, strip) = (&self.bank.vertical, self.edges, self.strip);
-            // One radius for the whole picture: several rows share what they read.
-            if P == 3 && ys.len() == BLOCK {
+            // With one radius for the whole picture, the rows of a block have the same taps and share what they read.
+            if P == 3 && ys.len() == BLOCK_ROWS {
                 let shared = self.taps::<R>(table, first, &edges.at(strip, ys.start), x);
                 let mut same = true;
                 for y in ys.clone() {
@@ -215,9 +216,9 @@ impl Strip<'_> {
                 }
                 if same {
                     let sums = along_column_block::<S, R, P>(simd, &shared, rows, ys.start, x, self.size.1);
-                    for k in 0..BLOCK {
+                    for k in 0..BLOCK_ROWS {
                         let y = ys.start + k;
-                        self.finish::<S, R, P>(simd, first, (x, y), sums[k], &edges.at(strip, y));
+                        self.add_to_result::<S, R, P>(simd, first, (x, y), sums[k], &edges.at(strip, y));
                     }
                     continue;
                 }
@@ -230,14 +231,14 @@ impl Strip<'_> {
                 } else {
                     along_column::<S, R, EVEN, true, P>(simd, &taps, rows, y, x, self.size.1)
                 };
-                self.finish::<S, R, P>(simd, first, (x, y), sums, &edges);
+                self.add_to_result::<S, R, P>(simd, first, (x, y), sums, &edges);
             }
         }
     }
 
-    /// Stores the sums of a group, and keeps them in range after the last one.
+    /// Adds the sums of a group to the result; after the last group, clamps it.
     #[inline(always)]
-    fn finish<S: Simd, const R: usize, const P: usize>(
+    fn add_to_result<S: Simd, const R: usize, const P: usize>(
         &mut self,
         simd: S,
         first: usize,
@@ -252,7 +253,7 @@ impl Strip<'_> {
             }
         }
         if first + R >= self.bank.terms {
-            // A bin that is whole was filtered without its coverage.
+            // A whole bin was filtered without its coverage, which is 1.
             if P == 3 {
                 sums[3] = simd.splat_f32s(1.0);
             }
@@ -263,7 +264,7 @@ impl Strip<'_> {
         }
     }
 
-    /// The taps of the vector at column `x` of the strip.
+    /// The taps in `table` of the vector at column `x` of the strip, for the terms from `first` on.
     #[inline(always)]
     fn taps<'b, const R: usize>(
         &self,

@@ -22,7 +22,7 @@ pub const CHUNK: usize = 128;
 /// Entries of one half of the table back to 8 bits: small enough for the nearest cache, fine enough that decoding and
 /// encoding is the identity.
 const ENCODE_STEPS: usize = 1 << 12;
-/// Light below this has a half of its own, as steep as the curve is there.
+/// Light below this has a half of its own, with finer steps, as the curve is steep there.
 const DARK: f32 = 1.0 / 16.0;
 /// Entries of the table: two halves of `ENCODE_STEPS + 1`, and up to a power of two, so that an index is masked.
 const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
@@ -41,11 +41,11 @@ impl EncodeTable {
     }
 }
 
-/// Rows `y0..` of the result, a row of tiles.
+/// Makes rows `y0..` of the result: a row of tiles.
 pub struct Composite<'a> {
     pub plan: &'a Plan,
     pub slots: &'a [Slot],
-    /// What stays as it is.
+    /// Tells which tiles stay as they are.
     pub tiles: &'a Tiles,
     /// The frame as it came.
     pub frame: &'a Source<'a>,
@@ -58,7 +58,7 @@ pub struct Composite<'a> {
     pub out: &'a mut [u8],
 }
 
-/// What lies along the rays through some pixels, front to back: a bin covers what is still open.
+/// Bins composited front to back at some pixels: each covers what is still open.
 #[derive(Clone, Copy)]
 struct Pile<S: Simd> {
     color: [S::f32s; 3],
@@ -76,25 +76,25 @@ impl<S: Simd> Pile<S> {
         Self { color: [zero; 3], open: one, hindmost: [zero; 3], known: zero }
     }
 
-    /// Puts a bin behind all there is.
+    /// Adds a bin behind all others, as premultiplied colour and coverage.
     #[inline(always)]
     fn add(&mut self, simd: S, layer: [S::f32s; 4]) {
         let one = simd.splat_f32s(1.0);
-        let taken = simd.min_f32s(layer[3], self.open);
+        let covered = simd.min_f32s(layer[3], self.open);
         let inverse = simd.div_f32s(one, simd.max_f32s(layer[3], simd.splat_f32s(1e-6)));
-        let counts = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / HINDMOST_COVERAGE)), one);
+        let weight = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / HINDMOST_COVERAGE)), one);
         for p in 0..3 {
-            let own = simd.mul_f32s(layer[p], inverse);
-            self.color[p] = fma(simd, own, taken, self.color[p]);
-            self.hindmost[p] = fma(simd, simd.sub_f32s(own, self.hindmost[p]), counts, self.hindmost[p]);
+            let straight = simd.mul_f32s(layer[p], inverse);
+            self.color[p] = fma(simd, straight, covered, self.color[p]);
+            self.hindmost[p] = fma(simd, simd.sub_f32s(straight, self.hindmost[p]), weight, self.hindmost[p]);
         }
-        self.known = fma(simd, simd.sub_f32s(one, self.known), counts, self.known);
-        self.open = simd.sub_f32s(self.open, taken);
+        self.known = fma(simd, simd.sub_f32s(one, self.known), weight, self.known);
+        self.open = simd.sub_f32s(self.open, covered);
     }
 
-    /// What is still open was hidden from the camera, and lies behind all else: it gets the colour of the hindmost.
+    /// The colour, with what is still open in that of the hindmost bin: it was hidden from the camera behind all else.
     #[inline(always)]
-    fn closed(&self, simd: S) -> [S::f32s; 3] {
+    fn with_rest_filled(&self, simd: S) -> [S::f32s; 3] {
         let scale = simd.div_f32s(self.open, simd.max_f32s(self.known, simd.splat_f32s(1e-6)));
         std::array::from_fn(|p| fma(simd, self.hindmost[p], scale, self.color[p]))
     }
@@ -108,7 +108,7 @@ struct Layers {
 }
 
 impl Layers {
-    /// One picture out of all layers.
+    /// Composites the layers, the near ones over the others, to linear light.
     #[inline(always)]
     fn flatten<S: Simd>(&self, simd: S, color: &mut Color) {
         let (near, rest) = self.planes.0[..self.count].split_at(self.near);
@@ -117,16 +117,16 @@ impl Layers {
             let layer = |planes: &[[f32; CHUNK]; 4]| planes.each_ref().map(|plane| load::<S>(plane, x));
             let mut back = Pile::new(simd);
             rest.iter().for_each(|planes| back.add(simd, layer(planes)));
-            let mut light = back.closed(simd);
+            let mut light = back.with_rest_filled(simd);
             if !near.is_empty() {
                 let mut front = Pile::new(simd);
                 near.iter().for_each(|planes| front.add(simd, layer(planes)));
-                // Where nothing lies behind, what lies in front is all there is.
-                let some = simd.greater_than_f32s(back.known, simd.splat_f32s(1e-4));
-                let alone = front.closed(simd);
-                let open = simd.select_f32s(some, front.open, zero);
+                // Where nothing lies behind, the near bins have to fill the pixel.
+                let has_back = simd.greater_than_f32s(back.known, simd.splat_f32s(1e-4));
+                let alone = front.with_rest_filled(simd);
+                let open = simd.select_f32s(has_back, front.open, zero);
                 for p in 0..3 {
-                    let ahead = simd.select_f32s(some, front.color[p], alone[p]);
+                    let ahead = simd.select_f32s(has_back, front.color[p], alone[p]);
                     light[p] = fma(simd, light[p], open, ahead);
                 }
             }
@@ -159,14 +159,14 @@ impl WithSimd for Composite<'_> {
                 let row = &mut row[x0 * 3..][..take * 3];
                 match self.plan.compositing {
                     Compositing::Layers => {
-                        if !self.read::<S>(y, x0, still, &mut layers) {
+                        if !self.read_layers::<S>(y, x0, still, &mut layers) {
                             row.copy_from_slice(&self.frame.color.rgb[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
                         layers.flatten(simd, &mut color);
                     }
                     Compositing::Select => self.select::<S>(y, x0, take, &mut layers.planes.0[0], &mut color.0),
-                    Compositing::Gather => gathered(self.gathered, width, y, x0, &mut color.0),
+                    Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
                 }
                 encode(&mut color.0, self.plan.expansion, self.encode, row);
             }
@@ -175,9 +175,9 @@ impl WithSimd for Composite<'_> {
 }
 
 impl Composite<'_> {
-    /// Reads every bin that has something in a chunk; false where a still chunk stays as it is.
+    /// Reads the bins that hold anything in a chunk; false where it is `still` and nothing near reaches it: it stays.
     #[inline(always)]
-    fn read<S: Simd>(&self, y: usize, x0: usize, still: bool, layers: &mut Layers) -> bool {
+    fn read_layers<S: Simd>(&self, y: usize, x0: usize, still: bool, layers: &mut Layers) -> bool {
         (layers.near, layers.count) = (0, 0);
         for bin in &self.plan.bins {
             if still && !bin.near && layers.count == 0 {
@@ -191,7 +191,7 @@ impl Composite<'_> {
         true
     }
 
-    /// Every pixel takes the bins of its own CoC.
+    /// The colour of a chunk of `take` pixels, from the bins of each pixel's own CoC, by their share of it.
     #[inline(always)]
     fn select<S: Simd>(
         &self,
@@ -219,8 +219,9 @@ impl Composite<'_> {
     }
 }
 
+/// Copies a chunk of the gather's result.
 #[inline(always)]
-fn gathered(rows: &[f32], width: usize, y: usize, x0: usize, color: &mut [[f32; CHUNK]; 3]) {
+fn copy_gathered(rows: &[f32], width: usize, y: usize, x0: usize, color: &mut [[f32; CHUNK]; 3]) {
     let take = CHUNK.min(width - x0);
     for (p, color) in color.iter_mut().enumerate() {
         color[..take].copy_from_slice(&rows[(y * 3 + p) * width + x0..][..take]);
@@ -246,16 +247,17 @@ fn sample<S: Simd>(bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32;
         return false;
     }
     match bin.scale {
-        1 => stretch::<S, 1>(slot, bin.height, (above, below, share), x0, out),
-        2 => stretch::<S, 2>(slot, bin.height, (above, below, share), x0, out),
-        4 => stretch::<S, 4>(slot, bin.height, (above, below, share), x0, out),
-        _ => stretch::<S, 8>(slot, bin.height, (above, below, share), x0, out),
+        1 => upsample::<S, 1>(slot, bin.height, (above, below, share), x0, out),
+        2 => upsample::<S, 2>(slot, bin.height, (above, below, share), x0, out),
+        4 => upsample::<S, 4>(slot, bin.height, (above, below, share), x0, out),
+        _ => upsample::<S, 8>(slot, bin.height, (above, below, share), x0, out),
     }
     true
 }
 
+/// A chunk of a bin of scale `S`, linear between rows `above` and `below` (by `share`) and between columns.
 #[inline(always)]
-fn stretch<V: Simd, const S: usize>(
+fn upsample<V: Simd, const S: usize>(
     slot: &Slot,
     height: usize,
     (above, below, share): (usize, usize, f32),
@@ -301,6 +303,7 @@ fn stretch<V: Simd, const S: usize>(
     }
 }
 
+/// Compresses the highlights of a chunk and looks up its 8-bit sRGB.
 #[inline(always)]
 fn encode(color: &mut [[f32; CHUNK]; 3], expansion: f32, table: &EncodeTable, out: &mut [u8]) {
     if expansion.is_finite() {

@@ -12,11 +12,14 @@ use crate::bokeh::plan::Plan;
 use crate::compute::simd::madd;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// Memory of the gathers.
+/// Runs both forms of the gather, and has their memory.
 pub struct Gather {
+    /// As in [`Exact`]; none unless the plan is exact.
     kernels: Vec<[Vec<f32>; 2]>,
     source: Rows<4>,
+    /// Signed CoC, `[row][width]`.
     coc: Vec<f32>,
+    /// Results of the horizontal pass, `[row][term][3][width]`; none where the plan is exact.
     rows: Vec<f32>,
     result: Vec<f32>,
 }
@@ -44,7 +47,8 @@ impl Gather {
         &self.result
     }
 
-    /// Gathers a frame from the one bin that holds it.
+    /// Blurs a frame whose one bin is in `strips`: copies that to padded rows, finds the CoC of every pixel, and
+    /// gathers with the full kernels or with the separable ones.
     pub fn run(
         &mut self,
         (workers, arch): (&mut ThreadPool, Arch),
@@ -119,6 +123,7 @@ impl WithSimd for Exact<'_> {
             let mut sums = [simd.splat_f32s(0.0); 3];
             let mut tails = [0.0f32; 3];
             for (k, taps) in kernel.chunks_exact(side).enumerate() {
+                // Beyond the picture its outermost row goes on.
                 let y = (self.y + k).saturating_sub(reach).min(height - 1);
                 let row = self.source.row(y);
                 let (taps, taps_tail) = S::as_simd_f32s(taps);

@@ -48,10 +48,13 @@ pub struct CpuBokeh {
     tiles: Tiles,
     slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
+    /// Per band and block, whether its bins behind wait for the fill.
     waits: Vec<bool>,
     gather: Option<Gather>,
     members: Vec<Member>,
+    /// Flags for [`DisjointParts`]: as many as any pass has parts.
     taken: Vec<AtomicBool>,
+    /// The last frame, until it is collected.
     done: Option<Finished>,
 }
 
@@ -74,6 +77,7 @@ impl CpuBokeh {
             .map(|_| Member {
                 coc: vec![0.0; width],
                 sums: BandSums::new(),
+                // The pass takes a grid and a row of it.
                 reach: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 blur: Scratch::new(&plan),
             })
@@ -134,6 +138,7 @@ impl CpuBokeh {
         let frame = Source { color, depth, coc, expansion: self.plan.expansion };
         self.split(&frame);
         lap("split");
+        // With something in front, blocks in which it hides anything get their bins behind after the fill.
         let fills = self.filled();
         self.bin(&frame, fills, false);
         lap("bin");
@@ -159,7 +164,7 @@ impl CpuBokeh {
         Ok(times)
     }
 
-    /// What is where, and which bins that makes.
+    /// Splits the frame's CoC into bins, finds the tiles that stay as they are, and which bins hold anything.
     fn split(&mut self, frame: &Source<'_>) {
         self.plan.split(frame.depth, frame.coc);
         let across = self.tiles.across;
@@ -172,7 +177,7 @@ impl CpuBokeh {
             });
         }
         self.tiles.settle(layered);
-        // What lies in front spreads over tiles that are in focus, however far; there they are needed.
+        // What lies in front may spread to any tile in focus, so bins are needed there, too.
         if self.plan.bins.iter().any(|bin| bin.near) {
             self.tiles.idle.fill(false);
         }
@@ -181,37 +186,39 @@ impl CpuBokeh {
             let bin = &self.plan.bins[k];
             let slot = &mut self.slots[bin.slot];
             let meets = || self.tiles.any_within(&self.plan.share(k), 0..self.tiles.across, 0..self.tiles.down);
+            // What is filled in may be in any bin behind.
             slot.present = !layered || (fills && !bin.near) || meets();
-            slot.shape(&self.plan, bin);
+            slot.reshape(&self.plan, bin);
         }
     }
 
-    /// The bins; `again` for those behind, where they waited for the fill.
-    fn bin(&mut self, frame: &Source<'_>, fills: bool, again: bool) {
+    /// Pass `bin`. With `fills` it runs twice: `second_pass` does the bins behind, in blocks that waited for the fill.
+    fn bin(&mut self, frame: &Source<'_>, fills: bool, second_pass: bool) {
         let plan = &self.plan;
         let blocks = plan.width.div_ceil(BLOCK);
+        // Bands of 32 rows at least, as each reads some rows of its neighbours again.
         let coarsest = plan.bins.iter().map(|bin| bin.scale).max().unwrap_or(1).max(SCALES[2]);
         let rows = CELL * coarsest;
         let mut shelves: [Option<BinShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bin_in(slot.index) else { continue };
-            if !(again && plan.bins[k].near) {
+            if !(second_pass && plan.bins[k].near) {
                 shelves[k] = Some(BinShelves::new(plan, k, slot, rows));
             }
         }
         let (arch, tiles) = (self.arch, &self.tiles);
         let bands = plan.height.div_ceil(rows);
         let waits = DisjointParts::new(&mut self.waits[..bands * blocks], blocks, &mut self.taken);
-        let behind = plan.unhidden();
+        let unhidden = plan.unhidden();
         let nearest_px = plan.nearest_behind_px();
         let (base, filled) = match self.pyramid.as_mut().filter(|_| fills) {
-            Some(pyramid) if again => (None, Some(pyramid.behind(behind, nearest_px))),
+            Some(pyramid) if second_pass => (None, Some(pyramid.behind(unhidden, nearest_px))),
             Some(pyramid) => (Some(pyramid.base(rows)), None),
             None => (None, None),
         };
         self.workers.run_with(&mut self.members, bands, &|member: &mut Member, band| {
             let hidden = match (&base, filled) {
-                (Some(base), _) => Hidden::Waits(behind, base.band(band, rows, plan.height)),
+                (Some(base), _) => Hidden::Waits(unhidden, base.band(band, rows, plan.height)),
                 (_, Some(filled)) => Hidden::Filled(filled),
                 _ => Hidden::Nothing,
             };
@@ -227,6 +234,7 @@ impl CpuBokeh {
         });
     }
 
+    /// Pass `reach`: each part is a bin.
     fn reach(&mut self) {
         let plan = &self.plan;
         let parts = DisjointParts::new(&mut self.slots, 1, &mut self.taken);
@@ -238,6 +246,7 @@ impl CpuBokeh {
         });
     }
 
+    /// Pass `blur`: each part is a strip; the strips of all bins are numbered through, so that no thread runs idle.
     fn blur_bins(&mut self) {
         let (plan, arch) = (&self.plan, self.arch);
         let mut shelves: [Option<StripShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
@@ -249,6 +258,7 @@ impl CpuBokeh {
             parts += strips;
         }
         self.workers.run_with(&mut self.members, parts, &|member: &mut Member, part| {
+            // The bin of a part is the last one that begins at or before it.
             let all = shelves.iter().zip(&plan.bins).filter_map(|(shelf, bin)| shelf.as_ref().zip(Some(bin)));
             let Some((shelf, bin)) = all.filter(|(shelf, _)| shelf.first <= part).max_by_key(|(shelf, _)| shelf.first)
             else {
@@ -272,6 +282,7 @@ impl CpuBokeh {
         });
     }
 
+    /// Pass `composite`: each part is a row of tiles.
     fn composite(&mut self, frame: &Source<'_>, out: &mut ColorImage) {
         let width = self.plan.width;
         let out = DisjointParts::new(&mut out.rgb, TILE_H * width * 3, &mut self.taken);

@@ -1,5 +1,5 @@
-//! Pass `reach`, a dilation of radii on the coarse grid: what the filters can reach from each cell: the radius of the
-//! content there (its mean, weighted by coverage and nearness), and the range of its colours.
+//! Pass `reach`, a dilation of radii on the coarse grid. Each cell gets the radius of the content that the filters can
+//! reach from there (its mean, weighted by coverage and nearness), and the range of its colours.
 
 use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges, NO_COLOR};
 use crate::bokeh::plan::{ANY_COLOR, Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};
@@ -10,9 +10,11 @@ pub fn nearness(distance: usize, bin: &Bin) -> f32 {
     (-0.5 * d * d).exp() + FAR_WEIGHT
 }
 
-/// The neighbourhood of every cell, one axis after the other; `scratch` holds as many values as the grid.
+/// Combines the neighbourhood of every cell, one axis after the other, and writes radius and range of colours at the
+/// `edges` of segments. `scratch` grows to the size of the grid and one row of it.
 pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
     let (width, height, radius) = (cells.width, cells.height, plan.reach_cells(bin));
+    // Only blurs of thousands of pixels reach farther; they are cut.
     let mut weights = [0.0; 64];
     let radius = radius.min(weights.len() - 1);
     (0..=radius).for_each(|d| weights[d] = nearness(d, bin));
@@ -21,7 +23,7 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
     scratch.resize(cells.data.len() + row_len, 0.0);
     let (across, row) = scratch.split_at_mut(cells.data.len());
     for (k, (source, target)) in cells.data.chunks_exact(width).zip(across.chunks_exact_mut(width)).enumerate() {
-        along(k % CELL_PLANES, source, target, &weights[..=radius]);
+        combine_row(k % CELL_PLANES, source, target, &weights[..=radius]);
     }
     for y in 0..height {
         row[..2 * width].fill(0.0);
@@ -36,6 +38,7 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
             lows.iter_mut().zip(&source[2 * width..]).for_each(|(t, &s)| *t = if s < *t { s } else { *t });
             highs.iter_mut().zip(&source[5 * width..]).for_each(|(t, &s)| *t = if s > *t { s } else { *t });
         }
+        // The mean of |CoC| becomes the radius.
         for x in 0..width {
             let coc_px = if row[x] > 0.0 { row[width + x] / row[x] } else { 0.0 };
             row[width + x] = plan.bin_radius_px(bin, coc_px);
@@ -49,6 +52,7 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
         }
         let out = &mut edges.data[y * edges.across * EDGE_VALUES..][..edges.across * EDGE_VALUES];
         for (edge, values) in out.chunks_exact_mut(EDGE_VALUES).enumerate() {
+            // An edge lies between two cells, or at an end of the row: the mean of both sides.
             let right = edge * SEGMENT / CELL;
             let (left, right) = (right.saturating_sub(1), right.min(width - 1));
             for (plane, value) in values.iter_mut().take(CELL_PLANES - 1).enumerate() {
@@ -59,8 +63,9 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
     }
 }
 
-/// One plane of one row: each cell with those up to `weights.len() - 1` away.
-fn along(plane: usize, source: &[f32], target: &mut [f32], weights: &[f32]) {
+/// Combines each cell of a plane's row with those up to `weights.len() - 1` cells away: weighted sums in planes 0 and
+/// 1, minima in planes 2 to 4, maxima in planes 5 to 7.
+fn combine_row(plane: usize, source: &[f32], target: &mut [f32], weights: &[f32]) {
     let combine = |target: &mut [f32], source: &[f32], weight: f32| {
         let pairs = target.iter_mut().zip(source);
         match plane {

@@ -67,12 +67,12 @@ impl Cells {
     /// An empty grid over `width` x `height` bin pixels (`width` in whole tiles).
     pub fn new(width: usize, height: usize) -> Self {
         let mut cells = Self { data: Vec::new(), width: 0, height: 0 };
-        cells.shape(width, height);
+        cells.reshape(width, height);
         cells
     }
 
     /// Empties the grid and gives it another size.
-    pub fn shape(&mut self, width: usize, height: usize) {
+    pub fn reshape(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width.next_multiple_of(TILE_W) / CELL, height.div_ceil(CELL));
         self.data.clear();
         let planes = (0..self.height).flat_map(|_| EMPTY_CELL);
@@ -104,24 +104,24 @@ impl Edges {
     /// Edges of a grid of cells.
     pub fn new(cells: &Cells) -> Self {
         let mut edges = Self { data: Vec::new(), across: 0, height: 0 };
-        edges.shape(cells);
+        edges.reshape(cells);
         edges
     }
 
     /// Gives the edges another size; their content is unspecified after.
-    pub fn shape(&mut self, cells: &Cells) {
+    pub fn reshape(&mut self, cells: &Cells) {
         (self.across, self.height) = (cells.width * CELL / SEGMENT + 1, cells.height);
         self.data.resize(self.across * self.height * EDGE_VALUES, 0.0);
     }
 
-    /// The values at the edges of a strip in row `y` of the bin, linear between the middles of the cells.
+    /// The values at the edges of a strip in row `y` of the bin, linear between the middle rows of the cells.
     #[inline(always)]
     pub fn at(&self, strip: usize, y: usize) -> [[f32; EDGE_VALUES]; STRIP_EDGES] {
-        let along = (y as f32 - (CELL as f32 - 1.0) / 2.0) * (1.0 / CELL as f32);
-        // Above the first middle the first cell holds; a comparison, as `max` would ask for NaN, too.
-        let along = if along < 0.0 { 0.0 } else { along };
-        let above = (along as usize).min(self.height - 1);
-        let share = along - above as f32;
+        let cell_y = (y as f32 - (CELL as f32 - 1.0) / 2.0) * (1.0 / CELL as f32);
+        // Above the middle of the first cells these hold. A comparison: `max` would check for NaN, too.
+        let cell_y = if cell_y < 0.0 { 0.0 } else { cell_y };
+        let above = (cell_y as usize).min(self.height - 1);
+        let share = cell_y - above as f32;
         let below = (above + 1).min(self.height - 1);
         let row = |row: usize| {
             &self.data[(row * self.across + strip * (STRIP_EDGES - 1)) * EDGE_VALUES..][..STRIP_EDGES * EDGE_VALUES]
@@ -156,10 +156,10 @@ impl Strips {
         &self.data[(y / CELL * self.across + strip) * STRIP_CELLS + y % CELL * STRIP_ROW..][..STRIP_ROW]
     }
 
-    /// Row `y` of a strip with `pad` columns on both sides (whole pieces): `[4][STRIP + 2 pad]`. Outside the picture,
-    /// which has `width` columns, the outermost ones repeat.
+    /// Copies row `y` of a strip with `pad` columns on both sides (whole pieces) to `line`, `[4][STRIP + 2 pad]`.
+    /// Outside the picture, which has `width` columns, the outermost ones repeat.
     #[inline(always)]
-    pub fn line(&self, strip: usize, y: usize, width: usize, pad: usize, line: &mut [f32]) {
+    pub fn copy_line(&self, strip: usize, y: usize, width: usize, pad: usize, line: &mut [f32]) {
         let span = STRIP + 2 * pad;
         for at in (0..span).step_by(PIECE) {
             let x = (strip * STRIP + at) as isize - pad as isize;
@@ -196,13 +196,14 @@ pub struct Slot {
     pub active: Vec<bool>,
     /// Whether anything in the frame belongs to this bin.
     pub present: bool,
-    /// Flags for three shelves at once.
+    /// Flags for three [`DisjointParts`](crate::compute::thread_pool::DisjointParts) at once.
     pub taken: [Vec<AtomicBool>; 3],
+    /// That of the bin whose shape it has; 0 before the first.
     scale: usize,
 }
 
 impl Slot {
-    /// Memory for one bin; pages that no frame touches are never really taken.
+    /// Zeros for the largest bin that can be in the slot; the system provides pages only as frames touch them.
     pub fn new(plan: &Plan, slot: usize) -> Self {
         let scale = plan.least_scale(slot);
         let (width, height) = (plan.width.div_ceil(scale), plan.height.div_ceil(scale));
@@ -225,8 +226,8 @@ impl Slot {
         }
     }
 
-    /// Takes the shape of a bin, empty where it is another than before.
-    pub fn shape(&mut self, plan: &Plan, bin: &Bin) {
+    /// Takes the shape of a bin; where its scale is another than before, clears all that was used.
+    pub fn reshape(&mut self, plan: &Plan, bin: &Bin) {
         if self.scale == bin.scale {
             return;
         }
@@ -240,8 +241,8 @@ impl Slot {
         self.active.fill(false);
         self.scale = bin.scale;
         self.source.across = bin.width.div_ceil(STRIP);
-        self.cells.shape(bin.width, bin.height);
-        self.edges.shape(&self.cells);
+        self.cells.reshape(bin.width, bin.height);
+        self.edges.reshape(&self.cells);
     }
 
     /// The values that the current shape uses: of `source`, and of `out`.

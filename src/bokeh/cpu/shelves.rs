@@ -18,24 +18,26 @@ pub struct BinShelves<'a> {
     size: (usize, usize),
     ranged: bool,
     across: usize,
+    /// Rows of the bin in a band.
     rows: usize,
 }
 
 impl<'a> BinShelves<'a> {
-    /// Parts of `rows` rows of the picture for the `k`-th bin.
+    /// Splits the memory of the `k`-th bin into bands of `rows` rows of the picture, in whole rows of cells.
     pub fn new(plan: &Plan, k: usize, slot: &'a mut Slot, rows: usize) -> Self {
         let bin = &plan.bins[k];
         let blocks = plan.width.div_ceil(BLOCK);
         let used = slot.used(bin).0;
         let [first, second, third] = &mut slot.taken;
-        let each = rows / bin.scale;
-        let cells = each / CELL;
+        // Rows of the bin, and of its cells, in a band.
+        let bin_rows = rows / bin.scale;
+        let cells = bin_rows / CELL;
         Self {
             source: DisjointParts::new(&mut slot.source.data[..used], cells * slot.source.across * STRIP_CELLS, first),
             cells: DisjointParts::new(&mut slot.cells.data, cells * CELL_PLANES * slot.cells.width, second),
             filled: DisjointParts::new(&mut slot.filled[..blocks * bin.height.div_ceil(CELL)], cells * blocks, third),
             across: slot.source.across,
-            rows: each,
+            rows: bin_rows,
             share: (plan.compositing == Compositing::Layers).then(|| plan.share(k)),
             ranged: plan.has_lobes(bin),
             scale: bin.scale,
@@ -43,6 +45,7 @@ impl<'a> BinShelves<'a> {
         }
     }
 
+    /// The memory of one band, which can be taken once.
     pub fn part(&self, band: usize) -> BinRows<'_> {
         BinRows {
             share: self.share,
@@ -70,17 +73,18 @@ pub struct StripShelves<'a> {
 }
 
 impl<'a> StripShelves<'a> {
+    /// Splits the memory of a bin into strips; `first` is the part that does its first strip.
     pub fn new(bin: &Bin, slot: &'a mut Slot, first: usize) -> Self {
         let used = slot.used(bin).1;
         let down = bin.height.div_ceil(CELL);
-        let [taken, taken_too, _] = &mut slot.taken;
+        let [out_taken, active_taken, _] = &mut slot.taken;
         Self {
             first,
             source: &slot.source,
             cells: &slot.cells,
             edges: &slot.edges,
-            out: DisjointParts::new(&mut slot.out[..used], bin.height * STRIP_ROW, taken),
-            active: DisjointParts::new(&mut slot.active[..slot.source.across * down], down, taken_too),
+            out: DisjointParts::new(&mut slot.out[..used], bin.height * STRIP_ROW, out_taken),
+            active: DisjointParts::new(&mut slot.active[..slot.source.across * down], down, active_taken),
         }
     }
 }

@@ -67,9 +67,9 @@ pub fn picture_bytes(plan: &Plan) -> u64 {
     (plan.width * plan.height).div_ceil(4) as u64 * 12
 }
 
-/// Pieces of work of a frame that have a uniform `Work` each: two for the pass `bin`, one for `reach`, and every group
-/// of terms of every batch for the filters.
-pub fn works(plan: &Plan) -> usize {
+/// How many uniforms `Work` a frame can need: two for the pass `bin`, one for `reach`, and for the filters one for
+/// every group of four terms of every batch of bins.
+pub fn work_count(plan: &Plan) -> usize {
     3 + MAX_BINS * plan.ladder.most_terms().div_ceil(4)
 }
 
@@ -94,24 +94,25 @@ impl Buffers {
                 mapped_at_creation: false,
             })
         };
-        let filled = |label: &str, data: &[u8], usage: Usage| {
+        let with_data = |label: &str, data: &[u8], usage: Usage| {
             let target = buffer(label, data.len(), usage);
             device.queue.write_buffer(&target, 0, data);
             target
         };
-        let storage = |label: &str, values: usize| buffer(label, values * 4, Usage::STORAGE | Usage::COPY_SRC);
+        // In words of four bytes: a bin's pixel is four halves, a cell or an edge eight floats.
+        let storage = |label: &str, words: usize| buffer(label, words * 4, Usage::STORAGE | Usage::COPY_SRC);
         let (width, height) = (plan.width, plan.height);
         let layered = plan.compositing == Compositing::Layers;
         let (levels, pyramid_pixels) =
-            if layered && plan.ladder.fill() { levels(width, height) } else { (Vec::new(), 1) };
+            if layered && plan.ladder.fill() { pyramid_steps(width, height) } else { (Vec::new(), 1) };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
-        let works = works(plan) as u64;
+        let work_bytes = work_count(plan) * WORK_STRIDE as usize;
         Self {
             frame: buffer("frame", size_of::<Frame>(), Usage::UNIFORM),
             bins: buffer("bins", MAX_BINS * size_of::<Bin>(), Usage::UNIFORM),
-            work: buffer("work", (works * WORK_STRIDE) as usize, Usage::UNIFORM),
+            work: buffer("work", work_bytes, Usage::UNIFORM),
             level_sizes: levels.iter().map(|level| (level.fine, level.coarse)).collect(),
-            levels: levels.iter().map(|level| filled("level", bytemuck::bytes_of(level), Usage::UNIFORM)).collect(),
+            levels: levels.iter().map(|level| with_data("level", bytemuck::bytes_of(level), Usage::UNIFORM)).collect(),
             color: storage("color", picture_bytes(plan) as usize / 4),
             scene: storage("scene", width * height * 2),
             ranges: storage("ranges", width.div_ceil(16) * height.div_ceil(16) * 2),
@@ -132,31 +133,32 @@ impl Buffers {
                 .iter()
                 .map(|bank| Filters {
                     terms: bank.terms,
-                    taps: [&bank.horizontal, &bank.vertical]
-                        .map(|taps| filled("bank", bytemuck::cast_slice(&in_fours(taps, bank.terms)), Usage::STORAGE)),
-                    node_reach: filled("node reach", bytemuck::cast_slice(&bank.node_reach), Usage::STORAGE),
+                    taps: [&bank.horizontal, &bank.vertical].map(|taps| {
+                        with_data("bank", bytemuck::cast_slice(&pad_to_fours(taps, bank.terms)), Usage::STORAGE)
+                    }),
+                    node_reach: with_data("node reach", bytemuck::cast_slice(&bank.node_reach), Usage::STORAGE),
                 })
                 .collect(),
             kernels: [
-                filled("kernel starts", bytemuck::cast_slice(&starts), Usage::STORAGE),
-                filled("kernels", bytemuck::cast_slice(&kernels), Usage::STORAGE),
+                with_data("kernel starts", bytemuck::cast_slice(&starts), Usage::STORAGE),
+                with_data("kernels", bytemuck::cast_slice(&kernels), Usage::STORAGE),
             ],
         }
     }
 
-    /// A buffer for depth of `values` metres.
-    pub fn depth(device: &Device, values: usize) -> wgpu::Buffer {
+    /// A buffer for a depth map of so many pixels, in metres.
+    pub fn depth(device: &Device, pixels: usize) -> wgpu::Buffer {
         device.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("depth"),
-            size: (values.max(4) * 4) as u64,
+            size: (pixels.max(4) * 4) as u64,
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         })
     }
 }
 
-/// Taps padded with zeros to whole groups of four terms.
-fn in_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
+/// The taps with their terms padded with zeros to groups of four, the vectors of the shaders.
+fn pad_to_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
     let padded = |tap: &[f32]| {
         let mut four = [0.0; 4];
         four[..tap.len()].copy_from_slice(tap);
@@ -165,8 +167,8 @@ fn in_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
     taps.chunks(terms).flat_map(|tap| tap.chunks(4).map(padded)).collect()
 }
 
-/// The steps of the pyramid, finest first, and its pixels in all.
-fn levels(width: usize, height: usize) -> (Vec<Level>, usize) {
+/// The steps from one level of the pyramid to the next, finest first, and the pixels of all levels.
+fn pyramid_steps(width: usize, height: usize) -> (Vec<Level>, usize) {
     let (mut fine, mut offset, mut steps) = ([width.div_ceil(2), height.div_ceil(2)], 0, Vec::new());
     while fine != [1, 1] {
         let coarse = [fine[0].div_ceil(2), fine[1].div_ceil(2)];

@@ -43,7 +43,7 @@ impl Capacity {
         if plan.compositing == Compositing::Layers {
             return Self::of_scales(plan, (0..plan.slots()).map(|slot| plan.least_scale(slot)));
         }
-        // These bins are the same in every frame of a level.
+        // Otherwise a level has the same bins in every frame: the maximum over all levels suffices.
         let mut plan = plan.clone();
         let ladder = Arc::clone(&plan.ladder);
         ladder.iter().fold(Self::default(), |most, step| {
@@ -103,7 +103,8 @@ impl Layout {
         Self { bins: Vec::with_capacity(MAX_BINS), near: 0, batches: Vec::with_capacity(MAX_BINS) }
     }
 
-    /// Lays out the current bins of a plan.
+    /// Gives the current bins of a plan their places in the shared buffers, and divides them into batches whose pixels
+    /// fit `capacity.rows`.
     pub fn lay_out(&mut self, plan: &Plan, capacity: &Capacity) {
         self.bins.clear();
         self.batches.clear();
@@ -111,14 +112,14 @@ impl Layout {
             Compositing::Layers => plan.bins.iter().take_while(|bin| bin.near).count(),
             _ => 0,
         };
-        let mut at = Capacity::default();
-        let (mut first, mut rows) = (0, 0);
+        let mut used = Capacity::default();
+        let (mut first, mut batch_pixels) = (0, 0);
         for (k, bin) in plan.bins.iter().enumerate() {
             let ([cells_across, down], [edges, _]) = (cells(bin.width, bin.height), edges(bin.width, bin.height));
             let pixels = bin.width * bin.height;
-            if rows + pixels > capacity.rows && k > first {
+            if batch_pixels + pixels > capacity.rows && k > first {
                 self.batches.push(first..k);
-                (first, rows) = (k, 0);
+                (first, batch_pixels) = (k, 0);
             }
             let share = plan.share(k);
             self.bins.push(Bin {
@@ -133,25 +134,26 @@ impl Layout {
                 max_radius_px: bin.max_radius_px,
                 sigma_cells: bin.sigma_cells(),
                 reach_cells: plan.reach_cells(bin) as u32,
-                pixels_at: at.pixels as u32,
-                rows_at: rows as u32,
-                edges_at: at.edges as u32,
-                cells_at: at.cells as u32,
+                pixels_at: used.pixels as u32,
+                rows_at: batch_pixels as u32,
+                edges_at: used.edges as u32,
+                cells_at: used.cells as u32,
                 rows_apart: capacity.rows as u32,
                 reach: match plan.compositing {
+                    // Each pixel has its own radius, which no bin limits.
                     Compositing::Gather => plan.bank.reach as u32,
                     _ => plan.bin_reach(bin) as u32,
                 },
-                filtered_at: at.filtered as u32,
-                active_at: at.active as u32,
+                filtered_at: used.filtered as u32,
+                active_at: used.active as u32,
                 has_lobes: u32::from(plan.has_lobes(bin)),
             });
-            at.pixels += pixels;
-            at.cells += cells_across * down;
-            at.edges += edges * down;
-            at.filtered += tiles([bin.width, bin.height], ROWS_TILE);
-            at.active += tiles([bin.width, bin.height], RESULT_TILE);
-            rows += pixels;
+            used.pixels += pixels;
+            used.cells += cells_across * down;
+            used.edges += edges * down;
+            used.filtered += tiles([bin.width, bin.height], ROWS_TILE);
+            used.active += tiles([bin.width, bin.height], RESULT_TILE);
+            batch_pixels += pixels;
         }
         if !plan.bins.is_empty() {
             self.batches.push(first..plan.bins.len());

@@ -34,6 +34,7 @@ pub struct GpuBokeh {
     plan: Plan,
     device: Arc<Device>,
     buffers: Buffers,
+    /// Depth of the current frame; grows to the largest map that came.
     depth: wgpu::Buffer,
     capacity: Capacity,
     layout: Layout,
@@ -43,6 +44,7 @@ pub struct GpuBokeh {
     refused: Option<Job>,
     /// Results that stay on the device, once any is wanted there.
     results: Option<Pool<DevicePicture>>,
+    /// Two timestamps a pass, and the buffer that they are resolved to.
     queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
 }
 
@@ -61,13 +63,14 @@ impl GpuBokeh {
     /// # Errors
     /// The device is too small for such pictures, or failed.
     pub fn on(plan: &Plan, device: Arc<Device>) -> Result<Self, BokehError> {
-        let most = device.device.limits().max_storage_buffer_binding_size;
+        let allowed = device.device.limits().max_storage_buffer_binding_size;
         let capacity = Capacity::of(plan);
         let rows = capacity.rows * plan.ladder.most_terms().min(4);
+        // A pixel is four halves, also in each of the up to four terms that rows are filtered with at once.
         let largest = (capacity.pixels.max(rows).max(1) as u64 * 8).max(buffers::filter_bytes(plan));
-        if largest > most {
+        if largest > allowed {
             return Err(GpuError::Failed(format!(
-                "{}: pictures of {} x {} need buffers of {largest} bytes and it allows {most}; use --backend cpu",
+                "{}: pictures of {} x {} need buffers of {largest} bytes and it allows {allowed}; use --backend cpu",
                 device.name, plan.width, plan.height
             ))
             .into());
@@ -95,8 +98,8 @@ impl GpuBokeh {
         Ok(Self { plan, device, buffers, depth, capacity, layout, passes, ring, refused, results, queries })
     }
 
-    /// Where a result is left on the device, if it shall be and there is room.
-    fn room(&mut self, place: Place) -> Option<Pooled<DevicePicture>> {
+    /// Memory to leave a result in on the device, where `place` asks for that and some is free.
+    fn device_picture(&mut self, place: Place) -> Option<Pooled<DevicePicture>> {
         if place == Place::Memory {
             return None;
         }
@@ -104,7 +107,8 @@ impl GpuBokeh {
         self.results.get_or_insert_with(|| Pool::new(ON_DEVICE, || DevicePicture::new(device, size))).try_take()
     }
 
-    fn frame(&self, job: &Job) -> shaders::Frame {
+    /// The uniform `Frame` of a job; `common.wgsl` says what the numbers mean.
+    fn frame_uniform(&self, job: &Job) -> shaders::Frame {
         let plan = &self.plan;
         let unhidden = plan.unhidden().front;
         let most_px = match job.coc {
@@ -131,6 +135,7 @@ impl GpuBokeh {
             reach: plan.bank.reach as u32,
             nodes: plan.bank.nodes as u32,
             groups: plan.bank.terms.div_ceil(4) as u32,
+            // The shaders divide by it.
             most_px: most_px.max(1e-3),
             coc,
             ramp,
@@ -160,7 +165,7 @@ impl Bokeh for GpuBokeh {
             return Err(GpuError::Failed(format!("more than {CAPACITY} frames submitted and not collected")).into());
         };
         let started = Instant::now();
-        let on_device = self.room(job.place);
+        let on_device = self.device_picture(job.place);
         job.out.resize(made_for.0, made_for.1);
         if let Some(map) = &job.depth {
             let bytes: &[u8] = bytemuck::cast_slice(&map.metres);
@@ -175,7 +180,7 @@ impl Bokeh for GpuBokeh {
         self.plan.split(job.depth.as_deref(), &job.coc);
         self.layout.lay_out(&self.plan, &self.capacity);
         self.passes.upload(&self.device, &self.buffers, &self.layout, self.plan.bank_index);
-        let frame = self.frame(&job);
+        let frame = self.frame_uniform(&job);
         self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
 
         let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

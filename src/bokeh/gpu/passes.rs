@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use super::buffers::{Buffers, Filters, WORK_STRIDE, works};
+use super::buffers::{Buffers, Filters, WORK_STRIDE, work_count};
 use super::layout::{Layout, tiles};
 use super::readback::MAX_QUERIES;
 use super::shaders::{self, Bin, LINE, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work};
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
 use crate::compute::device::{Device, Shader, in_two};
 
-/// Where each piece of work has its uniform `Work`.
+/// Which uniform `Work` a dispatch has: `bin` for the near bins and for the rest, `reach`, and the filters' batches.
 const NEAR: usize = 0;
 const REST: usize = 1;
 const ALL: usize = 2;
@@ -39,26 +39,30 @@ pub struct Passes {
     /// For each bank, rows and columns of each batch of bins and group of terms.
     blur: Vec<Vec<[Step; 2]>>,
     composite: Fixed,
+    /// The uniforms `Work` as they are uploaded.
     work: Vec<u8>,
 }
 
+/// Makes the passes; compiles each shader once.
 struct Maker<'a> {
     device: &'a Device,
     buffers: &'a Buffers,
-    made: Vec<(&'static str, wgpu::ComputePipeline)>,
+    /// Pipelines by the names of their shaders.
+    pipelines: Vec<(&'static str, wgpu::ComputePipeline)>,
 }
 
 impl Maker<'_> {
+    /// The pipeline of a shader, shared by all passes that run it.
     fn pipeline(&mut self, shader: Shader) -> wgpu::ComputePipeline {
-        if let Some((_, pipeline)) = self.made.iter().find(|(name, _)| *name == shader.name) {
+        if let Some((_, pipeline)) = self.pipelines.iter().find(|(name, _)| *name == shader.name) {
             return pipeline.clone();
         }
         let pipeline = self.device.pipeline(shader, &shaders::CONSTANTS);
-        self.made.push((shader.name, pipeline.clone()));
+        self.pipelines.push((shader.name, pipeline.clone()));
         pipeline
     }
 
-    /// A pass in the name of `name`, over `size` invocations in workgroups of `tile`.
+    /// A pass over `size` invocations in workgroups of `tile` x `tile`, whose time counts for `name`.
     fn fixed(
         &mut self,
         name: &'static str,
@@ -72,13 +76,13 @@ impl Maker<'_> {
         Fixed { step: Step { name, pipeline, bindings }, workgroups: size.map(|size| size.div_ceil(tile)) }
     }
 
-    /// A pass over some bins, with the `index`-th `work` and the `bins` in front of `buffers`.
-    fn over_bins(&mut self, name: &'static str, shader: Shader, index: usize, buffers: &[&wgpu::Buffer]) -> Step {
+    /// A pass over several bins at once, which are in uniform `Work` number `work`; binds that and the bins first.
+    fn over_bins(&mut self, name: &'static str, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Step {
         let pipeline = self.pipeline(shader);
         let b = self.buffers;
         let work = wgpu::BufferBinding {
             buffer: &b.work,
-            offset: index as u64 * WORK_STRIDE,
+            offset: work as u64 * WORK_STRIDE,
             size: wgpu::BufferSize::new(size_of::<Work>() as u64),
         };
         let uniforms = [work, b.bins.as_entire_buffer_binding()];
@@ -91,7 +95,7 @@ impl Maker<'_> {
 impl Passes {
     /// The passes of a plan over its buffers.
     pub fn new(device: &Device, plan: &Plan, b: &Buffers, depth: &wgpu::Buffer) -> Self {
-        let mut maker = Maker { device, buffers: b, made: Vec::new() };
+        let mut maker = Maker { device, buffers: b, pipelines: Vec::new() };
         let picture = [plan.width as u32, plan.height as u32];
         let half = picture.map(|v| v.div_ceil(2));
 
@@ -118,6 +122,7 @@ impl Passes {
                 maker.over_bins("blur_columns", shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
             ]
         };
+        // A batch has at least one bin, so there are no more batches than bins.
         let blur = b.banks.iter().map(|bank| {
             let steps = 0..MAX_BINS * bank.terms.div_ceil(4);
             steps.map(|k| filters(&mut maker, bank, k)).collect()
@@ -131,6 +136,7 @@ impl Passes {
         let bin = [NEAR, REST].map(|index| {
             maker.over_bins("bin", shaders::BIN, index, &[&b.frame, &b.scene, &b.source, &b.grid, &b.ranges])
         });
+        // Each invocation makes four pixels: three whole words.
         let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active];
         let mut composite = maker.fixed("composite", shaders::COMPOSITE, [0; 2], LINE, &composite);
         composite.workgroups = in_two(((plan.width * plan.height).div_ceil(4) as u32).div_ceil(LINE));
@@ -148,7 +154,7 @@ impl Passes {
             reach: maker.over_bins("reach", shaders::REACH, ALL, &[&b.grid, &b.edges]),
             blur,
             composite,
-            work: vec![0; works(plan) * WORK_STRIDE as usize],
+            work: vec![0; work_count(plan) * WORK_STRIDE as usize],
         }
     }
 
@@ -213,7 +219,8 @@ impl Passes {
                 names.push(step.name);
             }
         };
-        let all = |bins: &[Bin], tile: [usize; 2], extent: fn(&Bin) -> [u32; 2]| {
+        // Workgroups for all tiles of some bins.
+        let workgroups = |bins: &[Bin], tile: [usize; 2], extent: fn(&Bin) -> [u32; 2]| {
             in_two(bins.iter().map(|bin| tiles(extent(bin).map(|size| size as usize), tile) as u32).sum())
         };
         let (near, rest) = layout.bins.split_at(layout.near);
@@ -223,18 +230,18 @@ impl Passes {
             run(&gather.step, gather.workgroups);
         } else {
             if !near.is_empty() {
-                run(&self.bin[NEAR], all(near, [TILE as usize; 2], cells));
+                run(&self.bin[NEAR], workgroups(near, [TILE as usize; 2], cells));
                 let fill = self.fill.iter().filter(|_| plan.fill);
                 fill.for_each(|fill| run(&fill.step, fill.workgroups));
             }
-            run(&self.bin[REST], all(rest, [TILE as usize; 2], cells));
-            run(&self.reach, all(&layout.bins, [SMALL_TILE as usize; 2], |bin| [bin.edges, bin.cells[1]]));
+            run(&self.bin[REST], workgroups(rest, [TILE as usize; 2], cells));
+            run(&self.reach, workgroups(&layout.bins, [SMALL_TILE as usize; 2], |bin| [bin.edges, bin.cells[1]]));
             let groups = plan.bank.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];
                 for [rows, columns] in steps {
-                    run(rows, all(bins, ROWS_TILE, |bin| bin.size));
-                    run(columns, all(bins, RESULT_TILE, |bin| bin.size));
+                    run(rows, workgroups(bins, ROWS_TILE, |bin| bin.size));
+                    run(columns, workgroups(bins, RESULT_TILE, |bin| bin.size));
                 }
             }
         }

@@ -19,7 +19,7 @@ impl GpuBokeh {
                 let values = self.read(&b.edges, bin.edges_at * 8, bin.edges * bin.cells[1] * 8)?;
                 Ok(values.as_chunks::<4>().0.iter().map(|value| value.map(f32::from_bits)).collect())
             }
-            // Where nothing is, nothing was written: which cells hold anything, and which tiles.
+            // Cells and tiles that hold nothing were not written, and have values of earlier frames.
             Probe::Bin(k) => {
                 let bin = &self.layout.bins[k];
                 let cells = self.read(&b.grid, bin.cells_at * 8, bin.cells[0] * bin.cells[1] * 8)?;
@@ -37,45 +37,46 @@ impl GpuBokeh {
         }
     }
 
-    /// The pixels of a bin, zero where there is nothing.
+    /// The pixels of bin `k` in `buffer`, zero where they were not written.
     fn pixels(
         &self,
         k: usize,
         buffer: &wgpu::Buffer,
-        some: impl Fn(usize, usize) -> bool,
+        is_written: impl Fn(usize, usize) -> bool,
     ) -> Result<Vec<[f32; 4]>, BokehError> {
         let bin = &self.layout.bins[k];
         let words = self.read(buffer, bin.pixels_at * 2, bin.size[0] * bin.size[1] * 2)?;
         let width = bin.size[0] as usize;
         let value = |(n, [a, b]): (usize, &[u32; 2])| {
             let halves = [*a as u16, (a >> 16) as u16, *b as u16, (b >> 16) as u16];
-            if some(n % width, n / width) { halves.map(from_half) } else { [0.0; 4] }
+            if is_written(n % width, n / width) { halves.map(from_half) } else { [0.0; 4] }
         };
         Ok(words.as_chunks::<2>().0.iter().enumerate().map(value).collect())
     }
 
-    /// Words of a buffer.
+    /// Reads back `count` words of a buffer, from word `first` on; waits for the device.
     fn read(&self, buffer: &wgpu::Buffer, first: u32, count: u32) -> Result<Vec<u32>, BokehError> {
         let device = &self.device.device;
-        let back = device.create_buffer(&wgpu::BufferDescriptor {
+        let staging = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("probe"),
             size: u64::from(count) * 4,
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &back, 0, u64::from(count) * 4);
+        encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &staging, 0, u64::from(count) * 4);
         let submission = self.device.queue.submit([encoder.finish()]);
-        back.map_async(wgpu::MapMode::Read, .., |_| {});
+        staging.map_async(wgpu::MapMode::Read, .., |_| {});
         let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", self.device.name));
         self.device.poll(Some(submission))?;
-        let mapped = back.get_mapped_range(..).map_err(|error| fault(&error))?;
+        let mapped = staging.get_mapped_range(..).map_err(|error| fault(&error))?;
         self.device.check()?;
         Ok(bytemuck::pod_collect_to_vec(&mapped[..]))
     }
 }
 
-/// A value of half precision.
+/// A value of half precision: shifted to single precision, then times 2^112 for the other exponent bias. Exact for
+/// subnormals, too; infinities become large.
 fn from_half(bits: u16) -> f32 {
     let magnitude = f32::from_bits(u32::from(bits & 0x7fff) << 13) * f32::from_bits(0x7780_0000);
     if bits & 0x8000 != 0 { -magnitude } else { magnitude }

@@ -37,18 +37,21 @@ pub struct Sent {
     pub on_device: Option<Pooled<DevicePicture>>,
     /// Whether it was copied to the slot.
     pub in_memory: bool,
-    /// When it is done.
+    /// What to wait for.
     pub submission: wgpu::SubmissionIndex,
     /// When it was begun.
     pub started: Instant,
 }
 
+/// A frame whose buffers are being mapped.
 struct Pending {
     slot: Slot,
     sent: Sent,
+    /// [`PENDING`], [`READY`] or [`FAILED`]: set by the device's callback.
     state: Arc<AtomicU8>,
 }
 
+/// The frames on their way back, and the buffers for more.
 pub struct Ring {
     free: Vec<Slot>,
     pending: VecDeque<Pending>,
@@ -85,7 +88,7 @@ impl Ring {
         self.pending.len()
     }
 
-    /// Gives back the oldest frame in flight as it was submitted; what the device makes of it is dropped.
+    /// Gives back the oldest frame in flight as it was submitted, after an error: its buffers are dropped.
     pub fn give_up(&mut self) -> Option<Job> {
         self.pending.pop_front().map(|pending| pending.sent.job)
     }
@@ -95,7 +98,7 @@ impl Ring {
         let state = Arc::new(AtomicU8::new(PENDING));
         let done = Arc::clone(&state);
         let done = move |is_ok: bool| done.store(if is_ok { READY } else { FAILED }, Ordering::Release);
-        // What is mapped last tells that all is: a device calls back in this order.
+        // Only the last mapping reports: callbacks run in the order of the calls, so all is mapped then.
         match &slot.stamps {
             Some(stamps) if !sent.in_memory => {
                 stamps.map_async(wgpu::MapMode::Read, .., move |result| done(result.is_ok()));
@@ -111,7 +114,7 @@ impl Ring {
         self.pending.push_back(Pending { slot, sent, state });
     }
 
-    /// The oldest frame, if it is back (`wait`: when it is back).
+    /// The oldest frame, if it is back; with `wait`, blocks until it is.
     ///
     /// # Errors
     /// The device failed.
@@ -160,7 +163,7 @@ impl Ring {
             }
             stamps.unmap();
         } else {
-            // One frame after the other: what it waited for the one before is not its own time.
+            // Frames run one after the other: the time before the previous one was back does not count.
             let began = self.last.map_or(started, |last| last.max(started));
             times.add("gpu", began.elapsed());
         }

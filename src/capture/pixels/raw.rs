@@ -32,9 +32,10 @@ struct Rows {
 }
 
 impl Raw {
+    /// For pictures of this layout: RGB, grey or Y'CbCr.
     pub(super) fn new(layout: &Layout) -> Self {
         let is_rgb = matches!(layout.family(), Family::Rgb24 { .. } | Family::Grey);
-        // In Y'CbCr the coefficients know the range.
+        // Of RGB and grey the table expands the range; of Y'CbCr the coefficients do.
         let range = if is_rgb { layout.range } else { Range::Full };
         let width = if is_rgb { 0 } else { layout.width as usize };
         let pairs = width.div_ceil(2);
@@ -60,6 +61,7 @@ impl Raw {
         self
     }
 
+    /// Decodes a picture of `layout` into `out` (resized to fit), unless one of its planes is cut short.
     pub(super) fn decode(&mut self, layout: &Layout, planes: &[&[u8]], out: &mut ColorImage) -> Result<(), PixelError> {
         for (index, plane) in planes.iter().enumerate() {
             let (found_bytes, needed_bytes) = (plane.len(), layout.needed_bytes(index));
@@ -82,7 +84,7 @@ struct Frame<'a> {
     rgb: &'a mut [u8],
 }
 
-/// Rows of a component.
+/// One component of a picture in its memory plane.
 #[derive(Clone, Copy)]
 struct Samples<'a> {
     plane: &'a [u8],
@@ -95,9 +97,9 @@ impl<'a> Samples<'a> {
         &self.plane[self.at.offset_bytes + y * self.at.stride_bytes..][..self.at.row_bytes]
     }
 
-    /// The chroma rows nearest to row `y` of the picture, and next to that.
+    /// Of half as many rows as the picture, the nearest and the second nearest one to its row `y`.
     #[inline(always)]
-    fn around(self, y: usize) -> [&'a [u8]; 2] {
+    fn nearest_two(self, y: usize) -> [&'a [u8]; 2] {
         let near = y / 2;
         let far = if y.is_multiple_of(2) { near.saturating_sub(1) } else { (near + 1).min(self.at.rows - 1) };
         [self.row(near), self.row(far)]
@@ -118,7 +120,7 @@ impl WithSimd for Frame<'_> {
         for (y, out) in rgb.chunks_exact_mut(3 * width).enumerate() {
             match family {
                 Family::Rgb24 { swapped: false } => out.copy_from_slice(first.row(y)),
-                Family::Rgb24 { swapped: true } => swap(first.row(y), out),
+                Family::Rgb24 { swapped: true } => bgr_to_rgb(first.row(y), out),
                 Family::Grey => {
                     let row = first.row(y);
                     ycc::interleave([row, row, row], out);
@@ -128,12 +130,12 @@ impl WithSimd for Frame<'_> {
                     raw.rows.finish(&raw.coefficients, None, out);
                 }
                 Family::SemiPlanar420 { swapped, .. } => {
-                    raw.rows.semi_planar(second.around(y), swapped);
+                    raw.rows.semi_planar(second.nearest_two(y), swapped);
                     raw.rows.finish(&raw.coefficients, Some(first.row(y)), out);
                 }
                 Family::Planar420 { swapped, .. } => {
                     let [cb, cr] = if swapped { [third, second] } else { [second, third] };
-                    raw.rows.planar([cb.around(y), cr.around(y)]);
+                    raw.rows.planar([cb.nearest_two(y), cr.nearest_two(y)]);
                     raw.rows.finish(&raw.coefficients, Some(first.row(y)), out);
                 }
                 // Neither comes here: they are no raw colours.
@@ -147,7 +149,8 @@ impl WithSimd for Frame<'_> {
 }
 
 impl Rows {
-    /// Two pixels in four bytes: luma and chroma alternate, and so do Cb and Cr.
+    /// Takes a 4:2:2 row apart into luma and, times 4, the chroma of pairs: luma and chroma alternate, and so do Cb and
+    /// Cr.
     #[inline(always)]
     fn packed(&mut self, row: &[u8], luma_first: bool, cb_first: bool) {
         let width = row.len() / 2;
@@ -168,11 +171,12 @@ impl Rows {
         if let ([.., last], true) = (&*alternating, width % 2 == 1) {
             let at = width / 2;
             first[at] = u16::from(*last) * 4;
+            // 512 is grey, 128, times 4.
             second[at] = at.checked_sub(1).map_or(512, |before| second[before]);
         }
     }
 
-    /// Rows of alternating Cb and Cr.
+    /// Interpolates the chroma of a 4:2:0 row, times 4, between two rows of alternating Cb and Cr.
     #[inline(always)]
     fn semi_planar(&mut self, [near, far]: [&[u8]; 2], swapped: bool) {
         let [cb, cr] = &mut self.half;
@@ -185,14 +189,14 @@ impl Rows {
         }
     }
 
-    /// Rows of Cb and of Cr.
+    /// As [`Rows::semi_planar`], between two rows of Cb and two of Cr.
     #[inline(always)]
     fn planar(&mut self, [cb, cr]: [[&[u8]; 2]; 2]) {
         ycc::mix(cb[0], cb[1], &mut self.half[0]);
         ycc::mix(cr[0], cr[1], &mut self.half[1]);
     }
 
-    /// From luma (its own, where none is given) and the chroma of pairs to pixels.
+    /// Converts luma (what [`Rows::packed`] left, where none is given) and the chroma of pairs to pixels.
     #[inline(always)]
     fn finish(&mut self, by: &Coefficients, luma: Option<&[u8]>, out: &mut [u8]) {
         let width = out.len() / 3;
@@ -211,9 +215,9 @@ impl Rows {
     }
 }
 
-/// Blue, green, red to red, green, blue.
+/// Turns blue, green, red into red, green, blue.
 #[inline(always)]
-fn swap(row: &[u8], out: &mut [u8]) {
+fn bgr_to_rgb(row: &[u8], out: &mut [u8]) {
     for (out, &[blue, green, red]) in out.as_chunks_mut::<3>().0.iter_mut().zip(row.as_chunks::<3>().0) {
         *out = [red, green, blue];
     }

@@ -1,4 +1,4 @@
-//! Tables from what a camera's numbers mean to sRGB.
+//! Tables that turn a camera's RGB codes into sRGB, by its transfer curve and range.
 
 use crate::color::linear_to_srgb;
 use crate::v4l2::layout::{Range, Transfer};
@@ -8,12 +8,13 @@ pub(super) type Table = [u8; 256];
 
 /// The table for red, green and blue on the curve `transfer`; none where it would change nothing.
 pub(super) fn table(transfer: Transfer, range: Range) -> Option<Box<Table>> {
-    let to_linear = match transfer {
+    // What values are raised to for linear light; none on curves that are shown as they are.
+    let exponent = match transfer {
         Transfer::Linear => Some(1.0),
         Transfer::Gamma(tenths) => Some(f64::from(tenths) / 10.0),
         Transfer::Display | Transfer::Pq => None,
     };
-    if to_linear.is_none() && range == Range::Full {
+    if exponent.is_none() && range == Range::Full {
         return None;
     }
     let mut table = Box::new([0; 256]);
@@ -22,7 +23,7 @@ pub(super) fn table(transfer: Transfer, range: Range) -> Option<Box<Table>> {
             Range::Full => code as f64 / 255.0,
             Range::Limited => ((code as f64 - 16.0) / 219.0).clamp(0.0, 1.0),
         };
-        let shown = to_linear.map_or(value, |power| f64::from(linear_to_srgb(value.powf(power) as f32)));
+        let shown = exponent.map_or(value, |power| f64::from(linear_to_srgb(value.powf(power) as f32)));
         *byte = (shown * 255.0).round() as u8;
     }
     Some(table)

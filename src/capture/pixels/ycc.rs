@@ -13,7 +13,7 @@ const COLOR_BITS: u32 = 5;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coefficients {
     luma: i16,
-    /// Of black, with what rounds.
+    /// Takes black away, and adds what rounds, in colours of [`COLOR_BITS`] fractional bits.
     offset: i16,
     cr_to_red: i16,
     cb_to_green: i16,
@@ -22,6 +22,7 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
+    /// The coefficients of [`convert`] for pictures of this matrix and range.
     pub(super) fn new(matrix: Matrix, range: Range) -> Self {
         let [red, green, blue] = matrix.weights();
         let (black, luma_scale, chroma_scale) = match range {
@@ -32,7 +33,7 @@ impl Coefficients {
         // A product loses its lower 16 bits, luma is multiplied by 128, and chroma by 256.
         let luma = |weight: f64| (weight * color * 512.0).round() as i16;
         let chroma = |weight: f64| (weight * chroma_scale * color * 256.0).round() as i16;
-        // Two or three products lost half a unit each.
+        // Half a code, and the half units that the two or three products lose on average.
         let round = f64::from(1 << (COLOR_BITS - 1)) + 1.0;
         Self {
             luma: luma(luma_scale),
@@ -56,7 +57,7 @@ fn byte(color: i16) -> u8 {
     (color >> COLOR_BITS).clamp(0, 255) as u8
 }
 
-/// A row of pixels. All slices are as long as `luma`; chroma is its distance from grey, times 256.
+/// Converts a row of pixels. All slices are as long as `luma`; chroma is its distance from grey, times 256.
 #[inline(always)]
 pub(super) fn convert(by: &Coefficients, luma: &[u8], [cb, cr]: [&[i16]; 2], [red, green, blue]: [&mut [u8]; 3]) {
     let by = *by;
@@ -69,7 +70,7 @@ pub(super) fn convert(by: &Coefficients, luma: &[u8], [cb, cr]: [&[i16]; 2], [re
     }
 }
 
-/// Three rows of bytes to pixels.
+/// Joins rows of red, green and blue to pixels.
 #[inline(always)]
 pub(super) fn interleave([red, green, blue]: [&[u8]; 3], rgb: &mut [u8]) {
     for (((pixel, &red), &green), &blue) in rgb.as_chunks_mut::<3>().0.iter_mut().zip(red).zip(green).zip(blue) {
@@ -77,7 +78,7 @@ pub(super) fn interleave([red, green, blue]: [&[u8]; 3], rgb: &mut [u8]) {
     }
 }
 
-/// The first and the second bytes of pairs.
+/// Separates the first and the second bytes of pairs.
 #[inline(always)]
 pub(super) fn split(pairs: &[u8], first: &mut [u8], second: &mut [u8]) {
     for ((pair, first), second) in pairs.as_chunks::<2>().0.iter().zip(first).zip(second) {
@@ -86,7 +87,7 @@ pub(super) fn split(pairs: &[u8], first: &mut [u8], second: &mut [u8]) {
     }
 }
 
-/// Between two rows, a quarter of the way: samples times 4.
+/// Interpolates a quarter of the way from the row `near` to `far`: samples times 4.
 #[inline(always)]
 pub(super) fn mix(near: &[u8], far: &[u8], out: &mut [u16]) {
     for ((out, &near), &far) in out.iter_mut().zip(near).zip(far) {
@@ -94,11 +95,12 @@ pub(super) fn mix(near: &[u8], far: &[u8], out: &mut [u16]) {
     }
 }
 
-/// A sample for each pair of pixels (times 4; one more than pairs) to one for each pixel: its distance from grey, times
-/// 256. Samples lie on the left pixels.
+/// Interpolates chroma from a sample for each pair of pixels (times 4; one more than pairs), on its left pixel, to one
+/// for each pixel: its distance from grey, times 256.
 #[inline(always)]
 pub(super) fn widen(half: &[u16], full: &mut [i16]) {
     for ((pair, &left), &right) in full.as_chunks_mut::<2>().0.iter_mut().zip(half).zip(&half[1..]) {
+        // Grey is 128, times 4.
         let (left, right) = (left as i16 - 512, right as i16 - 512);
         *pair = [left << 6, (left + right) << 5];
     }

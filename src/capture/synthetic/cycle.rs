@@ -1,7 +1,8 @@
 //! The scene's motion kept in memory: it is played at any rate, though rendering is slow.
 //!
 //! The first frame is there at once. A helper renders those after it, one by one, at the lowest priority; meanwhile
-//! what is there is played forth and back like a breath that gets deeper. Once the motion is whole, it goes round.
+//! what is there is played forth and back, in swings that get wider. Once all frames are there, they are played in a
+//! loop.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -15,26 +16,27 @@ use crate::scene::{Scene, View};
 
 /// What all frames together may take; where that is not enough, there are fewer.
 const MOST_BYTES: usize = 128 << 20;
-/// Forth and back takes no less than this.
-const BREATH_S: f64 = 2.0;
+/// A swing forth and back takes no less than this.
+const LEAST_SWING_S: f64 = 2.0;
 
-/// The frames of one period of the scene, those that there are.
+/// Plays the kept frames of one period of the scene's motion.
 pub(super) struct Cycle {
-    shelf: Arc<DisjointParts>,
+    shelf: Arc<Shelf>,
     threads: usize,
     /// Kept frames from one captured frame to the next.
     step: f64,
-    /// The longest step of `turn`.
-    most_turn: f64,
-    /// Where on the shelf the playing is: in kept frames.
+    /// The longest step of `phase`.
+    most_phase_step: f64,
+    /// The playing position in kept frames.
     at: f64,
-    /// Forth below half a turn, back above it.
-    turn: f64,
-    /// Whether it goes round.
-    round: bool,
+    /// Phase of the swing in radians: forth below pi, back above it.
+    phase: f64,
+    /// Whether all frames are there and are played in a loop.
+    looping: bool,
 }
 
-struct DisjointParts {
+/// The kept frames, shared with the helper that renders them.
+struct Shelf {
     scene: Scene,
     view: View,
     frames: Vec<OnceLock<(ColorImage, DepthMap)>>,
@@ -44,7 +46,8 @@ struct DisjointParts {
     over: AtomicBool,
 }
 
-impl DisjointParts {
+impl Shelf {
+    /// Renders the frame `index` unless it is there, and counts it as ready: to be called in order.
     fn render(&self, index: usize, threads: usize) {
         let time_s = index as f64 / self.frames.len() as f64 * self.scene.period_s();
         self.frames[index].get_or_init(|| {
@@ -55,6 +58,7 @@ impl DisjointParts {
         self.ready.store(index + 1, Ordering::Release);
     }
 
+    /// Renders all frames but the first, until nobody plays them any more.
     fn render_the_others(&self, threads: usize) {
         // Pictures that are shown come first.
         const LOWEST_PRIORITY: i32 = 19;
@@ -74,10 +78,11 @@ impl Cycle {
     /// `frames` (> 0) of a period, or as many as there is memory for, played at `fps`.
     pub(super) fn new(scene: Scene, view: View, frames: u64, fps: f64, threads: usize) -> Self {
         let pixels = view.width as usize * view.height as usize;
-        let most = (MOST_BYTES / (pixels * (3 + size_of::<f32>()))).max(1);
-        let count = usize::try_from(frames).unwrap_or(most).clamp(1, most);
+        // Three bytes of colour and a depth for each pixel.
+        let most_frames = (MOST_BYTES / (pixels * (3 + size_of::<f32>()))).max(1);
+        let count = usize::try_from(frames).unwrap_or(most_frames).clamp(1, most_frames);
         let period_s = scene.period_s();
-        let shelf = DisjointParts {
+        let shelf = Shelf {
             scene,
             view,
             frames: (0..count).map(|_| OnceLock::new()).collect(),
@@ -88,14 +93,14 @@ impl Cycle {
             shelf: Arc::new(shelf),
             threads,
             step: count as f64 / (period_s * fps),
-            most_turn: TAU / (BREATH_S * fps),
+            most_phase_step: TAU / (LEAST_SWING_S * fps),
             at: 0.0,
-            turn: 0.0,
-            round: false,
+            phase: 0.0,
+            looping: false,
         }
     }
 
-    /// The frame that is on.
+    /// Copies the present frame into `shot`; the first call renders it and starts the helper.
     pub(super) fn read(&mut self, shot: Shot) {
         if self.shelf.ready.load(Ordering::Acquire) == 0 {
             self.shelf.render(0, self.threads);
@@ -119,19 +124,20 @@ impl Cycle {
         }
     }
 
-    /// To the next frame.
+    /// Moves on by one captured frame.
     pub(super) fn advance(&mut self) {
         let (ready, count) = (self.shelf.ready.load(Ordering::Acquire), self.shelf.frames.len());
-        self.round |= ready == count && self.turn < PI;
-        if self.round {
+        // The loop begins on the way forth, so that the motion does not jump.
+        self.looping |= ready == count && self.phase < PI;
+        if self.looping {
             self.at = (self.at + self.step) % count as f64;
             return;
         }
         let half = ready.max(1) as f64 / 2.0;
-        // As fast as people move, where there is room for that.
-        self.turn = (self.turn + self.most_turn.min(self.step / half)) % TAU;
-        // The last one counts as a whole step, or it would but flash up.
-        let goal = (half * (1.0 - self.turn.cos())).min(2.0 * half - 1e-6);
+        // At the middle of the swing no faster than the scene's own speed.
+        self.phase = (self.phase + self.most_phase_step.min(self.step / half)) % TAU;
+        // The swing goes up to `ready`, as the position is rounded down: else the last frame would only flash up.
+        let goal = (half * (1.0 - self.phase.cos())).min(2.0 * half - 1e-6);
         self.at += (goal - self.at).clamp(-self.step, self.step);
     }
 }
@@ -221,13 +227,13 @@ mod tests {
         let mut cycle = with_ready(60, 30.0, 50);
         let back = (0..).find(|_| {
             read(&mut cycle);
-            cycle.turn > PI
+            cycle.phase > PI
         });
         assert!(back.is_some());
         fill(&cycle, 60);
         let played = play(&mut cycle, 400);
         assert!(played.windows(2).all(|pair| (pair[1] - pair[0]).abs() <= 1 || pair == [59, 0]), "{played:?}");
-        assert!(cycle.round);
+        assert!(cycle.looping);
     }
 
     #[test]

@@ -32,24 +32,24 @@ pub struct TwoEyes<E> {
     clock: Clock,
     info: SourceInfo,
     pairing: Pairing,
-    /// What the right eye saw last.
-    seen: ColorImage,
+    /// The last picture of the right camera.
+    right_color: ColorImage,
     /// Pairs given so far.
     given: u64,
     waited_ns: u64,
+    /// Frames of the right camera without a partner.
     rights_alone: u64,
-    /// How far apart the eyes' frames are taken.
-    apart: Histogram,
+    /// How far apart in time the frames of pairs are taken.
+    skews: Histogram,
 }
 
-/// Pairs after which it is said how far apart they are taken.
+/// Pairs after which the median of how far apart they are taken is logged.
 const FIRST_PAIRS: u64 = 30;
-/// News of the right camera in a row: one that never runs dry must not keep the left one waiting.
-const MOST_NEWS: usize = 8;
+/// Polls of the right camera in a row: one that never runs dry must not keep the left one waiting.
+const MOST_POLLS: usize = 8;
 
 impl<E: Eye> TwoEyes<E> {
-    /// Pairs the frames of `left` and `right`, which give them by themselves without end; ends after so many pairs, with
-    /// `None` never.
+    /// Pairs the frames of `left` and `right`, two cameras without end; ends after so many pairs, with `None` never.
     ///
     /// # Errors
     /// Their pictures are not of one size.
@@ -59,6 +59,7 @@ impl<E: Eye> TwoEyes<E> {
             let names = [ours.name, theirs.name];
             return Err(CaptureError::EyesDiffer { names, left: ours.size, right: theirs.size });
         }
+        // Rates within 2 % count as one, such as 29.97 and 30.
         if ours.period_ns.abs_diff(theirs.period_ns) > ours.period_ns / 50 {
             let fps = |period_ns: u64| 1e9 / period_ns as f64;
             let (left_fps, right_fps) = (fps(ours.period_ns), fps(theirs.period_ns));
@@ -77,18 +78,19 @@ impl<E: Eye> TwoEyes<E> {
             right,
             clock,
             info,
-            seen: ColorImage::default(),
+            right_color: ColorImage::default(),
             given: 0,
             waited_ns: 0,
             rights_alone: 0,
-            apart: Histogram::default(),
+            skews: Histogram::default(),
         })
     }
 
-    /// Looks for the partner of the left frame in hand. Gives how far apart they are taken; `None` where there is none.
+    /// Reads frames of the right camera until one is the partner of the left frame in hand. Returns how much later that
+    /// one was taken, in nanoseconds; `None` where there is none in time.
     fn find_partner(&mut self) -> Option<i64> {
-        let until_ns = self.clock.now_ns() + self.pairing.half_ns();
-        let mut news = 0;
+        let deadline_ns = self.clock.now_ns() + self.pairing.half_ns();
+        let mut polls = 0;
         loop {
             match self.pairing.judge() {
                 Verdict::Pair { skew_ns } => return Some(skew_ns),
@@ -96,14 +98,15 @@ impl<E: Eye> TwoEyes<E> {
                 Verdict::RightAlone => self.rights_alone += 1,
                 Verdict::NeedsRight => {}
             }
-            let remaining_ns = until_ns.saturating_sub(self.clock.now_ns());
-            if remaining_ns == 0 && news > 0 || news == MOST_NEWS {
+            let remaining_ns = deadline_ns.saturating_sub(self.clock.now_ns());
+            // However late it is, the partner may be there already: one poll is always made.
+            if remaining_ns == 0 && polls > 0 || polls == MOST_POLLS {
                 self.pairing.give_up_left();
                 return None;
             }
-            news += 1;
+            polls += 1;
             let began_ns = self.clock.now_ns();
-            match self.right.next_within(Duration::from_nanos(remaining_ns), &mut self.seen) {
+            match self.right.next_within(Duration::from_nanos(remaining_ns), &mut self.right_color) {
                 Captured::Frame(stamp) => self.pairing.right(stamp.captured_ns.unwrap_or(began_ns)),
                 Captured::Lost(count, cause) => {
                     tracing::debug!("{count} frames of the right camera were lost: {cause:?}");
@@ -114,11 +117,11 @@ impl<E: Eye> TwoEyes<E> {
         }
     }
 
-    /// Takes down how far apart a pair was taken, and says so once there were some.
-    fn note(&mut self, skew_ns: i64) {
-        self.apart.add(skew_ns.unsigned_abs());
-        if self.apart.samples() == FIRST_PAIRS {
-            let median_ns = self.apart.percentile_ns(0.5);
+    /// Counts how far apart a pair was taken, and logs the median once, after [`FIRST_PAIRS`].
+    fn record_skew(&mut self, skew_ns: i64) {
+        self.skews.add(skew_ns.unsigned_abs());
+        if self.skews.samples() == FIRST_PAIRS {
+            let median_ns = self.skews.percentile_ns(0.5);
             let line = format!("{}: the eyes are {:.1} ms apart", self.info.name, median_ns as f64 / 1e6);
             if median_ns > self.info.period_ns / 4 {
                 tracing::warn!(
@@ -147,8 +150,8 @@ impl<E: Eye> Camera for TwoEyes<E> {
         self.pairing.left(stamp.captured_ns.unwrap_or(began_ns));
         Ok(match self.find_partner() {
             Some(skew_ns) => {
-                right.set_luma_of(&self.seen);
-                self.note(skew_ns);
+                right.set_luma_of(&self.right_color);
+                self.record_skew(skew_ns);
                 self.given += 1;
                 Captured::Frame(stamp)
             }
@@ -174,8 +177,8 @@ impl<E> Drop for TwoEyes<E> {
             "{}: {} pairs, {:.1} ms apart (at most {:.1}); {} frames of the right camera had no partner",
             self.info.name,
             self.given,
-            ms(self.apart.percentile_ns(0.5)),
-            ms(self.apart.max_ns()),
+            ms(self.skews.percentile_ns(0.5)),
+            ms(self.skews.max_ns()),
             self.rights_alone
         );
     }

@@ -84,7 +84,7 @@ fn frames_of_one_time_come_together_whichever_camera_leads() {
         let (pairs, unpaired, lost) = play(&mut camera, &clock, 3 * MS);
         assert!(pairs.into_iter().eq((0..50).map(|k| (k, k))), "{left_skew} {right_skew}");
         assert_eq!((unpaired, lost), (0, 0));
-        assert!(camera.apart.max_ns() == left_skew.abs_diff(right_skew));
+        assert!(camera.skews.max_ns() == left_skew.abs_diff(right_skew));
     }
 }
 

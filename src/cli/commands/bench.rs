@@ -26,7 +26,7 @@ use crate::pipeline::still::{Depth, prepared};
 use crate::scene::{Scene, View};
 use crate::source::{self, DepthChoice, Size};
 
-/// Frames before those that are measured: caches and clocks settle.
+/// Frames before those that are measured: caches fill, and the processor's clock rises.
 const WARM_UP_FRAMES: usize = 2;
 
 /// Measure the blur on this machine, without reading or writing files
@@ -150,6 +150,7 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
     Ok(())
 }
 
+/// Measures one combination of settings: blurs the same picture `command.frames` times after a warm-up.
 fn measure(
     command: &BenchCommand,
     look: &Look,
@@ -173,12 +174,12 @@ fn measure(
         results: Pool::new(bokeh.capacity(), || ColorImage::new(size.0, size.1)),
     };
     for _ in 0..WARM_UP_FRAMES {
-        buffers.frame(&mut *bokeh, coc)?;
+        buffers.time_frame(&mut *bokeh, coc)?;
     }
     let mut times = Vec::new();
     let mut passes = BTreeMap::<_, Vec<Duration>>::new();
     for _ in 0..command.frames {
-        let (time, in_passes) = buffers.frame(&mut *bokeh, coc)?;
+        let (time, in_passes) = buffers.time_frame(&mut *bokeh, coc)?;
         times.push(time);
         in_passes.iter().for_each(|(name, time)| passes.entry(name).or_default().push(time));
     }
@@ -189,26 +190,26 @@ fn measure(
         quality: quality.name(),
         executor: bokeh.describe(),
         frames: command.frames,
-        p50_ms: share_ms(&times, 0.5),
-        p95_ms: share_ms(&times, 0.95),
-        max_ms: share_ms(&times, 1.0),
+        p50_ms: quantile_ms(&times, 0.5),
+        p95_ms: quantile_ms(&times, 0.95),
+        max_ms: quantile_ms(&times, 1.0),
         frames_per_s: times.len() as f64 / times.iter().sum::<Duration>().as_secs_f64(),
         passes_ms: passes
             .into_iter()
             .map(|(name, mut times)| {
                 times.sort_unstable();
-                (name, share_ms(&times, 0.5))
+                (name, quantile_ms(&times, 0.5))
             })
             .collect(),
     })
 }
 
-/// The time that this share of the sorted times does not exceed.
-fn share_ms(sorted: &[Duration], share: f64) -> f64 {
+/// The quantile `share` (0 to 1) of sorted times, in milliseconds.
+fn quantile_ms(sorted: &[Duration], share: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3
 }
 
-/// The same frame again and again, without copying it.
+/// Copies of one frame, as many as the executor holds at a time, so that no copying is measured.
 struct Buffers {
     colors: Pool<ColorImage>,
     depths: Option<Pool<DepthMap>>,
@@ -216,8 +217,8 @@ struct Buffers {
 }
 
 impl Buffers {
-    /// Time from handing a frame over until it is back, and that of its passes.
-    fn frame(&self, bokeh: &mut dyn Bokeh, coc: CocField) -> Result<(Duration, PassTimes), CliError> {
+    /// Blurs the frame once: the time from handing it over until it is back, and the times of its passes.
+    fn time_frame(&self, bokeh: &mut dyn Bokeh, coc: CocField) -> Result<(Duration, PassTimes), CliError> {
         let job = Job {
             ticket: 0,
             color: self.colors.take(),
@@ -235,6 +236,7 @@ impl Buffers {
     }
 }
 
+/// The first frame of the synthetic scene with its exact depth, one ray per pixel.
 fn synthetic_frame(scene: BenchScene, size: (u32, u32)) -> (ColorImage, DepthMap) {
     let threads = cores();
     let scene = match scene {
@@ -247,6 +249,7 @@ fn synthetic_frame(scene: BenchScene, size: (u32, u32)) -> (ColorImage, DepthMap
 }
 
 impl Measured {
+    /// The result as one JSON object, or as a row of the table with its passes (if asked for) in a second line.
     fn line(&self, json: bool, passes: bool) -> String {
         if json {
             // Numbers and texts always have a form in JSON.

@@ -58,8 +58,8 @@ const TO: &str = "/dev/videoN (virtual camera), window, DIR/ (numbered PNG), FIL
 const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, \
                   .mkv or .webm (ffmpeg), or null; may be given more than once";
 
-/// Runs the command; `given` is what was said of other things than the look. The report is written whenever the pipeline
-/// ran, however it ended.
+/// Runs the command; `given` is for warnings and for the window. The report is written whenever the pipeline ran,
+/// however it ended.
 ///
 /// # Errors
 /// The options do not fit the source, something would be overwritten, or a stage of the pipeline failed.
@@ -104,7 +104,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     }
     let settings = look.settings(info.size, adaptive);
     let bokeh = settings.map(|settings| options.computing.blur(&settings, info.size)).transpose()?;
-    // Last, so that nothing is begun that cannot be carried through.
+    // Outputs are opened last, so that none is begun where the run cannot start.
     let demand = stream.on_demand.then(Demand::new);
     let stop = terminal::stop_flag()?;
     let sink_options = sink::Options {

@@ -46,7 +46,7 @@ impl<const QUALITY: bool> FromArgMatches for LookSettings<QUALITY> {
     }
 }
 
-/// The option of a setting.
+/// The command-line option of a look's setting; its value stays text, and is only checked here.
 fn option(setting: &'static Setting) -> Arg {
     let heading = match setting.group {
         Group::Blur => "Blur",

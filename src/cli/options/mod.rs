@@ -72,7 +72,7 @@ pub struct Blur {
 }
 
 impl Blur {
-    /// Whether there was to be depth if the source has any, and else none.
+    /// Whether depth is optional: used if the source has any, else left out without an error.
     pub fn takes_whatever_depth(&self) -> bool {
         self.look.0.effect == Some(Effect::Auto) && self.depth == DepthChoice::Auto
     }
@@ -97,7 +97,7 @@ pub struct Computing {
 }
 
 impl Computing {
-    /// What blurs and matches.
+    /// The same options for executors.
     pub fn choice(&self) -> computing::Computing {
         let Self { backend, adapter, threads, .. } = self.clone();
         computing::Computing { backend, adapter, threads }

@@ -1,4 +1,4 @@
-//! The command line before it is parsed, and what is said where it cannot be.
+//! The command line before it is parsed, and the message where it cannot be.
 
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
@@ -14,6 +14,7 @@ use crate::cli::options::LogFormat;
 /// not an option `-1`, so that the option can say what it accepts.
 pub fn joined(args: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     let mut joined: Vec<OsString> = Vec::new();
+    // Until `--`: what follows that is never an option.
     let mut are_options = true;
     for arg in args {
         let is_number = matches!(arg.as_bytes(), [b'-', b'0'..=b'9' | b'.', ..]);
@@ -50,7 +51,7 @@ pub fn log_format(args: &[OsString]) -> LogFormat {
 pub fn refuse(error: &clap::Error, args: &[OsString]) -> ExitCode {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-            // A reader that is gone needs no help.
+            // A closed standard output is no reason to fail.
             let _ = error.print();
             return ExitCode::SUCCESS;
         }

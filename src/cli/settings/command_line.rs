@@ -7,7 +7,7 @@ use crate::look::Value;
 pub fn equivalent(source: &str, outputs: &[String], flags: &[Value], switches: &[(String, String)]) -> String {
     let mut words = vec!["bokehcam".to_string()];
     words.push(if outputs.is_empty() { "preview" } else { "stream" }.to_string());
-    // What begins with a dash would be taken for an option.
+    // A source that begins with a dash would be taken for an option: it goes last, after `--`.
     let is_option = source.starts_with('-');
     words.extend((!is_option).then(|| quoted(source)));
     for output in outputs {
@@ -23,6 +23,7 @@ pub fn equivalent(source: &str, outputs: &[String], flags: &[Value], switches: &
     words.join(" ")
 }
 
+/// Appends an option; joined with `=` where its value would be taken for an option. `-` alone is no option.
 fn option(words: &mut Vec<String>, name: &str, value: &str) {
     match value.starts_with('-') && value != "-" {
         true => words.push(quoted(&format!("--{name}={value}"))),
@@ -30,7 +31,7 @@ fn option(words: &mut Vec<String>, name: &str, value: &str) {
     }
 }
 
-/// One word of a shell.
+/// `word` in single quotes, unless a shell takes it literally without.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_=:,./%+@".contains(c);
     match !word.is_empty() && word.chars().all(plain) {

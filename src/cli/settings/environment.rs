@@ -1,4 +1,4 @@
-//! Settings in the environment: what a variable is called, which variables are none, and what they are to blame for.
+//! Settings in the environment: warnings of unknown variables, and messages that name the variable behind an error.
 
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStrExt;
@@ -6,16 +6,16 @@ use std::os::unix::ffi::OsStrExt;
 use super::table::{PREFIX, all_settings, nearest_setting, variable};
 use crate::cli::log;
 
-/// Variables that are no settings: the settings file's, and those of the tests.
-const OTHERS: [&str; 6] = ["CONFIG", "DATA", "NO_VM", "PAIR", "SCREENSHOTS", "VM"];
+/// Variables of this program that are no settings: the path of the settings file, and those of the tests.
+const NOT_SETTINGS: [&str; 6] = ["CONFIG", "DATA", "NO_VM", "PAIR", "SCREENSHOTS", "VM"];
 
-/// Warns of variables that would be settings if there were such settings.
+/// Warns of variables that begin with `BOKEHCAM_` and belong to no setting.
 pub fn warn_of_unknown() {
     let known: Vec<String> = all_settings().get_arguments().filter_map(|arg| arg.get_long().map(variable)).collect();
     let names = std::env::vars_os().map(|(name, _)| name.to_string_lossy().into_owned());
     let is_unknown = |name: &String| {
-        let own = name.strip_prefix(PREFIX);
-        own.is_some_and(|own| !OTHERS.contains(&own)) && !known.contains(name)
+        let rest = name.strip_prefix(PREFIX);
+        rest.is_some_and(|rest| !NOT_SETTINGS.contains(&rest)) && !known.contains(name)
     };
     let mut unknown: Vec<String> = names.filter(is_unknown).map(|name| described(&name)).collect();
     unknown.sort();
@@ -30,7 +30,7 @@ fn described(name: &str) -> String {
     format!("{name}, which is no setting{hint}")
 }
 
-/// A message with the environment's variables that the options in it come from.
+/// An error message, with those environment variables appended that set the options it names.
 pub fn with_origin(message: &str, args: &[OsString]) -> String {
     let mut variables: Vec<String> = options_in(message)
         .filter(|name| !has_option(args, name))
@@ -56,7 +56,7 @@ fn has_option(args: &[OsString], name: &str) -> bool {
     args.iter().any(is_it)
 }
 
-/// The options that a text speaks of, without their dashes.
+/// The options `--name` that occur in a text, without their dashes.
 fn options_in(text: &str) -> impl Iterator<Item = &str> {
     text.match_indices("--").filter_map(|(at, _)| {
         let rest = &text[at + 2..];

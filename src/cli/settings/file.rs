@@ -13,6 +13,7 @@ use crate::look::{self, SETTINGS, presets};
 #[cfg(feature = "window")]
 use crate::look::{Patch, presets::Preset};
 
+/// A settings file whose values have been checked.
 #[derive(Debug, Default)]
 pub struct SettingsFile {
     pub values: Values,
@@ -38,15 +39,15 @@ impl SettingsFile {
         Self::parse(&path, &text)
     }
 
-    /// Reads the text of the file `path`.
+    /// Parses the text of the settings file at `path`.
     ///
     /// # Errors
     /// As [`SettingsFile::load`].
     pub fn parse(path: &Path, text: &str) -> Result<Self, CliError> {
-        let refuse = |(at, what): (usize, String)| CliError::Settings {
+        let refuse = |(byte, what): (usize, String)| CliError::Settings {
             path: path.to_owned(),
-            line: text[..at.min(text.len())].matches('\n').count() + 1,
-            // Keys and values are others' texts.
+            line: text[..byte.min(text.len())].matches('\n').count() + 1,
+            // It may quote keys and values, which may hold anything.
             what: printable(&what, &[]).into_owned(),
         };
         let keys = DeTable::parse(text).map_err(|error| {
@@ -54,14 +55,14 @@ impl SettingsFile {
         })?;
         let mut file = Self::default();
         let (tables, settings): (Vec<_>, Vec<_>) = in_order(keys.get_ref()).partition(|entry| entry.name == PRESETS);
-        file.values = values(settings, &is_setting).map_err(refuse)?;
+        file.values = checked(settings, &is_setting).map_err(refuse)?;
         for presets in tables {
             let no_table = || refuse((presets.at, "presets are tables: write [presets.NAME]".to_string()));
             for entry in in_order(presets.value.as_table().ok_or_else(no_table)?) {
                 let settings = entry.value.as_table().ok_or_else(no_table)?;
                 check_name(entry.name).map_err(|what| refuse((entry.at, what)))?;
                 let of_a_look = |name: &str| look::settings::setting(name).is_some();
-                let values = values(in_order(settings), &of_a_look).map_err(refuse)?;
+                let values = checked(in_order(settings), &of_a_look).map_err(refuse)?;
                 file.presets.insert(entry.name.to_owned(), values);
             }
         }
@@ -81,13 +82,13 @@ impl SettingsFile {
         values.map(owned).or_else(|| self.presets.get(name).cloned())
     }
 
-    /// All presets, those in this file last. Those that cannot be, such as one whose aperture is a picture that is gone, are
-    /// left out with a warning.
+    /// All presets, those in this file last. One that cannot be used, such as one whose aperture is a picture that is
+    /// gone, is left out with a warning.
     #[cfg(feature = "window")]
     pub fn all_presets(&self) -> Vec<Preset> {
-        let own = self.presets.iter().filter_map(|(name, values)| {
+        let of_user = self.presets.iter().filter_map(|(name, values)| {
             let pairs = values.iter().map(|(name, value)| (name.as_str(), value.as_str()));
-            // It was read before.
+            // This never fails: the values were checked when the file was read.
             let mut patch = Patch::parse(pairs).ok()?;
             match patch.load() {
                 Ok(()) => Some(Preset { name: name.clone(), patch, own: true }),
@@ -97,10 +98,10 @@ impl SettingsFile {
                 }
             }
         });
-        presets::built_in().chain(own).collect()
+        presets::built_in().chain(of_user).collect()
     }
 
-    /// Says that there is no preset of this name, and which there are.
+    /// The message that there is no preset of this name, with a list of those there are.
     pub fn no_preset(&self, name: &str) -> String {
         let built_in = presets::built_in().map(|preset| preset.name);
         let all: Vec<String> = built_in.chain(self.presets.keys().cloned()).collect();
@@ -108,10 +109,10 @@ impl SettingsFile {
     }
 }
 
-/// Whether a preset of the person's own can have this name.
+/// Checks the name of a preset that a user defines.
 ///
 /// # Errors
-/// It cannot: why.
+/// It is empty, has control characters, or is that of a built-in preset.
 pub fn check_name(name: &str) -> Result<(), String> {
     if name.trim().is_empty() {
         return Err("a preset needs a name".to_string());
@@ -125,23 +126,24 @@ pub fn check_name(name: &str) -> Result<(), String> {
     }
 }
 
-/// A key of the file.
+/// A key of a table with its value.
 struct Entry<'a> {
     name: &'a str,
-    /// Where it is, in bytes.
+    /// Byte offset of the key in the file.
     at: usize,
     value: &'a DeValue<'a>,
 }
 
-/// The keys of a table, as they are in the file.
+/// The keys of a table in the order of the file (the parser sorts them by name), so that the first error is reported.
 fn in_order<'a>(table: &'a DeTable<'a>) -> impl Iterator<Item = Entry<'a>> {
     let mut keys: Vec<_> = table.iter().collect();
     keys.sort_unstable_by_key(|(key, _)| key.span().start);
     keys.into_iter().map(|(key, value)| Entry { name: key.get_ref(), at: key.span().start, value: value.get_ref() })
 }
 
-/// Settings as their flags would take them; or where something is wrong with them, and what.
-fn values<'a>(
+/// The values as text, each checked by the parser of its flag. An error is the byte offset of a key and what is wrong
+/// with it.
+fn checked<'a>(
     entries: impl IntoIterator<Item = Entry<'a>>,
     allowed: &dyn Fn(&str) -> bool,
 ) -> Result<Values, (usize, String)> {
@@ -153,12 +155,12 @@ fn values<'a>(
             return Err((at, what));
         }
         if !allowed(name) {
-            return Err((at, format!("'{name}' is not about the look, and a preset is: it can have {}", names())));
+            return Err((at, format!("'{name}' is not about the look, and a preset is: it can have {}", look_names())));
         }
         let value = match value {
             DeValue::String(text) => text.clone().into_owned(),
             DeValue::Boolean(yes) => yes.to_string(),
-            // With another base or other marks it is no number to the flags.
+            // The flags read decimal numbers alone: none with a prefix such as 0x.
             DeValue::Integer(number) => {
                 i64::from_str_radix(number.as_str(), number.radix()).map_or(number.to_string(), |n| n.to_string())
             }
@@ -172,8 +174,8 @@ fn values<'a>(
     Ok(values)
 }
 
-/// The settings of a look, as a list for people.
-fn names() -> String {
+/// The names of a look's settings, as a list for people.
+fn look_names() -> String {
     SETTINGS.each_ref().map(|setting| setting.name).join(", ")
 }
 
@@ -182,13 +184,13 @@ pub fn user_file() -> Option<PathBuf> {
     Some(folder("XDG_CONFIG_HOME", ".config")?.join("config.toml"))
 }
 
-/// What is remembered that is no setting: `$XDG_STATE_HOME/bokehcam`, or the same under `~/.local/state`.
+/// The folder for what is remembered and no setting: `$XDG_STATE_HOME/bokehcam`, or the same under `~/.local/state`.
 #[cfg(feature = "window")]
 pub fn state_folder() -> Option<PathBuf> {
     folder("XDG_STATE_HOME", ".local/state")
 }
 
-/// This program's folder in the one that `variable` names, else in `usual` under the user's home.
+/// This program's folder in the one that the environment variable names, else in `usual` under the user's home.
 fn folder(variable: &str, usual: &str) -> Option<PathBuf> {
     let absolute = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let folder = absolute(variable).or_else(|| Some(absolute("HOME")?.join(usual)))?;

@@ -1,7 +1,7 @@
 //! Which value of a setting holds: flag > snapshot > environment > preset > file > default.
 //!
-//! What is behind the environment becomes the default values of the flags. A setting sets aside those that it excludes
-//! in the layers behind it.
+//! What comes from a snapshot, preset or file is given to clap as default values of the flags. A setting also overrides
+//! those that it excludes in weaker layers.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,27 +17,29 @@ use crate::cli::log::one_line;
 use crate::look::{SETTINGS, settings};
 use crate::recording::snapshot;
 
+/// A setting with its effective value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Its flag without the dashes.
     pub name: String,
     /// Its value as it would follow the flag; none when its default depends on the picture.
     pub value: Option<String>,
-    /// Where the value comes from.
+    /// Its layer: flag, environment, snapshot, preset, file or default.
     pub origin: &'static str,
     pub help: String,
 }
 
-/// What a command line says besides the look.
+/// What a command line gives, as the window and the warnings about unused settings need it.
 #[derive(Clone, Debug, Default)]
 pub struct Given {
-    /// What flags and the environment say of other things, by name and value.
+    /// Options besides the look's that flags and the environment set, as name and value.
     #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
     pub switches: Vec<(String, String)>,
-    /// Settings of the look that come from elsewhere than flags and defaults: left unsaid, they come again.
+    /// Settings of the look that the environment, a snapshot, a preset or the file set: a command that leaves one out
+    /// gets that value again, so it has to state even a default.
     #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone puts commands together"))]
     pub behind: Vec<String>,
-    /// All that flags, the environment and the preset say; of the preset what is unlike the defaults.
+    /// All settings from flags, environment and preset; of the preset only those that differ from the defaults.
     pub settings: Vec<Setting>,
 }
 
@@ -46,51 +48,52 @@ pub struct Given {
 pub struct Layers {
     /// Their values, and where those come from.
     values: BTreeMap<String, (String, &'static str)>,
-    /// Settings whose environment variable is set aside.
+    /// Settings whose environment variable is ignored, as a stronger layer has or excludes them.
     silent: Vec<String>,
 }
 
 impl Layers {
-    /// What stands behind the flags and the environment in `given`.
+    /// Resolves the layers that `given`, the first parse of the command line, knows nothing of.
     ///
     /// # Errors
     /// There is no preset of the name that was chosen, or the snapshot that was named has no settings in it.
     pub fn of(file: &SettingsFile, given: &ArgMatches) -> Result<Self, CliError> {
         let given = leaf(given);
-        let from = |source: ValueSource| -> Vec<String> {
+        let names_from = |source: ValueSource| -> Vec<String> {
             let is_from = |arg: &&Arg| source_of(given, arg) == Some(source);
             all_settings().get_arguments().filter(is_from).filter_map(|arg| arg.get_long().map(str::to_owned)).collect()
         };
-        let (by_flag, by_environment) = (from(ValueSource::CommandLine), from(ValueSource::EnvVariable));
-        let named = |id: &str| given.try_get_one::<String>(id).ok().flatten();
-        let preset = match named("preset").or_else(|| file.values.get("preset")) {
+        let (by_flag, by_environment) = (names_from(ValueSource::CommandLine), names_from(ValueSource::EnvVariable));
+        let text_of = |id: &str| given.try_get_one::<String>(id).ok().flatten();
+        let preset = match text_of("preset").or_else(|| file.values.get("preset")) {
             Some(name) => file.preset(name).ok_or_else(|| CliError::Usage(file.no_preset(name)))?,
             None => Values::new(),
         };
-        let like = match given.try_get_one::<PathBuf>("like").ok().flatten() {
-            Some(path) => of_snapshot(path)?,
+        let snapshot = match given.try_get_one::<PathBuf>("like").ok().flatten() {
+            Some(path) => read_snapshot(path)?,
             None => Values::new(),
         };
 
+        // The strongest layer first: a later one adds only what is not taken yet.
         let mut layers = Self::default();
         let mut taken = by_flag.clone();
         // A preset that was asked for beside a snapshot is meant to change it.
-        if !like.is_empty() && by_flag.iter().any(|name| name == "preset") {
+        if !snapshot.is_empty() && by_flag.iter().any(|name| name == "preset") {
             layers.add(&preset, "preset", &mut taken);
         }
-        layers.add(&like, "snapshot", &mut taken);
-        let (silent, heard) = apart(by_environment, &taken);
+        layers.add(&snapshot, "snapshot", &mut taken);
+        let (silent, effective) = split_taken(by_environment, &taken);
         layers.silent = silent;
-        taken.extend(heard);
+        taken.extend(effective);
         layers.add(&preset, "preset", &mut taken);
         layers.add(&file.values, "file", &mut taken);
         Ok(layers)
     }
 
-    /// What a command that does the same has to say besides the look.
+    /// What the command line gave, for putting together a command that does the same and for warnings.
     pub fn given(&self, matches: &ArgMatches) -> Given {
-        /// These are for one run, or the window's, which says them itself.
-        const ONCE: [&str; 10] = [
+        /// Never repeated in a command: they are for one run only, or the window states them itself.
+        const NOT_REPEATED: [&str; 10] = [
             "preset",
             "report",
             "force",
@@ -106,7 +109,7 @@ impl Layers {
             let name = setting.name.as_str();
             ["flag", "environment"].contains(&setting.origin)
                 && settings::setting(name).is_none()
-                && !ONCE.contains(&name)
+                && !NOT_REPEATED.contains(&name)
         };
         let resolved = self.resolved(matches);
         let is_behind = |setting: &&Setting| {
@@ -114,38 +117,39 @@ impl Layers {
         };
         let mut behind: Vec<String> = resolved.iter().filter(is_behind).map(|setting| setting.name.clone()).collect();
         let of_strength = |name: &str| settings::setting(name).is_some_and(settings::Setting::is_strength);
+        // They exclude each other: whichever the look has now must be stated to override the one that is behind.
         if behind.iter().any(|name| of_strength(name)) {
             let all = SETTINGS.iter().filter(|setting| setting.is_strength());
             behind.extend(all.map(|setting| setting.name.to_owned()));
         }
-        let is_said = |setting: &&Setting| match setting.origin {
+        let is_given_or_preset = |setting: &&Setting| match setting.origin {
             "flag" | "environment" => true,
-            "preset" => !is_usual(setting),
+            "preset" => !is_default(setting),
             _ => false,
         };
-        let said = resolved.iter().filter(is_said).cloned().collect();
+        let settings = resolved.iter().filter(is_given_or_preset).cloned().collect();
         let given = resolved.into_iter().filter(is_given);
         let switches = given.filter_map(|setting| Some((setting.name, setting.value?))).collect();
-        Given { switches, behind, settings: said }
+        Given { switches, behind, settings }
     }
 
-    /// Adds what no layer before has or excludes.
+    /// Adds the values that no stronger layer has or excludes.
     fn add(&mut self, values: &Values, origin: &'static str, taken: &mut Vec<String>) {
-        let (_, free) = apart(values.keys().cloned().collect(), taken);
+        let (_, free) = split_taken(values.keys().cloned().collect(), taken);
         self.values.extend(free.iter().map(|name| (name.clone(), (values[name].clone(), origin))));
         taken.extend(free);
     }
 
-    /// The command with these settings as defaults.
+    /// The command with these values as defaults of its flags, and without the environment variables to ignore.
     pub fn as_defaults(&self, command: Command) -> Command {
         on_settings(command, &|arg, name| {
-            let heard = match self.silent.iter().any(|silent| silent == name) {
+            let arg = match self.silent.iter().any(|silent| silent == name) {
                 true => arg.env(Resettable::Reset),
                 false => arg,
             };
             match self.values.get(name) {
-                Some((value, _)) => heard.default_value(value.clone()),
-                None => heard,
+                Some((value, _)) => arg.default_value(value.clone()),
+                None => arg,
             }
         })
     }
@@ -172,16 +176,17 @@ impl Layers {
     }
 }
 
-/// Whether a setting has the value that it has where nothing is said.
-fn is_usual(setting: &Setting) -> bool {
+/// Whether a setting has its default value.
+fn is_default(setting: &Setting) -> bool {
     let every = all_settings();
     let arg = every.get_arguments().find(|arg| arg.get_long() == Some(&setting.name));
     let default = arg.and_then(|arg| arg.get_default_values().first()).map(|value| value.to_string_lossy());
+    // Presets write `auto` for a default that depends on the picture, of which clap knows nothing.
     setting.value.as_deref() == Some(default.as_deref().unwrap_or("auto"))
 }
 
-/// Those of `names` that are in `taken` or excluded by it, and the others.
-fn apart(names: Vec<String>, taken: &[String]) -> (Vec<String>, Vec<String>) {
+/// Splits `names` into those that are in `taken` or excluded by it, and the others.
+fn split_taken(names: Vec<String>, taken: &[String]) -> (Vec<String>, Vec<String>) {
     let excluded = excluded_by(taken);
     names.into_iter().partition(|name| taken.contains(name) || excluded.contains(name))
 }
@@ -191,13 +196,13 @@ fn source_of(given: &ArgMatches, arg: &Arg) -> Option<ValueSource> {
     given.try_contains_id(id).is_ok_and(|present| present).then(|| given.value_source(id)).flatten()
 }
 
-/// The settings in a snapshot, as good as if they were flags.
-fn of_snapshot(path: &Path) -> Result<Values, CliError> {
+/// Reads the settings in a snapshot, and checks them as if they were flags.
+fn read_snapshot(path: &Path) -> Result<Values, CliError> {
     let refuse = |what: String| CliError::Usage(format!("--like {}: {what}", path.display()));
     let values: Values = snapshot::settings(path)?.into_iter().collect();
-    if let Some(other) = values.keys().find(|name| settings::setting(name).is_none()) {
+    if let Some(unknown) = values.keys().find(|name| settings::setting(name).is_none()) {
         return Err(refuse(format!(
-            "its setting '{other}' is none of a look: it is of another version, or was edited"
+            "its setting '{unknown}' is none of a look: it is of another version, or was edited"
         )));
     }
     parse_flags(&values).map_err(|error| refuse(one_line(&error)))?;

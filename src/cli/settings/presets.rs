@@ -20,17 +20,18 @@ pub fn save(path: &Path, name: &str, settings: &[Value]) -> Result<(), CliError>
     save::edit(path, |document| with_preset(document, name, settings))
 }
 
-/// Puts a preset into a settings file.
+/// Sets the preset `name` to exactly `settings`. `None` where `presets` or the preset exists and is no table.
 fn with_preset(document: &mut DocumentMut, name: &str, settings: &[Value]) -> Option<()> {
-    let mut tables = Table::new();
-    tables.set_implicit(true);
-    let presets = document.entry(PRESETS).or_insert(Item::Table(tables)).as_table_like_mut()?;
+    let mut new_presets = Table::new();
+    // Without a line `[presets]` of its own.
+    new_presets.set_implicit(true);
+    let presets = document.entry(PRESETS).or_insert(Item::Table(new_presets)).as_table_like_mut()?;
     if presets.get(name).is_none() {
         presets.insert(name, Item::Table(Table::new()));
     }
     let preset: &mut dyn TableLike = presets.get_mut(name)?.as_table_like_mut()?;
-    let gone: Vec<String> = preset.iter().map(|(key, _)| key.to_owned()).collect();
-    gone.iter().filter(|key| !settings.iter().any(|(name, _)| name == key)).for_each(|key| drop(preset.remove(key)));
+    let old: Vec<String> = preset.iter().map(|(key, _)| key.to_owned()).collect();
+    old.iter().filter(|key| !settings.iter().any(|(name, _)| name == key)).for_each(|key| drop(preset.remove(key)));
     settings.iter().for_each(|(name, text)| save::set(preset, name, text));
     Some(())
 }

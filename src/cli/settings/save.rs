@@ -32,14 +32,14 @@ pub fn run(chosen: Option<&Path>, settings: &[Setting]) -> Result<(), CliError> 
     }
     let path = file_to_save(chosen)?;
     let excluded = excluded_by(&names);
-    let mut gone: Vec<String> = Vec::new();
+    let mut removed: Vec<String> = Vec::new();
     edit(&path, |document| {
         let table = document.as_table_mut();
-        gone = excluded.iter().filter(|name| table.remove(name).is_some()).cloned().collect();
+        removed = excluded.iter().filter(|name| table.remove(name).is_some()).cloned().collect();
         given.iter().for_each(|(name, value)| set(table, name, value));
         Some(())
     })?;
-    let without = if gone.is_empty() { String::new() } else { format!("; {} set aside", gone.join(", ")) };
+    let without = if removed.is_empty() { String::new() } else { format!("; {} set aside", removed.join(", ")) };
     terminal::say(&format!("{}: saved {}{without}", path.display(), names.join(", ")));
     Ok(())
 }
@@ -59,8 +59,8 @@ pub fn file_to_save(chosen: Option<&Path>) -> Result<PathBuf, CliError> {
 /// # Errors
 /// It is no settings file, before or after, or cannot be read or written; `change` has no place in it.
 pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) -> Result<(), CliError> {
-    // A link, as those who keep their settings elsewhere have it, stays one.
-    let path = &target(path)?;
+    // A symbolic link, as into a repository of settings, is written through and not replaced.
+    let path = &link_target(path)?;
     let text = match input::read_text(path, input::MOST_SETTINGS_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
         read => read.map_err(CliError::io(path))?,
@@ -79,9 +79,9 @@ pub fn edit(path: &Path, change: impl FnOnce(&mut DocumentMut) -> Option<()>) ->
     write_whole(path, edited.as_bytes())
 }
 
-/// Where the links at `path` lead, if it is one, though nothing may be there yet.
-fn target(path: &Path) -> Result<PathBuf, CliError> {
-    /// As many as the kernel follows.
+/// Follows the symbolic links at `path`. Unlike with `canonicalize`, nothing need be there at the end of them yet.
+fn link_target(path: &Path) -> Result<PathBuf, CliError> {
+    /// As many as Linux follows.
     const MOST_LINKS: usize = 40;
     let mut target = path.to_owned();
     for _ in 0..MOST_LINKS {
@@ -93,7 +93,7 @@ fn target(path: &Path) -> Result<PathBuf, CliError> {
     Err(CliError::io(path)(io::Error::new(io::ErrorKind::InvalidInput, "a loop of links")))
 }
 
-/// Gives a key its value, in its place and with its comments where it is there already.
+/// Sets a key. If it is there already, its place and the comments around its value stay.
 pub fn set(table: &mut dyn TableLike, key: &str, text: &str) {
     let mut value = toml_number(text).unwrap_or_else(|| Value::from(text));
     match table.get_mut(key).and_then(Item::as_value_mut) {
@@ -154,9 +154,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (link, real) = (folder.path().join("link.toml"), folder.path().join("dot/real.toml"));
         std::os::unix::fs::symlink("dot/real.toml", &link).unwrap();
-        assert_eq!(target(&link).unwrap(), real);
+        assert_eq!(link_target(&link).unwrap(), real);
         let looped = folder.path().join("loop");
         std::os::unix::fs::symlink("loop", &looped).unwrap();
-        assert!(target(&looped).is_err());
+        assert!(link_target(&looped).is_err());
     }
 }

@@ -1,5 +1,5 @@
-//! Settings by their names: the parser of the flags is the only one there is. A setting's environment variable and its
-//! key in the settings file are its flag's name.
+//! Settings by name: a setting's environment variable and its key in the settings file follow from the name of its
+//! flag, and all three are parsed by the flag's parser.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -42,7 +42,7 @@ pub fn nearest_setting(name: &str) -> Option<String> {
     (error.kind() == ErrorKind::UnknownArgument).then(|| suggested.to_string().trim_start_matches('-').to_owned())
 }
 
-/// Settings as if they were flags.
+/// Parses settings as if they were flags.
 ///
 /// # Errors
 /// One of them would be refused.
@@ -54,9 +54,10 @@ pub fn parse_flags(values: &Values) -> Result<ArgMatches, clap::Error> {
 /// Names of the settings that exclude, or are excluded by, one of `names`.
 pub fn excluded_by(names: &[String]) -> Vec<String> {
     let every = all_settings();
+    // clap knows a conflict from the side that declares it.
     let exclude_each_other = |a: &Arg, b: &Arg| {
-        let names = |from: &Arg, to: &Arg| every.get_arg_conflicts_with(from).iter().any(|x| x.get_id() == to.get_id());
-        names(a, b) || names(b, a)
+        let lists = |from: &Arg, to: &Arg| every.get_arg_conflicts_with(from).iter().any(|x| x.get_id() == to.get_id());
+        lists(a, b) || lists(b, a)
     };
     let is_named = |arg: &&Arg| arg.get_long().is_some_and(|long| names.iter().any(|name| name == long));
     let (named, rest): (Vec<&Arg>, Vec<&Arg>) = every.get_arguments().partition(is_named);

@@ -1,6 +1,6 @@
-//! Settings that were given and can have no effect in this run: said in one line, whatever the command.
+//! Warnings of settings that were given and have no effect in this run, in one line for every command.
 //!
-//! What was given is what flags, the environment and a preset say; the settings file is a wish for all runs.
+//! Given are those of flags, the environment and a preset; the settings file is meant for all runs.
 
 use super::layers::Setting;
 use super::table::variable;
@@ -8,14 +8,14 @@ use crate::cli::log;
 use crate::look::Effect;
 use crate::source::{DepthFrom, Kind};
 
-/// What a run came to, as far as settings depend on it.
+/// What decides in a run which settings have an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
     /// What frames come from.
     pub source: From,
     /// What depth comes from.
     pub depth: DepthFrom,
-    /// Whether anything is made of it.
+    /// Whether the effect uses depth.
     pub uses_depth: bool,
     /// What the blur follows.
     pub effect: Effect,
@@ -23,7 +23,7 @@ pub struct Run {
     pub lens: bool,
     /// Whether frames come in real time.
     pub realtime: bool,
-    /// Whether the CPU alone was asked for.
+    /// Whether the user chose the CPU backend.
     pub cpu_only: bool,
     /// Whether there is a window.
     pub window: bool,
@@ -39,9 +39,10 @@ pub enum From {
     Bench,
 }
 
-/// Why a setting has no effect in a run, if it has none.
+/// Why a setting has no effect in a run; `None` where it has one.
 type Why = fn(&Run) -> Option<&'static str>;
 
+/// What settings need to have an effect. The first two rows depend on the source alone: `warn_by_source` takes these.
 const NEEDS: [(&[&str], Why); 13] = [
     (&["size", "fps"], |run| (run.source == From::Source(Kind::Recording)).then_some("a recording has its own")),
     (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
@@ -78,7 +79,7 @@ const NEEDS: [(&[&str], Why); 13] = [
 const NO_DEPTH: &str = "there is no depth";
 const DEPTH_UNUSED: &str = "the effect does not use depth";
 
-/// Depth is used by one effect.
+/// Settings of depth of field need the effect that uses depth.
 fn dof(run: &Run) -> Option<&'static str> {
     match (run.effect, run.depth) {
         (effect, _) if effect.follows_depth() => None,
@@ -87,16 +88,17 @@ fn dof(run: &Run) -> Option<&'static str> {
     }
 }
 
+/// Settings of the blur need any effect that blurs.
 fn blur(run: &Run) -> Option<&'static str> {
     (run.effect == Effect::None).then_some("nothing is blurred")
 }
 
-/// Warns of what was given and has no effect.
+/// Warns of the given settings that have no effect in this run.
 pub fn warn(given: &[Setting], run: &Run) {
     warn_of(unused(given, run));
 }
 
-/// The same, as far as that depends on the source alone: the window changes all else.
+/// Warns of the given settings that have no effect with this kind of source; all else can be changed in the window.
 #[cfg(feature = "window")]
 pub fn warn_by_source(given: &[Setting], source: Kind) {
     let run = Run {
@@ -123,7 +125,7 @@ fn unused<'a>(given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str
     given.iter().filter_map(|setting| Some((setting, why(setting)?))).collect()
 }
 
-/// One line, whatever there is to say: settings with one reason together.
+/// Warns in one line, with the settings of one reason together.
 fn warn_of(unused: Vec<(&Setting, &str)>) {
     let mut reasons: Vec<&str> = Vec::new();
     for (_, why) in &unused {
@@ -131,16 +133,17 @@ fn warn_of(unused: Vec<(&Setting, &str)>) {
             reasons.push(why);
         }
     }
-    let with = |why: &&str| {
-        let names: Vec<String> = unused.iter().filter(|(_, other)| other == why).map(|(s, _)| called(s)).collect();
+    let grouped = |why: &&str| {
+        let names: Vec<String> = unused.iter().filter(|(_, other)| other == why).map(|(s, _)| as_given(s)).collect();
         format!("{} ({why})", names.join(", "))
     };
     if !reasons.is_empty() {
-        log::warn(&format!("without effect here: {}", reasons.iter().map(with).collect::<Vec<_>>().join("; ")));
+        log::warn(&format!("without effect here: {}", reasons.iter().map(grouped).collect::<Vec<_>>().join("; ")));
     }
 }
 
-fn called(setting: &Setting) -> String {
+/// A setting as the user wrote it, and where.
+fn as_given(setting: &Setting) -> String {
     let Setting { name, value, origin, .. } = setting;
     let value = value.as_deref().unwrap_or_default();
     match *origin {
@@ -150,15 +153,15 @@ fn called(setting: &Setting) -> String {
     }
 }
 
-/// Warns that a picture without depth gets tilt-shift, where depth was not declined.
+/// Warns that tilt-shift replaces depth of field, as there is no depth. Not for those who chose to do without.
 pub fn warn_of_no_depth(source: From) {
-    let way = match source {
+    let fix = match source {
         From::Picture => "--depth-map FILE gives its depth",
         From::Source(Kind::Recording) => "--depth FOLDER takes another recording's",
         From::Source(_) | From::Bench => "--depth NAME takes a depth camera's",
     };
     log::warn(&format!(
-        "{NO_DEPTH}, so a band of the picture stays sharp and the rest is blurred (tilt-shift): {way}, --effect blur blurs it all"
+        "{NO_DEPTH}, so a band of the picture stays sharp and the rest is blurred (tilt-shift): {fix}, --effect blur blurs it all"
     ));
 }
 

@@ -1,9 +1,9 @@
 //! Depth from a camera of its own, beside the one that gives the colours.
 //!
 //! The newest maps are kept and paired with the colours by the time they were taken. When none comes any more, the last
-//! one stays: a blur that follows an old map is wrong at its edges, but a blur that vanishes shows the room. That is
-//! said once, and so is its end. Before the first map, and after a rest, there is none, and frames go without being
-//! shown.
+//! one stays: a blur that follows an old map is wrong at its edges, but a blur that vanishes shows the room. The loss
+//! of depth is logged once, and so is its return. Before the first map, and after a rest, there is no map, and frames
+//! are not shown.
 
 mod pairing;
 mod units;
@@ -20,14 +20,14 @@ use crate::v4l2::layout::Content;
 use crate::v4l2::live::{Live, Next, OpenError, Wish};
 use pairing::Pairing;
 
-/// A map that is this much older than its picture is worth a word.
+/// A warning is logged when the newest map is older than this.
 const STALE_NS: u64 = 1_000_000_000;
 
-/// The share of a depth period that a picture waits for a map that fits better than those that are there.
-const WAIT_PER_PERIOD: u32 = 4;
+/// A picture waits up to a depth period divided by this for a map that fits it better than those that are there.
+const WAIT_DIVISOR: u32 = 4;
 
-/// Calls for news in a row: a driver that never runs dry must not keep a picture waiting.
-const MOST_NEWS: usize = 8;
+/// Polls of the camera in a row: a driver that never runs dry must not keep a picture waiting.
+const MOST_POLLS: usize = 8;
 
 /// A depth camera.
 pub struct LiveDepth {
@@ -36,6 +36,7 @@ pub struct LiveDepth {
     registration: Option<Registration>,
     pairing: Pairing,
     clock: Clock,
+    /// Whether the loss of depth was logged, and its return was not.
     stale: bool,
 }
 
@@ -55,9 +56,9 @@ impl LiveDepth {
         Ok(Self { live, units, registration, pairing: Pairing::default(), clock, stale: false })
     }
 
-    /// Takes what the camera has, and waits for it no longer than `patience`.
-    fn take_news(&mut self, mut patience: Duration) {
-        for _ in 0..MOST_NEWS {
+    /// Decodes the maps that the camera has ready into `pairing`; waits for the first of them up to `patience`.
+    fn take_maps(&mut self, mut patience: Duration) {
+        for _ in 0..MOST_POLLS {
             match self.live.next(patience) {
                 Next::Frame { captured_ns } => {
                     let (layout, planes) = (*self.live.layout(), self.live.planes());
@@ -76,8 +77,8 @@ impl LiveDepth {
         }
     }
 
-    /// Says when maps grow old, and when new ones come.
-    fn watch(&mut self, now_ns: u64, newest_ns: u64) {
+    /// Logs when no maps have come for a while, and when they come again: each change once.
+    fn log_staleness(&mut self, now_ns: u64, newest_ns: u64) {
         let stale = now_ns.saturating_sub(newest_ns) > STALE_NS;
         if stale != self.stale {
             match stale {
@@ -91,17 +92,18 @@ impl LiveDepth {
 
 impl DepthSource for LiveDepth {
     fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
-        self.take_news(Duration::ZERO);
+        self.take_maps(Duration::ZERO);
         let now_ns = self.clock.now_ns();
+        // Colours without a time of capture get the newest map.
         let taken_ns = stamp.captured_ns.unwrap_or(now_ns);
         let period_ns = self.live.agreed().interval.period_ns();
         if self.pairing.is_worth_waiting(taken_ns, period_ns) {
-            self.take_news(Duration::from_nanos(period_ns) / WAIT_PER_PERIOD);
+            self.take_maps(Duration::from_nanos(period_ns) / WAIT_DIVISOR);
         }
         let Some(newest_ns) = self.pairing.newest_ns() else {
             return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
         };
-        self.watch(now_ns, newest_ns);
+        self.log_staleness(now_ns, newest_ns);
         let Some(nearest) = self.pairing.nearest(taken_ns) else {
             return Err(DepthError::Unpaired { source_name: self.live.name().to_owned() });
         };
@@ -117,7 +119,7 @@ impl DepthSource for LiveDepth {
 
     fn rest(&mut self) {
         self.live.rest();
-        // Who sits there when it is watched again is not known.
+        // Afterwards somebody else may sit there: an old map would be wrong.
         self.pairing.clear();
         self.stale = false;
     }

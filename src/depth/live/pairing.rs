@@ -14,7 +14,7 @@ pub(super) struct Pairing {
     maps: [DepthMap; KEPT],
     /// None where there is no map.
     taken_ns: [Option<u64>; KEPT],
-    /// Where the oldest is.
+    /// Index of the oldest map, which the next one overwrites.
     next: usize,
 }
 
@@ -25,7 +25,7 @@ impl Pairing {
         &mut self.maps[self.next]
     }
 
-    /// What was written over the oldest map was taken at this time.
+    /// Makes the overwritten oldest map the newest, taken at this time.
     pub(super) fn keep(&mut self, taken_ns: u64) {
         self.taken_ns[self.next] = Some(taken_ns);
         self.next = (self.next + 1) % KEPT;
@@ -40,8 +40,8 @@ impl Pairing {
         self.taken_ns.into_iter().flatten().max()
     }
 
-    /// Whether a better map for a picture of this time may come at once: none lies within half a period, and the camera
-    /// runs.
+    /// Whether a better map for a picture of this time may come at once: the newest is more than half a period older,
+    /// and the camera still runs.
     pub(super) fn is_worth_waiting(&self, taken_ns: u64, period_ns: u64) -> bool {
         self.newest_ns().is_some_and(|newest_ns| {
             let behind_ns = taken_ns.saturating_sub(newest_ns);

@@ -14,7 +14,8 @@ pub struct Units {
 }
 
 impl Units {
-    /// Decodes a picture of this layout into `map` (resized to fit); false where it is no depth, or cut short.
+    /// Decodes a picture of this layout into `map` (resized to fit). Returns false where the layout holds no 16-bit
+    /// depth, or the plane is cut short.
     pub(super) fn decode(&self, layout: &Layout, plane: &[u8], map: &mut DepthMap) -> bool {
         if layout.family() != Family::Depth16 || plane.len() < layout.needed_bytes(0) {
             return false;
@@ -25,6 +26,7 @@ impl Units {
         for (row, metres) in plane.chunks(stride_bytes).zip(map.metres.chunks_exact_mut(width)) {
             for (bytes, metres) in row.as_chunks().0.iter().zip(metres) {
                 let units = u16::from_le_bytes(*bytes);
+                // 0 units become 0 m, which means unknown as well.
                 let known = (units != self.invalid) & (units != u16::MAX);
                 *metres = if known { f32::from(units) * m_per_unit } else { 0.0 };
             }

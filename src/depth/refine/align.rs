@@ -13,7 +13,7 @@
 use pulp::{Arch, WithSimd};
 
 use super::planes::{Planes, SetDepths};
-use super::votes::{self, BEFORE, Votes, Weights, jump_at};
+use super::votes::{self, REACH_LANES, Votes, Weights, jump_at};
 
 /// How far from a jump a depth may be wrong, in pixels.
 const BAND_PX: usize = 4;
@@ -27,11 +27,12 @@ const ROUNDS: usize = 2;
 #[derive(Debug)]
 pub struct Aligner {
     planes: Planes,
+    /// Both sides of every jump, and what lies within [`BAND_PX`] of one.
     edge: Vec<bool>,
     band: Vec<bool>,
     scratch: Vec<bool>,
-    /// How much each depth weighs.
-    sure: Vec<f32>,
+    /// How much each depth counts as a vote, 0 to 1.
+    confidence: Vec<f32>,
     /// Weight of votes by distance.
     nearby: Weights,
     /// Pixels to ask, in order: first those at an edge, then the neighbours of those that changed.
@@ -47,7 +48,7 @@ impl Default for Aligner {
             edge: Vec::new(),
             band: Vec::new(),
             scratch: Vec::new(),
-            sure: Vec::new(),
+            confidence: Vec::new(),
             nearby: votes::weights_by_distance(),
             front: Vec::new(),
             moved: Vec::new(),
@@ -56,14 +57,14 @@ impl Default for Aligner {
 }
 
 impl Aligner {
-    /// Aligns `inverse` to the picture `rgb`. Steps of inverse depth above `jump` are edges; depths that
-    /// are `unknown` were made up.
+    /// Moves the edges of `inverse` onto those of the picture `rgb`. Steps of inverse depth above `jump` are edges;
+    /// depths that are `unknown` were made up.
     pub fn align(&mut self, arch: Arch, inverse: &mut [f32], unknown: &[bool], rgb: &[u8], width: usize, jump: f32) {
         let height = inverse.len().checked_div(width).unwrap_or(0);
         self.moved.clear();
         for round in 0..ROUNDS {
-            let Self { planes, edge, band, scratch, sure, nearby, front, moved } = self;
-            sure.resize(inverse.len(), 0.0);
+            let Self { planes, edge, band, scratch, confidence, nearby, front, moved } = self;
+            confidence.resize(inverse.len(), 0.0);
             arch.dispatch(FindBand { inverse, width, jump, edge, band, scratch });
             // Only what moved in the round before can move its neighbours now.
             front.clear();
@@ -76,10 +77,10 @@ impl Aligner {
                 return;
             }
             if round == 0 {
-                planes.set_colors(rgb, width, height, BEFORE);
+                planes.set_colors(rgb, width, height, REACH_LANES);
             }
-            for ((sure, &band), &unknown) in sure.iter_mut().zip(&*band).zip(unknown) {
-                *sure = if unknown {
+            for ((confidence, &band), &unknown) in confidence.iter_mut().zip(&*band).zip(unknown) {
+                *confidence = if unknown {
                     MADE_UP
                 } else if band {
                     UNSURE
@@ -87,7 +88,7 @@ impl Aligner {
                     1.0
                 };
             }
-            arch.dispatch(SetDepths { planes, inverse, sure });
+            arch.dispatch(SetDepths { planes, inverse, confidence });
             moved.clear();
             arch.dispatch(Vote { planes, band, nearby, inverse, jump, front, moved });
         }
@@ -131,24 +132,25 @@ impl WithSimd for FindBand<'_> {
                 out[width - 1] |= is_jump(row[width - 1], row[width - 2], jump);
             }
         }
+        // The edge pixel itself is the first of the band. Along rows, then down the columns.
         const REST_PX: usize = BAND_PX - 1;
         for (row, out) in edge.chunks_exact(width).zip(scratch.chunks_exact_mut(width)) {
             out.copy_from_slice(row);
             for px in 1..=REST_PX.min(width - 1) {
-                spread(&row[..width - px], &mut out[px..]);
-                spread(&row[px..], &mut out[..width - px]);
+                or_assign(&mut out[px..], &row[..width - px]);
+                or_assign(&mut out[..width - px], &row[px..]);
             }
         }
         for (y, out) in band.chunks_exact_mut(width).enumerate() {
-            for near in y.saturating_sub(REST_PX)..(y + BAND_PX).min(height) {
-                spread(&scratch[near * width..][..width], out);
+            for other in y.saturating_sub(REST_PX)..(y + BAND_PX).min(height) {
+                or_assign(out, &scratch[other * width..][..width]);
             }
         }
     }
 }
 
 #[inline(always)]
-fn spread(from: &[bool], to: &mut [bool]) {
+fn or_assign(to: &mut [bool], from: &[bool]) {
     for (to, &from) in to.iter_mut().zip(from) {
         *to |= from;
     }
@@ -165,7 +167,7 @@ fn is_jump(here: f32, beside: f32, jump: f32) -> bool {
 /// an edge moves like a front, and where it is right it costs little.
 struct Vote<'a> {
     planes: &'a Planes,
-    /// Where depths may change. A pixel leaves it when it is asked.
+    /// Where depths may change. A pixel leaves it when it joins the front, so that it is asked once.
     band: &'a mut [bool],
     nearby: &'a Weights,
     inverse: &'a mut [f32],
@@ -198,6 +200,7 @@ impl WithSimd for Vote<'_> {
             moved.push(asked);
             let beside =
                 [(x > 0, k.wrapping_sub(1)), (x + 1 < width, k + 1), (y > 0, k.wrapping_sub(width)), (true, k + width)];
+            // Below the last row `k + width` lies beyond the band.
             for (inside, beside) in beside {
                 if inside && beside < band.len() && band[beside] {
                     band[beside] = false;

@@ -1,10 +1,10 @@
 //! Measured depth, made fit for the blur: as large as the picture, without holes, calm on surfaces, with its edges on
 //! the edges of the colours, and steady in time.
 //!
-//! What the blur shows of an error in depth is where an edge runs, and that it flickers; noise of a surface matters
-//! less. All is done in inverse depth, the distance in focus over the depth, in which the circle of confusion is linear, a plane is a plane, and the
-//! noise of a stereo or structured-light sensor is the same at every distance (Khoshelham and Oude Elberink, *Accuracy
-//! and resolution of Kinect depth data*, 2012).
+//! The blur shows where an edge is misplaced and where depth flickers; noise of a surface matters less. All is done in
+//! inverse depth, the distance in focus over the depth, in which the circle of confusion is linear, a plane is a plane,
+//! and the noise of a stereo or structured-light sensor is the same at every distance (Khoshelham and Oude Elberink,
+//! *Accuracy and resolution of Kinect depth data*, 2012).
 
 mod align;
 mod planes;
@@ -37,16 +37,17 @@ pub struct Refiner {
     arch: Arch,
     upsampler: Upsampler,
     filler: Filler,
+    /// Pixels whose depth nobody measured: the filler made it up.
     unknown: Vec<bool>,
+    /// Distance in focus over the depth.
     inverse: Vec<f32>,
     smoother: Smoother,
     aligner: Aligner,
     temporal: TemporalFilter,
-    /// Distance in focus over a metre.
     focus: Focus,
 }
 
-/// The unit of inverse depth: steps count by the blur they make, and that is by how they compare to what is in focus.
+/// The distance in focus, in metres. Inverse depth is this over the depth, so that equal steps of it blur equally.
 #[derive(Clone, Copy, Debug)]
 struct Focus(f32);
 
@@ -79,6 +80,7 @@ impl Refiner {
         self.unknown.clear();
         self.unknown.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
         self.filler.fill_by(map, color);
+        // The filler leaves either nothing unknown or everything: one pixel tells which.
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
             return self.temporal.forget();
         }

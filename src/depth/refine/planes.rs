@@ -8,7 +8,7 @@ pub const LANES: usize = 16;
 /// Columns of one parity before the picture's first and after its last, in which nothing weighs anything.
 const MARGIN: usize = LANES;
 
-/// Inverse depth, its weight, red, green and blue.
+/// Inverse depth, its confidence, red, green and blue.
 const KINDS: usize = 5;
 
 /// Planes of a frame, even columns in the first half of each row, odd ones in the second.
@@ -40,6 +40,7 @@ impl Planes {
         for (y, row) in rgb.chunks_exact(3 * width).enumerate() {
             for (parity, first) in [(0, 0), (1, 3)] {
                 let at = (2 * y + parity) * stride + MARGIN;
+                // Every second pixel: six bytes on. A row of one pixel has no odd column.
                 let pixels = row[first.min(row.len())..].chunks(6);
                 let out = red[at..].iter_mut().zip(&mut green[at..]).zip(&mut blue[at..]);
                 for (pixel, ((red, green), blue)) in pixels.zip(out) {
@@ -56,29 +57,30 @@ impl Planes {
         [self.planes[2][at], self.planes[3][at], self.planes[4][at]]
     }
 
-    /// Of row `y`, the pixels of the parity of `x` from `reach` before it: inverse depth, weight, red, green, blue.
+    /// The pixels of row `y` with the parity of `x`, from `reach` before it on: inverse depth, confidence, red, green,
+    /// blue.
     #[inline(always)]
     pub fn window(&self, x: usize, y: usize) -> [&[f32; LANES]; KINDS] {
         let at = (2 * y + x % 2) * self.stride + MARGIN + x / 2 - self.reach;
-        let [depth, sure, red, green, blue] = &self.planes;
-        [chunk(depth, at), chunk(sure, at), chunk(red, at), chunk(green, at), chunk(blue, at)]
+        let [depth, confidence, red, green, blue] = &self.planes;
+        [chunk(depth, at), chunk(confidence, at), chunk(red, at), chunk(green, at), chunk(blue, at)]
     }
 }
 
-/// Takes inverse depths, and how much each of them weighs.
+/// Copies inverse depths, and how much each of them weighs, into the planes.
 pub struct SetDepths<'a> {
     pub planes: &'a mut Planes,
     /// Inverse depths of the picture, row by row.
     pub inverse: &'a [f32],
-    pub sure: &'a [f32],
+    pub confidence: &'a [f32],
 }
 
 impl WithSimd for SetDepths<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { planes: Planes { width, stride, planes: [depth, weight, ..], .. }, inverse, sure } = self;
-        for (from, to) in [(inverse, depth), (sure, weight)] {
+        let Self { planes: Planes { width, stride, planes: [depth, weight, ..], .. }, inverse, confidence } = self;
+        for (from, to) in [(inverse, depth), (confidence, weight)] {
             for (row, out) in from.chunks_exact(*width).zip(to.chunks_exact_mut(2 * *stride)) {
                 let (even, odd) = out.split_at_mut(*stride);
                 let (even, odd) = (&mut even[MARGIN..][..width.div_ceil(2)], &mut odd[MARGIN..][..*width / 2]);

@@ -13,7 +13,7 @@ const PAIRS_PX: [usize; 4] = [2, 4, 6, 8];
 const SAME_SURFACE: f32 = 3.5;
 /// Distance in pixels between the three depths that tell noise from slope, above the length over which it correlates.
 const LAG_PX: usize = 6;
-/// Rows and columns looked at for the noise, at most.
+/// Rows and columns sampled for the noise, at most.
 const LOOKS: usize = 96;
 /// Share of the differences that lie on smooth surfaces, whatever else the picture holds, and the quantile of `|x|`
 /// there of a normal distribution in standard deviations.
@@ -26,7 +26,8 @@ const NO_NOISE: f32 = 5e-4;
 #[derive(Debug, Default)]
 pub struct Smoother {
     differences: Vec<f32>,
-    other: Vec<f32>,
+    /// The map after the pass along the rows.
+    along_rows: Vec<f32>,
 }
 
 impl Smoother {
@@ -60,72 +61,75 @@ impl Smoother {
         if noise < NO_NOISE || width == 0 {
             return;
         }
-        self.other.resize(inverse.len(), 0.0);
-        let reach = SAME_SURFACE * noise;
-        arch.dispatch(Rows { from: inverse, to: &mut self.other, width, reach });
-        arch.dispatch(Columns { from: &self.other, to: inverse, width, reach });
+        self.along_rows.resize(inverse.len(), 0.0);
+        let limit = SAME_SURFACE * noise;
+        arch.dispatch(Rows { from: inverse, to: &mut self.along_rows, width, limit });
+        arch.dispatch(Columns { from: &self.along_rows, to: inverse, width, limit });
     }
 }
 
+/// The sigma filter along rows. Ends of a pair within `limit` of its middle lie on the middle's surface.
 struct Rows<'a> {
     from: &'a [f32],
     to: &'a mut [f32],
     width: usize,
-    reach: f32,
+    limit: f32,
 }
 
 impl WithSimd for Rows<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { from, to, width, reach } = self;
+        let Self { from, to, width, limit } = self;
         for (row, out) in from.chunks_exact(width).zip(to.chunks_exact_mut(width)) {
             out.fill(0.0);
             for px in PAIRS_PX.into_iter().filter(|px| 2 * px < width) {
-                add_pair(&row[..width - 2 * px], &row[px..width - px], &row[2 * px..], &mut out[px..width - px], reach);
+                add_pair(&row[..width - 2 * px], &row[px..width - px], &row[2 * px..], &mut out[px..width - px], limit);
             }
-            add_share(row, out);
+            finish_mean(row, out);
         }
     }
 }
 
+/// As [`Rows`], along columns.
 struct Columns<'a> {
     from: &'a [f32],
     to: &'a mut [f32],
     width: usize,
-    reach: f32,
+    limit: f32,
 }
 
 impl WithSimd for Columns<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { from, to, width, reach } = self;
+        let Self { from, to, width, limit } = self;
         let height = from.len() / width;
         let row = |y: usize| &from[y * width..(y + 1) * width];
         for (y, out) in to.chunks_exact_mut(width).enumerate() {
             out.fill(0.0);
             for px in PAIRS_PX.into_iter().filter(|&px| px <= y && y + px < height) {
-                add_pair(row(y - px), row(y), row(y + px), out, reach);
+                add_pair(row(y - px), row(y), row(y + px), out, limit);
             }
-            add_share(row(y), out);
+            finish_mean(row(y), out);
         }
     }
 }
 
-/// Adds how far the mean of a pair is from the middle, times two, where both its ends are on the middle's surface.
+/// Adds the differences of both ends of a pair from its middle to `out`, where both lie on the middle's surface.
 #[inline(always)]
-fn add_pair(before: &[f32], here: &[f32], after: &[f32], out: &mut [f32], reach: f32) {
+fn add_pair(before: &[f32], here: &[f32], after: &[f32], out: &mut [f32], limit: f32) {
     for (((&before, &here), &after), out) in before.iter().zip(here).zip(after).zip(out) {
         let (before, after) = (before - here, after - here);
-        let same = (before.abs() < reach) & (after.abs() < reach);
+        let same = (before.abs() < limit) & (after.abs() < limit);
         *out += if same { before + after } else { 0.0 };
     }
 }
 
-/// The middle and its share of what the pairs add to it.
+/// Turns the summed differences in `out` into the mean over all taps. A pair that was left out counts as two taps equal
+/// to the middle.
 #[inline(always)]
-fn add_share(row: &[f32], out: &mut [f32]) {
+fn finish_mean(row: &[f32], out: &mut [f32]) {
     const SHARE: f32 = 1.0 / (2 * PAIRS_PX.len() + 1) as f32;
     for (&here, out) in row.iter().zip(out) {
         *out = here + *out * SHARE;

@@ -11,13 +11,14 @@ use pulp::{Arch, WithSimd};
 const LONGEST: f32 = 8.0;
 /// Frames for which a jump under resting colours is held back: a tenth of a second at 30 per second.
 const HOLD: f32 = 2.0;
-/// Sums of the changes of red, green and blue, in steps of 8-bit sRGB averaged over 3x3 pixels, between which a pixel
-/// counts as moved: this many times the median change, within these bounds.
+/// A pixel rests up to a change of colour (of red, green and blue together, in steps of 8-bit sRGB, averaged over 3x3
+/// pixels) of this many times the median change, which is mostly camera noise, within these bounds; at twice that it
+/// has moved.
 const MOVED: f32 = 2.5;
 const MOVED_BOUNDS: (f32, f32) = (8.0, 24.0);
 /// Frames further apart than this in media time, or not in order, do not follow each other.
 const LONGEST_GAP_NS: u64 = 500_000_000;
-/// Rows and columns looked at for the median change, at most.
+/// Rows and columns sampled for the median change, at most.
 const LOOKS: usize = 64;
 
 /// What a change of inverse depth means.
@@ -40,29 +41,31 @@ pub struct TemporalFilter {
     count: Vec<f32>,
     /// Frames for which a jump was held back.
     held: Vec<f32>,
+    /// The last picture.
     rgb: Vec<u8>,
     /// Change of colour since the last frame, then its mean over 3x3 pixels.
     change: Vec<f32>,
     smooth_change: Vec<f32>,
+    /// Memory for the samples of the median.
     looks: Vec<f32>,
 }
 
 impl TemporalFilter {
-    /// The unit of inverse depth has become so many times smaller.
+    /// Multiplies the remembered inverse depth, as its unit has become `times` smaller.
     pub fn rescale(&mut self, times: f32) {
         self.mean.iter_mut().for_each(|v| *v *= times);
     }
 
-    /// No frame came before the next one.
+    /// Starts anew with the next frame.
     pub fn forget(&mut self) {
         self.mean.clear();
     }
 
     /// Steadies `inverse` of the frame at `time_ns`, with the picture `rgb`.
     pub fn steady(&mut self, arch: Arch, inverse: &mut [f32], rgb: &[u8], width: usize, time_ns: u64, limits: Limits) {
-        let follows = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
+        let same_size = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
         let in_order = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
-        if follows && in_order {
+        if same_size && in_order {
             self.change.resize(inverse.len(), 0.0);
             self.smooth_change.resize(inverse.len(), 0.0);
             let (change, smooth) = (&mut self.change, &mut self.smooth_change);
@@ -84,6 +87,7 @@ impl TemporalFilter {
         (self.width, self.time_ns) = (width, time_ns);
     }
 
+    /// The median of the smoothed change over a grid of samples.
     fn median_change(&mut self) -> f32 {
         let height = self.smooth_change.len() / self.width;
         self.looks.clear();
@@ -96,7 +100,7 @@ impl TemporalFilter {
     }
 }
 
-/// How much the colours around each pixel changed.
+/// How much the colours around each pixel changed: the mean over 3x3 pixels, in `smooth`.
 struct Change<'a> {
     rgb: &'a [u8],
     before: &'a [u8],
@@ -136,12 +140,14 @@ impl WithSimd for Change<'_> {
     }
 }
 
+/// Moves the average of each pixel towards the new inverse depth, and gives it out in `inverse`.
 struct Average<'a> {
     inverse: &'a mut [f32],
     mean: &'a mut [f32],
     count: &'a mut [f32],
     held: &'a mut [f32],
     change: &'a [f32],
+    /// Up to this change of colour a pixel rests.
     moved: f32,
     limits: Limits,
 }
@@ -154,18 +160,18 @@ impl WithSimd for Average<'_> {
         let (per_moved, per_noise) = (1.0 / moved, 1.0 / limits.noise);
         let state = mean.iter_mut().zip(count).zip(held).zip(change);
         for (inverse, (((mean, count), held), &change)) in inverse.iter_mut().zip(state) {
-            // From 1 at rest to 0 at twice the bound.
+            // From 1 up to the bound to 0 at twice the bound: the weight of the past.
             let rest = unit(2.0 - change * per_moved);
-            let off = *inverse - *mean;
-            let size = unit(off.abs() * per_noise);
-            let changed = size >= 1.0;
-            let hold = (off.abs() > limits.jump) & (rest >= 1.0) & (*held < HOLD);
+            let step = *inverse - *mean;
+            let noise_share = unit(step.abs() * per_noise);
+            let changed = noise_share >= 1.0;
+            let hold = (step.abs() > limits.jump) & (rest >= 1.0) & (*held < HOLD);
             let frames = *count * rest;
-            // The nearer to the limit, the less it is noise: no step where the average would be left.
-            let size = size * size;
+            // The nearer to the limit, the less it is noise: the share of the new depth grows to 1 there, smoothly.
+            let squared = noise_share * noise_share;
             let share = 1.0 / (frames + 1.0);
-            let share = share + (1.0 - share) * size * size;
-            let v = if hold { *mean } else { *mean + share * off };
+            let share = share + (1.0 - share) * squared * squared;
+            let v = if hold { *mean } else { *mean + share * step };
             let longer = frames + 1.0;
             let longer = if longer < LONGEST { longer } else { LONGEST };
             *count = if hold {

@@ -25,7 +25,7 @@ struct Tap {
 }
 
 impl Tap {
-    /// What lies under the centre of pixel `at` of `to` pixels among `from` samples that cover the same length.
+    /// The samples around the centre of pixel `at`, where `to` pixels and `from` samples cover the same length.
     fn new(at: usize, to: usize, from: usize) -> Self {
         let place = ((at as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
         let first = place as usize;
@@ -34,7 +34,7 @@ impl Tap {
 }
 
 impl Upsampler {
-    /// Gives `map` the size of its picture, in pixels.
+    /// Resamples `map` to the size of its picture, in pixels; an empty map becomes unknown (0) everywhere.
     pub fn resize(&mut self, map: &mut DepthMap, (width, height): (u32, u32)) {
         let (from_width, from_height) = (map.width as usize, map.height as usize);
         if map.metres.is_empty() || map.size() == (width, height) {
@@ -50,7 +50,7 @@ impl Upsampler {
             let above = &self.metres[first * from_width..][..from_width];
             let below = &self.metres[second * from_width..][..from_width];
             for (z_m, tap) in row.iter_mut().zip(&self.columns) {
-                *z_m = between(
+                *z_m = interpolate(
                     [above[tap.first], above[tap.second], below[tap.first], below[tap.second]],
                     tap.share,
                     share,
@@ -60,8 +60,9 @@ impl Upsampler {
     }
 }
 
-/// The depth in metres between four neighbours (upper two, then lower two), at a share to the right and down.
-fn between(four_m: [f32; 4], right: f32, down: f32) -> f32 {
+/// The depth between four neighbours (upper two, then lower two), `right` and `down` (0 to 1) of the way; the nearest
+/// neighbour's where they are not one surface.
+fn interpolate(four_m: [f32; 4], right: f32, down: f32) -> f32 {
     let nearest_m = four_m[usize::from(right >= 0.5) + 2 * usize::from(down >= 0.5)];
     if !four_m.into_iter().all(DepthMap::is_known) {
         return nearest_m;

@@ -1,4 +1,5 @@
-//! A joint bilateral vote: the votes of a window for one pixel: which of the surfaces around is it on?
+//! A joint bilateral vote: the depths of a window vote, weighted by distance and colour, for the surface that one pixel
+//! lies on.
 
 use super::planes::{LANES, Planes};
 
@@ -6,29 +7,30 @@ use super::planes::{LANES, Planes};
 const REACH_PX: usize = 12;
 const STEP_PX: usize = 2;
 const ROW_STEP_PX: usize = 3;
-/// Votes along the two sides of the window.
+/// Votes in a row and in a column of the window.
 const COLUMNS: usize = 2 * REACH_PX / STEP_PX + 1;
 const ROWS: usize = 2 * REACH_PX / ROW_STEP_PX + 1;
 /// Standard deviation in pixels of the weight by distance.
 const NEARBY_PX: f32 = 8.0;
 /// Standard deviation, in steps of 8-bit sRGB, of the weight by colour.
 const ALIKE: f32 = 12.0;
-/// Weight of a vote that looks altogether different: decides where nothing looks alike.
+/// Weight of a vote whose colour is altogether different: decides where no colour is alike.
 const UNLIKE: f32 = 0.003;
-/// By how much the votes of the other side must outweigh those of the pixel's own.
+/// The votes of the other side must outweigh those of the pixel's present side this many times.
 const LOYALTY: f32 = 1.15;
-/// The same, in addition, where all that votes looks like the pixel: colour does not tell the sides apart, and the mere
-/// majority would round corners off.
-const CLUELESS: f32 = 6.0;
-/// Pixels of one parity that a window begins before its own.
-pub const BEFORE: usize = REACH_PX / STEP_PX;
+/// Added to [`LOYALTY`] where all votes have the pixel's colour: colour does not tell the sides apart then, and the
+/// mere majority would round corners off.
+const LOYALTY_WITHOUT_CONTRAST: f32 = 6.0;
+/// Lanes (columns of the pixel's parity) from the start of a window to its own pixel.
+pub const REACH_LANES: usize = REACH_PX / STEP_PX;
 
 /// Weights of a window, row by row; the lanes beyond its last column weigh nothing.
 pub type Weights = [[f32; LANES]; ROWS];
 
-/// What each vote of a window weighs by its distance.
+/// The weight of each vote of a window by its distance: a Gaussian, cut to a disc.
 pub fn weights_by_distance() -> Weights {
     let squared_px = |k: usize, step_px: usize| ((k * step_px) as f32 - REACH_PX as f32).powi(2);
+    // R (R + 1) is the square of a radius of about R + 1/2: a rounder disc on the pixel grid than R gives.
     let weight = |squared_px: f32| match squared_px <= ((REACH_PX + 1) * REACH_PX) as f32 {
         true => (-squared_px / (2.0 * NEARBY_PX * NEARBY_PX)).exp(),
         false => 0.0,
@@ -38,7 +40,7 @@ pub fn weights_by_distance() -> Weights {
     std::array::from_fn(row)
 }
 
-/// The larger of what counts as a jump anywhere and what does so near an inverse depth of `v`: a twentieth.
+/// The step of inverse depth that is an edge near the inverse depth `v`: `jump`, but at least a twentieth of `v`.
 #[inline(always)]
 pub fn jump_at(jump: f32, v: f32) -> f32 {
     let relative = 0.05 * v;
@@ -48,20 +50,22 @@ pub fn jump_at(jump: f32, v: f32) -> f32 {
 /// The votes for one pixel.
 #[derive(Debug, Default)]
 pub struct Votes {
+    /// The inverse depths voted for, laid out as their weights.
     depth: Weights,
     weight: Weights,
     /// Least and largest inverse depth that has a vote.
     range: (f32, f32),
-    /// How many times the own side's votes count.
+    /// How many times the votes of the pixel's present side count.
     loyalty: f32,
 }
 
 impl Votes {
-    /// Takes the votes for the pixel at column `x` and row `y`.
+    /// Collects the votes of the window around column `x` and row `y`; `nearby` weighs them by distance.
     #[inline(always)]
     pub fn gather(&mut self, planes: &Planes, nearby: &Weights, x: usize, y: usize) {
-        const FALL: f32 = 1.0 / (8.0 * ALIKE * ALIKE);
-        let own = planes.color(x, y);
+        // exp(-t) with t = apart / (2 ALIKE^2) is computed as (1 - t/4)^4, cut where that would rise again.
+        const QUARTER_T: f32 = 1.0 / (8.0 * ALIKE * ALIKE);
+        let center = planes.color(x, y);
         let (mut low, mut high) = ([f32::MAX; LANES], [0.0_f32; LANES]);
         let (mut total, mut alike_total) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         for k in 0..ROWS {
@@ -71,44 +75,45 @@ impl Votes {
                 *weight = [0.0; LANES];
                 continue;
             }
-            let [from_depth, sure, red, green, blue] = planes.window(x, row);
+            let [from_depth, confidence, red, green, blue] = planes.window(x, row);
             for lane in 0..LANES {
-                let (red, green, blue) = (red[lane] - own[0], green[lane] - own[1], blue[lane] - own[2]);
+                let (red, green, blue) = (red[lane] - center[0], green[lane] - center[1], blue[lane] - center[2]);
                 let apart = red * red + green * green + blue * blue;
-                // (1 - t/4)^4 for exp(-t), cut where it would rise again.
-                let alike = 1.0 - apart * FALL;
+                let alike = 1.0 - apart * QUARTER_T;
                 let alike = if alike > 0.0 { alike } else { 0.0 };
                 let alike = alike * alike;
-                let any = sure[lane] * nearby[lane];
-                let w = any * (alike * alike + UNLIKE);
-                total[lane] += any;
+                let w_without_color = confidence[lane] * nearby[lane];
+                let w = w_without_color * (alike * alike + UNLIKE);
+                total[lane] += w_without_color;
                 alike_total[lane] += w;
                 let v = from_depth[lane];
                 weight[lane] = w;
                 depth[lane] = v;
-                let least = if v < low[lane] { v } else { low[lane] };
-                let largest = if v > high[lane] { v } else { high[lane] };
-                low[lane] = if w > 0.0 { least } else { low[lane] };
-                high[lane] = if w > 0.0 { largest } else { high[lane] };
+                let lower = if v < low[lane] { v } else { low[lane] };
+                let higher = if v > high[lane] { v } else { high[lane] };
+                low[lane] = if w > 0.0 { lower } else { low[lane] };
+                high[lane] = if w > 0.0 { higher } else { high[lane] };
             }
         }
         self.range = (least(low), largest(high));
-        let share = sum(alike_total) / sum(total);
-        self.loyalty = LOYALTY + CLUELESS * share.powi(8);
+        // The high power adds it only in windows in which nearly everything is alike.
+        let alike_share = sum(alike_total) / sum(total);
+        self.loyalty = LOYALTY + LOYALTY_WITHOUT_CONTRAST * alike_share.powi(8);
     }
 
-    /// The inverse depth of the surface with most votes; `own` where that lies on it.
+    /// The inverse depth of the surface with most votes: the heavier half of their range, halved until it is no wider
+    /// than a jump. `current`, the pixel's inverse depth so far, is returned as it is where it lies on that surface.
     #[inline(always)]
-    pub fn surface(&self, own: f32, jump: f32) -> f32 {
+    pub fn surface(&self, current: f32, jump: f32) -> f32 {
         let (mut low, mut high) = self.range;
-        let mut mean = own;
+        let mut mean = current;
         while high - low > jump_at(jump, high) {
             let middle = 0.5 * (low + high);
-            let halves = self.halves(low, middle, high);
-            let own_is_near = (own > middle) & (own <= high);
-            let own_is_far = (own <= middle) & (own >= low);
-            let near = halves.near * if own_is_near { self.loyalty } else { 1.0 };
-            let far = halves.far * if own_is_far { self.loyalty } else { 1.0 };
+            let halves = self.split(low, middle, high);
+            let is_near = (current > middle) & (current <= high);
+            let is_far = (current <= middle) & (current >= low);
+            let near = halves.near * if is_near { self.loyalty } else { 1.0 };
+            let far = halves.far * if is_far { self.loyalty } else { 1.0 };
             let before = (low, high);
             if near > far {
                 (low, mean) = (halves.near_low, halves.near_moment / halves.near);
@@ -120,13 +125,15 @@ impl Votes {
                 break;
             }
         }
-        let near_enough = 0.5 * jump_at(jump, own);
-        let on_it = (own >= low - near_enough) & (own <= high + near_enough) & ((own - mean).abs() < near_enough);
-        if on_it { own } else { mean }
+        let slack = 0.5 * jump_at(jump, current);
+        let is_on_it = (current >= low - slack) & (current <= high + slack) & ((current - mean).abs() < slack);
+        if is_on_it { current } else { mean }
     }
 
+    /// Sums up the votes from `low` to `middle` (far) and from there to `high` (near: inverse depth grows towards the
+    /// eye).
     #[inline(always)]
-    fn halves(&self, low: f32, middle: f32, high: f32) -> Halves {
+    fn split(&self, low: f32, middle: f32, high: f32) -> Halves {
         let (mut near, mut far) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_moment, mut far_moment) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_low, mut far_high) = ([high; LANES], [low; LANES]);
@@ -157,12 +164,15 @@ impl Votes {
     }
 }
 
-/// Votes above and below the middle of a range, their first moments, and where in the range they begin and end.
+/// The votes of the near and of the far half of a range of inverse depths.
 struct Halves {
+    /// Sums of the weights.
     near: f32,
     far: f32,
+    /// Sums of weight times inverse depth.
     near_moment: f32,
     far_moment: f32,
+    /// The votes nearest to the middle on either side.
     near_low: f32,
     far_high: f32,
 }
@@ -182,7 +192,7 @@ fn largest(lanes: [f32; LANES]) -> f32 {
     fold(lanes, |a, b| if a > b { a } else { b })
 }
 
-/// All lanes combined, in halves.
+/// Reduces the lanes (a power of two) to one value by combining halves: vector code.
 #[inline(always)]
 fn fold(mut lanes: [f32; LANES], combine: impl Fn(f32, f32) -> f32) -> f32 {
     let mut half = LANES / 2;

@@ -5,9 +5,9 @@
 
 use super::fixed::UNKNOWN;
 
-/// What a step costs along a row, and across rows: most borders belong to what is beside them.
+/// Cost of a step along a row, and to another row: most of the border belongs to what is beside it.
 const STEP: [u16; 2] = [1, 8];
-/// What a change of brightness by one code costs.
+/// Cost of a change of brightness by one of 255 levels.
 const CHANGE: u16 = 2;
 /// Rounds of sweeps: ways that bend more often than this are found late, or not.
 const ROUNDS: usize = 2;
@@ -17,7 +17,7 @@ const ROUNDS: usize = 2;
 pub struct Border {
     /// Length of the best way from each pixel of the strip, `[row][column]`.
     length: Vec<u16>,
-    /// First known column of each row.
+    /// First known column of each row; 0 in rows without any disparity, which are left as they are.
     first: Vec<usize>,
 }
 
@@ -38,6 +38,7 @@ impl Border {
         self.first.clear();
         let first = |row: &[u16]| row.iter().position(|&d| d != UNKNOWN).unwrap_or(0);
         self.first.extend(map.chunks_exact(width).map(first));
+        // The strip reaches to the first known column of the row where that is farthest.
         let columns = self.first.iter().max().map_or(0, |&most| (most + 1).min(width));
         if columns < 2 {
             return;
@@ -57,14 +58,15 @@ impl Border {
         }
     }
 
-    /// Looks for better ways from the pixels of row `y`: through their neighbours in it, from both sides, and in the row
-    /// `other`.
+    /// Shortens the ways to the pixels of row `y`, and copies the disparity at their start: by way of the neighbours in
+    /// the row, on both sides, and in the adjacent row `other`.
     fn sweep(&mut self, map: &mut [u16], luma: &[u8], width: usize, columns: usize, y: usize, other: Option<usize>) {
         let mut try_way = |x: usize, from_x: usize, from_y: usize| {
             let (to, from) = (y * width + x, from_y * width + from_x);
             let so_far = self.length[from_y * columns + from_x];
             let change = u16::from(luma[to].abs_diff(luma[from]));
             let length = so_far.saturating_add(STEP[usize::from(from_y != y)] + CHANGE * change);
+            // Rows without any disparity have length 0 and nothing to give.
             if length < self.length[y * columns + x] && map[from] != UNKNOWN {
                 self.length[y * columns + x] = length;
                 map[to] = map[from];

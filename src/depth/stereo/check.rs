@@ -1,9 +1,9 @@
-//! The epipolar check: whether two pictures are a rectified pair: the same point in the same row, further to the left
-//! in the right picture.
+//! The epipolar check: whether two pictures are a rectified pair, with the same point in the same row, further to the
+//! left in the right picture.
 //!
 //! Distinctive points (Shi and Tomasi, *Good features to track*, CVPR 1994) of the left picture are looked for in the
 //! right one by normalised correlation, in rows above and below and on both sides: first at half resolution, then to
-//! parts of a pixel at the full one. Only what is found in one place, from there and back, counts.
+//! parts of a pixel at the full one. Only points that match in one place, and in both directions, count.
 
 mod search;
 
@@ -19,7 +19,7 @@ use search::{Coarse, Search, corners, halved, refined};
 const LEAST_MATCHES: u32 = 12;
 /// Rows of a rectified pair agree this well in the median, in pixels.
 const MOST_OFF_PX: f32 = 0.75;
-/// And so do six of ten points to the median.
+/// Six of ten points of a rectified pair lie this near to that median, in pixels.
 const MOST_SPREAD_PX: f32 = 1.0;
 /// Disparities of what is far are around 0; those beyond this count as negative.
 const NEGATIVE_PX: f32 = -1.0;
@@ -89,8 +89,8 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// Looks for points of `left` in `right`, at disparities from `-disparities` to `disparities` and in rows up to 24 pixels
-/// away. For once a run: it allocates.
+/// Looks for points of `left` in `right`, at disparities from `-disparities` to `disparities` and in rows up to 24
+/// pixels away. For once a run: it allocates.
 ///
 /// # Errors
 /// The pictures are not of one size.
@@ -109,7 +109,7 @@ pub fn check(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<Pa
     for (x, y) in corners(&halves[0]) {
         let Some((dx, dy)) = search(0, (x, y)) else { continue };
         let Some((back_dx, back_dy)) = search(1, (x + dx, y + dy)) else { continue };
-        // Whoever is the best match of its own best match.
+        // Only mutual best matches, within a pixel of the half size.
         if (dx + back_dx).abs() <= 1 && (dy + back_dy).abs() <= 1 {
             moved_px.extend(refined(left, right, (2 * x, 2 * y), (2 * dx, 2 * dy)));
         }
@@ -117,7 +117,7 @@ pub fn check(left: &GrayImage, right: &GrayImage, disparities: u32) -> Result<Pa
     Ok(summary(&moved_px))
 }
 
-/// What the moves (across, down) of all points say.
+/// Statistics of the moves (across, down) of all matched points, from left to right picture.
 fn summary(moved_px: &[(f32, f32)]) -> PairCheck {
     if moved_px.is_empty() {
         return PairCheck::default();
@@ -129,6 +129,7 @@ fn summary(moved_px: &[(f32, f32)]) -> PairCheck {
     let mut down_px: Vec<f32> = moved_px.iter().map(|&(_, down_px)| down_px).collect();
     let vertical_px = quantile(&mut down_px, 0.5);
     down_px.iter_mut().for_each(|down_px| *down_px = (*down_px - vertical_px).abs());
+    // A disparity is a move to the left: the negated move across.
     let negative = moved_px.iter().filter(|&&(across_px, _)| -across_px < NEGATIVE_PX).count();
     PairCheck {
         matches: moved_px.len() as u32,

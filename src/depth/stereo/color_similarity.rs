@@ -11,19 +11,19 @@ use super::Settings;
 use super::fixed::{ONE, UNKNOWN};
 use crate::frame::ColorImage;
 
-/// Disparities this far apart are not of one surface.
+/// Disparities this far apart, in fixed point, are not of one surface.
 const APART: u16 = 8 * ONE;
-/// Classes of disparities, each so wide.
+/// Classes of disparities, each [`APART`] wide.
 const CLASSES: usize = Settings::MOST_DISPARITIES as usize * ONE as usize / APART as usize + 1;
 /// Colours that are told apart.
 const COLORS: usize = 1 << 12;
-/// Colours are learned from so many widths of the border.
-const REACH: usize = 4;
-/// Known pixels of a colour that tell something.
-const LEAST: u32 = 16;
-/// A colour stands for a surface that has so many of eight of its pixels.
+/// Colours are learned from the columns up to this many times the border's widest.
+const LEARNED_WIDTHS: usize = 4;
+/// Known pixels that a colour needs to stand for a surface.
+const LEAST_PIXELS: u32 = 16;
+/// A colour stands for a surface that has at least this many eighths of its pixels.
 const MOST_OF_8: u32 = 7;
-/// Of the nine pixels that lie so far around one, more than half must be of the same surface.
+/// Of the nine pixels at this spacing around one, itself included, more than half must be of its surface.
 const AROUND_PX: usize = 2;
 
 /// Colours of the pixels of a map.
@@ -48,6 +48,7 @@ impl Colors<'_> {
 /// Whether one of the [`COLORS`] is none: all channels are about the same. Greys are everywhere, in grey pictures above
 /// all, and say nothing.
 fn is_grey(color: usize) -> bool {
+    // Differences are shifted to be positive: 15 and 16 are those around 0.
     [color >> 7, color >> 2 & 31].iter().all(|difference| [15, 16].contains(difference))
 }
 
@@ -82,25 +83,25 @@ pub struct ColorSimilarity {
     counts: Vec<u32>,
     /// The disparity of the surface that has a colour, or unknown.
     surfaces: Vec<u16>,
-    /// The same by the colour of each pixel of the border, `[row][column]`.
-    seen: Vec<u16>,
+    /// The surface that each pixel of the border has by its colour, `[row][column]`.
+    border_surfaces: Vec<u16>,
 }
 
 impl ColorSimilarity {
     /// Corrects the pixels of `map` that were filled, those left of column `first` of their row.
     pub fn correct(&mut self, map: &mut [u16], width: usize, first: &[usize], colors: Colors) {
-        self.take_memory(map.len());
+        self.prepare(map.len());
         let columns = first.iter().max().map_or(0, |&most| (most + 1).min(width));
         if columns < 2 {
             return;
         }
-        self.learn(map, width, first, (REACH * columns).min(width), colors);
+        self.learn(map, width, first, (LEARNED_WIDTHS * columns).min(width), colors);
         for y in 0..first.len() {
-            self.seen.extend((0..columns).map(|x| self.surfaces[colors.at(x, y)]));
+            self.border_surfaces.extend((0..columns).map(|x| self.surfaces[colors.at(x, y)]));
         }
         for (y, (row, &first)) in map.chunks_exact_mut(width).zip(first).enumerate() {
             for (x, d) in row[..first].iter_mut().enumerate() {
-                let surface = self.seen[y * columns + x];
+                let surface = self.border_surfaces[y * columns + x];
                 if surface != UNKNOWN && surface.abs_diff(*d) >= APART && self.is_amid(surface, x, y, columns) {
                     *d = surface;
                 }
@@ -108,23 +109,26 @@ impl ColorSimilarity {
         }
     }
 
-    /// All that a map of so many pixels may ever need, so that no wider border of a later one takes more.
-    fn take_memory(&mut self, pixels: usize) {
+    /// Empties the results, and takes all the memory that maps of so many pixels can need, so that a wider border later
+    /// allocates nothing.
+    fn prepare(&mut self, pixels: usize) {
         self.tallies.resize(COLORS, [Tally::default(); CLASSES]);
         self.counts.resize(COLORS, 0);
         self.surfaces.clear();
         self.surfaces.reserve(COLORS);
-        self.seen.clear();
-        self.seen.reserve(pixels);
+        self.border_surfaces.clear();
+        self.border_surfaces.reserve(pixels);
     }
 
-    /// Learns the surfaces from every other of the known pixels of the first `reach` columns, and of the rows.
-    fn learn(&mut self, map: &[u16], width: usize, first: &[usize], reach: usize, colors: Colors) {
+    /// Learns which surface each colour stands for, from every other column and row of the known pixels of the first
+    /// `end` columns; `first` has the first known column of each row.
+    fn learn(&mut self, map: &[u16], width: usize, first: &[usize], end: usize, colors: Colors) {
         self.counts.fill(0);
         for (y, (row, &first)) in map.chunks_exact(width).zip(first).enumerate().step_by(2) {
-            for (x, &d) in row[..reach].iter().enumerate().skip(first).step_by(2) {
+            for (x, &d) in row[..end].iter().enumerate().skip(first).step_by(2) {
                 if d != UNKNOWN {
                     let color = colors.at(x, y);
+                    // Cleared on first use: most colours do not occur.
                     if self.counts[color] == 0 {
                         self.tallies[color] = [Tally::default(); CLASSES];
                     }
@@ -135,29 +139,29 @@ impl ColorSimilarity {
             }
         }
         self.surfaces.extend(self.counts.iter().zip(&self.tallies).enumerate().map(|(color, (&count, tallies))| {
-            if count < LEAST || is_grey(color) {
+            if count < LEAST_PIXELS || is_grey(color) {
                 return UNKNOWN;
             }
-            // A surface may lie in two classes.
-            let mut most = Tally::default();
+            // A surface may lie in two neighbouring classes.
+            let mut best = Tally::default();
             for pair in tallies.windows(2) {
                 let mut both = pair[0];
                 both += pair[1];
-                if both.count > most.count {
-                    most = both;
+                if both.count > best.count {
+                    best = both;
                 }
             }
-            if 8 * most.count >= MOST_OF_8 * count { most.mean() } else { UNKNOWN }
+            if 8 * best.count >= MOST_OF_8 * count { best.mean() } else { UNKNOWN }
         }));
     }
 
-    /// Whether the colours around a pixel are of this surface, too.
+    /// Whether most colours around a pixel of the border stand for this surface, too.
     fn is_amid(&self, surface: u16, x: usize, y: usize, columns: usize) -> bool {
-        let rows = self.seen.len() / columns;
+        let rows = self.border_surfaces.len() / columns;
         let mut same = 0;
         for y in [y.saturating_sub(AROUND_PX), y, (y + AROUND_PX).min(rows - 1)] {
             for x in [x.saturating_sub(AROUND_PX), x, (x + AROUND_PX).min(columns - 1)] {
-                let other = self.seen[y * columns + x];
+                let other = self.border_surfaces[y * columns + x];
                 same += u32::from(other != UNKNOWN && other.abs_diff(surface) < APART);
             }
         }

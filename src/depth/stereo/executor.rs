@@ -8,9 +8,9 @@ pub trait Executor: Send {
     /// One line for the report.
     fn describe(&self) -> String;
 
-    /// The disparities of the left picture into `out`, in fixed point ([`super::fixed`]), or unknown. `eyes` are the grey
-    /// values of the left and the right picture, row by row. `likely` has one more than the whole disparity that is
-    /// likely for a pixel, or 0: that one and those beside it cost less by [`super::fixed::BONUS`].
+    /// Writes the disparities of the left picture to `out`, in fixed point ([`super::fixed`]), or unknown. `eyes` are
+    /// the grey values of the left and the right picture, row by row. `likely` has one more than the whole disparity
+    /// that is likely for a pixel, or 0: that one and those beside it cost less by [`super::fixed::BONUS`].
     ///
     /// # Errors
     /// The GPU failed.

@@ -13,9 +13,10 @@ use crate::compute::device::Device;
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{Backend, GpuError};
 
+/// Makes executors on the chosen backend.
 pub(super) struct Executors {
     threads: usize,
-    /// A GPU, and whether nothing else will do.
+    /// The GPU, if one is used, and whether it was asked for by name or kind, so that the CPU must not take its place.
     #[cfg(feature = "gpu")]
     gpu: Option<(Arc<Device>, bool)>,
 }
@@ -30,10 +31,10 @@ impl Executors {
         if backend == Backend::Cpu {
             return Ok(Self { threads, gpu: None });
         }
-        let must = backend == Backend::Gpu || adapter.is_some();
+        let is_required = backend == Backend::Gpu || adapter.is_some();
         match Device::open(backend == Backend::Auto, adapter) {
-            Ok(device) => Ok(Self { threads, gpu: Some((Arc::new(device), must)) }),
-            Err(error) if must => Err(error),
+            Ok(device) => Ok(Self { threads, gpu: Some((Arc::new(device), is_required)) }),
+            Err(error) if is_required => Err(error),
             Err(error) => {
                 tracing::info!("matching on the CPU: {error}");
                 Ok(Self { threads, gpu: None })
@@ -56,14 +57,14 @@ impl Executors {
     /// The GPU that was asked for has no room, or failed.
     pub fn executor(&self, size: (usize, usize), disparities: usize) -> Result<Box<dyn Executor>, GpuError> {
         #[cfg(feature = "gpu")]
-        if let Some((device, must)) = &self.gpu {
+        if let Some((device, is_required)) = &self.gpu {
             match GpuExecutor::new(device, size, disparities) {
                 Ok(gpu) => {
                     let threads = self.threads;
                     let cpu = move || Box::new(CpuExecutor::new(size, disparities, threads)) as Box<dyn Executor>;
                     return Ok(Box::new(Fallback::new(Box::new(gpu), cpu)));
                 }
-                Err(error) if *must => return Err(error),
+                Err(error) if *is_required => return Err(error),
                 Err(error) => tracing::info!("matching on the CPU: {error}"),
             }
         }
@@ -71,11 +72,11 @@ impl Executors {
     }
 }
 
-/// One executor, and another one from the first fault of the GPU on.
+/// The executor on the GPU, replaced by one on the CPU at its first fault.
 #[cfg(feature = "gpu")]
 struct Fallback {
     now: Box<dyn Executor>,
-    /// What makes the other one, until it is needed.
+    /// Makes the replacement; `None` once it was needed.
     other: Option<MakesExecutor>,
 }
 
@@ -105,6 +106,7 @@ impl Executor for Fallback {
         match (self.now.winners(eyes, likely, workers, out), self.other.take()) {
             (Err(error), Some(other)) => {
                 tracing::warn!("{error}; the CPU matches from here on");
+                // This pair is matched anew, so that none is lost.
                 self.now = other();
                 self.now.winners(eyes, likely, workers, out)
             }

@@ -1,5 +1,5 @@
-//! Occlusion filling from the background: what only one eye sees lies behind what hides it: gaps take the farther one
-//! of what is left and right of them.
+//! Occlusion filling from the background: what only one eye sees lies behind what hides it from the other, so gaps take
+//! the farther one of the disparities left and right of them.
 
 use super::fixed::UNKNOWN;
 
@@ -14,6 +14,7 @@ pub fn fill_row(row: &mut [u16]) {
         let length = row[x..].iter().position(|&d| d != UNKNOWN).unwrap_or(row.len() - x);
         let left = x.checked_sub(1).map_or(UNKNOWN, |before| row[before]);
         let right = row.get(x + length).copied().unwrap_or(UNKNOWN);
+        // The smaller disparity is farther, and UNKNOWN is the largest number: at a border the only side wins.
         row[x..x + length].fill(left.min(right));
         x += length;
     }
@@ -24,6 +25,7 @@ pub fn fill_row(row: &mut [u16]) {
 pub fn fill(map: &mut [u16], width: usize) {
     map.chunks_exact_mut(width).for_each(fill_row);
     let height = map.len() / width;
+    // A row is now full or empty: one pixel tells which.
     let Some(first) = (0..height).find(|&y| map[y * width] != UNKNOWN) else { return map.fill(0) };
     for y in (0..first).rev() {
         map.copy_within((y + 1) * width..(y + 2) * width, y * width);

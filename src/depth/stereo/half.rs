@@ -25,9 +25,9 @@ pub fn shrink(from: &GrayImage, into: &mut GrayImage) {
     }
 }
 
-/// Row `y` of the disparities of a whole picture, from those of its half: of the four that are near, a pixel takes that of
-/// the one which is as bright as itself, so that the edges follow the picture. `small` is the half of `whole`, and `px`
-/// its disparities.
+/// Upsamples row `y` of the disparities `px` of `small`, the picture `whole` at half size, into `out`. Of the four
+/// nearest small pixels a pixel takes the disparity of the one closest to it in brightness, so that edges follow the
+/// picture; doubled, as a small pixel is as wide as two.
 pub fn grow_row(whole: &GrayImage, small: &GrayImage, px: &[f32], y: usize, out: &mut [f32]) {
     let (columns, rows) = (small.width as usize, small.height as usize);
     // Even rows and columns lie nearer to the one before, odd ones nearer to the one after.
@@ -39,16 +39,16 @@ pub fn grow_row(whole: &GrayImage, small: &GrayImage, px: &[f32], y: usize, out:
     for (x, (out, &luma)) in out.iter_mut().zip(luma).enumerate() {
         let at = x / 2;
         let beside = if x.is_multiple_of(2) { at.saturating_sub(1) } else { (at + 1).min(columns - 1) };
-        let mut apart = near_luma[at].abs_diff(luma);
+        let mut best_difference = near_luma[at].abs_diff(luma);
         let mut best_px = near_px[at];
         for (place_luma, place_px) in [
             (near_luma[beside], near_px[beside]),
             (other_luma[at], other_px[at]),
             (other_luma[beside], other_px[beside]),
         ] {
-            let here = place_luma.abs_diff(luma);
-            best_px = if here < apart { place_px } else { best_px };
-            apart = apart.min(here);
+            let difference = place_luma.abs_diff(luma);
+            best_px = if difference < best_difference { place_px } else { best_px };
+            best_difference = best_difference.min(difference);
         }
         *out = 2.0 * best_px;
     }

@@ -41,7 +41,7 @@ use crate::names::named;
 pub struct Settings {
     /// Columns and rows of both pictures.
     pub size: (u32, u32),
-    /// Disparities that are tried, from 0 on: rounded up ([`fixed::range`]), and at most [`Settings::MOST_DISPARITIES`].
+    /// Disparities that are tried, from 0 on: rounded up ([`fixed::range`]), at most [`Settings::MOST_DISPARITIES`].
     pub disparities: u32,
     /// How much is done for it.
     pub effort: Effort,
@@ -134,15 +134,17 @@ pub fn create(settings: &Settings, backend: Backend, adapter: Option<&str>) -> R
     }))
 }
 
-/// Islands of so many pixels are chance, in whole pictures.
+/// Islands of up to so many pixels are taken for mismatches, in pictures of full size.
 const SPECKLE: u32 = 100;
 
 struct Matching {
     settings: Settings,
     workers: ThreadPool,
+    /// By [`Effort`].
     levels: [Level; 2],
     /// Left and right at half the size.
     small: [GrayImage; 2],
+    /// A flag for each row, with which [`DisjointParts`] hands it to one thread only.
     taken: Vec<AtomicBool>,
 }
 
@@ -151,7 +153,9 @@ struct Level {
     executor: Box<dyn Executor>,
     prior: Prior,
     tidy: Tidy,
+    /// Disparities in fixed point, as they are found.
     map: Vec<u16>,
+    /// Disparities of the small pair in pixels; empty at full size, where they go to the caller's map.
     px: Vec<f32>,
 }
 
@@ -172,9 +176,9 @@ impl Level {
         })
     }
 
-    /// The disparities of a pair of this level's size, to `into`, else to the level's own; islands of up to `speckle`
-    /// pixels are left out.
-    fn find(
+    /// Matches a pair of this level's size and writes a disparity for every pixel, in pixels, to `into`, or without it
+    /// to the level's own `px`. Islands of up to `speckle` pixels are dropped.
+    fn match_pair(
         &mut self,
         eyes: [&GrayImage; 2],
         colors: Option<Colors>,
@@ -186,6 +190,7 @@ impl Level {
         let [luma, right] = eyes.map(|eye| &*eye.luma);
         executor.winners([luma, right], prior.likely(luma), workers, map)?;
         tidy.drop_islands(map, speckle);
+        // Before filling: what was not matched says nothing about the next pair.
         prior.keep(luma, map);
         tidy.fill(map, luma, colors, workers, into.unwrap_or(px));
         Ok(())
@@ -216,12 +221,13 @@ impl Matcher for Matching {
         let Self { settings, workers, levels, small, taken } = self;
         let level = &mut levels[settings.effort as usize];
         match settings.effort {
-            Effort::Full => level.find([left, right], colors(1), SPECKLE, workers, Some(&mut into.px))?,
+            Effort::Full => level.match_pair([left, right], colors(1), SPECKLE, workers, Some(&mut into.px))?,
             Effort::Fast => {
                 half::shrink(left, &mut small[0]);
                 half::shrink(right, &mut small[1]);
                 let [small_left, small_right] = &*small;
-                level.find([small_left, small_right], colors(2), SPECKLE / 4, workers, None)?;
+                // The same island has a quarter of the pixels.
+                level.match_pair([small_left, small_right], colors(2), SPECKLE / 4, workers, None)?;
                 let (px, rows) = (&level.px, DisjointParts::new(&mut into.px, left.width as usize, taken));
                 workers.run(left.height as usize, &|y| half::grow_row(left, small_left, px, y, rows.part(y)));
             }

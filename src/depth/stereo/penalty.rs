@@ -1,6 +1,6 @@
 //! The smoothness penalty P2 of semi-global matching: what it costs a path to change its disparity by more than one.
 
-/// This much across an edge of the picture, where a jump is likely, and up to so much more without one.
+/// P2 across a strong edge of the picture, where a jump is likely, and what is added where there is no edge.
 const JUMP: (f32, f32) = (20.0, 40.0);
 /// Difference of grey values that takes away all but 1/e of the additional penalty.
 const EDGE: f32 = 10.0;

@@ -1,9 +1,8 @@
-//! Temporal prior: what the last pair says about the next one: where the picture has not changed, its disparity is
-//! likely what it was.
+//! Temporal prior: where the picture has not changed since the last pair, its disparity is likely what it was.
 //!
-//! A blank wall costs much the same at any disparity, and noise decides anew for every frame. There a small bonus for the
-//! last disparity decides instead. Where there is texture, the right disparity is better by more than the bonus, so that
-//! nothing that moved keeps its old one.
+//! A blank wall costs much the same at any disparity, and noise decides anew for every frame. There a small bonus for
+//! the last disparity decides instead. Where there is texture, the right disparity is better by more than the bonus, so
+//! that nothing that moved keeps its old one.
 
 use super::fixed::{ONE, UNKNOWN};
 
@@ -16,7 +15,7 @@ pub struct Prior {
     width: usize,
     /// The last left picture; empty before the first.
     luma: Vec<u8>,
-    /// The disparities that both eyes agreed on, in fixed point.
+    /// The last disparities that both eyes agreed on, in fixed point.
     map: Vec<u16>,
     /// Sums of changes of three neighbours in a row.
     changes: Vec<u16>,
@@ -53,14 +52,14 @@ impl Prior {
             let row = |y: usize| &changes[y * width..(y + 1) * width];
             let three = row(y.saturating_sub(1)).iter().zip(row(y)).zip(row((y + 1).min(height - 1)));
             likely.extend(map.iter().zip(three).map(|(&d, ((above, here), below))| {
-                let still = above + here + below <= NOISE;
-                if still && d != UNKNOWN { (d + ONE / 2) / ONE + 1 } else { 0 }
+                let is_still = above + here + below <= NOISE;
+                if is_still && d != UNKNOWN { (d + ONE / 2) / ONE + 1 } else { 0 }
             }));
         }
         Some(likely)
     }
 
-    /// The pair with the left picture `luma` has these disparities, or [`UNKNOWN`].
+    /// Remembers a pair: its left picture, and its disparities in fixed point or [`UNKNOWN`].
     pub fn keep(&mut self, luma: &[u8], map: &[u16]) {
         self.luma.clear();
         self.luma.extend_from_slice(luma);

@@ -12,11 +12,12 @@ use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
 use crate::optics::StereoRig;
 
-/// A disparity this little above that of infinity is as far as any: it is not measured any finer, and depth stays finite.
+/// Disparities are taken to be at least this far above that of infinity: finer ones are not measured, and depth stays
+/// finite.
 const FARTHEST_PX: f32 = 1.0 / 16.0;
 
-/// Pairs that are looked at until one of them tells whether it is rectified; each look takes the time of a few frames.
-const FIRST_LOOKS: u32 = 5;
+/// Pairs that are checked at most until one tells whether it is rectified; each check takes the time of a few frames.
+const MOST_CHECKS: u32 = 5;
 
 /// What a map costs with little effort beside a full one, as measured: an eighth of the candidates, and what does not
 /// depend on them.
@@ -34,13 +35,13 @@ pub struct StereoDepth {
     right: GrayImage,
     disparity: DisparityMap,
     disparities: u32,
-    /// Pairs that may still be looked at, for whether they are what they were said to be.
-    looks: u32,
+    /// Pairs that may still be checked for whether they are rectified.
+    checks_left: u32,
 }
 
 impl StereoDepth {
-    /// Depth by `matcher`, which tries so many `disparities`, from pairs that `rig` took and that are rectified already.
-    /// `source_name` stands for their source in messages.
+    /// Depth by `matcher`, which tries so many `disparities`, from pairs that `rig` took and that are rectified
+    /// already. `source_name` stands for their source in messages.
     pub fn of_rectified(source_name: &str, rig: StereoRig, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         Self {
             source_name: source_name.to_owned(),
@@ -52,7 +53,7 @@ impl StereoDepth {
             right: GrayImage::default(),
             disparity: DisparityMap::default(),
             disparities,
-            looks: FIRST_LOOKS,
+            checks_left: MOST_CHECKS,
         }
     }
 
@@ -73,9 +74,9 @@ impl StereoDepth {
     }
 }
 
-/// Whether a pair is what it was said to be, or what its calibration made of it; said where it is not. Gives whether it
-/// could be told.
-fn first_look(
+/// Checks whether a pair is rectified, as was claimed or as its calibration (`calibrated`) should have made it, and
+/// logs the verdict. Returns false where the pair cannot tell.
+fn log_check(
     (source_name, calibrated): (&str, bool),
     left: &GrayImage,
     right: &GrayImage,
@@ -120,9 +121,9 @@ impl DepthSource for StereoDepth {
             }
             None => right,
         };
-        if self.looks > 0 {
-            let told = first_look((&self.source_name, self.rectifier.is_some()), &self.left, right, self.disparities)?;
-            self.looks = if told { 0 } else { self.looks - 1 };
+        if self.checks_left > 0 {
+            let clear = log_check((&self.source_name, self.rectifier.is_some()), &self.left, right, self.disparities)?;
+            self.checks_left = if clear { 0 } else { self.checks_left - 1 };
         }
         let pair = Pair { left: &self.left, color: Some(seen.color), right };
         self.matcher.disparity(pair, &mut self.disparity)?;
@@ -139,15 +140,15 @@ impl DepthSource for StereoDepth {
     }
 }
 
-/// Disparity as depth. What is unknown stays so; what is at infinity, or beyond it by an error of measurement, is as far
-/// as anything can be told to be.
+/// Disparity as depth. What is unknown stays so; what is at infinity, or beyond it by an error of measurement, gets the
+/// largest depth that can be measured.
 pub fn metres(disparity: &DisparityMap, rig: &StereoRig, map: &mut DepthMap) {
     map.resize(disparity.width, disparity.height);
     let (focal_baseline, doffs_px) = (rig.focal_px * rig.baseline_m, rig.doffs_px);
     for (z_m, &d_px) in map.metres.iter_mut().zip(&disparity.px) {
         let known = (d_px > 0.0) & (d_px < f32::INFINITY);
-        let far_m = focal_baseline / (d_px + doffs_px).max(FARTHEST_PX);
-        *z_m = if known { far_m } else { 0.0 };
+        let known_m = focal_baseline / (d_px + doffs_px).max(FARTHEST_PX);
+        *z_m = if known { known_m } else { 0.0 };
     }
 }
 

@@ -1,11 +1,11 @@
-//! The speckle filter: small islands of one disparity in another are chance.
+//! The speckle filter: small islands whose disparity differs from all around them are mismatches, and become unknown.
 
 use super::fixed::{ONE, UNKNOWN};
 
 /// Neighbours that differ by more are not of one island.
 const STEP: u16 = 2 * ONE;
 
-/// Removes islands; owns the memory for it.
+/// Removes islands, found by union-find over runs of rows; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Speckles {
     runs: Vec<Run>,
@@ -15,7 +15,7 @@ pub struct Speckles {
     pixels: Vec<u32>,
 }
 
-/// Neighbours in a row.
+/// Columns `start` to `end` (exclusive) of row `y`, whose neighbours belong together.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     y: u32,
@@ -33,10 +33,10 @@ impl Speckles {
         }
     }
 
-    /// Makes all islands of `map`, `width` columns, unknown that have at most `most` pixels.
-    pub fn remove(&mut self, map: &mut [u16], width: usize, most: u32) {
+    /// Makes all islands of `map`, `width` columns, unknown that have at most `max_pixels`.
+    pub fn remove(&mut self, map: &mut [u16], width: usize, max_pixels: u32) {
         self.find_runs(map, width);
-        self.join(map, width);
+        self.join_rows(map, width);
         self.pixels.clear();
         self.pixels.resize(self.runs.len(), 0);
         for run in 0..self.runs.len() {
@@ -45,13 +45,14 @@ impl Speckles {
             self.pixels[root as usize] += self.runs[run].end - self.runs[run].start;
         }
         for (run, &root) in self.runs.iter().zip(&self.parents) {
-            if self.pixels[root as usize] <= most {
+            if self.pixels[root as usize] <= max_pixels {
                 let row = run.y as usize * width;
                 map[row + run.start as usize..row + run.end as usize].fill(UNKNOWN);
             }
         }
     }
 
+    /// Splits the rows into runs of known pixels without a step, each an island of its own at first.
     fn find_runs(&mut self, map: &[u16], width: usize) {
         self.runs.clear();
         for (y, row) in (0..).zip(map.chunks_exact(width)) {
@@ -70,8 +71,9 @@ impl Speckles {
         self.parents.extend(0..self.runs.len() as u32);
     }
 
-    /// Joins runs of neighbouring rows that touch.
-    fn join(&mut self, map: &[u16], width: usize) {
+    /// Joins the islands of runs in neighbouring rows that touch without a step.
+    fn join_rows(&mut self, map: &[u16], width: usize) {
+        // The first run that may touch the present one from the row above.
         let mut above = 0;
         for below in 0..self.runs.len() {
             let run = self.runs[below];
@@ -97,6 +99,7 @@ impl Speckles {
         }
     }
 
+    /// The run that stands for the island of `run`; shortens the way to it for the next time.
     fn root(&mut self, mut run: u32) -> u32 {
         while self.parents[run as usize] != run {
             let parent = self.parents[run as usize];

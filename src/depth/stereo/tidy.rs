@@ -1,5 +1,5 @@
-//! Post-processing: from the disparities that both eyes agree on to one for every pixel: islands go, gaps are filled
-//! from behind, and the median of 3x3 pixels takes what is left of chance.
+//! Post-processing: turns the disparities that both eyes agree on into one for every pixel. Islands are dropped, gaps
+//! are filled from the background, and the median of 3x3 pixels removes what outliers are left.
 
 use std::sync::atomic::AtomicBool;
 
@@ -12,12 +12,13 @@ use super::gaps;
 use super::speckle::Speckles;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// Owns the memory for it.
+/// Post-processes maps of one size; owns the memory for it.
 pub struct Tidy {
     width: usize,
     speckles: Speckles,
     border: Border,
     similarity: ColorSimilarity,
+    /// A flag for each row, with which [`DisjointParts`] hands it to one thread only.
     taken: Vec<AtomicBool>,
     arch: Arch,
 }
@@ -35,12 +36,12 @@ impl Tidy {
         }
     }
 
-    /// Makes islands of at most `most` pixels unknown.
-    pub fn drop_islands(&mut self, map: &mut [u16], most: u32) {
-        self.speckles.remove(map, self.width, most);
+    /// Makes islands of at most `max_pixels` unknown.
+    pub fn drop_islands(&mut self, map: &mut [u16], max_pixels: u32) {
+        self.speckles.remove(map, self.width, max_pixels);
     }
 
-    /// Fills the gaps of `map`, whose left picture is `luma`, and writes its median to `px`, in pixels, above 0.
+    /// Fills the gaps of `map`, whose left picture is `luma`, and writes its 3x3 median to `px`, in pixels, above 0.
     pub fn fill(
         &mut self,
         map: &mut [u16],
@@ -85,16 +86,17 @@ impl WithSimd for Median<'_> {
             for (k, row) in [above, here, below].into_iter().enumerate() {
                 (nine[3 * k], nine[3 * k + 1], nine[3 * k + 2]) = (row[before], row[x], row[after]);
             }
-            px(median(nine))
+            to_px(median(nine))
         };
         (out[0], out[width - 1]) = (at(0), at(width - 1));
         if width < 3 {
             return;
         }
+        // Slices of one length need no bounds checks: vector code.
         let inner = width - 2;
         let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
         for (x, out) in out[1..=inner].iter_mut().enumerate() {
-            *out = px(median([
+            *out = to_px(median([
                 above[0][x],
                 above[1][x],
                 above[2][x],
@@ -109,15 +111,15 @@ impl WithSimd for Median<'_> {
     }
 }
 
-/// A row, and the same from the next two columns on.
+/// `row` from its first, second and third column on: what is before, at and after each of `length` inner pixels.
 #[inline(always)]
 fn columns(row: &[u16], length: usize) -> [&[u16]; 3] {
     [&row[..length], &row[1..=length], &row[2..length + 2]]
 }
 
-/// Pixels from fixed point. 0 would mean that nothing is known, and infinity is.
+/// Pixels from fixed point, above 0: 0 would mean unknown, and a disparity of 0 is known.
 #[inline(always)]
-fn px(fixed: u16) -> f32 {
+fn to_px(fixed: u16) -> f32 {
     f32::from(if fixed > 1 { fixed } else { 1 }) / f32::from(ONE)
 }
 

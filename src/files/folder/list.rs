@@ -18,7 +18,7 @@ pub(super) struct List {
 }
 
 impl List {
-    /// Begins the list of `folder`; what was there has no files any more.
+    /// Begins a new list in `folder`, in place of one whose files are gone.
     pub(super) fn create(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(LIST);
         let removed = match fs::remove_file(&path) {
@@ -37,7 +37,7 @@ impl List {
     pub(super) fn add(&mut self, name: &str) -> Result<(), FolderError> {
         let line = format!("{name}\n");
         if let Err(cause) = self.file.write_all(line.as_bytes()) {
-            // A part of a name is that of another file; the first error is the one to tell.
+            // A name that was cut could be that of another file. The first error is the one to report.
             let _ = self.file.set_len(self.bytes);
             return Err(FolderError::Write { path: self.path.clone(), cause });
         }
@@ -47,9 +47,10 @@ impl List {
     }
 }
 
-/// Names as they were written.
+/// The names in a list.
 #[derive(Debug, Default)]
 pub(super) struct Names {
+    /// In the order in which they were written.
     ordered: Vec<String>,
     all: HashSet<String>,
 }
@@ -82,9 +83,9 @@ pub(super) fn read(folder: &Path) -> Result<Names, FolderError> {
     Ok(Names { ordered, all })
 }
 
-/// Enters files that are there into the list of `folder`, which is made where it is missing: files that a run may
-/// replace, because something else says that they belong to what it replaces. What does not lie within the folder, at
-/// most one folder down, is passed over.
+/// Adds existing files to the list of `folder`, which is made where it is missing, so that a run may replace them:
+/// files that are known in another way to belong to what it replaces. What does not lie within the folder, at most one
+/// folder down, is passed over.
 ///
 /// # Errors
 /// The list cannot be read or written.
@@ -97,10 +98,11 @@ pub fn adopt(folder: &Path, names: impl IntoIterator<Item = String>) -> Result<(
         return Ok(());
     }
     let path = folder.join(LIST);
-    let all = known.ordered.iter().map(|name| format!("{name}\n")).collect::<String>() + &lines;
-    whole::write(&path, all.as_bytes(), true).map_err(FolderError::write(&path))
+    let list = known.ordered.iter().map(|name| format!("{name}\n")).collect::<String>() + &lines;
+    whole::write(&path, list.as_bytes(), true).map_err(FolderError::write(&path))
 }
 
+/// Whether a name is a plain path of at most one folder and a file that is not hidden.
 fn lies_within(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     let is_plain = |part: Option<Component>| part.is_none_or(|part| matches!(part, Component::Normal(_)));

@@ -1,4 +1,4 @@
-//! How one set of files takes the place of another, and what is done with what was broken off.
+//! How one set of files takes the place of another, and how interrupted runs are recovered.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::{FolderError, LIST, PART, Set, WHOLE, list};
 use crate::files::whole;
 
-/// Refuses files of the set that the list does not have.
+/// Fails if the folder has a file of the set that is not on its list: somebody else wrote it.
 pub(super) fn refuse_foreign(path: &Path, set: &Set) -> Result<(), FolderError> {
     let ours = list::read(path)?;
     for subfolder in [""].iter().chain(set.subfolders) {
@@ -29,7 +29,8 @@ pub(super) fn refuse_foreign(path: &Path, set: &Set) -> Result<(), FolderError> 
     Ok(())
 }
 
-/// Ends what a run that was killed began.
+/// Recovers from a run that was killed: completes its swap, keeps what it left in [`PART`] as `NAME.incomplete`, and
+/// removes files that it was writing.
 pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
     if is_folder(&path.join(WHOLE)) {
         swap(path)?;
@@ -49,7 +50,7 @@ pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
             let file = folder.join(name);
             let name = file.strip_prefix(path).ok().and_then(Path::to_str);
             if name.is_some_and(|name| (set.has)(name)) {
-                // One file that is not whole, of many that are.
+                // A single incomplete file of a set is not worth keeping.
                 fs::remove_file(&part).map_err(FolderError::write(&part))?;
             }
         }
@@ -57,13 +58,14 @@ pub(super) fn recover(path: &Path, set: &Set) -> Result<(), FolderError> {
     Ok(())
 }
 
-/// Moves whole files to where they belong, after the old ones are gone, the last ones first. May have been broken off
-/// anywhere before. Gives the number of files that went.
+/// Removes the files on the old list, the last ones first, moves those in [`WHOLE`] to their places, and gives the
+/// number of files removed. An interrupted swap is completed by calling it again.
 pub(super) fn swap(path: &Path) -> Result<u64, FolderError> {
     let whole = path.join(WHOLE);
     let (old, new) = (list::read(path)?, list::read(&whole)?);
     let mut gone = 0;
     for name in old.iter().rev() {
+        // By a swap that was interrupted: this is the new file already.
         let is_moved = new.contains(name) && !whole.join(name).exists();
         let file = path.join(name);
         if is_moved || !is_file(path, name) {
@@ -78,6 +80,7 @@ pub(super) fn swap(path: &Path) -> Result<u64, FolderError> {
             make_subfolder(&path.join(subfolder))?;
         }
         match whole::rename(&from, &to, false) {
+            // Moved before.
             Err(error) if error.kind() == ErrorKind::NotFound => {}
             Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(FolderError::Foreign { path: to }),
             renamed => renamed.map_err(FolderError::write(&to))?,
@@ -87,7 +90,7 @@ pub(super) fn swap(path: &Path) -> Result<u64, FolderError> {
     whole::rename(&whole.join(LIST), &list, true).map_err(FolderError::write(&list))?;
     fs::remove_dir_all(&whole).map_err(FolderError::write(&whole))?;
     for name in old.iter().filter_map(|name| Some(name.rsplit_once('/')?.0)) {
-        // It goes with its last file.
+        // Succeeds once the subfolder is empty.
         let _ = fs::remove_dir(path.join(name));
     }
     whole::sync_folder(&list).map_err(FolderError::write(path))?;
@@ -111,8 +114,10 @@ pub(super) fn make_subfolder(path: &Path) -> Result<(), FolderError> {
     }
 }
 
-/// Keeps files beside the folder; within it, where that is another file system or must not be written.
+/// Renames `part` to `NAME.incomplete` beside the folder `path`; within it, if that is another file system or not
+/// writable. Gives the new path.
 pub(super) fn keep(part: &Path, path: &Path) -> Result<PathBuf, FolderError> {
+    // Names such as `..` give no file name.
     let path = if path.file_name().is_some() { path.to_owned() } else { fs::canonicalize(path).unwrap_or(path.into()) };
     let within = path.join(path.file_name().unwrap_or("files".as_ref()));
     let kept = whole::keep_incomplete(part, &path).or_else(|_| whole::keep_incomplete(part, &within));

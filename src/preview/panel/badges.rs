@@ -1,4 +1,4 @@
-//! What must not be forgotten while the panel is away: that something is written, or that the picture stands still.
+//! Badges while the panel is hidden: that something is being written, or that the picture is frozen.
 
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Id, LayerId, Order, vec2};
 
@@ -9,7 +9,7 @@ const HEIGHT: f32 = 24.0;
 /// Red enough for a dot on a dark badge.
 const LIVE: Color32 = Color32::from_rgb(255, 90, 80);
 
-/// Draws them at the top right.
+/// Draws the badges at the top right.
 pub fn show(ctx: &Context, state: &State) {
     let all = [
         (state.recording().is_some(), "Recording", LIVE),

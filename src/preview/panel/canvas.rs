@@ -1,4 +1,4 @@
-//! What one does to the picture itself: click, double-click, turn the wheel, drag.
+//! Gestures on the picture itself: click, double-click, wheel, drag.
 
 use egui::{Id, Rect, Response, Sense, Ui};
 
@@ -9,11 +9,11 @@ use crate::depth::focus::FocusRule;
 use crate::look::Effect;
 use crate::look::Look;
 
-/// How long a ring shows where one clicked, in seconds.
+/// How long the ring at a click is shown, in seconds.
 pub const RING_S: f64 = 0.9;
-/// Points of the wheel that double the blur.
+/// Scrolling by this many points doubles the blur.
 const WHEEL_TO_DOUBLE: f32 = 300.0;
-/// The split line can be taken hold of this near to it, in points.
+/// The split line can be grabbed this near to it, in points.
 const HOLD: f32 = 12.0;
 
 /// What the gestures remember.
@@ -26,14 +26,14 @@ pub struct Gestures {
 }
 
 impl Gestures {
-    /// Reads what is done to the picture, and draws the marks on it.
+    /// Reads the gestures on the picture, and draws the marks on it.
     pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, actions: &mut Vec<Action>) {
         // No stop for the Tab key: the arrow keys do what a click does.
         let response = ui.interact(place.rect, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
         let line = split_line(ui, state, &place);
         let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.bare;
-        let own = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
-        if !own {
+        let on_line = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
+        if !on_line {
             self.click(&response, state, &place, actions);
         }
         if is_tilt {
@@ -42,13 +42,14 @@ impl Gestures {
         if response.hovered() {
             wheel(ui, state, &place, actions);
         }
-        self.draw(ui, state, &place, is_tilt, own);
+        self.draw(ui, state, &place, is_tilt, on_line);
         if let Some(at) = line.filter(Response::dragged).and_then(|line| line.interact_pointer_pos()) {
             let fraction = (at.x - place.rect.left()) / place.rect.width();
             actions.push(Action::Split(Some(fraction.clamp(0.0, 1.0))));
         }
     }
 
+    /// Focuses where one clicked, or moves the band of tilt-shift there; a double click follows the subject again.
     fn click(&mut self, response: &Response, state: &State, place: &Place, actions: &mut Vec<Action>) {
         let Some(at) = response.interact_pointer_pos().filter(|_| response.clicked()) else { return };
         let mut look = state.look.clone();
@@ -66,6 +67,7 @@ impl Gestures {
         push_look(actions, state, look, "picture click");
     }
 
+    /// Drags the mark of tilt-shift that was pressed.
     fn tilt(&mut self, ui: &Ui, response: &Response, state: &State, place: &Place, actions: &mut Vec<Action>) {
         if response.drag_started() {
             let origin = ui.input(|input| input.pointer.press_origin());
@@ -81,6 +83,7 @@ impl Gestures {
         }
     }
 
+    /// Draws the marks on the picture: split line, band of tilt-shift, point of focus and the ring of a click.
     fn draw(&mut self, ui: &Ui, state: &State, place: &Place, is_tilt: bool, line_held: bool) {
         let painter = ui.painter().with_clip_rect(place.rect);
         let now = ui.input(|input| input.time);
@@ -98,8 +101,8 @@ impl Gestures {
         if let (FocusRule::Point { x, y }, Effect::Auto) = (state.look.focus, state.look.effect) {
             marks::point(&painter, place.point([x, y]));
         }
-        if let Some((at, since)) = self.ring {
-            let age = (now - since) / RING_S;
+        if let Some((at, clicked_s)) = self.ring {
+            let age = (now - clicked_s) / RING_S;
             if age < 1.0 {
                 marks::ring(&painter, place.point(at), age.max(0.0) as f32);
                 ui.ctx().request_repaint_after_secs(1.0 / 30.0);
@@ -110,7 +113,7 @@ impl Gestures {
     }
 }
 
-/// The line between before and after, to take hold of.
+/// The area around the split line in which it can be dragged; `None` without a split.
 fn split_line(ui: &mut Ui, state: &State, place: &Place) -> Option<Response> {
     let at = state.split?;
     let x = place.rect.left() + at * place.rect.width();
@@ -119,6 +122,7 @@ fn split_line(ui: &mut Ui, state: &State, place: &Place) -> Option<Response> {
     Some(line.on_hover_and_drag_cursor(egui::CursorIcon::ResizeHorizontal))
 }
 
+/// Changes the amount of blur by the wheel.
 fn wheel(ui: &Ui, state: &State, place: &Place, actions: &mut Vec<Action>) {
     let turned = ui.input(|input| if input.modifiers.any() { 0.0 } else { input.smooth_scroll_delta().y });
     if turned != 0.0 {
@@ -128,6 +132,7 @@ fn wheel(ui: &Ui, state: &State, place: &Place, actions: &mut Vec<Action>) {
     }
 }
 
+/// Adds the action for another look, if it is another one.
 fn push_look(actions: &mut Vec<Action>, state: &State, look: Look, stroke: &'static str) {
     if look != state.look {
         actions.push(Action::Look { look: Box::new(look), stroke: Some(stroke) });

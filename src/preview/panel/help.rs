@@ -16,7 +16,7 @@ const GESTURES: [(&str, &str); 6] = [
     ("Tab", "from control to control; Space and the arrow keys change it"),
 ];
 
-/// Draws the help over everything.
+/// Draws the help over everything, in two columns where the window is wide. Enter or a click beside it closes it.
 pub fn show(ctx: &Context, actions: &mut Vec<Action>) {
     let window = ctx.content_rect();
     let dim = ctx.layer_painter(egui::LayerId::new(Order::Middle, Id::unique("dim")));
@@ -42,32 +42,33 @@ pub fn show(ctx: &Context, actions: &mut Vec<Action>) {
                 if columns == 2 {
                     ui.columns_const(|[left, right]| {
                         GROUPS[..3].iter().for_each(|group| {
-                            keys(left, group.name, group.bindings.iter().map(|key| (key.keys, key.does)))
+                            table(left, group.name, group.bindings.iter().map(|key| (key.keys, key.does)))
                         });
                         GROUPS[3..].iter().for_each(|group| {
-                            keys(right, group.name, group.bindings.iter().map(|key| (key.keys, key.does)))
+                            table(right, group.name, group.bindings.iter().map(|key| (key.keys, key.does)))
                         });
-                        keys(right, "On the picture", GESTURES.into_iter());
+                        table(right, "On the picture", GESTURES.into_iter());
                     });
                 } else {
                     for group in &GROUPS {
-                        keys(ui, group.name, group.bindings.iter().map(|key| (key.keys, key.does)));
+                        table(ui, group.name, group.bindings.iter().map(|key| (key.keys, key.does)));
                     }
-                    keys(ui, "On the picture", GESTURES.into_iter());
+                    table(ui, "On the picture", GESTURES.into_iter());
                 }
             });
         });
     });
-    let beside = ctx.input(|input| {
+    let clicked_outside = ctx.input(|input| {
         let at = input.pointer.interact_pos().filter(|_| input.pointer.primary_clicked());
         at.is_some_and(|at| !drawn.response.rect.contains(at))
     });
-    if beside || ctx.input(|input| input.key_pressed(Key::Enter)) {
+    if clicked_outside || ctx.input(|input| input.key_pressed(Key::Enter)) {
         actions.push(Action::Help(false));
     }
 }
 
-fn keys<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &'a str)>) {
+/// A titled table of keys or gestures and what they do.
+fn table<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &'a str)>) {
     let colors = Colors::here(ui);
     ui.spacing_mut().interact_size.y = 17.0;
     ui.add_space(8.0);

@@ -10,7 +10,7 @@ use egui::{Role, vec2};
 use super::theme::Colors;
 use super::theme::focus_ring;
 
-/// Side of a button that is an icon, in points.
+/// Side of an icon button, in points.
 pub const SIDE: f32 = 26.0;
 
 /// What an icon shows.
@@ -26,7 +26,7 @@ pub enum Icon {
     Close,
 }
 
-/// A button that is an icon. Whether it was clicked.
+/// Draws an icon button. Whether it was clicked.
 pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     let colors = Colors::here(ui);
     let sense = if enabled { Sense::click() } else { Sense::hover() };
@@ -41,11 +41,12 @@ pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     response.on_hover_text(hint).clicked()
 }
 
+/// Draws an icon around its centre `at`; offsets are in points.
 fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
     let stroke = Stroke::new(1.6, color);
     match icon {
-        Icon::Undo => turn(painter, at, -1.0, stroke),
-        Icon::Redo => turn(painter, at, 1.0, stroke),
+        Icon::Undo => curved_arrow(painter, at, -1.0, stroke),
+        Icon::Redo => curved_arrow(painter, at, 1.0, stroke),
         Icon::Reset => {
             arc(painter, at, 6.0, [0.12, 0.92], stroke);
             let tip = at + Vec2::angled(0.12 * TAU) * 6.0;
@@ -65,8 +66,8 @@ fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
     }
 }
 
-/// An arrow over an arc, that points down at the left (-1) or right (1).
-fn turn(painter: &Painter, at: Pos2, side: f32, stroke: Stroke) {
+/// A half circle with an arrow that points down at its left (`side` is -1) or right (1) end.
+fn curved_arrow(painter: &Painter, at: Pos2, side: f32, stroke: Stroke) {
     let mut curve: Vec<Pos2> = (0..=14)
         .map(|k| {
             let angle = 0.5 * TAU * k as f32 / 14.0;
@@ -74,11 +75,13 @@ fn turn(painter: &Painter, at: Pos2, side: f32, stroke: Stroke) {
         })
         .collect();
     let tip = at + vec2(side * 6.5, 3.0);
+    // Both ends reach a little below the half circle.
     (curve[0], curve[14]) = (at + vec2(side * -4.5, 3.5), tip);
     painter.add(Shape::line(curve, stroke));
     painter.add(Shape::line(vec![tip + vec2(-3.6, -3.4), tip, tip + vec2(3.6, -3.4)], stroke));
 }
 
+/// A part of a circle, from the first of `turns` (of a whole turn, clockwise from the right) to the second.
 fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: Stroke) {
     let points = (0..=20).map(|k| {
         let turn = turns[0] + (turns[1] - turns[0]) * k as f32 / 20.0;
@@ -87,7 +90,7 @@ fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: St
     painter.add(Shape::line(points.collect(), stroke));
 }
 
-/// The mark of a section: it points down where it is open.
+/// The arrow before a section's title: it points right where the section is folded, down where it is open.
 pub fn chevron(ui: &mut Ui, openness: f32, response: &Response) {
     let colors = Colors::here(ui);
     let center = response.rect.center();
@@ -96,7 +99,7 @@ pub fn chevron(ui: &mut Ui, openness: f32, response: &Response) {
     ui.painter().add(Shape::line(points.to_vec(), Stroke::new(1.6, colors.weak)));
 }
 
-/// A dot, as on a recorder; a square while it records.
+/// A dot, as on a recorder's button; a square, to stop, while it records.
 pub fn record(painter: &Painter, center: Pos2, on: bool, color: Color32) {
     if on {
         painter.rect_filled(Rect::from_center_size(center, Vec2::splat(9.0)), CornerRadius::same(2), color);

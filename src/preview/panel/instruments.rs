@@ -12,11 +12,12 @@ use super::theme::{Colors, GAP, PAD, card, medium, rung};
 use crate::budget::Quality;
 
 const WIDTH: f32 = 286.0;
+/// Height of the graph.
 const GRAPH: f32 = 74.0;
-/// Numbers are made anew so often: faster than that, nobody reads.
+/// Seconds between updates of the numbers: nobody reads faster.
 const EVERY_S: f64 = 0.2;
 
-/// Numbers that are not made anew in every pass.
+/// The numbers, which are not computed anew in every pass.
 #[derive(Default)]
 pub struct Cache {
     summary: Summary,
@@ -24,6 +25,7 @@ pub struct Cache {
 }
 
 impl Cache {
+    /// Draws the instruments.
     pub fn show(&mut self, ctx: &Context, state: &State) {
         let now_s = ctx.input(|input| input.time);
         if now_s - self.at_s >= EVERY_S || self.summary == Summary::default() {
@@ -42,6 +44,7 @@ impl Cache {
         });
     }
 
+    /// Frame rate and rung, the graph, and a row for each number.
     fn rows(&self, ui: &mut Ui, state: &State) {
         let colors = Colors::here(ui);
         let (budget_ms, executor) = match &state.source {
@@ -112,8 +115,8 @@ fn drops(state: &State) -> String {
     text
 }
 
-/// The blur's time of each of the last frames, in the colour of its rung, with the letter of the rung under each run of
-/// the same; and a line at the budget.
+/// The graph: a bar for the blur's time of each of the last frames in the colour of its rung, the rung's letter under
+/// each run of frames at the same rung, and a line at the budget.
 fn graph(ui: &mut Ui, state: &State, budget_ms: f32) {
     let colors = Colors::here(ui);
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), GRAPH + 16.0), Sense::hover());
@@ -121,14 +124,17 @@ fn graph(ui: &mut Ui, state: &State, budget_ms: f32) {
     let painter = ui.painter().with_clip_rect(rect);
     painter.rect_filled(plot, egui::CornerRadius::same(6), colors.field);
     let longest_ms = state.meters.bars().map(|bar| bar.blur_ms).fold(0.0, f32::max);
+    // The budget and all bars fit, but rare bars of more than three budgets do not flatten the others.
     let top_ms = (1.35 * budget_ms).max(longest_ms.min(3.0 * budget_ms.max(1.0)) * 1.1).max(1.0);
     let step = plot.width() / FRAMES as f32;
     let held = state.meters.bars().len();
     let theme = theme(ui);
     let mut mesh = Mesh::default();
+    // The rung of the present run, and where that begins.
     let mut run: Option<(Option<Quality>, f32)> = None;
     let font = egui::FontId::new(11.0, medium());
-    let letter = |quality: Option<Quality>, from: f32, to: f32| {
+    let draw_letter = |quality: Option<Quality>, from: f32, to: f32| {
+        // Narrower than a letter, the letters of neighbours would overlap.
         if to - from >= 9.0 {
             let (color, letter) = rung(quality, theme);
             painter.text(
@@ -147,7 +153,7 @@ fn graph(ui: &mut Ui, state: &State, budget_ms: f32) {
         mesh.add_colored_rect(at, rung(bar.quality, theme).0);
         match run {
             Some((quality, from)) if quality != bar.quality => {
-                letter(quality, from, x);
+                draw_letter(quality, from, x);
                 run = Some((bar.quality, x));
             }
             Some(_) => {}
@@ -157,7 +163,7 @@ fn graph(ui: &mut Ui, state: &State, budget_ms: f32) {
     }
     painter.add(Shape::mesh(mesh));
     if let Some((quality, from)) = run {
-        letter(quality, from, x);
+        draw_letter(quality, from, x);
     }
     if budget_ms > 0.0 {
         let y = plot.bottom() - budget_ms / top_ms * plot.height();

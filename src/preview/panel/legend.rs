@@ -1,23 +1,25 @@
-//! What the colours of a view mean, on the picture.
+//! The legend of a view's colours, drawn over the picture.
 
 use egui::{Align2, Color32, FontFamily, FontId, Mesh, Painter, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2};
 
 use super::state::State;
-use super::theme::{Colors, GAP, card};
+use super::theme::{Colors, GAP, PAD, card};
 use super::views::{BIN_COLORS, Legend, depth_share, diverging, perceptual};
 
 const WIDTH: f32 = 260.0;
+/// Height of a bar of colours.
 const BAR: f32 = 14.0;
-/// Cells of a bar of colours.
+/// Steps of a bar of colours.
 const CELLS: usize = 64;
 
-/// The legend of what is shown, at the bottom left.
+/// Draws the legend of what is shown, at the bottom left, unless the window is too small for it.
 pub fn show(ui: &Ui, state: &State) {
     let Some(legend) = state.legend else { return };
     let window = ui.ctx().content_rect();
     if window.width() < WIDTH * 1.2 || window.height() < 120.0 {
         return;
     }
+    // Bins are listed in two columns.
     let rows = match legend {
         Legend::Bins { count, .. } => count.div_ceil(2),
         Legend::Depth { .. } | Legend::Coc { .. } => 0,
@@ -26,7 +28,8 @@ pub fn show(ui: &Ui, state: &State) {
     let rect = Rect::from_min_size(pos2(window.left() + GAP, window.bottom() - GAP - height), vec2(WIDTH, height));
     let colors = Colors::here(ui);
     let painter = ui.painter();
-    painter.add(card(&colors).paint(rect.shrink(14.0)));
+    // The card adds its inner margin.
+    painter.add(card(&colors).paint(rect.shrink(PAD)));
     let inner = rect.shrink2(vec2(16.0, 10.0));
     let title = |text: &str| {
         let font = FontId::new(12.5, super::theme::medium());
@@ -62,17 +65,20 @@ pub fn show(ui: &Ui, state: &State) {
     }
 }
 
+/// Fills a bar with `color(share)`, the share going from 0 at the left to 1 at the right.
 fn ramp(painter: &Painter, bar: Rect, color: impl Fn(f32) -> [u8; 3]) {
     let mut mesh = Mesh::default();
     let width = bar.width() / CELLS as f32;
     for cell in 0..CELLS {
         let [r, g, b] = color((cell as f32 + 0.5) / CELLS as f32);
+        // A little wider, against gaps between the cells.
         let at = Rect::from_min_size(bar.min + vec2(cell as f32 * width, 0.0), vec2(width + 0.25, bar.height()));
         mesh.add_colored_rect(at, Color32::from_rgb(r, g, b));
     }
     painter.add(Shape::mesh(mesh));
 }
 
+/// Hatches a part of a bar, as the view hatches what lies in front.
 fn hatch(painter: &Painter, rect: Rect) {
     let painter = painter.with_clip_rect(rect);
     let mut x = rect.left();
@@ -83,6 +89,7 @@ fn hatch(painter: &Painter, rect: Rect) {
     }
 }
 
+/// A tick under a bar with its label, which is moved aside where it would stick out.
 fn tick(painter: &Painter, colors: &Colors, bar: Rect, x: f32, label: &str) {
     painter.line_segment([pos2(x, bar.bottom()), pos2(x, bar.bottom() + 4.0)], Stroke::new(1.0, colors.text));
     let font = FontId::new(12.0, FontFamily::Proportional);
@@ -91,10 +98,12 @@ fn tick(painter: &Painter, colors: &Colors, bar: Rect, x: f32, label: &str) {
     painter.galley(pos2(left, bar.bottom() + 5.0), galley, colors.text);
 }
 
+/// A line of the legend of bins: colour, number, and the CoC from the end of the bin before to its own.
 fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usize, high_px: &[f32]) {
     let [r, g, b] = BIN_COLORS[index % BIN_COLORS.len()];
     let swatch = Rect::from_min_size(at, Vec2::new(22.0, 15.0));
     painter.rect_filled(swatch, egui::CornerRadius::same(3), Color32::from_rgb(r, g, b));
+    // Luma in tenths: white figures on what is darker than 120 of 255.
     let dark = u32::from(r) * 3 + u32::from(g) * 6 + u32::from(b) < 1200;
     let ink = if dark { Color32::WHITE } else { Color32::BLACK };
     let font = FontId::new(11.0, super::theme::medium());
@@ -111,9 +120,10 @@ fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usi
     painter.text(swatch.right_center() + vec2(6.0, 0.0), Align2::LEFT_CENTER, range, font, colors.text);
 }
 
-/// Round distances within a range, so few and so far apart that their labels stay clear of each other.
+/// Round distances within a range, in metres from near to far, with room between them for their labels.
 pub fn nice_depths(near_m: f32, far_m: f32) -> Vec<f32> {
     const STEPS: [f32; 9] = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0];
+    // Of the bar's width.
     const APART: f32 = 0.17;
     let mut chosen: Vec<f32> = Vec::new();
     let nice = (-1..3).flat_map(|decade| STEPS.map(|step| step * 10f32.powi(decade)));

@@ -1,6 +1,6 @@
-//! Marks drawn on the picture: where the focus is, the line of the split, the band of tilt-shift.
+//! Marks drawn on the picture: the point of focus, the split line, the band of tilt-shift.
 //!
-//! They are light with a dark border, so that they are seen on any picture.
+//! They are light with a dark border, so that they stand out on any picture.
 
 use egui::{Align2, CornerRadius, FontFamily, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
@@ -9,22 +9,22 @@ use super::state::tweak::turned;
 use super::theme::{ON_PICTURE, SHADE, medium};
 use crate::look::Tilt;
 
-/// A mark can be taken hold of this near to it, in points.
+/// A mark can be grabbed this near to it, in points.
 const HOLD: f32 = 16.0;
 
-/// A mark of tilt-shift in hand.
+/// The mark of tilt-shift that is being dragged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tilting {
-    /// The middle: the band moves.
+    /// The middle, which moves the band.
     Middle,
-    /// An edge: it becomes wider.
+    /// An edge, which changes its width.
     Edge,
-    /// The far grip: it turns.
+    /// The grip beside the middle, which turns it.
     Turn,
 }
 
 impl Tilting {
-    /// Changes by this mark are undone together.
+    /// The stroke of this mark: changes of one stroke are undone together.
     pub fn stroke(self) -> &'static str {
         match self {
             Self::Middle => "tilt middle",
@@ -44,7 +44,7 @@ fn dot(painter: &Painter, at: Pos2, radius: f32) {
     painter.circle_filled(at, radius, ON_PICTURE);
 }
 
-/// The ring where one clicked: it draws together and fades; `age` from 0 to 1.
+/// The ring where one clicked, which shrinks and fades as `age` goes from 0 to 1.
 pub fn ring(painter: &Painter, at: Pos2, age: f32) {
     let settle = (age / 0.3).min(1.0);
     let radius = 40.0 - 18.0 * (1.0 - (1.0 - settle) * (1.0 - settle));
@@ -80,7 +80,7 @@ pub fn split(painter: &Painter, place: &Place, at: f32, held: bool) {
     label(painter, pos2(x + 12.0, rect.top() + 14.0), Align2::LEFT_TOP, "After");
 }
 
-/// A word on the picture.
+/// A word on the picture, on a dark field.
 pub fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) {
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::new(12.5, medium()), ON_PICTURE);
     let rect = align.anchor_size(at, galley.size() + vec2(14.0, 6.0));
@@ -88,10 +88,10 @@ pub fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) {
     painter.galley(rect.min + vec2(7.0, 3.0), galley, ON_PICTURE);
 }
 
-/// The band on the screen: its middle, the direction along it, and that across it (both one picture height long), in
-/// points.
+/// The band of tilt-shift on the screen, in points.
 struct Band {
     middle: Pos2,
+    /// The directions along the band and across it, each as long as the picture is high.
     along: Vec2,
     across: Vec2,
 }
@@ -108,22 +108,23 @@ impl Band {
         }
     }
 
+    /// The middle of an edge: the upper one (`side` is -1) or the lower one (1) of a level band.
     fn edge(&self, tilt: &Tilt, side: f32) -> Pos2 {
         self.middle + self.across * (side * tilt.band / 2.0)
     }
 
     /// The grip that turns it, within the picture.
-    fn turn(&self, place: &Place) -> Pos2 {
-        let most = place.rect.width().min(place.rect.height()) / place.rect.height();
-        self.middle + self.along * (0.32 * most)
+    fn turn_grip(&self, place: &Place) -> Pos2 {
+        let shorter_side = place.rect.width().min(place.rect.height()) / place.rect.height();
+        self.middle + self.along * (0.32 * shorter_side)
     }
 }
 
-/// The mark of tilt-shift that a press at `at` takes hold of.
+/// The mark of tilt-shift that a press at `at` grabs: one that is near, or else the band itself.
 pub fn grip(tilt: &Tilt, place: &Place, at: Pos2) -> Option<Tilting> {
     let band = Band::new(tilt, place);
     let near = |mark: Pos2| mark.distance(at) <= HOLD;
-    if near(band.turn(place)) {
+    if near(band.turn_grip(place)) {
         Some(Tilting::Turn)
     } else if near(band.middle) {
         Some(Tilting::Middle)
@@ -135,7 +136,7 @@ pub fn grip(tilt: &Tilt, place: &Place, at: Pos2) -> Option<Tilting> {
     }
 }
 
-/// Moves a mark to `at`.
+/// Drags a mark to `at`.
 pub fn drag(tilt: &mut Tilt, tilting: Tilting, place: &Place, at: Pos2) {
     let band = Band::new(tilt, place);
     let from_middle = at - band.middle;
@@ -145,10 +146,11 @@ pub fn drag(tilt: &mut Tilt, tilting: Tilting, place: &Place, at: Pos2) {
             let across = from_middle.dot(band.across) / band.across.length_sq();
             tilt.band = (2.0 * across.abs()).clamp(0.0, 1.0);
         }
+        // Nearer to the middle the angle would jump.
         Tilting::Turn if from_middle.length() > 4.0 => {
             let side = if place.mirror { -1.0 } else { 1.0 };
             let angle = from_middle.y.atan2(side * from_middle.x).to_degrees();
-            // Level, upright and half between are easy to find.
+            // Snaps to multiples of 45 degrees.
             let nearest = (angle / 45.0).round() * 45.0;
             tilt.angle_deg = turned(if (angle - nearest).abs() < 2.0 { nearest } else { angle }, 0.0);
         }
@@ -156,12 +158,12 @@ pub fn drag(tilt: &mut Tilt, tilting: Tilting, place: &Place, at: Pos2) {
     }
 }
 
-/// The middle of a band, as a fraction of the height, that runs through a point given as fractions; `size` is the
-/// picture's own, in pixels.
+/// The `center_y` with which the middle of the band runs through a point, given as fractions of the picture; `size` is
+/// the picture's own, in pixels.
 pub fn center_through(tilt: &Tilt, size: Vec2, [x, y]: [f32; 2]) -> f32 {
     let (sin, cos) = tilt.angle_deg.to_radians().sin_cos();
     if cos.abs() < 0.2 {
-        // Nearly upright: no middle within reach would do.
+        // Nearly upright: the `center_y` would lie far outside of the picture.
         return y;
     }
     (y - sin / cos * (x - 0.5) * size.x / size.y).clamp(0.0, 1.0)
@@ -170,6 +172,7 @@ pub fn center_through(tilt: &Tilt, size: Vec2, [x, y]: [f32; 2]) -> f32 {
 /// The band of tilt-shift and its grips; the one that is `near` the pointer is larger.
 pub fn tilt(painter: &Painter, tilt: &Tilt, place: &Place, near: Option<Tilting>) {
     let band = Band::new(tilt, place);
+    // As long as the picture's diagonal, so that the edges cross all of it.
     let reach = band.along * (place.rect.size().length() / place.rect.height());
     for side in [-1.0, 1.0] {
         let at = band.edge(tilt, side);
@@ -177,19 +180,19 @@ pub fn tilt(painter: &Painter, tilt: &Tilt, place: &Place, near: Option<Tilting>
             painter.extend(Shape::dashed_line(&[at - reach, at + reach], Stroke::new(width, color), 10.0, 7.0));
         }
     }
-    let turn = band.turn(place);
-    line(painter, [band.middle, turn], 1.5);
+    let turn_grip = band.turn_grip(place);
+    line(painter, [band.middle, turn_grip], 1.5);
     let size = |tilting: Tilting, usual: f32| if near == Some(tilting) { usual + 2.5 } else { usual };
     for side in [-1.0, 1.0] {
         dot(painter, band.edge(tilt, side), size(Tilting::Edge, 5.5));
     }
-    dot(painter, turn, size(Tilting::Turn, 6.5));
-    painter.circle_filled(turn, 3.0, egui::Color32::from_gray(40));
+    dot(painter, turn_grip, size(Tilting::Turn, 6.5));
+    painter.circle_filled(turn_grip, 3.0, egui::Color32::from_gray(40));
     dot(painter, band.middle, size(Tilting::Middle, 9.0));
     let text = format!("{:.0}°", tilt.angle_deg);
     if near == Some(Tilting::Turn) {
         let font = FontId::new(12.5, FontFamily::Proportional);
-        let at = Rect::from_center_size(turn + vec2(0.0, -24.0), vec2(44.0, 20.0));
+        let at = Rect::from_center_size(turn_grip + vec2(0.0, -24.0), vec2(44.0, 20.0));
         painter.rect_filled(at, CornerRadius::same(9), egui::Color32::from_black_alpha(190));
         painter.text(at.center(), Align2::CENTER_CENTER, text, font, ON_PICTURE);
     }

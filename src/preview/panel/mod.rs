@@ -1,4 +1,4 @@
-//! The controls, as egui draws them.
+//! The controls, drawn with egui.
 
 mod badges;
 mod canvas;
@@ -28,38 +28,39 @@ use super::{keys, meters, state, views};
 use canvas::Gestures;
 use place::Place;
 
-/// After so many seconds without pointer or keyboard the panel hides.
+/// After this many seconds without pointer or keyboard the panel hides.
 const HIDES_AFTER_S: f64 = 4.0;
-/// A key or the wheel that rests for so many seconds was let go.
+/// A key or the wheel that rests for this many seconds counts as let go.
 const LET_GO_AFTER_S: f64 = 0.8;
 
 /// What the controls remember from frame to frame besides egui's own memory.
 #[derive(Default)]
 pub struct Panel {
+    /// Whether fonts and styles are installed.
     ready: bool,
-    /// When there was pointer or keyboard last, in egui's seconds.
+    /// When pointer or keyboard were used last, in egui's seconds.
     active_s: f64,
-    /// When a control in hand changed the look last.
+    /// When a control in hand changed the look last, until it is let go.
     stroke_s: Option<f64>,
     gestures: Gestures,
     sheet: sheet::Memory,
     instruments: instruments::Cache,
     notes: notes::Ages,
-    /// Whether a control had the focus, or a list was open, when the last pass ended.
+    /// Whether a control had the focus or a list was open at the end of the last pass.
     was_in_hand: bool,
 }
 
-/// Where the picture is, for the gestures on it.
+/// The picture's area in the window, for the gestures on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Canvas {
     /// The picture's area, in pixels of the window.
     pub area: Area,
-    /// Its own columns and rows.
+    /// The picture's own columns and rows.
     pub size: (u32, u32),
 }
 
 impl Panel {
-    /// Draws the controls, reads keys and gestures, and says what the person did.
+    /// Draws the controls, reads keys and gestures, and adds what the person did to `actions`.
     pub fn show(&mut self, ui: &mut Ui, state: &State, canvas: Canvas, actions: &mut Vec<Action>) {
         let ctx = ui.ctx().clone();
         if !std::mem::replace(&mut self.ready, true) {
@@ -72,7 +73,7 @@ impl Panel {
         }
         let first = actions.len();
         let height_px = if canvas.size.1 > 0 { canvas.size.1 } else { 720 };
-        self.keys(ui, state, height_px, actions);
+        self.read_keys(ui, state, height_px, actions);
         let awake = self.is_awake(ui);
         if let Some(place) = Place::new(canvas, ctx.pixels_per_point(), state.mirror) {
             self.gestures.show(ui, state, place, actions);
@@ -96,12 +97,13 @@ impl Panel {
         self.settle(ui, &actions[first..]).into_iter().for_each(|settle| actions.push(settle));
     }
 
-    fn keys(&mut self, ui: &Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
+    /// Adds the actions of the keys that were pressed, unless text is being typed.
+    fn read_keys(&mut self, ui: &Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
         let ctx = ui.ctx();
         if ctx.text_edit_focused() {
             return;
         }
-        // Esc takes the focus away, or closes a list, before it comes here.
+        // egui has already used Esc to drop the focus or to close a list: it must not close anything else.
         let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape)) && self.was_in_hand;
         let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped;
         ui.input(|input| {
@@ -109,14 +111,14 @@ impl Panel {
         });
     }
 
-    /// Whether there was pointer or keyboard a short while ago.
+    /// Whether pointer or keyboard were used a short while ago.
     fn is_awake(&mut self, ui: &Ui) -> bool {
         let (now_s, active) = ui.input(|input| {
-            let is_sign = |event: &Event| {
-                let away = matches!(event, Event::PointerGone | Event::WindowFocused(_) | Event::MouseMoved(_));
-                !away && !matches!(event, Event::Key { pressed: false, .. })
+            let is_use = |event: &Event| {
+                let is_other = matches!(event, Event::PointerGone | Event::WindowFocused(_) | Event::MouseMoved(_));
+                !is_other && !matches!(event, Event::Key { pressed: false, .. })
             };
-            (input.time, input.events.iter().any(is_sign) || input.pointer.any_down())
+            (input.time, input.events.iter().any(is_use) || input.pointer.any_down())
         });
         if active {
             self.active_s = now_s;
@@ -128,15 +130,15 @@ impl Panel {
         left_s > 0.0
     }
 
-    /// Says when a control was let go, so that its changes are undone together and the next ones are not.
+    /// The action that ends a stroke, once the control is let go: its changes are undone together, later ones apart.
     fn settle(&mut self, ui: &Ui, done: &[Action]) -> Option<Action> {
         let (now_s, down, released) =
             ui.input(|input| (input.time, input.pointer.any_down(), input.pointer.any_released()));
         if done.iter().any(|action| matches!(action, Action::Look { stroke: Some(_), .. })) {
             self.stroke_s = Some(now_s);
         }
-        let since_s = self.stroke_s?;
-        if released || !down && now_s - since_s > LET_GO_AFTER_S {
+        let changed_s = self.stroke_s?;
+        if released || !down && now_s - changed_s > LET_GO_AFTER_S {
             self.stroke_s = None;
             return Some(Action::Settle);
         }

@@ -1,4 +1,4 @@
-//! Lines for the person: notes that fade, and what is to be known of the source.
+//! Messages: notes that fade, failures of outputs, and why a source gives no frames.
 
 use std::time::Duration;
 
@@ -7,24 +7,26 @@ use egui::{Align2, Area, Context, Id, Label, Order, RichText, Ui, vec2};
 use super::state::{Action, Source, State};
 use super::theme::{Colors, GAP, card, medium};
 
-/// A note is shown for so long, and longer the more there is to read.
+/// A note is shown for this long, plus some time per letter to read it.
 const SHOWN_S: f64 = 3.5;
 const PER_LETTER_S: f64 = 0.05;
-/// Of this, it fades for so long.
+/// Of that time, it fades during the last part.
 const FADES_S: f64 = 0.4;
+/// The most notes that are shown at once.
 const MOST: usize = 3;
 
-/// When notes were seen first.
+/// When notes were first shown.
 #[derive(Default)]
 pub struct Ages {
+    /// Number of a note, and the time in egui's seconds.
     seen: Vec<(u64, f64)>,
 }
 
 impl Ages {
-    /// Draws notes, and the state of the source where there are no frames.
+    /// Draws, upwards from the bottom of the window: the banner, the failure of an output, and the notes.
     pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) {
-        let mut up = GAP + banner(ctx, state, actions);
-        up += trouble(ctx, state, up, actions);
+        let mut bottom = GAP + banner(ctx, state, actions);
+        bottom += trouble(ctx, state, bottom, actions);
         let now_s = ctx.input(|input| input.time);
         self.seen.retain(|(number, _)| state.notes.iter().any(|note| note.number == *number));
         for note in &state.notes {
@@ -32,13 +34,14 @@ impl Ages {
                 self.seen.push((note.number, now_s));
             }
         }
+        // Time to the next pass that shows a change: the begin of a fade, or a step of it.
         let mut next_s = f64::INFINITY;
         let shown: Vec<(&str, f32)> = state
             .notes
             .iter()
             .filter_map(|note| {
-                let since = self.seen.iter().find(|(number, _)| *number == note.number)?.1;
-                let left_s = since + SHOWN_S + PER_LETTER_S * note.text.chars().count() as f64 - now_s;
+                let first_s = self.seen.iter().find(|(number, _)| *number == note.number)?.1;
+                let left_s = first_s + SHOWN_S + PER_LETTER_S * note.text.chars().count() as f64 - now_s;
                 if left_s <= 0.0 {
                     return None;
                 }
@@ -50,7 +53,7 @@ impl Ages {
             ctx.request_repaint_after(Duration::from_secs_f64(next_s + 0.005));
         }
         for (&(text, opacity), place) in shown.iter().rev().take(MOST).zip(0..) {
-            let area = Area::new(Id::unique(("note", place))).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -up));
+            let area = Area::new(Id::unique(("note", place))).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom));
             let drawn = area.order(Order::Foreground).interactable(false).fade_in(false).show(ctx, |ui| {
                 ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 460.0));
                 ui.set_opacity(opacity);
@@ -59,15 +62,15 @@ impl Ages {
                     ui.add(Label::new(RichText::new(text).color(colors.text)).wrap());
                 });
             });
-            up += drawn.response.rect.height() + 6.0;
+            bottom += drawn.response.rect.height() + 6.0;
         }
     }
 }
 
-/// What went wrong with an output, until it was read. Its height.
-fn trouble(ctx: &Context, state: &State, up: f32, actions: &mut Vec<Action>) -> f32 {
+/// Draws why an output failed, `bottom` points above the window's edge, until that is dismissed. Its height.
+fn trouble(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) -> f32 {
     let Some(why) = &state.trouble else { return 0.0 };
-    let area = Area::new(Id::unique("trouble")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -up)).order(Order::Middle);
+    let area = Area::new(Id::unique("trouble")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom)).order(Order::Middle);
     let drawn = area.fade_in(false).show(ctx, |ui| {
         let colors = Colors::here(ui);
         ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 460.0));
@@ -83,8 +86,8 @@ fn trouble(ctx: &Context, state: &State, up: f32, actions: &mut Vec<Action>) -> 
     drawn.response.rect.height() + 6.0
 }
 
-/// What there is to know of a source without frames, with a way out: at the bottom, clear of the picture's middle. Its
-/// height.
+/// Draws why the source gives no frames and a button to try again: at the bottom, clear of the picture's middle. Its
+/// height, 0 while frames come.
 fn banner(ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
     let silent;
     let (title, why, button) = match &state.source {
@@ -101,12 +104,18 @@ fn banner(ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
     let drawn = area.fade_in(false).show(ctx, |ui| {
         let colors = Colors::here(ui);
         ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 360.0));
-        card(&colors).show(ui, |ui| lines(ui, &colors, (title, why, button), actions));
+        card(&colors).show(ui, |ui| banner_text(ui, &colors, (title, why, button), actions));
     });
     drawn.response.rect.height() + 6.0
 }
 
-fn lines(ui: &mut Ui, colors: &Colors, (title, why, button): (&str, &str, Option<&str>), actions: &mut Vec<Action>) {
+/// The banner's title, reason and button.
+fn banner_text(
+    ui: &mut Ui,
+    colors: &Colors,
+    (title, why, button): (&str, &str, Option<&str>),
+    actions: &mut Vec<Action>,
+) {
     ui.label(RichText::new(title).family(medium()).size(16.0));
     if !why.is_empty() {
         ui.add(Label::new(RichText::new(why).color(colors.text)).wrap());

@@ -9,7 +9,7 @@ use egui::{
 
 use super::theme::{Colors, ROW, focus_ring, medium};
 
-/// How a number is chosen.
+/// A control for a number.
 pub struct Number<'a> {
     /// What it is called.
     pub label: &'a str,
@@ -17,15 +17,15 @@ pub struct Number<'a> {
     pub hint: &'a str,
     /// Least and largest value.
     pub range: RangeInclusive<f32>,
-    /// Whether the slider goes by ratios.
+    /// Whether the slider is logarithmic.
     pub ratios: bool,
     /// Digits after the point.
     pub digits: usize,
-    /// What is written before and after it.
+    /// Prefix and suffix of the number.
     pub around: [&'a str; 2],
 }
 
-/// A name, a number to drag or type, and a slider under them. Whether the number changed.
+/// Draws a name, a number to drag or type, and a slider under them. Whether the number was changed.
 pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
     let Number { label, hint, range, ratios, digits, around: [before, after] } = how;
     let mut changed = false;
@@ -36,11 +36,12 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
                 ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
-                let decades = (range.end() - range.start()) / 300.0;
+                // Dragging over 300 points, the panel's width, covers the range.
+                let per_point = (range.end() - range.start()) / 300.0;
                 // What was chosen elsewhere may lie outside; it stays until somebody moves it.
                 let mut typed = *value;
                 let drag = DragValue::new(&mut typed).range(range.clone()).clamp_existing_to_range(false);
-                let drag = drag.speed(decades).max_decimals(digits).min_decimals(digits).prefix(before).suffix(after);
+                let drag = drag.speed(per_point).max_decimals(digits).min_decimals(digits).prefix(before).suffix(after);
                 if ui.add(drag).labelled_by(name.id).on_hover_text(hint).changed() {
                     (*value, changed) = (typed, true);
                 }
@@ -49,6 +50,7 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
         });
         ui.spacing_mut().slider_width = ui.available_width();
         ui.spacing_mut().interact_size.y = 20.0;
+        // A logarithmic slider that begins at 0 has to begin its decades somewhere.
         let least = if ratios { f64::from(*range.start()).max(1e-3) } else { 0.0 };
         let mut slid = *value;
         let slider = Slider::new(&mut slid, range).clamping(SliderClamping::Edits).show_value(false);
@@ -62,7 +64,7 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
     changed
 }
 
-/// One of several, side by side: name and hint of each, and which of them can be chosen. The one that was clicked.
+/// Draws options side by side, each with a name and a hint; `can` says which may be chosen. The one that was clicked.
 pub fn choose(
     ui: &mut Ui,
     what: &str,
@@ -106,7 +108,7 @@ pub fn choose(
     clicked
 }
 
-/// A name and a switch. Whether it was turned.
+/// Draws a name and a switch. Whether it was clicked.
 pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     let colors = Colors::here(ui);
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
@@ -134,7 +136,7 @@ pub fn remark(ui: &mut Ui, text: &str) {
     ui.label(RichText::new(text).text_style(TextStyle::Small).color(colors.weak));
 }
 
-/// A part of the panel that can be folded.
+/// Draws a part of the panel that can be folded, `open` at first. What `body` gave, unless it is folded.
 pub fn section<R>(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui) -> R) -> Option<R> {
     let colors = Colors::here(ui);
     ui.add_space(4.0);

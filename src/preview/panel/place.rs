@@ -1,4 +1,4 @@
-//! Where the picture is on the screen.
+//! The picture's place on the screen.
 
 use egui::{Pos2, Rect, Vec2, pos2};
 
@@ -8,14 +8,14 @@ use super::Canvas;
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     pub rect: Rect,
-    /// Its own columns and rows.
+    /// The picture's own columns and rows.
     pub size: Vec2,
-    /// Whether it is shown as a mirror does.
+    /// Whether it is shown flipped left to right.
     pub mirror: bool,
 }
 
 impl Place {
-    /// Of this canvas; `None` where there is no picture.
+    /// The place of a canvas; `None` without a picture.
     pub fn new(canvas: Canvas, pixels_per_point: f32, mirror: bool) -> Option<Self> {
         let area = canvas.area;
         if area.width == 0 || area.height == 0 || canvas.size.0 == 0 || canvas.size.1 == 0 {
@@ -29,13 +29,13 @@ impl Place {
         Some(Self { rect, size: Vec2::new(canvas.size.0 as f32, canvas.size.1 as f32), mirror })
     }
 
-    /// Where a point of the picture is on the screen; both of `at` are fractions.
+    /// The position on the screen of a point of the picture, given as fractions of its width and height.
     pub fn point(&self, [x, y]: [f32; 2]) -> Pos2 {
         let x = if self.mirror { 1.0 - x } else { x };
         self.rect.min + Vec2::new(x, y) * self.rect.size()
     }
 
-    /// What of the picture is there on the screen: fractions from 0 to 1.
+    /// The point of the picture at a position on the screen, as fractions from 0 to 1; the nearest if it lies outside.
     pub fn fractions(&self, at: Pos2) -> [f32; 2] {
         let at = (at - self.rect.min) / self.rect.size();
         let x = if self.mirror { 1.0 - at.x } else { at.x };

@@ -12,9 +12,9 @@ use super::theme::{self, Colors, GAP, PAD, WIDTH};
 pub struct Memory {
     saving: Saving,
     thumbs: Thumbs,
-    /// Where it was drawn last.
+    /// Where the panel was drawn last; `None` while it is closed.
     rect: Option<Rect>,
-    /// What had the focus in the pass before.
+    /// The control that had the focus in the pass before.
     focused: Option<Id>,
 }
 
@@ -23,7 +23,7 @@ fn id() -> Id {
 }
 
 impl Memory {
-    /// Whether the pointer is over it or a control of it has the focus: then it stays.
+    /// Whether the pointer is over the panel, or a control has the focus or a list open: then it must not hide.
     pub fn is_in_use(&self, ctx: &Context) -> bool {
         let pointer = ctx.input(|input| input.pointer.latest_pos());
         let under_pointer = self.rect.zip(pointer).is_some_and(|(rect, at)| rect.contains(at));
@@ -36,7 +36,7 @@ impl Memory {
         self.rect
     }
 
-    /// Draws as much of the panel as is in the window.
+    /// Draws the panel, sliding in or out from the right; what does not fit is scrolled.
     pub fn show(&mut self, ctx: &Context, state: &State, shown: bool, height_px: u32, actions: &mut Vec<Action>) {
         let openness = ctx.animate_bool_with_time(id().with("open"), shown, 0.16);
         if openness == 0.0 {
@@ -62,12 +62,12 @@ impl Memory {
             });
         });
         if shown && matches!(state.source, Source::Running(_)) {
-            ctx.request_repaint_after_secs(TOLD_EVERY_S);
+            ctx.request_repaint_after_secs(STATUS_PERIOD_S);
         }
         self.rect = shown.then_some(drawn.response.rect);
     }
 
-    /// Scrolls to a control that the keyboard has come to.
+    /// Scrolls to the control that the focus moved to, if that is out of sight.
     fn follow_focus(&mut self, ui: &Ui) {
         let focused = ui.ctx().memory(|memory| memory.focused());
         if let Some(id) = focused.filter(|_| focused != self.focused)
@@ -80,8 +80,9 @@ impl Memory {
         self.focused = focused;
     }
 
+    /// Draws the sections, and turns what they changed of the look into an action.
     fn body(&mut self, ui: &mut Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
-        // The bar floats over what is at the right.
+        // Room for the scroll bar, which floats over the right edge.
         ui.set_width(ui.available_width() - 4.0);
         ui.spacing_mut().combo_width = ui.available_width();
         let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, height_px, actions };
@@ -94,10 +95,10 @@ impl Memory {
     }
 }
 
-/// What the distance of focus is, is told so often, in seconds.
-const TOLD_EVERY_S: f32 = 0.5;
+/// Seconds between updates of the focus distance, which changes without any input.
+const STATUS_PERIOD_S: f32 = 0.5;
 
-/// What goes on, in one line.
+/// The state of the source and the distance of focus, in one line.
 fn status(ui: &mut Ui, state: &State) {
     let colors = Colors::here(ui);
     let mut parts: Vec<String> = Vec::new();
@@ -118,7 +119,7 @@ fn status(ui: &mut Ui, state: &State) {
     ui.add(egui::Label::new(text).truncate());
 }
 
-/// The name, and what concerns all of the look.
+/// The title, and buttons for undo, redo, reset, help and closing the panel.
 fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;

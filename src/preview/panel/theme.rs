@@ -1,4 +1,4 @@
-//! Colours, fonts and measures of the controls, light and dark.
+//! Colours, fonts and sizes of the controls, for a light and a dark theme.
 
 use std::sync::Arc;
 
@@ -14,19 +14,19 @@ use crate::budget::Quality;
 pub const WIDTH: f32 = 300.0;
 /// Distance of panel and cards from the window's border.
 pub const GAP: f32 = 10.0;
-/// Room inside of them.
+/// Margin inside of them.
 pub const PAD: f32 = 14.0;
 /// Height of a control that is clicked.
 pub const ROW: f32 = 26.0;
 
-/// Colours of a theme. Text is on `card` or `field`, over whatever picture, with a contrast of 4.5 or more.
+/// Colours of a theme. Text on `card` or `field` has a contrast of 4.5 or more, whatever the picture below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Colors {
     /// Behind text: the panel, hardly translucent.
     pub card: Color32,
     /// Behind the text of a control.
     pub field: Color32,
-    /// The same under the pointer.
+    /// The same, while the pointer is over the control.
     pub hover: Color32,
     pub text: Color32,
     /// Text that is less important.
@@ -64,7 +64,7 @@ const LIGHT: Colors = Colors {
     alarm: Color32::from_rgb(178, 24, 24),
 };
 
-/// On the picture itself, whatever the theme: light lines with a dark border are seen on every picture.
+/// On the picture itself, in both themes: light lines with a dark border stand out on any picture.
 pub const ON_PICTURE: Color32 = Color32::from_rgb(255, 255, 255);
 pub const SHADE: Color32 = Color32::from_rgba_premultiplied(0, 0, 0, 150);
 
@@ -77,17 +77,16 @@ impl Colors {
         }
     }
 
-    /// The colours of what is being drawn.
+    /// The colours of the theme that is in use.
     pub fn here(ui: &egui::Ui) -> Self {
         Self::of(if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light })
     }
 }
 
-/// The colour of a rung, and the letter that says the same without it.
+/// The colour of a rung, and a letter for those who cannot tell the colours apart.
 pub fn rung(quality: Option<Quality>, theme: Theme) -> (Color32, &'static str) {
-    let light = theme == Theme::Light;
-    let pick = |dark: [u8; 3], bright: [u8; 3]| {
-        let [r, g, b] = if light { bright } else { dark };
+    let pick = |on_dark: [u8; 3], on_light: [u8; 3]| {
+        let [r, g, b] = if theme == Theme::Light { on_light } else { on_dark };
         Color32::from_rgb(r, g, b)
     };
     match quality {
@@ -100,20 +99,22 @@ pub fn rung(quality: Option<Quality>, theme: Theme) -> (Color32, &'static str) {
     }
 }
 
-/// The family of headings and of what is chosen.
+/// The font family of headings and of what is chosen.
 pub fn medium() -> FontFamily {
     FontFamily::Name("medium".into())
 }
 
-/// Gives egui fonts and styles; once, before the first pass that draws.
+/// Installs fonts and styles; to be called once, before the first pass that draws.
 pub fn install(ctx: &Context) {
     ctx.set_fonts(fonts());
     for theme in [Theme::Dark, Theme::Light] {
         ctx.set_style_of(theme, style(theme));
     }
+    // Our own keys change the text's size.
     ctx.options_mut(|options| options.zoom_with_keyboard = false);
 }
 
+/// The two fonts that come with the program, in place of egui's.
 fn fonts() -> FontDefinitions {
     let mut fonts = FontDefinitions::empty();
     let files: [(&str, &[u8]); 2] = [
@@ -131,6 +132,7 @@ fn fonts() -> FontDefinitions {
     fonts
 }
 
+/// Text sizes and spacing.
 fn style(theme: Theme) -> Style {
     let colors = Colors::of(theme);
     let mut style = Style { visuals: visuals(theme, &colors), animation_time: 0.12, ..Style::default() };
@@ -156,6 +158,7 @@ fn style(theme: Theme) -> Style {
     style
 }
 
+/// Colours and shapes of egui's own widgets.
 fn visuals(theme: Theme, colors: &Colors) -> Visuals {
     let mut visuals = if theme == Theme::Dark { Visuals::dark() } else { Visuals::light() };
     let radius = CornerRadius::same(7);
@@ -186,7 +189,7 @@ fn visuals(theme: Theme, colors: &Colors) -> Visuals {
     visuals.window_stroke = Stroke::new(1.0, colors.line);
     visuals.window_corner_radius = CornerRadius::same(12);
     visuals.menu_corner_radius = CornerRadius::same(9);
-    // Soft shadows are many triangles, and the window may be drawn by the processor.
+    // Soft shadows are many triangles, and the CPU may have to draw them.
     (visuals.window_shadow, visuals.popup_shadow) = (Shadow::NONE, Shadow::NONE);
     visuals.slider_trailing_fill = true;
     visuals.handle_shape = HandleShape::Circle;
@@ -194,13 +197,13 @@ fn visuals(theme: Theme, colors: &Colors) -> Visuals {
     visuals
 }
 
-/// The same colour without anything to be seen through it.
+/// The same colour, fully opaque.
 pub fn opaque(color: Color32) -> Color32 {
     let [r, g, b, _] = color.to_srgba_unmultiplied();
     Color32::from_rgb(r, g, b)
 }
 
-/// What panel and cards are drawn on.
+/// The frame of panel and cards.
 pub fn card(colors: &Colors) -> egui::Frame {
     egui::Frame::new()
         .fill(colors.card)
@@ -209,7 +212,7 @@ pub fn card(colors: &Colors) -> egui::Frame {
         .inner_margin(Margin::same(PAD as i8))
 }
 
-/// A ring around what has the keyboard's focus.
+/// Draws a ring around `rect`, if the control has the keyboard focus.
 pub fn focus_ring(ui: &Ui, response: &Response, rect: Rect) {
     if response.has_focus() {
         let colors = Colors::here(ui);

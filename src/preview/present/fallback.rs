@@ -1,13 +1,13 @@
-//! The window goes on when the GPU does not: it is drawn on the CPU.
+//! Keeps the window alive when the GPU fails: it is then drawn on the CPU.
 
 use super::soft::Painter;
 use super::{Controls, Drawing, PresentError, Presenter};
 use crate::compute::DevicePicture;
 
-/// Presents with a GPU, and with another presenter from its first fault on.
+/// Presents with a GPU, and from its first error on with another presenter.
 pub struct Fallback<Other> {
-    now: Box<dyn Presenter>,
-    /// What makes the other presenter of one that knows the controls, until it is needed.
+    active: Box<dyn Presenter>,
+    /// What makes the other presenter, and a painter for it that is kept up to date with the controls. Taken when used.
     other: Option<(Other, Painter)>,
     size: (u32, u32),
 }
@@ -15,46 +15,47 @@ pub struct Fallback<Other> {
 impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Fallback<Other> {
     /// Presents with `first`, and with what `other` makes once `first` fails.
     pub fn new(first: Box<dyn Presenter>, other: Other) -> Self {
-        Self { now: first, other: Some((other, Painter::new())), size: (0, 0) }
+        Self { active: first, other: Some((other, Painter::new())), size: (0, 0) }
     }
 }
 
 impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Presenter for Fallback<Other> {
     fn resize(&mut self, size: (u32, u32)) {
         self.size = size;
-        self.now.resize(size);
+        self.active.resize(size);
     }
 
     fn set_controls(&mut self, controls: Controls) {
         if let Some((_, painter)) = &mut self.other {
             painter.set_controls(controls.clone());
         }
-        self.now.set_controls(controls);
+        self.active.set_controls(controls);
     }
 
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
-        let presented = self.now.present(drawing);
+        let presented = self.active.present(drawing);
+        // Only the first error is answered by another presenter; later ones are the caller's.
         let Some((error, (other, painter))) =
             presented.as_ref().err().and_then(|error| Some((error, self.other.take()?)))
         else {
             return presented;
         };
         tracing::warn!("{error}; the CPU draws from here on");
-        self.now = other(painter)?;
-        self.now.resize(self.size);
-        self.now.present(drawing)
+        self.active = other(painter)?;
+        self.active.resize(self.size);
+        self.active.present(drawing)
     }
 
     fn takes(&self, picture: &DevicePicture) -> bool {
-        self.now.takes(picture)
+        self.active.takes(picture)
     }
 
     fn has_device(&self) -> bool {
-        self.now.has_device()
+        self.active.has_device()
     }
 
     fn describe(&self) -> String {
-        self.now.describe()
+        self.active.describe()
     }
 }
 

@@ -1,7 +1,7 @@
-//! How the window's content gets onto the screen: two ways that show the same.
+//! How the window's content gets onto the screen: two presenters that show the same.
 //!
-//! `gpu` draws with the device that blurs, so that a picture blurred there is shown without a way back; `soft` draws
-//! on the CPU into memory shared with the display server, where there is no GPU.
+//! `gpu` draws with the device that blurs, so that a picture blurred there need not be read back; `soft` draws on the
+//! CPU into memory shared with the display server, where there is no GPU.
 
 mod fallback;
 pub mod gpu;
@@ -16,7 +16,7 @@ use winit::window::Window;
 use crate::compute::device::{Device, DevicePicture};
 use crate::frame::ColorImage;
 
-/// Where something lies in the window, in its pixels.
+/// A rectangle of the window, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Area {
     /// Columns from the left; the area lies within the window.
@@ -27,11 +27,11 @@ pub struct Area {
     pub height: u32,
 }
 
-/// A picture, where it is.
+/// A picture, in memory or on a GPU.
 #[derive(Clone, Copy, Debug)]
 pub enum Image<'a> {
     Memory(&'a ColorImage),
-    /// In a GPU's memory; only who [takes](Presenter::takes) it shows it.
+    /// On a GPU; only a presenter that [takes](Presenter::takes) it can show it.
     Device(&'a DevicePicture),
 }
 
@@ -50,21 +50,21 @@ pub struct Drawing<'a> {
     /// Where the picture goes, scaled to fill it; the rest of the window is the background.
     pub area: Area,
     pub picture: Image<'a>,
-    /// Another one of the same size, shown instead left of this fraction of the area's width.
+    /// A picture of the same size to show instead, left of this fraction of the area's width.
     pub before: Option<(&'a ColorImage, f32)>,
     /// Whether pictures are flipped left to right; the split is not.
     pub mirror: bool,
-    /// Whether they are shown grey and dim: there are no new ones.
+    /// Whether pictures are shown grey and dim, because no new ones come.
     pub stale: bool,
-    /// Colour of the rest, sRGB.
+    /// Colour of the rest of the window, sRGB.
     pub background: [u8; 3],
 }
 
-/// How a picture that is not new looks: grey and dim, `(r * R + g * G + b * B) / 2^BITS` in each channel.
+/// The look of a stale picture, grey and dim: each channel is `(r * R + g * G + b * B) / 2^BITS`.
 pub struct Tone;
 
 impl Tone {
-    /// Weights of red, green and blue: luma (BT.601), by 0.6.
+    /// Weights of red, green and blue: luma (BT.601) times 0.6.
     pub const STALE_WEIGHTS: [u32; 3] = [11_757, 23_082, 4_483];
     /// Fractional bits of the weights.
     pub const STALE_BITS: u32 = 16;
@@ -94,13 +94,13 @@ pub trait Presenter {
     /// The window cannot be drawn to any more.
     fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError>;
 
-    /// Whether it shows this picture from where it is; otherwise it has to be in memory.
+    /// Whether it can show this picture straight from the GPU; otherwise it needs it in memory.
     fn takes(&self, picture: &DevicePicture) -> bool {
         let _ = picture;
         false
     }
 
-    /// Whether it draws with a GPU, so that pictures on it may stay there.
+    /// Whether it draws with a GPU, so that blurred pictures may stay there.
     fn has_device(&self) -> bool {
         false
     }
@@ -114,8 +114,8 @@ pub trait Presenter {
 #[error("cannot draw to the window: {0}")]
 pub struct PresentError(pub String);
 
-/// What shows pictures in `window`: with the GPU where there is a `device`, otherwise, or where the device cannot draw to
-/// the window or once it fails, on the CPU.
+/// A presenter for `window`: with the GPU where there is a `device`; on the CPU without one, where it cannot draw to
+/// the window, and from the moment it fails.
 ///
 /// # Errors
 /// Neither can draw to it.

@@ -1,42 +1,43 @@
-//! Where before and after meet.
+//! The split view: the picture before the blur on the left, after it on the right.
 
 use std::ops::Range;
 
 use super::Drawing;
 use crate::frame::ColorImage;
 
-/// Rows of the picture's area for each pixel of the divider's thickness.
+/// The divider is one pixel thicker per this many rows of the picture's area.
 const ROWS_PER_PX: u32 = 800;
-/// The divider's stripes, left to right: dark beside bright can be seen on everything.
+/// The divider's stripes, left to right: dark beside bright stands out on any picture.
 const STRIPES: [[u8; 3]; 3] = [[24; 3], [255; 3], [24; 3]];
 
-/// Where the two meet, in columns of the area.
+/// The border between the two, in columns of the picture's area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Split {
-    /// The first column of what is shown after the blur.
+    /// The first column that shows the picture after the blur.
     pub at: usize,
+    /// Columns of the area.
     width: usize,
-    unit: usize,
+    /// Thickness of a dark stripe; the bright one is twice as thick.
+    stripe_px: usize,
 }
 
 impl Split {
-    /// At a fraction of an area.
+    /// A split at a fraction of the width of an area of `width` columns and `height` rows.
     fn new(fraction: f32, width: u32, height: u32) -> Self {
         let at = (fraction.clamp(0.0, 1.0) * width as f32).round() as usize;
-        Self { at, width: width as usize, unit: (height / ROWS_PER_PX).max(1) as usize }
+        Self { at, width: width as usize, stripe_px: (height / ROWS_PER_PX).max(1) as usize }
     }
 
     /// The columns of each stripe of the divider, and its colour.
     pub fn divider(self) -> [(Range<usize>, [u8; 3]); 3] {
-        let Self { at, width, unit } = self;
-        // The bright one is twice as wide.
-        let edges = [-2, -1, 1, 2].map(|step: isize| at.saturating_add_signed(step * unit as isize).min(width));
+        let Self { at, width, stripe_px } = self;
+        let edges = [-2, -1, 1, 2].map(|step: isize| at.saturating_add_signed(step * stripe_px as isize).min(width));
         std::array::from_fn(|k| (edges[k]..edges[k + 1], STRIPES[k]))
     }
 }
 
 impl<'a> Drawing<'a> {
-    /// What is shown on the left, and how far; none where it does not fit the picture.
+    /// The picture before the blur and where it ends; `None` without a split, or if it is not as large as the picture.
     pub fn split(&self) -> Option<(&'a ColorImage, Split)> {
         let (before, fraction) = self.before.filter(|(before, _)| before.size() == self.picture.size())?;
         Some((before, Split::new(fraction, self.area.width, self.area.height)))

@@ -15,7 +15,7 @@ use crate::sink;
 use crate::sink::switch::{Fate, Notice};
 use crate::stats::Report;
 
-/// What a session has and does.
+/// The session, on its own thread.
 pub(super) struct Host {
     services: Box<dyn Services>,
     look: Look,
@@ -28,25 +28,26 @@ pub(super) struct Host {
     news: News,
     orders: mpsc::Sender<Order>,
     live: Option<Live>,
+    /// Runs so far, which is also the number of the present one.
     runs: u64,
     report: Option<Report>,
-    /// Why the first of the outputs failed that did.
+    /// Why an output failed: the first that did.
     failed: Option<String>,
     /// Whether there ever was a run.
     began: bool,
-    /// The last looks that frames had, by the number of the change that brought each.
+    /// The last looks of the present run, each with the number of its change, oldest first.
     looks: VecDeque<(u64, Look)>,
 }
 
-/// What a recording without a name of its own is called, before its number and after it.
+/// A recording without a name of its own is called this, around a number.
 const RECORDING: &str = "bokehcam-";
 const VIDEO: &str = ".mp4";
 
-/// Looks that are kept: a frame that is shown, if it is not held, is of one of the last.
+/// Looks that are kept for snapshots: frames that come are of one of the last few.
 const KEPT_LOOKS: usize = 512;
 
 impl Host {
-    /// A session that nothing was done of yet; `orders` is the way to it.
+    /// A session that has not started yet; `orders` sends orders to itself.
     pub fn new(start: Start, news: News, orders: mpsc::Sender<Order>) -> Self {
         let Start { services, look, source, outputs, keep_going, budget_ns, folder, wanted } = start;
         Self {
@@ -69,7 +70,7 @@ impl Host {
         }
     }
 
-    /// Does what is ordered until it is to close.
+    /// Opens the source, then carries out orders until it is told to close.
     pub fn run(mut self, inbox: &mpsc::Receiver<Order>) -> Closed {
         self.tell_choices();
         self.recover();
@@ -78,7 +79,7 @@ impl Host {
             let mut next = Some(order);
             while let Some(order) = next.take() {
                 match order {
-                    // Of looks that wait, the last one counts.
+                    // Of several looks in the queue only the last counts; the order after them comes next.
                     Order::Do(Request::Look(mut look)) => {
                         for order in inbox.try_iter() {
                             match order {
@@ -91,11 +92,11 @@ impl Host {
                         }
                         self.adopt(*look);
                     }
-                    Order::Do(request) => self.bring_about(request),
+                    Order::Do(request) => self.carry_out(request),
                     Order::Save(still) => self.save(&still),
                     Order::Copy(switches) => self.copy(&switches),
-                    Order::Wrote(run, written) => self.wrote(run, &written),
-                    Order::Ended(run, ended) => self.ended(run, *ended),
+                    Order::Wrote(run, notice) => self.on_output(run, &notice),
+                    Order::Ended(run, ended) => self.on_run_end(run, *ended),
                     Order::Close => return self.close(inbox),
                 }
             }
@@ -103,17 +104,18 @@ impl Host {
         self.close(inbox)
     }
 
+    /// Ends the run, and hears what became of its outputs.
     fn close(mut self, inbox: &mpsc::Receiver<Order>) -> Closed {
         self.stop();
         for order in inbox.try_iter() {
-            if let Order::Wrote(run, written) = order {
-                self.wrote(run, &written);
+            if let Order::Wrote(run, notice) = order {
+                self.on_output(run, &notice);
             }
         }
         Closed { report: self.report, failed: self.failed }
     }
 
-    /// Keeps what a window that was killed recorded.
+    /// Rescues recordings of an earlier preview that was killed.
     fn recover(&self) {
         let is_ours = |name: &str| name.starts_with(RECORDING) && name.ends_with(VIDEO);
         for kept in sink::recover_all(&self.folder, is_ours) {
@@ -121,7 +123,8 @@ impl Host {
         }
     }
 
-    fn bring_about(&mut self, request: Request) {
+    /// Carries out a request of the window's.
+    fn carry_out(&mut self, request: Request) {
         match request {
             Request::Open(name) => {
                 self.source = name;
@@ -129,7 +132,7 @@ impl Host {
                 self.open();
             }
             Request::Begin(output) => {
-                self.begin(output);
+                self.write_to(output);
                 self.tell_outputs();
             }
             Request::End(output) => {
@@ -168,8 +171,10 @@ impl Host {
         self.news.tell(Update::Outputs(self.outputs.clone()));
     }
 
-    /// There is no source, and nothing is written any more; a virtual camera goes on with the next one.
+    /// Tells that there is no running source; `source` says why. Recordings are over; a virtual camera goes on with the
+    /// next source.
     fn without_source(&mut self, source: Source) {
+        // Before the first run, the recordings that were asked for at the start still wait for a source.
         if self.began {
             self.outputs.retain(|output| output.is_camera);
         }
@@ -177,7 +182,7 @@ impl Host {
         self.news.tell(Update::Source(source));
     }
 
-    /// Opens the source and begins a run of it.
+    /// Opens the source and starts a run of it.
     fn open(&mut self) {
         self.news.tell(Update::Source(Source::Opening));
         let opened = match self.services.open(&self.source) {
@@ -211,13 +216,14 @@ impl Host {
                 // A recording ends with its source; a virtual camera goes on with the next one.
                 let first = !std::mem::replace(&mut self.began, true);
                 let outputs = std::mem::take(&mut self.outputs);
-                outputs.into_iter().filter(|output| output.is_camera || first).for_each(|output| self.begin(output));
+                outputs.into_iter().filter(|output| output.is_camera || first).for_each(|output| self.write_to(output));
                 self.tell_outputs();
             }
             Err(line) => self.without_source(Source::Lost(line)),
         }
     }
 
+    /// Blurs with another look from now on, and remembers it by its number for snapshots.
     fn adopt(&mut self, look: Look) {
         self.look = look;
         if let Some(live) = &mut self.live {
@@ -232,7 +238,8 @@ impl Host {
         }
     }
 
-    fn begin(&mut self, mut output: Output) {
+    /// Opens an output and adds it to the run; a recording without a name is given one.
+    fn write_to(&mut self, mut output: Output) {
         let Some(live) = &self.live else { return self.news.note("there is no source to write out") };
         if output.name.is_empty() {
             output.name = self.free_name().display().to_string();
@@ -247,12 +254,13 @@ impl Host {
         }
     }
 
-    /// A name for a recording that nothing has yet.
+    /// A path for a recording that does not exist yet.
     fn free_name(&self) -> PathBuf {
         let name = |number: u32| self.folder.join(format!("{RECORDING}{number}{VIDEO}"));
         (1..u32::MAX).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
     }
 
+    /// Puts the command line that does the same on the clipboard.
     fn copy(&self, switches: &[Switch]) {
         let outputs: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
         let look = self.live.as_ref().map_or_else(|| self.look.clone(), |live| live.effective(&self.look));
@@ -261,7 +269,8 @@ impl Host {
         self.news.send(SessionEvent::Copy(command));
     }
 
-    fn wrote(&mut self, run: u64, Notice { member, fate }: &Notice) {
+    /// Takes note of what became of an output of the run of this number.
+    fn on_output(&mut self, run: u64, Notice { member, fate }: &Notice) {
         match fate {
             Fate::Began => self.news.note(format!("writing to {member}")),
             Fate::Completed { frames } => self.news.note(format!("{member}: complete, {frames} frames")),
@@ -269,7 +278,7 @@ impl Host {
                 tracing::error!("{why}");
                 self.failed.get_or_insert_with(|| why.clone());
                 self.news.tell(Update::Trouble(why.clone()));
-                // One of the same name may be written by the next run already.
+                // The output of an earlier run may share its name with one of the present run.
                 if run == self.runs {
                     self.outputs.retain(|output| output.name != *member);
                     self.tell_outputs();
@@ -278,9 +287,9 @@ impl Host {
         }
     }
 
-    /// A run came to its end by itself; one that was stopped is not waited for any more.
-    fn ended(&mut self, run: u64, ended: Result<Report, PipelineError>) {
-        let asked_for = run != self.runs || self.live.is_none();
+    /// Keeps the report of a run that ended. If it was not stopped by the session, there is no source any more.
+    fn on_run_end(&mut self, run: u64, ended: Result<Report, PipelineError>) {
+        let was_stopped = run != self.runs || self.live.is_none();
         let source = match &ended {
             Ok(_) => Source::Ended,
             Err(failed) => Source::Lost(failed.fault.to_string()),
@@ -289,7 +298,7 @@ impl Host {
             Ok(report) => report,
             Err(failed) => *failed.report,
         });
-        if !asked_for {
+        if !was_stopped {
             if let Some(live) = self.live.take() {
                 live.join();
             }
@@ -306,9 +315,10 @@ impl Host {
         }
     }
 
+    /// Saves a snapshot with the settings that repeat it: those of the look that its frame was blurred with.
     fn save(&self, still: &Still) {
-        let its_own = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
-        let look = its_own.map_or(&self.look, |(_, look)| look);
+        let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
+        let look = its_look.map_or(&self.look, |(_, look)| look);
         let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
         let Still { picture, color, depth, .. } = still;
         let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };

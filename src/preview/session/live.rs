@@ -1,4 +1,4 @@
-//! One run of the pipeline behind the window.
+//! One run of the pipeline.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +19,7 @@ use crate::sink::switch::Notice;
 use crate::sink::{Switch, Switchboard};
 use crate::stats::Report;
 
-/// What a run begins with besides its source.
+/// What a run starts with besides its source.
 pub(super) struct Settings<'a> {
     pub look: &'a Look,
     pub keep_going: bool,
@@ -27,12 +27,12 @@ pub(super) struct Settings<'a> {
     pub wanted: Arc<Wanted>,
 }
 
-/// A run, and the ways into it.
+/// A run, and the channels into it.
 pub(super) struct Live {
     pub size: (u32, u32),
     pub period_ns: u64,
     has_depth: bool,
-    /// What the executor was made for.
+    /// The settings that the executor was made for; `None` if nothing is blurred.
     made_for: Option<bokeh::Settings>,
     changes: mpsc::Sender<Change>,
     board: Switchboard,
@@ -44,7 +44,7 @@ pub(super) struct Live {
 const ADAPTIVE: bool = true;
 
 impl Live {
-    /// Begins a run; `wrote` is told what becomes of its outputs, and `ended` how it ended.
+    /// Starts a run. `wrote` is called with what becomes of its outputs, `ended` once with how it ended.
     ///
     /// # Errors
     /// The executor cannot be made, or the system gives no thread: one line.
@@ -123,7 +123,7 @@ impl Live {
         look.for_source(self.has_depth)
     }
 
-    /// Frames have this look from now on, and are known by this number.
+    /// Blurs with this look from now on; its frames carry this number.
     ///
     /// # Errors
     /// Its executor cannot be made: one line. The one before goes on.
@@ -132,9 +132,10 @@ impl Live {
         let made_for = look.settings(self.size, ADAPTIVE);
         let change = |number, bokeh| Change { number, look: look.clone(), bokeh };
         let kind = |settings: &Option<bokeh::Settings>| settings.as_ref().map(|settings| settings.coc);
-        // A run that has ended hears nothing.
+        // Sending fails only if the run has ended; then nothing is to be done.
         if kind(&self.made_for) == kind(&made_for) {
-            // At once what can be at once: the executor at hand cuts what it was not made for.
+            // The same kind of CoC takes effect at once: the present executor does what it can until the new one is
+            // made, and such frames keep the number before.
             let (number, executor) =
                 if made_for == self.made_for { (number, Executor::Keep) } else { (number - 1, Executor::Meanwhile) };
             let _ = self.changes.send(change(number, executor));
@@ -149,12 +150,13 @@ impl Live {
         Ok(())
     }
 
-    /// Frames go to this sink, too.
+    /// Adds a sink to the run.
     pub(super) fn write_to(&self, output: &Output, sink: Box<dyn Sink>) {
-        // A run that has ended drops it, which is told.
+        // A run that has ended gives the sink up, and tells so by `wrote`.
         let _ = self.board.add(&output.name, sink);
     }
 
+    /// Takes an output out of the run, which completes it.
     pub(super) fn end(&self, output: &Output) {
         self.board.remove(&output.name);
     }
@@ -165,7 +167,7 @@ impl Live {
         self.join()
     }
 
-    /// Waits for a run that has ended or will.
+    /// Waits for a run that has ended or was told to.
     pub(super) fn join(self) -> Option<Report> {
         self.thread.join().ok().flatten()
     }

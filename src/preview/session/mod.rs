@@ -23,20 +23,20 @@ use crate::pipeline::{PipelineError, View, Wanted};
 use crate::sink::switch::Notice;
 use crate::stats::Report;
 
-/// An end that takes longer is told.
+/// A close that takes longer is logged.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Called when the window has something to hear, from any thread.
+/// Wakes the window's thread to take events; called from any thread.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// What a session begins with.
+/// What a session starts with.
 pub struct Start {
-    /// Gets what is asked for by name.
+    /// Opens sources and outputs, and makes executors.
     pub services: Box<dyn Services>,
     pub look: Look,
     /// The source; empty for the first camera there is, else the synthetic scene.
     pub source: String,
-    /// Outputs to begin with the source.
+    /// Outputs to start together with the source.
     pub outputs: Vec<Output>,
     /// Count frames that fail and go on.
     pub keep_going: bool,
@@ -51,7 +51,7 @@ pub struct Start {
 /// What comes from a session.
 pub enum SessionEvent {
     Update(Update),
-    /// Frames of another run come from here.
+    /// A new run started: its frames come from here.
     Views(Receiver<View>),
     /// A text for the clipboard.
     Copy(String),
@@ -59,14 +59,15 @@ pub enum SessionEvent {
 
 /// A frame to be saved.
 pub struct Still {
-    /// As it is shown.
+    /// After the blur.
     pub picture: ColorImage,
+    /// Before the blur.
     pub color: ColorImage,
-    /// What it was blurred by.
+    /// The depth that it was blurred by.
     pub depth: Option<DepthMap>,
     /// The radius of every pixel.
     pub coc: CocField,
-    /// The number of the last change before it.
+    /// The number of the change of look that it is of.
     pub change: u64,
     /// The rung that it was blurred at.
     pub quality: Option<Quality>,
@@ -77,7 +78,7 @@ pub struct Still {
 pub struct Closed {
     /// The report of the last run, if there was one.
     pub report: Option<Report>,
-    /// Why the first of the outputs failed that did: one line.
+    /// Why an output failed, the first that did: one line.
     pub failed: Option<String>,
 }
 
@@ -93,7 +94,7 @@ enum Order {
     Close,
 }
 
-/// A session, as the window has it.
+/// The window's handle of a session.
 pub struct Session {
     orders: mpsc::Sender<Order>,
     heard: mpsc::Receiver<SessionEvent>,
@@ -101,21 +102,21 @@ pub struct Session {
 }
 
 impl Session {
-    /// Begins: opens the source at once.
+    /// Starts the thread, which opens the source at once.
     ///
     /// # Errors
     /// The system gives no thread.
     pub fn begin(start: Start, wake: Wake) -> std::io::Result<Self> {
         let (orders, inbox) = mpsc::channel();
         let (told, heard) = mpsc::channel();
-        let own = orders.clone();
+        let to_itself = orders.clone();
         let thread = thread::Builder::new()
             .name("session".into())
-            .spawn(move || Host::new(start, News { told, wake }, own).run(&inbox))?;
+            .spawn(move || Host::new(start, News { told, wake }, to_itself).run(&inbox))?;
         Ok(Self { orders, heard, thread })
     }
 
-    /// Has an effect brought about. One that comes after the end is nobody's.
+    /// Asks for a request to be carried out; ignored after the end.
     pub fn order(&self, request: Request) {
         let _ = self.orders.send(Order::Do(request));
     }
@@ -124,12 +125,12 @@ impl Session {
         let _ = self.orders.send(Order::Save(Box::new(still)));
     }
 
-    /// Has the equivalent command put together; `switches` are the window's own.
+    /// Asks for the equivalent command, for the clipboard; `switches` are the window's options.
     pub fn copy(&self, switches: Vec<Switch>) {
         let _ = self.orders.send(Order::Copy(switches));
     }
 
-    /// The next news, if there are any.
+    /// The next event, if one is waiting.
     pub fn hear(&self) -> Option<SessionEvent> {
         self.heard.try_recv().ok()
     }
@@ -137,7 +138,7 @@ impl Session {
     /// Ends the run and completes all outputs.
     pub fn close(self) -> Closed {
         let _ = self.orders.send(Order::Close);
-        // What is still said is said to nobody.
+        // Nobody will take its events any more.
         drop(self.heard);
         let began = Instant::now();
         let mut told = false;
@@ -152,7 +153,7 @@ impl Session {
     }
 }
 
-/// The way to the window.
+/// Sends events to the window, and wakes it.
 #[derive(Clone)]
 struct News {
     told: mpsc::Sender<SessionEvent>,

@@ -1,18 +1,18 @@
-//! What an action makes of the state.
+//! How actions change the state.
 
 use super::{Action, Output, Request, Shown, Source, State, TEXT_SCALES};
 use crate::look::{Effect, Look, Strength};
 
-/// What is missing where a look or a view needs depth; also what to do.
+/// Shown when a look or a view needs depth and there is none: what to do.
 pub const NO_DEPTH: &str =
     "This source has no depth. A second camera beside it, a depth camera or a recording with depth gives it.";
-/// Why depth is not shown: nobody makes it.
+/// Shown when depth is to be viewed while it is not computed.
 pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: choose Depth as the effect first.";
-/// What is missing where there is no virtual camera.
+/// Shown when there is no virtual camera.
 pub const NO_VIRTUAL_CAMERA: &str = "There is no virtual camera yet: `bokehcam doctor` says how to make one.";
 
 impl State {
-    /// Does what the person did; gives back what only others can bring about.
+    /// Applies an action; gives back what the window or the session has to do for it.
     pub fn apply(&mut self, action: Action) -> Vec<Request> {
         match action {
             Action::Look { look, stroke } => return self.set_look(*look, stroke),
@@ -51,7 +51,7 @@ impl State {
             }
             Action::Snapshot => return vec![Request::Snapshot],
             Action::Record(on) => return self.record(on),
-            Action::VirtualCamera(name) => return self.write_to(name),
+            Action::VirtualCamera(name) => return self.set_virtual_camera(name),
             Action::Open(name) => return self.open(name),
             Action::Retry => return self.open(self.source_name.clone()),
             Action::Control(name, value) => return self.set_control(name, value),
@@ -63,6 +63,7 @@ impl State {
         Vec::new()
     }
 
+    /// Changes the look as far as the source allows it; the one before can be undone.
     fn set_look(&mut self, look: Look, stroke: Option<&'static str>) -> Vec<Request> {
         let look = self.fitting(look);
         if look == self.look {
@@ -72,11 +73,13 @@ impl State {
         self.go_to(Some(look))
     }
 
+    /// Changes the look without remembering the one before. With an effect that needs no depth, a lens and the depth
+    /// view are given up.
     fn go_to(&mut self, look: Option<Look>) -> Vec<Request> {
         let Some(look) = look else { return Vec::new() };
         let mut look = self.fitting(look);
         if self.look.effect.follows_depth() && !look.effect.follows_depth() {
-            // Without depth a lens would need a distance, and there is no depth to be seen.
+            // Without depth there are no distances that a lens needs, and no depth to view.
             if matches!(look.strength, Strength::Lens(_)) {
                 look.strength = Strength::Default;
             }
@@ -115,20 +118,22 @@ impl State {
         }
     }
 
-    fn write_to(&mut self, name: Option<String>) -> Vec<Request> {
+    /// Changes the virtual camera that is written to, or ends it with `None`.
+    fn set_virtual_camera(&mut self, name: Option<String>) -> Vec<Request> {
         let current = self.virtual_camera().cloned();
         if current.as_ref().map(|output| &output.name) == name.as_ref() {
+            // With nothing to end, this came of a wish to start the first camera of none.
             if name.is_none() {
                 self.note(NO_VIRTUAL_CAMERA);
             }
             return Vec::new();
         }
-        let mut effects: Vec<_> = current.into_iter().flat_map(|output| self.end(output)).collect();
-        effects.extend(name.into_iter().flat_map(|name| self.begin(Output { name, is_camera: true })));
-        effects
+        let mut requests: Vec<_> = current.into_iter().flat_map(|output| self.end(output)).collect();
+        requests.extend(name.into_iter().flat_map(|name| self.begin(Output { name, is_camera: true })));
+        requests
     }
 
-    /// It counts as written to from now on, so that nothing begins it twice; what becomes of it, others tell.
+    /// Asks for an output. It is listed at once, so that it is not begun twice; the session reports what became of it.
     fn begin(&mut self, output: Output) -> Vec<Request> {
         self.outputs.push(output.clone());
         vec![Request::Begin(output)]
@@ -139,6 +144,7 @@ impl State {
         vec![Request::End(output)]
     }
 
+    /// Asks for a source, and forgets what was known of the one before.
     fn open(&mut self, name: String) -> Vec<Request> {
         if name != self.source_name {
             self.controls.clear();
@@ -155,6 +161,7 @@ impl State {
             return Vec::new();
         };
         let (least, most, _) = control.range;
+        // Not `clamp`, which panics if a driver gives a range upside down.
         let value = value.min(most).max(least);
         if std::mem::replace(&mut control.value, value) == value {
             return Vec::new();

@@ -1,14 +1,14 @@
-//! What others tell, and what it makes of the state.
+//! How the session's updates change the state.
 
 use super::apply::NO_DEPTH;
 use super::{Request, Shown, Source, State, Update};
 use crate::look::{Effect, Look};
 
 impl State {
-    /// Takes note of what others tell; gives back another look where the source calls for one.
-    pub fn hear(&mut self, told: Update) -> Option<Request> {
-        match told {
-            Update::Source(source) => return self.source_is(source),
+    /// Applies an update of the session; gives back the request for another look where a new source needs one.
+    pub fn hear(&mut self, update: Update) -> Option<Request> {
+        match update {
+            Update::Source(source) => return self.set_source(source),
             Update::Choices { sources, virtual_cameras } => {
                 (self.sources, self.virtual_cameras) = (sources, virtual_cameras);
             }
@@ -21,7 +21,8 @@ impl State {
         None
     }
 
-    fn source_is(&mut self, source: Source) -> Option<Request> {
+    /// Takes another source, and fits the view and the look to it.
+    fn set_source(&mut self, source: Source) -> Option<Request> {
         if let Source::Running(running) = &source {
             self.meters.restart();
             self.source_name.clone_from(&running.name);
@@ -32,11 +33,11 @@ impl State {
             self.note(NO_DEPTH);
         }
         let look = match &self.source {
-            // What was changed for a source without depth is changed back for one that has it.
+            // An effect that was replaced by tilt-shift for want of depth comes back, unless another was chosen since.
             Source::Running(running) if running.has_depth && self.fitted => {
                 self.fitted = false;
-                let follows = self.look.effect == Effect::TiltShift;
-                Look { effect: if follows { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
+                let still_fitted = self.look.effect == Effect::TiltShift;
+                Look { effect: if still_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
             }
             _ => self.fitting(self.look.clone()),
         };
@@ -46,7 +47,7 @@ impl State {
         })
     }
 
-    /// A look as the source allows it.
+    /// A look as far as the source allows it; remembers if that changed its effect.
     pub(super) fn fitting(&mut self, look: Look) -> Look {
         let fitted = look.for_source(self.may_have_depth());
         self.fitted |= fitted.effect != look.effect;

@@ -2,20 +2,22 @@
 
 use crate::look::Look;
 
-/// Looks that can be gone back to, at most.
+/// The most looks that can be undone.
 const MOST: usize = 100;
 
-/// The looks before the one that is shown, and those that were undone.
+/// The looks before the present one, and those that were undone.
 #[derive(Clone, Debug, Default)]
 pub struct History {
+    /// The latest last.
     past: Vec<Look>,
+    /// The latest undone last.
     future: Vec<Look>,
-    /// The control in hand: its changes are one.
+    /// The control in hand: its changes are undone together.
     stroke: Option<&'static str>,
 }
 
 impl History {
-    /// `look` is about to be replaced. Changes of one stroke are kept as one, until [`History::settle`].
+    /// Remembers `look`, which is about to be replaced. Changes of one stroke count as one until [`History::settle`].
     pub fn keep(&mut self, look: &Look, stroke: Option<&'static str>) {
         self.future.clear();
         if stroke.is_some() && stroke == self.stroke {
@@ -33,7 +35,7 @@ impl History {
         self.stroke = None;
     }
 
-    /// The look before `look`, which can be gone forth to again.
+    /// The look before `look`, which itself is kept for [`History::redo`].
     pub fn undo(&mut self, look: &Look) -> Option<Look> {
         self.stroke = None;
         let before = self.past.pop()?;
@@ -41,7 +43,7 @@ impl History {
         Some(before)
     }
 
-    /// The look that was undone last.
+    /// The look that was undone last; `look` is kept for [`History::undo`].
     pub fn redo(&mut self, look: &Look) -> Option<Look> {
         self.stroke = None;
         let after = self.future.pop()?;

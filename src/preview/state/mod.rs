@@ -33,7 +33,7 @@ pub enum Source {
     #[default]
     Opening,
     Running(Running),
-    /// There are no frames any more, or never were: why. The last picture stays.
+    /// Why there are no frames any more, or never were. The last picture stays.
     Lost(String),
     /// It came to its end. The last picture stays.
     Ended,
@@ -69,12 +69,12 @@ pub struct Output {
 /// A line for the person. It is shown for a while.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// Counts from 1; another line has another number.
+    /// Counts from 1, different for each line.
     pub number: u64,
     pub text: String,
 }
 
-/// Text is between this many times its usual size, and as many.
+/// The text scales that can be chosen; 1 is the usual size.
 pub const TEXT_SCALES: std::ops::RangeInclusive<f32> = 0.75..=3.0;
 
 /// All that the window shows, but the picture itself.
@@ -101,7 +101,7 @@ pub struct State {
     pub mirror: bool,
     /// Whether the window keeps the picture it has.
     pub frozen: bool,
-    /// Left of this fraction of the picture's width, it is shown as it was before the blur.
+    /// Left of this fraction of its width, the picture is shown as before the blur.
     pub split: Option<f32>,
     /// Whether the panel is open.
     pub panel: bool,
@@ -113,7 +113,7 @@ pub struct State {
     pub help: bool,
     /// Whether the window fills the screen.
     pub full_screen: bool,
-    /// For how many seconds no frame came, where one should have.
+    /// Seconds without a frame, where the source runs but has been silent for too long.
     pub silent_s: Option<u64>,
     /// Distance of the focal plane in the last frame, in metres.
     pub focus_m: Option<f32>,
@@ -128,11 +128,13 @@ pub struct State {
     pub meters: Meters,
     /// The looks before, and those that were undone.
     pub history: History,
-    /// Whether the effect is another than was chosen, because the source has no depth.
+    /// Whether the effect differs from what was chosen, because the source has no depth.
     fitted: bool,
+    /// Number of the last note.
     noted: u64,
 }
 
+/// The most notes that are kept.
 const NOTES: usize = 6;
 
 impl State {
@@ -179,7 +181,7 @@ impl State {
         }
     }
 
-    /// Whether frames have depth, as far as is known: one that is being opened may.
+    /// Whether frames have depth, as far as is known: without a running source they may.
     pub fn may_have_depth(&self) -> bool {
         match &self.source {
             Source::Running(running) => running.has_depth,
@@ -197,7 +199,7 @@ impl State {
         self.outputs.iter().find(|output| output.is_camera)
     }
 
-    /// Whether the look is that of a preset, wherever it is focused.
+    /// Whether the look is that of a preset; where it is focused does not matter.
     pub fn is_in_use(&self, preset: &Preset) -> bool {
         let used = preset.patch.on(&self.look);
         used.is_ok_and(|look| Look { focus: self.look.focus, ..look } == self.look)

@@ -4,7 +4,7 @@ use super::{Shown, State};
 use crate::preview::services::Switch;
 
 impl State {
-    /// The options that show the window as it is, beside those of the look; what is usual is left out.
+    /// The options that reproduce the window, besides those of the look; defaults are left out.
     pub fn switches(&self) -> Vec<Switch> {
         let shown = Some(self.shown).filter(|shown| *shown != Shown::default());
         let yes = |on: bool| on.then(|| "true".to_owned());

@@ -1,11 +1,11 @@
-//! Small changes of a look, as a key or a turn of the wheel makes them.
+//! Small changes of a look, made by a key or the wheel.
 
 use crate::bokeh::Rank;
 use crate::depth::focus::FocusRule;
 use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Effect, Look, MAX_COC_PER_HEIGHT, Strength};
 use crate::optics::Lens;
 
-/// The lens that is meant where none was chosen: a portrait lens on full frame.
+/// The lens to start from where none was chosen: a portrait lens on full frame.
 pub const LENS: Lens = Lens { focal_length_mm: 50.0, f_number: 1.8, sensor_width_mm: 36.0 };
 /// The f-numbers that can be chosen.
 pub const F_NUMBERS: std::ops::RangeInclusive<f32> = 0.7..=22.0;
@@ -14,7 +14,7 @@ pub const FOCUS_RANGES_M: std::ops::RangeInclusive<f32> = 0.0..=3.0;
 /// The distances that can be focused at, in metres.
 pub const DISTANCES_M: std::ops::RangeInclusive<f32> = 0.2..=20.0;
 
-/// Radius at infinity as a share of the picture's height, where it is not a lens's.
+/// CoC radius at infinity as a share of the picture's height; `None` where the strength is given as a lens.
 pub fn amount(look: &Look, height_px: u32) -> Option<f32> {
     match look.strength {
         Strength::Default => Some(COC_AT_INFINITY_PER_HEIGHT),
@@ -24,13 +24,14 @@ pub fn amount(look: &Look, height_px: u32) -> Option<f32> {
     }
 }
 
-/// Blurs `factor` times as much: a lens by its f-number.
+/// Makes the blur `factor` times as strong, by its f-number where the strength is given as a lens.
 pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
+    // As a share of the height: below that no blur is visible, so a step down ends at 0, and one up starts from half.
     let least = 0.002;
     match amount(look, height_px) {
-        // Below, blur is none to be seen; from there one gets back by a first step.
         Some(share) => {
             let share = if share < least && factor < 1.0 { 0.0 } else { share.max(least / 2.0) * factor };
+            // A radius beyond the usual limit may stay.
             let most = amount(look, height_px).unwrap_or_default().max(MAX_COC_PER_HEIGHT);
             look.strength = Strength::Percent(share.min(most) * 100.0);
         }
@@ -38,8 +39,8 @@ pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
     }
 }
 
-/// Makes the f-number `factor` times as large; the first time, a lens is put on. Only where the blur follows depth has a
-/// lens a distance.
+/// Makes the f-number `factor` times as large; a look without a lens gets [`LENS`] instead. Does nothing unless the
+/// blur follows depth: a lens needs distances.
 pub fn f_number_by(look: &mut Look, factor: f32) {
     if !look.effect.follows_depth() {
         return;
@@ -52,22 +53,24 @@ pub fn f_number_by(look: &mut Look, factor: f32) {
     look.strength = Strength::Lens(Lens { f_number, ..lens });
 }
 
-/// Makes the focal range larger or smaller by some metres.
+/// Widens the focal range by some metres, in steps of a centimetre.
 pub fn focus_range_by(look: &mut Look, by_m: f32) {
     let range_m = ((look.focus_range_m + by_m) * 100.0).round() / 100.0;
     look.focus_range_m = range_m.clamp(*FOCUS_RANGES_M.start(), *FOCUS_RANGES_M.end());
 }
 
-/// Moves what is sharp by fractions of the picture's width and height: the band of tilt-shift, the distance of focus
-/// where one was chosen (up is farther), else the point of focus.
+/// Moves what is sharp by fractions of the picture's width and height: the band of tilt-shift (sideways turns it), the
+/// distance of focus where one was chosen (up and right is farther), else the point of focus.
 pub fn move_focus(look: &mut Look, dx: f32, dy: f32) {
     if look.effect == Effect::TiltShift {
         look.tilt.center_y = (look.tilt.center_y + dy).clamp(0.0, 1.0);
+        // A key's step of 0.02 turns by 2 degrees.
         look.tilt.angle_deg = turned(look.tilt.angle_deg, dx * 100.0);
         return;
     }
     look.focus = match look.focus {
         FocusRule::Metres(metres) => {
+            // The same step is a share of the distance: 4 %.
             let metres = metres * (1.0 + 2.0 * (dx - dy));
             FocusRule::Metres(metres.clamp(*DISTANCES_M.start(), *DISTANCES_M.end()))
         }
@@ -76,12 +79,12 @@ pub fn move_focus(look: &mut Look, dx: f32, dy: f32) {
     };
 }
 
-/// An angle turned on, between -90 and 90 degrees: a band has no direction.
+/// An angle plus `by_deg`, wrapped to -90 to 90 degrees: a band turned by 180 degrees is the same.
 pub fn turned(angle_deg: f32, by_deg: f32) -> f32 {
     (angle_deg + by_deg + 90.0).rem_euclid(180.0) - 90.0
 }
 
-/// How many separable terms a look has; `None` is the quality's own choice.
+/// The label for a number of separable terms; `None` leaves it to the quality.
 pub fn rank_label(rank: Option<Rank>) -> String {
     match rank {
         None => "auto".into(),

@@ -1,4 +1,4 @@
-//! Which bin each pixel falls in.
+//! The bins view: in which depth bin each pixel is blurred.
 
 use super::Legend;
 use super::colors::BINS;
@@ -10,18 +10,19 @@ use crate::budget::Quality;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
-/// Most bins that there can be.
+/// The most bins that there can be.
 pub const MOST: usize = MAX_BINS;
 
-/// The plan that splits frames, as long as settings and size are the same.
+/// Splits frames into bins as the blur did. Keeps its plan as long as settings and size stay the same.
 #[derive(Default)]
 pub struct Bins {
+    /// The plan, and the settings and the size that it was made for.
     made: Option<(Settings, (u32, u32), Plan)>,
 }
 
 impl Bins {
-    /// The plan of this frame.
-    pub fn of(
+    /// A plan with the bins of this frame. It is made anew only if what decides their borders changed.
+    pub fn split(
         &mut self,
         settings: &Settings,
         size: (u32, u32),
@@ -29,18 +30,18 @@ impl Bins {
         depth: Option<&DepthMap>,
         coc: &CocField,
     ) -> &Plan {
-        let is_current = |(planned, at, _): &(Settings, (u32, u32), Plan)| {
-            let what = |settings: &Settings| (settings.coc, settings.method);
+        let is_current = |(planned, planned_size, _): &(Settings, (u32, u32), Plan)| {
+            let kind = |settings: &Settings| (settings.coc, settings.method);
             let radii_px = |settings: &Settings| [settings.far_max_px, settings.near_max_px];
-            what(planned) == what(settings) && radii_px(planned) == radii_px(settings) && *at == size
+            kind(planned) == kind(settings) && radii_px(planned) == radii_px(settings) && *planned_size == size
         };
         self.made = self.made.take().filter(is_current);
         let (.., plan) = self.made.get_or_insert_with(|| {
-            // Borders are the same whatever the filters; these are made fastest.
+            // The bins' borders do not depend on the kernels; these take the least time to make.
             let aperture = Aperture::default();
-            let light = Settings { aperture, rank: Some(Rank::Terms(1)), adaptive: true, ..settings.clone() };
-            let plan = Plan::new(&light, size.0, size.1);
-            (light, size, plan)
+            let cheap = Settings { aperture, rank: Some(Rank::Terms(1)), adaptive: true, ..settings.clone() };
+            let plan = Plan::new(&cheap, size.0, size.1);
+            (cheap, size, plan)
         });
         plan.set_quality(level.unwrap_or(settings.quality));
         plan.split(depth, coc);
@@ -48,7 +49,7 @@ impl Bins {
     }
 }
 
-/// Draws the bins of a plan.
+/// Colours each pixel by the bin of `plan` that its CoC falls in. `columns` are those of [`Field::new`].
 pub fn draw(field: &Field, columns: &[u32], plan: &Plan, image: &mut ColorImage) -> Legend {
     let mut high_px = [f32::INFINITY; MOST];
     let count = plan.bins.len().min(MOST);

@@ -1,11 +1,11 @@
-//! Colours for numbers.
+//! Colour maps.
 
 use std::sync::LazyLock;
 
-/// Entries of a table of colours.
+/// Entries of the table of [`perceptual`] colours.
 pub const ENTRIES: usize = 256;
 
-/// Colours of bins, front to back: neighbours differ in lightness, too (after Okabe and Ito, and lighter or darker ones).
+/// Colours of bins, front to back: after Okabe and Ito, lightened or darkened so that neighbours differ in lightness.
 pub const BINS: [[u8; 3]; 13] = [
     [230, 159, 0],
     [120, 60, 20],
@@ -22,7 +22,7 @@ pub const BINS: [[u8; 3]; 13] = [
     [220, 220, 225],
 ];
 
-/// Viridis by polynomials (Matt Zucker, public domain), the table made once.
+/// Viridis, approximated by polynomials (Matt Zucker, public domain).
 static PERCEPTUAL: LazyLock<[[u8; 3]; ENTRIES]> = LazyLock::new(|| {
     const TERMS: [[f64; 3]; 7] = [
         [0.277_727_327_223_417_7, 0.005_407_344_544_966_578, 0.334_099_805_335_306_1],
@@ -35,6 +35,7 @@ static PERCEPTUAL: LazyLock<[[u8; 3]; ENTRIES]> = LazyLock::new(|| {
     ];
     std::array::from_fn(|k| {
         let t = k as f64 / (ENTRIES - 1) as f64;
+        // Horner's scheme, from the highest power down.
         let at = |channel: usize| TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term[channel]);
         [0, 1, 2].map(|channel| (at(channel) * 255.0).round().clamp(0.0, 255.0) as u8)
     })
@@ -45,7 +46,7 @@ pub fn perceptual() -> &'static [[u8; 3]; ENTRIES] {
     &PERCEPTUAL
 }
 
-/// From -1 (in front: red-brown) over 0 (sharp: nearly white) to 1 (behind: blue); as dark on either side.
+/// A colour from -1 (in front: red-brown) over 0 (sharp: nearly white) to 1 (behind: blue), equally dark at both ends.
 pub fn diverging(share: f32) -> [u8; 3] {
     const SHARP: [f32; 3] = [246.0, 246.0, 242.0];
     const NEAR: [[f32; 3]; 2] = [[238.0, 150.0, 70.0], [122.0, 30.0, 20.0]];

@@ -1,4 +1,4 @@
-//! Pictures of what a picture was made from: depth, circle of confusion and bins, in colours with a legend.
+//! Views of what a picture was blurred by: depth, circle of confusion and bins, in false colours with a legend.
 
 mod bins;
 mod colors;
@@ -34,16 +34,16 @@ named! {
 /// What the colours of a view mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Legend {
-    /// Depth: [`perceptual`] colours, even in dioptres, light is near.
+    /// Depth: [`perceptual`] colours, linear in dioptres, light is near.
     Depth {
-        /// What is lightest, in metres; nearer is no lighter.
+        /// Distance of the lightest colour, in metres; nearer is no lighter.
         near_m: f32,
-        /// What is darkest, in metres; infinity where nothing is known.
+        /// Distance of the darkest colour, in metres.
         far_m: f32,
     },
     /// Circle of confusion: [`diverging`] colours, hatched in front.
     Coc {
-        /// Radius of the darkest on either side, in pixels.
+        /// Radius of the darkest colours, in front and behind, in pixels.
         most_px: f32,
     },
     /// Bins, front to back, by [`BIN_COLORS`].
@@ -55,20 +55,20 @@ pub enum Legend {
     },
 }
 
-/// Makes views; keeps the memory for them, and what steadies their colours.
+/// Draws views. Keeps their memory, and the range of the depth colours, which is eased from frame to frame.
 #[derive(Default)]
 pub struct Views {
     image: ColorImage,
     legend: Option<Legend>,
     depth: depth::Range,
+    /// The depth map's column for each column of the picture.
     columns: Vec<u32>,
     bins: bins::Bins,
 }
 
 impl Views {
-    /// The picture of `shown` of this frame, as large as the frame's; `None` where that is the picture itself or
-    /// cannot be shown. `settings` are those that it was blurred with. Allocates nothing but for another size, and for
-    /// bins of other settings.
+    /// Draws the view `shown` of this frame, as large as its picture; `None` for the picture itself and for what the
+    /// frame lacks. `settings` are those that it was blurred with. Allocates only for another size or other bins.
     pub fn draw(&mut self, shown: Shown, view: &View, settings: Option<&Settings>) -> Option<&ColorImage> {
         self.legend = None;
         let size = view.picture.size();
@@ -82,7 +82,7 @@ impl Views {
             Shown::Coc => field.map(|field| radius::draw(&field, columns, settings, image)),
             Shown::Bins => {
                 let level = view.trace.quality;
-                let plan = settings.map(|settings| self.bins.of(settings, size, level, depth, &view.coc));
+                let plan = settings.map(|settings| self.bins.split(settings, size, level, depth, &view.coc));
                 field.zip(plan).map(|(field, plan)| bins::draw(&field, columns, plan, image))
             }
         };

@@ -1,5 +1,5 @@
-//! The circle of confusion in colours: white is sharp, darker is more blurred; what lies in front is hatched, so that
-//! it is told from what lies behind without colour, too.
+//! The view of the circle of confusion: white is sharp, darker is more blurred. What lies in front is hatched, so that
+//! it differs from what lies behind by more than colour.
 
 use super::Legend;
 use super::colors::diverging;
@@ -7,17 +7,17 @@ use super::sample::Field;
 use crate::bokeh::Settings;
 use crate::frame::ColorImage;
 
-/// Lines of the hatching are so far apart, and so wide, in pixels of a picture with 720 rows.
+/// Period of the hatching in pixels, for a picture of 720 rows, and the share of it that a line takes.
 const HATCH_PX: f32 = 12.0;
 const LINE_SHARE: f32 = 0.25;
-/// Less is not in front: a face is not hatched for the roughness of its depth.
+/// Signed CoC below which a pixel counts as in front, so that noise of the depth does not hatch a sharp face.
 const FRONT_FROM_PX: f32 = -0.5;
-/// Steps of the table from one end of the colours to the other.
+/// Entries of the table of colours.
 const STEPS: usize = 256;
-/// Colours are for at least this radius, in pixels: a sharp picture shall look sharp.
+/// The colours end at this radius or more, in pixels, so that a nearly sharp picture looks sharp.
 const LEAST_PX: f32 = 2.0;
 
-/// Draws the CoC of a field.
+/// Colours each pixel by its signed CoC. `columns` are those of [`Field::new`].
 pub fn draw(field: &Field, columns: &[u32], settings: Option<&Settings>, image: &mut ColorImage) -> Legend {
     let most_px = settings.map_or(0.0, |settings| settings.far_max_px.max(settings.near_max_px)).max(LEAST_PX);
     let table: [[u8; 3]; STEPS] = std::array::from_fn(|k| diverging(2.0 * k as f32 / (STEPS - 1) as f32 - 1.0));

@@ -11,19 +11,20 @@ use super::memory::Memory;
 use crate::compute::device::Device;
 use crate::preview::present::{self, Area, Presenter};
 
+/// The window, egui's input from it, and its presenter.
 pub(super) struct Gfx {
     pub window: Arc<Window>,
     pub input: egui_winit::State,
     pub presenter: Box<dyn Presenter>,
 }
 
-/// What windows are grouped and themed by.
+/// The application id that desktops group windows by.
 const CLASS: &str = "bokehcam";
 const FIRST_SIZE: LogicalSize<f64> = LogicalSize::new(1280.0, 720.0);
 const LEAST_SIZE: LogicalSize<f64> = LogicalSize::new(240.0, 160.0);
 
 impl Gfx {
-    /// Opens the window.
+    /// Opens the window, in the size that is remembered.
     ///
     /// # Errors
     /// The display refuses it, or nothing can draw in it.
@@ -61,13 +62,13 @@ impl Gfx {
         Ok(Self { window, input, presenter })
     }
 
-    /// Where a picture of `size` lies in the window: as large as it fits, in the middle.
+    /// Where a picture of `size` lies in the window: centred, as large as fits.
     pub fn area(&self, size: (u32, u32)) -> Area {
         let PhysicalSize { width, height } = self.window.inner_size();
         fitted(size, (width, height))
     }
 
-    /// What shall be remembered of the window, unless it fills the screen.
+    /// The size to remember; `None` in full screen, whose size is not the window's own.
     pub fn memory(&self) -> Option<Memory> {
         let LogicalSize { width, height } = self.window.inner_size().to_logical::<f64>(self.window.scale_factor());
         let maximized = self.window.is_maximized();
@@ -78,21 +79,23 @@ impl Gfx {
 /// Any GPU takes textures of this size.
 const MOST_TEXTURE_PX: usize = 4096;
 
-/// The largest area of the aspect of `size` within `window`, in its middle.
+/// The largest area with the aspect ratio of `size` within `window`, centred.
 fn fitted(size: (u32, u32), window: (u32, u32)) -> Area {
     let [width, height, all_width, all_height] = [size.0, size.1, window.0, window.1].map(u64::from);
     if width == 0 || height == 0 || all_width == 0 || all_height == 0 {
         return Area::default();
     }
-    let by_width = all_width * height <= all_height * width;
-    let (wide, high) = match by_width {
+    // Whichever side limits; the other is rounded to whole pixels.
+    let fills_width = all_width * height <= all_height * width;
+    let (fit_width, fit_height) = match fills_width {
         true => (all_width, (all_width * height + width / 2) / width),
         false => ((all_height * width + height / 2) / height, all_height),
     };
-    let (wide, high) = (wide.clamp(1, all_width), high.clamp(1, all_height));
+    let (fit_width, fit_height) = (fit_width.clamp(1, all_width), fit_height.clamp(1, all_height));
     // All four are at most the window's sides.
     let px = |side: u64| u32::try_from(side).unwrap_or(u32::MAX);
-    Area { x: px((all_width - wide) / 2), y: px((all_height - high) / 2), width: px(wide), height: px(high) }
+    let (x, y) = (px((all_width - fit_width) / 2), px((all_height - fit_height) / 2));
+    Area { x, y, width: px(fit_width), height: px(fit_height) }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::files::{input, whole};
 
-/// The window, in points.
+/// The window's size in points, as it was last.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
     pub width: f64,
@@ -16,18 +16,19 @@ pub(super) struct Memory {
     pub maximized: bool,
 }
 
+/// A side beyond these is taken for a mistake.
 const LEAST: f64 = 200.0;
 const MOST: f64 = 16_384.0;
 
 impl Memory {
-    /// What the file remembers; nothing where it is missing or says nothing sensible: it is no setting.
+    /// What the file remembers; `None` if it is missing or not sensible, without an error, as it is no setting.
     pub fn read(path: &Path) -> Option<Self> {
         let memory: Self = toml::from_str(&input::read_text(path, input::MOST_SETTINGS_BYTES).ok()?).ok()?;
         let sides = LEAST..=MOST;
         (sides.contains(&memory.width) && sides.contains(&memory.height)).then_some(memory)
     }
 
-    /// Writes it whole or not at all. Where it cannot be written, the next window has the first size again.
+    /// Writes the file, whole or not at all. If that fails, the next window just has its initial size again.
     pub fn write(self, path: &Path) {
         let Ok(text) = toml::to_string(&self) else { return };
         let folder = path.parent().map_or(Ok(()), fs::create_dir_all);

@@ -24,9 +24,9 @@ use crate::stats::Report;
 pub struct Preview {
     /// What the window shows first.
     pub state: State,
-    /// What goes on behind it.
+    /// What the session starts with.
     pub session: session::Start,
-    /// What draws, where that is a GPU.
+    /// The GPU to draw with, if any.
     pub device: Option<Arc<Device>>,
     /// Close the window when the source ends.
     pub close_at_end: bool,
@@ -78,7 +78,7 @@ pub fn show(preview: Preview) -> Result<Ended, WindowError> {
     ended
 }
 
-/// What an error says, without the place in its library's source.
+/// An error's text without the location in its library's source, which winit puts before it.
 fn plain(error: &impl std::fmt::Display) -> String {
     let text = error.to_string();
     match text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")) {
@@ -87,7 +87,8 @@ fn plain(error: &impl std::fmt::Display) -> String {
     }
 }
 
-/// The event loop. Where a library that the display needs is missing, winit panics.
+/// The event loop. winit panics if a library that the display needs is missing: that becomes an error, too, and the
+/// panic hook is silenced meanwhile.
 fn event_loop() -> Result<EventLoop<()>, WindowError> {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));

@@ -1,13 +1,13 @@
-//! The layout of the EuRoC and ASL sets: `mav0/cam0` and `mav0/cam1`, each with `data.csv` (lines of `nanoseconds,file`),
-//! the pictures in `data`, and `sensor.yaml`. The pictures are as the cameras took them. Without `data.csv` the names of
-//! the pictures are their times.
+//! The layout of the EuRoC and ASL sets: `mav0/cam0` and `mav0/cam1`, each with `data.csv` (lines of
+//! `nanoseconds,file`), the pictures in `data`, and `sensor.yaml`. The pictures are not rectified. Without `data.csv`
+//! the names of the pictures are their times.
 
 use std::path::{Path, PathBuf};
 
 use super::contents::{Contents, Folder, Layout, Listed, Source, numbered_pictures};
 use super::error::RecordingError;
 use super::fault::LineFault;
-use super::list::{self, Entry, give_up_disorder, inside, quoted, refuse_faults};
+use super::list::{self, Entry, clear_unordered_times, inside, quoted, refuse_faults};
 use super::{Options, Pair, Unpaired, pair, timeline};
 use crate::calibration;
 
@@ -19,7 +19,7 @@ pub(super) const LAYOUT: Layout = Layout {
     open,
 };
 
-/// What a camera has, below the folder of the recording.
+/// Paths of a camera's files, below the folder of the recording.
 struct Camera {
     list: &'static str,
     pictures: &'static str,
@@ -43,6 +43,7 @@ impl Camera {
         dir.join(self.list).exists() || dir.join(self.pictures).is_dir()
     }
 
+    /// The pictures of the camera with their times: by its list, or without one by their names.
     fn read(&self, dir: &Path, options: &Options) -> Result<Vec<Entry>, RecordingError> {
         let mut entries = match dir.join(self.list).exists() {
             true => list::read(dir, self.list, |place, text| {
@@ -56,17 +57,17 @@ impl Camera {
                     Err(fault) => Entry::new(place, Err(fault.clone()), Err(fault.clone())),
                 }
             })?,
-            false => self.by_name(dir)?,
+            false => self.entries_by_name(dir)?,
         };
-        give_up_disorder(entries.iter_mut());
+        clear_unordered_times(entries.iter_mut());
         if !options.keep_going {
             refuse_faults(dir, entries.iter())?;
         }
         Ok(entries)
     }
 
-    /// Entries of the pictures whose name is a time.
-    fn by_name(&self, dir: &Path) -> Result<Vec<Entry>, RecordingError> {
+    /// Entries of the pictures whose name is a time in nanoseconds; others are left out.
+    fn entries_by_name(&self, dir: &Path) -> Result<Vec<Entry>, RecordingError> {
         let names = numbered_pictures(&dir.join(self.pictures))?;
         let entry = |name: String| {
             let time_ns = parse_ns(name.split('.').next()?).ok()?;
@@ -80,6 +81,7 @@ impl Camera {
     }
 }
 
+/// Pairs the pictures of the two cameras by time, and reads their calibration. A left camera alone has no pair.
 fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     let [left, right] = CAMERAS.iter().find(|[left, _]| left.is_in(dir)).unwrap_or(&CAMERAS[0]);
@@ -89,7 +91,7 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
         let frames = entries.into_iter().map(|left| frame(left, None)).collect();
         return Ok(Contents { frames, depth: None, pair: None, disparities: None, unpaired: Unpaired::default() });
     }
-    // What is half a period away belongs as well to the next picture.
+    // A right picture that is further away than half a period is nearer to another left one, which may be missing.
     let half_period_ns = timeline::median_period_ns(entries.iter().filter_map(|entry| entry.time_ns)) / 2;
     let tolerance_ns = options.pair_tolerance_ns.min(half_period_ns);
     let paired = pair::join(entries, right.read(dir, options)?, tolerance_ns);
@@ -110,7 +112,7 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
     })
 }
 
-/// The times have 61 bits, and `f64` 53: they stay whole numbers.
+/// Parses nanoseconds as a whole number: today's date in nanoseconds takes 61 bits, and `f64` has 53.
 fn parse_ns(text: &str) -> Result<u64, LineFault> {
     // `parse` alone would also take a sign.
     let is_number = text.bytes().all(|byte| byte.is_ascii_digit());

@@ -8,22 +8,26 @@ use crate::recording::geometry::{Geometry, Wrong, numbers, rig};
 /// `P[3]` minus the focal length times how far right the camera stands, in metres.
 type Projection = [f64; 12];
 
+/// A line with a projection.
 struct Row {
     line: u32,
+    /// Number of the camera; `None` for a row without a key.
     camera: Option<usize>,
     projection: Result<Projection, GeometryFault>,
 }
 
-/// The geometry of the eyes `left` and `left + 1`; where it is not given, of 2 and 3 if they are there, else of 0 and 1.
+/// The geometry of the cameras `left` and `left + 1`. Without `left`, those are the colour cameras 2 and 3 if they are
+/// there, else 0 and 1.
 pub(in crate::recording) fn parse(text: &str, left: Option<usize>) -> Result<Geometry, Wrong> {
-    let rows: Vec<Row> = (1..).zip(text.lines()).filter_map(|(line, text)| row(line, text)).collect();
+    let rows: Vec<Row> = (1..).zip(text.lines()).filter_map(|(line, text)| parse_row(line, text)).collect();
     if rows.is_empty() {
         return Err((None, GeometryFault::Unknown));
     }
     let keyed = |camera: usize| rows.iter().find(|row| row.camera == Some(camera));
     let keyless = |nth: usize| rows.iter().filter(|row| row.camera.is_none()).nth(nth);
     let left = left.unwrap_or_else(|| if keyed(3).or(keyless(3)).is_some() { 2 } else { 0 });
-    let of = |camera: usize| {
+    let projection_of = |camera: usize| {
+        // Rows without a key: four are P0 to P3, fewer are those of the left and the right camera.
         let row = match (keyed(camera), keyless(3)) {
             (Some(row), _) => Some(row),
             (None, Some(_)) => keyless(camera),
@@ -33,14 +37,14 @@ pub(in crate::recording) fn parse(text: &str, left: Option<usize>) -> Result<Geo
         let projection = row.projection.as_ref().map_err(|fault| (Some(row.line), fault.clone()))?;
         Ok((row.line, projection))
     };
-    let ((_, left), (line, right)) = (of(left)?, of(left + 1)?);
+    let ((_, left), (line, right)) = (projection_of(left)?, projection_of(left + 1)?);
     let baseline_m = (left[3] - right[3]) / left[0];
     let rig = rig([left[0], right[0]], right[2] - left[2], baseline_m).map_err(|fault| (Some(line), fault))?;
     Ok(Geometry { rig, size: None, disparities: None })
 }
 
-/// The projection in a line; nothing where the line holds something else.
-fn row(line: u32, text: &str) -> Option<Row> {
+/// The projection in a line; `None` if the line is for something else.
+fn parse_row(line: u32, text: &str) -> Option<Row> {
     let (key, values) = match text.split_once(':') {
         Some((key, values)) => (key.trim(), values),
         None => ("", text),

@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use super::contents::{Contents, Folder, Layout, Listed, Source, numbered_pictures};
 use super::error::RecordingError;
 use super::geometry::Geometry;
-use super::list::{give_up_disorder, refuse_faults};
+use super::list::{clear_unordered_times, refuse_faults};
 use super::{Options, Pair, Unpaired};
 
-/// A folder for each eye.
+/// Recognised by the folders of the two eyes.
 pub(super) const LAYOUT: Layout =
     Layout { name: "KITTI", looked_for: "image_2 and image_3, or image_0 and image_1", is_in, open };
 
@@ -47,6 +47,7 @@ pub(super) fn camera_of(left: &Path) -> Option<usize> {
     EYES.iter().find(|eyes| folder.ends_with(eyes.left))?.camera
 }
 
+/// Lists the pictures of both eyes, with their times, and reads the calibration.
 fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     let eyes = eyes(dir)?;
@@ -60,20 +61,21 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
         if let Some(name) = names.iter().find(|name| !right_names.contains(*name)) {
             return Err(no_partner(eyes.left, name, eyes.right));
         }
+        // The smallest, so that the message is the same each time: a `HashSet` has no order.
         if let Some(name) = right_alone.iter().min() {
             return Err(no_partner(eyes.right, name, eyes.left));
         }
     }
 
     let pictures = names.iter().map(|name| (name.as_str(), PathBuf::from(format!("{}/{name}", eyes.left))));
-    let mut entries = times::of(dir, pictures.collect(), options)?;
-    give_up_disorder(entries.iter_mut());
+    let mut entries = times::timed_entries(dir, pictures.collect(), options)?;
+    clear_unordered_times(entries.iter_mut());
     if !options.keep_going {
         refuse_faults(dir, entries.iter())?;
     }
     let frames = entries.into_iter().zip(&names).map(|(left, name)| Listed {
         time_ns: left.time_ns,
-        // A list of times says nothing about a picture, unless it is wrong itself.
+        // `times.txt` does not name the pictures: its line is cited only where the time itself is faulty.
         color: Source { place: left.source.place.filter(|_| left.source.file.is_err()), ..left.source },
         right: Some(Source::found(Path::new(eyes.right).join(name))),
         depth: None,
@@ -92,7 +94,7 @@ fn open(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> 
     })
 }
 
-/// The first eyes that are both there.
+/// The first pair of folders that are both there.
 fn eyes(dir: &Path) -> Result<&'static Eyes, RecordingError> {
     let has = |eye: &str| dir.join(eye).is_dir();
     if let Some(eyes) = EYES.iter().find(|eyes| has(eyes.left) && has(eyes.right)) {

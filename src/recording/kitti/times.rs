@@ -10,18 +10,23 @@ use crate::recording::list::{self, Entry, quoted};
 
 const LIST: &str = "times.txt";
 
-/// Without times: 10 frames per second, as KITTI's cameras were triggered.
+/// Period where there is no list of times: 10 frames per second, as KITTI's cameras were triggered.
 const PERIOD_NS: u64 = 100_000_000;
 
 /// Seconds up to which a time is taken: beyond any date.
 const LAST_S: f64 = 1e10;
 
-/// Entries for pictures by name and file. A picture whose name is a number has the time in that line, so that an
-/// excerpt may keep the list of the whole; others have it by their place.
+/// Entries with times for `pictures` (name, file). A picture whose name is the number n has the time in line n (from 0)
+/// of `times.txt`, so that an excerpt may keep the list of the whole; other names count by their position. Without the
+/// list, the pictures are [`PERIOD_NS`] apart.
 ///
 /// # Errors
 /// Without `keep_going`, a picture has no time.
-pub(super) fn of(dir: &Path, pictures: Vec<(&str, PathBuf)>, options: &Options) -> Result<Vec<Entry>, RecordingError> {
+pub(super) fn timed_entries(
+    dir: &Path,
+    pictures: Vec<(&str, PathBuf)>,
+    options: &Options,
+) -> Result<Vec<Entry>, RecordingError> {
     if !dir.join(LIST).exists() {
         let entry = |(index, (_, file)): (u64, (&str, PathBuf))| Entry {
             time_ns: Some(index * PERIOD_NS),
@@ -45,8 +50,8 @@ pub(super) fn of(dir: &Path, pictures: Vec<(&str, PathBuf)>, options: &Options) 
     entries.collect()
 }
 
-/// Nanoseconds of seconds >= 0, written in any way (KITTI writes `1.037359e-01`). They count from the first picture,
-/// and `f64` holds these to the nanosecond.
+/// Parses seconds >= 0, with or without an exponent (KITTI writes `1.037359e-01`), to nanoseconds. `f64` is exact
+/// enough: the times count from the first picture.
 fn parse_ns(text: &str) -> Result<u64, LineFault> {
     let seconds = text.parse().ok().filter(|seconds| (0.0..LAST_S).contains(seconds));
     seconds.map(|seconds: f64| (seconds * 1e9).round() as u64).ok_or_else(|| LineFault::Time(quoted(text)))

@@ -1,5 +1,5 @@
-//! `calib.txt`: `key=value` lines; `cam0` and `cam1` are 3x3 matrices, `baseline` is in millimetres, `doffs` the column of
-//! the right principal point less that of the left, `ndisp` a bound on the disparities.
+//! `calib.txt`: `key=value` lines; `cam0` and `cam1` are 3x3 matrices, `baseline` is in millimetres, `doffs` the column
+//! of the right principal point less that of the left, `ndisp` a bound on the disparities.
 
 use crate::recording::MAX_SIDE_PX;
 use crate::recording::fault::GeometryFault;
@@ -7,13 +7,14 @@ use crate::recording::geometry::{Geometry, Wrong, numbers, rig};
 
 const MM_PER_M: f64 = 1000.0;
 
-/// Whether the text has a key of this form.
-pub(in crate::recording) fn is_one(text: &str) -> bool {
+/// Whether the text is in this format: whether it has one of its keys.
+pub(in crate::recording) fn is_middlebury(text: &str) -> bool {
     let keys = ["cam0", "cam1", "baseline", "doffs"];
     text.lines().any(|line| line.split_once('=').is_some_and(|(key, _)| keys.contains(&key.trim())))
 }
 
-/// The geometry of the pair. ETH3D gives the width as `ndisp`: what bounds nothing is left out.
+/// The geometry of the pair. One of `cam1` and `doffs` may be missing. An `ndisp` of the full width, as ETH3D has it,
+/// bounds nothing and is left out.
 pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, Wrong> {
     let find = |wanted: &str| {
         let mut lines = (1..).zip(text.lines());
@@ -34,7 +35,7 @@ pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, Wrong> {
             None => Err(wrong(line, key, "a number", value)),
         },
     };
-    let whole = |key: &str| match find(key) {
+    let pixels = |key: &str| match find(key) {
         None => Ok(None),
         Some((line, value)) => match value.parse::<u32>() {
             Ok(number) if (1..=MAX_SIDE_PX).contains(&number) => Ok(Some(number)),
@@ -57,13 +58,13 @@ pub(in crate::recording) fn parse(text: &str) -> Result<Geometry, Wrong> {
         None if right.is_some() => right_x_px - left_x_px,
         None => return Err(missing("doffs")),
     };
-    let (line, baseline_mm) = number("baseline")?.ok_or_else(|| missing("baseline"))?;
-    let size = whole("width")?.zip(whole("height")?);
+    let (baseline_line, baseline_mm) = number("baseline")?.ok_or_else(|| missing("baseline"))?;
+    let size = pixels("width")?.zip(pixels("height")?);
     let bound = size.map_or(MAX_SIDE_PX, |(width, _)| width);
-    let disparities = whole("ndisp")?.filter(|&most| most < bound).map(|most| most.next_multiple_of(16));
+    let disparities = pixels("ndisp")?.filter(|&count| count < bound).map(|count| count.next_multiple_of(16));
     let rig = rig([left_px, right_px], doffs_px, baseline_mm / MM_PER_M).map_err(|fault| match fault {
         GeometryFault::UnequalFocal(..) => (Some(right_line), fault),
-        fault => (Some(line), fault),
+        fault => (Some(baseline_line), fault),
     })?;
     Ok(Geometry { rig, size, disparities })
 }

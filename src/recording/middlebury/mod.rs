@@ -15,7 +15,7 @@ use crate::optics::StereoRig;
 pub(super) const LAYOUT: Layout =
     Layout { name: "Middlebury stereo", looked_for: "im0.png and im1.png", is_in: |dir| eyes(dir).is_some(), open };
 
-/// The pictures of the left and the right eye; the second is that of the sets of 2001 and 2003.
+/// Pictures of the left and the right eye; the second names are those of the sets of 2001 and 2003.
 const EYES: [[&str; 2]; 2] = [["im0.png", "im1.png"], ["im2.png", "im6.png"]];
 
 const CALIBRATION: &str = "calib.txt";
@@ -28,12 +28,13 @@ fn eyes(dir: &Path) -> Option<[Source; 2]> {
     Some(eyes.map(|eye| Source::found(eye.into())))
 }
 
+/// Makes a recording of one frame: the pair, with depth if there are a calibration and a disparity map.
 fn open(folder: &Folder, _: &Options) -> Result<Contents, RecordingError> {
     let dir = &folder.dir;
     let [color, right] = eyes(dir).unwrap_or(EYES[0].map(|eye| Source::found(eye.into())));
     let file = dir.join(CALIBRATION);
     let rig = match file.exists() {
-        true => Some(rig(folder, &color, &file)?),
+        true => Some(read_rig(folder, &color, &file)?),
         false => None,
     };
     let depth = DISPARITIES.iter().find(|name| dir.join(name).exists()).zip(rig.map(|(rig, _)| rig));
@@ -47,11 +48,11 @@ fn open(folder: &Folder, _: &Options) -> Result<Contents, RecordingError> {
     })
 }
 
-/// The eyes by the calibration `file`, and the bound on their disparities, at the size of the picture `color`.
-fn rig(folder: &Folder, color: &Source, file: &Path) -> Result<(StereoRig, Option<u32>), RecordingError> {
+/// Reads the rig and the number of disparities from the calibration `file`, scaled to the size of the picture `color`.
+fn read_rig(folder: &Folder, color: &Source, file: &Path) -> Result<(StereoRig, Option<u32>), RecordingError> {
     let stated = Geometry::read_as(file, calib::parse)?;
     let path = folder.locate(color)?;
-    let (size, _) = decode::header(&path).map_err(|fault| color.wrong(&folder.dir, fault))?;
+    let (size, _) = decode::header(&path).map_err(|fault| color.error(&folder.dir, fault))?;
     let fitted = stated.fitted(file, size)?;
     if fitted != stated {
         tracing::warn!("{}: made for pictures of another size, and scaled to {}x{}", file.display(), size.0, size.1);

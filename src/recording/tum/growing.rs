@@ -1,4 +1,4 @@
-//! A list that grows with a recording, and appears when that is whole.
+//! A list that grows with a recording, and gets its name when that is whole.
 
 use std::fs::OpenOptions;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -13,9 +13,10 @@ use crate::recording::list::lines;
 /// A list under construction. Its lines reach the disk one by one, so that they are there if the process is killed.
 pub(super) struct GrowingList {
     part: Part,
-    /// Bytes of whole lines, and of those before the last one.
+    /// Bytes of whole lines.
     bytes: u64,
-    before: u64,
+    /// The same without the last line.
+    bytes_before_last: u64,
 }
 
 impl GrowingList {
@@ -24,39 +25,41 @@ impl GrowingList {
         let part = folder.begin(name)?;
         part.file().write_all(head.as_bytes()).map_err(RecordingError::io("write", part.path()))?;
         let bytes = head.len() as u64;
-        Ok(Self { part, bytes, before: bytes })
+        Ok(Self { part, bytes, bytes_before_last: bytes })
     }
 
     /// Adds a line. Where that fails, the list stays as it was.
-    pub(super) fn line(&mut self, line: std::fmt::Arguments) -> Result<(), RecordingError> {
+    pub(super) fn add_line(&mut self, line: std::fmt::Arguments) -> Result<(), RecordingError> {
         let line = format!("{line}\n");
-        self.before = self.bytes;
+        self.bytes_before_last = self.bytes;
         match self.part.file().write_all(line.as_bytes()) {
             Ok(()) => self.bytes += line.len() as u64,
             Err(error) => {
-                self.take_back();
+                self.remove_last_line();
                 return Err(RecordingError::io("write", self.part.path())(error));
             }
         }
         Ok(())
     }
 
-    /// Removes the line that was added last.
-    pub(super) fn take_back(&mut self) {
-        self.bytes = self.before;
+    /// Removes the line that was added last, or the part of it that was written.
+    pub(super) fn remove_last_line(&mut self) {
+        self.bytes = self.bytes_before_last;
         let mut file = self.part.file();
-        // The caller is on its way out with an error that says more than this one would.
+        // The caller already has an error to return, which says more.
         let _ = file.set_len(self.bytes);
         let _ = file.seek(SeekFrom::Start(self.bytes));
     }
 
-    /// Lets the list appear under its name.
+    /// Gives the list its name.
     pub(super) fn put(self, folder: &mut Folder) -> Result<(), RecordingError> {
         Ok(folder.put(self.part)?)
     }
 
-    /// Lets those of the lists `names` in `dir` appear whose process was killed, as far as their lines are whole.
+    /// Completes lists that a killed process left unfinished: those of `names` in `dir` that have whole lines and whose
+    /// name is free get their name, without a last line that was cut.
     pub(super) fn rescue(dir: &Path, names: &[&str]) -> Result<(), RecordingError> {
+        // In `PART`, a recording that was to replace another waits.
         for folder in [dir.to_owned(), dir.join(folder::PART)] {
             for name in names {
                 let list = folder.join(name);
@@ -67,6 +70,7 @@ impl GrowingList {
                         continue;
                     }
                     whole::rename(&part, &list, false).map_err(RecordingError::io("rename to", &list))?;
+                    // So that later runs know the list as one of ours.
                     folder::adopt(&folder, [(*name).to_owned()])?;
                     tracing::warn!("{}: completed, as far as an interrupted recording came", list.display());
                 }
@@ -76,12 +80,12 @@ impl GrowingList {
     }
 }
 
-/// Takes a half line from the end of a list. Gives whether anything but comments is left.
+/// Cuts an incomplete line off the end of a list. Gives whether it has any entry left.
 fn cut_half_line(list: &Path) -> io::Result<bool> {
     let text = input::read(list, input::MOST_TEXT_BYTES)?;
-    let whole = &text[..text.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1)];
+    let whole_lines = &text[..text.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1)];
     let file = OpenOptions::new().write(true).open(list)?;
-    file.set_len(whole.len() as u64)?;
+    file.set_len(whole_lines.len() as u64)?;
     file.sync_all()?;
-    Ok(lines(whole).next().is_some())
+    Ok(lines(whole_lines).next().is_some())
 }

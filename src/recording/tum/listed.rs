@@ -13,8 +13,8 @@ pub(super) fn lists(dir: &Path) -> impl Iterator<Item = String> {
     LISTS.into_iter().filter(|list| is_file(&dir.join(list))).map(str::to_owned)
 }
 
-/// The PNG and JPEG pictures that the lists name and that are there, at most one folder down. What is wrong with a list
-/// does no harm: what it does not name stays.
+/// The PNG and JPEG pictures that the lists name and that are there, at most one folder down. Faulty lists and lines
+/// are passed over: pictures that are not found here are kept.
 pub(super) fn pictures(dir: &Path) -> impl Iterator<Item = String> {
     let entries = |list: &'static str| -> Vec<Entry> {
         if !is_file(&dir.join(list)) {

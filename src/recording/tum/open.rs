@@ -1,4 +1,4 @@
-//! From the lists to frames.
+//! Makes frames of the lists.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
 use crate::recording::contents::{Contents, DepthForm, Folder, Listed, Source};
 use crate::recording::decode::{self, DepthUnits, Kind};
 use crate::recording::error::RecordingError;
-use crate::recording::list::{Entry, give_up_disorder, refuse_faults};
+use crate::recording::list::{Entry, clear_unordered_times, refuse_faults};
 use crate::recording::{Options, Unpaired, pair};
 
-/// Pictures that are looked at before the columns of the associations are given up.
+/// After so many pictures that do not tell the columns of the associations apart, no more are looked at.
 const MOST_PICTURES: usize = 1000;
 
 /// Whether `dir` has a list of this layout.
@@ -31,10 +31,11 @@ pub(super) fn open(folder: &Folder, options: &Options) -> Result<Contents, Recor
     }
 }
 
+/// Pairs `rgb.txt` with `depth.txt`, if that is there, by nearest time.
 fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents, RecordingError> {
     let read = |list| {
         let mut entries = list::read(dir, list)?;
-        give_up_disorder(entries.iter_mut());
+        clear_unordered_times(entries.iter_mut());
         if !options.keep_going {
             refuse_faults(dir, entries.iter())?;
         }
@@ -42,42 +43,45 @@ fn from_lists(dir: &Path, has_depth: bool, options: &Options) -> Result<Contents
     };
     let colors = read(COLOR_LIST)?;
     if !has_depth {
-        let frame = |color: Entry| frame(color, None);
-        return Ok(contents(colors.into_iter().map(frame).collect(), None, Unpaired::default()));
+        let frames = colors.into_iter().map(|color| to_frame(color, None)).collect();
+        return Ok(to_contents(frames, None, Unpaired::default()));
     }
     let paired = pair::join(colors, read(DEPTH_LIST)?, options.pair_tolerance_ns);
     if paired.frames.iter().all(|(_, depth)| depth.is_none()) {
         return Err(RecordingError::NoPairs { dir: dir.to_owned(), tolerance_ns: options.pair_tolerance_ns });
     }
     let unpaired = Unpaired { color: paired.left_over, depth: paired.others_left_over, ..Unpaired::default() };
-    let frames = paired.frames.into_iter().map(|(color, depth)| frame(color, depth)).collect();
-    Ok(contents(frames, Some(options), unpaired))
+    let frames = paired.frames.into_iter().map(|(color, depth)| to_frame(color, depth)).collect();
+    Ok(to_contents(frames, Some(options), unpaired))
 }
 
-fn frame(color: Entry, depth: Option<Source>) -> Listed {
+fn to_frame(color: Entry, depth: Option<Source>) -> Listed {
     Listed { time_ns: color.time_ns, color: color.source, right: None, depth }
 }
 
-fn contents(frames: Vec<Listed>, depth: Option<&Options>, unpaired: Unpaired) -> Contents {
+/// `depth_options` are given if the frames have depth.
+fn to_contents(frames: Vec<Listed>, depth_options: Option<&Options>, unpaired: Unpaired) -> Contents {
     let units = |options: &Options| DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid };
-    let depth = depth.map(|options| DepthForm::Units(units(options)));
+    let depth = depth_options.map(|options| DepthForm::Units(units(options)));
     Contents { frames, depth, pair: None, disparities: None, unpaired }
 }
 
+/// Takes the pairs of `associations.txt` as they are; the colour gives the time of a frame.
 fn from_associations(folder: &Folder, options: &Options) -> Result<Contents, RecordingError> {
     let mut pairs = list::read_pairs(&folder.dir, ASSOCIATIONS)?;
     if !is_color_first(folder, &pairs)? {
         pairs.iter_mut().for_each(|pair| pair.reverse());
     }
-    give_up_disorder(pairs.iter_mut().map(|[color, _]| color));
+    clear_unordered_times(pairs.iter_mut().map(|[color, _]| color));
     if !options.keep_going {
         refuse_faults(&folder.dir, pairs.iter().flatten())?;
     }
-    let frames = pairs.into_iter().map(|[color, depth]| frame(color, Some(depth.source))).collect();
-    Ok(contents(frames, Some(options), Unpaired::default()))
+    let frames = pairs.into_iter().map(|[color, depth]| to_frame(color, Some(depth.source))).collect();
+    Ok(to_contents(frames, Some(options), Unpaired::default()))
 }
 
-/// Whether the colour is in the first columns: told by the other lists, else by the pictures.
+/// Whether the colour is in the first columns, and the depth in the last ones: told by a file that another list names,
+/// else by a pair of pictures of different kinds.
 fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, RecordingError> {
     for (list, is_color) in [(COLOR_LIST, true), (DEPTH_LIST, false)] {
         // Here the other lists are only a hint: what is wrong with them does no harm.
@@ -95,7 +99,7 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
 
     let mut kinds = HashMap::new();
     for pair in pairs {
-        let [first, second] = pair.each_ref().map(|entry| kind(folder, &entry.source, &mut kinds));
+        let [first, second] = pair.each_ref().map(|entry| cached_kind(folder, &entry.source, &mut kinds));
         match (first, second) {
             (first, second) if first == second => {}
             (Some(Kind::Color), _) | (_, Some(Kind::Depth)) => return Ok(true),
@@ -111,8 +115,8 @@ fn is_color_first(folder: &Folder, pairs: &[[Entry; 2]]) -> Result<bool, Recordi
     Err(RecordingError::Columns { list: folder.dir.join(ASSOCIATIONS) })
 }
 
-/// What a picture is, if it can be read; each is looked at once.
-fn kind(folder: &Folder, source: &Source, kinds: &mut HashMap<PathBuf, Option<Kind>>) -> Option<Kind> {
+/// The kind of a picture, if it can be read. Each file is read once, and then found in `kinds`.
+fn cached_kind(folder: &Folder, source: &Source, kinds: &mut HashMap<PathBuf, Option<Kind>>) -> Option<Kind> {
     let path = folder.locate(source).ok()?;
     *kinds.entry(path).or_insert_with_key(|path| decode::header(path).ok().map(|(_, kind)| kind))
 }

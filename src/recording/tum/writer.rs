@@ -14,7 +14,7 @@ use crate::recording::{MAX_SIDE_PX, check_depth_scale, depth_covers, encode};
 const COLOR_FOLDER: &str = "rgb";
 const DEPTH_FOLDER: &str = "depth";
 
-/// What a recording has in its folder.
+/// The files that a recording may have in its folder.
 const SET: Set = Set { subfolders: &[COLOR_FOLDER, DEPTH_FOLDER], has: &is_ours };
 
 /// How to write a recording.
@@ -52,6 +52,7 @@ pub struct Writer {
     size: Option<(u32, u32)>,
     /// Known depths of all frames, and of these the ones that were too far for the file.
     depths: (u64, u64),
+    /// Working memory for encoding: samples of a depth map, and the picture file.
     units: Vec<u8>,
     file: Vec<u8>,
 }
@@ -76,8 +77,8 @@ impl Writer {
     /// began gets its lists, as far as it came.
     ///
     /// # Errors
-    /// The folder has something in it, which may not be overwritten, or pictures of the names of a recording that no list
-    /// names; it is being written by others, or cannot be; the depth scale is not a number > 0.
+    /// The folder has something in it, which may not be overwritten, or pictures of the names of a recording that no
+    /// list names; it is being written by others, or cannot be; the depth scale is not a number > 0.
     pub fn create(dir: &Path, options: &WriterOptions) -> Result<Self, RecordingError> {
         check_depth_scale(options.depth_scale)?;
         GrowingList::rescue(dir, &[DEPTH_LIST, COLOR_LIST])?;
@@ -109,8 +110,8 @@ impl Writer {
     /// left unpaired by readers.
     ///
     /// # Errors
-    /// The frame does not fit the recording: the time is not after the last one, the colour picture differs in size from
-    /// the first, the depth map does not cover it. Or a file cannot be written. The recording stays as it was.
+    /// The frame does not fit the recording: the time is not after the last one, the colour picture differs in size
+    /// from the first, the depth map does not cover it. Or a file cannot be written. The recording stays as it was.
     pub fn add(&mut self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), RecordingError> {
         self.check(time_ns, color, depth)
             .map_err(|reason| RecordingError::Unrecordable { index: self.count, reason })?;
@@ -131,17 +132,18 @@ impl Writer {
         encode::color_png(color, &mut self.file).map_err(|e| self.encoding(e))?;
         self.write_picture(COLOR_FOLDER, &file_name)?;
 
+        // Lists after pictures, so that what they name is there; a frame that fails is in neither list.
         let time = Seconds(time_ns);
         if depth.is_some() {
             let list = match &mut self.depth {
                 Some(list) => list,
                 none => none.insert(GrowingList::create(&self.folder, DEPTH_LIST, &depth_head(self.depth_scale))?),
             };
-            list.line(format_args!("{time} {DEPTH_FOLDER}/{file_name}"))?;
+            list.add_line(format_args!("{time} {DEPTH_FOLDER}/{file_name}"))?;
         }
-        if let Err(error) = self.color.line(format_args!("{time} {COLOR_FOLDER}/{file_name}")) {
+        if let Err(error) = self.color.add_line(format_args!("{time} {COLOR_FOLDER}/{file_name}")) {
             if let (Some(list), Some(_)) = (&mut self.depth, depth) {
-                list.take_back();
+                list.remove_last_line();
             }
             return Err(error);
         }
@@ -157,7 +159,7 @@ impl Writer {
 
     /// The largest depth that is written, in metres.
     pub fn most_m(&self) -> f32 {
-        encode::most(self.depth_scale)
+        encode::largest(self.depth_scale)
     }
 
     /// Completes the recording: its lists appear, and what it replaces goes.
@@ -171,8 +173,8 @@ impl Writer {
         Ok(written)
     }
 
-    /// Ends a recording that is not all that it should be: what it would have replaced stays, and it is kept beside as
-    /// `NAME.incomplete`. Where it replaces nothing, it is where it should be. Both can be read.
+    /// Ends a recording that was broken off. If it was to replace an earlier one, that stays, and the new one is kept
+    /// beside the folder as `NAME.incomplete`; otherwise it stays in its folder. It can be read in either place.
     ///
     /// # Errors
     /// As for [`Writer::finish`].
@@ -188,7 +190,7 @@ impl Writer {
         Written { dir: self.dir.clone(), frames: self.count, replaced: 0, depths, too_far }
     }
 
-    /// The folder, with its lists.
+    /// The folder, after the lists got their names in it.
     fn with_lists(self) -> Result<Folder, RecordingError> {
         let mut folder = self.folder;
         if self.count == 0 {
@@ -202,6 +204,7 @@ impl Writer {
         Ok(folder)
     }
 
+    /// Fails with the reason if the frame cannot become the next one of the recording.
     fn check(&self, time_ns: u64, color: &ColorImage, depth: Option<&DepthMap>) -> Result<(), String> {
         let (width, height) = color.size();
         if let Some(last_ns) = self.last_ns.filter(|&last_ns| time_ns <= last_ns) {
@@ -248,7 +251,7 @@ fn depth_head(depth_scale: f32) -> String {
     format!("# depth maps, 16-bit PNG, {depth_scale} units per metre, 0 = unknown\n# timestamp filename\n")
 }
 
-/// Whether a recording may have a file of this name.
+/// Whether this is a name that a recording has for a list or picture, such as `rgb/000000.png`.
 fn is_ours(name: &str) -> bool {
     let folders = [COLOR_FOLDER, DEPTH_FOLDER];
     let number = folders.iter().find_map(|folder| name.strip_prefix(folder)?.strip_prefix('/')?.strip_suffix(".png"));

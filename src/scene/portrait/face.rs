@@ -12,14 +12,16 @@ pub const EYE: Vec3 = Vec3::new(0.0315, 0.004, -0.0625);
 /// Radius of an eye.
 pub const EYE_RADIUS_M: f32 = 0.0168;
 
-/// Skin without hair, eyes open.
+/// Signed distance to the bare head and neck, eyes open: skull and jaw, then feature by feature.
 pub fn face(p: Vec3) -> f32 {
     let q = fold(p);
     let skull = egg(p - Vec3::new(0.0, 0.028, 0.018), Vec3::new(0.078, 0.094, 0.094));
     let jaw = egg(p - Vec3::new(0.0, -0.032, -0.014), Vec3::new(0.0705, 0.080, 0.069));
     let mut d = blend(skull, jaw, 0.03);
+    // Chin and cheeks.
     d = blend(d, ball(p - Vec3::new(0.0, -0.088, -0.047), 0.022), 0.045);
     d = blend(d, ball(q - Vec3::new(0.040, -0.036, -0.040), 0.032), 0.034);
+    // Eye sockets, bridge and wings of the nose.
     d = carve(d, ball(q - Vec3::new(0.0315, 0.004, -0.098), 0.021), 0.018);
     d = blend(d, rod(p, Vec3::new(0.0, 0.012, -0.077), Vec3::new(0.0, -0.024, -0.0955), 0.006, 0.0105), 0.016);
     d = blend(d, ball(q - Vec3::new(0.0095, -0.028, -0.0870), 0.0068), 0.008);
@@ -43,7 +45,7 @@ fn lid(q: Vec3) -> f32 {
     shell.max(above.min(below))
 }
 
-/// Depth of the front of the face at (`x`, `y`).
+/// Depth of the front of the face at (`x`, `y`), by sphere tracing from before it along `z`.
 pub fn surface_z(x: f32, y: f32) -> f32 {
     let mut z = -0.13;
     for _ in 0..40 {
@@ -61,10 +63,12 @@ pub fn skin(spot: &Spot) -> Surface {
         + 0.40 * near(Vec3::new(0.0, -0.024, -0.105), 0.015)
         + 0.40 * near(Vec3::new(0.085, 0.0, 0.02), 0.025);
     color = color.lerp(hex(0xd9705c), 0.55 * flush.min(1.0));
+    // Where the lips meet, curved upwards, and the width of the lips, which narrows to the corners.
     let middle = -0.0588 + 12.0 * p.x * p.x;
     let width = (1.0 - (p.x / 0.0285).powi(2)).max(0.0).sqrt();
     let (over, under) = (p.y - middle, middle - p.y);
     let lip = step(0.0, 0.0016, 0.0068 * width - over) * step(0.0, 0.0016, 0.0092 * width - under);
+    // At the front only: the back of the head has the same x and y.
     if p.z < -0.05 && lip > 0.0 {
         let seam = 0.6 * (-(over / 0.0010).powi(2)).exp();
         color = color.lerp(hex(0xb8453f), 0.8 * lip).lerp(hex(0x4a1512), seam * lip);

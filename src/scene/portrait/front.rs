@@ -43,6 +43,7 @@ pub fn desk() -> Part {
     part
 }
 
+/// Signed distance to the cup: a hollow body with a handle, and coffee in it.
 fn cup(p: Vec3) -> f32 {
     let q = p - CUP;
     let radial = Vec2::new(q.x, q.z).length();
@@ -50,18 +51,21 @@ fn cup(p: Vec3) -> f32 {
     let side = (radial - radius) * 0.98;
     let body = side.max((q.y - 0.046).abs() - 0.044);
     let hollow = (side + 0.004).max(0.006 - q.y);
-    let arc = Vec2::new(Vec2::new(q.x - 0.038, q.y - 0.046).length() - 0.021, q.z).length() - 0.0048;
-    let shell = carve(blend(body, arc, 0.006), hollow, 0.0025);
+    let handle = Vec2::new(Vec2::new(q.x - 0.038, q.y - 0.046).length() - 0.021, q.z).length() - 0.0048;
+    let shell = carve(blend(body, handle, 0.006), hollow, 0.0025);
     let coffee = (side + 0.002).max((q.y - 0.066).abs() - 0.003);
+    // Blends are no true distances: scaled so that they are not too long.
     shell.min(coffee) * 0.9
 }
 
+/// The cup's glaze in two colours, and the coffee inside.
 fn glaze(spot: &Spot) -> Surface {
     let q = spot.p - CUP;
-    let inside = Vec2::new(q.x, q.z).length() < 0.0335 + 0.05 * (q.y - 0.04);
-    if inside && q.y < 0.0695 {
+    let is_inside = Vec2::new(q.x, q.z).length() < 0.0335 + 0.05 * (q.y - 0.04);
+    if is_inside && q.y < 0.0695 {
         return Surface::matt(spot, hex(0x3a2012)).glossy(0.3, 60.0);
     }
+    // The lower part has another colour, up to a wavy line.
     let dip = step(0.034, 0.036, q.y + 0.003 * (6.0 * q.z.atan2(q.x)).sin());
     let color = hex(0x2f6f73).lerp(spot.tint, dip);
     Surface::matt(spot, color).glossy(0.30, 50.0)
@@ -112,6 +116,7 @@ fn add_arm(part: &mut Part, dice: &mut Dice, [a, b, c, d]: [Vec3; 4]) {
     for k in 0..7 {
         let s = 0.22 + 0.13 * k as f32;
         let ahead = (at(s + 0.02) - at(s - 0.02)).normalize_or(Vec3::X);
+        // The last leaf is at the tip.
         let sides: &[f32] = if k == 6 { &[0.0] } else { &[-1.0, 1.0] };
         for side in sides {
             let out = (ahead.cross(Vec3::Z) * *side + ahead * 0.55 + 0.30 * dice.direction()).normalize_or(ahead);

@@ -29,12 +29,12 @@ pub fn grow(part: &mut Part, form: &Arc<Grid>) {
     part.add(Shape::Field { distance: mass, bounds, guide: form.clone() }, material);
     let mut dice = Dice::new(11);
     for k in 0..COMBED {
-        let Some(root) = root(&mut dice) else { continue };
+        let Some(root) = sample_root(&mut dice) else { continue };
         let points = strand(&mut dice, root, Lie { lift_m: 0.0012, rise: 0.0, wild: 0.10, step_m: 0.011 }, 6, 0.0007);
         part.add_chain(&points, Material::new(fibre, hex(HAIR)).seeded(k as u32));
     }
     for k in 0..FLYAWAY {
-        let Some(root) = root(&mut dice) else { continue };
+        let Some(root) = sample_root(&mut dice) else { continue };
         let lie = Lie {
             lift_m: 0.001,
             rise: dice.between(0.10, 0.62),
@@ -42,6 +42,7 @@ pub fn grow(part: &mut Part, form: &Arc<Grid>) {
             step_m: dice.between(0.004, 0.0095),
         };
         let points = strand(&mut dice, root, lie, 8, 0.00042);
+        // None may grow into the face.
         if points.iter().skip(2).any(|(p, _)| face(*p) < 0.002) {
             continue;
         }
@@ -54,7 +55,7 @@ pub fn grow(part: &mut Part, form: &Arc<Grid>) {
     }
 }
 
-/// The combed mass with its bun.
+/// Signed distance to the combed mass with its bun.
 pub fn mass(p: Vec3) -> f32 {
     let q = fold(p);
     let cap = egg(p - Vec3::new(0.0, 0.036, 0.030), Vec3::new(0.0895, 0.100, 0.100));
@@ -68,6 +69,7 @@ pub fn mass(p: Vec3) -> f32 {
     d = blend(d, rod(p, Vec3::new(-0.052, 0.064, -0.056), Vec3::new(-0.082, 0.012, -0.016), 0.011, 0.006), 0.014);
     d = blend(d, rod(p, Vec3::new(0.048, 0.090, -0.050), Vec3::new(0.083, 0.014, -0.012), 0.013, 0.006), 0.016);
     let bun = p - BUN;
+    // Wound hair. Here and at the end the scale keeps what is no true distance from being too long.
     let coil = 0.0022 * (3.0 * bun.z.atan2(bun.x) + 150.0 * bun.y).sin();
     d = blend(d, (egg(bun, Vec3::new(1.08, 0.86, 1.0) * BUN_RADIUS_M) + coil) * 0.8, 0.016);
     d * 0.9
@@ -79,10 +81,12 @@ fn comb(p: Vec3) -> f32 {
     away.z.atan2(away.x)
 }
 
+/// The mass: streaks along the combed or wound hair.
 fn combed(spot: &Spot) -> Surface {
     let p = spot.p;
-    let bun = (p - BUN).length() < BUN_RADIUS_M * 1.25;
-    let across = if bun {
+    let is_bun = (p - BUN).length() < BUN_RADIUS_M * 1.25;
+    // Changes from hair to hair, and is constant along one.
+    let across = if is_bun {
         let b = p - BUN;
         90.0 * b.y + 5.0 * (b.z.atan2(b.x)).sin() + 40.0 * b.x
     } else {
@@ -103,8 +107,9 @@ fn fibre(spot: &Spot) -> Surface {
     Surface { wrap: 0.5, fibre: spot.tangent, ..Surface::matt(spot, color) }.glossy(0.14, 22.0)
 }
 
-/// A point on the mass, over the head or on the bun.
-fn root(dice: &mut Dice) -> Option<Vec3> {
+/// A random point on the mass, over the head or on the bun; `None` where no hair grows. Found by sphere tracing from
+/// outside.
+fn sample_root(dice: &mut Dice) -> Option<Vec3> {
     let from = if dice.next() < 0.22 { BUN } else { Vec3::new(0.0, 0.045, 0.02) };
     let direction = dice.direction();
     let mut p = from + 0.2 * direction;
@@ -124,6 +129,7 @@ fn root(dice: &mut Dice) -> Option<Vec3> {
 
 /// How a strand lies.
 struct Lie {
+    /// Least distance from the mass.
     lift_m: f32,
     /// 0 along the mass, 1 straight up from it.
     rise: f32,
@@ -160,7 +166,8 @@ fn strand(dice: &mut Dice, root: Vec3, lie: Lie, steps: usize, radius_m: f32) ->
     points
 }
 
-/// A hair of the loose lock that falls beside the face.
+/// Adds one hair of the loose lock that falls beside the face, on the left (`side` -1) or right (1): all follow one
+/// wavy curve, and spread from it.
 fn add_lock(part: &mut Part, dice: &mut Dice, side: f32, k: u32) {
     let spread = 0.0045 * Vec3::new(dice.next() - 0.5, 0.0, dice.next() - 0.5) * 2.0;
     let end = 0.6 + 0.4 * dice.next();

@@ -23,20 +23,21 @@ pub fn part(motion: fn(f32) -> Pose) -> Part {
     for side in [-1.0, 1.0] {
         let mirror = Vec3::new(side, 1.0, 1.0);
         let eye = Shape::Sphere { centre: EYE * mirror, radius: EYE_RADIUS_M };
-        part.add(eye, Material::new(iris, hex(0x4f6b45)).seeded((side > 0.0).into()));
-        add_eye_lines(&mut part, mirror);
+        part.add(eye, Material::new(eyeball, hex(0x4f6b45)).seeded((side > 0.0).into()));
+        add_lashes_and_brow(&mut part, mirror);
         add_glasses(&mut part, mirror);
     }
     let bridge = [-0.0095, -0.004, 0.004, 0.0095].map(|x| (Vec3::new(x, 0.0095 - 30.0 * x * x, -0.0985), 0.0013));
-    part.add_chain(&bridge, Material::new(frame, hex(0x3a2416)));
+    part.add_chain(&bridge, Material::new(satin, hex(0x3a2416)));
     hair::grow(&mut part, &form);
     part.form = Some(form);
     part.shades = vec![(Vec3::new(0.0, 0.02, 0.02), 0.1), (Vec3::new(0.0, -0.05, 0.0), 0.075)];
     part
 }
 
-fn add_eye_lines(part: &mut Part, mirror: Vec3) {
-    let dark = Material::new(frame, hex(0x2a1710));
+/// Upper lashes along the edge of the lid, and the brow on the skin above. `mirror` puts them on either side.
+fn add_lashes_and_brow(part: &mut Part, mirror: Vec3) {
+    let dark = Material::new(satin, hex(0x2a1710));
     let lash: Vec<_> = (0..9)
         .map(|i| {
             let x = -0.0118 + 0.0262 * i as f32 / 8.0;
@@ -57,11 +58,11 @@ fn add_eye_lines(part: &mut Part, mirror: Vec3) {
             (Vec3::new(x, y, surface_z(x, y) + 0.0008) * mirror, 0.0027 - 0.0019 * s * s)
         })
         .collect();
-    part.add_chain(&brow, Material::new(frame, hex(0x5d3218)));
+    part.add_chain(&brow, Material::new(satin, hex(0x5d3218)));
 }
 
 fn add_glasses(part: &mut Part, mirror: Vec3) {
-    let tortoise = Material::new(frame, hex(0x3a2416));
+    let tortoise = Material::new(satin, hex(0x3a2416));
     let rim: Vec<_> = (0..=40)
         .map(|i| {
             let (sin, cos) = (i as f32 / 40.0 * std::f32::consts::TAU).sin_cos();
@@ -74,21 +75,25 @@ fn add_glasses(part: &mut Part, mirror: Vec3) {
     part.add_chain(&temple.map(|p| (p * mirror, 0.0013)), tortoise);
 }
 
-fn iris(spot: &Spot) -> Surface {
+/// An eye that looks at the camera: white, iris with its dark rim, pupil, and the reflection of a lamp. The seed tells
+/// the side.
+fn eyeball(spot: &Spot) -> Surface {
     let side = if spot.seed == 1 { 1.0 } else { -1.0 };
     let gaze = Mat3::from_rotation_y(-0.17) * Vec3::NEG_Z;
     let local = (spot.p - EYE * Vec3::new(side, 1.0, 1.0)) / EYE_RADIUS_M;
+    // Distance from the axis of the gaze, in radii of the eye.
     let off = (local - gaze * local.dot(gaze)).length();
     let streak = fractal(Vec3::new(local.y.atan2(local.x) * 9.0, off * 3.0, 4.0), 2);
-    let rim = step(0.53, 0.46, off);
+    let iris_share = step(0.53, 0.46, off);
     let color = (spot.tint * (0.5 + 1.1 * streak)).lerp(hex(0x7a5a2e), step(0.40, 0.22, off));
     let color = color.lerp(hex(0x10100c), step(0.40, 0.52, off)).lerp(Vec3::splat(0.006), step(0.235, 0.205, off));
     let white = hex(0xf0e9e2) * (1.0 - 0.25 * step(0.2, 0.9, local.x.abs()));
-    let catch = step(0.13, 0.07, (local - Vec3::new(-0.25, 0.28, -0.93)).length());
-    let surface = Surface { wrap: 0.2, ..Surface::matt(spot, white.lerp(color, rim)) };
-    Surface { emission: Vec3::splat(0.9 * catch), ..surface }.glossy(0.5, 300.0)
+    let catchlight = step(0.13, 0.07, (local - Vec3::new(-0.25, 0.28, -0.93)).length());
+    let surface = Surface { wrap: 0.2, ..Surface::matt(spot, white.lerp(color, iris_share)) };
+    Surface { emission: Vec3::splat(0.9 * catchlight), ..surface }.glossy(0.5, 300.0)
 }
 
-fn frame(spot: &Spot) -> Surface {
+/// One colour with a soft highlight.
+fn satin(spot: &Spot) -> Surface {
     Surface::matt(spot, spot.tint).glossy(0.25, 60.0)
 }

@@ -36,7 +36,7 @@ pub fn scene(with_front: bool) -> Scene {
         parts: parts.into_iter().chain(front).map(Part::built).collect(),
         lights: lights(),
         ambient: Ambient { above: Vec3::new(0.155, 0.165, 0.20), below: Vec3::new(0.105, 0.080, 0.066) },
-        nothing: Vec3::ZERO,
+        background: Vec3::ZERO,
         focus_m: FOCUS_M,
         period_s: 2.0,
     }
@@ -76,6 +76,7 @@ fn nod(phase: f32) -> Pose {
     let pitch = 0.02 + 0.018 * (2.0 * TAU * phase).sin();
     let roll = -0.035 + 0.022 * (TAU * phase - 0.5).sin();
     let turn = Mat3::from_rotation_z(roll) * Mat3::from_rotation_y(yaw) * Mat3::from_rotation_x(pitch);
+    // The head sits a little lower than it was modelled.
     let seat = Pose { turn: Mat3::IDENTITY, place: Vec3::new(0.0, -0.014, 0.0) };
     sway(phase).over(Pose::about(NAPE, turn)).over(seat)
 }

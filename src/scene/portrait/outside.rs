@@ -8,6 +8,7 @@ use crate::scene::noise::{Dice, cell, fractal};
 use crate::scene::part::{Material, Part, Spot, Surface};
 use crate::scene::shape::{Shape, whole};
 
+/// The view, all of which shines by itself: the room's lamps do not light it.
 pub fn part() -> Part {
     let mut part = Part::still();
     let sky = Shape::Quad { centre: Vec3::new(-3.0, 1.0, 12.8), right: 8.0 * Vec3::X, up: 5.0 * Vec3::Y, cut: whole };
@@ -57,6 +58,7 @@ fn add_trees(part: &mut Part) {
     }
 }
 
+/// Street lamps in two rows, and small lights between them: the highlights that become discs in the blur.
 fn add_lights(part: &mut Part) {
     let warm = Vec3::new(1.0, 0.52, 0.13);
     let amber = Vec3::new(1.0, 0.36, 0.05);
@@ -80,6 +82,7 @@ fn add_lights(part: &mut Part) {
                 continue;
             }
             let z = dice.between(6.5, 10.2);
+            // Slopes of the ray: spaced evenly in the picture, whatever the depth.
             let u = -0.455 + 0.052 * (column as f32 + dice.between(0.15, 0.85));
             let v = -0.135 + 0.062 * (row as f32 + dice.between(0.15, 0.85));
             let (color, power) = palette[(dice.next() * palette.len() as f32) as usize % palette.len()];
@@ -100,6 +103,7 @@ fn dusk(spot: &Spot) -> Surface {
     Surface { emission: 0.62 * color.lerp(hex(0xf3b79a), 0.35 * cloud), ..Surface::matt(spot, Vec3::ZERO) }
 }
 
+/// A front in the haze with rows of windows, two of five of which are lit.
 fn house(spot: &Spot) -> Surface {
     let p = spot.p;
     let haze = 0.55 * hex(0x4a4a72) * (0.55 + 0.25 * fractal(1.5 * p, 2));

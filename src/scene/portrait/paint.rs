@@ -31,6 +31,7 @@ pub fn wood(spot: &Spot) -> Surface {
     grain(spot, spot.p)
 }
 
+/// Wood of rings along `x` that a noise warps, and fine pores.
 fn grain(spot: &Spot, p: Vec3) -> Surface {
     let offset = 31.0 * unit(spot.seed);
     let warp = fractal(Vec3::new(1.6 * p.x + offset, 9.0 * p.y, 9.0 * p.z), 3);
@@ -57,6 +58,7 @@ pub fn wallpaper(spot: &Spot) -> Surface {
     if p.y < -0.47 {
         return panelling(spot, mottle);
     }
+    // Tiles of 10.5 x 11.5 cm, every other row shifted by half; `u`, `v` in -1..1 within one.
     let row = (p.y / 0.115).floor();
     let x = p.x / 0.105 + 0.5 * (row - 2.0 * (0.5 * row).floor());
     let (u, v) = (2.0 * (x - x.floor()) - 1.0, 2.0 * (p.y / 0.115 - row) - 1.0);
@@ -71,6 +73,7 @@ pub fn wallpaper(spot: &Spot) -> Surface {
     Surface::matt(spot, (spot.tint * mottle).lerp(hex(0x86a08a), 0.42 * motif))
 }
 
+/// Panels 42 cm wide with grooves between them, under a rail.
 fn panelling(spot: &Spot, mottle: f32) -> Surface {
     let x = spot.p.x / 0.42;
     let within = (x - x.floor() - 0.5).abs();
@@ -83,6 +86,7 @@ fn panelling(spot: &Spot, mottle: f32) -> Surface {
 /// A book's spine and boards: a title, two bands.
 pub fn book(spot: &Spot) -> Surface {
     let band = (spot.p.y * (70.0 + 40.0 * unit(spot.seed)) + 6.0 * unit(spot.seed ^ 5)).sin();
+    // On the spine alone, which faces the camera.
     let gilt = step(0.93, 0.97, band) * step(-0.5, -0.8, spot.normal.z);
     let worn = 0.85 + 0.3 * fractal(40.0 * spot.p, 2);
     Surface::matt(spot, (spot.tint * worn).lerp(hex(0xd8b878), 0.8 * gilt)).glossy(0.05, 20.0)

@@ -21,6 +21,7 @@ const FLOOR_Y: f32 = -1.02;
 const SOFA: Vec3 = Vec3::new(-0.98, -0.40, 2.35);
 const TABLE: Vec3 = Vec3::new(1.10, -0.50, 2.45);
 
+/// All of the room behind the subject.
 pub fn part() -> Part {
     let mut part = Part::still();
     let around = Bounds { low: Vec3::new(-2.2, FLOOR_Y - 0.02, 1.75), high: Vec3::new(2.3, 1.1, WALL_M + 0.05) };
@@ -35,6 +36,7 @@ pub fn part() -> Part {
     part
 }
 
+/// Adds an upright box between two opposite corners.
 fn solid(part: &mut Part, low: [f32; 3], high: [f32; 3], material: Material) {
     let (low, high) = (Vec3::from(low), Vec3::from(high));
     let shape = Shape::Cuboid { centre: 0.5 * (low + high), axes: Mat3::IDENTITY, half: 0.5 * (high - low) };
@@ -57,6 +59,7 @@ fn add_walls(part: &mut Part) {
     solid(part, [-4.0, FLOOR_Y, WALL_M - 0.02], [4.0, FLOOR_Y + 0.09, WALL_M], paint(paint::plain, 0x2a4442));
 }
 
+/// Frame and sill, curtains, and pots on the sill.
 fn add_window(part: &mut Part) {
     let white = paint(paint::plain, 0xd9d2c4);
     let (low, high) = WINDOW;
@@ -87,7 +90,7 @@ fn add_window(part: &mut Part) {
     }
 }
 
-/// A pot with a tuft of leaves.
+/// A pot with a tuft of leaves, each of two halves.
 fn add_pot(part: &mut Part, foot: Vec3, radius: f32, color: u32, seed: u32, spread: f32) {
     let height = 1.7 * radius;
     let pot = Shape::Frustum { base: foot, height, low_radius: 0.75 * radius, high_radius: radius };
@@ -119,6 +122,7 @@ fn add_pot(part: &mut Part, foot: Vec3, radius: f32, color: u32, seed: u32, spre
 
 const BOOKS: [u32; 9] = [0x9c3b34, 0x2f5d73, 0xd8a24a, 0x54734f, 0x7d4b63, 0xc9bda3, 0x33415e, 0xb5643c, 0x8a8f5c];
 
+/// Two boards with books and pots, and a picture on the wall.
 fn add_shelves(part: &mut Part) {
     let board = paint(paint::wood, 0x8a5a33);
     let mut dice = Dice::new(3);
@@ -129,6 +133,7 @@ fn add_shelves(part: &mut Part) {
         }
         let mut x = from + 0.06;
         while x < to - 0.10 {
+            // A pot, a gap, or a book; some books lean.
             let kind = dice.next();
             if kind < 0.13 && x > from + 0.2 {
                 let radius = dice.between(0.055, 0.075);
@@ -162,6 +167,7 @@ fn add_shelves(part: &mut Part) {
     part.add(canvas, paint(paint::landscape, 0xffffff));
 }
 
+/// Sideboard with three doors; on it a lamp, a pot and a pile of books.
 fn add_sideboard(part: &mut Part) {
     let walnut = paint(paint::wood, 0x6d4527);
     solid(part, [0.62, -0.455, 3.70], [2.30, -0.42, WALL_M], paint(paint::wood, 0x8a5a33).seeded(4));
@@ -198,6 +204,7 @@ fn add_fairy_lights(part: &mut Part) {
         (Vec3::new(0.64, 0.19, 3.925), Vec3::new(2.18, 0.19, 3.925), 0.085, 18),
     ];
     for (from, to, sag, count) in drapes {
+        // A parabola instead of a catenary.
         let at = |s: f32| from + (to - from) * s - 4.0 * sag * s * (1.0 - s) * Vec3::Y;
         let line: Vec<_> = (0..=24).map(|i| (at(i as f32 / 24.0), 0.0025)).collect();
         part.add_chain(&line, wire);
@@ -211,6 +218,7 @@ fn add_fairy_lights(part: &mut Part) {
     }
 }
 
+/// Sofa with a pillow, and the low table before it.
 fn add_seats(part: &mut Part, form: &Arc<Grid>) {
     let bounds = Bounds { low: SOFA - Vec3::new(0.75, 0.65, 0.45), high: SOFA + Vec3::new(0.75, 0.25, 0.5) };
     part.add(Shape::Field { distance: sofa, bounds, guide: form.clone() }, paint(paint::cloth, 0x8c4a52));
@@ -270,6 +278,7 @@ fn add_still_life(part: &mut Part) {
     }
 }
 
+/// Signed distance to the sofa: back, seat and two arms.
 fn sofa(p: Vec3) -> f32 {
     let q = p - SOFA;
     let back = brick(q - Vec3::new(0.0, -0.12, 0.26), Vec3::new(0.62, 0.26, 0.10), 0.09);
@@ -278,13 +287,14 @@ fn sofa(p: Vec3) -> f32 {
     blend(back, seat, 0.03).min(brick(side, Vec3::new(0.085, 0.21, 0.33), 0.08))
 }
 
+/// Signed distance to a turned pillow, thinner towards its edges (scaled, since that is no true distance).
 fn pillow(p: Vec3) -> f32 {
     let q = Mat3::from_rotation_x(0.35) * Mat3::from_rotation_z(-0.2) * (p - SOFA - Vec3::new(-0.16, -0.07, 0.04));
     let edge = (q.x / 0.19).powi(2).max((q.y / 0.19).powi(2)).min(1.0);
     brick(q, Vec3::new(0.19, 0.19, 0.075 - 0.045 * edge), 0.03) * 0.8
 }
 
-/// The large forms, for shadow and occlusion.
+/// Signed distance to the large things of the room, for shadow and occlusion; also the guide of sofa and pillow.
 fn form(p: Vec3) -> f32 {
     let wall = WALL_M - p.z;
     let (low, high) = WINDOW;

@@ -21,6 +21,7 @@ pub fn part(motion: fn(f32) -> Pose) -> Part {
     part
 }
 
+/// Signed distance to the sweater: chest, shoulders, arms and collar.
 fn form(p: Vec3) -> f32 {
     let q = fold(p);
     let chest = egg(p - Vec3::new(0.0, -0.42, 0.045), Vec3::new(0.180, 0.215, 0.112));
@@ -36,7 +37,7 @@ fn form(p: Vec3) -> f32 {
     d * 0.92
 }
 
-/// Height of the knit at a point, 0 to 1, and how near it is to a rib's edge.
+/// Relief of the knit at a point, 0 to 1: ribs, each a column of V-shaped loops.
 fn stitch(p: Vec3) -> f32 {
     let collar = step(-0.212, -0.204, p.y);
     let around = (p.z - 0.044).atan2(p.x);
@@ -49,6 +50,7 @@ fn stitch(p: Vec3) -> f32 {
     rib * (0.55 + 0.45 * loop_height)
 }
 
+/// Wool with the relief of [`stitch`], which tilts the normal and darkens the hollows.
 fn knit(spot: &Spot) -> Surface {
     let p = spot.p;
     let height = stitch(p);

@@ -1,4 +1,4 @@
-//! How ffmpeg is called.
+//! Command lines of ffmpeg.
 
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
@@ -12,17 +12,17 @@ use crate::color::Matrix;
 
 const PROGRAM: &str = "ffmpeg";
 
-/// What a file name's ending asks for.
+/// How ffmpeg writes a file, by the extension of its name.
 pub(super) struct Format {
     pub container: Container,
     muxer: &'static [&'static str],
     encoder: &'static [&'static str],
-    /// Times are kept to this.
+    /// Unit of the times of frames, as a fraction of a second.
     time_base: &'static str,
 }
 
-/// All are written in pieces of a second, so that what is there can be played whatever happens.
 impl Format {
+    /// Every format is written in pieces of a second, so that a file that was cut short can be played.
     pub(super) fn of(path: &Path) -> Self {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         let matroska = |muxer, encoder| Self { container: Container::Matroska, muxer, encoder, time_base: "1:1000" };
@@ -34,7 +34,8 @@ impl Format {
     }
 }
 
-/// Ticks of which the usual rates are multiples, but so few that readers believe a gap of half a day (2^28 ticks).
+/// A tick of which the usual frame periods are multiples, and so long that a gap of half a day is below 2^28 ticks:
+/// readers doubt longer ones.
 const MP4_TIME_BASE: &str = "1:6000";
 
 const FRAGMENTS: &[&str] =
@@ -46,11 +47,11 @@ const H264: &[&str] = &["-c:v", "libx264", "-preset", "veryfast", "-crf", "18"];
 const VP9: &[&str] =
     &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-deadline", "realtime", "-cpu-used", "5", "-row-mt", "1"];
 
-/// Encodes what comes on its standard input into `part`.
+/// The command that encodes the Matroska stream on its standard input into the file `part`.
 pub(super) fn encode(format: &Format, part: &Path, height: u32) -> Command {
     let color = match Matrix::for_height(height) {
         Matrix::Bt601 => "smpte170m",
-        // Players expect no other.
+        // What players expect of high definition.
         Matrix::Bt709 | Matrix::Bt2020 => "bt709",
     };
     // Tagged on the frames, for filters, and on the stream, for the muxer. 4:2:0 encoders refuse odd sizes.
@@ -58,29 +59,31 @@ pub(super) fn encode(format: &Format, part: &Path, height: u32) -> Command {
         "crop=trunc(iw/2)*2:trunc(ih/2)*2,\
          setparams=range=tv:colorspace={color}:color_primaries={color}:color_trc={color}"
     );
-    let mut command = begin();
+    let mut command = base_command();
     command
         .args(["-f", "matroska", "-i", "pipe:0"])
         .args(["-vf", &filters, "-pix_fmt", "yuv420p", "-color_range", "tv"])
         .args(["-colorspace", color, "-color_primaries", color, "-color_trc", color])
-        .args([keeps_times(), "vfr", "-enc_time_base", format.time_base])
+        .args([frame_timing_option(), "vfr", "-enc_time_base", format.time_base])
         .args(format.encoder)
         .args(["-flush_packets", "1"])
         .args(format.muxer)
-        .arg(file(part))
+        .arg(as_file(part))
         .stdin(Stdio::piped());
     command
 }
 
-/// Copies `from` to `to` as an mp4 with its index in front, so that a player can start before it has the whole file.
+/// The command that copies `from` to `to` as an mp4 with its index in front, so that a player can start before it has
+/// the whole file.
 pub(super) fn index_in_front(from: &Path, to: &Path) -> Command {
-    let mut command = begin();
-    command.arg("-i").arg(file(from)).args(["-c", "copy", "-movflags", "+faststart", "-f", "mp4"]).arg(file(to));
+    let mut command = base_command();
+    command.arg("-i").arg(as_file(from)).args(["-c", "copy", "-movflags", "+faststart", "-f", "mp4"]).arg(as_file(to));
     command.stdin(Stdio::null());
     command
 }
 
-fn begin() -> Command {
+/// ffmpeg in a process group of its own, which says nothing but errors and overwrites its output file.
+fn base_command() -> Command {
     let mut command = Command::new(PROGRAM);
     command
         .args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y"])
@@ -91,20 +94,21 @@ fn begin() -> Command {
     command
 }
 
-/// Named as a file, so that neither a dash nor a colon in it means anything.
-fn file(path: &Path) -> OsString {
+/// Marked as a file, so that ffmpeg takes neither a dash for an option nor a colon for a protocol.
+fn as_file(path: &Path) -> OsString {
     let mut name = OsString::from("file:");
     name.push(path);
     name
 }
 
-/// What the option is called by which frames keep their times: another since version 5.1, which later ones only know.
-fn keeps_times() -> &'static str {
+/// The name of the option by which frames keep their times: `-fps_mode` since ffmpeg 5.1, `-vsync` before, which later
+/// versions do not know any more.
+fn frame_timing_option() -> &'static str {
     let said = output_within(Command::new(PROGRAM).arg("-version"), Duration::from_secs(2));
     if said.as_deref().and_then(version).is_some_and(|version| version < (5, 1)) { "-vsync" } else { "-fps_mode" }
 }
 
-/// `ffmpeg version 5.1.9-0+deb12u1 Copyright ...`
+/// Parses `ffmpeg version 5.1.9-0+deb12u1 Copyright ...` to (5, 1).
 fn version(said: &str) -> Option<(u32, u32)> {
     let number = said.strip_prefix("ffmpeg version ")?.split_whitespace().next()?.trim_start_matches('n');
     let mut parts = number.split(|c: char| !c.is_ascii_digit());

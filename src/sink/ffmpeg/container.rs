@@ -1,4 +1,4 @@
-//! Whether a video file is whole, by its container: what was cut anywhere lacks its end.
+//! Whether a video file is whole, by its container: one that was cut short lacks what is written last.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -13,7 +13,7 @@ pub(super) enum Container {
 }
 
 impl Container {
-    /// Says what is missing.
+    /// Whether the file is whole, and if not, what is missing.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -30,8 +30,8 @@ impl Container {
 const NO_END: &str = "its end is missing";
 const NO_INDEX: &str = "its index is missing";
 
-/// Boxes (ISO 14496-12) one after the other up to the end, an index, and, where there are fragments, what comes after the
-/// last one.
+/// An mp4 is whole if its boxes (ISO 14496-12) lie one after the other up to the end of the file, one of them is an
+/// index (`moov`), and the last one of a fragmented file (`moof`) is what ffmpeg closes it with (`mfra`).
 fn check_mp4(file: &mut File, len_bytes: u64) -> io::Result<Result<(), &'static str>> {
     let (mut at, mut has_index, mut has_fragments, mut last) = (0, false, false, [0; 4]);
     while at < len_bytes {
@@ -41,6 +41,7 @@ fn check_mp4(file: &mut File, len_bytes: u64) -> io::Result<Result<(), &'static 
             return Ok(Err(NO_END));
         }
         let number = |bytes: &[u8]| bytes.iter().fold(0, |number, &byte| number << 8 | u64::from(byte));
+        // 0 means up to the end of the file, 1 that a 64-bit size follows the kind.
         let size_bytes = match number(&head[..4]) {
             0 => len_bytes - at,
             1 => number(&head[8..]),
@@ -64,12 +65,15 @@ fn check_mp4(file: &mut File, len_bytes: u64) -> io::Result<Result<(), &'static 
     })
 }
 
-/// A segment whose size is known, and ends where the file does: both are written last.
+/// A Matroska file is whole if the size of its segment is known, and the segment ends where the file does: ffmpeg
+/// writes the size last.
 fn check_matroska(file: &mut File, len_bytes: u64) -> io::Result<Result<(), &'static str>> {
     const SEGMENT: [u8; 4] = [0x18, 0x53, 0x80, 0x67];
+    // The segment begins after a header of some 40 bytes.
     let mut head = [0; 128];
     let head = read_up_to(file, &mut head)?;
     let Some(at) = head.windows(SEGMENT.len()).position(|bytes| bytes == SEGMENT) else { return Ok(Err(NO_INDEX)) };
+    // The leading zeros of its first byte say how many bytes a size has; only ones mean unknown.
     let size = &head[at + SEGMENT.len()..];
     let Some(size_len) = size.first().map(|first| first.leading_zeros() as usize + 1).filter(|&len| len <= size.len())
     else {

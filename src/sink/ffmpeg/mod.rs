@@ -47,24 +47,24 @@ impl Ffmpeg {
             ErrorKind::NotFound => SinkError::NoFfmpeg { path: path.to_owned() },
             _ => SinkError::Write { path: path.to_owned(), cause },
         })?;
-        let mut life = process.life();
+        let mut watchdog = process.watchdog();
         let pipe = match process.stdin() {
-            Some(stdin) => Pipe::own(OwnedFd::from(stdin), move |blocked| !life.hangs(blocked)),
+            Some(stdin) => Pipe::own(OwnedFd::from(stdin), move |blocked| !watchdog.hangs(blocked)),
             None => Err(ErrorKind::BrokenPipe.into()),
         };
         let input = RawVideo::new(pipe.map_err(SinkError::write(path))?, options.size, options.period_ns);
         Ok(Self { input: Some(input), process, format, output, size: options.size, stop: Arc::clone(&options.stop) })
     }
 
-    /// Waits for the end of the process, if it does not hang; the file must be whole then.
+    /// Closes the input of ffmpeg and waits for its end, or kills it if it `hangs`; then checks its file.
     fn end(&mut self, hangs: bool) -> Result<(), SinkError> {
         self.input = None;
-        let ended = if hangs { Ok(self.process.end()) } else { self.process.wait() };
-        check(ended, self.output.path(), self.output.part(), self.format.container)
+        let ended = if hangs { Ok(self.process.end_hung()) } else { self.process.wait() };
+        check_outcome(ended, self.output.path(), self.output.part(), self.format.container)
     }
 
-    /// Moves the index to the front, if there is room for it.
-    fn tidy_up(&mut self) {
+    /// Copies an mp4 to one with its index at the front. If that fails, as for want of room, the file stays as it is.
+    fn move_index_to_front(&mut self) {
         if self.format.container != Container::Mp4 {
             return;
         }
@@ -82,14 +82,15 @@ impl Ffmpeg {
 /// Runs ffmpeg to write `part`, which must then be a whole mp4.
 fn run(mut command: Command, stop: &Arc<AtomicBool>, path: &Path, part: &Path) -> Result<(), SinkError> {
     let ended = Process::start(&mut command, stop).and_then(|mut process| process.wait());
-    check(ended, path, part, Container::Mp4)
+    check_outcome(ended, path, part, Container::Mp4)
 }
 
 /// What ffmpeg says when frames are missing from a file, though it may end as if all were well.
 const LOSSES: [&str; 5] =
     ["av_interleaved_write_frame", "Error writing", "Error muxing", "No space left", "Input/output error"];
 
-fn check(ended: io::Result<Ended>, path: &Path, part: &Path, container: Container) -> Result<(), SinkError> {
+/// Fails unless ffmpeg ended well, did not report losses, and left a whole file at `part`. `path` is for the message.
+fn check_outcome(ended: io::Result<Ended>, path: &Path, part: &Path, container: Container) -> Result<(), SinkError> {
     let Ended { status, said } = ended.map_err(SinkError::write(path))?;
     let path = path.to_owned();
     let failed = |status: &str| SinkError::Ffmpeg { path: path.clone(), status: status.into(), said: said.clone() };
@@ -136,7 +137,7 @@ impl Sink for Ffmpeg {
         }
         match self.end(false) {
             Ok(()) => {
-                self.tidy_up();
+                self.move_index_to_front();
                 self.output.complete(ending)
             }
             Err(error) => Err(self.output.failed(error)),

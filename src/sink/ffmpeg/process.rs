@@ -1,4 +1,4 @@
-//! A child process that is never waited for in vain.
+//! A child process that is killed when it hangs.
 
 use std::collections::VecDeque;
 use std::fs;
@@ -16,14 +16,15 @@ use crate::sink::pipe::LAST_PATIENCE;
 
 /// Lines of a complaint that are kept: the cause comes last, but not always alone.
 const LAST_LINES: usize = 4;
-/// A process that does nothing for so long, and has something to do, hangs; once the run is to stop, sooner.
+/// A process that has something to do and does nothing for this long hangs; [`LAST_PATIENCE`] once the run is to stop.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// So often it is looked.
+/// How often a process is checked while it is waited for.
 const TICK: Duration = Duration::from_millis(10);
 
 /// A process in a group of its own. Dropping it kills the group.
 pub(super) struct Process {
     child: Child,
+    /// Its last lines on standard error, once it has closed that.
     said: Receiver<VecDeque<String>>,
     stop: Arc<AtomicBool>,
 }
@@ -37,10 +38,11 @@ pub(super) struct Ended {
 }
 
 impl Process {
+    /// Starts a command whose standard error is piped. `stop` is set once the run is to stop.
     pub(super) fn start(command: &mut Command, stop: &Arc<AtomicBool>) -> io::Result<Self> {
         let mut child = command.spawn()?;
         let (to, said) = mpsc::channel();
-        // Read all the while, or a talkative one would stand still with its pipe full, and this program with it.
+        // Read all the while: a process that fills the pipe would block, and this program with it.
         let reader = child.stderr.take().map(|stderr| {
             thread::Builder::new().name("ffmpeg".into()).spawn(move || drop(to.send(last_lines(stderr))))
         });
@@ -52,42 +54,42 @@ impl Process {
         self.child.stdin.take()
     }
 
-    pub(super) fn life(&self) -> Life {
-        Life { pid: self.child.id(), stop: Arc::clone(&self.stop), used: None, worked_at: Instant::now() }
+    pub(super) fn watchdog(&self) -> Watchdog {
+        Watchdog { pid: self.child.id(), stop: Arc::clone(&self.stop), used: None, worked_at: Instant::now() }
     }
 
-    /// Waits for its end, or makes one where it hangs.
+    /// Waits until it ends; kills it if it hangs.
     pub(super) fn wait(&mut self) -> io::Result<Ended> {
-        let (began, mut life) = (Instant::now(), self.life());
+        let (began, mut watchdog) = (Instant::now(), self.watchdog());
         let status = loop {
             if let Some(status) = self.child.try_wait()? {
                 break Some(status);
             }
-            if life.hangs(began.elapsed()) {
-                return Ok(self.end());
+            if watchdog.hangs(began.elapsed()) {
+                return Ok(self.end_hung());
             }
             thread::sleep(TICK);
         };
         Ok(Ended { status, said: self.said() })
     }
 
-    /// Makes an end of it, because it hangs.
-    pub(super) fn end(&mut self) -> Ended {
+    /// Kills it because it hangs.
+    pub(super) fn end_hung(&mut self) -> Ended {
         self.kill();
         Ended { status: None, said: self.said() }
     }
 
     fn said(&self) -> String {
-        // A child of its own may have its standard error for longer.
+        // A child of its own may keep standard error open for longer.
         Vec::from(self.said.recv_timeout(LAST_PATIENCE / 2).unwrap_or_default()).join(" | ")
     }
 
     fn kill(&mut self) {
-        // It may have ended just now, as may have all of its group.
+        // Errors are ignored: it may just have ended by itself.
         let _ = Pid::from_raw(self.child.id() as i32).map(|group| kill_process_group(group, Signal::KILL));
         let _ = self.child.kill();
         let began = Instant::now();
-        // One that waits for a device that does not answer cannot even be killed.
+        // A process that waits for a device that does not answer cannot even be killed.
         while began.elapsed() < LAST_PATIENCE / 2 && matches!(self.child.try_wait(), Ok(None)) {
             thread::sleep(TICK);
         }
@@ -102,8 +104,8 @@ impl Drop for Process {
     }
 }
 
-/// Whether a process still does something.
-pub(super) struct Life {
+/// Tells whether a process hangs, by its use of the processor and its state.
+pub(super) struct Watchdog {
     pid: u32,
     stop: Arc<AtomicBool>,
     /// Processor time that it had used, in ticks, when it was last seen to work.
@@ -111,14 +113,15 @@ pub(super) struct Life {
     worked_at: Instant,
 }
 
-impl Life {
-    /// Whether it has done nothing for longer than one waits, `waited` for it until now.
+impl Watchdog {
+    /// Whether it has done nothing for too long, where the caller has waited for it for `waited`.
     pub(super) fn hangs(&mut self, waited: Duration) -> bool {
         let (works, used) = activity(self.pid);
         if works || used != self.used {
             (self.used, self.worked_at) = (used, Instant::now());
         }
         let patience = if self.stop.load(Ordering::Relaxed) { LAST_PATIENCE } else { PATIENCE };
+        // It may have been idle before, for want of something to do.
         waited.min(self.worked_at.elapsed()) >= patience
     }
 }
@@ -155,12 +158,12 @@ pub(super) fn output_within(command: &mut Command, patience: Duration) -> Option
     let (to, said) = mpsc::channel();
     let read = move || {
         let mut text = Vec::new();
-        // Whoever waits no more takes it no more.
+        // The receiver may have given up.
         let _ = stdout.read_to_end(&mut text).map(|_| to.send(text));
     };
     thread::Builder::new().name("ffmpeg".into()).spawn(read).ok()?;
     let said = said.recv_timeout(patience);
-    // One that has closed its output has nothing left to do.
+    // Either it has closed its output and is done, or it took too long.
     let _ = child.kill();
     let _ = child.wait();
     String::from_utf8(said.ok()?).ok()

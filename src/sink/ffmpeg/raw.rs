@@ -10,7 +10,7 @@ use crate::sink::yuv::Converter;
 
 /// Times are in microseconds.
 const TICK_NS: u64 = 1000;
-/// What comes sooner after another frame, encoders would take for the same one.
+/// Least distance of frames, 1 ms: encoders would take closer ones for the same frame.
 const LEAST_TICKS: u64 = 1000;
 
 /// A stream of raw frames.
@@ -19,36 +19,37 @@ pub(super) struct RawVideo<W: Write> {
     converter: Converter,
     /// Time of the first frame.
     first_ns: Option<u64>,
-    /// Ticks since then, of the last one.
-    last: Option<u64>,
-    /// What is written next.
+    /// Time of the last frame, in ticks after the first.
+    last_ticks: Option<u64>,
+    /// Encoded and not yet written: the header, or a cluster.
     bytes: Vec<u8>,
 }
 
 impl<W: Write> RawVideo<W> {
-    /// A stream into `to` of frames of `size` that mostly come every `period_ns`. The header goes out with the first frame.
+    /// A stream into `to` of frames of `size` that mostly come every `period_ns`. The header is written with the first
+    /// frame.
     pub(super) fn new(to: W, size: (u32, u32), period_ns: u64) -> Self {
         let matrix = Matrix::for_height(size.1);
         let bytes = header(size, period_ns, matrix);
-        Self { to, converter: Converter::new(matrix), first_ns: None, last: None, bytes }
+        Self { to, converter: Converter::new(matrix), first_ns: None, last_ticks: None, bytes }
     }
 
-    /// Writes a frame that was taken at `time_ns`.
+    /// Writes a frame that was captured at `time_ns`, as a cluster of its own.
     pub(super) fn write(&mut self, frame: &ColorImage, time_ns: u64) -> io::Result<()> {
         let first_ns = *self.first_ns.get_or_insert(time_ns);
-        let at = (time_ns.saturating_sub(first_ns) + TICK_NS / 2) / TICK_NS;
-        let at = self.last.map_or(at, |last| at.max(last + LEAST_TICKS));
-        self.last = Some(at);
+        let ticks = (time_ns.saturating_sub(first_ns) + TICK_NS / 2) / TICK_NS;
+        let ticks = self.last_ticks.map_or(ticks, |last| ticks.max(last + LEAST_TICKS));
+        self.last_ticks = Some(ticks);
         let (width, height) = (frame.width as usize, frame.height as usize);
         let picture_bytes = width * height + 2 * width.div_ceil(2) * height.div_ceil(2);
-        let time = element(TIMESTAMP, &at.to_be_bytes());
+        let time = element(TIMESTAMP, &ticks.to_be_bytes());
         // Track 1, at the time of the cluster, a key frame.
-        let block = [0x81, 0, 0, 0x80];
-        let block_bytes = block.len() + picture_bytes;
-        begin(CLUSTER, time.len() + SIMPLE_BLOCK.len() + SIZE_BYTES + block_bytes, &mut self.bytes);
+        let block_head = [0x81, 0, 0, 0x80];
+        let block_bytes = block_head.len() + picture_bytes;
+        begin_element(CLUSTER, time.len() + SIMPLE_BLOCK.len() + SIZE_BYTES + block_bytes, &mut self.bytes);
         self.bytes.extend_from_slice(&time);
-        begin(SIMPLE_BLOCK, block_bytes, &mut self.bytes);
-        self.bytes.extend_from_slice(&block);
+        begin_element(SIMPLE_BLOCK, block_bytes, &mut self.bytes);
+        self.bytes.extend_from_slice(&block_head);
         self.converter.append(frame, &mut self.bytes);
         let written = self.to.write_all(&self.bytes);
         self.bytes.clear();
@@ -60,31 +61,34 @@ const SEGMENT: &[u8] = &[0x18, 0x53, 0x80, 0x67];
 const CLUSTER: &[u8] = &[0x1f, 0x43, 0xb6, 0x75];
 const TIMESTAMP: &[u8] = &[0xe7];
 const SIMPLE_BLOCK: &[u8] = &[0xa3];
-/// Sizes are written as eight bytes, of which the first one says so.
+/// Sizes are written as eight bytes, the first of which is 01 to say so.
 const SIZE_BYTES: usize = 8;
 const UNKNOWN_SIZE: [u8; SIZE_BYTES] = [0x01, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff];
 
-fn begin(id: &[u8], bytes: usize, to: &mut Vec<u8>) {
+/// Appends the head of an element whose content of `bytes` bytes is to follow.
+fn begin_element(id: &[u8], bytes: usize, to: &mut Vec<u8>) {
     to.extend_from_slice(id);
     to.extend_from_slice(&(bytes as u64 | 1 << 56).to_be_bytes());
 }
 
 fn element(id: &[u8], content: &[u8]) -> Vec<u8> {
     let mut element = Vec::with_capacity(id.len() + SIZE_BYTES + content.len());
-    begin(id, content.len(), &mut element);
+    begin_element(id, content.len(), &mut element);
     element.extend_from_slice(content);
     element
 }
 
+/// Everything before the first cluster: EBML header, and the head of an endless segment with its info and one track.
 fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8> {
     let number = |id: &[u8], value: u64| element(id, &value.to_be_bytes());
     let within = |id: &[u8], parts: &[Vec<u8>]| element(id, &parts.concat());
-    // As ITU-T H.273 numbers them; limited range, chroma in the middle of its four pixels.
+    // As ITU-T H.273 numbers them.
     let color = match matrix {
         Matrix::Bt601 => 6,
         Matrix::Bt709 => 1,
         Matrix::Bt2020 => 9,
     };
+    // Matrix, chroma siting (in the middle of four pixels, both ways), limited range, transfer, primaries.
     let colour = within(
         &[0x55, 0xb0],
         &[
@@ -96,6 +100,7 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8
             number(&[0x55, 0xbb], color),
         ],
     );
+    // Width, height, layout of the pixels.
     let video = within(
         &[0xe0],
         &[number(&[0xb0], width.into()), number(&[0xba], height.into()), element(&[0x2e, 0xb5, 0x24], b"I420"), colour],
@@ -103,11 +108,13 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8
     let track = within(
         &[0xae],
         &[
+            // Number and unique number.
             number(&[0xd7], 1),
             number(&[0x73, 0xc5], 1),
             // Video, without lacing.
             number(&[0x83], 1),
             number(&[0x9c], 0),
+            // Codec and frame period.
             element(&[0x86], b"V_UNCOMPRESSED"),
             number(&[0x23, 0xe3, 0x83], period_ns),
             video,
@@ -128,6 +135,7 @@ fn header((width, height): (u32, u32), period_ns: u64, matrix: Matrix) -> Vec<u8
     );
     header.extend_from_slice(SEGMENT);
     header.extend_from_slice(&UNKNOWN_SIZE);
+    // Info: the length of a tick, the programs that mux and write.
     let by = |id: &[u8]| element(id, b"bokehcam");
     header.extend(within(
         &[0x15, 0x49, 0xa9, 0x66],

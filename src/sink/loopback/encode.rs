@@ -1,4 +1,4 @@
-//! A picture as the bytes of a node's frame: BT.601, limited range.
+//! Pictures as frames in the pixel layouts of V4L2; Y'CbCr ones in BT.601, limited range.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -12,7 +12,7 @@ pub(super) struct Encoder {
     layout: Layout,
     arch: Arch,
     planar: Converter,
-    /// Planes that are to be interleaved.
+    /// Working memory: planes that are to be interleaved.
     planes: Vec<u8>,
 }
 
@@ -21,7 +21,7 @@ impl Encoder {
         Self { layout, arch: Arch::new(), planar: Converter::new(Matrix::Bt601), planes: Vec::new() }
     }
 
-    /// Fills `bytes`, which are as many as the layout's frame of this size has.
+    /// Encodes `picture` into `bytes`, which are resized to a frame of the layout.
     pub(super) fn encode(&mut self, picture: &ColorImage, bytes: &mut Vec<u8>) {
         match self.layout {
             Layout::Yuyv => {
@@ -62,7 +62,7 @@ impl Encoder {
 /// Pixels that are converted together: whole vectors of every width.
 const BLOCK: usize = 64;
 
-/// An even number of pixels, all rows in one: their colour is that of pairs from the first pixel on.
+/// Converts an even number of pixels, all rows as one: every pair from the first pixel on shares its chroma.
 struct Yuyv<'a> {
     rgb: &'a [u8],
     yuyv: &'a mut [u8],
@@ -76,22 +76,23 @@ impl WithSimd for Yuyv<'_> {
         let (blocks, rest) = self.rgb.as_chunks::<{ 3 * BLOCK }>();
         let (to_blocks, to_rest) = self.yuyv.as_chunks_mut::<{ 2 * BLOCK }>();
         for (rgb, yuyv) in blocks.iter().zip(to_blocks.iter_mut()) {
-            block(rgb, yuyv);
+            rgb_to_yuyv(rgb, yuyv);
         }
         if !rest.is_empty() {
+            // Padded to a block.
             let (mut rgb, mut yuyv) = ([0; 3 * BLOCK], [0; 2 * BLOCK]);
             rgb[..rest.len()].copy_from_slice(rest);
-            block(&rgb, &mut yuyv);
+            rgb_to_yuyv(&rgb, &mut yuyv);
             let len = to_rest.len();
             to_rest.copy_from_slice(&yuyv[..len]);
         }
     }
 }
 
-/// In 16-bit integers and coefficients of 8 bits, so that a vector has as many pixels as it can: within one code of
-/// the exact value.
+/// Converts pixels to YUYV (BT.601, limited range), within one code of the exact value. 16-bit integers with
+/// coefficients of 8 bits fit the most pixels into a vector.
 #[inline(always)]
-fn block(rgb: &[u8; 3 * BLOCK], yuyv: &mut [u8; 2 * BLOCK]) {
+fn rgb_to_yuyv(rgb: &[u8; 3 * BLOCK], yuyv: &mut [u8; 2 * BLOCK]) {
     let (mut r, mut g, mut b) = ([0_u16; BLOCK], [0_u16; BLOCK], [0_u16; BLOCK]);
     for at in 0..BLOCK {
         r[at] = u16::from(rgb[3 * at]);
@@ -107,7 +108,7 @@ fn block(rgb: &[u8; 3 * BLOCK], yuyv: &mut [u8; 2 * BLOCK]) {
     for pair in 0..BLOCK / 2 {
         let sum = |values: &[u16; BLOCK]| (values[2 * pair] + values[2 * pair + 1]) as i16;
         let (r, g, b) = (sum(&r), sum(&g), sum(&b));
-        // At most 28 560 to either side.
+        // Coefficients are halved, since these are sums of two pixels: at most 28 560 to either side.
         chroma[2 * pair] = (((56 * b - 19 * r - 37 * g + 128) >> 8) + 128) as u8;
         chroma[2 * pair + 1] = (((56 * r - 47 * g - 9 * b + 128) >> 8) + 128) as u8;
     }

@@ -32,7 +32,7 @@ pub struct Loopback {
     encoder: Encoder,
     fit: Fit,
     fitted: ColorImage,
-    /// The frame as it was written last.
+    /// The frame that was written last, encoded.
     bytes: Vec<u8>,
     /// Whether that is the still card.
     shows_card: bool,
@@ -57,7 +57,7 @@ impl Loopback {
             let (width, height) = output.size();
             tracing::warn!("{} is fixed to {width} x {height} pixels: pictures are fitted into that", path.display());
         }
-        let _watcher = options.demand.clone().map(|demand| watch(path, &output, demand)).transpose()?;
+        let _watcher = options.demand.clone().map(|demand| start_watcher(path, &output, demand)).transpose()?;
         let mut loopback = Self {
             encoder: Encoder::new(output.layout()),
             fit: Fit::default(),
@@ -73,7 +73,8 @@ impl Loopback {
         Ok(loopback)
     }
 
-    fn rests(&self) -> bool {
+    /// Whether nobody watches, as far as that is noticed.
+    fn is_unwatched(&self) -> bool {
         self.demand.as_ref().is_some_and(|demand| !demand.is_watched())
     }
 
@@ -81,12 +82,13 @@ impl Loopback {
         card::draw(&mut self.fitted);
         self.encoder.encode(&self.fitted, &mut self.bytes);
         self.shows_card = true;
-        // Nobody who comes now may find a picture from before.
+        // All buffers of the driver: a new reader is first given what lies there, which must be no picture from before.
         Ok(self.output.overwrite(&self.bytes)?)
     }
 }
 
-fn watch(path: &Path, output: &Output, demand: Demand) -> Result<Watcher, SinkError> {
+/// Starts a thread that tells `demand` whether anybody reads from the camera.
+fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<Watcher, SinkError> {
     let refused = |cause| LoopbackError::System {
         path: path.to_owned(),
         doing: "it cannot be known whether somebody watches; leave --on-demand out",
@@ -115,9 +117,9 @@ impl Sink for Loopback {
         Ok(ControlFlow::Continue(()))
     }
 
-    /// A camera that rests has shown its last picture before that is known here: soon, the card takes its place.
+    /// Once nobody watches, the card soon takes the place of the last picture, and then seldom needs to be written.
     fn hold(&self) -> Option<Duration> {
-        match (self.rests(), self.shows_card) {
+        match (self.is_unwatched(), self.shows_card) {
             (true, true) => Some(IDLE_HOLD),
             (true, false) => Some(SHORTEST_HOLD),
             (false, _) => Some(self.hold),
@@ -126,7 +128,7 @@ impl Sink for Loopback {
 
     /// Once nobody watches, the still card takes the place of the last frame.
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
-        if self.rests() && !self.shows_card {
+        if self.is_unwatched() && !self.shows_card {
             self.show_card()?;
         } else {
             self.output.write(&self.bytes)?;
@@ -147,8 +149,8 @@ impl Sink for Loopback {
 
 impl Drop for Loopback {
     fn drop(&mut self) {
-        // Whoever still reads would keep the last picture of a person before them for good. What fails here would
-        // have been told by the frames before.
+        // Otherwise readers that stay would show the last picture of a person for good. An error is not reported: it
+        // would have come with the frames before.
         if !self.shows_card {
             let _ = self.show_card();
         }

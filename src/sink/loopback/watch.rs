@@ -1,4 +1,4 @@
-//! Watches who reads from the virtual camera, and tells the demand.
+//! Notices whether anybody reads from the virtual camera, and tells the demand.
 
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -8,7 +8,7 @@ use crate::clock::Clock;
 use crate::link::demand::Demand;
 use crate::v4l2::audience::{Audience, ReaderEvent, Stop};
 
-/// So long after its last reader went an output still counts as watched: calls open a camera more than once.
+/// How long a camera still counts as watched after its last reader left: call programs close and open it repeatedly.
 const LINGER: Duration = Duration::from_millis(2500);
 
 /// A thread that watches until it is dropped.
@@ -19,7 +19,7 @@ pub(super) struct Watcher {
 
 impl Watcher {
     pub(super) fn start((mut audience, stop): (Audience, Stop), demand: Demand) -> io::Result<Self> {
-        let listen = move || attend(&demand, &Clock::system(), |patience| audience.wait(patience));
+        let listen = move || follow_readers(&demand, &Clock::system(), |patience| audience.wait(patience));
         let thread = thread::Builder::new().name("audience".into()).spawn(listen)?;
         Ok(Self { stop: Some(stop), thread: Some(thread) })
     }
@@ -28,34 +28,35 @@ impl Watcher {
 impl Drop for Watcher {
     fn drop(&mut self) {
         drop(self.stop.take());
-        // A panic there has been told; the output is at its end.
+        // A panic of the thread was printed; there is nothing left to do about it.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-/// Holds a watch while there are readers, and for a while after. `wait` sleeps until something is heard.
-fn attend(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Duration>) -> ReaderEvent) {
+/// Holds a watch on `demand` while there are readers, and [`LINGER`] longer, until it is told to stop. `wait` blocks
+/// for the next event, at most for the given time (`None`: without limit).
+fn follow_readers(demand: &Demand, clock: &Clock, mut wait: impl FnMut(Option<Duration>) -> ReaderEvent) {
     let mut watch = None;
-    let mut leaves_ns: Option<u64> = None;
+    let mut release_at_ns: Option<u64> = None;
     loop {
-        let patience = leaves_ns.map(|at_ns| Duration::from_nanos(at_ns.saturating_sub(clock.now_ns())));
-        match wait(patience) {
+        let timeout = release_at_ns.map(|at_ns| Duration::from_nanos(at_ns.saturating_sub(clock.now_ns())));
+        match wait(timeout) {
             ReaderEvent::Readers(true) => {
-                leaves_ns = None;
+                release_at_ns = None;
                 if watch.is_none() {
                     tracing::info!("somebody watches");
                     watch = Some(demand.watch());
                 }
             }
             ReaderEvent::Readers(false) if watch.is_some() => {
-                leaves_ns.get_or_insert(clock.now_ns() + LINGER.as_nanos() as u64);
+                release_at_ns.get_or_insert(clock.now_ns() + LINGER.as_nanos() as u64);
             }
             ReaderEvent::Readers(false) | ReaderEvent::Nothing => {}
             ReaderEvent::Stopped => return,
         }
-        if leaves_ns.is_some_and(|at_ns| clock.now_ns() >= at_ns) {
+        if release_at_ns.is_some_and(|at_ns| clock.now_ns() >= at_ns) {
             tracing::info!("nobody watches");
-            leaves_ns = None;
+            release_at_ns = None;
             drop(mem::take(&mut watch));
         }
     }
@@ -74,7 +75,7 @@ mod tests {
         let mut left = heard.iter();
         let mut seen = Vec::new();
         let mut next = left.next().copied();
-        attend(&demand, &clock, |patience| {
+        follow_readers(&demand, &clock, |patience| {
             seen.push((demand.is_watched(), patience));
             let Some((after, what)) = next else { return ReaderEvent::Stopped };
             match patience {

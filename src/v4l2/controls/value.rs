@@ -29,10 +29,10 @@ impl fmt::Display for Value {
 #[derive(Debug, thiserror::Error)]
 pub enum ControlError {
     /// The device has none of this name.
-    #[error("control {name}: {}", known(near, *count))]
+    #[error("control {name}: {}", suggestion(near, *count))]
     Unknown {
         name: String,
-        /// Names that look alike, or all where none does.
+        /// Names of similar controls, the most similar first; may be empty.
         near: Vec<String>,
         /// How many controls there are.
         count: usize,
@@ -54,7 +54,7 @@ pub enum ControlError {
     },
 }
 
-fn known(near: &[String], count: usize) -> String {
+fn suggestion(near: &[String], count: usize) -> String {
     match (near, count) {
         (_, 0) => "the device has no controls".to_owned(),
         ([], _) => "the device has none of this name; `bokehcam devices --controls` lists them".to_owned(),
@@ -63,25 +63,25 @@ fn known(near: &[String], count: usize) -> String {
 }
 
 impl ControlError {
-    /// No control has this name: what the user may have meant.
+    /// The error for a `name` that no control has, with up to three similar names to suggest.
     pub(super) fn unknown(name: &str, controls: &[Control]) -> Self {
-        /// Below this, names have nothing in common.
+        /// Least likeness, from 0 to 1, of a name that may have been meant.
         const ALIKE: f64 = 0.75;
-        const MOST: usize = 3;
+        const MAX_SUGGESTIONS: usize = 3;
         let likeness = |control: &Control| {
-            let part = !name.is_empty() && control.name.contains(name);
-            if part { 1.0 } else { strsim::normalized_damerau_levenshtein(&control.name, name) }
+            let contains = !name.is_empty() && control.name.contains(name);
+            if contains { 1.0 } else { strsim::normalized_damerau_levenshtein(&control.name, name) }
         };
         let mut near: Vec<(f64, &str)> = controls.iter().map(|control| (likeness(control), &*control.name)).collect();
         near.retain(|(likeness, _)| *likeness >= ALIKE);
         near.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let near = near.iter().take(MOST).map(|(_, name)| (*name).to_owned()).collect();
+        let near = near.iter().take(MAX_SUGGESTIONS).map(|(_, name)| (*name).to_owned()).collect();
         Self::Unknown { name: name.to_owned(), near, count: controls.len() }
     }
 }
 
 impl Control {
-    /// The value that a text means for this control.
+    /// Parses a value of this control as a user writes it, and checks that the control can be set to it now.
     ///
     /// # Errors
     /// It takes no such value, or none now.
@@ -96,6 +96,7 @@ impl Control {
         Err(ControlError::Fixed { name: self.name.clone(), why })
     }
 
+    /// The value that `text` stands for; `None` if the control does not take it. Ignores whether it can be set now.
     fn value_of(&self, text: &str) -> Option<Value> {
         let number = number(text);
         let value = match self.kind {
@@ -106,15 +107,16 @@ impl Control {
                 _ => None,
             },
             Kind::Integer | Kind::Integer64 => number.filter(|number| {
-                let steps = number.wrapping_sub(self.minimum).cast_unsigned();
-                (self.minimum..=self.maximum).contains(number) && steps.is_multiple_of(self.step)
+                // Wraps to the right `u64` where the range is wider than an `i64`.
+                let above_minimum = number.wrapping_sub(self.minimum).cast_unsigned();
+                (self.minimum..=self.maximum).contains(number) && above_minimum.is_multiple_of(self.step)
             }),
             Kind::Bitmask => number.filter(|number| (0..=self.bits()).contains(number) && number & !self.bits() == 0),
             Kind::Menu | Kind::IntegerMenu => self.item(text).map(|item| item.index),
             Kind::String => {
                 let length = text.len() as i64;
-                let steps = length.wrapping_sub(self.minimum).cast_unsigned();
-                let fits = (self.minimum..=self.maximum).contains(&length) && steps.is_multiple_of(self.step);
+                let above_minimum = length.wrapping_sub(self.minimum).cast_unsigned();
+                let fits = (self.minimum..=self.maximum).contains(&length) && above_minimum.is_multiple_of(self.step);
                 return (fits && !text.contains('\0')).then(|| Value::Text(text.to_owned()));
             }
             Kind::Compound => None,
@@ -122,25 +124,25 @@ impl Control {
         value.map(Value::Number)
     }
 
-    /// All bits that a bit mask may have.
+    /// All bits that a bit mask may have, of its 32.
     fn bits(&self) -> i64 {
         self.maximum & i64::from(u32::MAX)
     }
 
-    /// By number, by name, or by name as it would be written for a control.
+    /// The menu item that `text` means: its number, its name, or its name as [`super::tool_name`] writes it.
     fn item(&self, text: &str) -> Option<&Item> {
         let by = |fits: &dyn Fn(&Item) -> bool| self.items.iter().find(|item| fits(item));
         let number = number(text);
         by(&|item| Some(item.index) == number)
             .or_else(|| by(&|item| item.name.eq_ignore_ascii_case(text)))
-            .or_else(|| by(&|item| !item.name.is_empty() && super::variable(&item.name) == super::variable(text)))
+            .or_else(|| by(&|item| !item.name.is_empty() && super::tool_name(&item.name) == super::tool_name(text)))
     }
 
     fn refuse(&self, text: &str) -> ControlError {
         ControlError::Value { name: self.name.clone(), value: text.to_owned(), accepted: self.accepted() }
     }
 
-    /// What it takes, for people.
+    /// Which values it takes, as the hint of an error message.
     pub fn accepted(&self) -> String {
         let steps = if self.step > 1 { format!(" in steps of {}", self.step) } else { String::new() };
         match self.kind {

@@ -29,7 +29,8 @@ pub enum Transfer {
     Pq,
 }
 
-/// The colours of a format as V4L2 defines what it leaves open. SMPTE 240M, an early high definition, counts as BT.709.
+/// What the codes of a format say of its colours; a code that is 0 or unknown has V4L2's default for the colour space.
+/// SMPTE 240M, an early standard of high definition, counts as BT.709.
 pub(super) fn resolve(
     family: Family,
     colorspace: u32,
@@ -62,7 +63,7 @@ pub(super) fn resolve(
     let range = match quantization {
         sys::v4l2_quantization_V4L2_QUANTIZATION_FULL_RANGE => Range::Full,
         sys::v4l2_quantization_V4L2_QUANTIZATION_LIM_RANGE => Range::Limited,
-        // Brightness alone is no Y'CbCr: sensors give it as they count.
+        // Grey is no Y'CbCr: sensors give it over their full range.
         _ if matches!(family, Family::Rgb24 { .. } | Family::Grey | Family::Depth16) => Range::Full,
         _ if colorspace == sys::v4l2_colorspace_V4L2_COLORSPACE_JPEG => Range::Full,
         _ => Range::Limited,

@@ -153,8 +153,8 @@ impl Family {
         }
     }
 
-    /// Bytes of a row, and rows, of component `index` in a picture of `width` x `height` pixels. The second of two
-    /// packed pixels may lack in an odd row, and with it a chroma sample.
+    /// Bytes of a row, and number of rows, of component `index` in a picture of `width` x `height` pixels. A packed row
+    /// of odd width ends in half a pair of pixels, with one of its two chroma samples.
     pub(super) fn rows(self, index: usize, width: usize, height: usize) -> (usize, usize) {
         match (self, index) {
             (Self::Jpeg, _) => (0, 0),
@@ -166,7 +166,7 @@ impl Family {
         }
     }
 
-    /// From row to row of component `index`, where the first component of the same memory has `first_bytes`.
+    /// Stride of component `index`, where the first component of the same memory plane has a stride of `first_bytes`.
     pub(super) fn stride_bytes(self, index: usize, first_bytes: usize) -> usize {
         match (self, index) {
             // An odd row of luma has one chroma pair more than bytes.
@@ -197,8 +197,8 @@ impl FromStr for FourCc {
     }
 }
 
-/// Without trailing blanks. What is no visible character is written as `\xNN`, and the kernel's mark for samples with
-/// their high byte first as `-BE`.
+/// Without trailing blanks. Invisible characters are written as `\xNN`, the kernel's mark for big-endian samples as
+/// `-BE`.
 impl fmt::Display for FourCc {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [first @ .., last] = self.0;
@@ -211,6 +211,7 @@ impl fmt::Display for FourCc {
                 other => name.push_str(&format!("\\x{other:02x}")),
             }
         }
+        // Bit 31 of the code is the mark.
         if last & 0x80 != 0 {
             name.push_str("-BE");
         }

@@ -40,7 +40,7 @@ pub struct Layout {
 /// One piece of memory of a picture: a buffer of its own in a multi-planar queue, otherwise the only one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Plane {
-    /// From row to row of its first component; 0 in compressed formats.
+    /// Bytes from row to row of its first component; 0 in compressed formats.
     pub stride_bytes: usize,
     /// As the driver says; may be more than the picture needs, and is the largest picture of compressed formats.
     pub size_bytes: usize,
@@ -53,15 +53,15 @@ pub struct Component {
     pub plane: usize,
     /// Where the first row starts in it.
     pub offset_bytes: usize,
-    /// From row to row.
+    /// Bytes from row to row.
     pub stride_bytes: usize,
-    /// That matter of each row.
+    /// Those of each row that hold samples.
     pub row_bytes: usize,
     pub rows: usize,
 }
 
 impl Component {
-    /// Bytes of its plane up to its end. The last row need not be padded.
+    /// Bytes of its plane up to the end of its last row, which need not be padded.
     pub fn end_bytes(&self) -> usize {
         self.offset_bytes + self.stride_bytes * (self.rows - 1) + self.row_bytes
     }
@@ -114,7 +114,7 @@ pub enum LayoutError {
     Interlaced(u32),
 }
 
-/// The fields of the kernel's two structures.
+/// What the kernel's single- and multi-planar structure have in common, not checked yet.
 struct Raw {
     fourcc: FourCc,
     width: u32,
@@ -129,7 +129,7 @@ struct Raw {
 }
 
 impl Layout {
-    /// What `VIDIOC_G_FMT` or `VIDIOC_S_FMT` answered on a capture queue, single- or multi-planar. Where the driver
+    /// The layout in the driver's answer to `VIDIOC_G_FMT` or `VIDIOC_S_FMT`, single- or multi-planar. Where the driver
     /// leaves the colours open, V4L2's defaults hold; values that are not known count as open.
     ///
     /// # Errors
@@ -149,7 +149,7 @@ impl Layout {
             }
             other => return Err(LayoutError::BufferType(other)),
         };
-        raw.layout()
+        raw.into_layout()
     }
 
     /// The layout of a picture without padding, as V4L2's defaults have it: for formats that no driver describes.
@@ -158,6 +158,7 @@ impl Layout {
     /// Such pictures cannot be read.
     pub fn packed(fourcc: FourCc, width: u32, height: u32) -> Result<Self, LayoutError> {
         let plane_count = fourcc.family().map_or(1, |family| family.memory_planes());
+        // Strides and sizes of 0 are computed, colour codes of 0 stand for V4L2's defaults.
         let (planes, defaults) = ([Plane::default(); MAX_PLANES], 0);
         Raw {
             fourcc,
@@ -171,7 +172,7 @@ impl Layout {
             planes,
             plane_count,
         }
-        .layout()
+        .into_layout()
     }
 
     /// The same with `extra_bytes` between rows.
@@ -223,10 +224,11 @@ impl Layout {
 }
 
 impl Raw {
+    /// From the format of a single-planar queue.
     fn single(pix: &sys::v4l2_pix_format) -> Self {
         // Without this mark the fields after it were never written.
         let extended = pix.priv_ == sys::V4L2_PIX_FMT_PRIV_MAGIC;
-        let open = |value| if extended { value } else { 0 };
+        let if_extended = |value| if extended { value } else { 0 };
         // SAFETY: two names of one number.
         #[allow(unsafe_code)]
         let ycbcr_encoding = unsafe { pix.__bindgen_anon_1.ycbcr_enc };
@@ -238,14 +240,15 @@ impl Raw {
             height: pix.height,
             field: pix.field,
             colorspace: pix.colorspace,
-            ycbcr_encoding: open(ycbcr_encoding),
-            quantization: open(pix.quantization),
-            transfer: open(pix.xfer_func),
+            ycbcr_encoding: if_extended(ycbcr_encoding),
+            quantization: if_extended(pix.quantization),
+            transfer: if_extended(pix.xfer_func),
             planes,
             plane_count: 1,
         }
     }
 
+    /// From the format of a multi-planar queue.
     fn multi(pix: &sys::v4l2_pix_format_mplane) -> Self {
         // The structure is packed, so its fields are copied before they are looked at.
         let formats = pix.plane_fmt;
@@ -270,7 +273,8 @@ impl Raw {
         }
     }
 
-    fn layout(self) -> Result<Layout, LayoutError> {
+    /// Checks the driver's values against the format, and computes the strides and sizes that it left 0.
+    fn into_layout(self) -> Result<Layout, LayoutError> {
         let Self { fourcc, width, height, field, .. } = self;
         let family = fourcc.family().ok_or(LayoutError::FourCc(fourcc))?;
         if !(1..=MAX_SIDE_PX).contains(&width) || !(1..=MAX_SIDE_PX).contains(&height) {
@@ -302,7 +306,7 @@ impl Raw {
                 return Err(LayoutError::Stride { fourcc, width, stride_bytes, needed_bytes });
             }
         }
-        // Half of an odd stride, too, must hold a chroma row.
+        // Chroma strides follow from the luma's: half of an odd one, too, must hold a chroma row.
         for component in layout.components() {
             if component.stride_bytes < component.row_bytes {
                 let stride_bytes = layout.planes[component.plane].stride_bytes;

@@ -1,4 +1,4 @@
-//! Which camera it is, so that it is found again when its number has changed.
+//! The identity of a camera, by which it is found again when the number of its node has changed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -49,21 +49,21 @@ impl Address {
     pub fn find(&mut self, everywhere: bool) -> Option<PathBuf> {
         let linked = [&self.given].into_iter().chain(&self.links).filter_map(|link| fs::canonicalize(link).ok());
         let known: Vec<PathBuf> = linked.chain([self.node.clone()]).collect();
-        let found = known.into_iter().find(|node| self.is(node));
+        let found = known.into_iter().find(|node| self.is_at(node));
         let found = found.or_else(|| everywhere.then(|| self.among(&nodes())).flatten())?;
         self.node.clone_from(&found);
         Some(found)
     }
 
     /// Whether the camera of this name is at that node now, wherever it is plugged in.
-    fn is(&self, node: &Path) -> bool {
+    fn is_at(&self, node: &Path) -> bool {
         let mut capability: sys::v4l2_capability = zeroed();
         let answered = Device::open(node).and_then(|device| device.query_capability(&mut capability));
-        answered.is_ok() && self.answers(&capability)
+        answered.is_ok() && self.matches(&capability)
     }
 
-    /// Whether this is what the camera says of itself. Its other nodes have its name, too, but give no frames.
-    fn answers(&self, capability: &sys::v4l2_capability) -> bool {
+    /// Whether a node with this answer is the camera's: its other nodes have the same name, but give no frames.
+    fn matches(&self, capability: &sys::v4l2_capability) -> bool {
         let frames = sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE;
         text(&capability.card) == self.card && own_caps(capability) & frames != 0
     }
@@ -125,7 +125,7 @@ mod tests {
             let capabilities = sys::V4L2_CAP_DEVICE_CAPS | sys::V4L2_CAP_VIDEO_CAPTURE | sys::V4L2_CAP_META_CAPTURE;
             let mut capability = sys::v4l2_capability { capabilities, device_caps: own_caps, ..zeroed() };
             capability.card[..4].copy_from_slice(card);
-            c920().answers(&capability)
+            c920().matches(&capability)
         };
         for caps in [sys::V4L2_CAP_VIDEO_CAPTURE, sys::V4L2_CAP_VIDEO_CAPTURE_MPLANE] {
             assert!(answers(b"C920", caps) && !answers(b"C930", caps));

@@ -68,7 +68,7 @@ const ENODEV: i32 = rustix::io::Errno::NODEV.raw_os_error();
 const ENOSPC: i32 = rustix::io::Errno::NOSPC.raw_os_error();
 
 impl OpenError {
-    /// What an error of the system's means when `what` was tried.
+    /// The error for a system call that failed on the node `path`; `what` names the call, or what failed with it.
     pub fn at(path: &Path, what: &'static str, source: io::Error) -> Self {
         let path = path.to_owned();
         match source.raw_os_error() {
@@ -79,10 +79,10 @@ impl OpenError {
         }
     }
 
-    /// The same for a queue.
+    /// The error for a queue of buffers of the node `path`.
     pub fn queue(path: &Path, source: QueueError) -> Self {
         match source {
-            // Elsewhere it means what it says, and never comes.
+            // When streaming starts, no space is left on the USB bus, not on a disk.
             QueueError::Refused { step: "STREAMON", source } if source.raw_os_error() == Some(ENOSPC) => {
                 Self::Bandwidth(path.to_owned())
             }
@@ -96,7 +96,7 @@ impl OpenError {
         }
     }
 
-    /// Whether it may be otherwise in a moment: another program lets go of it, or a driver comes to itself.
+    /// Whether trying again in a moment may help: another program may let go of the device, or a driver recover.
     pub fn may_pass(&self) -> bool {
         matches!(self, Self::Busy { .. } | Self::Queue { .. } | Self::Io { .. })
     }

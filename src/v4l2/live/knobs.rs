@@ -19,8 +19,8 @@ pub fn list(name: &str) -> Result<Vec<Knob>, OpenError> {
     knobs(&open(name)?)
 }
 
-/// Turns one of them; gives back all, since others may follow it. Where a value is none that the control takes, nothing
-/// changes.
+/// Sets one of them; returns all as they are then, since others may change with it. A value that the control does not
+/// take changes nothing.
 ///
 /// # Errors
 /// As for [`list`]; there is no such knob, it does not take this value or none now, or the camera refuses.
@@ -42,16 +42,18 @@ fn knobs(device: &Device) -> Result<Vec<Knob>, OpenError> {
     Ok(all.into_iter().filter_map(knob).collect())
 }
 
-/// Nothing for what is no knob: it only tells something, has no number, is about sound, or is a driver's own affair.
+/// The knob for a control; `None` where a person would not turn it: it is read-only, has no number, is about sound, or
+/// is specific to a driver.
 fn knob(control: Control) -> Option<Knob> {
-    /// In a class, the numbers from here on are those of single drivers.
-    const DRIVERS_OWN: u32 = 0x1000;
-    let is_a_persons = matches!(control.id & !0xffff, sys::V4L2_CTRL_CLASS_USER | sys::V4L2_CTRL_CLASS_CAMERA)
-        && control.id & 0xffff < (sys::V4L2_CID_BASE & 0xffff) + DRIVERS_OWN
+    /// Ids of a class that are this far from its first one, or further, are specific to a driver.
+    const DRIVER_SPECIFIC: u32 = 0x1000;
+    // The upper half of an id is its class. In every class ids begin at the same number, here that of `CID_BASE`.
+    let is_for_users = matches!(control.id & !0xffff, sys::V4L2_CTRL_CLASS_USER | sys::V4L2_CTRL_CLASS_CAMERA)
+        && control.id & 0xffff < (sys::V4L2_CID_BASE & 0xffff) + DRIVER_SPECIFIC
         && !(sys::V4L2_CID_AUDIO_VOLUME..=sys::V4L2_CID_AUDIO_LOUDNESS).contains(&control.id);
     let has_number = matches!(control.kind, Kind::Integer | Kind::Boolean | Kind::Menu | Kind::IntegerMenu);
     let Some(Value::Number(value)) = control.value else { return None };
-    if !is_a_persons || !has_number || control.read_only {
+    if !is_for_users || !has_number || control.read_only {
         return None;
     }
     let step = i64::try_from(control.step).unwrap_or(1);

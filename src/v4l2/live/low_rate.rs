@@ -1,15 +1,18 @@
-//! Whether a camera gives fewer frames than it says, and none are lost: most do so in the dark.
+//! Notices a camera that gives fewer frames than it says although none are lost: most do so in the dark.
 
-/// Measures a camera's rate.
+/// Measures a camera's rate, and reports once that it is low.
 #[derive(Debug)]
 pub struct LowRateCheck {
     nominal_fps: f64,
-    /// Frames of the present window, and when it began.
+    /// Frames counted in the present window, and when it begins or began.
     window: Option<(u64, u64)>,
+    /// A low rate was reported.
     done: bool,
 }
 
+/// Time after a start that is not measured.
 const SETTLE_NS: u64 = 1_000_000_000;
+/// Time over which the rate is measured.
 const WINDOW_NS: u64 = 3_000_000_000;
 /// Less than this part of the stated rate is well below it.
 const WELL_BELOW: f64 = 0.75;
@@ -25,15 +28,15 @@ impl LowRateCheck {
         self.window = Some((0, now_ns + SETTLE_NS));
     }
 
-    /// `frames` frames came since the last call, at `now_ns`, and `missed` did not. Gives the rate, once, when it was
-    /// well below the stated one for three seconds and nothing was lost.
+    /// Counts `frames` that came since the last call and `missed` ones that did not, at `now_ns`. Returns the measured
+    /// rate, once, when it was well below the stated one for three seconds and nothing was lost.
     pub fn frames(&mut self, frames: u64, missed: u64, now_ns: u64) -> Option<f64> {
         let (count, began_ns) = self.window?;
         if self.done || now_ns < began_ns {
             return None;
         }
         if missed > 0 || count == 0 {
-            // Lost frames have another cause.
+            // The window begins anew: what loses frames is not the dark.
             self.window = Some((frames.min(1), now_ns));
             return None;
         }
@@ -43,7 +46,7 @@ impl LowRateCheck {
             return None;
         }
         self.window = Some((1, now_ns));
-        // The first frame began the window.
+        // The first frame began the window: intervals are one fewer.
         let fps = (count + frames - 1) as f64 / (passed_ns as f64 / 1e9);
         self.done = fps < WELL_BELOW * self.nominal_fps;
         self.done.then_some(fps)

@@ -1,5 +1,5 @@
-//! A device that gives frames for hours: it is opened once, and after that whatever happens to it is waited out. It
-//! stalls, fails, is unplugged, comes back under another number; frames go on when they can.
+//! A device that gives frames for hours: once it was opened, it is recovered from whatever happens to it. It may stall,
+//! fail, be unplugged, come back under another number; frames go on when they can.
 
 mod address;
 pub mod error;
@@ -51,7 +51,7 @@ pub struct Live {
 
 enum State {
     Streaming(Box<Session>),
-    /// Closed against its will; to be opened again at this time.
+    /// Closed after a failure; to be opened again at this time.
     Away {
         retry_ns: u64,
     },
@@ -77,12 +77,12 @@ pub enum Next {
 const LOOK_NS: u64 = 150_000_000;
 /// How often among all nodes: each is opened for that.
 const SEARCH_NS: u64 = 1_000_000_000;
-/// After an error the driver gets so long to come to itself.
+/// Pause after an error of the driver, for it to recover.
 const ERROR_NAP_NS: u64 = 5_000_000;
 /// How often a camera is tried at the start, and how long between: whoever closes it may take a while.
 const TRIES: u32 = 5;
 const TRY_NAP_NS: u64 = 200_000_000;
-/// A driver's time that is further from now is no time of ours.
+/// A frame with an older time stamp than this was stamped by another clock than ours.
 const CREDIBLE_AGE_NS: u64 = 5_000_000_000;
 
 impl Live {
@@ -155,7 +155,7 @@ impl Live {
                     self.watchdog.started(self.clock.now_ns());
                     self.low_rate.restarted(self.clock.now_ns());
                 }
-                // One that waits because losses were told before it.
+                // A frame may be there already: the last call told losses instead.
                 if session.queue.current().is_none() {
                     match session.queue.wait_newest(patience) {
                         Ok(true) => self.frame_came(),
@@ -183,7 +183,7 @@ impl Live {
         self.report()
     }
 
-    /// What there is to say: losses first.
+    /// What [`Live::next`] returns: losses before the frame that follows them.
     fn report(&mut self) -> Next {
         if let State::Streaming(session) = &mut self.state {
             add(&mut self.losses, session.queue.take_losses());
@@ -225,6 +225,7 @@ impl Live {
         self.said.clear();
     }
 
+    /// A frame was dequeued: tells the watchdog and the check for a low rate, and counts what was lost before it.
     fn frame_came(&mut self) {
         let State::Streaming(session) = &mut self.state else { return };
         let now_ns = self.clock.now_ns();
@@ -234,13 +235,14 @@ impl Live {
             tracing::warn!("{}: frames again after {:.1} s", self.name, trouble.as_secs_f64());
         }
         self.said.clear();
-        // What another program writes has the rate that it has.
-        let told = if session.is_loopback() {
+        // The rate of a virtual camera is the business of the program that writes to it.
+        let low_fps = if session.is_loopback() {
             None
         } else {
+            // Frames that came in vain are part of the camera's rate.
             self.low_rate.frames(1 + losses.stale + losses.corrupt, losses.missed, now_ns)
         };
-        if let Some(fps) = told {
+        if let Some(fps) = low_fps {
             self.warn_of_low_rate(fps);
         }
     }

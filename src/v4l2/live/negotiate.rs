@@ -63,9 +63,9 @@ pub enum NoMode {
 /// Wanted where nothing is said.
 const DEFAULT_SIZE_PX: (u32, u32) = (1280, 720);
 const DEFAULT_FPS: f64 = 30.0;
-/// USB 2 carries raw pictures up to this size and rate, in pixels per second.
+/// USB 2 carries raw pictures up to this size and rate, in pixels per second: 30 fps, and a little for rounded rates.
 const VGA_PX_PER_S: f64 = 640.0 * 480.0 * 30.5;
-/// Rates that differ by less are the same to who watches.
+/// Logarithm of the ratio of two rates below which viewers see no difference: about a tenth.
 const SAME_RATE: f64 = 0.1;
 
 /// The best mode of each readable format, the best of all first: never empty.
@@ -94,7 +94,7 @@ pub fn ranked(modes: &[FormatModes], wish: &Wish, wire: Wire) -> Result<Vec<Choi
     Ok(best.into_iter().map(|(_, choice)| choice).collect())
 }
 
-/// What a mode lacks, what matters most first: the least is the best.
+/// Penalties of a mode, the weightiest first; compared one after the other, and the least is the best.
 type Rank = [f64; 6];
 
 fn compare(a: &Rank, b: &Rank) -> Ordering {
@@ -108,6 +108,7 @@ fn best_mode(format: &FormatModes, wish: &Wish, wire: Wire) -> Option<(Rank, Cho
         Sizes::Unknown => vec![(wanted_px, &Rates::Unknown)],
         Sizes::Discrete(sizes) => sizes.iter().map(|SizeModes { size_px, rates }| (*size_px, rates)).collect(),
         Sizes::Range { min_px, max_px, step_px, rates } => {
+            // The nearest value of the grid, also where a driver has its limits the wrong way round.
             let on_grid = |wanted: u32, min: u32, max: u32, step: u32| {
                 let steps = (wanted.clamp(min, max.max(min)) - min + step / 2) / step.max(1);
                 (min + steps * step).min(max.max(min))
@@ -121,6 +122,7 @@ fn best_mode(format: &FormatModes, wish: &Wish, wire: Wire) -> Option<(Rank, Cho
     ranked.min_by(|(a, _), (b, _)| compare(a, b))
 }
 
+/// The penalties of a format at one of its sizes, and the mode to ask for there: the rate nearest to the wish.
 fn rank(
     format: &FormatModes,
     size_px: (u32, u32),
@@ -133,33 +135,37 @@ fn rank(
     // Where the driver does not tell, the wish is as good as anything.
     let interval = rates.nearest(wanted).unwrap_or(wanted);
     let choice = Choice { queue: format.queue, fourcc: format.fourcc, size_px, interval };
-    let ratio = |a: f64, b: f64| (a / b).ln();
-    let beyond = |distance: f64| if distance < SAME_RATE { 0.0 } else { distance };
-    let slower = beyond(ratio(wanted.fps(), interval.fps()));
-    let off_rate = beyond(ratio(wanted.fps(), interval.fps()).abs());
+    let log_ratio = |a: f64, b: f64| (a / b).ln();
+    let if_visible = |distance: f64| if distance < SAME_RATE { 0.0 } else { distance };
+    // Negative, and so no penalty, where the mode is faster.
+    let slower = if_visible(log_ratio(wanted.fps(), interval.fps()));
+    let off_rate = if_visible(log_ratio(wanted.fps(), interval.fps()).abs());
     let off_size =
-        ratio(size_px.0.into(), wanted_px.0.into()).abs() + ratio(size_px.1.into(), wanted_px.1.into()).abs();
-    // Who asks for a size gets it, slow as it may be; who does not gets a fluent picture.
+        log_ratio(size_px.0.into(), wanted_px.0.into()).abs() + log_ratio(size_px.1.into(), wanted_px.1.into()).abs();
+    // A size that was asked for is kept, however slow; otherwise a fluent picture matters more.
     let (first, second) = if wish.size_px.is_some() { (off_size, slower) } else { (slower, off_size) };
-    let order = order(format.fourcc, &choice, wire);
-    let second_hand = f64::from(u8::from(format.emulated));
-    let queue = f64::from(u8::from(format.queue == QueueKind::MultiPlanar));
-    ([first, second, off_rate, second_hand, order, queue], choice)
+    let preference = format_place(format.fourcc, &choice, wire);
+    let emulated = f64::from(u8::from(format.emulated));
+    let multi_planar = f64::from(u8::from(format.queue == QueueKind::MultiPlanar));
+    ([first, second, off_rate, emulated, preference, multi_planar], choice)
 }
 
-/// Place of a format among those that give the same size and rate.
-fn order(fourcc: FourCc, choice: &Choice, wire: Wire) -> f64 {
-    let table = FourCc::supported().position(|supported| supported == fourcc).unwrap_or(usize::MAX) as f64;
+/// Place of a format among those that give the same size and rate: its place among the supported ones, unless it is
+/// moved before (-100) or behind (1000) all of them.
+fn format_place(fourcc: FourCc, choice: &Choice, wire: Wire) -> f64 {
+    let place = FourCc::supported().position(|supported| supported == fourcc).unwrap_or(usize::MAX) as f64;
     let px_per_s = f64::from(choice.size_px.0) * f64::from(choice.size_px.1) * choice.interval.fps();
     let raw_fits = wire == Wire::Wide || px_per_s <= VGA_PX_PER_S;
     match fourcc.family() {
         // Grey only where there are no colours.
         Some(Family::Grey) => 1000.0,
-        Some(Family::Jpeg) if !raw_fits => table - 100.0,
-        _ => table,
+        // Compressed first where the cable does not carry raw pictures.
+        Some(Family::Jpeg) if !raw_fits => place - 100.0,
+        _ => place,
     }
 }
 
+/// The names without repetitions, for messages.
 fn list(fourccs: impl Iterator<Item = FourCc>) -> String {
     let mut names: Vec<String> = Vec::new();
     for name in fourccs.map(|fourcc| fourcc.to_string()) {

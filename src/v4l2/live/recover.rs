@@ -25,6 +25,7 @@ impl Live {
         self.apply(remedy, &error.to_string());
     }
 
+    /// Carries out a remedy; `because` is its reason, for the log. If a restart fails, the next remedy follows at once.
     pub(super) fn apply(&mut self, remedy: Remedy, because: &str) {
         let now_ns = self.clock.now_ns();
         match remedy {
@@ -56,6 +57,7 @@ impl Live {
         }
     }
 
+    /// Tries once to open the device wherever it is now; if that fails, it is away until a later try.
     pub(super) fn reopen(&mut self) {
         let opened = match self.find() {
             Some(path) => Session::open(&path, &self.wish, &self.settings, Some(&self.agreed), &self.clock),
@@ -79,6 +81,7 @@ impl Live {
             }
             Err(error) => {
                 self.watchdog.gone(now_ns);
+                // It is closed already, so of a remedy only the pause counts.
                 let pause = match self.watchdog.remedy(now_ns) {
                     Remedy::Reopen(pause) => pause.as_nanos() as u64,
                     Remedy::Restart | Remedy::Wait => 0,
@@ -89,7 +92,7 @@ impl Live {
         }
     }
 
-    /// Where the device is now.
+    /// The node of the device now; searches all nodes only every [`SEARCH_NS`].
     fn find(&mut self) -> Option<PathBuf> {
         let now_ns = self.clock.now_ns();
         let everywhere = now_ns.saturating_sub(self.searched_ns) >= SEARCH_NS;

@@ -47,8 +47,8 @@ pub struct Session {
 const TRIES: usize = 6;
 
 impl Session {
-    /// Opens the camera at `path`, agrees on a mode, sets its controls and starts it. With `before`, the same mode as
-    /// then is asked for first, which is quick; and a control that cannot be set is said and passed over.
+    /// Opens the camera at `path`, agrees on a mode, sets its controls and starts it. With `before` (what was agreed
+    /// last time) that mode is asked for first, which is quick, and a control that cannot be set is only warned of.
     ///
     /// # Errors
     /// Any of this is refused.
@@ -60,7 +60,7 @@ impl Session {
         clock: &Clock,
     ) -> Result<Self, OpenError> {
         let device = Device::open(path).map_err(|error| OpenError::at(path, "it cannot be opened", error))?;
-        let capability = capability(&device)?;
+        let capability = query_camera(&device)?;
         let agreed = agree(&device, &capability, wish, before)?;
         for (name, value) in settings {
             match controls::set(&device, name, value) {
@@ -94,22 +94,22 @@ fn is_loopback(capability: &sys::v4l2_capability) -> bool {
     text(&capability.driver) == LOOPBACK_DRIVER
 }
 
-/// What the device is, if it is a camera.
-fn capability(device: &Device) -> Result<sys::v4l2_capability, OpenError> {
+/// Asks the device what it is; an error if it is no camera.
+fn query_camera(device: &Device) -> Result<sys::v4l2_capability, OpenError> {
     let path = device.path();
     let mut capability: sys::v4l2_capability = zeroed();
     device.query_capability(&mut capability).map_err(|error| match error.raw_os_error() {
         Some(ENOTTY) => OpenError::NotACamera { path: path.to_owned(), what: "it does not answer as one" },
         _ => OpenError::at(path, "VIDIOC_QUERYCAP", error),
     })?;
-    match lacking(&capability) {
+    match why_no_camera(&capability) {
         Some(what) => Err(OpenError::NotACamera { path: path.to_owned(), what }),
         None => Ok(capability),
     }
 }
 
-/// Why a device with this capability is no camera; nothing where it is one.
-fn lacking(capability: &sys::v4l2_capability) -> Option<&'static str> {
+/// Why a device with this capability is no camera; `None` where it is one.
+fn why_no_camera(capability: &sys::v4l2_capability) -> Option<&'static str> {
     let caps = own_caps(capability);
     let can = |any: u32| caps & any != 0;
     if can(sys::V4L2_CAP_VIDEO_M2M | sys::V4L2_CAP_VIDEO_M2M_MPLANE) {
@@ -127,7 +127,8 @@ fn lacking(capability: &sys::v4l2_capability) -> Option<&'static str> {
 
 const ENOTTY: i32 = rustix::io::Errno::NOTTY.raw_os_error();
 
-/// Agrees with the driver on a mode: asks for what suits best, and takes what it makes of that.
+/// Agrees with the driver on a mode: that of `before` if it can still be had, otherwise the best one that the driver
+/// accepts, with whatever it changes about that.
 fn agree(
     device: &Device,
     capability: &sys::v4l2_capability,
@@ -138,7 +139,7 @@ fn agree(
         match set_format(device, &before.choice) {
             Ok(layout) if layout == before.layout => return Ok(with_rate(device, before.choice, layout)),
             Err(error @ (OpenError::Gone(_) | OpenError::Busy { .. })) => return Err(error),
-            // It is not as it was: from the beginning.
+            // The camera has changed: agree anew.
             _ => {}
         }
     }
@@ -146,6 +147,7 @@ fn agree(
     let offered = modes(device).map_err(|error| OpenError::at(path, "VIDIOC_QUERYCAP", error))?;
     let choices = ranked(&offered, wish, wire(path, capability))
         .map_err(|source| OpenError::NoMode { path: path.to_owned(), source })?;
+    // The first one, that of the best mode, is what the user is told.
     let mut refusal = None;
     for choice in choices.into_iter().take(TRIES) {
         match set_format(device, &choice) {
@@ -156,9 +158,10 @@ fn agree(
             }
             Ok(layout) if layout.fourcc.content() == Some(wish.content) => {
                 let agreed = with_rate(device, choice, layout);
-                tell_differences(device, &agreed, wish);
+                warn_of_differences(device, &agreed, wish);
                 return Ok(agreed);
             }
+            // Changed into a format of other content, or one that cannot be read.
             Ok(_) => {}
             Err(error @ (OpenError::Gone(_) | OpenError::Busy { .. })) => return Err(error),
             Err(error) => {
@@ -170,7 +173,7 @@ fn agree(
         .unwrap_or_else(|| OpenError::NotACamera { path: path.to_owned(), what: "it takes none of its formats" }))
 }
 
-/// Sets a format; gives what the driver made of it.
+/// Sets a format; returns the layout that the driver made of it.
 fn set_format(device: &Device, choice: &Choice) -> Result<Layout, OpenError> {
     let mut format: sys::v4l2_format = zeroed();
     format.type_ = choice.queue.buffer_type();
@@ -193,7 +196,7 @@ fn set_format(device: &Device, choice: &Choice) -> Result<Layout, OpenError> {
 fn with_rate(device: &Device, choice: Choice, layout: Layout) -> Agreed {
     let mut parameters: sys::v4l2_streamparm = zeroed();
     parameters.type_ = choice.queue.buffer_type();
-    // What else is in there stays as it is. Some inputs have the rate that their signal has, and refuse.
+    // Read first, as the other parameters are to stay. Inputs that follow the rate of their signal refuse.
     if device.get_parameters(&mut parameters).is_ok() {
         parameters.parm.capture.timeperframe = choice.interval.fraction();
         if let Err(error) = device.set_parameters(&mut parameters) {
@@ -225,8 +228,8 @@ fn wire(path: &Path, capability: &sys::v4l2_capability) -> Wire {
     }
 }
 
-/// Whoever asked for something else should know.
-fn tell_differences(device: &Device, agreed: &Agreed, wish: &Wish) {
+/// Warns if the size or the rate (by more than 2 %) is not the one that was asked for.
+fn warn_of_differences(device: &Device, agreed: &Agreed, wish: &Wish) {
     let size = (agreed.layout.width, agreed.layout.height);
     let other_size = wish.size_px.is_some_and(|wanted| wanted != size);
     let other_rate = wish.fps.is_some_and(|wanted| (agreed.interval.fps() / wanted).ln().abs() > 0.02);
@@ -246,7 +249,7 @@ mod tests {
             let capabilities = sys::V4L2_CAP_DEVICE_CAPS;
             let mut capability = sys::v4l2_capability { capabilities, device_caps, ..zeroed() };
             capability.driver[..driver.len()].copy_from_slice(driver.as_bytes());
-            lacking(&capability)
+            why_no_camera(&capability)
         };
         let streams = sys::V4L2_CAP_STREAMING;
         assert_eq!(said("uvcvideo", sys::V4L2_CAP_VIDEO_CAPTURE | streams), None);

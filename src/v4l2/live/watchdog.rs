@@ -5,11 +5,11 @@ use std::time::Duration;
 /// Watches over a stream.
 #[derive(Debug)]
 pub struct Watchdog {
-    /// Without a frame for so long, the stream has stalled.
+    /// After this time without a frame, the stream has stalled.
     limit_ns: u64,
-    /// The last frame, or the last remedy.
-    since_ns: u64,
-    /// When it began to fail, if it does.
+    /// When the present silence began: at the last start, frame or remedy.
+    silent_since_ns: u64,
+    /// When the present trouble began, if there is any.
     trouble_ns: Option<u64>,
     /// Remedies tried without a frame since.
     tried: u32,
@@ -26,7 +26,7 @@ pub enum Remedy {
     Reopen(Duration),
 }
 
-/// So many errors in a row are no accident.
+/// Errors in a row that need a remedy: fewer may pass by themselves.
 const MOST_ERRORS: u32 = 8;
 /// Frames that may be missing before the stream has stalled, but at least [`LEAST_LIMIT_NS`].
 const LIMIT_PERIODS: u64 = 5;
@@ -38,30 +38,31 @@ impl Watchdog {
     /// Over a stream with this time from frame to frame, which starts at `now_ns`.
     pub fn new(period_ns: u64, now_ns: u64) -> Self {
         let limit_ns = (LIMIT_PERIODS * period_ns).max(LEAST_LIMIT_NS);
-        Self { limit_ns, since_ns: now_ns, trouble_ns: None, tried: 0, errors: 0 }
+        Self { limit_ns, silent_since_ns: now_ns, trouble_ns: None, tried: 0, errors: 0 }
     }
 
     /// The stream starts (again).
     pub fn started(&mut self, now_ns: u64) {
-        self.since_ns = now_ns;
+        self.silent_since_ns = now_ns;
         self.errors = 0;
     }
 
-    /// A frame came. Gives how long there was trouble, if there was.
+    /// A frame came. Returns how long there was trouble before it, if there was.
     pub fn frame(&mut self, now_ns: u64) -> Option<Duration> {
-        self.since_ns = now_ns;
+        self.silent_since_ns = now_ns;
         (self.tried, self.errors) = (0, 0);
         self.trouble_ns.take().map(|trouble_ns| Duration::from_nanos(now_ns.saturating_sub(trouble_ns)))
     }
 
+    /// No frame came: what to do about it.
     pub fn silence(&mut self, now_ns: u64) -> Remedy {
-        if now_ns.saturating_sub(self.since_ns) < self.limit_ns {
+        if now_ns.saturating_sub(self.silent_since_ns) < self.limit_ns {
             return Remedy::Wait;
         }
         self.remedy(now_ns)
     }
 
-    /// The driver gave an error instead of a frame.
+    /// The driver gave an error instead of a frame: what to do about it.
     pub fn error(&mut self, now_ns: u64) -> Remedy {
         self.errors += 1;
         if self.errors < MOST_ERRORS {
@@ -70,21 +71,22 @@ impl Watchdog {
         self.remedy(now_ns)
     }
 
-    /// The device went away or cannot be opened: there is trouble since now, unless there was before.
+    /// The device went away or cannot be opened: trouble begins, unless there was some before.
     pub fn gone(&mut self, now_ns: u64) {
         self.trouble_ns.get_or_insert(now_ns);
     }
 
-    /// The next remedy; what was tried did not help.
+    /// The next stronger remedy; what was tried did not help.
     pub fn remedy(&mut self, now_ns: u64) -> Remedy {
         // It began when the last frame had come.
-        self.trouble_ns.get_or_insert(self.since_ns);
-        self.since_ns = now_ns;
+        self.trouble_ns.get_or_insert(self.silent_since_ns);
+        self.silent_since_ns = now_ns;
         self.errors = 0;
         self.tried = self.tried.saturating_add(1);
         match self.tried {
             1 => Remedy::Restart,
             2 => Remedy::Reopen(Duration::ZERO),
+            // Pauses double with each try.
             more => Remedy::Reopen((FIRST_PAUSE * 2u32.pow((more - 3).min(4))).min(LONGEST_PAUSE)),
         }
     }

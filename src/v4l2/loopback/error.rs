@@ -68,7 +68,7 @@ pub enum LoopbackError {
     },
 }
 
-/// ", by this and that", or nothing where nobody is known.
+/// Writes ` by this, that`, or nothing if no holder is known.
 struct By<'a>(&'a [Holder]);
 
 impl fmt::Display for By<'_> {
@@ -83,7 +83,7 @@ impl fmt::Display for By<'_> {
 /// The command that makes `path` a virtual camera; `/dev/video10` if it is no name of a node.
 pub fn modprobe(path: &Path) -> String {
     let number = path.to_str().and_then(|path| path.strip_prefix("/dev/video")?.parse::<u32>().ok()).unwrap_or(10);
-    // The module takes its options when it is loaded.
+    // The module takes its options only while it is loaded, so a loaded one must go first.
     let unload = if Path::new("/sys/module/v4l2loopback").exists() { "sudo modprobe -r v4l2loopback && " } else { "" };
     format!(
         "{unload}sudo modprobe v4l2loopback devices=1 video_nr={number} card_label=\"bokehcam\" exclusive_caps=1 \
@@ -91,23 +91,23 @@ pub fn modprobe(path: &Path) -> String {
     )
 }
 
-/// The module's nodes, by number: those with its own attributes in the system's tree, whether they can be opened or
-/// not.
+/// All nodes of v4l2loopback, sorted by number, whether or not they can be opened: those with its attribute
+/// `max_openers` in sysfs.
 pub fn nodes() -> Vec<PathBuf> {
     let entries = fs::read_dir("/sys/class/video4linux").into_iter().flatten().flatten();
-    let ours = entries.filter(|entry| entry.path().join("max_openers").exists());
+    let loopbacks = entries.filter(|entry| entry.path().join("max_openers").exists());
     let mut numbers: Vec<u32> =
-        ours.filter_map(|entry| entry.file_name().to_str()?.strip_prefix("video")?.parse().ok()).collect();
+        loopbacks.filter_map(|entry| entry.file_name().to_str()?.strip_prefix("video")?.parse().ok()).collect();
     numbers.sort_unstable();
     numbers.into_iter().map(|number| PathBuf::from(format!("/dev/video{number}"))).collect()
 }
 
-/// What gives a virtual camera to someone who has named `path`, which is none.
+/// Advice for a user whose `path` is no virtual camera: use one of those there are, or make one.
 fn remedy(path: &Path) -> String {
     let there: Vec<String> = nodes().iter().map(|node| node.display().to_string()).collect();
     match there.is_empty() {
         true => format!("make a virtual camera with `{}`", modprobe(path)),
-        // Loading the module anew would take these away.
+        // Making others is the second choice: the module is reloaded for that, which removes these.
         false => format!("use {}, or make others with `{}`", there.join(" or "), modprobe(path)),
     }
 }

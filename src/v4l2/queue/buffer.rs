@@ -26,12 +26,12 @@ pub struct Part {
     pub end: usize,
 }
 
-/// Frames that came and were not given out.
+/// Frames that were not given out, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Losses {
     /// The driver dropped them.
     pub missed: u64,
-    /// A newer one was there.
+    /// Passed over, as a newer one was there.
     pub stale: u64,
     /// Damaged, empty or cut short.
     pub corrupt: u64,

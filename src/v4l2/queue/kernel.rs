@@ -96,7 +96,8 @@ pub struct Mapping {
 #[allow(unsafe_code)]
 unsafe impl Send for Mapping {}
 
-/// A buffer's description together with the planes that it points to.
+/// A buffer's description together with the planes that it points to. It does so only during an ioctl: the pointer is
+/// stale once the value was moved.
 struct Buffer {
     head: sys::v4l2_buffer,
     planes: [sys::v4l2_plane; MAX_PLANES],
@@ -112,8 +113,8 @@ impl DeviceKernel {
         &self.device
     }
 
-    /// Calls the driver with a buffer.
-    fn call(&self, request: Request, index: u32) -> io::Result<Buffer> {
+    /// Makes `request` (QUERYBUF, QBUF or DQBUF) for a buffer; returns what the driver filled in.
+    fn buffer_ioctl(&self, request: Request, index: u32) -> io::Result<Buffer> {
         let mut buffer = Buffer { head: zeroed(), planes: [zeroed(); MAX_PLANES] };
         buffer.head.index = index;
         buffer.head.type_ = self.kind.buffer_type();
@@ -151,7 +152,7 @@ impl Kernel for DeviceKernel {
     }
 
     fn query(&mut self, index: u32) -> io::Result<Described> {
-        let buffer = self.call(vidioc::VIDIOC_QUERYBUF as Request, index)?;
+        let buffer = self.buffer_ioctl(vidioc::VIDIOC_QUERYBUF as Request, index)?;
         let plane_count = self.plane_count(&buffer);
         let mut planes = [Span::default(); MAX_PLANES];
         // SAFETY: the members that are read are integers, and with memory of kind MMAP the kernel writes these.
@@ -190,16 +191,17 @@ impl Kernel for DeviceKernel {
     }
 
     fn queue(&mut self, index: u32) -> io::Result<()> {
-        self.call(vidioc::VIDIOC_QBUF as Request, index).map(drop)
+        self.buffer_ioctl(vidioc::VIDIOC_QBUF as Request, index).map(drop)
     }
 
     fn dequeue(&mut self) -> io::Result<Dequeued> {
-        let buffer = self.call(vidioc::VIDIOC_DQBUF as Request, 0)?;
+        let buffer = self.buffer_ioctl(vidioc::VIDIOC_DQBUF as Request, 0)?;
         let mut parts = [Part::default(); MAX_PLANES];
         match self.kind {
             QueueKind::SinglePlanar => parts[0] = Part { start: 0, end: buffer.head.bytesused as usize },
             QueueKind::MultiPlanar => {
                 for (part, plane) in parts.iter_mut().zip(&buffer.planes) {
+                    // `bytesused` counts from the plane's first byte, not from `data_offset`.
                     *part = Part { start: plane.data_offset as usize, end: plane.bytesused as usize };
                 }
             }
@@ -211,6 +213,7 @@ impl Kernel for DeviceKernel {
         Ok(Dequeued {
             index: buffer.head.index,
             sequence: buffer.head.sequence,
+            // Other clocks cannot be compared with ours, and 0 is no time.
             stamp_ns: (monotonic && stamp_ns > 0).then_some(stamp_ns),
             flagged: flags & sys::V4L2_BUF_FLAG_ERROR != 0,
             parts,
@@ -227,7 +230,7 @@ impl Kernel for DeviceKernel {
 
     fn wait(&mut self, patience: Duration) -> io::Result<Wake> {
         let timeout = Timespec { tv_sec: patience.as_secs() as i64, tv_nsec: patience.subsec_nanos().into() };
-        // No events are subscribed to; errors come unasked.
+        // Errors are reported without being asked for. No events are subscribed to, so PRI, too, is trouble.
         let mut fds = [PollFd::new(&self.device, PollFlags::IN)];
         if poll(&mut fds, Some(&timeout))? == 0 {
             return Ok(Wake::Late);
@@ -239,11 +242,12 @@ impl Kernel for DeviceKernel {
 }
 
 impl Mapping {
-    /// Copies the first `bytes`, where they may change. What is written meanwhile may tear the picture, but nothing
-    /// changes under who reads it.
+    /// Copies the first `bytes` if another program may overwrite them. A write during the copy may tear the picture,
+    /// but later ones do not change what is read.
     fn settle(&mut self, bytes: usize) {
         let Some(copy) = &mut self.copy else { return };
         let bytes = bytes.min(self.length_bytes);
+        // By words, since volatile reads of single bytes would be slow.
         let (words, rest) = copy[..bytes].as_chunks_mut::<{ size_of::<u64>() }>();
         let (address, rest_at) = (self.address.cast::<u64>(), words.len() * size_of::<u64>());
         for (k, word) in words.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! The queue of buffers between a driver and us, mapped into our memory: which side has each buffer, and what came in it.
+//! The queue of buffers between a driver and us, mapped into our memory: which side has each, and what came in it.
 //!
 //! Every buffer is the kernel's (to fill, or filled) or ours; one of ours may hold the current frame. All are queued
 //! before the stream starts and go back as soon as they are read: a driver that has none drops frames.
@@ -29,6 +29,7 @@ const LEAST_BUFFERS: u32 = 2;
 /// How often a refused buffer is offered again before the stream starts.
 const OFFERS: u32 = 3;
 
+/// A buffer: its mapped planes, and which side has it.
 struct Slot<M> {
     memory: Vec<M>,
     in_kernel: bool,
@@ -39,7 +40,7 @@ pub struct Queue<K: Kernel> {
     kernel: K,
     clock: Clock,
     slots: Vec<Slot<K::Memory>>,
-    /// Fewest bytes of each plane of a whole frame.
+    /// Least bytes in each plane of an uncut frame.
     least_bytes: Vec<usize>,
     sequence: Sequence,
     /// The frame that is given out.
@@ -58,7 +59,7 @@ impl<K: Kernel> Queue<K> {
         let sequence = Sequence::new(period_ns);
         let (slots, current, losses) = (Vec::new(), None, Losses::default());
         let mut queue = Self { kernel, clock, slots, least_bytes, sequence, current, losses };
-        // From here on dropping it frees what there is.
+        // Made first, so that an early return drops it, which frees the buffers granted until then.
         let granted = retry(|| queue.kernel.request(BUFFERS)).map_err(QueueError::at("REQBUFS"))?;
         if granted < LEAST_BUFFERS {
             return Err(QueueError::TooFewBuffers { granted });
@@ -91,6 +92,7 @@ impl<K: Kernel> Queue<K> {
         started
     }
 
+    /// As [`Queue::start`], but leaves the buffers with the kernel when it fails.
     fn try_start(&mut self) -> Result<(), QueueError> {
         for index in 0..self.slots.len() {
             let mut offers = 0;
@@ -110,19 +112,19 @@ impl<K: Kernel> Queue<K> {
         self.pass_over_current();
         let stopped = retry(|| self.kernel.stream_off());
         for index in 0..self.slots.len() {
-            // Where stopping failed, each buffer is asked for.
+            // A successful stop returns them all; after a failed one, ask about each.
             self.slots[index].in_kernel = stopped.is_err() && self.is_in_kernel(index).unwrap_or(false);
         }
     }
 
     /// Waits for a frame, no longer than `patience`, and makes the newest of all that are there the current one; older
-    /// ones are passed over. Gives whether there is one. A frame that still was current goes back unread.
+    /// ones, and one that still was current, count as stale. Returns whether there is one.
     ///
     /// # Errors
-    /// What the driver says; it may be well again at the next call.
+    /// What the driver says; the next call may succeed.
     pub fn wait_newest(&mut self, patience: Duration) -> Result<bool, QueueError> {
         self.pass_over_current();
-        // What was refused before.
+        // Offers again the buffers that the kernel refused before.
         for index in 0..self.slots.len() {
             if !self.slots[index].in_kernel {
                 let _ = self.give(index);
@@ -138,11 +140,11 @@ impl<K: Kernel> Queue<K> {
                     self.drain()?;
                     return match self.current {
                         Some(_) => Ok(true),
-                        // Nothing to dequeue, and no wait that would not end at once.
+                        // An error without a buffer: returned, since every further wait would end at once, too.
                         None => Err(QueueError::at("poll")(io::Error::from_raw_os_error(EIO))),
                     };
                 }
-                // Again, with the time that is left.
+                // A signal: waits on for the time that is left.
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
                 Err(error) => return Err(QueueError::at("poll")(error)),
             }
@@ -158,14 +160,14 @@ impl<K: Kernel> Queue<K> {
 
     /// Dequeues all that is filled and keeps the newest whole frame.
     fn drain(&mut self) -> Result<(), QueueError> {
-        // A driver that fills faster than we look must not hold us.
+        // Bounded: a driver that fills buffers as fast as they are drained must not keep us here.
         for _ in 0..2 * self.slots.len() {
             match retry(|| self.kernel.dequeue()) {
-                Ok(frame) => self.take(frame)?,
+                Ok(frame) => self.accept(frame)?,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
                 Err(error) => {
                     self.find_lost_buffers();
-                    // A frame is worth more than an error, which will come again.
+                    // The frame comes first; an error that lasts will come again.
                     return if self.current.is_some() { Ok(()) } else { Err(QueueError::at("DQBUF")(error)) };
                 }
             }
@@ -173,7 +175,8 @@ impl<K: Kernel> Queue<K> {
         Ok(())
     }
 
-    fn take(&mut self, frame: Dequeued) -> Result<(), QueueError> {
+    /// Makes a dequeued frame the current one, in place of an older one; a corrupt one is counted and queued again.
+    fn accept(&mut self, frame: Dequeued) -> Result<(), QueueError> {
         let index = frame.index as usize;
         match self.slots.get_mut(index) {
             Some(slot) if slot.in_kernel => slot.in_kernel = false,
@@ -194,6 +197,7 @@ impl<K: Kernel> Queue<K> {
         Ok(())
     }
 
+    /// Whether the driver did not flag the frame as damaged, and each plane has its least bytes within its mapping.
     fn is_whole(&self, frame: &Dequeued) -> bool {
         let memory = &self.slots[frame.index as usize].memory;
         let parts = frame.parts.iter().zip(memory);
@@ -223,7 +227,7 @@ impl<K: Kernel> Queue<K> {
         }
     }
 
-    /// Passes over all that is filled by now, without counting it; nor are frames counted that were dropped until now.
+    /// Discards all frames that are filled by now, and all losses until now: counting begins with the next frame.
     pub fn begin(&mut self) {
         let _ = self.drain();
         self.release();
@@ -246,7 +250,7 @@ impl<K: Kernel> Queue<K> {
     /// Gives a buffer of ours to the kernel.
     fn give(&mut self, index: usize) -> io::Result<()> {
         let given = retry(|| self.kernel.queue(index as u32));
-        // Refused, it may be because the kernel has it.
+        // EINVAL may mean that the kernel has the buffer already.
         self.slots[index].in_kernel = match &given {
             Ok(()) => true,
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => self.is_in_kernel(index).unwrap_or(false),
@@ -259,8 +263,8 @@ impl<K: Kernel> Queue<K> {
         retry(|| self.kernel.query(index as u32)).map(|described| described.in_kernel)
     }
 
-    /// After an error it is unknown whether a buffer was dequeued with it. That its frame is missing shows in the
-    /// next one's number.
+    /// Asks which buffers the kernel still has: a failed dequeue may have taken one all the same. Its frame shows as
+    /// missed by the next one's number.
     fn find_lost_buffers(&mut self) {
         for index in 0..self.slots.len() {
             if self.slots[index].in_kernel {

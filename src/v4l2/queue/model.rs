@@ -1,5 +1,5 @@
-//! A model of the kernel's side of a queue. It knows every buffer's state, breaks down at random where a kernel may, and
-//! panics where its user breaks a rule that a kernel only punishes.
+//! A model of the kernel's side of a queue. It knows every buffer's state, fails at random where a kernel may, and
+//! panics where its user breaks a rule of V4L2.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -58,13 +58,14 @@ pub struct State {
     pub granted: u32,
     clock: Clock,
     buffers: Vec<Buffer>,
+    /// Queued buffers, filled ones included, in the order in which they were queued.
     order: VecDeque<u32>,
     streaming: bool,
     mapped: usize,
     sequence: u32,
     last_handed: Option<u32>,
     pub gone: bool,
-    /// Asked about a buffer, it fails.
+    /// Queries about buffers fail.
     pub mute: bool,
     pub facts: Facts,
 }
@@ -122,6 +123,7 @@ impl Model {
 }
 
 impl State {
+    /// A pseudo-random number (xorshift).
     pub fn random(&mut self) -> u64 {
         self.random ^= self.random << 13;
         self.random ^= self.random >> 7;
@@ -129,11 +131,12 @@ impl State {
         self.random
     }
 
-    pub fn chance(&mut self, of: f64) -> bool {
-        ((self.random() >> 11) as f64 / (1u64 << 53) as f64) < of
+    /// True with this probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        ((self.random() >> 11) as f64 / (1u64 << 53) as f64) < probability
     }
 
-    /// What may come between any call: a signal, or the end of the device.
+    /// Begins any ioctl: fails if the device is gone, or by chance as if a signal had interrupted it.
     fn call(&mut self) -> io::Result<()> {
         if self.gone {
             return error(ENODEV);
@@ -141,6 +144,7 @@ impl State {
         if self.chance(self.chances.interrupted) { error(EINTR) } else { Ok(()) }
     }
 
+    /// Fails by chance, with any of these errors.
     fn refuse(&mut self, errnos: &[i32]) -> io::Result<()> {
         if self.chance(self.chances.refused) {
             let which = self.random() as usize % errnos.len();
@@ -154,7 +158,7 @@ impl State {
         self.buffers.iter().filter(|buffer| **buffer != Buffer::Dequeued).count()
     }
 
-    /// The camera takes a picture, and fills a buffer if it has one.
+    /// A period passes and the camera takes a picture: it fills the oldest empty buffer, if there is one.
     pub fn shoot(&mut self) {
         self.clock.advance_ns(PERIOD_NS);
         self.sequence += 1;
@@ -171,6 +175,7 @@ impl State {
         self.buffers[free as usize] = Buffer::Done { sequence: self.sequence - 1, flagged, used_bytes };
     }
 
+    /// The buffer to dequeue next, if it is filled.
     fn done(&self) -> Option<u32> {
         self.order.front().copied().filter(|index| matches!(self.buffers[*index as usize], Buffer::Done { .. }))
     }
@@ -240,7 +245,7 @@ impl Kernel for Model {
         let Some(index) = state.done() else { return error(EAGAIN) };
         if state.chance(chances.refused) {
             if state.chance(0.5) {
-                // With the buffer.
+                // The error comes with a buffer, as it may from a real driver.
                 state.order.pop_front();
                 state.buffers[index as usize] = Buffer::Dequeued;
             }

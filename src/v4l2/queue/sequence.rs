@@ -9,9 +9,10 @@ pub struct Sequence {
     period_ns: f64,
 }
 
-/// A gap that took less than this part of its time is none: some drivers count a broken frame twice.
+/// Share of its expected time that a gap in the numbers must have taken to be believed: some drivers count a broken
+/// frame twice.
 const CREDIBLE: f64 = 0.65;
-/// How much one frame's distance changes the measured period.
+/// Weight of each new interval in the measured period, a moving average.
 const GAIN: f64 = 0.1;
 
 impl Sequence {
@@ -39,7 +40,7 @@ impl Sequence {
         let Some(passed_ns) = passed_ns.filter(|passed_ns| *passed_ns > 0) else { return gap };
         let passed_ns = passed_ns as f64;
         if gap == 0 {
-            // Not where a pause lies between: a stalled camera does not have another rate.
+            // Longer intervals are pauses: a camera that stalled does not have another rate.
             if passed_ns < 4.0 * self.period_ns {
                 self.period_ns += GAIN * (passed_ns - self.period_ns);
             }
@@ -48,6 +49,7 @@ impl Sequence {
         if passed_ns >= CREDIBLE * f64::from(ahead) * self.period_ns {
             return gap;
         }
+        // The numbers jumped in too short a time: as many frames were lost as fit into it.
         let periods = (passed_ns / self.period_ns).round() as u64;
         periods.saturating_sub(1).min(gap)
     }

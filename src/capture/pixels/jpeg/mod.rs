@@ -25,6 +25,7 @@ pub(super) struct Jpeg {
 }
 
 impl Jpeg {
+    /// Decodes the JPEG in `bytes` into `out` (resized to fit), if it is whole and of the layout's size.
     pub(super) fn decode(&mut self, layout: &Layout, bytes: &[u8], out: &mut ColorImage) -> Result<(), PixelError> {
         let expected = (layout.width as usize, layout.height as usize);
         let found = repair::repair(bytes, &mut self.file).map_err(|fault| PixelError::Jpeg(fault.to_string()))?;

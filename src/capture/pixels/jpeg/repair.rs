@@ -1,4 +1,4 @@
-//! From what a camera sends to a JPEG that is complete and says where it is not.
+//! Copies what a camera sends into a JPEG of which the decoder notices any missing part.
 //!
 //! - What comes before the start marker and after the end is left out, and so are notes and thumbnails.
 //! - Missing Huffman tables are put in.
@@ -28,7 +28,7 @@ mod marker {
     pub const APP14: u8 = 0xEE;
 }
 
-/// Ones, stuffed: more than the decoder reads ahead.
+/// One bits, as stuffed bytes FF 00, which no Huffman table may use as a code: more than the decoder reads ahead.
 const NO_CODE: [u8; 32] = {
     let mut ones = [0; 32];
     let mut at = 0;
@@ -54,7 +54,7 @@ pub(super) enum Fault {
     Restart,
 }
 
-/// Writes a whole JPEG to `file`; returns its columns and rows.
+/// Writes the JPEG in `bytes` to `file`, repaired as above; returns its columns and rows.
 pub(super) fn repair(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize), Fault> {
     let start = bytes.windows(3).position(|three| three == [0xFF, marker::SOI, 0xFF]).ok_or(Fault::NoStart)?;
     let mut rest = without_padding(&bytes[start + 2..]);
@@ -85,11 +85,11 @@ pub(super) fn repair(bytes: &[u8], file: &mut Vec<u8>) -> Result<(usize, usize),
             has_scan = true;
             file.extend(segment);
             let restarts;
-            (rest, restarts) = scan(after, !frame.progressive, file)?;
+            (rest, restarts) = copy_scan(after, !frame.progressive, file)?;
             // One scan for all components: others have units of their own, and no camera sends them.
             if !frame.progressive && segment.get(4) == Some(&frame.components) {
                 let expected = if interval == 0 { 0 } else { frame.units.div_ceil(interval) - 1 };
-                // Some end with one more.
+                // Some cameras end the last interval with a restart, too.
                 if restarts < expected || restarts > expected + usize::from(interval != 0) {
                     return Err(Fault::Restart);
                 }
@@ -126,13 +126,14 @@ struct Frame {
 }
 
 impl Frame {
-    /// Of a segment with its marker; none where it is too short, or says what cannot be.
+    /// Parses a frame header segment with its marker; `None` where it is too short, or a size or sampling is 0.
     fn parse(segment: &[u8]) -> Option<Self> {
         let (&[_, code, _, _, _, height_high, height_low, width_high, width_low, components], sampling) =
             segment.split_first_chunk()?;
         let number = |high, low| usize::from(u16::from_be_bytes([high, low]));
         let (width, height) = (number(width_high, width_low), number(height_high, height_low));
         let sampling = sampling.as_chunks::<3>().0.get(..usize::from(components))?;
+        // Sampling factors are two numbers of 4 bits, across and down; the largest ones make a coded unit.
         let largest = |shift: u8| sampling.iter().map(|&[_, factors, _]| usize::from(factors >> shift & 15)).max();
         // The only component has units of one block.
         let (across, down) = if components == 1 { (1, 1) } else { (largest(4)?, largest(0)?) };
@@ -144,8 +145,8 @@ impl Frame {
     }
 }
 
-/// The next marker in `rest`, whatever comes before it: its code, the segment with the marker, and what follows. `None` if
-/// there is none or it is cut short.
+/// The next marker in `rest`, whatever comes before it: its code, the segment with the marker, and what follows. `None`
+/// if there is none or it is cut short.
 fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let at = rest.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xFF))?;
     let (code, after) = (rest[at + 1], &rest[at + 2..]);
@@ -159,15 +160,16 @@ fn next_segment(rest: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     Some((code, &rest[at..at + 2 + length], following))
 }
 
-/// Copies coded bits up to the next marker that ends them; returns what follows, from that marker on, and the number
-/// of restarts.
-fn scan<'a>(bytes: &'a [u8], baseline: bool, file: &mut Vec<u8>) -> Result<(&'a [u8], usize), Fault> {
+/// Copies coded bits up to the next marker that ends them, with [`NO_CODE`] after each stretch if `sequential`; returns
+/// what follows, from that marker on, and the number of restarts.
+fn copy_scan<'a>(bytes: &'a [u8], sequential: bool, file: &mut Vec<u8>) -> Result<(&'a [u8], usize), Fault> {
     let (mut from, mut at, mut restarts) = (0, 0, 0);
     loop {
         let next = bytes[at..].iter().position(|&byte| byte == 0xFF).map(|found| at + found);
         let code = next.and_then(|next| bytes.get(next + 1).copied());
         let end = next.unwrap_or(bytes.len());
         match code {
+            // A stuffed byte FF 00 is data.
             Some(0) => {
                 at = end + 2;
                 continue;
@@ -180,7 +182,7 @@ fn scan<'a>(bytes: &'a [u8], baseline: bool, file: &mut Vec<u8>) -> Result<(&'a 
             }
             _ => file.extend(&bytes[from..end]),
         }
-        if baseline {
+        if sequential {
             file.extend(NO_CODE);
         }
         match code {

@@ -75,6 +75,7 @@ impl Analysis {
 }
 
 impl RankErrors {
+    /// Compares the approximation `taps` with `kernel`, both of unit sum; `plateau` is the largest tap of the kernel.
     fn between(kernel: &[f64], taps: &[f64], plateau: f64, rank: usize, truncation_error: f64) -> Self {
         let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
         let difference = || kernel.iter().zip(taps).map(|(exact, tap)| tap - exact);

@@ -33,6 +33,7 @@ pub fn error_by_rank(analyses: &[Analysis], size_px: u16, rim: f32) -> Result<St
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
+/// Draws the whole diagram: one curve and one entry of the legend for each aperture.
 fn draw(
     area: &Area,
     analyses: &[Analysis],
@@ -41,8 +42,9 @@ fn draw(
 ) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
     area.fill(&WHITE)?;
     let ranks = analyses.iter().map(|analysis| analysis.truncation_errors.len()).max().unwrap_or(1);
-    let drawn = |error: &f64| Some(error * 100.0).filter(|&percent| percent >= LEAST_PERCENT);
-    let errors = analyses.iter().flat_map(|analysis| analysis.truncation_errors.iter().filter_map(drawn));
+    let visible_percent = |error: &f64| Some(error * 100.0).filter(|&percent| percent >= LEAST_PERCENT);
+    let errors = analyses.iter().flat_map(|analysis| analysis.truncation_errors.iter().filter_map(visible_percent));
+    // Down to a power of ten, and over at least the decade from 10 to 100 %.
     let (low, high) = (10f64.powf(errors.fold(10.0, f64::min).log10().floor()), 100.0);
     let mut chart = ChartBuilder::on(area)
         .caption(
@@ -68,7 +70,7 @@ fn draw(
     for (analysis, color) in analyses.iter().zip(COLORS.iter().cycle()) {
         // Beyond its exact rank a kernel has no error to draw.
         let points: Vec<(f64, f64)> =
-            (1..).map(f64::from).zip(analysis.truncation_errors.iter().map_while(drawn)).collect();
+            (1..).map(f64::from).zip(analysis.truncation_errors.iter().map_while(visible_percent)).collect();
         let line = color.stroke_width(2);
         chart
             .draw_series(LineSeries::new(points, line).point_size(3))?

@@ -6,7 +6,7 @@ use crate::frame::ColorImage;
 
 /// Space around and between the panels, in pixels.
 const MARGIN_PX: usize = 12;
-/// Height of the line of ranks, in pixels.
+/// Height of the line in which the ranks are written, in pixels.
 const LABEL_PX: usize = 26;
 /// Panels are magnified to about this side, in pixels.
 const PANEL_PX: usize = 200;
@@ -58,11 +58,12 @@ pub fn draw(analysis: &Analysis) -> ColorImage {
     sheet.image
 }
 
-/// Black to white for 0 to 1, blue below.
+/// The colour of a tap relative to the plateau: black to white for 0 to 1, blue below 0.
 fn tap_color(tap: f64) -> [u8; 3] {
     if tap < 0.0 {
-        let depth = (-tap / FULL_DIFFERENCE).min(1.0).sqrt();
-        return BLUE.map(|channel| (channel * depth) as u8);
+        // The root lifts faint negative lobes out of the black.
+        let strength = (-tap / FULL_DIFFERENCE).min(1.0).sqrt();
+        return BLUE.map(|channel| (channel * strength) as u8);
     }
     [encode_srgb(tap as f32); 3]
 }
@@ -75,12 +76,14 @@ fn difference_color(difference: f64) -> [u8; 3] {
 
 struct Sheet {
     image: ColorImage,
+    /// Pixels per tap, each way.
     zoom: usize,
+    /// Taps per row and column of a kernel.
     size: usize,
 }
 
 impl Sheet {
-    /// A panel of `size * size` cells with its corner at (`left`, `top`).
+    /// Draws `size * size` colours, row by row, as a panel with its corner at (`left`, `top`).
     fn panel(&mut self, left: usize, top: usize, colors: impl Iterator<Item = [u8; 3]>) {
         for (cell, color) in colors.enumerate() {
             let (column, row) = (cell % self.size, cell / self.size);
@@ -88,9 +91,10 @@ impl Sheet {
         }
     }
 
-    /// A number in the label line, centred over a panel.
+    /// Draws a number in the label line, centred over the panel at `left` that is `panel` pixels wide.
     fn number(&mut self, left: usize, panel: usize, number: usize) {
         let digits = number.to_string();
+        // Three cells of a digit and one of space.
         let advance = 4 * DIGIT_CELL_PX;
         let mut x = left + panel.saturating_sub(digits.len() * advance) / 2;
         let top = LABEL_PX.saturating_sub(5 * DIGIT_CELL_PX);

@@ -27,8 +27,8 @@ use crate::source::options::DEPTH_SCALE;
 
 use preview::preview;
 
-/// Disparities that are tried of a pair of which no more is known.
-const DISPARITIES: u32 = 64;
+/// Disparities that are tried where neither the user nor the calibration says how many.
+const DEFAULT_DISPARITIES: u32 = 64;
 
 /// Find the disparity of a rectified stereo pair, or its depth
 ///
@@ -167,7 +167,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
 }
 
 impl DepthCommand {
-    /// What needs no picture to be refused.
+    /// Refuses options and files that cannot go together, before any picture is read.
     fn check(&self) -> Result<(), CliError> {
         let usage = |text: &str| Err(CliError::Usage(text.to_string()));
         if self.metres && self.calib.is_empty() && self.focal_px.is_none() {
@@ -190,7 +190,8 @@ impl DepthCommand {
         refuse_overwrite([self.out.as_path()].into_iter().chain(self.preview.as_deref()), self.output.force)
     }
 
-    /// How the eyes stand, where that is given, for pictures of `size`, and what rectifies these where that is needed.
+    /// The stereo geometry for pictures of `size`, where options or calibration give it, and the rectifier that raw
+    /// pictures need.
     fn geometry(
         &self,
         size: (u32, u32),
@@ -218,19 +219,20 @@ impl DepthCommand {
         }
     }
 
-    /// How many disparities are searched in pictures `width` px wide: what `--max-disparity` says, else what the calibration
-    /// has `stated`, else [`DISPARITIES`]; never more than fit. A multiple of 16, as the matcher takes them.
+    /// How many disparities are searched in pictures `width` px wide: those of `--max-disparity`, else those that the
+    /// calibration has `stated`, else [`DEFAULT_DISPARITIES`]; at most as many as fit. The matcher needs a multiple
+    /// of 16.
     fn disparity_range(&self, stated: Option<u32>, width: u32, note: &dyn Fn(String)) -> Result<u32, CliError> {
         // A disparity is less than the width.
-        let most = (width.saturating_sub(1) / 16 * 16).min(Settings::MOST_DISPARITIES);
-        if most == 0 {
+        let limit = (width.saturating_sub(1) / 16 * 16).min(Settings::MOST_DISPARITIES);
+        if limit == 0 {
             return Err(CliError::Usage(format!("the pictures are {width} px wide, and matching needs 17 or more")));
         }
         if let Some(asked) = self.max_disparity {
             let rounded = asked.next_multiple_of(16);
-            if rounded > most {
+            if rounded > limit {
                 return Err(CliError::Usage(format!(
-                    "--max-disparity {asked} does not fit pictures {width} px wide: use at most {most}"
+                    "--max-disparity {asked} does not fit pictures {width} px wide: use at most {limit}"
                 )));
             }
             if rounded != asked {
@@ -240,11 +242,11 @@ impl DepthCommand {
         }
         let (wanted, whose) = match stated {
             Some(stated) => (stated, "the calibration's"),
-            None => (DISPARITIES, "assumed: --max-disparity says how many"),
+            None => (DEFAULT_DISPARITIES, "assumed: --max-disparity says how many"),
         };
-        let tried = wanted.min(most);
+        let tried = wanted.min(limit);
         if tried < wanted {
-            note(format!("{wanted} disparities ({whose}), and at most {most} can be tried: what is nearer is missed"));
+            note(format!("{wanted} disparities ({whose}), and at most {limit} can be tried: what is nearer is missed"));
         } else {
             note(format!("{tried} disparities ({whose})"));
         }
@@ -258,13 +260,13 @@ fn luma_of(color: &ColorImage) -> GrayImage {
     luma
 }
 
-/// Tells how much of the depth a PNG cannot hold.
+/// Notes how many percent of the pixels are farther than a 16-bit PNG can hold.
 fn note_what_is_too_far(out: &Path, depth: &DepthMap, note: &dyn Fn(String)) -> Result<(), CliError> {
-    let most_m = f32::from(u16::MAX) / DEPTH_SCALE;
-    let beyond = depth.metres.iter().filter(|&&metres| metres > most_m).count();
+    let limit_m = f32::from(u16::MAX) / DEPTH_SCALE;
+    let beyond = depth.metres.iter().filter(|&&metres| metres > limit_m).count();
     if still::map_format(out)? == MapFormat::Png && beyond > 0 {
         let percent = 100.0 * beyond as f32 / depth.metres.len() as f32;
-        note(format!("{percent:.1} % lies beyond {most_m:.1} m, which a .png cannot hold: unknown there; a .pfm can"));
+        note(format!("{percent:.1} % lies beyond {limit_m:.1} m, which a .png cannot hold: unknown there; a .pfm can"));
     }
     Ok(())
 }

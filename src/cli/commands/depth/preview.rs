@@ -2,8 +2,8 @@
 
 use crate::frame::{ColorImage, DepthMap, DisparityMap};
 
-/// The colours span the disparities but for this share at either end, so that a stray one does not flatten the rest.
-const LEFT_OUT: f32 = 0.01;
+/// The colours span the disparities without this share at either end, so that outliers do not take the contrast.
+const OUTLIER_SHARE: f32 = 0.01;
 
 /// Coefficients of red, green and blue in powers of the value, 0 to 1: A. Mikhailov's polynomial for his colour map
 /// Turbo, from dark blue by green and yellow to dark red (Google AI blog, 2019).
@@ -13,12 +13,12 @@ const TURBO: [[f32; 6]; 3] = [
     [0.106_673_3, 12.641_946, -60.582_05, 110.362_77, -89.903_11, 27.348_25],
 ];
 
-/// Near is red, far is blue, unknown is black.
+/// Colours a disparity map: near is red, far is blue, unknown is black.
 pub fn preview(disparity: &DisparityMap) -> ColorImage {
     let mut known: Vec<f32> = disparity.px.iter().copied().filter(|&px| DepthMap::is_known(px)).collect();
     known.sort_unstable_by(f32::total_cmp);
-    let at = |share: f32| known.get((share * known.len() as f32) as usize).copied().unwrap_or(0.0);
-    let (far_px, near_px) = (at(LEFT_OUT), at(1.0 - LEFT_OUT));
+    let quantile = |share: f32| known.get((share * known.len() as f32) as usize).copied().unwrap_or(0.0);
+    let (far_px, near_px) = (quantile(OUTLIER_SHARE), quantile(1.0 - OUTLIER_SHARE));
     let span_px = (near_px - far_px).max(f32::MIN_POSITIVE);
     let mut image = ColorImage::new(disparity.width, disparity.height);
     for (pixel, &px) in image.rgb.as_chunks_mut::<3>().0.iter_mut().zip(&disparity.px) {

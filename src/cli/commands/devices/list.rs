@@ -13,9 +13,9 @@ use crate::v4l2::modes::{FormatModes, modes};
 use crate::v4l2::node::{self, Kind, Node};
 use crate::v4l2::{Device, controls::Value};
 
-/// What is told about a device.
+/// What is shown of a device.
 #[derive(Serialize)]
-struct Told {
+struct DeviceInfo {
     #[serde(flatten)]
     node: Node,
     holders: Vec<Holder>,
@@ -24,13 +24,14 @@ struct Told {
     controls: Option<Vec<Control>>,
 }
 
+/// All devices shown, in groups.
 #[derive(Serialize)]
 struct List {
-    cameras: Vec<Told>,
-    virtual_cameras: Vec<Told>,
-    /// Only what was asked for by name.
+    cameras: Vec<DeviceInfo>,
+    virtual_cameras: Vec<DeviceInfo>,
+    /// Neither of both: shown only when asked for by name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    others: Vec<Told>,
+    others: Vec<DeviceInfo>,
 }
 
 /// Runs the command.
@@ -40,7 +41,7 @@ struct List {
 pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
     let list = match &command.device {
         None => List::of(node::nodes(), false, command.controls),
-        Some(name) => List::of(named(name)?, true, command.controls),
+        Some(name) => List::of(find(name)?, true, command.controls),
     };
     if command.json {
         // Numbers and texts always have a form in JSON.
@@ -53,8 +54,9 @@ pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
     print(list.to_string().as_bytes())
 }
 
-/// The node that is meant by a name, also one that gives no pictures now.
-fn named(name: &str) -> Result<Vec<Node>, CliError> {
+/// The node that `name` means (see [`node::resolve`]), else all whose card's name contains it: these may be nodes that
+/// give no pictures.
+fn find(name: &str) -> Result<Vec<Node>, CliError> {
     let nodes = node::nodes();
     let path = match node::resolve(name) {
         Ok(path) => path,
@@ -65,13 +67,14 @@ fn named(name: &str) -> Result<Vec<Node>, CliError> {
             return if found.is_empty() { Err(error.into()) } else { Ok(found) };
         }
     };
-    // It may be a link.
-    let meant = path.canonicalize().unwrap_or_else(|_| path.clone());
-    let found: Vec<Node> = nodes.into_iter().filter(|node| node.path == meant).collect();
+    // Nodes are listed by their own paths, and this may be a link.
+    let real_path = path.canonicalize().unwrap_or_else(|_| path.clone());
+    let found: Vec<Node> = nodes.into_iter().filter(|node| node.path == real_path).collect();
     if found.is_empty() { Err(CliError::NotVideo(path)) } else { Ok(found) }
 }
 
 impl List {
+    /// Sorts nodes into groups; `asked_for` by name are even those that are no cameras.
     fn of(nodes: Vec<Node>, asked_for: bool, with_controls: bool) -> Self {
         let mut list = Self { cameras: Vec::new(), virtual_cameras: Vec::new(), others: Vec::new() };
         for node in nodes {
@@ -83,15 +86,15 @@ impl List {
                 _ if asked_for => &mut list.others,
                 _ => continue,
             };
-            group.push(Told::of(node, with_controls));
+            group.push(DeviceInfo::of(node, with_controls));
         }
         list
     }
 }
 
-impl Told {
+impl DeviceInfo {
     fn of(node: Node, with_controls: bool) -> Self {
-        // Before this program is one of them.
+        // Before this program opens it and is one of them.
         let holders = holders(&node.path);
         let device = Device::open(&node.path).ok();
         let formats = device.as_ref().and_then(|device| modes(device).ok()).unwrap_or_default();
@@ -108,24 +111,25 @@ impl std::fmt::Display for List {
         for (heading, group) in groups.iter().filter(|(_, group)| !group.is_empty()) {
             writeln!(f, "{}{heading}", if first { "" } else { "\n" })?;
             first = false;
-            for told in *group {
-                f.write_str(&told.lines())?;
+            for device in *group {
+                f.write_str(&device.lines())?;
             }
         }
         Ok(())
     }
 }
 
-impl Told {
+impl DeviceInfo {
+    /// The device for people: a line of names, then indented its problem, links, state, holders, formats and controls.
     fn lines(&self) -> String {
         let Self { node, holders, formats, controls } = self;
         let mut out = String::new();
         let card = if node.card.is_empty() { "no name" } else { &node.card };
-        let mut about = vec![node.driver.clone(), node.bus.clone()];
-        about.extend(node.usb.as_ref().map(|usb| format!("USB {}, {} Mbit/s", usb.id, usb.mbit_per_s)));
-        about.retain(|part| !part.is_empty());
+        let mut attachment = vec![node.driver.clone(), node.bus.clone()];
+        attachment.extend(node.usb.as_ref().map(|usb| format!("USB {}, {} Mbit/s", usb.id, usb.mbit_per_s)));
+        attachment.retain(|part| !part.is_empty());
         // Writing to a string does not fail.
-        let _ = writeln!(out, "  {}  {card}  ({})", node.path.display(), about.join(", "));
+        let _ = writeln!(out, "  {}  {card}  ({})", node.path.display(), attachment.join(", "));
         let mut line = |text: String| {
             let _ = writeln!(out, "    {text}");
         };
@@ -142,9 +146,9 @@ impl Told {
             let names: Vec<_> = holders.iter().map(ToString::to_string).collect();
             line(format!("opened by {}", names.join(", ")));
         }
-        let (formats, others): (Vec<_>, Vec<_>) = formats.iter().partition(|format| format.fourcc.content().is_some());
-        let width = formats.iter().map(|format| format.fourcc.to_string().len()).max().unwrap_or_default();
-        for format in formats {
+        let (readable, others): (Vec<_>, Vec<_>) = formats.iter().partition(|format| format.fourcc.content().is_some());
+        let width = readable.iter().map(|format| format.fourcc.to_string().len()).max().unwrap_or_default();
+        for format in readable {
             line(format!("{:width$}  {}", format.fourcc.to_string(), format.sizes));
         }
         if !others.is_empty() {
@@ -158,7 +162,7 @@ impl Told {
     }
 }
 
-/// What a virtual camera is now: some tell it only while somebody writes.
+/// The state of a virtual camera, told by its capabilities: with `exclusive_caps=1` these change with its first writer.
 fn state(node: &Node) -> &'static str {
     match (node.captures, node.outputs) {
         (true, true) => "can be written to and read from",
@@ -168,6 +172,7 @@ fn state(node: &Node) -> &'static str {
     }
 }
 
+/// A control as `name=value  (accepted values), flags`.
 fn control_line(control: &Control) -> String {
     let Control { name, value, minimum, maximum, step, default, items, .. } = control;
     let mut line = name.clone();
@@ -177,7 +182,7 @@ fn control_line(control: &Control) -> String {
             _ => write!(line, "={value}"),
         };
     }
-    let takes = match control.kind {
+    let accepted = match control.kind {
         ControlKind::Integer | ControlKind::Integer64 if *step > 1 => {
             format!("{minimum} to {maximum} in steps of {step}, default {default}")
         }
@@ -192,11 +197,11 @@ fn control_line(control: &Control) -> String {
         ControlKind::Bitmask => format!("bits of {maximum:#x}"),
         ControlKind::Compound => "a table".to_owned(),
     };
-    let _ = write!(line, "  ({takes})");
-    for (is, word) in
+    let _ = write!(line, "  ({accepted})");
+    for (is_set, word) in
         [(control.read_only, "read-only"), (control.inactive, "inactive"), (control.grabbed, "not while streaming")]
     {
-        if is {
+        if is_set {
             let _ = write!(line, ", {word}");
         }
     }

@@ -11,19 +11,19 @@ use crate::v4l2::{Device, controls::Control};
 
 pub const ABOUT: &str = "camera";
 
-/// USB 2 carries no more.
+/// The rate of USB 2 (high speed).
 const USB2_MBIT_PER_S: f32 = 480.0;
 
 /// Drivers of sensors that give raw data, which only libcamera makes pictures of.
 const RAW_DRIVERS: [&str; 4] = ["isys", "intel-ipu6-isys", "intel-ipu7-isys", "ipu3-cio2"];
 
-/// What there is to say about cameras.
-pub fn look(nodes: &[Node], system: &System) -> Vec<Finding> {
+/// Checks the cameras, and the nodes that could be cameras.
+pub fn findings(nodes: &[Node], system: &System) -> Vec<Finding> {
     let (raw, cameras): (Vec<&Node>, Vec<&Node>) = nodes
         .iter()
         .filter(|node| node.kind == Kind::Capture)
         .partition(|node| RAW_DRIVERS.contains(&node.driver.as_str()));
-    let mut findings: Vec<Finding> = cameras.iter().flat_map(|node| camera(node)).collect();
+    let mut findings: Vec<Finding> = cameras.iter().flat_map(|node| check_camera(node)).collect();
     for node in nodes.iter().filter(|node| node.denied && node.kind == Kind::Other) {
         findings.push(denied(ABOUT, node));
     }
@@ -47,8 +47,9 @@ pub fn denied(about: &'static str, node: &Node) -> Finding {
     Finding::missing(about, format!("{node}: this user may not open it"), fix)
 }
 
-fn camera(node: &Node) -> Vec<Finding> {
-    // Before this program is one of them.
+/// Checks one camera: whether it opens, its best mode, its USB connection, who else has it open, its rate in the dark.
+fn check_camera(node: &Node) -> Vec<Finding> {
+    // Before this program opens it and is one of them.
     let holders = holders(&node.path);
     let device = match Device::open(&node.path) {
         Ok(device) => device,
@@ -57,7 +58,7 @@ fn camera(node: &Node) -> Vec<Finding> {
         }
     };
     let modes = modes(&device).unwrap_or_default();
-    let mut findings = vec![Finding::good(ABOUT, format!("{node}: {}", best(&modes)))];
+    let mut findings = vec![Finding::good(ABOUT, format!("{node}: {}", best_mode(&modes)))];
     if let Some(usb) = &node.usb {
         let mbit_per_s = usb.mbit_per_s;
         findings.push(if mbit_per_s < USB2_MBIT_PER_S {
@@ -79,7 +80,7 @@ fn camera(node: &Node) -> Vec<Finding> {
     findings
 }
 
-/// A camera that exposes longer than its rate allows gives fewer frames in the dark.
+/// Notes that the camera lowers its frame rate in the dark, so as to expose longer, if it is set to do so.
 fn low_light(node: &Node, controls: &[Control]) -> Option<Finding> {
     let control = controls::find(controls, LOW_LIGHT)?;
     (control.value == Some(Value::Number(1)) && !control.inactive).then(|| {
@@ -88,11 +89,12 @@ fn low_light(node: &Node, controls: &[Control]) -> Option<Finding> {
     })
 }
 
-/// The largest picture at 30 frames per second or nearly that; the fastest one where there is none.
-fn best(modes: &[FormatModes]) -> String {
+/// Describes the largest mode that moves smoothly, else the fastest one.
+fn best_mode(modes: &[FormatModes]) -> String {
+    /// From this rate on motion looks smooth; it takes in the 25 and 29.97 fps of some cameras.
     const SMOOTH_FPS: f64 = 24.0;
-    let read = modes.iter().filter(|format| format.fourcc.content() == Some(Content::Color));
-    let all = read.flat_map(|format| sizes(&format.sizes).into_iter().map(move |size| (format, size)));
+    let readable = modes.iter().filter(|format| format.fourcc.content() == Some(Content::Color));
+    let all = readable.flat_map(|format| sizes(&format.sizes).into_iter().map(move |size| (format, size)));
     let rank = |(_, (size_px, fastest)): &(&FormatModes, ((u32, u32), Option<Interval>))| {
         let fps = fastest.map_or(0.0, Interval::fps);
         let pixels = u64::from(size_px.0) * u64::from(size_px.1);
@@ -107,7 +109,7 @@ fn best(modes: &[FormatModes]) -> String {
     }
 }
 
-/// Each size with its shortest interval.
+/// Each size with its shortest frame interval, where that is known; of a range of sizes only the largest.
 fn sizes(sizes: &Sizes) -> Vec<((u32, u32), Option<Interval>)> {
     let fastest = |rates: &Rates| match rates {
         Rates::Unknown => None,

@@ -10,13 +10,13 @@ use crate::look::{Effect, Look};
 const BLUR: &str = "blur";
 const PROGRAMS: &str = "programs";
 
-/// What there is to say about the blur and about other programs.
-pub fn look() -> Vec<Finding> {
-    vec![blur(), ffmpeg()]
+/// Checks what runs the blur, and whether other programs are installed.
+pub fn findings() -> Vec<Finding> {
+    vec![check_blur(), check_ffmpeg()]
 }
 
-/// What `--backend auto` gives here.
-fn blur() -> Finding {
+/// Which executor `--backend auto` chooses here.
+fn check_blur() -> Finding {
     /// Any size will do.
     const SIZE: (u32, u32) = (64, 64);
     let settings = Look::plain(Effect::Blur).settings(SIZE, false);
@@ -36,11 +36,12 @@ fn blur() -> Finding {
     }
 }
 
-fn ffmpeg() -> Finding {
+/// The version of ffmpeg, if it is installed.
+fn check_ffmpeg() -> Finding {
     let output = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).stderr(Stdio::null()).output();
     let text = output.ok().filter(|output| output.status.success()).map(|output| output.stdout);
-    let first = text.as_deref().and_then(|text| text.split(|byte| *byte == b'\n').next());
-    match first {
+    let first_line = text.as_deref().and_then(|text| text.split(|byte| *byte == b'\n').next());
+    match first_line {
         Some(line) => {
             let line = String::from_utf8_lossy(line);
             Finding::good(PROGRAMS, line.split(" Copyright").next().unwrap_or_default().to_owned())

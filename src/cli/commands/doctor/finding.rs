@@ -1,4 +1,4 @@
-//! One thing that was looked at, and what to do about it.
+//! The result of one check, and what to do about it.
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ pub enum Level {
     Missing,
 }
 
-/// One thing that was looked at.
+/// The result of one check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// What it is about.

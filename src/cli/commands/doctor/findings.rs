@@ -10,36 +10,38 @@ use super::{CliError, cameras, computing, loopback};
 use crate::cli::terminal::print;
 use crate::v4l2::node::nodes;
 
+/// The JSON form of everything that was found.
 #[derive(Serialize)]
-struct Told<'a> {
+struct Report<'a> {
     ready: bool,
     system: &'a System,
     findings: &'a [Finding],
 }
 
-/// Looks at everything, and tells it.
+/// Runs all checks and prints the findings.
 ///
 /// # Errors
 /// Something essential is missing.
 pub fn run(json: bool) -> Result<(), CliError> {
-    let system = System::look();
+    let system = System::detect();
     let nodes = nodes();
-    let mut findings = cameras::look(&nodes, &system);
-    findings.extend(loopback::look(&nodes, &system));
-    findings.extend(computing::look());
+    let mut findings = cameras::findings(&nodes, &system);
+    findings.extend(loopback::findings(&nodes, &system));
+    findings.extend(computing::findings());
     let missing: Vec<&str> = [cameras::ABOUT, loopback::ABOUT]
         .into_iter()
         .filter(|about| findings.iter().any(|f| f.about == *about && f.level == Level::Missing))
         .collect();
     if json {
-        let told = Told { ready: missing.is_empty(), system: &system, findings: &findings };
-        print((serde_json::to_string_pretty(&told).unwrap_or_default() + "\n").as_bytes())?;
+        let report = Report { ready: missing.is_empty(), system: &system, findings: &findings };
+        print((serde_json::to_string_pretty(&report).unwrap_or_default() + "\n").as_bytes())?;
     } else {
         print(text(&system, &findings).as_bytes())?;
     }
     if missing.is_empty() { Ok(()) } else { Err(CliError::NotReady(missing.join(" and no "))) }
 }
 
+/// The findings for people, each group under a heading.
 fn text(system: &System, findings: &[Finding]) -> String {
     let mut out = system.to_string();
     let mut about = "";

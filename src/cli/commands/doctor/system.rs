@@ -17,9 +17,9 @@ pub struct System {
     pub distribution: String,
     /// How the desktop session shows windows: wayland, x11, tty, or none.
     pub session: String,
-    /// What shuts this program in, if anything does.
+    /// The sandbox or container that this program runs in, if any.
     pub sandbox: Option<String>,
-    /// Whether the firmware lets signed code only into the kernel. Nothing where it does not tell.
+    /// Whether Secure Boot is on: then the kernel takes signed modules only. `None` where the firmware does not tell.
     pub secure_boot: Option<bool>,
     /// Whether PipeWire, which many programs get their cameras from, has a socket in this session.
     pub pipewire: bool,
@@ -28,17 +28,18 @@ pub struct System {
 }
 
 impl System {
-    /// Looks at files; starts nothing.
-    pub fn look() -> Self {
+    /// Reads files and environment variables; starts no process.
+    pub fn detect() -> Self {
         Self {
             bokehcam: env!("CARGO_PKG_VERSION"),
-            kernel: line("/proc/sys/kernel/osrelease"),
+            kernel: trimmed("/proc/sys/kernel/osrelease"),
             distribution: distribution(&fs::read_to_string("/etc/os-release").unwrap_or_default()),
             session: std::env::var("XDG_SESSION_TYPE").unwrap_or_else(|_| "none".into()),
             sandbox: sandbox(),
             secure_boot: secure_boot(),
             pipewire: pipewire(),
-            portal: runs("xdg-desktop-por"),
+            // xdg-desktop-portal, as cut by the kernel.
+            portal: is_running("xdg-desktop-por"),
         }
     }
 }
@@ -58,7 +59,7 @@ impl fmt::Display for System {
     }
 }
 
-fn line(path: &str) -> String {
+fn trimmed(path: &str) -> String {
     fs::read_to_string(path).map_or_else(|_| "unknown".into(), |text| text.trim().to_owned())
 }
 
@@ -71,22 +72,23 @@ fn distribution(os_release: &str) -> String {
 }
 
 fn sandbox() -> Option<String> {
-    let there = |path: &str| Path::new(path).exists();
+    let exists = |path: &str| Path::new(path).exists();
     let variable = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
-    if there("/.flatpak-info") {
+    if exists("/.flatpak-info") {
         Some("Flatpak".into())
     } else if variable("SNAP_NAME").is_some() {
         Some("Snap".into())
-    } else if there("/run/.containerenv") || there("/.dockerenv") {
+    } else if exists("/run/.containerenv") || exists("/.dockerenv") {
         Some("container".into())
     } else {
-        // systemd tells its services so.
+        // Set by systemd-nspawn, LXC and others for what runs in them.
         variable("container")
     }
 }
 
 fn secure_boot() -> Option<bool> {
     if !Path::new("/sys/firmware/efi").exists() {
+        // Booted without UEFI.
         return Some(false);
     }
     let variable = "/sys/firmware/efi/efivars/SecureBoot-8be4df61-93ca-11d2-aa0d-00e098032b8c";
@@ -99,12 +101,12 @@ fn pipewire() -> bool {
     folder.is_some_and(|folder| Path::new(&folder).join("pipewire-0").exists())
 }
 
-/// Whether a process has this name, as the system cuts it.
-fn runs(name: &str) -> bool {
+/// Whether a process has this name, which the kernel cuts to 15 bytes.
+fn is_running(name: &str) -> bool {
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     processes.into_iter().any(|process| {
-        let number = process.file_name().to_str().is_some_and(|name| name.bytes().all(|b| b.is_ascii_digit()));
-        number && fs::read_to_string(process.path().join("comm")).is_ok_and(|comm| comm.trim_end() == name)
+        let is_process = process.file_name().to_str().is_some_and(|name| name.bytes().all(|b| b.is_ascii_digit()));
+        is_process && fs::read_to_string(process.path().join("comm")).is_ok_and(|comm| comm.trim_end() == name)
     })
 }
 

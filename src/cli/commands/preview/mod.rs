@@ -55,13 +55,13 @@ pub struct PreviewCommand {
     parts: Streaming,
 }
 
-/// Runs the command; `given` is what was said of other things than the look.
+/// Runs the command; `given` is for warnings and for the commands that the window composes.
 ///
 /// # Errors
 /// The options do not fit each other, there is no display, or there never was a frame.
 pub fn run(command: &PreviewCommand, global: &Global, given: Given) -> Result<(), CliError> {
     let mut parts = command.parts.clone();
-    // Who looks for a look does so for longer than a recording takes.
+    // Finding a look takes longer than most recordings last.
     parts.frames.repeat = true;
     show(command.source.as_deref().unwrap_or_default(), &command.to, &command.window, &parts, (global, given))
 }
@@ -97,9 +97,9 @@ pub fn show(
         None => Err(usage("--to: beside a window, use a virtual camera, a folder or a file")),
     });
     let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
-    // As if there were depth: what the source lacks is seen when it is open.
     sinks::try_report(stream.report.as_deref())?;
     let look = look::look(&parts.blur, &computing.quality)?;
+    // As if there were depth: what the source lacks is known only when it is open, and a window may open others.
     let look = source::fitting_look(&look, &parts.blur.depth, true)?;
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
     let look = Look { effect, ..look };
@@ -110,7 +110,7 @@ pub fn show(
     system.out_size = stream.out_size.map(|size| (size.width, size.height));
     system.force = output.force;
     let state = first_state(look.clone(), name, window, stream.mirror);
-    let closes = frames.frames.is_some() || !frames.repeat;
+    let close_at_end = frames.frames.is_some() || !frames.repeat;
     let stop = terminal::stop_flag()?;
     let ended = window::show(Preview {
         state,
@@ -125,7 +125,7 @@ pub fn show(
             folder: window.save_to.clone().unwrap_or_else(pictures_folder),
         },
         device: device.clone(),
-        close_at_end: closes,
+        close_at_end,
         memory: file::state_folder().map(|folder| folder.join("window.toml")),
         stop,
     })?;
@@ -137,11 +137,12 @@ pub fn show(
         terminal::say(&report.to_string());
     }
     match ended.lost {
-        Some(why) if ended.report.is_none() || closes => Err(CliError::NoFrames(why)),
+        Some(why) if ended.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
         _ => ended.unwritten.map_or(written, |why| Err(CliError::Unwritten(why))),
     }
 }
 
+/// What the window shows first.
 fn first_state(look: Look, source: &str, window: &Window, mirror: bool) -> State {
     let mut state = State::new(look, source.to_owned());
     state.shown = window.show;
@@ -154,7 +155,7 @@ fn first_state(look: Look, source: &str, window: &Window, mirror: bool) -> State
     state
 }
 
-/// Where people keep pictures, else here.
+/// The user's folder of pictures, else the current folder.
 fn pictures_folder() -> PathBuf {
     let home = std::env::var_os("HOME").map(PathBuf::from);
     let named = std::env::var_os("XDG_PICTURES_DIR").map(PathBuf::from);

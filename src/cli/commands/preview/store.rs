@@ -13,11 +13,11 @@ use crate::look::presets::Preset;
 use crate::look::{Look, Patch};
 use crate::preview::services::{SettingsStore, Switch};
 
-/// The settings file, and what the command line said.
+/// The settings file, and what the command line gave.
 pub(super) struct FileStore {
     /// The settings file, where one was chosen.
     pub chosen: Option<PathBuf>,
-    /// What was said besides the look.
+    /// Of the command line, what the window does not state by itself.
     pub given: Given,
 }
 
@@ -40,14 +40,15 @@ impl SettingsStore for FileStore {
         let mut switches = switches.to_vec();
         let is_new = |(name, _): &&Switch| !switches.iter().any(|(other, _)| other == name);
         let given: Vec<Switch> = self.given.switches.iter().filter(is_new).cloned().collect();
-        // Controls of the camera come last.
+        // The window's own switches override those of the command line; controls of the camera come last.
         let at = switches.iter().position(|(name, _)| name == "control").unwrap_or(switches.len());
         switches.splice(at..at, given);
-        let unusual = Patch::of(look).beside(&Patch::of(&Look::default())).values();
-        let says = |value: &Value| unusual.contains(value) || self.given.behind.iter().any(|name| name == value.0);
-        let flags: Vec<Value> = Patch::of(look).values().into_iter().filter(says).collect();
+        let changed = Patch::of(look).beside(&Patch::of(&Look::default())).values();
+        // A default is left out, unless another layer (see `Given::behind`) would set the value instead.
+        let is_stated = |value: &Value| changed.contains(value) || self.given.behind.iter().any(|name| name == value.0);
+        let flags: Vec<Value> = Patch::of(look).values().into_iter().filter(is_stated).collect();
         let command = command_line::equivalent(source, outputs, &flags, &switches);
-        // Whoever reads it may be gone.
+        // A closed standard output is no reason to fail.
         let _ = print(format!("{command}\n").as_bytes());
         command
     }

@@ -1,4 +1,4 @@
-//! `render --debug-dir`: a blur from within, every intermediate as a picture, and the plan in numbers.
+//! `render --debug-dir`: every intermediate result of a blur as a picture, and its plan in numbers.
 
 use std::fs;
 use std::io;
@@ -21,7 +21,7 @@ use crate::optics::CocField;
 use crate::pipeline::still::{Depth, prepared};
 use crate::recording::still;
 
-/// The file of numbers, which is always there.
+/// The file of numbers, which is always written, even where nothing is blurred.
 pub const PLAN: &str = "plan.json";
 
 /// How the picture was blurred.
@@ -64,15 +64,17 @@ struct BinEntry {
     /// Largest radius of its filters, in bin pixels: white in the picture of the radius.
     max_radius_px: f32,
     near: bool,
+    /// Which of the executor's buffers it uses.
     slot: usize,
     /// Whether anything was in it; if not, its passes were left out.
     present: bool,
-    /// What belongs to it by more than half: the share of the picture, and the ranges of CoC and of depth.
+    /// The pixels that are in this bin by more than half: their share of the picture, their ranges of CoC and depth.
     picture_share: f32,
     content_coc_px: Option<Range>,
     content_depth_m: Option<Range>,
 }
 
+/// Lowest and highest value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct Range(f32, f32);
 
@@ -85,8 +87,8 @@ impl Range {
     }
 }
 
-/// The blurred picture, and what blurred it, once everything in between is in the folder; with `force`, files of the
-/// same names are overwritten.
+/// Blurs a picture on the CPU and writes every intermediate result into the folder `dir`; with `force`, files of the
+/// same names are overwritten. Returns the blurred picture and a description of the executor.
 ///
 /// # Errors
 /// As without a folder; the folder or a file in it cannot be written, or exists and may not be overwritten.
@@ -98,7 +100,7 @@ pub fn blurred(
     (dir, force): (&Path, bool),
 ) -> Result<(ColorImage, String), CliError> {
     let size = color.size();
-    let mut inside = Inside { pictures: Vec::new(), plan: PlanFile::of(size) };
+    let mut output = DebugOutput { pictures: Vec::new(), plan: PlanFile::of(size) };
     let mut result = ColorImage::default();
     match look.settings(size, false) {
         None => result = color,
@@ -111,22 +113,21 @@ pub fn blurred(
             let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
             let (coc, depth) = prepared(look, &color, depth)?;
             bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
-            inside.look(&bokeh, &color, depth.as_ref(), &coc);
+            output.collect(&bokeh, &color, depth.as_ref(), &coc);
         }
     }
-    inside.write(dir, force)?;
-    let by = inside.plan.executor;
-    Ok((result, by))
+    output.write(dir, force)?;
+    Ok((result, output.plan.executor))
 }
 
-/// What is to be written.
-struct Inside {
+/// The pictures, by file name, and the numbers that are to be written.
+struct DebugOutput {
     pictures: Vec<(String, ColorImage)>,
     plan: PlanFile,
 }
 
 impl PlanFile {
-    /// Of a picture that is not blurred.
+    /// The plan of a picture that is not blurred.
     fn of(size: (u32, u32)) -> Self {
         Self {
             size,
@@ -145,16 +146,16 @@ impl PlanFile {
     }
 }
 
-impl Inside {
+impl DebugOutput {
     /// Collects everything about the frame that an executor has just blurred.
-    fn look(&mut self, bokeh: &CpuBokeh, color: &ColorImage, depth: Option<&DepthMap>, field: &CocField) {
+    fn collect(&mut self, bokeh: &CpuBokeh, color: &ColorImage, depth: Option<&DepthMap>, field: &CocField) {
         let (plan, width) = (bokeh.plan(), color.width as usize);
-        let of_pixels = |k: usize| (k % width, k / width);
+        let position = |k: usize| (k % width, k / width);
         let scene = bokeh.scene(color, depth, field, false);
         let coc_px: Vec<f32> = scene.iter().map(|pixel| pixel[3]).collect();
         let range = Range::of(coc_px.iter().copied());
         let full_px = range.map_or(0.0, |Range(low, high)| high.max(-low));
-        let still = (0..scene.len()).map(|k| f32::from(u8::from(bokeh.is_still(of_pixels(k)))));
+        let still = (0..scene.len()).map(|k| f32::from(u8::from(bokeh.is_still(position(k)))));
         let still_share = still.clone().sum::<f32>() / scene.len().max(1) as f32;
         let lens = match field {
             CocField::Depth(lens) => Some(lens),
@@ -183,18 +184,19 @@ impl Inside {
         if bokeh.filled() {
             let mut behind = bokeh.scene(color, depth, field, true);
             self.add("behind_coc", coc(width, behind.iter().map(|pixel| pixel[3]), full_px));
+            // From CoC to full coverage, as `light` takes it.
             behind.iter_mut().for_each(|pixel| pixel[3] = 1.0);
             self.add("behind", light(width, &behind, plan.expansion, 1));
             self.add("hidden", grey(width, coc_px.iter().map(|&coc_px| bokeh.hidden(coc_px)), 1.0));
         }
         for (k, bin) in plan.bins.iter().enumerate() {
-            self.look_at(bokeh, k, bin);
+            self.collect_bin(bokeh, k, bin);
             self.plan.bins.push(bin_entry(bokeh, (k, bin), &coc_px, depth, field));
         }
     }
 
-    /// One bin before and after its filters.
-    fn look_at(&mut self, bokeh: &CpuBokeh, k: usize, bin: &Bin) {
+    /// Collects the pictures of bin `k` before and after its filters, and of its filter radii.
+    fn collect_bin(&mut self, bokeh: &CpuBokeh, k: usize, bin: &Bin) {
         let plan = bokeh.plan();
         let mut show = |name: &str, pixels: &[[f32; 4]]| {
             let coverage = pixels.iter().map(|pixel| pixel[3]);
@@ -204,6 +206,7 @@ impl Inside {
             self.add(&format!("{name}_{k}"), grey(bin.width, coverage, 1.0));
         };
         show("bin", &bokeh.probe(Probe::Bin(k)));
+        // A gather blurs straight into the picture, without a filtered bin.
         if plan.compositing != Compositing::Gather {
             show("blur", &bokeh.probe(Probe::Blur(k)));
             let radius = grey(bin.width, bokeh.radius_px(k).into_iter(), bin.max_radius_px);

@@ -76,7 +76,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     let sources = sources(command);
     for source in &sources {
         refuse_source("--out", &command.out, source)?;
-        // Its files are called as they must be.
+        // The files in that folder have fixed names, of which the source may have one.
         if let Some(dir) = command.debug_dir.as_ref().filter(|_| command.output.force)
             && source.parent().is_some_and(|folder| place::resolved(folder) == place::resolved(dir))
         {
@@ -93,11 +93,11 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     command.warn(&look, color.size(), depth.as_ref(), given);
     let computing = command.computing.choice();
     make_folder_of(&command.out)?;
-    let (result, by) = match &command.debug_dir {
+    let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
         None => pipeline::still::blur(&look, color, depth, &computing)?,
     };
-    // Its thumbnail would show what the blur hides.
+    // The thumbnail in the photo's metadata would show what the blur hides.
     let mut extras = extras.without_thumbnail();
     if still::photo_format(&command.out)? == PhotoFormat::Jpeg {
         extras = extras.for_jpeg();
@@ -107,13 +107,13 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
         if !extras.left_behind.is_empty() {
             terminal::say(&format!("note: not in {}: {}", command.out.display(), extras.left_behind.join(", ")));
         }
-        terminal::say(&format!("{}: written ({by})", command.out.display()));
+        terminal::say(&format!("{}: written ({executor})", command.out.display()));
     }
     Ok(())
 }
 
 impl RenderCommand {
-    /// Says what has no effect, and what cannot be meant.
+    /// Warns of settings without effect, and of a focus outside the depth of the picture.
     fn warn(&self, look: &Look, size: (u32, u32), depth: Option<&Depth>, given: &Given) {
         let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
         let in_units = self.depth_map.as_ref().is_some_and(in_units);
@@ -146,9 +146,9 @@ impl RenderCommand {
     }
 }
 
-/// The pictures that are read.
+/// All files that are read, which the outputs must not replace.
 fn sources(command: &RenderCommand) -> Vec<PathBuf> {
-    let beside = command.like.iter().flat_map(|like| {
+    let of_snapshot = command.like.iter().flat_map(|like| {
         let (color, depth) = snapshot::sources(like);
         [like.clone(), color, depth]
     });
@@ -156,22 +156,24 @@ fn sources(command: &RenderCommand) -> Vec<PathBuf> {
         Some(ApertureName::Image(file)) => Some(file),
         _ => None,
     };
-    [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(beside).collect()
+    [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(of_snapshot).collect()
 }
 
-/// The picture, what goes with it, and its depth if there is any.
+/// Reads the picture, its metadata, and its depth if there is any. What the command does not name comes from the files
+/// of the snapshot of `--like`, whose depth was refined before and is not refined again.
 fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Option<Depth>), CliError> {
     let sources = command.like.as_ref().map(|like| snapshot::sources(like));
     let given =
         command.depth_map.as_deref().map(|file| read_depth(file, command, look)).transpose()?.map(Depth::Measured);
     let (color, extras, depth) = match (&command.image, sources) {
         (None, Some((color, depth))) => {
-            let kept = given.is_none() && depth.exists();
-            let kept = kept.then(|| read_depth(&depth, command, look)).transpose()?.map(Depth::Final);
+            let is_used = given.is_none() && depth.exists();
+            let kept = is_used.then(|| read_depth(&depth, command, look)).transpose()?.map(Depth::Final);
             let (color, extras) = still::read_photo(&color)?;
             (color, extras, given.or(kept))
         }
         (image, _) => {
+            // clap requires an image without `--like`.
             let (color, extras) = still::read_photo(image.as_deref().unwrap_or(Path::new("")))?;
             (color, extras, given)
         }
@@ -182,7 +184,7 @@ fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Opt
     Ok((color, extras, depth))
 }
 
-/// Depth in metres from a file of depth or disparity. Disparity of unknown eyes becomes depth that is right but for its
+/// Reads depth in metres from a file of depth or disparity. Disparity without stereo geometry gives depth of unknown
 /// scale, which is an error where the look needs real metres.
 fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
     let name = file.display();

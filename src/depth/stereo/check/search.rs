@@ -1,4 +1,4 @@
-//! Distinctive points, and where they are in another picture.
+//! Finds distinctive points of a picture, and the same points in another picture.
 
 use pulp::{Simd, WithSimd};
 
@@ -20,7 +20,7 @@ const CORNER_REACH: usize = 2;
 const LEAST_CORNER: f32 = 16.0;
 /// Least correlation of a match.
 const LEAST_SCORE: f32 = 0.8;
-/// A match lacks less than this part of what the second best place lacks to a correlation of 1.
+/// A match is unique if it lacks less than this part of what the second best place lacks to a correlation of 1.
 const UNIQUE: f32 = 0.6;
 /// Places this near to the best one belong to it, in pixels of half resolution.
 const SAME_PEAK: i32 = 3;
@@ -44,7 +44,8 @@ pub(super) fn halved(image: &GrayImage) -> GrayImage {
 pub(super) fn corners(image: &GrayImage) -> Vec<(i32, i32)> {
     let (width, height) = (image.width as usize, image.height as usize);
     let value = |x: usize, y: usize| f32::from(image.luma[y * width + x]);
-    let least = |x: usize, y: usize| {
+    // Shi and Tomasi's strength: the smaller eigenvalue of the structure tensor, the summed products of the gradients.
+    let strength_at = |x: usize, y: usize| {
         let (mut across, mut down, mut both) = (0.0, 0.0, 0.0);
         for y in y - CORNER_REACH..=y + CORNER_REACH {
             for x in x - CORNER_REACH..=x + CORNER_REACH {
@@ -52,11 +53,12 @@ pub(super) fn corners(image: &GrayImage) -> Vec<(i32, i32)> {
                 (across, down, both) = (across + gx * gx, down + gy * gy, both + gx * gy);
             }
         }
-        // The smaller eigenvalue of the sums' matrix; differences span two pixels.
+        // The factor 4, as differences span two pixels.
         let half: f32 = (across - down) / 2.0;
         let pixels = ((2 * CORNER_REACH + 1) * (2 * CORNER_REACH + 1) * 4) as f32;
         ((across + down) / 2.0 - half.hypot(both)) / pixels
     };
+    // Both the compared windows and the gradients' stay inside.
     let border = COARSE;
     let mut found = Vec::new();
     for top in (border..height.saturating_sub(border)).step_by(CELL) {
@@ -64,7 +66,7 @@ pub(super) fn corners(image: &GrayImage) -> Vec<(i32, i32)> {
             let mut best = (LEAST_CORNER, 0, 0);
             for y in top..(top + CELL).min(height - border) {
                 for x in (first..(first + CELL).min(width - border)).step_by(2) {
-                    let strength = least(x, y);
+                    let strength = strength_at(x, y);
                     if strength > best.0 {
                         best = (strength, x, y);
                     }
@@ -113,7 +115,8 @@ impl Coarse {
     }
 }
 
-/// The place in the picture `into` of the point `at` of the picture `from`, at half resolution: how far across and down.
+/// Finds the point `at` of the picture `from` in the picture `into`, at half resolution, by normalised correlation.
+/// Outputs how far across and down it moved; `None` where no match is good and unique.
 pub(super) struct Search<'a> {
     pub from: &'a GrayImage,
     pub into: &'a Coarse,
@@ -135,6 +138,7 @@ impl WithSimd for Search<'_> {
             patch.iter_mut().zip(from).for_each(|(patch, &luma)| *patch = f32::from(luma));
         }
         let mean = patch.iter().sum::<f32>() / patch.len() as f32;
+        // The patch sums to 0 from here on, so that the mean of the window it is compared with cancels out.
         patch.iter_mut().for_each(|value| *value -= mean);
         let norm = patch.iter().map(|value| value * value).sum::<f32>().sqrt();
         if norm == 0.0 {
@@ -160,26 +164,27 @@ impl WithSimd for Search<'_> {
                 *score *= inverse_norm / norm;
             }
         }
-        let place = |k: usize| (first_x + (k % places) as i32 - x, rows.start + (k / places) as i32 - y);
+        let move_of = |k: usize| (first_x + (k % places) as i32 - x, rows.start + (k / places) as i32 - y);
         let (mut best, mut score) = (0, 0.0);
         for (k, &other) in self.scores.iter().enumerate() {
             if other > score {
                 (best, score) = (k, other);
             }
         }
-        let (dx, dy) = place(best);
-        let rival = |k: usize| {
-            let (other_dx, other_dy) = place(k);
+        let (dx, dy) = move_of(best);
+        let is_elsewhere = |k: usize| {
+            let (other_dx, other_dy) = move_of(k);
             (other_dx - dx).abs() > SAME_PEAK || (other_dy - dy).abs() > SAME_PEAK
         };
-        // Anything that comes near enough to the best place elsewhere.
-        let enough = 1.0 - (1.0 - score) / UNIQUE;
-        let is_unique = !self.scores.iter().enumerate().any(|(k, &other)| other > enough && rival(k));
+        // A score above this elsewhere comes too near to the best.
+        let rival = 1.0 - (1.0 - score) / UNIQUE;
+        let is_unique = !self.scores.iter().enumerate().any(|(k, &other)| other > rival && is_elsewhere(k));
         (score > LEAST_SCORE && is_unique).then_some((dx, dy))
     }
 }
 
-/// The move (across, down) of the point `at`, about `moved`, at full resolution and to parts of a pixel.
+/// Refines the move (across, down) of the point `at`, about `moved`, at full resolution to parts of a pixel; `None`
+/// where no score around it peaks.
 pub(super) fn refined(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved: (i32, i32)) -> Option<(f32, f32)> {
     const SIDE: usize = (2 * STEP + 1) as usize;
     let patch = window(left, at)?;
@@ -194,6 +199,7 @@ pub(super) fn refined(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved
             }
         }
     }
+    // At the rim of the searched square the peak may lie beyond, and the parabola lacks a score.
     let (dx, dy) = peak.filter(|(dx, dy)| dx.abs() < STEP && dy.abs() < STEP)?;
     let (column, row) = ((dx + STEP) as usize, (dy + STEP) as usize);
     // The top of the parabola through three scores.
@@ -206,7 +212,7 @@ pub(super) fn refined(left: &GrayImage, right: &GrayImage, at: (i32, i32), moved
     Some(((moved.0 + dx) as f32 + across, (moved.1 + dy) as f32 + down))
 }
 
-/// The window around a pixel, of mean 0 and norm 1; `None` where it leaves the picture or nothing is in it.
+/// The window around a pixel, scaled to mean 0 and norm 1; `None` where it leaves the picture or is of one grey.
 fn window(image: &GrayImage, (x, y): (i32, i32)) -> Option<[f32; FINE * FINE]> {
     let (x, y) = (x - FINE as i32 / 2, y - FINE as i32 / 2);
     let is_inside = x >= 0 && y >= 0 && x + FINE as i32 <= image.width as i32 && y + FINE as i32 <= image.height as i32;
@@ -238,7 +244,8 @@ mod tests {
 
     #[test]
     fn a_point_is_distinctive_from_the_stated_gradient_on() {
-        // Gradients of half a step across and down at each pixel; over 5x5 of them, the least direction has 0.24 step^2.
+        // Gradients of half a step across and down at each pixel; over 5x5 of them, the least direction has 0.24
+        // step^2.
         assert!(corners(&squares(8)).is_empty(), "15.4 is less than 16");
         assert_eq!(corners(&squares(9)).len(), 4, "one of each cell away from the border");
     }

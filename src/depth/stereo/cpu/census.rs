@@ -51,8 +51,8 @@ impl Census {
         }
     }
 
-    /// Computes the census transform of `luma`, rows in parallel; `taken` has a flag for every row and border row, as each is
-    /// written by one thread.
+    /// Computes the census transform of `luma`, rows in parallel; `taken` has a flag for every row and border row, as
+    /// each is written by one thread.
     pub fn compute(&mut self, luma: &[u8], workers: &mut ThreadPool, arch: Arch, taken: &mut [AtomicBool]) {
         let Self { width, height, mirrored, stride, .. } = *self;
         let padded_stride = width + 2 * REACH;
@@ -79,7 +79,7 @@ impl Census {
     }
 }
 
-/// A row between borders that repeat its ends.
+/// Copies a row, reversed if `mirrored`, between borders that repeat its ends.
 fn pad(row: &[u8], mirrored: bool, padded: &mut [u8]) {
     let (width, end) = (row.len(), row.len() + REACH);
     padded[REACH..end].copy_from_slice(row);
@@ -91,6 +91,7 @@ fn pad(row: &[u8], mirrored: bool, padded: &mut [u8]) {
     padded[end..].fill(last);
 }
 
+/// The codes of one row, plane by plane.
 struct Row<'a> {
     /// `2 * REACH + 1` padded rows.
     window: &'a [u8],

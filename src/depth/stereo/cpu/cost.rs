@@ -1,5 +1,5 @@
-//! The matching cost (Hamming distance of census codes): what it costs to say that a pixel has a disparity: the bits in
-//! which the census of both eyes differs, averaged over 3x3 pixels.
+//! The matching cost of a disparity at a pixel: the bits in which the census codes of both eyes differ (their Hamming
+//! distance), averaged over 3x3 pixels.
 
 use pulp::WithSimd;
 
@@ -32,13 +32,13 @@ impl<const N: usize> WithSimd for Costs<'_, N> {
         let mut before = [[0u8; N]; GROUP];
         let mut here = [[0u8; N]; GROUP];
         let mut after = [[0u8; N]; GROUP];
-        columns(&codes, width, 0, &mut here);
+        sum_rows(&codes, width, 0, &mut here);
         // Beyond the borders the outermost columns repeat.
         before.copy_from_slice(&here);
         after.copy_from_slice(&here);
         for x in 0..width {
             if x + 1 < width {
-                columns(&codes, width, x + 1, &mut after);
+                sum_rows(&codes, width, x + 1, &mut after);
             }
             for row in 0..GROUP {
                 let out = &mut out[x * GROUP + row];
@@ -53,8 +53,8 @@ impl<const N: usize> WithSimd for Costs<'_, N> {
     }
 }
 
-/// Lowers the costs of the disparities that are `likely` (one more than each, or 0), `[row][column]` of the group, and of
-/// those beside them.
+/// Lowers the costs of each pixel's likely disparity, and of the two beside it, by [`BONUS`]. `likely`, `[row][column]`
+/// of the group, has one more than that disparity, or 0 where none is.
 pub fn favour<const N: usize>(likely: &[u16], width: usize, costs: &mut [u8]) {
     let costs = costs.as_chunks_mut::<N>().0;
     for (row, likely) in likely.chunks_exact(width).enumerate() {
@@ -69,18 +69,19 @@ pub fn favour<const N: usize>(likely: &[u16], width: usize, costs: &mut [u8]) {
     }
 }
 
-/// The differences of column `x`, summed over three rows, 0 to 72.
+/// For each row of the group, the differences of column `x` summed over it and the rows above and below, 0 to 72.
 #[inline(always)]
-fn columns<const N: usize>(codes: &[Codes; ROWS], width: usize, x: usize, sums: &mut [[u8; N]; GROUP]) {
-    let mut two = [[0u8; N]; 2];
+fn sum_rows<const N: usize>(codes: &[Codes; ROWS], width: usize, x: usize, sums: &mut [[u8; N]; GROUP]) {
+    // The differences of the last two rows.
+    let mut last = [[0u8; N]; 2];
     for (k, codes) in codes.iter().enumerate() {
-        let one = differences::<N>(codes, width, x);
+        let present = differences::<N>(codes, width, x);
         for d in 0..N {
             if k >= 2 {
-                sums[k - 2][d] = two[0][d] + two[1][d] + one[d];
+                sums[k - 2][d] = last[0][d] + last[1][d] + present[d];
             }
-            two[0][d] = two[1][d];
-            two[1][d] = one[d];
+            last[0][d] = last[1][d];
+            last[1][d] = present[d];
         }
     }
 }

@@ -43,9 +43,10 @@ pub struct CpuExecutor {
     costs: Aligned<u8>,
     /// Of a chunk, laid out as the costs.
     sums: Aligned<u8>,
-    /// Of the paths along the columns of each stripe.
+    /// Of the paths down the columns of each stripe.
     states: Vec<States>,
     members: Vec<Member>,
+    /// Flags with which [`DisjointParts`] hands each part to one thread only, for two buffers at a time.
     taken: [Vec<AtomicBool>; 2],
 }
 
@@ -62,10 +63,11 @@ impl CpuExecutor {
         let stripes = width.div_ceil(STRIPE);
         // Two for each of a few threads: they wait less for each other.
         let chunk = threads + threads.min(4);
-        let group = stripes * STRIPE * GROUP * disparities;
+        let group_bytes = stripes * STRIPE * GROUP * disparities;
         let member = || Member { states: States::new(2 * GROUP, disparities), eyes: Eyes::new(width, disparities) };
         let flags = || iter::repeat_with(AtomicBool::default);
-        let most = (height + 2 * census::REACH).max(chunk * stripes);
+        // The census shares out padded rows, the paths down the columns stripes of groups.
+        let most_parts = (height + 2 * census::REACH).max(chunk * stripes);
         Self {
             width,
             height,
@@ -76,14 +78,15 @@ impl CpuExecutor {
             right: Census::new((width, height), true, disparities),
             stripes,
             chunk,
-            costs: Aligned::zeros(chunk * group),
-            sums: Aligned::zeros(chunk * group),
+            costs: Aligned::zeros(chunk * group_bytes),
+            sums: Aligned::zeros(chunk * group_bytes),
             states: iter::repeat_with(|| States::new(STRIPE, disparities)).take(stripes).collect(),
             members: iter::repeat_with(member).take(threads).collect(),
-            taken: [(); 2].map(|()| flags().take(most).collect()),
+            taken: [(); 2].map(|()| flags().take(most_parts).collect()),
         }
     }
 
+    /// Matches a pair, whose census is known, with `N` disparities: chunk by chunk from the top.
     fn match_range<const N: usize>(
         &mut self,
         left: &[u8],
@@ -96,16 +99,16 @@ impl CpuExecutor {
             let groups = (first, self.chunk.min(groups - first));
             self.along_rows::<N>(groups, left, likely, workers);
             self.along_columns::<N>(groups, left, workers);
-            self.win::<N>(groups, workers, out);
+            self.pick_winners::<N>(groups, workers, out);
         }
     }
 
-    /// Bytes of a group of rows.
-    fn group(&self) -> usize {
+    /// Bytes of the costs of a group of rows.
+    fn group_bytes(&self) -> usize {
         self.stripes * STRIPE * GROUP * self.disparities
     }
 
-    /// The costs of the groups, and the sums of the paths along their rows.
+    /// Computes the costs of `groups` from number `first` on, and the sums of the paths along their rows.
     fn along_rows<const N: usize>(
         &mut self,
         (first, groups): (usize, usize),
@@ -113,10 +116,10 @@ impl CpuExecutor {
         likely: Option<&[u16]>,
         workers: &mut ThreadPool,
     ) {
-        let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
+        let (width, height, arch, bytes) = (self.width, self.height, self.arch, self.group_bytes());
         let [cost_taken, sum_taken] = &mut self.taken;
-        let costs = DisjointParts::new(&mut self.costs[..groups * group], group, cost_taken);
-        let sums = DisjointParts::new(&mut self.sums[..groups * group], group, sum_taken);
+        let costs = DisjointParts::new(&mut self.costs[..groups * bytes], bytes, cost_taken);
+        let sums = DisjointParts::new(&mut self.sums[..groups * bytes], bytes, sum_taken);
         let (census, penalties) = ((&self.left, &self.right), &self.penalties);
         workers.run_with(&mut self.members, groups, &|member, part| {
             let y = (first + part) * GROUP;
@@ -145,11 +148,12 @@ impl CpuExecutor {
         left: &[u8],
         workers: &mut ThreadPool,
     ) {
-        let (width, height, arch, group, stripes) = (self.width, self.height, self.arch, self.group(), self.stripes);
-        let stripe_len = group / stripes;
+        let (width, height, arch, stripes) = (self.width, self.height, self.arch, self.stripes);
+        let bytes = self.group_bytes();
+        let stripe_len = bytes / stripes;
         let [cost_taken, state_taken] = &mut self.taken;
         let (sums, penalties) = (&*self.sums, &self.penalties);
-        let costs = DisjointParts::new(&mut self.costs[..groups * group], stripe_len, cost_taken);
+        let costs = DisjointParts::new(&mut self.costs[..groups * bytes], stripe_len, cost_taken);
         let states = DisjointParts::new(&mut self.states, 1, state_taken);
         // Downwards a row needs the one above it: stripes of columns are what threads can share out.
         workers.run(stripes, &|stripe| {
@@ -170,14 +174,20 @@ impl CpuExecutor {
         });
     }
 
-    /// The winners of the groups.
-    fn win<const N: usize>(&mut self, (first, groups): (usize, usize), workers: &mut ThreadPool, out: &mut [u16]) {
-        let (width, height, arch, group) = (self.width, self.height, self.arch, self.group());
+    /// Writes the disparities that cost least in the groups, and that both eyes agree on, to `out`.
+    fn pick_winners<const N: usize>(
+        &mut self,
+        (first, groups): (usize, usize),
+        workers: &mut ThreadPool,
+        out: &mut [u16],
+    ) {
+        let (width, height, arch, bytes) = (self.width, self.height, self.arch, self.group_bytes());
         let rows = first * GROUP..((first + groups) * GROUP).min(height);
+        // The paths down the columns left the sums there.
         let sums = &self.costs;
         let out = DisjointParts::new(&mut out[rows.start * width..rows.end * width], GROUP * width, &mut self.taken[0]);
         workers.run_with(&mut self.members, groups, &|member, part| {
-            let sums = &sums[part * group..(part + 1) * group];
+            let sums = &sums[part * bytes..(part + 1) * bytes];
             arch.dispatch(Winners::<N> { sums, width, eyes: &mut member.eyes, out: out.part(part) });
         });
     }

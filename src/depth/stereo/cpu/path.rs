@@ -14,30 +14,31 @@ use super::super::penalty::Penalties;
 use super::GROUP;
 use crate::compute::aligned::Aligned;
 
-/// What lies beyond both ends of the range.
+/// Bytes of 255 beyond both ends of the disparities, so that d - 1 and d + 1 need no test: a cache line.
 const GUARD: usize = 64;
 
-/// The states of paths: the values of each at the pixel where it is, with [`GUARD`] bytes on both sides that are never
-/// the least, and the least of them. Those of the pixel before are kept beside those that are being made.
+/// The states of paths: for each its values L(p, d), with [`GUARD`] bytes on both sides that are never the least, and
+/// the least of them. Two buffers take turns: the values of the pixel before, and those that are being made.
 pub struct States {
     values: Aligned<u8>,
-    /// Where the second half of the values begins.
-    half: usize,
-    /// Whether those that are being made are in the second half.
+    /// Where the second buffer begins.
+    second_start: usize,
+    /// Whether the values that are being made are in the second buffer.
     second: bool,
+    /// The least value of each path at the pixel before.
     least: Vec<u8>,
 }
 
-/// Bytes after which addresses look alike to a processor that compares what it reads with what it is still to write.
-const ALIKE: usize = 4096;
+/// Bytes after which addresses alias: a load waits for an earlier store whose address has the same lower 12 bits.
+const ALIASING_BYTES: usize = 4096;
 
 /// One path on its way to its next pixel.
 struct Path<'a> {
-    /// Its values before, from one byte before them to the end of the guard.
+    /// Its values at the pixel before, from the last byte of the guard in front of them on.
     before: &'a [u8],
-    /// Takes the new ones; longer by the guard.
+    /// Takes the new values; longer by the guard.
     now: &'a mut [u8],
-    /// The least of the values.
+    /// The least of the values before, then of the new ones.
     least: &'a mut u8,
 }
 
@@ -45,50 +46,51 @@ impl States {
     /// Of `paths` paths.
     pub fn new(paths: usize, disparities: usize) -> Self {
         let length = GUARD + paths * (disparities + GUARD);
-        // As far from looking alike as can be, and in whole cache lines.
-        let half = (length + ALIKE / 2).next_multiple_of(ALIKE) - ALIKE / 2;
-        let half = if half < length { half + ALIKE } else { half };
-        let mut values = Aligned::zeros(half + length);
+        // Half the aliasing distance apart, which is as far from aliasing as can be, and in whole cache lines.
+        let start = (length + ALIASING_BYTES / 2).next_multiple_of(ALIASING_BYTES) - ALIASING_BYTES / 2;
+        let second_start = if start < length { start + ALIASING_BYTES } else { start };
+        let mut values = Aligned::zeros(second_start + length);
         values.fill(u8::MAX);
-        Self { values, half, second: false, least: vec![0; paths] }
+        Self { values, second_start, second: false, least: vec![0; paths] }
     }
 
-    /// The paths, for one step; [`States::turn`] ends it.
+    /// The paths, for one step, which [`States::end_step`] ends.
     #[inline(always)]
     fn paths<const N: usize>(&mut self) -> impl Iterator<Item = Path<'_>> {
-        let (first, second) = self.values.split_at_mut(self.half);
+        let (first, second) = self.values.split_at_mut(self.second_start);
         let (now, before) = if self.second { (second, first) } else { (first, second) };
         let now = now[GUARD..].chunks_exact_mut(N + GUARD);
         let before = before[GUARD - 1..].chunks_exact(N + GUARD);
         now.zip(before).zip(&mut self.least).map(|((now, before), least)| Path { before, now, least })
     }
 
-    /// All paths have gone their step.
+    /// Makes the new values those of the pixel before.
     #[inline(always)]
-    fn turn(&mut self) {
+    fn end_step(&mut self) {
         self.second = !self.second;
     }
 }
 
 impl Path<'_> {
-    /// Begins at a pixel of these costs; returns its values.
+    /// Starts at a pixel of these costs; returns its values.
     #[inline(always)]
-    fn begin<const N: usize>(self, cost: &[u8; N]) -> [u8; N] {
+    fn start<const N: usize>(self, cost: &[u8; N]) -> [u8; N] {
         self.now[..N].copy_from_slice(cost);
         *self.least = least(cost);
         *cost
     }
 
-    /// Goes on to a pixel of these costs; returns its values.
+    /// Goes on to a pixel of these costs, by the recurrence above; returns its values L(p, d).
     #[inline(always)]
-    fn go<const N: usize>(self, p2: u8, cost: &[u8; N]) -> [u8; N] {
+    fn advance<const N: usize>(self, p2: u8, cost: &[u8; N]) -> [u8; N] {
         let (lower, same, upper) = (&self.before[..N], &self.before[1..=N], &self.before[2..N + 2]);
-        let last = *self.least;
-        let cap = last + p2;
+        let last_least = *self.least;
+        let jump = last_least + p2;
         let mut values = [0; N];
         for d in 0..N {
             let near = lower[d].min(upper[d]).saturating_add(SLOPE);
-            values[d] = same[d].min(near).min(cap).wrapping_sub(last).wrapping_add(cost[d]);
+            // Never wraps: see the bounds in the module's documentation.
+            values[d] = same[d].min(near).min(jump).wrapping_sub(last_least).wrapping_add(cost[d]);
         }
         self.now[..N].copy_from_slice(&values);
         *self.least = least(&values);
@@ -106,24 +108,24 @@ fn least<const N: usize>(values: &[u8; N]) -> u8 {
     least
 }
 
-/// Half of the values.
+/// Half of the values, so that the sum of three paths fits a byte.
 #[inline(always)]
-fn half<const N: usize>(values: [u8; N]) -> [u8; N] {
-    let mut half = [0; N];
+fn halve<const N: usize>(values: [u8; N]) -> [u8; N] {
+    let mut halves = [0; N];
     for d in 0..N {
-        half[d] = values[d] >> 1;
+        halves[d] = values[d] >> 1;
     }
-    half
+    halves
 }
 
-/// Half of the values and what is there.
+/// `sum` and half of the values.
 #[inline(always)]
-fn half_and<const N: usize>(values: [u8; N], sum: &[u8; N]) -> [u8; N] {
-    let mut both = [0; N];
+fn add_half<const N: usize>(values: [u8; N], sum: &[u8; N]) -> [u8; N] {
+    let mut total = [0; N];
     for d in 0..N {
-        both[d] = sum[d].wrapping_add(values[d] >> 1);
+        total[d] = sum[d].wrapping_add(values[d] >> 1);
     }
-    both
+    total
 }
 
 /// The paths from the left and from the right along a group of rows, together: while one waits for the end of its own
@@ -151,21 +153,22 @@ impl<const N: usize> WithSimd for Rows<'_, N> {
         let sums = &mut sums.as_chunks_mut::<N>().0[..width * GROUP];
         let last = width - 1;
         for k in 0..width {
-            // The path that comes to a pixel first leaves its values there, and the other adds its own.
+            // For the paths from the left and from the right: the column, the one before it on the path, and whether
+            // the other path was here already. The first one leaves its values there, and the second adds its own.
             let ways = [(k, k.saturating_sub(1), k > last - k), (last - k, (width - k).min(last), k >= last - k)];
-            for (number, path) in states.paths::<N>().take(2 * rows).enumerate() {
-                let (row, (x, from, is_second)) = (number / 2, ways[number % 2]);
+            for (index, path) in states.paths::<N>().take(2 * rows).enumerate() {
+                let (row, (x, from, is_second)) = (index / 2, ways[index % 2]);
                 let cells = x * GROUP + row;
                 let cost = &costs[cells];
                 let values = if k == 0 {
-                    path.begin(cost)
+                    path.start(cost)
                 } else {
-                    path.go(penalties.between(luma[row * width + x], luma[row * width + from]), cost)
+                    path.advance(penalties.between(luma[row * width + x], luma[row * width + from]), cost)
                 };
                 let sum = &mut sums[cells];
-                *sum = if is_second { half_and(values, sum) } else { half(values) };
+                *sum = if is_second { add_half(values, sum) } else { halve(values) };
             }
-            states.turn();
+            states.end_step();
         }
     }
 }
@@ -201,12 +204,12 @@ impl<const N: usize> WithSimd for Columns<'_, N> {
             let y = first + row;
             let steps = luma_at(y).iter().zip(luma_at(y.saturating_sub(1)));
             let cells = costs.chunks_exact_mut(GROUP).zip(sums.chunks_exact(GROUP));
-            for ((path, (&here, &there)), (costs, sums)) in states.paths::<N>().zip(steps).zip(cells) {
+            for ((path, (&here, &above)), (costs, sums)) in states.paths::<N>().zip(steps).zip(cells) {
                 let cost = &costs[row];
-                let values = if y == 0 { path.begin(cost) } else { path.go(penalties.between(here, there), cost) };
-                costs[row] = half_and(values, &sums[row]);
+                let values = if y == 0 { path.start(cost) } else { path.advance(penalties.between(here, above), cost) };
+                costs[row] = add_half(values, &sums[row]);
             }
-            states.turn();
+            states.end_step();
         }
     }
 }

@@ -1,8 +1,8 @@
-//! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`. It finds what the CPU executor finds, to
-//! the bit.
+//! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`. It finds what the CPU executor finds,
+//! to the bit.
 //!
-//! Costs and sums are bytes, four disparities a word, in volumes on the device: their traffic is little beside the steps
-//! of the paths, which wait for each other. So each path is a workgroup of its own with four disparities in each
+//! Costs and sums are bytes, four disparities a word, in volumes on the device: their traffic is little beside the
+//! steps of the paths, which wait for each other. So each path is a workgroup of its own with four disparities in each
 //! invocation, and what lies ahead is fetched while it goes.
 
 pub mod shaders;
@@ -30,14 +30,14 @@ const LINE: usize = 64;
 pub struct GpuExecutor {
     device: Arc<Device>,
     pixels: usize,
-    /// Grey values, left and right.
+    /// Grey values, left and right; the right ones begin at a multiple of 4 bytes, as uploads must.
     luma: wgpu::Buffer,
     /// One more than the disparity that is likely, or 0.
     likely: wgpu::Buffer,
     passes: [Pass; 6],
     winners: wgpu::Buffer,
-    /// Where the winners can be read.
-    back: wgpu::Buffer,
+    /// A copy of the winners that the CPU can map.
+    readback: wgpu::Buffer,
     times: Option<Times>,
 }
 
@@ -78,14 +78,14 @@ impl GpuExecutor {
         let [costs, sums, totals] =
             ["costs", "sums", "totals"].map(|label| buffer(label, pixels * disparities, Usage::STORAGE));
         let winners = buffer("winners", pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
-        let back = buffer("winners back", pixels * 2, Usage::MAP_READ | Usage::COPY_DST);
+        let readback = buffer("winners back", pixels * 2, Usage::MAP_READ | Usage::COPY_DST);
 
-        let pass = |shader: Shader, back, buffers: &[&wgpu::Buffer], workgroups: [usize; 3]| {
-            let pipeline = device.pipeline(shader, &shaders::constants(size, disparities, back));
+        let pass = |shader: Shader, from_right, buffers: &[&wgpu::Buffer], workgroups: [usize; 3]| {
+            let pipeline = device.pipeline(shader, &shaders::constants(size, disparities, from_right));
             let bindings = device.bindings(&pipeline, buffers.iter().map(|buffer| buffer.as_entire_buffer_binding()));
             Pass { name: shader.name, pipeline, bindings, workgroups: workgroups.map(|count| count as u32) }
         };
-        let along_rows = |back| pass(shaders::ROWS, back, &[&costs, &penalties, &sums], [height, 1, 1]);
+        let along_rows = |from_right| pass(shaders::ROWS, from_right, &[&costs, &penalties, &sums], [height, 1, 1]);
         let [across, down] = in_two(pixels.div_ceil(LINE) as u32);
         let passes = [
             pass(
@@ -102,17 +102,18 @@ impl GpuExecutor {
         ];
         let times = device.timestamps.then(|| Times::new(&device.device, passes.len()));
         device.check()?;
-        Ok(Self { device: Arc::clone(device), pixels, luma, likely, passes, winners, back, times })
+        Ok(Self { device: Arc::clone(device), pixels, luma, likely, passes, winners, readback, times })
     }
 
-    /// Name and time of each pass over the last pair, in their order; nothing where the device keeps no time.
+    /// Name and time of each pass over the last pair, in their order; empty where the device has no timestamps.
     pub fn pass_times(&self) -> impl Iterator<Item = (&'static str, Duration)> {
         let times = self.times.iter().flat_map(|times| times.last());
         self.passes.iter().map(|pass| pass.name).zip(times)
     }
 }
 
-/// Whether a device has room for a volume, and for as many workgroups as there are rows and columns.
+/// Refuses sizes whose volume of costs, or whose number of workgroups (one for each row or column), exceeds the limits
+/// of the device.
 fn has_room(device: &Device, (width, height): (usize, usize), disparities: usize) -> Result<(), GpuError> {
     let limits = device.device.limits();
     let bytes = (width * height * disparities) as u64;
@@ -166,24 +167,25 @@ impl Executor for GpuExecutor {
             let [x, y, z] = step.workgroups;
             pass.dispatch_workgroups(x, y, z);
         }
-        encoder.copy_buffer_to_buffer(&self.winners, 0, &self.back, 0, self.back.size());
+        encoder.copy_buffer_to_buffer(&self.winners, 0, &self.readback, 0, self.readback.size());
         if let Some(times) = &self.times {
             times.fetch(&mut encoder);
         }
         let submission = device.queue.submit([encoder.finish()]);
-        self.back.map_async(wgpu::MapMode::Read, .., |_| {});
+        // Takes effect once the submission is done, which `poll` waits for.
+        self.readback.map_async(wgpu::MapMode::Read, .., |_| {});
         if let Some(times) = &self.times {
             times.map();
         }
         let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", device.name));
         device.poll(Some(submission))?;
         {
-            let bytes = self.back.get_mapped_range(..).map_err(|error| fault(&error))?;
+            let bytes = self.readback.get_mapped_range(..).map_err(|error| fault(&error))?;
             for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {
                 *out = u16::from_le_bytes(*bytes);
             }
         }
-        self.back.unmap();
+        self.readback.unmap();
         if let Some(times) = &mut self.times {
             times.read(self.device.queue.get_timestamp_period());
         }

@@ -32,8 +32,8 @@ pub const ALL: [Shader; 5] = [CENSUS, COST, ROWS, COLUMNS, WINNERS];
 /// The `override` constants of `stereo_common.wgsl`.
 pub type Constants = [(&'static str, f64); 10];
 
-/// The constants for pictures of this size; `back` is for the path along the rows from the right.
-pub fn constants((width, height): (usize, usize), disparities: usize, back: bool) -> Constants {
+/// The constants for pictures of this size; `from_right` turns the path along the rows round.
+pub fn constants((width, height): (usize, usize), disparities: usize, from_right: bool) -> Constants {
     [
         ("WIDTH", width as f64),
         ("HEIGHT", height as f64),
@@ -44,6 +44,6 @@ pub fn constants((width, height): (usize, usize), disparities: usize, back: bool
         ("AGREE", AGREE.into()),
         ("ONE", ONE.into()),
         ("UNKNOWN", UNKNOWN.into()),
-        ("BACK", u8::from(back).into()),
+        ("BACK", u8::from(from_right).into()),
     ]
 }

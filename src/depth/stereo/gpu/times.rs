@@ -1,12 +1,13 @@
-//! How long each pass took.
+//! How long each pass took, by timestamp queries.
 
 use std::time::Duration;
 
-/// Two stamps of the device for each pass.
+/// The device's timestamps at the beginning and end of each pass, and how they get back.
 pub struct Times {
     set: wgpu::QuerySet,
     resolved: wgpu::Buffer,
-    back: wgpu::Buffer,
+    /// A copy of `resolved` that the CPU can map.
+    readback: wgpu::Buffer,
     last: Vec<Duration>,
 }
 
@@ -17,6 +18,7 @@ impl Times {
         let buffer = |label, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
+                // Two stamps of 8 bytes.
                 size: passes as u64 * 16,
                 usage,
                 mapped_at_creation: false,
@@ -29,7 +31,7 @@ impl Times {
                 count: 2 * passes as u32,
             }),
             resolved: buffer("stamps", Usage::QUERY_RESOLVE | Usage::COPY_SRC),
-            back: buffer("stamps back", Usage::MAP_READ | Usage::COPY_DST),
+            readback: buffer("stamps back", Usage::MAP_READ | Usage::COPY_DST),
             last: vec![Duration::ZERO; passes],
         }
     }
@@ -46,25 +48,26 @@ impl Times {
     /// Fetches the stamps after the last pass.
     pub fn fetch(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.set, 0..2 * self.last.len() as u32, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.back, 0, self.back.size());
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, self.readback.size());
     }
 
     /// Asks for the stamps, after the commands were submitted.
     pub fn map(&self) {
-        self.back.map_async(wgpu::MapMode::Read, .., |_| {});
+        self.readback.map_async(wgpu::MapMode::Read, .., |_| {});
     }
 
-    /// Reads the stamps, after the device is done, which are `period_ns` apart.
+    /// Reads the stamps, in ticks of `period_ns`, after the device is done.
     pub fn read(&mut self, period_ns: f32) {
-        if let Ok(bytes) = self.back.get_mapped_range(..) {
+        if let Ok(bytes) = self.readback.get_mapped_range(..) {
             for (last, bytes) in self.last.iter_mut().zip(bytes.as_chunks::<16>().0) {
+                // The beginning in the lower half, the end in the upper one.
                 let stamps = u128::from_le_bytes(*bytes);
                 // Stamps may run backwards when clocks change.
                 let ticks = ((stamps >> 64) as u64).saturating_sub(stamps as u64);
                 *last = Duration::from_nanos((ticks as f64 * f64::from(period_ns)) as u64);
             }
         }
-        self.back.unmap();
+        self.readback.unmap();
     }
 
     /// The times of the passes over the last pair.

@@ -1,4 +1,4 @@
-//! The shape of the lens opening, chosen from pictures of what it makes of a light.
+//! The shape of the aperture, chosen from thumbnails of the bokeh of a point of light.
 
 use egui::{
     Color32, ColorImage, CornerRadius, Rect, Sense, Stroke, StrokeKind, TextureHandle, TextureOptions, Ui, Vec2,
@@ -19,7 +19,7 @@ const SIDE: f32 = 40.0;
 
 const SHAPES: [&str; 6] = ["Disc", "Ring", "Blades", "Heart", "Star", "Picture"];
 
-/// Pictures of apertures, and what they were made of.
+/// Thumbnails of apertures, each with the aperture and the rim that it was made of.
 #[derive(Default)]
 pub struct Thumbs {
     made: [Option<(Aperture, f32, TextureHandle)>; SHAPES.len()],
@@ -27,30 +27,30 @@ pub struct Thumbs {
 
 /// The shape, its numbers, and the highlights that show it.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
-    shapes(ui, sheet, thumbs);
+    shape_row(ui, sheet, thumbs);
     let before = sheet.look.aperture.clone();
-    let part = |label, hint, range, digits, around| Number { label, hint, range, ratios: false, digits, around };
+    let how = |label, hint, range, digits, around| Number { label, hint, range, ratios: false, digits, around };
     match &mut sheet.look.aperture.shape {
         Shape::Disc | Shape::Heart | Shape::Picture(_) => {}
         Shape::Ring { inner } => {
-            number(ui, part("Hole", "Its radius", 0.0..=0.95, 2, ["", ""]), inner);
+            number(ui, how("Hole", "Its radius", 0.0..=0.95, 2, ["", ""]), inner);
         }
         Shape::Polygon { blades, rotation_deg, curvature } => {
-            whole(ui, part("Blades", "How many", 3.0..=16.0, 0, ["", ""]), blades);
-            number(ui, part("Rotation", "Clockwise", -180.0..=180.0, 0, ["", "°"]), rotation_deg);
-            number(ui, part("Curvature", "Straight blades to a circle", 0.0..=1.0, 2, ["", ""]), curvature);
+            whole(ui, how("Blades", "How many", 3.0..=16.0, 0, ["", ""]), blades);
+            number(ui, how("Rotation", "Clockwise", -180.0..=180.0, 0, ["", "°"]), rotation_deg);
+            number(ui, how("Curvature", "Straight blades to a circle", 0.0..=1.0, 2, ["", ""]), curvature);
         }
-        Shape::Star { points } => whole(ui, part("Points", "How many", 3.0..=16.0, 0, ["", ""]), points),
+        Shape::Star { points } => whole(ui, how("Points", "How many", 3.0..=16.0, 0, ["", ""]), points),
     }
-    let light =
-        part("Intensity", "-1: soap bubbles; 1: bright in the middle, soft at the rim", -1.0..=1.0, 2, ["", ""]);
-    number(ui, light, &mut sheet.look.aperture.intensity);
-    let shaped = before != sheet.look.aperture;
-    sheet.changed(shaped, "aperture");
-    let soft = number(ui, part("Soft rim", "As a share of the radius", 0.0..=1.0, 2, ["", ""]), &mut sheet.look.rim);
+    let intensity =
+        how("Intensity", "-1: soap bubbles; 1: bright in the middle, soft at the rim", -1.0..=1.0, 2, ["", ""]);
+    number(ui, intensity, &mut sheet.look.aperture.intensity);
+    let changed = before != sheet.look.aperture;
+    sheet.changed(changed, "aperture");
+    let soft = number(ui, how("Soft rim", "As a share of the radius", 0.0..=1.0, 2, ["", ""]), &mut sheet.look.rim);
     sheet.changed(soft, "rim");
-    let how = part("Highlights", "How much brighter lights are than white; 0 is off", 0.0..=50.0, 1, ["", "×"]);
-    let bright = number(ui, how, &mut sheet.look.highlights);
+    let highlights = how("Highlights", "How much brighter lights are than white; 0 is off", 0.0..=50.0, 1, ["", "×"]);
+    let bright = number(ui, highlights, &mut sheet.look.highlights);
     sheet.changed(bright, "highlights");
 }
 
@@ -62,20 +62,21 @@ fn whole(ui: &mut Ui, how: Number, value: &mut u32) {
     }
 }
 
-fn shapes(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
+/// The shapes to choose from, side by side, as thumbnails.
+fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
     let chosen = index_of(&sheet.look.aperture.shape);
-    let settled = !ui.input(|input| input.pointer.any_down());
+    let no_drag = !ui.input(|input| input.pointer.any_down());
     let mut picked = None;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         for (index, name) in SHAPES.iter().enumerate() {
-            let Some(shape) = of_index(index, &sheet.look) else { continue };
+            let Some(shape) = shape_at(index, &sheet.look) else { continue };
             let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::click());
             let is_chosen = index == chosen;
             response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, *name));
             let aperture = Aperture { shape, intensity: sheet.look.aperture.intensity };
-            // One picture a pass, and while something is dragged only that of what is changed.
-            let texture = thumbs.of(ui, index, &aperture, sheet.look.rim, settled || is_chosen);
+            // Thumbnails take a while to make: during a drag only that of the chosen shape is made anew.
+            let texture = thumbs.of(ui, index, &aperture, sheet.look.rim, no_drag || is_chosen);
             thumbnail(ui, rect, texture, is_chosen, response.hovered());
             focus_ring(ui, &response, rect);
             if response.on_hover_text(*name).clicked() && !is_chosen {
@@ -89,6 +90,7 @@ fn shapes(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
     }
 }
 
+/// Draws a thumbnail on its field, marked where it is chosen or under the pointer.
 fn thumbnail(ui: &Ui, rect: Rect, texture: Option<egui::TextureId>, chosen: bool, hovered: bool) {
     let colors = Colors::here(ui);
     let painter = ui.painter();
@@ -103,6 +105,7 @@ fn thumbnail(ui: &Ui, rect: Rect, texture: Option<egui::TextureId>, chosen: bool
     }
 }
 
+/// The index of a shape's kind in [`SHAPES`].
 fn index_of(shape: &Shape) -> usize {
     match shape {
         Shape::Disc => 0,
@@ -114,8 +117,9 @@ fn index_of(shape: &Shape) -> usize {
     }
 }
 
-/// A shape to choose: the chosen one as it is, and others as they begin. A picture is only there where one was given.
-fn of_index(index: usize, look: &crate::look::Look) -> Option<Shape> {
+/// The shape that is offered at an index of [`SHAPES`]: the chosen one as it is, others with default numbers. A picture
+/// is offered only where the look has one.
+fn shape_at(index: usize, look: &crate::look::Look) -> Option<Shape> {
     if index == index_of(&look.aperture.shape) {
         return Some(look.aperture.shape.clone());
     }
@@ -130,15 +134,16 @@ fn of_index(index: usize, look: &crate::look::Look) -> Option<Shape> {
 }
 
 impl Thumbs {
-    fn of(&mut self, ui: &Ui, index: usize, aperture: &Aperture, rim: f32, may: bool) -> Option<egui::TextureId> {
+    /// The thumbnail of an aperture, by the index of its shape. An outdated one is made anew only with `renew`.
+    fn of(&mut self, ui: &Ui, index: usize, aperture: &Aperture, rim: f32, renew: bool) -> Option<egui::TextureId> {
         let made = &mut self.made[index];
-        let current = made.as_ref().is_some_and(|(of, at, _)| of == aperture && *at == rim);
-        if !current && (may || made.is_none()) {
+        let is_current = made.as_ref().is_some_and(|(of, made_rim, _)| of == aperture && *made_rim == rim);
+        if !is_current && (renew || made.is_none()) {
             let image = picture(aperture, rim);
             match made {
-                Some((of, at, texture)) => {
+                Some((of, made_rim, texture)) => {
                     texture.set(image, TextureOptions::LINEAR);
-                    (*of, *at) = (aperture.clone(), rim);
+                    (*of, *made_rim) = (aperture.clone(), rim);
                 }
                 None => {
                     let texture = ui.ctx().load_texture(SHAPES[index], image, TextureOptions::LINEAR);
@@ -150,11 +155,12 @@ impl Thumbs {
     }
 }
 
-/// White, as opaque as the aperture lets light through, the light as eyes see it.
+/// A thumbnail: white, as opaque as the aperture is bright there, interpolated from its mask.
 fn picture(aperture: &Aperture, rim: f32) -> ColorImage {
     let mask = aperture.mask(CELLS, rim);
     let brightest = mask.values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let at = |x: usize, y: usize| mask.values[y * CELLS + x] / brightest;
+    // The two cells around the centre of a pixel, and how far it is to the second.
     let place = |k: usize| {
         let cell = ((k as f64 + 0.5) / SIDE_PX as f64 * CELLS as f64 - 0.5).clamp(0.0, CELLS as f64 - 1.0);
         (cell as usize, (cell as usize + 1).min(CELLS - 1), cell.fract())
@@ -163,6 +169,7 @@ fn picture(aperture: &Aperture, rim: f32) -> ColorImage {
         let ((x0, x1, fx), (y0, y1, fy)) = (place(k % SIDE_PX), place(k / SIDE_PX));
         let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
         let light = mix(mix(at(x0, y0), at(x1, y0), fx), mix(at(x0, y1), at(x1, y1), fx), fy);
+        // About the gamma of a display, so that the opacity looks like the light.
         let opacity = (light.powf(1.0 / 1.8) * 255.0).round() as u8;
         Color32::from_rgba_premultiplied(opacity, opacity, opacity, opacity)
     };

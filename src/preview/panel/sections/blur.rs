@@ -13,7 +13,7 @@ const WAYS: [(&str, &str); 2] = [
     ("Lens", "What a real lens does: its f-number and focal length"),
 ];
 
-/// The strength, and what is in front.
+/// The strength and its limit.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let by_lens = matches!(sheet.look.strength, Strength::Lens(_));
     if sheet.follows_depth() || by_lens {
@@ -27,12 +27,13 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         sheet.changed(chosen.is_some(), "blur by");
     }
     match sheet.look.strength {
-        Strength::Lens(lens) => by_numbers(ui, sheet, lens),
+        Strength::Lens(lens) => lens_numbers(ui, sheet, lens),
         Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => by_amount(ui, sheet),
     }
-    largest(ui, sheet);
+    limit(ui, sheet);
 }
 
+/// The strength as a radius, with a lens to compare it with.
 fn by_amount(ui: &mut Ui, sheet: &mut Sheet) {
     let Some(share) = amount(&sheet.look, sheet.height_px) else { return };
     let mut percent = share * 100.0;
@@ -53,12 +54,14 @@ fn by_amount(ui: &mut Ui, sheet: &mut Sheet) {
     }
 }
 
-/// The lens that blurs as much.
+/// Says at which f-number [`LENS`] would blur as much, focused as the last frame was.
 fn like_lens(sheet: &Sheet) -> String {
     let share = amount(&sheet.look, sheet.height_px).unwrap_or_default();
     let focus_mm = sheet.state.focus_m.unwrap_or(1.0) * 1000.0;
+    // The share is of the height: the sensor's, with the common aspect ratio of 16:9.
     let radius_mm = share * LENS.sensor_width_mm * 9.0 / 16.0;
     let focal_mm = LENS.focal_length_mm;
+    // The thin lens: the CoC at infinity has a diameter of f^2 / (N (s - f)) for f-number N and focus distance s.
     let f_number = focal_mm * focal_mm / (2.0 * radius_mm * (focus_mm - focal_mm).max(1.0));
     if f_number.is_finite() && f_number < 64.0 {
         format!("Like {focal_mm:.0} mm at f/{f_number:.1} on full frame")
@@ -67,29 +70,30 @@ fn like_lens(sheet: &Sheet) -> String {
     }
 }
 
-fn by_numbers(ui: &mut Ui, sheet: &mut Sheet, mut lens: Lens) {
+/// The strength as the numbers of a lens.
+fn lens_numbers(ui: &mut Ui, sheet: &mut Sheet, mut lens: Lens) {
     let number_of = |label, hint, range, digits, around| Number { label, hint, range, ratios: true, digits, around };
     let f = number_of("Aperture", "f-number: smaller is more blur", F_NUMBERS, 1, ["f/", ""]);
     let focal = number_of("Focal length", "Longer is more blur", 14.0..=200.0, 0, ["", " mm"]);
     let sensor = number_of("Sensor width", "36 mm is full frame; smaller is more blur", 4.0..=54.0, 1, ["", " mm"]);
-    let by_f = number(ui, f, &mut lens.f_number);
-    let by_focal = number(ui, focal, &mut lens.focal_length_mm);
-    let by_sensor = number(ui, sensor, &mut lens.sensor_width_mm);
-    if by_f || by_focal || by_sensor {
+    let f_changed = number(ui, f, &mut lens.f_number);
+    let focal_changed = number(ui, focal, &mut lens.focal_length_mm);
+    let sensor_changed = number(ui, sensor, &mut lens.sensor_width_mm);
+    if f_changed || focal_changed || sensor_changed {
         sheet.look.strength = Strength::Lens(lens);
     }
-    sheet.changed(by_f, "f-number");
-    sheet.changed(by_focal, "focal length");
-    sheet.changed(by_sensor, "sensor width");
+    sheet.changed(f_changed, "f-number");
+    sheet.changed(focal_changed, "focal length");
+    sheet.changed(sensor_changed, "sensor width");
 }
 
-/// The largest radius: near things would blur without bound.
-fn largest(ui: &mut Ui, sheet: &mut Sheet) {
+/// The largest radius, where the person sets one: without any, near objects would blur without bound.
+fn limit(ui: &mut Ui, sheet: &mut Sheet) {
     let height_px = sheet.height_px as f32;
-    let own = sheet.look.max_coc_px.is_some();
-    if switch(ui, "Own limit", "Largest blur of anything, near or far; otherwise 6 % of the height", own) {
+    let has_limit = sheet.look.max_coc_px.is_some();
+    if switch(ui, "Own limit", "Largest blur of anything, near or far; otherwise 6 % of the height", has_limit) {
         let Look { max_coc_px, .. } = &mut sheet.look;
-        *max_coc_px = if own { None } else { Some((MAX_COC_PER_HEIGHT * height_px).round()) };
+        *max_coc_px = if has_limit { None } else { Some((MAX_COC_PER_HEIGHT * height_px).round()) };
         sheet.changed(true, "own limit");
     }
     if let Some(limit_px) = sheet.look.max_coc_px {

@@ -1,4 +1,4 @@
-//! What the blur follows.
+//! The effect: what the blur follows.
 
 use egui::Ui;
 
@@ -35,6 +35,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     }
 }
 
+/// The band of tilt-shift: place, width and angle.
 fn tilt(ui: &mut Ui, sheet: &mut Sheet) {
     let mut tilt = sheet.look.tilt;
     let percent = |ui: &mut Ui, label: &str, hint: &str, share: &mut f32, most: f32| {

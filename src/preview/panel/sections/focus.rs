@@ -1,4 +1,4 @@
-//! Where the focal plane is, and how deep the focus.
+//! The focus: distance of the focal plane, and depth of the focal range.
 
 use egui::Ui;
 
@@ -20,6 +20,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         FocusRule::Point { .. } => 1,
         FocusRule::Metres(_) => 2,
     };
+    // Without depth in the frame yet, something to start from.
     let now_m = sheet.state.focus_m.filter(|metres| metres.is_finite()).unwrap_or(1.0);
     if let Some(index) = choose(ui, "Focus on", &RULES, chosen, |_| true).filter(|&index| index != chosen) {
         sheet.look.focus = match index {
@@ -45,6 +46,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         sheet.look.focus = FocusRule::Metres(metres);
         sheet.changed(true, "focus distance");
     }
+    // Shown as half of it on either side of the focal plane.
     let how = Number {
         label: "Focal range",
         hint: "Depth that stays sharp in front of and behind the focal plane",

@@ -12,7 +12,9 @@ use crate::preview::state::Action;
 /// A preset that is being named.
 #[derive(Debug, Default)]
 pub struct Saving {
+    /// The name as typed so far, while one is asked for.
     name: Option<String>,
+    /// Whether the text field is new and still needs the focus.
     ask_focus: bool,
 }
 
@@ -56,17 +58,18 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving) {
     }
 }
 
-/// A preset to click, with the number of its key.
+/// Draws a preset with the number of its key. Whether it was clicked.
 fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> bool {
     let colors = Colors::here(ui);
     let family = if chosen { medium() } else { FontFamily::Proportional };
-    let shown = capital(&preset.name);
+    let shown = capitalized(&preset.name);
     let (text, number_color) = match (chosen, possible) {
         (true, _) => (colors.on_accent, colors.on_accent),
         (false, true) => (colors.text, colors.weak),
         (false, false) => (colors.weak.gamma_multiply(0.6), colors.weak.gamma_multiply(0.6)),
     };
     let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, family), text);
+    // The keys 1 to 9.
     let has_key = index < 9;
     let room = if has_key { 14.0 } else { 0.0 };
     let size = vec2((name.size().x + room + 20.0).min(ui.max_rect().width()), 28.0);
@@ -95,7 +98,7 @@ fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool
     response.on_hover_text(hint).clicked()
 }
 
-fn capital(name: &str) -> String {
+fn capitalized(name: &str) -> String {
     let mut letters = name.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

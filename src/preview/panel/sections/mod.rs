@@ -19,22 +19,22 @@ use super::parts::section;
 use super::state::{Action, State};
 use crate::look::Look;
 
-/// What the sections read and change.
+/// What the sections read and change while they are drawn.
 pub struct Sheet<'a> {
     /// The state as it is.
     pub state: &'a State,
-    /// The look as the controls make it.
+    /// A copy of the look, which the controls change.
     pub look: Look,
-    /// The control that changed it.
+    /// The control that changed it, if any.
     pub stroke: Option<&'static str>,
     /// Rows of the picture.
     pub height_px: u32,
-    /// What the person did besides.
+    /// What the person did other than change the look.
     pub actions: &'a mut Vec<Action>,
 }
 
 impl Sheet<'_> {
-    /// Remembers which control changed the look.
+    /// Remembers that the control `stroke` changed the look, if it did.
     fn changed(&mut self, is: bool, stroke: &'static str) {
         if is {
             self.stroke = Some(stroke);
@@ -54,6 +54,7 @@ impl Sheet<'_> {
     }
 }
 
+/// Draws the sections that the look and the source call for.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving, thumbs: &mut Thumbs) {
     looks::show(ui, sheet, saving);
     ui.add_space(2.0);

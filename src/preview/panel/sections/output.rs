@@ -12,7 +12,7 @@ use crate::preview::state::{Action, NO_VIRTUAL_CAMERA};
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     let recording = state.recording();
-    if record(ui, recording.is_some()) {
+    if record_button(ui, recording.is_some()) {
         sheet.act(Action::Record(recording.is_none()));
     }
     if let Some(output) = recording.filter(|output| !output.name.is_empty()) {
@@ -53,8 +53,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     });
 }
 
-/// The button that records.
-fn record(ui: &mut Ui, on: bool) -> bool {
+/// Draws the button that starts and stops a recording. Whether it was clicked.
+fn record_button(ui: &mut Ui, on: bool) -> bool {
     let colors = Colors::here(ui);
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 32.0), Sense::click());
     let text = if on { "Stop recording" } else { "Record" };

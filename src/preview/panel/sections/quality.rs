@@ -1,4 +1,4 @@
-//! How finely it is blurred.
+//! The quality of the blur.
 
 use egui::{ComboBox, Ui};
 

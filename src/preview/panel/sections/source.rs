@@ -50,18 +50,19 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     });
 }
 
+/// The camera's own controls.
 pub fn controls(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     for control in &state.controls {
-        let value = ui.add_enabled_ui(control.active, |ui| one(ui, control)).inner;
+        let value = ui.add_enabled_ui(control.active, |ui| knob(ui, control)).inner;
         if let Some(value) = value {
             sheet.act(Action::Control(control.name.clone(), value));
         }
     }
 }
 
-/// A control of the camera; its new value, if it was changed.
-fn one(ui: &mut Ui, control: &Knob) -> Option<i64> {
+/// Draws a control of the camera: a switch, a menu or a number. Its new value, if it was changed.
+fn knob(ui: &mut Ui, control: &Knob) -> Option<i64> {
     let label = title(&control.name);
     let hint = format!("--control {}={}", control.name, control.value);
     if control.switch {
@@ -88,6 +89,7 @@ fn one(ui: &mut Ui, control: &Knob) -> Option<i64> {
     if !number(ui, how, &mut value) {
         return None;
     }
+    // The driver takes only whole steps from the least value.
     let steps = ((f64::from(value) - least as f64) / step.max(1) as f64).round() as i64;
     let value = least.saturating_add(steps.saturating_mul(step.max(1)));
     (value != control.value).then_some(value)

@@ -13,6 +13,7 @@ const VIEWS: [(&str, &str, Shown); 4] = [
     ("Bins", "The layers that are blurred on their own", Shown::Bins),
 ];
 
+/// The view, how it is shown, and the instruments.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     let chosen = VIEWS.iter().position(|view| view.2 == state.shown).unwrap_or_default();

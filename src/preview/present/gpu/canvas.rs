@@ -1,4 +1,4 @@
-//! Draws pictures and controls to a texture: all but the way to the screen.
+//! Draws the picture and the controls to a texture: everything but the way to the screen.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::preview::present::{Controls, Drawing, Image, Tone};
 /// The picture in its area, and the background.
 pub const PRESENT: Shader = Shader { name: "present", source: include_str!("../../../../shaders/present.wgsl") };
 
-/// Combinations of buffers that are kept bound.
+/// Bind groups that are kept, one for each pair of buffers seen.
 const MOST_BOUND: usize = 16;
 
 /// `Window` of `present.wgsl`, where each field is explained.
@@ -33,23 +33,24 @@ pub struct Window {
 /// Draws to textures of one format.
 pub struct Canvas {
     device: Arc<Device>,
-    /// Whether what is written is taken as linear light.
+    /// Whether the target takes what the shader writes as linear light and encodes it itself.
     linear: bool,
     pipeline: wgpu::RenderPipeline,
     window: wgpu::Buffer,
-    /// Where the picture and the one before the blur go that come from memory.
+    /// Pictures from memory go here: the picture, and the one before the blur.
     uploads: [wgpu::Buffer; 2],
     bound: Vec<Bound>,
     overlay: Overlay,
 }
 
+/// A bind group and the pictures that it binds.
 struct Bound {
     pictures: [wgpu::Buffer; 2],
     bindings: wgpu::BindGroup,
 }
 
 impl Canvas {
-    /// For textures of `format`.
+    /// A canvas for textures of `format`.
     pub fn new(device: Arc<Device>, format: wgpu::TextureFormat) -> Self {
         let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(PRESENT.name),
@@ -82,7 +83,7 @@ impl Canvas {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let uploads = [upload(&device, 0), upload(&device, 0)];
+        let uploads = [upload_buffer(&device, 0), upload_buffer(&device, 0)];
         let overlay = Overlay::new(&device, format);
         Self { device, linear: format.is_srgb(), pipeline, window, uploads, bound: Vec::new(), overlay }
     }
@@ -92,17 +93,18 @@ impl Canvas {
         self.overlay.set(&self.device, controls);
     }
 
-    /// Draws to all of `target`, which has `size` pixels.
+    /// Draws picture and controls to the whole of `target`, which has `size` pixels.
     pub fn draw(&mut self, target: &wgpu::TextureView, size: (u32, u32), drawing: &Drawing) {
         let split = drawing.split();
         let picture = match drawing.picture {
             Image::Memory(picture) => self.upload(0, picture),
             Image::Device(picture) if picture.is_on(&self.device) => picture.buffer().clone(),
+            // Not shown, but something has to be bound.
             Image::Device(_) => self.uploads[0].clone(),
         };
         let before = split.map(|(before, _)| self.upload(1, before));
         let pictures = [picture, before.unwrap_or_else(|| self.uploads[1].clone())];
-        let window = self.window(drawing);
+        let window = self.window_uniform(drawing);
         self.device.queue.write_buffer(&self.window, 0, bytemuck::bytes_of(&window));
         let bound = self.bind_group_index(pictures);
 
@@ -136,12 +138,13 @@ impl Canvas {
         self.device.queue.submit(submitted);
     }
 
-    fn window(&self, drawing: &Drawing) -> Window {
+    /// The shader's parameters for a drawing.
+    fn window_uniform(&self, drawing: &Drawing) -> Window {
         let color = |[r, g, b]: [u8; 3], w: f32| [f32::from(r) / 255.0, f32::from(g) / 255.0, f32::from(b) / 255.0, w];
         let flag = |on: bool| f32::from(u8::from(on));
         let area = drawing.area;
         let (width, height) = drawing.picture.size();
-        // A picture without pixels is not drawn, and one of another device neither.
+        // Neither a picture without pixels nor one of another device is drawn.
         let shown = match drawing.picture {
             Image::Memory(picture) => !picture.rgb.is_empty(),
             Image::Device(picture) => picture.is_on(&self.device),
@@ -166,22 +169,22 @@ impl Canvas {
         window
     }
 
-    /// Uploads a picture to the buffer `k`.
+    /// Uploads a picture to `uploads[k]`, which grows where it is too small.
     fn upload(&mut self, k: usize, picture: &ColorImage) -> wgpu::Buffer {
         if (self.uploads[k].size() as usize) < picture.rgb.len() {
-            self.uploads[k] = upload(&self.device, picture.rgb.len());
+            self.uploads[k] = upload_buffer(&self.device, picture.rgb.len());
         }
         self.device.upload(&self.uploads[k], 0, &picture.rgb);
         self.uploads[k].clone()
     }
 
-    /// The index in `bound` of the bind group of these buffers, made if it is not there yet. Good until the next call, which
-    /// may empty a full list.
+    /// The index in `bound` of the bind group of these buffers, made if it is not there yet. Valid until the next call,
+    /// which may empty a full list.
     fn bind_group_index(&mut self, pictures: [wgpu::Buffer; 2]) -> usize {
         if let Some(bound) = self.bound.iter().position(|bound| bound.pictures == pictures) {
             return bound;
         }
-        // Those of buffers that are used no more must not live on.
+        // Bind groups keep their buffers alive, even of pictures that are gone.
         if self.bound.len() >= MOST_BOUND {
             self.bound.clear();
         }
@@ -193,10 +196,10 @@ impl Canvas {
 }
 
 /// A buffer for a picture of so many bytes.
-fn upload(device: &Device, bytes: usize) -> wgpu::Buffer {
+fn upload_buffer(device: &Device, bytes: usize) -> wgpu::Buffer {
     device.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("picture to present"),
-        // The last pixel may reach into a word of its own; a binding must not be empty.
+        // The shader reads whole words, also for the last pixel; and a binding must not be empty.
         size: (bytes.next_multiple_of(4) + 16) as u64,
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,

@@ -1,4 +1,4 @@
-//! The controls, by egui's own renderer.
+//! The controls, drawn by egui's own renderer.
 
 use egui::TextureId;
 use egui::epaint::ClippedPrimitive;
@@ -12,15 +12,16 @@ pub struct Overlay {
     renderer: Renderer,
     primitives: Vec<ClippedPrimitive>,
     pixels_per_point: f32,
-    /// Textures that only these controls still need.
+    /// Textures to free when these controls are replaced.
     freed: Vec<TextureId>,
-    /// Whether the device has other controls, or for another size.
+    /// Whether these controls have yet to be uploaded.
     outdated: bool,
+    /// What they were uploaded for, in pixels.
     size: (u32, u32),
 }
 
 impl Overlay {
-    /// For textures of `format`.
+    /// An overlay for textures of `format`.
     pub fn new(device: &Device, format: wgpu::TextureFormat) -> Self {
         // Without noise, so that a picture that stays stays the same.
         let options = RendererOptions { dithering: false, ..RendererOptions::default() };
@@ -34,10 +35,10 @@ impl Overlay {
         }
     }
 
-    /// Other controls from now on.
+    /// Replaces the controls.
     pub fn set(&mut self, device: &Device, controls: Controls) {
         let Controls { primitives, mut textures, pixels_per_point } = controls;
-        // The controls so far were the last to need these.
+        // Only the controls so far still needed these.
         self.freed.drain(..).for_each(|id| self.renderer.free_texture(&id));
         for (&id, changes) in &textures.set {
             for change in changes {
@@ -49,7 +50,7 @@ impl Overlay {
         (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
     }
 
-    /// Brings what changed to the device; gives back what is to be submitted before.
+    /// Uploads the controls, if they or the size changed; gives back what to submit before the commands of `encoder`.
     pub fn upload(
         &mut self,
         device: &Device,

@@ -1,4 +1,4 @@
-//! With the GPU, on the device that blurs.
+//! Presents with the GPU, on the device that blurs.
 
 mod canvas;
 mod controls;
@@ -15,7 +15,7 @@ use crate::compute::device::{Device, DevicePicture};
 pub struct Gpu {
     device: Arc<Device>,
     window: Arc<Window>,
-    /// There until it is dropped.
+    /// `None` only while it is dropped.
     surface: Option<wgpu::Surface<'static>>,
     config: wgpu::SurfaceConfiguration,
     /// Whether the surface is configured; a window without pixels has none.
@@ -24,35 +24,35 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// For this window.
+    /// A presenter for this window.
     ///
     /// # Errors
     /// The device cannot draw to it.
     pub fn new(window: Arc<Window>, device: Arc<Device>) -> Result<Self, PresentError> {
         let surface = new_surface(&window, &device)?;
-        let able = surface.get_capabilities(&device.adapter);
-        // Pictures and controls are encoded already.
+        let capabilities = surface.get_capabilities(&device.adapter);
+        // Pictures and controls are sRGB-encoded already: the surface should not encode them again.
         let plain = |format: &wgpu::TextureFormat| {
             matches!(format, wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Rgba8Unorm)
         };
-        let format = able.formats.iter().copied().find(plain).or_else(|| able.formats.first().copied());
+        let format = capabilities.formats.iter().copied().find(plain).or_else(|| capabilities.formats.first().copied());
         let Some(format) = format else {
             return Err(PresentError(format!("{} has no pixel format for it", device.name)));
         };
-        let newest = able.present_modes.contains(&wgpu::PresentMode::Mailbox);
+        let has_mailbox = capabilities.present_modes.contains(&wgpu::PresentMode::Mailbox);
         let config = wgpu::SurfaceConfiguration {
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
             format,
             color_space: wgpu::SurfaceColorSpace::default(),
             width: 0,
             height: 0,
-            present_mode: if newest { wgpu::PresentMode::Mailbox } else { wgpu::PresentMode::Fifo },
+            present_mode: if has_mailbox { wgpu::PresentMode::Mailbox } else { wgpu::PresentMode::Fifo },
             desired_maximum_frame_latency: 1,
             alpha_mode: wgpu::CompositeAlphaMode::Auto,
             view_formats: Vec::new(),
         };
-        // Where it is refused, the CPU draws, and the device goes on blurring.
-        let begun = device.attempt(|| {
+        // A refusal here must not be taken for a failure of the device, which goes on blurring while the CPU draws.
+        let made = device.attempt(|| {
             let canvas = Canvas::new(Arc::clone(&device), format);
             let size = window.inner_size();
             let surface = Some(surface);
@@ -60,9 +60,10 @@ impl Gpu {
             gpu.resize((size.width, size.height));
             gpu
         });
-        begun.map_err(fault)
+        made.map_err(fault)
     }
 
+    /// Fits the surface to `config`; a window without pixels leaves it as it is.
     fn configure(&mut self) {
         self.configured = self.config.width > 0 && self.config.height > 0;
         if let Some(surface) = self.surface.as_ref().filter(|_| self.configured) {
@@ -70,10 +71,10 @@ impl Gpu {
         }
     }
 
-    /// The texture to draw to; none where nothing is to be seen now.
-    fn texture(&mut self) -> Result<Option<wgpu::SurfaceTexture>, PresentError> {
+    /// The next texture to draw to; `None` while nothing of the window is visible.
+    fn next_texture(&mut self) -> Result<Option<wgpu::SurfaceTexture>, PresentError> {
         use wgpu::CurrentSurfaceTexture as Current;
-        // Once more after what is wrong with the surface was put right.
+        // The second time after the surface was configured or made anew.
         for _ in 0..2 {
             let Some(surface) = &self.surface else { return Ok(None) };
             match surface.get_current_texture() {
@@ -98,7 +99,7 @@ fn fault(error: impl std::fmt::Display) -> PresentError {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // Freeing one whose device hangs would wait for what never comes.
+        // To free the surface of a device that hangs would block forever: it is leaked.
         if self.device.check().is_err() {
             std::mem::forget(self.surface.take());
         }
@@ -118,8 +119,8 @@ impl Presenter for Gpu {
         if (self.config.width, self.config.height) == (width, height) && self.configured {
             return;
         }
-        let most = self.device.device.limits().max_texture_dimension_2d;
-        (self.config.width, self.config.height) = (width.min(most), height.min(most));
+        let max_side = self.device.device.limits().max_texture_dimension_2d;
+        (self.config.width, self.config.height) = (width.min(max_side), height.min(max_side));
         self.configure();
     }
 
@@ -132,7 +133,7 @@ impl Presenter for Gpu {
         if !self.configured {
             return Ok(());
         }
-        let Some(texture) = self.texture()? else { return Ok(()) };
+        let Some(texture) = self.next_texture()? else { return Ok(()) };
         let view = texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
         self.canvas.draw(&view, (self.config.width, self.config.height), drawing);
         self.window.pre_present_notify();

@@ -1,10 +1,11 @@
-//! Premultiplied colours in one word, `0xAARRGGBB`, laid over each other.
+//! Blending of premultiplied colours, one to a word: `0xAARRGGBB`.
 
+/// Two channels are computed at once, each in the low half of 16 bits. `ONE` is 256 and `HALF` 128 in both.
 const PAIR: u32 = 0x00ff_00ff;
 const ONE: u32 = 0x0100_0100;
 const HALF: u32 = 0x0080_0080;
 
-/// `color` over `below`, each channel rounded. Colours brighter than their alpha add light, to full white at most.
+/// `color` over `below`, each channel rounded. A colour brighter than its alpha adds light; channels saturate at 255.
 #[inline(always)]
 pub fn over(color: u32, below: u32) -> u32 {
     let rest = 255 - (color >> 24);
@@ -21,15 +22,16 @@ fn share(pair: u32, by: u32) -> u32 {
     ((product + ((product >> 8) & PAIR)) >> 8) & PAIR
 }
 
-/// Two channels, each at most 255.
+/// The sum of two pairs of channels, each saturated at 255.
 #[inline(always)]
 fn sum(a: u32, b: u32) -> u32 {
     let sum = a + b;
-    let beyond = sum & ONE;
-    (sum | (beyond - (beyond >> 8))) & PAIR
+    let overflow = sum & ONE;
+    // 256 - 1 sets all bits of a channel that overflowed.
+    (sum | (overflow - (overflow >> 8))) & PAIR
 }
 
-/// A texel times a colour (red, green, blue, alpha).
+/// A texel times a colour (red, green, blue, alpha), channel by channel: rounded products / 255.
 #[inline(always)]
 pub fn scaled_by(texel: u32, color: [u8; 4]) -> u32 {
     let [a, r, g, b] = texel.to_be_bytes();

@@ -1,4 +1,4 @@
-//! The controls as a picture of their own: painted when they change, laid over every frame.
+//! The controls as a picture of their own: painted when they change, blended over every frame.
 
 use std::ops::Range;
 
@@ -11,9 +11,9 @@ use super::texture::{Texture, Textures};
 use super::triangle::{self, Clip, Corner};
 use crate::preview::present::Controls;
 
-/// Cells that a row is divided into: one bit each.
+/// Most cells that a row is divided into: one bit each.
 const CELLS: usize = u64::BITS as usize;
-/// Columns of a cell at least.
+/// Fewest columns of a cell.
 const LEAST_CELL_PX: usize = 16;
 
 /// The controls over a window.
@@ -22,20 +22,21 @@ pub struct Overlay {
     size: (usize, usize),
     /// Premultiplied, `0xAARRGGBB`.
     pixels: Vec<u32>,
+    /// Columns of a cell.
     cell_px: usize,
-    /// For each row, the cells where there may be anything.
+    /// For each row, a bit per cell, the leftmost lowest: 0 where all `pixels` of the cell are 0.
     cells: Vec<u64>,
     textures: Textures,
     primitives: Vec<ClippedPrimitive>,
     pixels_per_point: f32,
-    /// Textures that only these controls still need.
+    /// Textures to free when these controls are replaced.
     freed: Vec<TextureId>,
-    /// Whether `pixels` shows something else.
+    /// Whether `pixels` has yet to be painted with these controls.
     outdated: bool,
 }
 
 impl Overlay {
-    /// Another size, in pixels.
+    /// Changes the size, in pixels.
     pub fn resize(&mut self, size: (usize, usize)) {
         if self.size == size {
             return;
@@ -49,10 +50,10 @@ impl Overlay {
         self.outdated = true;
     }
 
-    /// Other controls, from the next [`Overlay::paint`] on.
+    /// Replaces the controls, from the next [`Overlay::paint`] on.
     pub fn set(&mut self, controls: Controls) {
         let Controls { primitives, mut textures, pixels_per_point } = controls;
-        // The controls so far were the last to need these.
+        // Only the controls so far still needed these.
         self.textures.free(self.freed.drain(..));
         self.textures.set(&textures);
         self.freed.extend(&textures.free);
@@ -60,11 +61,13 @@ impl Overlay {
         (self.primitives, self.pixels_per_point, self.outdated) = (primitives, pixels_per_point, true);
     }
 
+    /// Paints the controls into `pixels`, if they or the size changed.
     pub fn paint(&mut self) {
         if !std::mem::take(&mut self.outdated) {
             return;
         }
         let width = self.size.0;
+        // Only what was painted before has to be cleared.
         for (row, cells) in self.pixels.chunks_exact_mut(width.max(1)).zip(&mut self.cells) {
             for columns in runs(std::mem::take(cells), self.cell_px, 0..width) {
                 row[columns].fill(0);
@@ -74,31 +77,32 @@ impl Overlay {
         for ClippedPrimitive { clip_rect, primitive } in &primitives {
             // Callbacks draw with a GPU; no control of ours has one.
             if let Primitive::Mesh(mesh) = primitive {
-                let clip = self.clip(*clip_rect);
-                self.mesh(mesh, clip);
+                let clip = self.clip_px(*clip_rect);
+                self.fill_mesh(mesh, clip);
             }
         }
         self.primitives = primitives;
     }
 
-    fn clip(&self, rect: egui::Rect) -> Clip {
+    /// A clip rectangle in points as whole pixels within the window.
+    fn clip_px(&self, rect: egui::Rect) -> Clip {
         let at = |points: f32, most: usize| (points * self.pixels_per_point).round().clamp(0.0, most as f32) as usize;
         let (width, height) = self.size;
         let (left, top) = (at(rect.min.x, width), at(rect.min.y, height));
         Clip { left, top, right: at(rect.max.x, width).max(left), bottom: at(rect.max.y, height).max(top) }
     }
 
-    fn mesh(&mut self, mesh: &Mesh, clip: Clip) {
+    fn fill_mesh(&mut self, mesh: &Mesh, clip: Clip) {
         let Self { textures, pixels, cells, cell_px, size, .. } = self;
         let Some(texture) = textures.get(mesh.texture_id) else { return };
         let (width, cell_px) = (size.0, *cell_px);
         for corners in mesh.indices.as_chunks::<3>().0 {
             let Some(corners) = corners_of(mesh, *corners, self.pixels_per_point) else { continue };
-            fill(corners, clip, texture, width, cell_px, pixels, cells);
+            fill_triangle(corners, clip, texture, width, cell_px, pixels, cells);
         }
     }
 
-    /// Lays the controls over some columns of the row `y`; `row` holds these.
+    /// Blends the controls over some columns of the row `y`; `row` holds just these columns.
     pub fn blend(&self, arch: Arch, y: usize, columns: Range<usize>, row: &mut [u32]) {
         let Some(&cells) = self.cells.get(y) else { return };
         let start = columns.start;
@@ -110,6 +114,7 @@ impl Overlay {
     }
 }
 
+/// The corners of a triangle from its indices into the mesh; `None` if one of them is out of range.
 fn corners_of(mesh: &Mesh, corners: [u32; 3], pixels_per_point: f32) -> Option<[Corner; 3]> {
     let corner = |index: u32| {
         let &Vertex { pos, uv, color } = mesh.vertices.get(index as usize)?;
@@ -120,7 +125,8 @@ fn corners_of(mesh: &Mesh, corners: [u32; 3], pixels_per_point: f32) -> Option<[
     Some([a?, b?, c?])
 }
 
-fn fill(
+/// Fills a triangle in `pixels`, rows of `width`, and sets the bits of all `cells` that it touches.
+fn fill_triangle(
     corners: [Corner; 3],
     clip: Clip,
     texture: &Texture,
@@ -131,13 +137,15 @@ fn fill(
 ) {
     triangle::fill(corners, clip, texture, |y, columns, paint| {
         let (first, last) = (columns.start / cell_px, (columns.end - 1) / cell_px);
+        // The bits `first..=last`.
         cells[y] |= (u64::MAX >> (CELLS - 1 - (last - first))) << first;
         paint(&mut pixels[y * width..][columns]);
     });
 }
 
-/// Runs of cells that are set, as columns, cut to `within`.
+/// The runs of set bits of a row's `cells`, as ranges of columns clipped to `within`.
 fn runs(mut cells: u64, cell_px: usize, within: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    // Cells that were shifted out of `cells` so far.
     let mut passed = 0;
     std::iter::from_fn(move || {
         if cells == 0 {
@@ -146,7 +154,7 @@ fn runs(mut cells: u64, cell_px: usize, within: Range<usize>) -> impl Iterator<I
         let skipped = cells.trailing_zeros() as usize;
         cells >>= skipped;
         let count = cells.trailing_ones() as usize;
-        // Shifted twice, as all bits at once is one too many.
+        // In two shifts, because a shift by all 64 bits would overflow.
         cells = cells >> (count - 1) >> 1;
         let first = passed + skipped;
         passed = first + count;
@@ -155,7 +163,7 @@ fn runs(mut cells: u64, cell_px: usize, within: Range<usize>) -> impl Iterator<I
     .filter(|run| run.start < run.end)
 }
 
-/// One run over the picture.
+/// Blends one run of the controls over the picture's pixels.
 struct Blend<'a> {
     from: &'a [u32],
     to: &'a mut [u32],

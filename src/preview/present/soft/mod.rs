@@ -1,4 +1,4 @@
-//! On the CPU, into memory that is shared with the display server.
+//! Presents on the CPU, into memory that is shared with the display server.
 
 mod blend;
 mod controls;
@@ -20,12 +20,13 @@ use super::{Controls, Drawing, PresentError, Presenter};
 pub struct Soft {
     window: Arc<Window>,
     surface: Surface<Arc<Window>, Arc<Window>>,
+    /// `None` while the window has no pixels.
     size: Option<(NonZeroU32, NonZeroU32)>,
     painter: Painter,
 }
 
 impl Soft {
-    /// For this window, by a painter that may know controls already.
+    /// A presenter for this window; `painter` may have been given controls already.
     ///
     /// # Errors
     /// The display server takes no pictures from memory.
@@ -58,7 +59,7 @@ impl Presenter for Soft {
         self.surface.resize(width, height).map_err(fault)?;
         let mut buffer = self.surface.buffer_mut().map_err(fault)?;
         let age = buffer.age();
-        // The memory may go on after the last pixel.
+        // The buffer may be longer than the window.
         let pixels = width.get() as usize * height.get() as usize;
         if let Some(pixels) = buffer.get_mut(..pixels) {
             self.painter.paint(pixels, age, drawing);

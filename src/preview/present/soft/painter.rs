@@ -1,4 +1,4 @@
-//! Paints drawing and controls into memory: all but the way to the screen.
+//! Paints the picture and the controls into memory: everything but the way to the screen.
 
 use std::sync::atomic::AtomicBool;
 
@@ -12,12 +12,13 @@ use crate::preview::present::{Area, Controls, Drawing, Image};
 
 /// Rows that one thread paints at a time.
 const BAND: usize = 16;
-/// Pixels from which on one thread is not enough, where they are copied and where they are scaled.
+/// Above this many pixels several threads are faster than one: where they are copied, and where they are scaled.
 const MANY_COPIED: u64 = 3_000_000;
 const MANY_SCALED: u64 = 700_000;
-/// The blur has the other half of the cores: who waits for a thread that gets none is slower than alone.
+/// At most this many threads, and half of the cores. The blur needs the others: waiting for a thread that gets no core
+/// takes longer than to paint alone.
 const MOST_THREADS: usize = 4;
-/// Windows are double or triple buffered.
+/// Buffers whose content is remembered: windows are double or triple buffered.
 const BUFFERS: usize = 4;
 
 /// Paints a window's content.
@@ -28,18 +29,21 @@ pub struct Painter {
     scaler: Scaler,
     /// The threads, once they are needed.
     workers: Option<ThreadPool>,
+    /// One for each thread.
     scratch: Vec<Scratch>,
+    /// A flag for each band, for [`DisjointParts`].
     taken: Vec<AtomicBool>,
     around: Around,
 }
 
-/// What is around the picture, which is painted only when it changes.
+/// The window around the picture, which is painted only into buffers that show an older version of it.
 #[derive(Debug, Default)]
 struct Around {
     area: Area,
     background: [u8; 3],
+    /// Counts the changes of area, background, size and controls.
     version: u64,
-    /// What the buffers have that were painted last, the last one in front.
+    /// The version in each of the last buffers, the one painted last first.
     painted: [u64; BUFFERS],
 }
 
@@ -58,7 +62,7 @@ impl Painter {
         }
     }
 
-    /// Another size of the window, in pixels.
+    /// Changes the size of the window, in pixels.
     pub fn resize(&mut self, size: (u32, u32)) {
         self.size = (size.0 as usize, size.1 as usize);
         self.overlay.resize(self.size);
@@ -72,14 +76,14 @@ impl Painter {
         self.around.version += 1;
     }
 
-    /// Paints the window into `pixels`: rows of `0x00RRGGBB` without gaps, as many as the window has. `age` says how
-    /// many paintings ago these were painted last, 0 that they hold anything.
+    /// Paints the window into `pixels`: rows of `0x00RRGGBB` without gaps, of the window's size. `age` is how many
+    /// calls ago this buffer was painted, 0 if its content is unknown.
     pub fn paint(&mut self, pixels: &mut [u32], age: u8, drawing: &Drawing) {
         if pixels.len() != self.size.0 * self.size.1 || pixels.is_empty() {
             return;
         }
         self.overlay.paint();
-        let around = self.around.begin(age, drawing);
+        let around = self.around.begin_frame(age, drawing);
         let picture = match drawing.picture {
             Image::Memory(picture) if !picture.rgb.is_empty() && drawing.area.width > 0 && drawing.area.height > 0 => {
                 self.scaler.adapt(picture, drawing.area);
@@ -91,20 +95,20 @@ impl Painter {
         let (arch, width, overlay, scaler) = (*arch, *width, &*overlay, &*scaler);
         let window = Window { arch, width, overlay, scaler, drawing, picture, around };
         let bands = pixels.len().div_ceil(width * BAND);
-        let band = |scratch: &mut Scratch, band: usize, pixels: &mut [u32]| {
+        let paint_band = |scratch: &mut Scratch, band: usize, pixels: &mut [u32]| {
             for (y, row) in (band * BAND..).zip(pixels.chunks_exact_mut(width)) {
-                window.row(y, scratch, row);
+                window.paint_row(y, scratch, row);
             }
         };
-        if is_much(drawing) {
+        if needs_threads(drawing) {
             let workers =
                 workers.get_or_insert_with(|| ThreadPool::new("present", (thread_pool::cores() / 2).min(MOST_THREADS)));
             scratch.resize_with(workers.thread_count(), Scratch::default);
-            let shelf = DisjointParts::new(pixels, width * BAND, taken);
-            workers.run_with(scratch, bands, &|scratch, part| band(scratch, part, shelf.part(part)));
+            let parts = DisjointParts::new(pixels, width * BAND, taken);
+            workers.run_with(scratch, bands, &|scratch, band| paint_band(scratch, band, parts.part(band)));
         } else {
-            for (part, pixels) in pixels.chunks_mut(width * BAND).enumerate() {
-                band(&mut scratch[0], part, pixels);
+            for (band, pixels) in pixels.chunks_mut(width * BAND).enumerate() {
+                paint_band(&mut scratch[0], band, pixels);
             }
         }
     }
@@ -116,29 +120,31 @@ impl Default for Painter {
     }
 }
 
-/// Whether several threads are worth their waking.
-fn is_much(drawing: &Drawing) -> bool {
+/// Whether there is so much to paint that several threads are worth waking.
+fn needs_threads(drawing: &Drawing) -> bool {
     let area = drawing.area;
     let scaled = drawing.picture.size() != (area.width, area.height);
     u64::from(area.width) * u64::from(area.height) > if scaled { MANY_SCALED } else { MANY_COPIED }
 }
 
 impl Around {
-    /// Whether what is around the picture has to be painted.
-    fn begin(&mut self, age: u8, drawing: &Drawing) -> bool {
+    /// Takes note of what is to be painted into a buffer of this `age`; whether the window around the picture has to be
+    /// painted, too.
+    fn begin_frame(&mut self, age: u8, drawing: &Drawing) -> bool {
         let looks = (drawing.area, drawing.background);
         if (self.area, self.background) != looks {
             (self.area, self.background) = looks;
             self.version += 1;
         }
-        let known = usize::from(age).checked_sub(1).and_then(|ago| self.painted.get(ago));
-        let needed = known != Some(&self.version);
+        let in_buffer = usize::from(age).checked_sub(1).and_then(|ago| self.painted.get(ago));
+        let needed = in_buffer != Some(&self.version);
         self.painted.rotate_right(1);
         self.painted[0] = self.version;
         needed
     }
 }
 
+/// What the threads share while they paint a frame.
 struct Window<'a> {
     arch: Arch,
     width: usize,
@@ -147,26 +153,28 @@ struct Window<'a> {
     drawing: &'a Drawing<'a>,
     /// The picture, where there is one in memory.
     picture: Option<&'a ColorImage>,
-    /// Whether what is around it is painted.
+    /// Whether the window around it is painted, too.
     around: bool,
 }
 
 impl Window<'_> {
-    fn row(&self, y: usize, scratch: &mut Scratch, row: &mut [u32]) {
+    /// Paints row `y` of the window: picture and background, and the controls over them.
+    fn paint_row(&self, y: usize, scratch: &mut Scratch, row: &mut [u32]) {
         let Self { arch, width, overlay, scaler, drawing, picture, around } = *self;
-        let Area { x, y: top, width: across, height } = drawing.area;
+        let Area { x, y: top, width: area_width, height } = drawing.area;
         let [r, g, b] = drawing.background;
         let background = u32::from_be_bytes([0, r, g, b]);
-        let (left, right) = ((x as usize).min(width), (x as usize + across as usize).min(width));
+        let (left, right) = ((x as usize).min(width), (x as usize + area_width as usize).min(width));
         let (top, bottom) = (top as usize, top as usize + height as usize);
         let Some(picture) = picture.filter(|_| (top..bottom).contains(&y)) else {
+            // Without a picture its area is background, too.
             if around || self.picture.is_none() {
                 row.fill(background);
                 overlay.blend(arch, y, 0..width, row);
             }
             return;
         };
-        scaler.row(arch, (drawing, picture), y - top, scratch, &mut row[left..right]);
+        scaler.paint_row(arch, (drawing, picture), y - top, scratch, &mut row[left..right]);
         if around {
             row[..left].fill(background);
             row[right..].fill(background);

@@ -8,7 +8,7 @@ use crate::frame::ColorImage;
 use crate::frame::scale::Scale;
 use crate::preview::present::{Area, Drawing, Tone};
 
-/// Scales pictures into an area; keeps its weights from one to the next.
+/// Paints pictures into an area, scaled where they have another size; keeps the scaling weights from frame to frame.
 #[derive(Debug, Default)]
 pub struct Scaler {
     scale: Scale,
@@ -17,12 +17,14 @@ pub struct Scaler {
 /// Memory for one thread.
 #[derive(Debug, Default)]
 pub struct Scratch {
+    /// For [`Scale::row`].
     row: Vec<u16>,
+    /// A scaled row, RGB.
     line: Vec<u8>,
 }
 
 impl Scaler {
-    /// For pictures of this size in this area; neither is without pixels.
+    /// Prepares for pictures of this size in this area; neither may be without pixels.
     pub fn adapt(&mut self, picture: &ColorImage, area: Area) {
         let [from, to] =
             [picture.size(), (area.width, area.height)].map(|(width, height)| (width as usize, height as usize));
@@ -31,8 +33,9 @@ impl Scaler {
         }
     }
 
-    /// The row `y` of the area, whose first columns `row` holds, with this picture.
-    pub fn row(
+    /// Paints row `y` of the area into `row`, which is shorter where the window cuts the area off: the picture before
+    /// the blur left of the split, `picture` right of it, and the divider.
+    pub fn paint_row(
         &self,
         arch: Arch,
         (drawing, picture): (&Drawing, &ColorImage),
@@ -40,10 +43,11 @@ impl Scaler {
         scratch: &mut Scratch,
         row: &mut [u32],
     ) {
-        let mut whole = |picture: &ColorImage, columns: Range<usize>, row: &mut [u32]| {
+        let mut paint_columns = |picture: &ColorImage, columns: Range<usize>, row: &mut [u32]| {
             let columns = columns.start..columns.end.min(row.len());
             let Some(row) = row.get_mut(columns.clone()).filter(|row| !row.is_empty()) else { return };
             let width = drawing.area.width as usize;
+            // Mirrored, columns come from the other side, and are reversed below.
             let from = if drawing.mirror { width - columns.end..width - columns.start } else { columns };
             let rgb = if picture.size() == (drawing.area.width, drawing.area.height) {
                 &picture.rgb[3 * (y * width + from.start)..3 * (y * width + from.end)]
@@ -59,19 +63,19 @@ impl Scaler {
         };
         let width = drawing.area.width as usize;
         let Some((before, split)) = drawing.split() else {
-            whole(picture, 0..width, row);
-            return self.tone(arch, drawing, row);
+            paint_columns(picture, 0..width, row);
+            return self.dim_if_stale(arch, drawing, row);
         };
-        whole(before, 0..split.at, row);
-        whole(picture, split.at..width, row);
-        self.tone(arch, drawing, row);
+        paint_columns(before, 0..split.at, row);
+        paint_columns(picture, split.at..width, row);
+        self.dim_if_stale(arch, drawing, row);
         for (columns, [r, g, b]) in split.divider() {
             let columns = columns.start.min(row.len())..columns.end.min(row.len());
             row[columns].fill(u32::from_be_bytes([0, r, g, b]));
         }
     }
 
-    fn tone(&self, arch: Arch, drawing: &Drawing, row: &mut [u32]) {
+    fn dim_if_stale(&self, arch: Arch, drawing: &Drawing, row: &mut [u32]) {
         if drawing.stale {
             arch.dispatch(Stale { row });
         }
@@ -94,6 +98,7 @@ impl WithSimd for Expand<'_> {
     }
 }
 
+/// Makes pixels grey and dim, as [`Tone`] says.
 struct Stale<'a> {
     row: &'a mut [u32],
 }
@@ -105,6 +110,7 @@ impl WithSimd for Stale<'_> {
         for pixel in self.row {
             let [r, g, b] = [*pixel >> 16 & 0xff, *pixel >> 8 & 0xff, *pixel & 0xff];
             let [red, green, blue] = Tone::STALE_WEIGHTS;
+            // The sum is rounded, and the last factor copies it to all three channels.
             *pixel =
                 ((red * r + green * g + blue * b + (1 << (Tone::STALE_BITS - 1))) >> Tone::STALE_BITS) * 0x0001_0101;
         }

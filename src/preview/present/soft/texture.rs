@@ -1,22 +1,25 @@
-//! The textures of controls: the glyphs of text, and pictures.
+//! The textures of the controls: glyphs and pictures.
 
 use std::collections::HashMap;
 
 use egui::epaint::ImageDelta;
 use egui::{Color32, ImageData, TextureFilter, TextureId, TextureWrapMode, TexturesDelta};
 
-/// Parts of a texel that places are rounded to.
+/// Positions are rounded to this fraction of a texel: 8 bits of weight.
 const PARTS: f32 = 256.0;
 
+/// A texture as egui set it.
 #[derive(Debug)]
 pub struct Texture {
     size: [usize; 2],
+    /// Row by row, premultiplied `0xAARRGGBB`.
     texels: Vec<u32>,
+    /// Whether to interpolate; otherwise the nearest texel is taken.
     smooth: bool,
     wrap: TextureWrapMode,
 }
 
-/// The textures by egui's names.
+/// The textures by egui's ids.
 #[derive(Debug, Default)]
 pub struct Textures(HashMap<TextureId, Texture>);
 
@@ -26,23 +29,24 @@ impl Textures {
         self.0.get(&id)
     }
 
-    /// Sets what is new or changed.
+    /// Adds new textures and changes others.
     pub fn set(&mut self, delta: &TexturesDelta) {
         for (&id, changes) in &delta.set {
             for change in changes {
-                self.change(id, change);
+                self.apply(id, change);
             }
         }
     }
 
-    /// Drops what is needed no more.
+    /// Drops textures.
     pub fn free(&mut self, ids: impl Iterator<Item = TextureId>) {
         for id in ids {
             self.0.remove(&id);
         }
     }
 
-    fn change(&mut self, id: TextureId, change: &ImageDelta) {
+    /// Replaces a texture, or the part of it at `change.pos`. A part that does not fit in it is ignored.
+    fn apply(&mut self, id: TextureId, change: &ImageDelta) {
         let ImageData::Color(image) = &change.image;
         let texels = image.pixels.iter().map(|&color| packed(color));
         let [width, height] = image.size;
@@ -57,32 +61,32 @@ impl Textures {
             return;
         };
         let Some(texture) = self.0.get_mut(&id) else { return };
-        let [across, down] = texture.size;
-        if left + width > across || top + height > down || width == 0 {
+        let [texture_width, texture_height] = texture.size;
+        if left + width > texture_width || top + height > texture_height || width == 0 {
             return;
         }
         let texels: Vec<u32> = texels.collect();
-        for (row, part) in texture.texels.chunks_exact_mut(across).skip(top).zip(texels.chunks_exact(width)) {
+        for (row, part) in texture.texels.chunks_exact_mut(texture_width).skip(top).zip(texels.chunks_exact(width)) {
             row[left..left + width].copy_from_slice(part);
         }
     }
 }
 
-/// As one word, `0xAARRGGBB`.
+/// A colour as `0xAARRGGBB`.
 fn packed(color: Color32) -> u32 {
     let [r, g, b, a] = color.to_array();
     u32::from_be_bytes([a, r, g, b])
 }
 
 impl Texture {
-    /// Where `uv` is, in texels.
-    pub fn place(&self, uv: [f32; 2]) -> [f32; 2] {
+    /// The position `uv` (0 to 1) in texels.
+    pub fn to_texels(&self, uv: [f32; 2]) -> [f32; 2] {
         [uv[0] * self.size[0] as f32, uv[1] * self.size[1] as f32]
     }
 
-    /// The colour at a place in texels.
+    /// The colour at a position in texels, whose centres lie at halves: of the nearest texel, or bilinear if `smooth`.
     #[inline]
-    pub fn at(&self, [x, y]: [f32; 2]) -> u32 {
+    pub fn sample(&self, [x, y]: [f32; 2]) -> u32 {
         if !self.smooth {
             return self.texel(x.floor() as i64, y.floor() as i64);
         }
@@ -90,14 +94,15 @@ impl Texture {
         let (parts, part_x, part_y) = (PARTS as i64, x & 255, y & 255);
         let (x, y) = (x.div_euclid(parts), y.div_euclid(parts));
         if part_x == 0 && part_y == 0 {
-            // Where texels and pixels coincide, as in text.
+            // At a texel's centre, as always in text.
             return self.texel(x, y);
         }
         let upper = mix(self.texel(x, y), self.texel(x + 1, y), part_x as u32);
         let lower = mix(self.texel(x, y + 1), self.texel(x + 1, y + 1), part_x as u32);
-        mix_finely(upper, lower, part_y as u32)
+        mix_rows(upper, lower, part_y as u32)
     }
 
+    /// The texel of a column and row, wrapped where they are beyond the texture.
     #[inline]
     fn texel(&self, x: i64, y: i64) -> u32 {
         let [width, height] = self.size;
@@ -119,15 +124,16 @@ impl Texture {
     }
 }
 
-/// Between two colours, with 8 more bits for each channel, in pairs: blue and red, green and alpha.
+/// From `a` to `b` by `part` / 256. Each channel gains 8 fractional bits, so there are two to a word: blue and red, and
+/// green and alpha.
 fn mix(a: u32, b: u32, part: u32) -> [u64; 2] {
     let pair = |color: u32| u64::from(color & 0xff) | u64::from(color >> 16 & 0xff) << 32;
     let (rest, part) = (u64::from(256 - part), u64::from(part));
     [pair(a) * rest + pair(b) * part, pair(a >> 8) * rest + pair(b >> 8) * part]
 }
 
-/// Between two of those, rounded.
-fn mix_finely(upper: [u64; 2], lower: [u64; 2], part: u32) -> u32 {
+/// From one result of [`mix`] to another by `part` / 256, rounded to `0xAARRGGBB`.
+fn mix_rows(upper: [u64; 2], lower: [u64; 2], part: u32) -> u32 {
     let (rest, part) = (u64::from(256 - part), u64::from(part));
     let [low, high] = std::array::from_fn(|k| {
         let sum = upper[k] * rest + lower[k] * part + 0x0000_8000_0000_8000;
@@ -158,19 +164,19 @@ mod tests {
     fn texels_are_met_at_their_centres_and_mixed_between() {
         let textures = texture(TextureOptions::LINEAR);
         let texture = textures.get(TextureId::default()).unwrap();
-        assert_eq!(texture.at([0.5, 0.5]), 0);
-        assert_eq!(texture.at([1.5, 1.5]), 0x280a_141e);
-        assert_eq!(texture.at([1.0, 0.5]), 0x8080_8080, "half way");
-        assert_eq!(texture.at([1.0, 1.0]), 0x8a74_5e54, "the mean of four");
-        assert_eq!(texture.at([-9.0, 40.0]), 0xffc8_6432, "beyond the edge");
+        assert_eq!(texture.sample([0.5, 0.5]), 0);
+        assert_eq!(texture.sample([1.5, 1.5]), 0x280a_141e);
+        assert_eq!(texture.sample([1.0, 0.5]), 0x8080_8080, "half way");
+        assert_eq!(texture.sample([1.0, 1.0]), 0x8a74_5e54, "the mean of four");
+        assert_eq!(texture.sample([-9.0, 40.0]), 0xffc8_6432, "beyond the edge");
     }
 
     #[test]
     fn the_nearest_texel_is_whole() {
         let textures = texture(TextureOptions::NEAREST);
         let texture = textures.get(TextureId::default()).unwrap();
-        assert_eq!(texture.at([1.01, 0.99]), 0xffff_ffff);
-        assert_eq!(texture.at([0.99, 1.01]), 0xffc8_6432);
+        assert_eq!(texture.sample([1.01, 0.99]), 0xffff_ffff);
+        assert_eq!(texture.sample([0.99, 1.01]), 0xffc8_6432);
     }
 
     #[test]
@@ -183,7 +189,7 @@ mod tests {
         textures.set(&delta);
         delta.clear();
         let texture = textures.get(TextureId::default()).unwrap();
-        assert_eq!((texture.at([1.5, 0.5]), texture.at([0.5, 1.5])), (0xffff_0000, 0xffc8_6432));
+        assert_eq!((texture.sample([1.5, 0.5]), texture.sample([0.5, 1.5])), (0xffff_0000, 0xffc8_6432));
         textures.free([TextureId::default()].into_iter());
         assert!(textures.get(TextureId::default()).is_none());
     }

@@ -1,28 +1,30 @@
-//! Fills triangles as a GPU does: the pixels whose centres they cover, colours and texture interpolated between the
-//! corners.
+//! Fills triangles as a GPU does: the pixels whose centres they cover, with colours and texture interpolated between
+//! the corners.
 
 use std::ops::Range;
 
 use super::blend::{over, scaled_by};
 use super::texture::Texture;
 
-/// Parts of a pixel that corners are rounded to; shared edges then neither overlap nor leave gaps.
+/// Corners are rounded to this fraction of a pixel, so that shared edges are exact: without overlaps and gaps.
 const SUBPIXELS: f32 = 256.0;
+/// A pixel in subpixels.
 const PIXEL: i64 = SUBPIXELS as i64;
-/// No corner is further away, in pixels, so that nothing overflows.
-const FURTHEST: f32 = 1e6;
+/// Coordinates are clamped to this, in pixels, so that products of two of them do not overflow.
+const FURTHEST_PX: f32 = 1e6;
 
+/// A vertex of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
-    /// Where it is, in pixels.
+    /// Position in pixels.
     pub at: [f32; 2],
-    /// Where it is in the texture, from 0 to 1.
+    /// Position in the texture, from 0 to 1.
     pub uv: [f32; 2],
     /// Red, green, blue and alpha, premultiplied.
     pub color: [u8; 4],
 }
 
-/// Rows and columns that may be drawn to, the ends excluded.
+/// The rectangle that may be drawn to, in pixels; `right` and `bottom` are excluded.
 #[derive(Clone, Copy, Debug)]
 pub struct Clip {
     pub left: usize,
@@ -31,13 +33,13 @@ pub struct Clip {
     pub bottom: usize,
 }
 
-/// Fills a triangle. `row` is called with each row and the columns that are covered there; it hands these pixels to the
-/// function it is given.
+/// Fills a triangle. Calls `on_row(y, columns, paint)` for each row that it covers; that has to call `paint` with the
+/// pixels of these columns.
 pub fn fill(
     corners: [Corner; 3],
     clip: Clip,
     texture: &Texture,
-    mut row: impl FnMut(usize, Range<usize>, &dyn Fn(&mut [u32])),
+    mut on_row: impl FnMut(usize, Range<usize>, &dyn Fn(&mut [u32])),
 ) {
     let Some(shape) = Shape::new(corners.map(|corner| corner.at)) else { return };
     let paint = Paint::new(corners, texture);
@@ -48,18 +50,20 @@ pub fn fill(
         let columns = shape.columns(y, clip);
         if !columns.is_empty() {
             let x = columns.start;
-            row(y, columns, &|pixels| paint.fill(x, y, pixels, texture));
+            on_row(y, columns, &|pixels| paint.fill(x, y, pixels, texture));
         }
     }
 }
 
+/// Which pixels a triangle covers, in exact integers.
 struct Shape {
     edges: [Edge; 3],
+    /// The highest and the lowest corner, in subpixels.
     top: i64,
     bottom: i64,
 }
 
-/// Pixels on the inner side of an edge have `start + x * across + y * down >= 0`.
+/// A pixel in column `x` and row `y` is on the inner side of an edge if `start + x * across + y * down >= 0`.
 #[derive(Clone, Copy)]
 struct Edge {
     start: i64,
@@ -68,25 +72,27 @@ struct Edge {
 }
 
 impl Shape {
-    /// `None` where nothing is covered.
+    /// `None` if the triangle has no area, or a corner that is not finite.
     fn new(corners: [[f32; 2]; 3]) -> Option<Self> {
         if corners.as_flattened().iter().any(|value| !value.is_finite()) {
             return None;
         }
         let mut corners =
-            corners.map(|corner| corner.map(|v| (v.clamp(-FURTHEST, FURTHEST) * SUBPIXELS).round() as i64));
+            corners.map(|corner| corner.map(|v| (v.clamp(-FURTHEST_PX, FURTHEST_PX) * SUBPIXELS).round() as i64));
         let [a, b, c] = corners;
         match (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) {
             0 => return None,
+            // Now clockwise on the screen, so that the inner side of each edge is the positive one.
             area if area < 0 => corners.swap(1, 2),
             _ => {}
         }
         let edge = |from: [i64; 2], to: [i64; 2]| {
             let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-            // A centre on a shared edge belongs to the triangle below it or right of it.
-            let mine = dy < 0 || (dy == 0 && dx > 0);
-            let at = |x: i64, y: i64| dx * (y - from[1]) - dy * (x - from[0]);
-            Edge { start: at(PIXEL / 2, PIXEL / 2) - i64::from(!mine), across: -dy * PIXEL, down: dx * PIXEL }
+            // The top-left rule: a centre on a shared edge belongs to the triangle below it or right of it.
+            let is_top_left = dy < 0 || (dy == 0 && dx > 0);
+            let side = |x: i64, y: i64| dx * (y - from[1]) - dy * (x - from[0]);
+            let start = side(PIXEL / 2, PIXEL / 2) - i64::from(!is_top_left);
+            Edge { start, across: -dy * PIXEL, down: dx * PIXEL }
         };
         let [a, b, c] = corners;
         let rows = corners.map(|corner| corner[1]);
@@ -94,11 +100,13 @@ impl Shape {
         Some(Self { edges: [edge(a, b), edge(b, c), edge(c, a)], top, bottom })
     }
 
+    /// The rows that may be covered.
     fn rows(&self, clip: Clip) -> Range<usize> {
         let within = |row: i64| row.clamp(clip.top as i64, clip.bottom as i64) as usize;
         within(self.top.div_euclid(PIXEL))..within(self.bottom.div_euclid(PIXEL) + 1)
     }
 
+    /// The columns of row `y` whose centres lie inside all three edges.
     fn columns(&self, y: usize, clip: Clip) -> Range<usize> {
         let (mut left, mut right) = (clip.left as i64, clip.right as i64);
         for edge in &self.edges {
@@ -106,8 +114,9 @@ impl Shape {
             match edge.across {
                 0 if start < 0 => return 0..0,
                 0 => {}
-                // The first column from which on the value is not negative: the quotient rounded up.
+                // Inside from the first column on whose value is not negative: the quotient rounded up.
                 across if across > 0 => left = left.max(-start.div_euclid(across)),
+                // Inside up to the last such column.
                 across => right = right.min(start.div_euclid(-across) + 1),
             }
         }
@@ -115,7 +124,7 @@ impl Shape {
     }
 }
 
-/// A value that changes evenly over the picture.
+/// A value that changes linearly over the picture.
 #[derive(Clone, Copy, Default)]
 struct Plane {
     start: f32,
@@ -124,6 +133,7 @@ struct Plane {
 }
 
 impl Plane {
+    /// The plane with these values at these three points; if they are all but on a line, the first value everywhere.
     fn through(at: [[f32; 2]; 3], values: [f32; 3]) -> Self {
         let (ab, ac) = ([at[1][0] - at[0][0], at[1][1] - at[0][1]], [at[2][0] - at[0][0], at[2][1] - at[0][1]]);
         let area = ab[0] * ac[1] - ab[1] * ac[0];
@@ -135,7 +145,7 @@ impl Plane {
         Self { start: values[0] - at[0][0] * across - at[0][1] * down, across, down }
     }
 
-    /// At the centre of a pixel.
+    /// The value at the centre of a pixel.
     fn at(&self, x: usize, y: usize) -> f32 {
         self.start + self.across * (x as f32 + 0.5) + self.down * (y as f32 + 0.5)
     }
@@ -143,16 +153,18 @@ impl Plane {
 
 /// What a triangle is filled with.
 struct Paint {
-    /// The colour, where it is one.
+    /// The colour of all corners, if they have the same.
     plain: Option<[u8; 4]>,
+    /// Red, green, blue and alpha otherwise.
     colors: [Plane; 4],
-    /// The texel, where it is one, as in [`over`].
+    /// The texel at all corners, as in [`over`], if they have the same texture position.
     texel: Option<u32>,
-    /// Where in the texture, in texels.
-    texels: [Plane; 2],
+    /// The texture position otherwise, in texels.
+    texel_at: [Plane; 2],
 }
 
 impl Paint {
+    /// Prepares to interpolate between the corners what is not the same at all of them.
     fn new(corners: [Corner; 3], texture: &Texture) -> Self {
         let [a, b, c] = corners;
         let at = corners.map(|corner| corner.at);
@@ -160,17 +172,17 @@ impl Paint {
             plain: (a.color == b.color && b.color == c.color).then_some(a.color),
             colors: [Plane::default(); 4],
             texel: None,
-            texels: [Plane::default(); 2],
+            texel_at: [Plane::default(); 2],
         };
         if paint.plain.is_none() {
             paint.colors =
                 std::array::from_fn(|k| Plane::through(at, corners.map(|corner| f32::from(corner.color[k]))));
         }
-        let uv = corners.map(|corner| texture.place(corner.uv));
+        let uv = corners.map(|corner| texture.to_texels(corner.uv));
         if a.uv == b.uv && b.uv == c.uv {
-            paint.texel = Some(texture.at(uv[0]));
+            paint.texel = Some(texture.sample(uv[0]));
         } else {
-            paint.texels = std::array::from_fn(|k| Plane::through(at, uv.map(|uv| uv[k])));
+            paint.texel_at = std::array::from_fn(|k| Plane::through(at, uv.map(|uv| uv[k])));
         }
         paint
     }
@@ -179,6 +191,8 @@ impl Paint {
         self.plain == Some([0; 4]) || self.texel == Some(0)
     }
 
+    /// Blends the triangle over `pixels`, which begin in column `x` of row `y`. The first two cases are shortcuts for
+    /// the most frequent triangles.
     fn fill(&self, x: usize, y: usize, pixels: &mut [u32], texture: &Texture) {
         match (self.plain, self.texel) {
             (Some(color), Some(texel)) => {
@@ -189,6 +203,7 @@ impl Paint {
                     pixels.iter_mut().for_each(|pixel| *pixel = over(color, *pixel));
                 }
             }
+            // A white texel leaves the colours as they are.
             (None, Some(u32::MAX)) => {
                 let (mut color, step) = self.color_from(x, y);
                 for pixel in pixels {
@@ -198,15 +213,15 @@ impl Paint {
             }
             (plain, texel) => {
                 let (mut color, step) = self.color_from(x, y);
-                let mut at = self.texels.map(|plane| plane.at(x, y));
+                let mut at = self.texel_at.map(|plane| plane.at(x, y));
                 for pixel in pixels {
-                    let texel = texel.unwrap_or_else(|| texture.at(at));
+                    let texel = texel.unwrap_or_else(|| texture.sample(at));
                     if texel != 0 {
                         let color = plain.unwrap_or_else(|| rounded(color));
                         *pixel = over(scaled_by(texel, color), *pixel);
                     }
                     color = std::array::from_fn(|k| color[k] + step[k]);
-                    at = std::array::from_fn(|k| at[k] + self.texels[k].across);
+                    at = std::array::from_fn(|k| at[k] + self.texel_at[k].across);
                 }
             }
         }
@@ -218,11 +233,12 @@ impl Paint {
     }
 }
 
-/// To whole codes; the conversion keeps to their range.
+/// Rounded to bytes; the cast saturates.
 fn rounded(color: [f32; 4]) -> [u8; 4] {
     color.map(|value| (value + 0.5) as u8)
 }
 
+/// A colour (red, green, blue, alpha) as `0xAARRGGBB`.
 fn packed(color: [f32; 4]) -> u32 {
     let [r, g, b, a] = rounded(color);
     u32::from_be_bytes([a, r, g, b])

@@ -29,49 +29,50 @@ use crate::preview::state::{Shown, Source, State};
 use crate::preview::views::Views;
 use crate::stats::WindowUse;
 
-/// Instruments are laid out anew this often.
+/// While frames come, instruments are laid out anew this often.
 const INSTRUMENTS_PERIOD: Duration = Duration::from_millis(200);
-/// A stop from outside is seen after this time at the latest.
-const LOOK_UP: Duration = Duration::from_millis(250);
-/// After so long without a frame, and so many periods of the source, the person is told.
+/// The stop flag is polled at least this often.
+const STOP_POLL: Duration = Duration::from_millis(250);
+/// After this long without a frame, and this many periods of the source, the person is told.
 const SILENCE: Duration = Duration::from_secs(2);
 const SILENT_PERIODS: u32 = 10;
-/// What a picture is like of which nothing is known yet.
+/// The picture's size until the source tells it.
 const USUAL_SIZE: (u32, u32) = (1280, 720);
 
 pub(super) struct App {
     state: State,
     wanted: Arc<Wanted>,
-    /// A snapshot waits for a frame that is in memory.
+    /// Whether a snapshot waits for the next frame that can be saved.
     snapshot_due: bool,
     panel: Panel,
     ctx: egui::Context,
     gfx: Option<Gfx>,
     device: Option<Arc<Device>>,
     session: Session,
-    /// Whether a wake is under way, so that a busy session rings once.
-    rung: Arc<AtomicBool>,
-    views: Option<Receiver<View>>,
+    /// Whether a wake-up is already on its way, so that a busy session does not fill the event queue.
+    wake_pending: Arc<AtomicBool>,
+    frames: Option<Receiver<View>>,
     view: Option<View>,
     /// Whether `view` was not on the screen yet.
     view_is_new: bool,
-    made: Views,
-    /// What `made` shows.
+    false_colors: Views,
+    /// The view that `false_colors` drew last.
     drawn: Shown,
-    /// What the frames that come are blurred with.
+    /// What frames are blurred with, once the present look has reached them.
     settings: Option<bokeh::Settings>,
-    nothing: ColorImage,
+    blank: ColorImage,
     clock: Clock,
     /// When the last frame came, or its source was opened.
     heard_at: Instant,
-    /// When controls are to be laid out next.
+    /// When controls are to be laid out next, and when they were last.
     layout_at: Option<Instant>,
     laid_out: Instant,
     /// The oldest input whose effect is not on the screen yet.
     input_at: Option<Instant>,
-    /// Whether nothing of the window is to be seen, and whether it has no pixels.
+    /// Whether the window is hidden completely, and whether it has no pixels.
     covered: bool,
     empty: bool,
+    /// Where the window's size is kept, and what was read from there or measured last.
     memory: Option<PathBuf>,
     remembered: Option<Memory>,
     close_at_end: bool,
@@ -80,14 +81,14 @@ pub(super) struct App {
 }
 
 impl App {
-    /// Begins the session at once, so that the source opens while the window does.
+    /// Starts the session at once, so that the source opens while the window does.
     pub fn new(preview: Preview, proxy: EventLoopProxy<()>) -> Result<Self, WindowError> {
         let Preview { mut state, session, device, close_at_end, memory, stop } = preview;
-        let rung = Arc::new(AtomicBool::new(false));
-        let ringing = Arc::clone(&rung);
+        let wake_pending = Arc::new(AtomicBool::new(false));
+        let pending = Arc::clone(&wake_pending);
         // An event loop that is gone needs no waking.
         let wake: Wake = Arc::new(move || {
-            if !ringing.swap(true, Ordering::AcqRel) {
+            if !pending.swap(true, Ordering::AcqRel) {
                 let _ = proxy.send_event(());
             }
         });
@@ -105,14 +106,14 @@ impl App {
             gfx: None,
             device,
             session: Session::begin(session, wake)?,
-            rung,
-            views: None,
+            wake_pending,
+            frames: None,
             view: None,
             view_is_new: false,
-            made: Views::default(),
+            false_colors: Views::default(),
             drawn: Shown::default(),
             settings: None,
-            nothing: ColorImage::new(16, 9),
+            blank: ColorImage::new(16, 9),
             clock,
             heard_at: Instant::now(),
             layout_at: Some(Instant::now()),
@@ -128,14 +129,14 @@ impl App {
         })
     }
 
-    /// Closes the session after the window. What was shown last goes into the report.
+    /// Closes the window, then the session, and adds what was shown to the report.
     pub fn end(self) -> Result<Ended, WindowError> {
-        let Self { gfx, view, views, session, state, failed, .. } = self;
+        let Self { gfx, view, frames, session, state, failed, .. } = self;
         // The window goes at once; outputs may take a while to be completed.
         drop((gfx, view));
         let Closed { mut report, failed: unwritten } = session.close();
-        // Only now: the frames on the way to a viewer that is gone would be nobody's.
-        drop(views);
+        // Only now: without a receiver, the last frames would be counted neither as delivered nor as dropped.
+        drop(frames);
         if let Some(report) = &mut report {
             report.window = Some(window_use(&state));
         }
@@ -146,18 +147,18 @@ impl App {
         failed.map_or(Ok(Ended { report, lost, unwritten }), Err)
     }
 
-    /// Hears what the session has to say, and takes the newest frame.
-    fn hear(&mut self, events: &ActiveEventLoop) {
-        // Before the look: what comes after it rings again.
-        self.rung.swap(false, Ordering::AcqRel);
+    /// Handles what the session sent, and takes the newest frame.
+    fn receive(&mut self, events: &ActiveEventLoop) {
+        // First of all, so that what comes after the queue was read wakes this thread again.
+        self.wake_pending.swap(false, Ordering::AcqRel);
         let mut changed = false;
-        while let Some(heard) = self.session.hear() {
-            match heard {
-                SessionEvent::Views(views) => {
+        while let Some(event) = self.session.hear() {
+            match event {
+                SessionEvent::Views(frames) => {
                     self.heard_at = Instant::now();
-                    // It was of another source.
+                    // It was meant for the source before.
                     self.snapshot_due = false;
-                    self.views = Some(views);
+                    self.frames = Some(frames);
                     self.state.meters.restart();
                 }
                 SessionEvent::Copy(text) => {
@@ -174,19 +175,20 @@ impl App {
             }
         }
         if changed {
-            self.look_changed();
+            self.update_settings();
             self.layout_at = Some(Instant::now());
-            self.place();
+            self.update_wanted();
             self.set_title();
             if self.close_at_end && matches!(self.state.source, Source::Ended | Source::Lost(_)) {
                 events.exit();
             }
         }
-        let newest = self.views.as_mut().and_then(Receiver::try_recv);
+        let newest = self.frames.as_mut().and_then(Receiver::try_recv);
         if newest.is_some() {
             self.heard_at = Instant::now();
-            self.listen();
+            self.check_silence();
         }
+        // A frozen frame has to be in memory, to be saved: frames are replaced until one is.
         let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
         if let Some(view) = newest.filter(|_| !frozen) {
             self.state.focus_m = match view.coc {
@@ -205,8 +207,8 @@ impl App {
         }
     }
 
-    /// Whether frames come. A camera that is gone may come back by itself: only its silence tells.
-    fn listen(&mut self) {
+    /// Updates how long a running source has been silent. A camera that is gone reports no error, as it may come back.
+    fn check_silence(&mut self) {
         let silent = match &self.state.source {
             Source::Running(running) => {
                 let patience = SILENCE.max(Duration::from_nanos(running.period_ns) * SILENT_PERIODS);
@@ -227,7 +229,7 @@ impl App {
         }
     }
 
-    fn look_changed(&mut self) {
+    fn update_settings(&mut self) {
         self.settings = match &self.state.source {
             Source::Running(running) => self.state.look.for_source(running.has_depth).settings(running.size, true),
             _ => None,
@@ -244,7 +246,7 @@ impl App {
         self.covered || self.empty
     }
 
-    fn touched(&mut self) {
+    fn on_input(&mut self) {
         let now = Instant::now();
         if !self.is_hidden() {
             self.input_at.get_or_insert(now);
@@ -275,19 +277,19 @@ impl ApplicationHandler<()> for App {
         match Gfx::open(events, &self.ctx, self.remembered, self.state.full_screen, self.device.clone()) {
             Ok(gfx) => {
                 self.gfx = Some(gfx);
-                self.place();
+                self.update_wanted();
             }
             Err(error) => {
                 self.failed = Some(error);
                 return events.exit();
             }
         }
-        self.hear(events);
+        self.receive(events);
         self.ask_for_redraw();
     }
 
     fn user_event(&mut self, events: &ActiveEventLoop, (): ()) {
-        self.hear(events);
+        self.receive(events);
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
@@ -303,7 +305,7 @@ impl ApplicationHandler<()> for App {
             WindowEvent::CloseRequested => return events.exit(),
             WindowEvent::Occluded(hidden) => {
                 self.covered = *hidden;
-                // What waits while nobody can see it is no latency.
+                // Waiting while nobody can see the window is no latency.
                 self.input_at = None;
                 return self.ask_for_redraw();
             }
@@ -315,9 +317,9 @@ impl ApplicationHandler<()> for App {
             _ => {}
         }
         if gfx.input.on_window_event(&gfx.window, &event).repaint {
-            self.touched();
+            self.on_input();
         }
-        // What is pressed is found by where the pointer is when controls are laid out: not after it has moved on.
+        // egui takes a press to be where the pointer is when controls are laid out: before it moves on.
         if matches!(event, WindowEvent::MouseInput { .. }) {
             self.lay_out(events);
         }
@@ -327,14 +329,14 @@ impl ApplicationHandler<()> for App {
         if self.stop.load(Ordering::Relaxed) {
             return events.exit();
         }
-        self.listen();
+        self.check_silence();
         let now = Instant::now();
         if self.layout_at.is_some_and(|at| at <= now) {
             self.ask_for_redraw();
         }
-        // What is due waits for the redraw that was asked for, which the display may hold back.
+        // A layout that is due needs no timer: it waits for its redraw, which the display may hold back.
         let layout_at = self.layout_at.filter(|at| !self.is_hidden() && *at > now);
-        let layout_at = layout_at.map_or(now + LOOK_UP, |at| at.min(now + LOOK_UP));
+        let layout_at = layout_at.map_or(now + STOP_POLL, |at| at.min(now + STOP_POLL));
         events.set_control_flow(ControlFlow::WaitUntil(layout_at));
     }
 

@@ -1,5 +1,4 @@
-//! What is done when the window is drawn: controls are laid out, what the person did with them is done, and the frame is
-//! shown.
+//! Drawing the window: the controls are laid out, what the person did with them is carried out, and the frame is shown.
 
 use std::time::{Duration, Instant};
 
@@ -13,14 +12,14 @@ use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::Still;
 use crate::preview::state::{Action, Request, Source, State};
 
-/// Why nothing is saved.
+/// Shown when there is nothing to save.
 const NO_PICTURE: &str = "There is no picture to save.";
 
-/// What is said when another presenter took over.
+/// Shown when another presenter took over.
 const GPU_FAILED: &str = "The GPU failed: the CPU takes over, more slowly.";
 
 impl App {
-    /// Lays the controls out and does what the person did to them.
+    /// Lays out the controls and carries out what the person did with them.
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let Some(gfx) = &mut self.gfx else { return };
@@ -37,16 +36,17 @@ impl App {
         let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
         self.layout_at = self.laid_out.checked_add(wait);
         if !actions.is_empty() {
-            // They are shown with the next layout, which also answers what is asked of the state then.
+            // Another layout right away shows what they changed.
             self.layout_at = Some(self.laid_out);
             actions.into_iter().for_each(|action| self.perform(action, events));
             self.ask_for_redraw();
         }
     }
 
+    /// Applies an action to the state; what this thread cannot do itself goes to the session.
     fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
-        for effect in self.state.apply(action) {
-            match effect {
+        for request in self.state.apply(action) {
+            match request {
                 Request::Snapshot => self.snapshot(),
                 Request::CopyCommand => self.session.copy(self.state.switches()),
                 Request::FullScreen(on) => {
@@ -57,35 +57,36 @@ impl App {
                 Request::Close => events.exit(),
                 Request::Look(look) => {
                     self.session.order(Request::Look(look));
-                    self.look_changed();
+                    self.update_settings();
                 }
                 other => self.session.order(other),
             }
         }
-        self.place();
+        self.update_wanted();
     }
 
-    /// Where pictures are needed from now on: only what stays on the GPU costs no way back.
-    pub(super) fn place(&self) {
+    /// Tells the pipeline where pictures are needed from now on. They are read back from the GPU only where something
+    /// other than drawing uses them.
+    pub(super) fn update_wanted(&self) {
         let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
-        let used = self.state.frozen || self.snapshot_due || !self.state.outputs.is_empty();
-        self.wanted.set(match (drawn_on_gpu, used) {
+        let used_in_memory = self.state.frozen || self.snapshot_due || !self.state.outputs.is_empty();
+        self.wanted.set(match (drawn_on_gpu, used_in_memory) {
             (false, _) => Place::Memory,
             (true, false) => Place::Device,
             (true, true) => Place::Both,
         });
     }
 
-    /// Saves the frame that is shown, or one of the next where this one is on the GPU alone, or between two looks and so
-    /// could not be repeated.
+    /// Saves the frame that is shown. If it is only on the GPU, or was blurred between two looks so that no settings
+    /// could repeat it, the next frame that is neither is saved instead.
     pub(super) fn snapshot(&mut self) {
         let Some(view) = &self.view else { return self.state.note(NO_PICTURE) };
-        let runs = matches!(self.state.source, Source::Running(_));
-        if view.picture.memory().is_none() && !runs {
+        let is_running = matches!(self.state.source, Source::Running(_));
+        if view.picture.memory().is_none() && !is_running {
             return self.state.note(NO_PICTURE);
         }
-        self.snapshot_due = view.picture.memory().is_none() || runs && view.trace.between;
-        self.place();
+        self.snapshot_due = view.picture.memory().is_none() || is_running && view.trace.between;
+        self.update_wanted();
         let Some(picture) = view.picture.memory().filter(|_| !self.snapshot_due) else { return };
         self.session.save(Still {
             picture: picture.clone(),
@@ -97,28 +98,29 @@ impl App {
         });
     }
 
-    /// Shows the frame with the controls as they are.
+    /// Shows the frame, or the view of it that is chosen, under the controls as they were laid out last.
     pub(super) fn draw(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let hidden = self.is_hidden();
         let Some(gfx) = self.gfx.as_mut().filter(|_| !hidden) else { return };
         let shown = self.state.shown;
         if let Some(view) = self.view.as_ref().filter(|_| self.view_is_new || self.drawn != shown) {
-            self.made.draw(shown, view, self.settings.as_ref());
+            self.false_colors.draw(shown, view, self.settings.as_ref());
             self.drawn = shown;
-            self.state.legend = self.made.legend();
+            self.state.legend = self.false_colors.legend();
         }
-        let made = self.state.legend.map(|_| self.made.image());
+        let false_colors = self.state.legend.map(|_| self.false_colors.image());
         let State { mirror, split, source, .. } = &self.state;
         let view = self.view.as_ref();
-        let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(&self.nothing);
+        let in_memory = view.and_then(|view| view.picture.memory()).unwrap_or(&self.blank);
         let on_device = view.and_then(|view| view.picture.device()).filter(|there| gfx.presenter.takes(there));
         let picture = on_device.map_or(Image::Memory(in_memory), Image::Device);
+        // Where nothing was blurred, before and after are the same.
         let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
         let drawing = Drawing {
             area: if self.view.is_some() { gfx.area(size) } else { Area::default() },
-            picture: made.map_or(picture, Image::Memory),
+            picture: false_colors.map_or(picture, Image::Memory),
             before: before.zip(*split),
             mirror: *mirror,
             stale: self.state.silent_s.is_some() || !matches!(source, Source::Running(_) | Source::Opening),
@@ -131,10 +133,11 @@ impl App {
             return events.exit();
         }
         if drawn_on_gpu && !gfx.presenter.has_device() {
-            self.place();
+            self.update_wanted();
             self.state.note(GPU_FAILED);
         }
         let now_ns = self.clock.now_ns();
+        // A frame counts once, however often it is drawn.
         if let Some(view) = self.view.as_ref().filter(|_| std::mem::take(&mut self.view_is_new)) {
             self.state.meters.presented(view, now_ns, now_ns - began_ns);
         }
