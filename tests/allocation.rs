@@ -225,7 +225,7 @@ fn two_eyes() {
     right.set_luma_of(&raw);
     let mut color = raw.clone();
     let mut frame = |index: usize| {
-        depth.straighten(&mut color);
+        depth.rectify(&mut color);
         let stamp = Stamp { index, time_ns: index as u64, captured_ns: None };
         depth.set_effort(index % 2);
         depth.read(Seen { stamp, color: &color, right: Some(&right) }, &mut map).expect("depth");

@@ -183,9 +183,9 @@ fn depths_of_no_scene_are_unknown() {
                 let focus_m = Focus::new(rule).focus_m(&strange, 0);
                 assert!((0.5..100.0).contains(&focus_m), "{value} in every {rare}th: focus {focus_m}");
                 let (mut filled, mut refined) = (strange.clone(), strange.clone());
-                Filler::new().fill_by(&mut filled, &color);
+                Filler::new().fill_guided(&mut filled, &color);
                 let mut refiner = Refiner::new();
-                refiner.focus_at(focus_m);
+                refiner.set_focus(focus_m);
                 refiner.refine(&mut refined, &color, 0);
                 for made in [filled, refined] {
                     let is_sound = |&metres: &f32| metres == 0.0 || (0.9..100.0).contains(&metres);

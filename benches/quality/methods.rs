@@ -172,7 +172,7 @@ impl Blurrer {
             }
             Method::Layered(_) => {
                 let mut depth = shot.depth.clone();
-                self.filler.fill_by(&mut depth, &shot.image);
+                self.filler.fill_guided(&mut depth, &shot.image);
                 self.run(shot, depth)
             }
             Method::Refined => {

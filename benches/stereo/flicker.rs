@@ -99,7 +99,7 @@ fn maps(sequence: &Sequence, options: &Options, effort: Effort, memory: bool) ->
         let [left, right] = frame.gray();
         matcher.disparity(Pair { left: &left, color: Some(&frame.left), right: &right }, &mut map)?;
         let mut depth = metres(&map, &sequence.rig);
-        refiner.focus_at(focus.focus_m(&depth, frame.time_ns));
+        refiner.set_focus(focus.focus_m(&depth, frame.time_ns));
         refiner.refine(&mut depth, &frame.left, frame.time_ns);
         let (width, height) = (map.width as usize, map.height as usize);
         let steady = depth.metres.iter().map(|&z_m| sequence.rig.disparity_px(z_m)).collect();

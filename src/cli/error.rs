@@ -50,7 +50,7 @@ pub enum CliError {
     /// An output of a preview failed.
     #[error("{0}")]
     #[cfg(feature = "window")]
-    Unwritten(String),
+    OutputFailed(String),
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),

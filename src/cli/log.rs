@@ -105,7 +105,7 @@ pub fn flush() {
 pub fn tell_of_panics() {
     std::panic::set_hook(Box::new(|panic| {
         // It is caught, and becomes an error that is reported elsewhere.
-        if crate::compute::catches() {
+        if crate::compute::is_catching_panics() {
             return;
         }
         let thread = std::thread::current();

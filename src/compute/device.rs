@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::{GpuError, catching};
+use super::{GpuError, catch_panic};
 
 /// A compute shader: the name of its entry point and file, and its source.
 #[derive(Clone, Copy, Debug)]
@@ -171,7 +171,7 @@ impl Device {
             None => wgpu::PollType::Poll,
         };
         // A device that is lost meanwhile makes it panic.
-        match catching(|| self.device.poll(poll)) {
+        match catch_panic(|| self.device.poll(poll)) {
             Some(Ok(_)) => {}
             Some(Err(wgpu::PollError::Timeout)) => self.give_up(),
             Some(Err(error)) => note(&self.fault, error.to_string()),
@@ -258,7 +258,7 @@ impl DevicePicture {
 }
 
 /// Workgroups in x and y, as a device may limit both to 65,535: `workgroups` in all, or a few more.
-pub fn in_two(workgroups: u32) -> [u32; 2] {
+pub fn workgroups_2d(workgroups: u32) -> [u32; 2] {
     let down = workgroups.div_ceil(32_768).max(1);
     [workgroups.div_ceil(down), down]
 }

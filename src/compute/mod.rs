@@ -67,12 +67,12 @@ impl GpuError {
 }
 
 thread_local! {
-    /// Whether the thread is in [`catching`].
+    /// Whether the thread is in [`catch_panic`].
     static CATCHES: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Calls what reports an error by panicking: `None` if it does. What it was changing must not be used afterwards.
-pub fn catching<T>(work: impl FnOnce() -> T) -> Option<T> {
+pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Option<T> {
     let before = CATCHES.replace(true);
     let done = catch_unwind(AssertUnwindSafe(work));
     CATCHES.set(before);
@@ -80,7 +80,7 @@ pub fn catching<T>(work: impl FnOnce() -> T) -> Option<T> {
     done.map_err(std::mem::forget).ok()
 }
 
-/// Whether a panic of this thread is only an error, which the caller of [`catching`] reports: no crash to log.
-pub fn catches() -> bool {
+/// Whether a panic of this thread is only an error, which the caller of [`catch_panic`] reports: no crash to log.
+pub fn is_catching_panics() -> bool {
     CATCHES.get()
 }

@@ -51,7 +51,7 @@ impl Filler {
 
     /// As [`Filler::fill`], then corrected by `color`, the picture of the map: a filled pixel that took the
     /// background's depth but looks like the near object beside it takes the object's depth.
-    pub fn fill_by(&mut self, map: &mut DepthMap, color: &ColorImage) {
+    pub fn fill_guided(&mut self, map: &mut DepthMap, color: &ColorImage) {
         self.hole.clear();
         self.hole.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
         // Without a hole there is nothing to correct, and without a known depth no object to compare with.

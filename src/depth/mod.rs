@@ -21,7 +21,7 @@ use crate::recording::RecordingError;
 pub trait DepthSource: Send {
     /// Gives a picture the geometry of its depth, in place: called with every frame, before [`DepthSource::read`] where
     /// that is called at all. Most depth is that of the picture as it is.
-    fn straighten(&mut self, color: &mut ColorImage) {
+    fn rectify(&mut self, color: &mut ColorImage) {
         let _ = color;
     }
 

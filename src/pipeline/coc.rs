@@ -99,9 +99,9 @@ impl CocMaker {
         let focus_m = self.focus.focus_m(map, time_ns);
         match &mut self.finisher {
             Finisher::Keep => {}
-            Finisher::Fill(filler) => filler.fill_by(map, color),
+            Finisher::Fill(filler) => filler.fill_guided(map, color),
             Finisher::Refine(refiner) => {
-                refiner.focus_at(focus_m);
+                refiner.set_focus(focus_m);
                 refiner.refine(map, color, time_ns);
             }
         }

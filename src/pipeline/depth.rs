@@ -131,7 +131,7 @@ impl Stage<'_> {
     ) -> Result<(Pooled<DepthMap>, CocField), Fault> {
         let began_ns = self.clock.now_ns();
         if let Some(source) = &mut self.source {
-            source.straighten(color);
+            source.rectify(color);
         }
         if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
             let mut map = brought.unwrap_or_else(|| self.depths.take());

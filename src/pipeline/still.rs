@@ -22,7 +22,7 @@ pub enum Depth {
 ///
 /// # Errors
 /// [`BokehError::NoDepth`] when the blur follows depth and there is none.
-pub fn prepared(
+pub fn coc_and_depth(
     look: &Look,
     color: &ColorImage,
     depth: Option<Depth>,
@@ -52,7 +52,7 @@ pub fn blur(
 ) -> Result<(ColorImage, String), BokehError> {
     let size = color.size();
     let Some(settings) = look.settings(size, false) else { return Ok((color, "not blurred".to_string())) };
-    let (coc, depth) = prepared(look, &color, depth)?;
+    let (coc, depth) = coc_and_depth(look, &color, depth)?;
     let mut bokeh = computing.blur(&settings, size)?;
     bokeh.submit(Job {
         ticket: 0,

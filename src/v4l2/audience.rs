@@ -75,7 +75,7 @@ impl Audience {
     }
 
     /// Whether the module tells of its readers; otherwise whoever opens the node counts as one.
-    pub fn is_told(&self) -> bool {
+    pub fn has_module_events(&self) -> bool {
         self.opens.is_none()
     }
 
@@ -166,7 +166,7 @@ mod tests {
         // The system's only device that every user may open and nobody else keeps open.
         let node = std::path::Path::new("/dev/full");
         let (mut audience, _stop) = listen(node);
-        assert!(!audience.is_told());
+        assert!(!audience.has_module_events());
         assert_eq!(audience.wait(None), ReaderEvent::Readers(false));
         // Looked at and left: no reader.
         drop(std::fs::File::open(node).unwrap());

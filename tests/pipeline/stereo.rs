@@ -114,7 +114,7 @@ struct Slow {
 const MARK: u8 = 77;
 
 impl DepthSource for Slow {
-    fn straighten(&mut self, color: &mut ColorImage) {
+    fn rectify(&mut self, color: &mut ColorImage) {
         color.rgb[BLURRED] = MARK;
     }
     fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {

@@ -7,7 +7,7 @@ use super::layout::{Layout, tiles};
 use super::readback::MAX_QUERIES;
 use super::shaders::{self, Bin, LINE, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work};
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
-use crate::compute::device::{Device, Shader, in_two};
+use crate::compute::device::{Device, Shader, workgroups_2d};
 
 /// Which uniform `Work` a dispatch has: `bin` for the near bins and for the rest, `reach`, and the filters' batches.
 const NEAR: usize = 0;
@@ -139,7 +139,7 @@ impl Passes {
         // Each invocation makes four pixels: three whole words.
         let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active];
         let mut composite = maker.fixed("composite", shaders::COMPOSITE, [0; 2], LINE, &composite);
-        composite.workgroups = in_two(((plan.width * plan.height).div_ceil(4) as u32).div_ceil(LINE));
+        composite.workgroups = workgroups_2d(((plan.width * plan.height).div_ceil(4) as u32).div_ceil(LINE));
         Self {
             unpack: maker.fixed(
                 "unpack",
@@ -221,7 +221,7 @@ impl Passes {
         };
         // Workgroups for all tiles of some bins.
         let workgroups = |bins: &[Bin], tile: [usize; 2], extent: fn(&Bin) -> [u32; 2]| {
-            in_two(bins.iter().map(|bin| tiles(extent(bin).map(|size| size as usize), tile) as u32).sum())
+            workgroups_2d(bins.iter().map(|bin| tiles(extent(bin).map(|size| size as usize), tile) as u32).sum())
         };
         let (near, rest) = layout.bins.split_at(layout.near);
         let cells = |bin: &Bin| bin.cells.map(|cells| cells * CELL as u32);

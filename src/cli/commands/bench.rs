@@ -22,7 +22,7 @@ use crate::look::number::within;
 use crate::look::{COC_AT_INFINITY_PER_HEIGHT, Look, MOST_RADIUS_PX, Strength};
 use crate::names::named;
 use crate::optics::CocField;
-use crate::pipeline::still::{Depth, prepared};
+use crate::pipeline::still::{Depth, coc_and_depth};
 use crate::scene::{Scene, View};
 use crate::source::{self, DepthChoice, Size};
 
@@ -166,7 +166,7 @@ fn measure(
             "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
         ));
     };
-    let (coc, depth) = prepared(&look, color, Some(Depth::Measured(depth.clone())))?;
+    let (coc, depth) = coc_and_depth(&look, color, Some(Depth::Measured(depth.clone())))?;
     let mut bokeh = computing.blur(&settings, size)?;
     let buffers = Buffers {
         colors: Pool::new(bokeh.capacity(), || color.clone()),

@@ -97,12 +97,12 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
                 Captured::End => return Ok(true),
             };
             if let Some(source) = &mut source {
-                source.straighten(&mut color);
+                source.rectify(&mut color);
                 let right = (info.brings == Brings::RightEye).then_some(&right);
                 source.read(Seen { stamp, color: &color, right }, &mut depth)?;
             }
             let has_depth = source.is_some() || info.brings == Brings::Depth;
-            if let Some(doubt) = doubt(&depth, writer.most_m()).filter(|_| has_depth && !is_doubted) {
+            if let Some(doubt) = doubt(&depth, writer.max_depth_m()).filter(|_| has_depth && !is_doubted) {
                 is_doubted = true;
                 tracing::warn!(
                     "frame {}: {doubt}; is --depth-scale, the units of a metre, that of the source?",
@@ -122,9 +122,9 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
     }
     match taken {
         Ok(true) => {
-            let most_m = writer.most_m();
+            let max_depth_m = writer.max_depth_m();
             let written = writer.finish()?;
-            say_what_is_too_far(&written, most_m);
+            say_what_is_too_far(&written, max_depth_m);
             if !global.quiet {
                 let gone = match written.replaced {
                     0 => String::new(),
@@ -163,14 +163,14 @@ fn keep(writer: Writer, to: &Path) -> Result<(), CliError> {
 /// Nearer than this is no scene that depth cameras see.
 const NEAR_M: f32 = 0.05;
 
-/// What makes all the depth of a frame unlikely, where a recording holds at most `most_m`.
-fn doubt(depth: &DepthMap, most_m: f32) -> Option<String> {
+/// What makes all the depth of a frame unlikely, where a recording holds at most `max_depth_m`.
+fn doubt(depth: &DepthMap, max_depth_m: f32) -> Option<String> {
     let known = depth.metres.iter().copied().filter(|&metres| DepthMap::is_known(metres));
     let (least_m, largest_m) = known.fold((f32::INFINITY, 0.0_f32), |(a, b), metres| (a.min(metres), b.max(metres)));
     if largest_m == 0.0 {
         None
-    } else if least_m > most_m {
-        Some(format!("all depth is {least_m:.1} m away or more, and a recording holds up to {most_m:.1} m"))
+    } else if least_m > max_depth_m {
+        Some(format!("all depth is {least_m:.1} m away or more, and a recording holds up to {max_depth_m:.1} m"))
     } else if largest_m < NEAR_M {
         Some(format!("all depth is nearer than {:.1} mm", largest_m * 1e3))
     } else {
@@ -179,11 +179,11 @@ fn doubt(depth: &DepthMap, most_m: f32) -> Option<String> {
 }
 
 /// Says how much of the depth was lost.
-fn say_what_is_too_far(written: &Written, most_m: f32) {
+fn say_what_is_too_far(written: &Written, max_depth_m: f32) {
     if written.too_far > 0 {
         let percent = 100.0 * written.too_far as f64 / written.depths as f64;
         tracing::warn!(
-            "{percent:.1} % of the depth lies beyond {most_m:.1} m, more than a recording holds: it is unknown there"
+            "{percent:.1} % of the depth lies beyond {max_depth_m:.1} m, more than a recording holds: it is unknown there"
         );
     }
 }

@@ -65,7 +65,7 @@ impl Refiner {
 
     /// What is in focus from the next frame on, in metres: for a street, a step of depth counts less than for a desk. A
     /// metre before the first call.
-    pub fn focus_at(&mut self, focus_m: f32) {
+    pub fn set_focus(&mut self, focus_m: f32) {
         if DepthMap::is_known(focus_m) && focus_m != self.focus.0 {
             self.temporal.rescale(focus_m / self.focus.0);
             self.focus = Focus(focus_m);
@@ -79,7 +79,7 @@ impl Refiner {
         self.upsampler.resize(map, color.size());
         self.unknown.clear();
         self.unknown.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
-        self.filler.fill_by(map, color);
+        self.filler.fill_guided(map, color);
         // The filler leaves either nothing unknown or everything: one pixel tells which.
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
             return self.temporal.forget();

@@ -102,7 +102,7 @@ fn log_check(
 }
 
 impl DepthSource for StereoDepth {
-    fn straighten(&mut self, color: &mut ColorImage) {
+    fn rectify(&mut self, color: &mut ColorImage) {
         if let Some(rectifier) = &self.rectifier {
             rectifier.left(color, &mut self.color);
             std::mem::swap(color, &mut self.color);
@@ -229,7 +229,7 @@ mod tests {
     fn a_rectified_pair_is_matched_as_it_is() {
         let mut source = StereoDepth::of_rectified("two eyes", RIG, Box::new(Difference(Effort::Full)), 16);
         let (mut picture, mut map) = (color(&[25, 55, 10]), DepthMap::default());
-        source.straighten(&mut picture);
+        source.rectify(&mut picture);
         assert_eq!(picture, color(&[25, 55, 10]));
         let right = gray(&[20, 40, 10]);
         source.read(Seen { stamp: STAMP, color: &picture, right: Some(&right) }, &mut map).unwrap();
@@ -269,7 +269,7 @@ mod tests {
 
         let mut source = StereoDepth::of_raw("two eyes", rectifier, Box::new(Difference(Effort::Full)), 16);
         let (mut picture, mut map) = (raw.clone(), DepthMap::default());
-        source.straighten(&mut picture);
+        source.rectify(&mut picture);
         assert_eq!(picture, left);
         source.read(Seen { stamp: STAMP, color: &picture, right: Some(&raw_right) }, &mut map).unwrap();
         let middle = 24 * 64 + 32;

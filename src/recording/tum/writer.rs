@@ -124,9 +124,9 @@ impl Writer {
                 .map_err(|e| self.encoding(e))?;
             self.write_picture(DEPTH_FOLDER, &file_name)?;
             let known = || depth.metres.iter().filter(|&&metres| DepthMap::is_known(metres));
-            let most_m = self.most_m();
+            let max_depth_m = self.max_depth_m();
             depths.0 += known().count() as u64;
-            depths.1 += known().filter(|&&metres| metres > most_m).count() as u64;
+            depths.1 += known().filter(|&&metres| metres > max_depth_m).count() as u64;
         }
         self.file.clear();
         encode::color_png(color, &mut self.file).map_err(|e| self.encoding(e))?;
@@ -158,7 +158,7 @@ impl Writer {
     }
 
     /// The largest depth that is written, in metres.
-    pub fn most_m(&self) -> f32 {
+    pub fn max_depth_m(&self) -> f32 {
         encode::largest(self.depth_scale)
     }
 

@@ -95,7 +95,7 @@ fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<Watcher
         cause,
     };
     let (audience, stop) = Audience::new(output.device().clone()).map_err(refused)?;
-    if !audience.is_told() {
+    if !audience.has_module_events() {
         tracing::info!(
             "{}: this version of v4l2loopback does not tell of its readers; whoever has it open counts as one",
             path.display()

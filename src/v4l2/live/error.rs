@@ -97,7 +97,7 @@ impl OpenError {
     }
 
     /// Whether trying again in a moment may help: another program may let go of the device, or a driver recover.
-    pub fn may_pass(&self) -> bool {
+    pub fn is_transient(&self) -> bool {
         matches!(self, Self::Busy { .. } | Self::Queue { .. } | Self::Io { .. })
     }
 

@@ -96,7 +96,7 @@ impl Live {
         let mut tries = 1;
         let session = loop {
             match Session::open(&path, &wish, &settings, None, &clock) {
-                Err(error) if error.may_pass() && tries < TRIES => {
+                Err(error) if error.is_transient() && tries < TRIES => {
                     tracing::debug!("{error}; trying again");
                     tries += 1;
                     clock.sleep_until_ns(clock.now_ns() + TRY_NAP_NS);

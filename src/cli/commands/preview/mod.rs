@@ -138,7 +138,7 @@ pub fn show(
     }
     match ended.lost {
         Some(why) if ended.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
-        _ => ended.unwritten.map_or(written, |why| Err(CliError::Unwritten(why))),
+        _ => ended.unwritten.map_or(written, |why| Err(CliError::OutputFailed(why))),
     }
 }
 

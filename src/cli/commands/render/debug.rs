@@ -18,7 +18,7 @@ use crate::computing::Computing;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 use crate::optics::CocField;
-use crate::pipeline::still::{Depth, prepared};
+use crate::pipeline::still::{Depth, coc_and_depth};
 use crate::recording::still;
 
 /// The file of numbers, which is always written, even where nothing is blurred.
@@ -111,7 +111,7 @@ pub fn blurred(
             }
             settings.check(size)?;
             let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
-            let (coc, depth) = prepared(look, &color, depth)?;
+            let (coc, depth) = coc_and_depth(look, &color, depth)?;
             bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
             output.collect(&bokeh, &color, depth.as_ref(), &coc);
         }

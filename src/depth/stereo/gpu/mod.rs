@@ -17,7 +17,7 @@ use super::executor::Executor;
 use super::fixed;
 use super::penalty::Penalties;
 use crate::compute::GpuError;
-use crate::compute::device::{Device, Shader, in_two};
+use crate::compute::device::{Device, Shader, workgroups_2d};
 use crate::compute::thread_pool::ThreadPool;
 
 /// What a workgroup does, as the shaders declare it: pixels a side of `stereo_census`, columns of `stereo_cost`, and
@@ -86,7 +86,7 @@ impl GpuExecutor {
             Pass { name: shader.name, pipeline, bindings, workgroups: workgroups.map(|count| count as u32) }
         };
         let along_rows = |from_right| pass(shaders::ROWS, from_right, &[&costs, &penalties, &sums], [height, 1, 1]);
-        let [across, down] = in_two(pixels.div_ceil(LINE) as u32);
+        let [across, down] = workgroups_2d(pixels.div_ceil(LINE) as u32);
         let passes = [
             pass(
                 shaders::CENSUS,
