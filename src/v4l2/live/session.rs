@@ -127,8 +127,10 @@ fn why_no_camera(capability: &sys::v4l2_capability) -> Option<&'static str> {
 
 const ENOTTY: i32 = rustix::io::Errno::NOTTY.raw_os_error();
 
-/// Agrees with the driver on a mode: that of `before` if it can still be had, otherwise the best one that the driver
-/// accepts, with whatever it changes about that.
+/// Sets a mode on the device: that of `before` if the driver still gives the same layout, otherwise the first of the
+/// [`TRIES`] best for `wish` that it takes. The driver may change size, rate, and a format that `wish` does not name, but
+/// not to other content: such a mode is passed over. Fails at once where the device is gone or busy, and else with the
+/// first refusal.
 fn agree(
     device: &Device,
     capability: &sys::v4l2_capability,
