@@ -9,6 +9,7 @@
 @group(0) @binding(4) var<storage, read_write> source: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read_write> grid: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read> ranges: array<vec2<f32>>;
+@group(0) @binding(7) var<storage, read> mixed: array<MixedPixel>;
 
 const HUGE: f32 = 3.0e38;
 
@@ -67,26 +68,42 @@ fn look(k: u32, tile: vec2<u32>, thread: u32) {
     }
 }
 
+// A bin's share of a surface: premultiplied colour and coverage, and coverage times |CoC|.
+fn taken(k: u32, surface: vec4<f32>, weight: f32) -> array<f32, 5> {
+    let share = weight * select(share_at(bins[k].front, bins[k].behind, surface.w), 1.0, bins[k].whole == 1u);
+    return array(share * surface.r, share * surface.g, share * surface.b, share, share * abs(surface.w));
+}
+
+fn plus(a: array<f32, 5>, b: array<f32, 5>) -> array<f32, 5> {
+    return array(a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4]);
+}
+
 // A pixel of the bin, and coverage times |CoC|.
 fn averaged(k: u32, pixel: vec2<u32>) -> array<f32, 5> {
     // A tent of twice the scale, so that reducing a picture keeps its centroid.
     let scale = bins[k].scale;
     let taps = select(2u * scale, 1u, scale == 1u);
     let before = select(scale / 2u, 0u, scale == 1u);
-    var sum = vec4(0.0);
-    var coc_sum = 0.0;
+    var sum = array<f32, 5>();
     for (var j = 0u; j < taps; j++) {
         let y = clamp(i32(pixel.y * scale + j) - i32(before), 0, i32(frame.size.y) - 1);
         for (var i = 0u; i < taps; i++) {
             let x = clamp(i32(pixel.x * scale + i) - i32(before), 0, i32(frame.size.x) - 1);
-            let value = scene_unpacked(scene[u32(y) * frame.size.x + u32(x)], frame.most_px);
-            let share = select(share_at(bins[k].front, bins[k].behind, value.w), 1.0, bins[k].whole == 1u);
-            let weight = share * tent(i, scale) * tent(j, scale);
-            sum += vec4(value.rgb, 1.0) * weight;
-            coc_sum += weight * abs(value.w);
+            let at = u32(y) * frame.size.x + u32(x);
+            let value = scene[at];
+            let surface = scene_unpacked(value, frame.most_px);
+            let weight = tent(i, scale) * tent(j, scale);
+            if is_mixed(value) {
+                let place = first_mixed(at);
+                let share = mixed[place].share;
+                sum = plus(sum, taken(k, surface, weight * (1.0 - share)));
+                sum = plus(sum, taken(k, near_surface(place), weight * share));
+            } else {
+                sum = plus(sum, taken(k, surface, weight));
+            }
         }
     }
-    return array(sum.r, sum.g, sum.b, sum.a, coc_sum);
+    return sum;
 }
 
 @compute @workgroup_size(TILE, TILE)

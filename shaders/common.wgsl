@@ -20,6 +20,7 @@ override RESULT_TILE_X: u32;
 override RESULT_TILE_Y: u32;
 
 const MAX_BINS = 13;
+const MIXED = 0x8000u;      // of a pixel of the scene: see scene_packed
 
 // One frame.
 struct Frame {
@@ -39,7 +40,7 @@ struct Frame {
     steps_per_px: f32,          // nodes of the bank per pixel of radius, below OCTAVES_FROM_PX
     unhidden: vec2<f32>,        // what counts as lying behind the near bins: CoC of the step, slope
     nearest_px: f32,            // no filled CoC is below this
-    unused: f32,
+    mixed: u32,                 // pixels that show two surfaces
 }
 
 // One bin. Offsets are in elements of the buffers that all bins share.
@@ -108,16 +109,17 @@ fn node_at(radius_px: f32, steps_per_px: f32, nodes: u32) -> u32 {
     return min(node, nodes - 1u);
 }
 
-// A pixel of the scene: light, and CoC as a signed square root, whose steps are fine where bins hand over.
+// A pixel of the scene: light, and CoC as a signed square root, whose steps are fine where bins hand over. Light is never
+// negative: the sign of blue says that this is the farther of two surfaces of a mixed pixel.
 fn scene_packed(light: vec3<f32>, coc_px: f32, most_px: f32) -> vec2<u32> {
     let root = sign(coc_px) * sqrt(abs(coc_px) / most_px);
-    let blue = pack2x16float(vec2(light.b, 0.0)) & 0xffffu;
+    let blue = pack2x16float(vec2(light.b, 0.0)) & ~MIXED & 0xffffu;
     return vec2(pack2x16float(light.rg), blue | (pack2x16snorm(vec2(0.0, root)) & 0xffff0000u));
 }
 
 fn scene_unpacked(value: vec2<u32>, most_px: f32) -> vec4<f32> {
     let root = unpack2x16snorm(value.y).y;
-    return vec4(unpack2x16float(value.x), unpack2x16float(value.y).x, root * abs(root) * most_px);
+    return vec4(unpack2x16float(value.x), unpack2x16float(value.y & ~MIXED).x, root * abs(root) * most_px);
 }
 
 // Highlights: all channels share a factor of the luminance, so that the hue stays.

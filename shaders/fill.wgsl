@@ -5,6 +5,16 @@
 @group(0) @binding(2) var<storage, read_write> scene: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read_write> ranges: array<vec2<f32>>;
 @group(0) @binding(4) var<storage, read> known: array<f32>;
+@group(0) @binding(5) var<storage, read_write> mixed: array<MixedPixel>;
+
+// A surface as far as it is not hidden, and else what lies behind.
+fn filled(surface: vec4<f32>, behind: u32) -> vec2<u32> {
+    let hidden = 1.0 - step_at(frame.unhidden, surface.w);
+    let value = mix(surface, pyramid[behind], hidden);
+    let result = scene_packed(value.rgb, max(value.w, frame.nearest_px), frame.most_px);
+    range_add(scene_unpacked(result, frame.most_px).w);
+    return result;
+}
 
 @compute @workgroup_size(TILE, TILE)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
@@ -17,15 +27,25 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
     workgroupBarrier();
     // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
     let inside = min(id.xy, frame.size - 1u);
-    let own = scene_unpacked(scene[inside.y * frame.size.x + inside.x], frame.most_px);
-    let hidden = 1.0 - step_at(frame.unhidden, own.w);
+    let pixel = inside.y * frame.size.x + inside.x;
+    let value = scene[pixel];
+    let own = scene_unpacked(value, frame.most_px);
     let behind = inside.y / 2u * ((frame.size.x + 1u) / 2u) + inside.x / 2u;
     // Where something near touches every pixel nothing is known, and nothing lies behind.
-    if all(id.xy < frame.size) && hidden > 0.0 && known[behind] > 0.5 {
-        let value = mix(own, pyramid[behind], hidden);
-        let filled = scene_packed(value.rgb, max(value.w, frame.nearest_px), frame.most_px);
-        scene[id.y * frame.size.x + id.x] = filled;
-        range_add(scene_unpacked(filled, frame.most_px).w);
+    if all(id.xy < frame.size) && known[behind] > 0.5 {
+        if step_at(frame.unhidden, own.w) < 1.0 {
+            let result = filled(own, behind);
+            scene[pixel] = vec2(result.x, result.y | (value.y & MIXED));
+        }
+        if is_mixed(value) {
+            let place = first_mixed(pixel);
+            let near = near_surface(place);
+            if step_at(frame.unhidden, near.w) < 1.0 {
+                let result = filled(near, behind);
+                mixed[place].near = result.x;
+                mixed[place].far = result.y;
+            }
+        }
     }
     workgroupBarrier();
     if thread == 0u {

@@ -1,7 +1,10 @@
 //! Pictures and depth maps: what travels between the stages.
 
 pub mod fit;
+mod matte;
 pub mod scale;
+
+pub use matte::{Matte, MixedPixel};
 
 /// Number of a captured frame: counts from 0 in capture order, dropped frames included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -103,7 +106,12 @@ impl DisparityMap {
     /// Its depth, where `depth_m` gives the metres of a disparity; 0 where that is unknown.
     pub fn depth(&self, depth_m: impl Fn(f32) -> f32) -> DepthMap {
         let metres = |&px: &f32| if DepthMap::is_known(px) { depth_m(px) } else { 0.0 };
-        DepthMap { width: self.width, height: self.height, metres: self.px.iter().map(metres).collect() }
+        DepthMap {
+            width: self.width,
+            height: self.height,
+            metres: self.px.iter().map(metres).collect(),
+            ..DepthMap::default()
+        }
     }
 
     /// Gives the map another size, keeping its memory where that suffices. The content is unspecified after.
@@ -129,6 +137,8 @@ pub struct DepthMap {
     pub height: u32,
     /// `height * width` metres.
     pub metres: Vec<f32>,
+    /// The pixels that show two surfaces at once, as far as that is known; none by default.
+    pub matte: Matte,
 }
 
 impl DepthMap {

@@ -13,7 +13,7 @@ use bokehcam::bokeh::plan::{CELL, Plan, SEGMENT};
 use bokehcam::bokeh::{Bokeh, Job, Method, Probe, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
 use bokehcam::optics::{CocField, DepthCoc};
@@ -160,6 +160,36 @@ fn a_range_of_focus_agrees() {
         for (name, map) in [("slope", &slope), ("three depths", &three_depths(width, height))] {
             let what = format!("{name} {range_m} m around {focus_m} m");
             same(&settings(CocKind::Depth), &image, map, &CocField::Depth(lens), &what);
+        }
+    }
+}
+
+/// Pixels that show two surfaces, some of which lie in front of the focal plane and hide others.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn mixed_pixels_agree() {
+    let (width, height) = (97, 71);
+    let (image, mut map) = (noise(width, height), three_depths(width, height));
+    let mut numbers = Numbers(11);
+    map.matte.pixels = (0..width * height)
+        .filter(|_| numbers.next() < 0.1)
+        .collect::<Vec<_>>()
+        .into_iter()
+        .map(|at| {
+            let own: [f32; 3] = std::array::from_fn(|p| f32::from(image.rgb[3 * at as usize + p]) / 255.0);
+            MixedPixel {
+                at,
+                near_m: [0.6, 0.9][(2.0 * numbers.next()) as usize],
+                far_m: [2.0, 6.0, f32::INFINITY][(3.0 * numbers.next()) as usize],
+                share: 0.05 + 0.9 * numbers.next(),
+                difference: own.map(|own| (2.0 * numbers.next() - 1.0) * own.min(1.0 - own)),
+            }
+        })
+        .collect();
+    for quality in Quality::ALL {
+        for highlights in [0.0, 6.0] {
+            let settings = Settings { quality, highlights, ..settings(CocKind::Depth) };
+            same(&settings, &image, &map, &coc(CocKind::Depth, 71), &format!("mixed, {quality}, {highlights}"));
         }
     }
 }

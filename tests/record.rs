@@ -57,7 +57,7 @@ fn run(home: &Path, args: &[&str]) -> Ran {
 fn recording(dir: &Path, frames: u64, shade: u8, metres: f32) {
     let mut writer = Writer::create(dir, &WriterOptions::default()).unwrap();
     let color = ColorImage { width: 24, height: 16, rgb: vec![shade; 24 * 16 * 3] };
-    let depth = DepthMap { width: 24, height: 16, metres: vec![metres; 24 * 16] };
+    let depth = DepthMap { width: 24, height: 16, metres: vec![metres; 24 * 16], ..DepthMap::default() };
     (0..frames).for_each(|frame| writer.add(frame * 100_000_000, &color, Some(&depth)).unwrap());
     writer.finish().unwrap();
 }

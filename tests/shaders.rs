@@ -72,7 +72,7 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             steps_per_px,
             unhidden,
             nearest_px,
-            unused
+            mixed
         }),
         layout!(Bin {
             size,

@@ -168,7 +168,7 @@ impl Blurrer {
             Method::Gather | Method::Gather3 => {
                 let (width, height) = (shot.depth.width as usize, shot.depth.height as usize);
                 let metres = damage::filled_nearest(&Plane { width, height, data: shot.depth.metres.clone() }).data;
-                self.run(shot, DepthMap { metres, ..shot.depth })
+                self.run(shot, DepthMap { metres, ..shot.depth.clone() })
             }
             Method::Layered(_) => {
                 let mut depth = shot.depth.clone();

@@ -53,7 +53,12 @@ pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
 /// The depth map whose CoC is `coc_px`.
 pub fn depth(coc_px: &Plane<f32>, coc_at_infinity_px: f32) -> DepthMap {
     let metres = |coc_px: f32| FOCUS_M / (1.0 - coc_px / coc_at_infinity_px).max(1e-3);
-    DepthMap { width: coc_px.width as u32, height: coc_px.height as u32, metres: coc_px.map(metres).data }
+    DepthMap {
+        width: coc_px.width as u32,
+        height: coc_px.height as u32,
+        metres: coc_px.map(metres).data,
+        ..DepthMap::default()
+    }
 }
 
 /// A number that changes with everything that the truth depends on.

@@ -20,7 +20,7 @@ pub use super::share::Share;
 use super::split::{Counts, MAX_PIECES, Piece};
 use super::{Method, Rank, Settings};
 use crate::budget::Quality;
-use crate::frame::DepthMap;
+use crate::frame::{DepthMap, Matte};
 use crate::optics::{CocField, CocKind};
 
 /// Bin pixels a side of a cell of the coarse grid.
@@ -284,6 +284,14 @@ impl Plan {
     /// The signed CoC, <= 0, from which on the near bins take no share: what is filled in behind them is not below it.
     pub fn nearest_behind_px(&self) -> f32 {
         self.bins.iter().rfind(|bin| bin.near).map_or(0.0, |bin| bin.high_px * (1.0 - HAND_OVER))
+    }
+
+    /// The mixed pixels of a frame that are taken apart: only layers can, and only with depth of the picture's size.
+    pub fn matte<'a>(&self, depth: Option<&'a DepthMap>, coc: &CocField) -> Option<&'a Matte> {
+        let map = depth.filter(|map| (map.width as usize, map.height as usize) == (self.width, self.height))?;
+        let some = 1..=Matte::most(self.width, self.height);
+        let apart = self.compositing == Compositing::Layers && matches!(coc, CocField::Depth(_));
+        (apart && some.contains(&map.matte.pixels.len())).then_some(&map.matte)
     }
 
     /// How much of a pixel the bins behind the near ones take as it is; the rest counts as hidden and is filled in.

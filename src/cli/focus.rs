@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn depth_on_one_side_of_the_focus_is_found_and_a_little_noise_does_not_hide_it() {
         let coc = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 1.5, range_m: 0.0, max_coc_px: 40.0 };
-        let map = |metres: Vec<f32>| DepthMap { width: metres.len() as u32, height: 1, metres };
+        let map = |metres: Vec<f32>| DepthMap { width: metres.len() as u32, height: 1, metres, ..DepthMap::default() };
         let metres = |scale: f32| (0..1000).map(|k| (0.5 + k as f32 * 0.004) * scale).collect::<Vec<f32>>();
         assert_eq!(out_of_focus(&coc, &map(metres(1.0))), None);
         let far = out_of_focus(&coc, &map(metres(5.0))).unwrap();

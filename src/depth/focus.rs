@@ -290,13 +290,13 @@ mod tests {
     const FRAME_NS: u64 = 33_000_000;
 
     fn flat(metres: f32) -> DepthMap {
-        DepthMap { width: 8, height: 8, metres: vec![metres; 64] }
+        DepthMap { width: 8, height: 8, metres: vec![metres; 64], ..DepthMap::default() }
     }
 
     /// Somebody at 1 m over so many of 64 columns, and the room at 3 m.
     fn beside(columns: usize) -> DepthMap {
         let metres = (0..64 * 64).map(|k| if k % 64 < columns { 1.0 } else { 3.0 });
-        DepthMap { width: 64, height: 64, metres: metres.collect() }
+        DepthMap { width: 64, height: 64, metres: metres.collect(), ..DepthMap::default() }
     }
 
     #[test]

@@ -178,7 +178,12 @@ mod tests {
 
     #[test]
     fn like_colours_stay_filled_from_behind() {
-        let mut map = DepthMap { width: 9, height: 3, metres: [1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0].repeat(3) };
+        let mut map = DepthMap {
+            width: 9,
+            height: 3,
+            metres: [1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0].repeat(3),
+            ..DepthMap::default()
+        };
         let before = map.clone();
         let mut hole = [false, false, false, true, true, true, false, false, false].repeat(3);
         let mut guided = GuidedHoleFill::default();

@@ -217,7 +217,7 @@ mod tests {
 
     fn map(width: u32, height: u32, depth: impl Fn(f32, f32) -> f32) -> DepthMap {
         let metres = (0..width * height).map(|k| depth((k % width) as f32, (k / width) as f32)).collect();
-        DepthMap { width, height, metres }
+        DepthMap { width, height, metres, ..DepthMap::default() }
     }
 
     fn registered(calibration: Calibration, from: &DepthMap) -> DepthMap {

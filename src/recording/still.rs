@@ -114,7 +114,7 @@ pub fn check_depth_size(path: &Path, depth: (u32, u32), color: (u32, u32)) -> Re
 
 /// A map turned as its file says.
 fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
-    let DepthMap { width, height, metres } = map;
+    let DepthMap { width, height, metres, .. } = map;
     let image: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(width, height, metres).unwrap_or_default();
     let image = match orientation {
         Orientation::NoTransforms => image,
@@ -126,7 +126,7 @@ fn upright(map: DepthMap, orientation: Orientation) -> DepthMap {
         Orientation::Rotate90FlipH => imageops::flip_horizontal(&imageops::rotate90(&image)),
         Orientation::Rotate270FlipH => imageops::flip_horizontal(&imageops::rotate270(&image)),
     };
-    DepthMap { width: image.width(), height: image.height(), metres: image.into_raw() }
+    DepthMap { width: image.width(), height: image.height(), metres: image.into_raw(), ..DepthMap::default() }
 }
 
 /// Reads a depth map in metres, as [`read_map`]. Disparity becomes depth where the file says which eyes see it.

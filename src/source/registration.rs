@@ -118,13 +118,18 @@ translation_m = [0.5, 0, 0]
 
     #[test]
     fn a_calibration_is_read() {
-        let from = DepthMap { width: 4, height: 2, metres: vec![1.0; 8] };
+        let from = DepthMap { width: 4, height: 2, metres: vec![1.0; 8], ..DepthMap::default() };
         let mut into = DepthMap::default();
         parse(Path::new("c.toml"), GOOD).unwrap().register(&from, &mut into);
         assert_eq!(into.metres, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0], "half a metre to the right is two pixels");
         // Row by row: a quarter turn about the optical axis puts x on y.
         let turned = GOOD.replace("1, 0, 0, 0, 1, 0, 0, 0, 1", "0, -1, 0, 1, 0, 0, 0, 0, 1").replace("[0.5", "[0");
-        let from = DepthMap { width: 4, height: 2, metres: vec![0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] };
+        let from = DepthMap {
+            width: 4,
+            height: 2,
+            metres: vec![0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+            ..DepthMap::default()
+        };
         parse(Path::new("c.toml"), &turned).unwrap().register(&from, &mut into);
         assert_eq!(into.metres, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0]);
     }

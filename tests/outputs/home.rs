@@ -57,7 +57,7 @@ impl Home {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 *byte = (state >> 24) as u8;
             });
-            let depth = DepthMap { width: 64, height: 48, metres: vec![2.0; 64 * 48] };
+            let depth = DepthMap { width: 64, height: 48, metres: vec![2.0; 64 * 48], ..DepthMap::default() };
             writer.add((frame as f64 * period_s * 1e9) as u64, &color, Some(&depth)).unwrap();
         }
         writer.finish().unwrap();

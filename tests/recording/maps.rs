@@ -94,7 +94,7 @@ fn a_wrong_pfm_is_told() {
 fn a_map_says_what_it_holds() {
     let dir = TempDir::new().unwrap();
     let path = |name: &str| dir.path().join(name);
-    let depth = DepthMap { width: 2, height: 1, metres: vec![0.5, 4.0] };
+    let depth = DepthMap { width: 2, height: 1, metres: vec![0.5, 4.0], ..DepthMap::default() };
     for name in ["z.png", "z.pfm"] {
         write_depth(&path(name), &depth, 1000.0, false).unwrap();
         assert_eq!(read_map(&path(name), None, None).unwrap(), Map::Depth(depth.clone()), "{name}");

@@ -137,7 +137,9 @@ fn a_frame_that_does_not_fit_is_refused_and_the_rest_stays() {
     assert_says(writer.add(20, &color, Some(&DepthMap::new(48, 32))), &["frame 1", "48x32"]);
     assert_says(writer.add(20, &ColorImage { rgb: vec![0; 5], ..color.clone() }, None), &["frame 1", "5 bytes"]);
     assert_says(writer.add(20, &color, Some(&DepthMap { metres: vec![], ..depth.clone() })), &["frame 1", "0 values"]);
-    writer.add(20, &color, Some(&DepthMap { width: 12, height: 8, metres: vec![1.0; 96] })).unwrap();
+    writer
+        .add(20, &color, Some(&DepthMap { width: 12, height: 8, metres: vec![1.0; 96], ..DepthMap::default() }))
+        .unwrap();
     writer.finish().unwrap();
     let recording = Recording::open(dir.path(), &Options::default()).unwrap();
     assert_eq!(times_ns(&recording), [0, 10]);

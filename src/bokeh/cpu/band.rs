@@ -8,9 +8,8 @@ use super::fill::{Behind, HalfRows};
 use super::tent::{MARGIN, WIDE};
 use super::tiles::BLOCK;
 use super::tiles::{TILE_H, TILE_W, Tiles, widen};
-use super::unpack::{Piece, Source};
+use super::unpack::{Source, Surfaces};
 use crate::bokeh::plan::{CELL, MAX_BINS, Share};
-use crate::compute::aligned::Line;
 
 /// Some rows of the picture: whole rows of cells of every bin.
 pub struct Band<'a> {
@@ -102,7 +101,7 @@ impl Band<'_> {
         if !active.contains(&true) && !matches!(self.hidden, Hidden::Waits(..)) {
             return;
         }
-        let mut piece: Piece<WIDE> = Line([[0.0; WIDE]; 4]);
+        let mut surfaces: Surfaces<WIDE> = Surfaces::new();
         let columns = columns_of(block, self.source.color.width as usize);
         let height = self.source.color.height as isize;
         let (first, end) = (self.rows.start as isize, self.rows.end as isize);
@@ -113,30 +112,33 @@ impl Band<'_> {
                 inside,
                 (block * BLOCK) as isize - MARGIN as isize,
                 columns + 2 * MARGIN,
-                &mut piece,
+                &mut surfaces,
             );
             match &mut self.hidden {
                 Hidden::Nothing => {}
                 Hidden::Waits(behind, halves) => {
                     if (first..end.min(height)).contains(&y) {
-                        halves.add(behind, block * BLOCK, MARGIN..MARGIN + columns, y as usize, &piece);
+                        halves.add(behind, block * BLOCK, MARGIN..MARGIN + columns, y as usize, &surfaces);
                     }
                 }
                 Hidden::Filled(behind) => {
                     let width = self.source.color.width as usize;
-                    behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut piece);
+                    behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
                 }
             }
             let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-            widen(&mut range, &piece.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
+            widen(&mut range, &surfaces.back.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
+            if surfaces.mixed {
+                widen(&mut range, &surfaces.front.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
+            }
             for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
             {
                 let Some(bin) = bin else { continue };
                 match bin.scale {
-                    1 => bin.add::<V, 1>(simd, sums, (block, columns), first, y, &piece, range),
-                    2 => bin.add::<V, 2>(simd, sums, (block, columns), first, y, &piece, range),
-                    4 => bin.add::<V, 4>(simd, sums, (block, columns), first, y, &piece, range),
-                    _ => bin.add::<V, 8>(simd, sums, (block, columns), first, y, &piece, range),
+                    1 => bin.add::<V, 1>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    2 => bin.add::<V, 2>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    4 => bin.add::<V, 4>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    _ => bin.add::<V, 8>(simd, sums, (block, columns), first, y, &surfaces, range),
                 }
             }
         }

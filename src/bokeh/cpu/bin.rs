@@ -7,7 +7,7 @@ use pulp::Simd;
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, STRIP, STRIP_CELLS, STRIP_ROW};
 use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, reduce, sum_row};
 use super::tiles::BLOCK;
-use super::unpack::Piece;
+use super::unpack::Surfaces;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{load, store};
@@ -73,14 +73,21 @@ fn clear_cells(cells: &mut CellSums) {
 /// `own` the lowest and highest colour.
 #[inline(always)]
 fn accumulate_columns<V: Simd>(simd: V, cells: &mut CellSums, x: usize, sums: [V::f32s; 2], own: Option<[V::f32s; 3]>) {
-    let cells = &mut cells.0;
     for p in 0..2 {
-        let sum = simd.add_f32s(load::<V>(&cells[p], x), sums[p]);
-        store::<V>(&mut cells[p], x, sum);
+        let sum = simd.add_f32s(load::<V>(&cells.0[p], x), sums[p]);
+        store::<V>(&mut cells.0[p], x, sum);
     }
-    let Some(own) = own else { return };
+    if let Some(own) = own {
+        accumulate_range(simd, cells, x, sums[0], own);
+    }
+}
+
+/// Adds colours of a coverage to their lowest and highest.
+#[inline(always)]
+fn accumulate_range<V: Simd>(simd: V, cells: &mut CellSums, x: usize, coverage: V::f32s, own: [V::f32s; 3]) {
+    let cells = &mut cells.0;
     // Without coverage there is no colour: an addition puts it out of range.
-    let counts = simd.greater_than_f32s(sums[0], simd.splat_f32s(COVERAGE_FLOOR));
+    let counts = simd.greater_than_f32s(coverage, simd.splat_f32s(COVERAGE_FLOOR));
     let beyond = simd.select_f32s(counts, simd.splat_f32s(0.0), simd.splat_f32s(NO_COLOR));
     for p in 0..3 {
         let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own[p], beyond));
@@ -145,14 +152,14 @@ impl BinRows<'_> {
         (block, columns): (usize, usize),
         first: isize,
         y: isize,
-        piece: &Piece<WIDE>,
+        surfaces: &Surfaces<WIDE>,
         range: (f32, f32),
     ) {
         let rows = self.rows as isize;
         let meets = self.share.is_none_or(|share| share.meets(range));
         if S == 1 {
             if (0..rows).contains(&(y - first)) {
-                self.whole_row(simd, (block, columns), (y - first) as usize, sums, meets.then_some(piece));
+                self.whole_row(simd, (block, columns), (y - first) as usize, sums, meets.then_some(surfaces));
             }
             return;
         }
@@ -171,7 +178,7 @@ impl BinRows<'_> {
             sum_row(
                 simd,
                 &ShareAt::new(simd, &self.share),
-                piece,
+                surfaces,
                 columns,
                 [1.0 / S as f32 - rise, rise],
                 above,
@@ -200,15 +207,15 @@ impl BinRows<'_> {
         (block, columns): (usize, usize),
         row: usize,
         sums: &mut BinSums,
-        piece: Option<&Piece<WIDE>>,
+        surfaces: Option<&Surfaces<WIDE>>,
     ) {
         let columns = columns.min(self.across * STRIP - block * BLOCK);
-        match piece {
+        match surfaces {
             None => (0..columns).step_by(STRIP).for_each(|x| self.strip_row(block * BLOCK + x, row).fill(0.0)),
-            Some(piece) => {
+            Some(surfaces) => {
                 let share = ShareAt::new(simd, &self.share);
                 for x in (0..columns).step_by(V::F32_LANES) {
-                    let values = share.of(simd, piece, MARGIN + x);
+                    let values = share.of(simd, surfaces, MARGIN + x);
                     let out = self.strip_row(block * BLOCK + x, row);
                     for p in 0..4 {
                         store::<V>(out, p * STRIP + x % STRIP, values[p]);
@@ -216,9 +223,15 @@ impl BinRows<'_> {
                     // At full scale a pixel is its own mean: its colour counts whatever its share.
                     let mut own = None;
                     if self.ranged {
-                        let [r, g, b, _] = &piece.0;
+                        let [r, g, b, _] = &surfaces.back.0;
                         let at = MARGIN + x;
                         own = Some([load::<V>(r, at), load::<V>(g, at), load::<V>(b, at)]);
+                        if surfaces.mixed {
+                            let [r, g, b, _] = &surfaces.front.0;
+                            let two = [load::<V>(r, at), load::<V>(g, at), load::<V>(b, at)];
+                            let share = load::<V>(&surfaces.share.0, at);
+                            accumulate_range(simd, &mut sums.cells, x, simd.mul_f32s(share, values[3]), two);
+                        }
                     }
                     accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
                 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use super::rows::Rows;
-use super::unpack::Piece;
+use super::unpack::{Piece, Surfaces};
 use crate::bokeh::plan::Share;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
@@ -169,12 +169,12 @@ impl HalfRows<'_> {
         x0: usize,
         columns: Range<usize>,
         y: usize,
-        piece: &Piece<W>,
+        surfaces: &Surfaces<W>,
     ) {
         let (row, odd) = ((y - self.first) / 2, y % 2 == 1);
         let first = x0 / 2;
         let count = (columns.len() / 2).min(self.width - first);
-        let pairs = |p: usize| piece.0[p][columns.start..].as_chunks::<2>().0.iter().take(count);
+        let pairs = |p: usize| surfaces.back.0[p][columns.start..].as_chunks::<2>().0.iter().take(count);
         // A last row without a partner stands for two.
         let share = if !odd && y + 1 == self.height { 0.5 } else { 0.25 };
         let planes = &mut self.rows[row * PLANES * self.stride..][..PLANES * self.stride];
@@ -189,13 +189,32 @@ impl HalfRows<'_> {
             let here = if a > b { a } else { b };
             *value = if odd && *value > here { *value } else { here };
         }
+        if surfaces.mixed {
+            // What something near covers in part is not known either.
+            let fronts = surfaces.front.0[3][columns.start..].as_chunks::<2>().0.iter().take(count);
+            let shares = surfaces.share.0[columns.start..].as_chunks::<2>().0;
+            for ((value, cocs), shares) in self.hidden[row * self.width + first..].iter_mut().zip(fronts).zip(shares) {
+                for (coc_px, share) in cocs.iter().zip(shares) {
+                    let here = if *share > 0.0 { 1.0 - behind.at(*coc_px) } else { 0.0 };
+                    *value = if *value > here { *value } else { here };
+                }
+            }
+        }
     }
 }
 
 impl Behind<'_> {
     /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
     #[inline(always)]
-    pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, piece: &mut Piece<W>) {
+    pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
+        self.put_one(x0, y, width, &mut surfaces.back);
+        if surfaces.mixed {
+            self.put_one(x0, y, width, &mut surfaces.front);
+        }
+    }
+
+    #[inline(always)]
+    fn put_one<const W: usize>(&self, x0: isize, y: usize, width: usize, piece: &mut Piece<W>) {
         let row = self.level.rows.row(y / 2);
         let [red, green, blue, coc] = &mut piece.0;
         for x in 0..W {

@@ -135,7 +135,7 @@ impl CpuBokeh {
             times.add(name, now - clock);
             clock = now;
         };
-        let frame = Source { color, depth, coc, expansion: self.plan.expansion };
+        let frame = Source { color, depth, coc, matte: self.plan.matte(depth, coc), expansion: self.plan.expansion };
         self.split(&frame);
         lap("split");
         // With something in front, blocks in which it hides anything get their bins behind after the fill.

@@ -3,10 +3,9 @@
 use super::CpuBokeh;
 use super::rows::STRIP;
 use super::tiles::{TILE_H, TILE_W};
-use super::unpack::{Piece, Source};
+use super::unpack::{Source, Surfaces};
 use crate::bokeh::Probe;
 use crate::bokeh::plan::{Plan, SEGMENT};
-use crate::compute::aligned::Line;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
@@ -63,18 +62,18 @@ impl CpuBokeh {
     /// has to be the last frame, what near objects hide is filled in, as for the bins behind them.
     pub fn scene(&self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField, filled: bool) -> Vec<[f32; 4]> {
         let (width, height) = (color.width as usize, color.height as usize);
-        let source = Source { color, depth, coc, expansion: self.plan.expansion };
+        let source = Source { color, depth, coc, matte: self.plan.matte(depth, coc), expansion: self.plan.expansion };
         let pyramid = self.pyramid.as_ref().filter(|_| filled && self.filled());
         let behind = pyramid.map(|pyramid| pyramid.behind(self.plan.unhidden(), self.plan.nearest_behind_px()));
-        let mut piece: Piece<SPAN> = Line([[0.0; SPAN]; 4]);
+        let mut surfaces: Surfaces<SPAN> = Surfaces::new();
         let mut scene = Vec::with_capacity(width * height);
         for y in 0..height {
             for x0 in (0..width).step_by(SPAN) {
-                source.unpack::<pulp::Scalar, SPAN>(y, x0 as isize, SPAN, &mut piece);
+                source.unpack::<pulp::Scalar, SPAN>(y, x0 as isize, SPAN, &mut surfaces);
                 if let Some(behind) = &behind {
-                    behind.put(x0 as isize, y, width, &mut piece);
+                    behind.put(x0 as isize, y, width, &mut surfaces);
                 }
-                let planes = &piece.0;
+                let planes = &surfaces.back.0;
                 scene.extend((0..SPAN.min(width - x0)).map(|x| planes.each_ref().map(|plane| plane[x])));
             }
         }

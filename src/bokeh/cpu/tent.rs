@@ -4,7 +4,7 @@
 use pulp::Simd;
 
 use super::tiles::BLOCK;
-use super::unpack::Piece;
+use super::unpack::{Piece, Surfaces};
 use crate::bokeh::plan::Share;
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, store};
@@ -27,7 +27,7 @@ pub type Means = Line<[[f32; PLANE]; SUMS]>;
 pub fn sum_row<S: Simd>(
     simd: S,
     share: &ShareAt<S>,
-    piece: &Piece<WIDE>,
+    surfaces: &Surfaces<WIDE>,
     columns: usize,
     weights: [f32; 2],
     above: &mut [[f32; WIDE]; SUMS],
@@ -35,7 +35,7 @@ pub fn sum_row<S: Simd>(
 ) {
     let weights = weights.map(|weight| simd.splat_f32s(weight));
     for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
-        let values = share.of(simd, piece, x);
+        let values = share.of(simd, surfaces, x);
         for p in 0..SUMS {
             let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
             store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
@@ -57,9 +57,21 @@ impl<S: Simd> ShareAt<S> {
         Self { steps: share.as_ref().map(|share| [step(share.front), step(share.behind)]) }
     }
 
-    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels.
+    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels, whatever surfaces they show.
     #[inline(always)]
-    pub fn of(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
+    pub fn of(&self, simd: S, surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; SUMS] {
+        let back = self.of_one(simd, &surfaces.back, x);
+        if !surfaces.mixed {
+            return back;
+        }
+        let front = self.of_one(simd, &surfaces.front, x);
+        let share = load::<S>(&surfaces.share.0, x);
+        std::array::from_fn(|p| fma(simd, share, simd.sub_f32s(front[p], back[p]), back[p]))
+    }
+
+    /// The same, of pixels of one surface.
+    #[inline(always)]
+    fn of_one(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
         let [r, g, b, coc] = piece.0.each_ref().map(|plane| load::<S>(plane, x));
         let [zero, one] = [0.0, 1.0].map(|value| simd.splat_f32s(value));
         let share = match &self.steps {

@@ -109,6 +109,13 @@ impl pulp::WithSimd for Survey<'_> {
                 widen(range, values, |value| if unknown(value) { f32::INFINITY } else { value });
             }
         }
+        if let Some(matte) = self.source.matte {
+            let rows = self.row * TILE_H * width..((self.row + 1) * TILE_H).min(height) * width;
+            for pixel in matte.within(rows) {
+                let (low, high) = &mut self.ranges[pixel.at as usize % width / TILE_W];
+                (*low, *high) = (low.min(pixel.near_m), high.max(pixel.far_m));
+            }
+        }
         if let Some((lens, _)) = direct {
             self.ranges.iter_mut().for_each(|(low, high)| (*low, *high) = (lens.coc_px(*low), lens.coc_px(*high)));
         }

@@ -1,11 +1,13 @@
 //! Pass `unpack`: 8-bit sRGB to linear light with highlights expanded, and depth to signed CoC.
 
+use std::ops::Range;
+
 use pulp::Simd;
 
 use crate::color::luminance;
 use crate::compute::aligned::Line;
 use crate::compute::simd::madd;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, Matte};
 use crate::optics::CocField;
 
 /// [`srgb_to_linear`](crate::color::srgb_to_linear) of an 8-bit value as a polynomial, which vectors can evaluate: off by less than 3e-5, or 0.004
@@ -44,6 +46,8 @@ pub struct Source<'a> {
     pub depth: Option<&'a DepthMap>,
     /// The rule of the CoC.
     pub coc: &'a CocField,
+    /// Its mixed pixels, where they are taken apart.
+    pub matte: Option<&'a Matte>,
     /// Highlight recovery, infinite when off.
     pub expansion: f32,
 }
@@ -51,16 +55,35 @@ pub struct Source<'a> {
 /// Some pixels of a row: linear light r, g, b and CoC.
 pub type Piece<const W: usize> = Line<[[f32; W]; 4]>;
 
+/// Some pixels of a row, each of one surface or two.
+pub struct Surfaces<const W: usize> {
+    /// The only surface of a pixel, or the farther of two.
+    pub back: Piece<W>,
+    /// The nearer of two; only where some are `mixed`, and their share is above 0.
+    pub front: Piece<W>,
+    /// How much of a pixel the nearer surface covers.
+    pub share: Line<[f32; W]>,
+    /// Whether any pixel here has two.
+    pub mixed: bool,
+}
+
+impl<const W: usize> Surfaces<W> {
+    /// Memory for them.
+    pub fn new() -> Self {
+        Self { back: Line([[0.0; W]; 4]), front: Line([[0.0; W]; 4]), share: Line([0.0; W]), mixed: false }
+    }
+}
+
 impl Source<'_> {
     /// Some pixels of row `y` from column `x0` on; outside, the outermost pixels repeat.
     #[inline(always)]
-    pub fn unpack<S: Simd, const W: usize>(&self, y: usize, x0: isize, columns: usize, piece: &mut Piece<W>) {
+    pub fn unpack<S: Simd, const W: usize>(&self, y: usize, x0: isize, columns: usize, surfaces: &mut Surfaces<W>) {
         let width = self.color.width as usize;
         let row = &self.color.rgb[y * width * 3..][..width * 3];
         let before = (-x0).clamp(0, columns as isize) as usize;
         let first = x0.max(0) as usize;
         let end = before + width.saturating_sub(first).min(columns - before);
-        let [red, green, blue, coc] = &mut piece.0;
+        let [red, green, blue, coc] = &mut surfaces.back.0;
         let count = end - before;
         // Channel by channel first, as bytes: vectors take three apart at once.
         let mut codes = [[0u8; W]; 3];
@@ -76,18 +99,51 @@ impl Source<'_> {
         }
         coc_row(self, y, first, &mut coc[before..end]);
         if self.expansion.is_finite() {
-            let [red, green, blue, _] = &mut piece.0;
+            let [red, green, blue, _] = &mut surfaces.back.0;
             for x in 0..columns {
                 let factor = expand(luminance(red[x], green[x], blue[x]), self.expansion);
                 (red[x], green[x], blue[x]) = (red[x] * factor, green[x] * factor, blue[x] * factor);
             }
         }
+        self.unmix(y * width + first..y * width + first + count, before, surfaces);
         if before > 0 || end < columns {
-            for plane in &mut piece.0 {
+            let Surfaces { back, front, share, mixed } = surfaces;
+            let twos = front.0.iter_mut().chain([&mut share.0]).filter(|_| *mixed);
+            for plane in back.0.iter_mut().chain(twos) {
                 let (left, right) = (plane[before], plane[end - 1]);
                 plane[..before].fill(left);
                 plane[end..columns].fill(right);
             }
+        }
+    }
+
+    /// Takes the mixed pixels among those at `range` apart; the first of the range is value `at` of the surfaces.
+    #[inline(always)]
+    fn unmix<const W: usize>(&self, range: Range<usize>, at: usize, surfaces: &mut Surfaces<W>) {
+        surfaces.mixed = false;
+        let (CocField::Depth(lens), Some(matte)) = (self.coc, self.matte) else { return };
+        let start = range.start;
+        let Surfaces { back, front, share, mixed } = surfaces;
+        for pixel in matte.within(range) {
+            if !*mixed {
+                front.0.as_flattened_mut().fill(0.0);
+                share.0.fill(0.0);
+                *mixed = true;
+            }
+            let x = at + pixel.at as usize - start;
+            // Both colours are as bright as the pixel's highlights are made: their sum stays the pixel.
+            let factor = match self.expansion.is_finite() {
+                true => compress(luminance(back.0[0][x], back.0[1][x], back.0[2][x]), self.expansion).recip(),
+                false => 1.0,
+            };
+            share.0[x] = pixel.share;
+            for p in 0..3 {
+                let own = back.0[p][x];
+                // Depth may be that of another frame, with other colours: no light is below 0.
+                front.0[p][x] = (own + (1.0 - pixel.share) * factor * pixel.difference[p]).max(0.0);
+                back.0[p][x] = (own - pixel.share * factor * pixel.difference[p]).max(0.0);
+            }
+            (front.0[3][x], back.0[3][x]) = (lens.coc_px(pixel.near_m), lens.coc_px(pixel.far_m));
         }
     }
 }

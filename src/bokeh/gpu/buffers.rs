@@ -6,6 +6,7 @@ use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::Device;
+use crate::frame::{Matte, MixedPixel};
 
 /// Bytes from one uniform `Work` to the next: no device asks for more.
 pub const WORK_STRIDE: u64 = 256;
@@ -25,6 +26,8 @@ pub struct Buffers {
     pub color: wgpu::Buffer,
     /// Linear light and CoC.
     pub scene: wgpu::Buffer,
+    /// Mixed pixels: uploaded in metres, and then the nearer surface of each.
+    pub mixed: wgpu::Buffer,
     /// Range of CoC of each tile of the picture.
     pub ranges: wgpu::Buffer,
     /// The pictures of all bins.
@@ -105,6 +108,7 @@ impl Buffers {
         let layered = plan.compositing == Compositing::Layers;
         let (levels, pyramid_pixels) =
             if layered && plan.ladder.fill() { pyramid_steps(width, height) } else { (Vec::new(), 1) };
+        let mixed = if layered { Matte::most(width, height).max(1) } else { 1 };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let work_bytes = work_count(plan) * WORK_STRIDE as usize;
         Self {
@@ -115,6 +119,7 @@ impl Buffers {
             levels: levels.iter().map(|level| with_data("level", bytemuck::bytes_of(level), Usage::UNIFORM)).collect(),
             color: storage("color", picture_bytes(plan) as usize / 4),
             scene: storage("scene", width * height * 2),
+            mixed: storage("mixed", mixed * size_of::<MixedPixel>() / 4),
             ranges: storage("ranges", width.div_ceil(16) * height.div_ceil(16) * 2),
             source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),

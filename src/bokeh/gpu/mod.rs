@@ -143,7 +143,7 @@ impl GpuBokeh {
             steps_per_px: STEPS_PER_PX,
             unhidden: unhidden.into(),
             nearest_px: plan.nearest_behind_px(),
-            unused: 0.0,
+            mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),
         }
     }
 }
@@ -174,6 +174,9 @@ impl Bokeh for GpuBokeh {
                 self.passes.set_depth(&self.device, &self.buffers, &self.depth);
             }
             self.device.upload(&self.depth, 0, bytes);
+        }
+        if let Some(matte) = self.plan.matte(job.depth.as_deref(), &job.coc) {
+            self.device.upload(&self.buffers.mixed, 0, bytemuck::cast_slice(&matte.pixels));
         }
         self.device.upload(&self.buffers.color, 0, &job.color.rgb);
         self.plan.set_quality(job.quality);

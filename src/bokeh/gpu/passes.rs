@@ -101,7 +101,13 @@ impl Passes {
 
         let mut fill = Vec::new();
         if !b.levels.is_empty() {
-            fill.push(maker.fixed("fill", shaders::HIDE, half, TILE, &[&b.frame, &b.scene, &b.hidden, &b.ranges]));
+            fill.push(maker.fixed(
+                "fill",
+                shaders::HIDE,
+                half,
+                TILE,
+                &[&b.frame, &b.scene, &b.hidden, &b.ranges, &b.mixed],
+            ));
             let known = [&b.frame, &b.scene, &b.hidden, &b.pyramid, &b.known];
             fill.push(maker.fixed("fill", shaders::KNOW, half, TILE, &known));
             for (level, (_, coarse)) in b.levels.iter().zip(&b.level_sizes) {
@@ -110,7 +116,7 @@ impl Passes {
             for (level, (fine, _)) in b.levels.iter().zip(&b.level_sizes).rev() {
                 fill.push(maker.fixed("fill", shaders::PUSH, *fine, SMALL_TILE, &[level, &b.pyramid, &b.known]));
             }
-            let filled = [&b.frame, &b.pyramid, &b.scene, &b.ranges, &b.known];
+            let filled = [&b.frame, &b.pyramid, &b.scene, &b.ranges, &b.known, &b.mixed];
             fill.push(maker.fixed("fill", shaders::FILL, picture, TILE, &filled));
         }
         let filters = |maker: &mut Maker, bank: &Filters, k: usize| {
@@ -134,7 +140,7 @@ impl Passes {
             maker.fixed("gather", shaders::GATHER, picture, TILE, &buffers)
         });
         let bin = [NEAR, REST].map(|index| {
-            maker.over_bins("bin", shaders::BIN, index, &[&b.frame, &b.scene, &b.source, &b.grid, &b.ranges])
+            maker.over_bins("bin", shaders::BIN, index, &[&b.frame, &b.scene, &b.source, &b.grid, &b.ranges, &b.mixed])
         });
         // Each invocation makes four pixels: three whole words.
         let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active];
@@ -146,7 +152,7 @@ impl Passes {
                 shaders::UNPACK,
                 picture,
                 TILE,
-                &[&b.frame, &b.color, depth, &b.scene, &b.ranges],
+                &[&b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed],
             ),
             fill,
             gather,
@@ -160,7 +166,8 @@ impl Passes {
 
     /// Binds another depth buffer.
     pub fn set_depth(&mut self, device: &Device, b: &Buffers, depth: &wgpu::Buffer) {
-        let buffers = [&b.frame, &b.color, depth, &b.scene, &b.ranges].map(|buffer| buffer.as_entire_buffer_binding());
+        let buffers =
+            [&b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed].map(|buffer| buffer.as_entire_buffer_binding());
         self.unpack.step.bindings = device.bindings(&self.unpack.step.pipeline, buffers.into_iter());
     }
 

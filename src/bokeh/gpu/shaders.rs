@@ -20,9 +20,9 @@ macro_rules! shader {
 }
 
 /// 8-bit sRGB and depth to linear light and CoC.
-pub const UNPACK: Shader = shader!("unpack", "range");
+pub const UNPACK: Shader = shader!("unpack", "range", "mixed");
 /// A bin's share of each pixel, and the coarse grid over it.
-pub const BIN: Shader = shader!("bin", "work");
+pub const BIN: Shader = shader!("bin", "work", "mixed");
 /// Local radius and range of colours.
 pub const REACH: Shader = shader!("reach", "work");
 pub const BLUR_ROWS: Shader = shader!("blur_rows", "work", "filter");
@@ -30,14 +30,14 @@ pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "work", "filter");
 /// The exact two-dimensional gather.
 pub const GATHER: Shader = shader!("gather");
 /// What near objects touch.
-pub const HIDE: Shader = shader!("hide");
+pub const HIDE: Shader = shader!("hide", "mixed");
 /// What is known behind them.
 pub const KNOW: Shader = shader!("know");
 /// To the coarser level.
 pub const PULL: Shader = shader!("pull", "level");
 /// Back to the finer level.
 pub const PUSH: Shader = shader!("push", "level");
-pub const FILL: Shader = shader!("fill", "range");
+pub const FILL: Shader = shader!("fill", "range", "mixed");
 pub const COMPOSITE: Shader = shader!("composite");
 
 pub const ALL: [Shader; 12] =
@@ -92,7 +92,7 @@ pub struct Frame {
     pub steps_per_px: f32,
     pub unhidden: [f32; 2],
     pub nearest_px: f32,
-    pub unused: f32,
+    pub mixed: u32,
 }
 
 /// `Bin` of `common.wgsl`.

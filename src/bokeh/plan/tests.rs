@@ -22,7 +22,7 @@ fn settings(coc: CocKind, quality: Quality) -> Settings {
 fn split(plan: &mut Plan, coc_px: impl Iterator<Item = f32>) {
     let lens = DepthCoc { coc_at_infinity_px: 16.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 30.0 };
     let metres: Vec<f32> = coc_px.map(|coc_px| 1.0 / (1.0 - coc_px / 16.0)).collect();
-    let depth = DepthMap { width: metres.len() as u32, height: 1, metres };
+    let depth = DepthMap { width: metres.len() as u32, height: 1, metres, ..DepthMap::default() };
     plan.split(Some(&depth), &CocField::Depth(lens));
 }
 

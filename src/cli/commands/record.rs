@@ -194,8 +194,12 @@ mod tests {
 
     #[test]
     fn depth_that_no_camera_sees_is_doubted() {
-        let said =
-            |metres: &[f32]| doubt(&DepthMap { width: metres.len() as u32, height: 1, metres: metres.into() }, 13.1);
+        let said = |metres: &[f32]| {
+            doubt(
+                &DepthMap { width: metres.len() as u32, height: 1, metres: metres.into(), ..DepthMap::default() },
+                13.1,
+            )
+        };
         assert_eq!(said(&[0.0, 1.0, 40.0]), None);
         assert_eq!(said(&[0.0, f32::NAN]), None);
         assert_eq!(said(&[0.02, 0.06]), None);
