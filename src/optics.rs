@@ -136,6 +136,11 @@ impl DepthCoc {
         self.focus_m + 0.5 * self.range_m
     }
 
+    /// The step of inverse depth, in 1/m, that changes the CoC by `px`; infinite where nothing is blurred.
+    pub fn inverse_depth_of_px(&self, px: f32) -> f32 {
+        px / (self.coc_at_infinity_px * self.focus_m)
+    }
+
     /// Signed CoC radius in pixels of a point at `depth_m`; unknown depth counts as infinitely far, so that what
     /// nobody measured is blurred rather than shown.
     #[inline(always)]

@@ -7,6 +7,7 @@ pub mod focus;
 mod guided_fill;
 #[cfg(feature = "camera")]
 pub mod live;
+pub mod matting;
 pub mod recorded;
 pub mod refine;
 pub mod registration;

@@ -2,6 +2,7 @@
 
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
+use crate::depth::matting::Matting;
 use crate::depth::refine::Refiner;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::CocRule;
@@ -25,11 +26,15 @@ impl Finish {
     }
 }
 
+/// Jumps of CoC from here on are outlines whose pixels are taken apart, in pixels.
+const MIXED_FROM_PX: f32 = 0.5;
+
 /// A [`CocRule`] at work, from frame to frame.
 pub struct CocMaker {
     rule: CocRule,
     focus: Focus,
     finisher: Finisher,
+    matting: Matting,
 }
 
 enum Finisher {
@@ -64,7 +69,7 @@ impl CocMaker {
             CocRule::Fixed(_) => FocusRule::Auto,
             CocRule::Depth { focus, .. } => focus,
         };
-        Self { rule, focus: Focus::new(focus), finisher: Finisher::new(finish) }
+        Self { rule, focus: Focus::new(focus), finisher: Finisher::new(finish), matting: Matting::default() }
     }
 
     /// Follows another rule, from where the lens stands now.
@@ -105,7 +110,11 @@ impl CocMaker {
                 refiner.refine(map, color, time_ns);
             }
         }
-        lens.field((focus_m, range_m), color.width, max_coc_px)
+        let field = lens.field((focus_m, range_m), color.width, max_coc_px);
+        if let CocField::Depth(lens) = &field {
+            self.matting.find(map, color, lens.inverse_depth_of_px(MIXED_FROM_PX));
+        }
+        field
     }
 }
 

@@ -1,0 +1,221 @@
+//! The colours of surfaces, in clusters: a square cell of pixels has one of each surface that it shows, at most two.
+//!
+//! What is wanted around a mixed pixel are means and covariances of both surfaces, close by where there are pure pixels
+//! and from some way off where there are none, as in hair. Cells have both for a tenth of the time that pixels need.
+
+use super::EdgePixel;
+use super::share::Contrast;
+
+/// Side of a cell, in pixels.
+const CELL_PX: usize = 8;
+/// So many cells in every direction are looked at; more where they have nothing of a surface, as at the tips of hair.
+const REACHES_CELLS: [usize; 3] = [1, 2, 5];
+/// Pixels at an edge may be mixed themselves. They count so little that they matter only where nothing is pure.
+const AT_EDGE_WEIGHT: f32 = 0.02;
+/// A cluster's weight falls to an eighth at this distance, in pixels; its long tail reaches hair.
+const HALF_PX: f32 = 6.0;
+
+/// Pixels of one surface in a cell, weighted: sums, but for the means of position and inverse depth.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cluster {
+    weight: f32,
+    x: f32,
+    y: f32,
+    inverse: f32,
+    light: [f32; 3],
+    squares: Symmetric,
+}
+
+/// A symmetric matrix: xx, xy, xz, yy, yz, zz.
+pub type Symmetric = [f32; 6];
+
+/// The upper triangle of `a` times its transpose.
+fn outer(a: [f32; 3]) -> Symmetric {
+    [a[0] * a[0], a[0] * a[1], a[0] * a[2], a[1] * a[1], a[1] * a[2], a[2] * a[2]]
+}
+
+/// Mean and covariance of a surface's colours in linear light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Color {
+    pub mean: [f32; 3],
+    pub covariance: Symmetric,
+}
+
+/// What clusters are made of.
+pub(super) struct View<'a> {
+    /// Columns and rows.
+    pub size: (usize, usize),
+    /// Inverse depth of all pixels, in 1/m; one surface's differ by no more than `jump`.
+    pub inverse: &'a [f32],
+    pub jump: f32,
+    /// Pixels that may be mixed.
+    pub at_edge: &'a [bool],
+    /// 8-bit sRGB, and the light of each code.
+    pub rgb: &'a [u8],
+    pub light: &'a [f32; 256],
+}
+
+impl View<'_> {
+    /// The colour of a pixel in linear light.
+    #[inline(always)]
+    pub fn light(&self, at: usize) -> [f32; 3] {
+        [0, 1, 2].map(|p| self.light[usize::from(self.rgb[3 * at + p])])
+    }
+}
+
+/// The clusters near edges, made when they are asked for.
+#[derive(Debug, Default)]
+pub struct Clusters {
+    across: usize,
+    down: usize,
+    /// Per cell, the place of its clusters plus one; 0 where none were made yet.
+    place: Vec<u32>,
+    clusters: Vec<[Cluster; 2]>,
+    /// Per cell, the place of its last answer plus one: pixels side by side ask for the same.
+    answered: Vec<u32>,
+    answers: Vec<Answer>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Answer {
+    near: f32,
+    far: f32,
+    contrast: Option<Contrast>,
+}
+
+impl Clusters {
+    /// Forgets the frame before.
+    pub(super) fn clear(&mut self, (width, height): (usize, usize)) {
+        (self.across, self.down) = (width.div_ceil(CELL_PX), height.div_ceil(CELL_PX));
+        for places in [&mut self.place, &mut self.answered] {
+            places.clear();
+            places.resize(self.across * self.down, 0);
+        }
+        self.clusters.clear();
+        self.answers.clear();
+    }
+
+    /// The place of the contrast between the near and the far surface around the cell of an edge pixel, for [`Self::at`];
+    /// `None` where one has no pixels, not even further away.
+    pub(super) fn around(&mut self, view: &View, edge: &EdgePixel) -> Option<u32> {
+        let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
+        let cell = row * self.across + column;
+        let same = |answer: &&Answer| {
+            (answer.near - edge.near).abs() <= view.jump && (answer.far - edge.far).abs() <= view.jump
+        };
+        let last = self.answered[cell].checked_sub(1);
+        if let Some(answer) = last.map(|last| &self.answers[last as usize]).filter(same) {
+            return last.filter(|_| answer.contrast.is_some());
+        }
+        let colors = REACHES_CELLS.into_iter().find_map(|reach| self.within(view, reach, edge));
+        let place = self.answers.len() as u32;
+        self.answers.push(Answer { near: edge.near, far: edge.far, contrast: colors.map(Contrast::of) });
+        self.answered[cell] = place + 1;
+        colors.map(|_| place)
+    }
+
+    /// A contrast that was found.
+    pub(super) fn at(&self, place: u32) -> &Contrast {
+        self.answers[place as usize].contrast.as_ref().expect("its place was given, so there is one")
+    }
+
+    /// The same of so many cells in every direction.
+    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<[Color; 2]> {
+        // A surface's inverse depth may change on the way, but by less than would make it the other one.
+        let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
+        let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
+        let [x, y] = [column, row].map(|cell| (cell * CELL_PX) as f32 + 0.5 * (CELL_PX - 1) as f32);
+        let mut sums = [Cluster::default(); 2];
+        for row in row.saturating_sub(reach)..(row + reach + 1).min(self.down) {
+            for column in column.saturating_sub(reach)..(column + reach + 1).min(self.across) {
+                for cluster in self.of_cell(view, (column, row)) {
+                    let is_near = edge.is_near(cluster.inverse);
+                    let surface = if is_near { edge.near } else { edge.far };
+                    if cluster.weight <= 0.0 || (cluster.inverse - surface).abs() > tolerance {
+                        continue;
+                    }
+                    let square = (cluster.x - x) * (cluster.x - x) + (cluster.y - y) * (cluster.y - y);
+                    let falloff = 1.0 / (1.0 + square / (HALF_PX * HALF_PX));
+                    let weight = falloff * falloff * falloff;
+                    let sum = &mut sums[usize::from(!is_near)];
+                    sum.weight += weight * cluster.weight;
+                    for (sum, light) in sum.light.iter_mut().zip(cluster.light) {
+                        *sum += weight * light;
+                    }
+                    for (sum, square) in sum.squares.iter_mut().zip(cluster.squares) {
+                        *sum += weight * square;
+                    }
+                }
+            }
+        }
+        sums.iter().all(|sum| sum.weight > 0.0).then(|| sums.map(|sum| sum.color()))
+    }
+
+    fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> [Cluster; 2] {
+        let place = &mut self.place[row * self.across + column];
+        if *place == 0 {
+            self.clusters.push(split(view, column, row));
+            *place = self.clusters.len() as u32;
+        }
+        self.clusters[*place as usize - 1]
+    }
+}
+
+impl Cluster {
+    fn color(&self) -> Color {
+        let mean = self.light.map(|light| light / self.weight);
+        let (squares, of_mean) = (self.squares, outer(mean));
+        Color { mean, covariance: std::array::from_fn(|k| squares[k] / self.weight - of_mean[k]) }
+    }
+}
+
+/// The clusters of a cell: one where inverse depths differ by no more than `jump`, or else those of its nearest and of its
+/// farthest surface.
+fn split(view: &View, column: usize, row: usize) -> [Cluster; 2] {
+    let View { size: (width, height), inverse, jump, at_edge, .. } = *view;
+    let (xs, ys) =
+        (column * CELL_PX..((column + 1) * CELL_PX).min(width), row * CELL_PX..((row + 1) * CELL_PX).min(height));
+    let [mut pure, mut all] = [(0.0f32, f32::INFINITY); 2];
+    for y in ys.clone() {
+        for at in y * width + xs.start..y * width + xs.end {
+            let value = inverse[at];
+            all = (all.0.max(value), all.1.min(value));
+            if !at_edge[at] {
+                pure = (pure.0.max(value), pure.1.min(value));
+            }
+        }
+    }
+    let (high, low) = if pure.0 >= pure.1 { pure } else { all };
+    let one = high - low <= jump;
+    let tolerance = if one { 2.0 * jump } else { jump };
+    let mut clusters = [Cluster::default(); 2];
+    for y in ys {
+        // Every other pixel, as on a chessboard, tells enough.
+        for x in (xs.start + y % 2..xs.end).step_by(2) {
+            let at = y * width + x;
+            let value = inverse[at];
+            let far = usize::from(!one && value <= 0.5 * (high + low));
+            if (value - [high, low][far]).abs() > tolerance {
+                continue;
+            }
+            let cluster = &mut clusters[far];
+            let weight = if at_edge[at] { AT_EDGE_WEIGHT } else { 1.0 };
+            let light = view.light(at);
+            cluster.weight += weight;
+            cluster.x += weight * x as f32;
+            cluster.y += weight * y as f32;
+            cluster.inverse += weight * value;
+            for (sum, light) in cluster.light.iter_mut().zip(light) {
+                *sum += weight * light;
+            }
+            for (sum, square) in cluster.squares.iter_mut().zip(outer(light)) {
+                *sum += weight * square;
+            }
+        }
+    }
+    for cluster in clusters.iter_mut().filter(|cluster| cluster.weight > 0.0) {
+        let scale = 1.0 / cluster.weight;
+        (cluster.x, cluster.y, cluster.inverse) = (scale * cluster.x, scale * cluster.y, scale * cluster.inverse);
+    }
+    clusters
+}

@@ -1,0 +1,234 @@
+//! Matting along depth edges: which pixels show two surfaces at once, how much of each, and in which colours.
+//!
+//! A depth map has one sample a pixel, a camera's pixel is an area: on an outline it is a share of what is near and the
+//! rest of what is far. Both surfaces have pure pixels close by, whose colours say how likely the mixed pixel's is for
+//! each share (Bayesian matting, after Chuang et al. 2001), and the map says which shares are likely before that.
+//! Everything is local, from one frame, and in time that grows with the length of the outlines.
+
+mod clusters;
+mod share;
+
+use std::ops::Range;
+
+use crate::color::srgb_to_linear;
+use crate::frame::{ColorImage, DepthMap, MixedPixel};
+
+use clusters::{Clusters, View};
+use share::{Evidence, Labels, Prior};
+
+/// Shares beyond this are those of a pure pixel.
+const NEARLY_PURE: f32 = 0.98;
+
+/// Neighbours of a pixel with this share are looked at, too, where the map has no edge.
+const TRACED_FROM: f32 = 0.15;
+/// What the map says of them: nothing.
+const TRACED: Labels = Labels { is_near: false, borders: false, is_thin: false };
+/// So many pixels away from an edge, at most.
+const MOST_STEPS: usize = 16;
+
+/// Estimates mattes; owns the memory for it.
+#[derive(Debug)]
+pub struct Matting {
+    light: Box<[f32; 256]>,
+    /// Inverse depth of all pixels, in 1/m; 0 where it is unknown.
+    inverse: Vec<f32>,
+    /// Whether pixels differ in depth from one of their eight neighbours: the others are pure.
+    at_edge: Vec<bool>,
+    /// Highest and lowest inverse depth of three rows, with a column more on either side.
+    ranges: [Vec<f32>; 2],
+    edges: Vec<EdgePixel>,
+    clusters: Clusters,
+    evidence: Vec<Evidence>,
+}
+
+/// A pixel beside a jump of depth.
+#[derive(Clone, Copy, Debug)]
+struct EdgePixel {
+    x: u32,
+    y: u32,
+    /// Inverse depth of the nearest and the farthest of the pixel and its neighbours, in 1/m.
+    near: f32,
+    far: f32,
+}
+
+impl EdgePixel {
+    /// Whether an inverse depth is closer to that of the near surface.
+    fn is_near(&self, inverse: f32) -> bool {
+        inverse > 0.5 * (self.near + self.far)
+    }
+}
+
+impl Default for Matting {
+    fn default() -> Self {
+        Self {
+            light: Box::new(std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0))),
+            inverse: Vec::new(),
+            at_edge: Vec::new(),
+            ranges: [Vec::new(), Vec::new()],
+            edges: Vec::new(),
+            clusters: Clusters::default(),
+            evidence: Vec::new(),
+        }
+    }
+}
+
+impl Matting {
+    /// Finds the mixed pixels of a map as large as its picture, beside jumps of inverse depth of more than `jump`, in 1/m.
+    /// Of another size, or where `jump` is not finite, it has none.
+    pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, jump: f32) {
+        map.matte.pixels.clear();
+        if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
+            return;
+        }
+        pulp::Arch::new().dispatch(Survey { matting: self, map, jump });
+        let size = (map.width as usize, map.height as usize);
+        self.clusters.clear(size);
+        self.evidence.clear();
+        let Self { light, inverse, at_edge, edges, clusters, evidence, .. } = self;
+        let view = View { size, inverse, jump, at_edge, rgb: &color.rgb, light };
+        evidence.extend(edges.iter().filter_map(|edge| {
+            let place = clusters.around(&view, edge)?;
+            let at = edge.y as usize * size.0 + edge.x as usize;
+            Some(Evidence::new(edge, labels(&view, edge, at), view.light(at), (place, clusters.at(place))))
+        }));
+        let prior = Prior::of(&self.evidence);
+        let on_edges = self.evidence.len();
+        self.trace(size, jump, &prior, &color.rgb);
+        let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
+        let view = View { size, inverse, jump, at_edge, rgb: &color.rgb, light };
+        map.matte.pixels.extend(evidence.iter().filter_map(|evidence| {
+            let share = prior.share(evidence);
+            let pure = if evidence.labels.is_near { share > NEARLY_PURE } else { share < 1.0 - NEARLY_PURE };
+            let at = evidence.edge.y as usize * size.0 + evidence.edge.x as usize;
+            (!pure).then(|| MixedPixel {
+                at: at as u32,
+                near_m: evidence.edge.near.recip(),
+                far_m: evidence.edge.far.recip(),
+                share,
+                difference: clusters.at(evidence.contrast).difference(view.light(at), share),
+            })
+        }));
+        if self.evidence.len() > on_edges {
+            map.matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
+        }
+    }
+
+    /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near
+    /// though the map has none there, to neighbours that do so, too (hysteresis, as edges are traced).
+    fn trace(&mut self, size: (usize, usize), jump: f32, prior: &Prior, rgb: &[u8]) {
+        let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
+        let (mut from, mut steps) = (0, 0);
+        while from < evidence.len() && steps < MOST_STEPS {
+            let end = evidence.len();
+            for k in from..end {
+                let Evidence { edge, labels, .. } = evidence[k];
+                if labels.is_near || prior.share(&evidence[k]) < TRACED_FROM {
+                    continue;
+                }
+                let (xs, ys) = neighbours(&edge, size);
+                for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
+                    let (at, next) = (y * size.0 + x, EdgePixel { x: x as u32, y: y as u32, ..edge });
+                    let is_far = (inverse[at] - edge.far).abs() <= jump;
+                    if !is_far || std::mem::replace(&mut at_edge[at], true) {
+                        continue;
+                    }
+                    let view = View { size, inverse, jump, at_edge, rgb, light };
+                    if let Some(place) = clusters.around(&view, &next) {
+                        let contrast = (place, clusters.at(place));
+                        evidence.push(Evidence::new(&next, TRACED, view.light(at), contrast));
+                    }
+                }
+            }
+            (from, steps) = (end, steps + 1);
+        }
+    }
+}
+
+/// What the map says of the edge pixel `at` and its neighbours.
+fn labels(view: &View, edge: &EdgePixel, at: usize) -> Labels {
+    let is_near = edge.is_near(view.inverse[at]);
+    let (mut borders, mut alike) = (false, 0);
+    let (xs, ys) = neighbours(edge, view.size);
+    for y in ys {
+        for x in xs.clone() {
+            let is_alike = edge.is_near(view.inverse[y * view.size.0 + x]) == is_near;
+            alike += u32::from(is_alike);
+            borders |= !is_alike && (x == edge.x as usize || y == edge.y as usize);
+        }
+    }
+    // Itself, and two neighbours in a row.
+    Labels { is_near, borders, is_thin: is_near && alike <= 3 }
+}
+
+/// The columns and rows of a pixel and those around it, as far as the picture has them.
+fn neighbours(edge: &EdgePixel, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
+    let (x, y) = (edge.x as usize, edge.y as usize);
+    (x.saturating_sub(1)..(x + 2).min(width), y.saturating_sub(1)..(y + 2).min(height))
+}
+
+/// Finds the pixels beside jumps of depth.
+struct Survey<'a> {
+    matting: &'a mut Matting,
+    map: &'a DepthMap,
+    jump: f32,
+}
+
+impl pulp::WithSimd for Survey<'_> {
+    type Output = ();
+    // No vectors by hand: the call lets the compiler make them of these loops, as wide as the processor has them.
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { matting: Matting { inverse, at_edge, ranges: [high, low], edges, .. }, map, jump } = self;
+        let (width, height) = (map.width as usize, map.height as usize);
+        inverse.resize(width * height, 0.0);
+        for (inverse, &metres) in inverse.iter_mut().zip(&map.metres) {
+            let known = metres > 0.0 && metres < f32::INFINITY;
+            *inverse = if known { 1.0 / metres } else { 0.0 };
+        }
+        at_edge.resize(width * height, false);
+        edges.clear();
+        for range in [&mut *high, &mut *low] {
+            range.resize(width + 2, 0.0);
+        }
+        for y in 0..height {
+            let row = |y: usize| &inverse[y * width..][..width];
+            let (above, here, below) = (row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1)));
+            let (most, least) = (&mut high[1..=width], &mut low[1..=width]);
+            for x in 0..width {
+                most[x] = larger(larger(above[x], here[x]), below[x]);
+                least[x] = smaller(smaller(above[x], here[x]), below[x]);
+            }
+            for range in [&mut *high, &mut *low] {
+                (range[0], range[width + 1]) = (range[1], range[width]);
+            }
+            let found = &mut at_edge[y * width..][..width];
+            let [left, middle, right] = [0, 1, 2].map(|by| (&high[by..][..width], &low[by..][..width]));
+            let around = |x: usize| {
+                let near = larger(larger(left.0[x], middle.0[x]), right.0[x]);
+                [near, smaller(smaller(left.1[x], middle.1[x]), right.1[x])]
+            };
+            for (x, found) in found.iter_mut().enumerate() {
+                let [near, far] = around(x);
+                *found = near - far > jump;
+            }
+            if !found.contains(&true) {
+                continue;
+            }
+            for (x, _) in found.iter().enumerate().filter(|(_, found)| **found) {
+                let [near, far] = around(x);
+                edges.push(EdgePixel { x: x as u32, y: y as u32, near, far });
+            }
+        }
+    }
+}
+
+/// The larger of two numbers: one instruction, unlike `f32::max`, which looks for what is no number.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}

@@ -1,0 +1,215 @@
+//! The share of a mixed pixel: what its colour says, and what was likely before that.
+
+use super::EdgePixel;
+use super::clusters::{Color, Symmetric};
+
+/// Shares are tried in steps of an eighth.
+const STEPS: usize = 9;
+const STEP: f32 = 1.0 / (STEPS - 1) as f32;
+/// Covariances of few pixels are too narrow: so much of them goes evenly into all directions.
+const SHRINKAGE: f32 = 0.01;
+/// Variance of what quantisation alone does, in linear light.
+const QUANTISATION: f32 = 5e-6;
+/// Surfaces have spots that no pixel around is like: so likely a pure pixel is one, times what evens out densities.
+const OUTLIER: f32 = 0.02;
+/// Of two pixels in a row at an edge, one borders the other surface only at a corner: it is mixed so much more rarely.
+const AT_CORNER: f32 = 0.3;
+
+/// How the colours of two surfaces differ, for how much they vary.
+#[derive(Clone, Copy, Debug)]
+pub struct Contrast {
+    /// Of the near and of the far surface.
+    surfaces: [Color; 2],
+    /// Fisher's linear discriminant: a colour's product with it, less `offset`, is the share.
+    direction: [f32; 3],
+    offset: f32,
+    /// The reciprocal variance of that share.
+    precision: f32,
+}
+
+impl Contrast {
+    /// Of the colours of the near and of the far surface.
+    pub(super) fn of(surfaces: [Color; 2]) -> Self {
+        let [near, far] = &surfaces;
+        let difference: [f32; 3] = std::array::from_fn(|p| near.mean[p] - far.mean[p]);
+        let mut spread: Symmetric = std::array::from_fn(|k| near.covariance[k] + far.covariance[k]);
+        let trace = spread[0] + spread[3] + spread[5];
+        spread = spread.map(|value| (1.0 - SHRINKAGE) * value);
+        for k in [0, 3, 5] {
+            spread[k] += SHRINKAGE / 3.0 * trace + QUANTISATION;
+        }
+        let direction = solve(&spread, difference);
+        let contrast = dot(direction, difference).max(1e-9);
+        // Both surfaces' variances are in it, of which a mixed pixel has half each. No finer than the steps.
+        let precision = (2.0 * contrast).min(1000.0);
+        let direction = direction.map(|value| value / contrast);
+        Self { surfaces, direction, offset: dot(direction, far.mean), precision }
+    }
+
+    /// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
+    /// ones of those that add up to the pixel's `own` (Chuang et al. 2001, equation 9, with the pixel as exact). None is
+    /// darker than black, or brighter than white.
+    pub(super) fn difference(&self, own: [f32; 3], share: f32) -> [f32; 3] {
+        let [near, far] = &self.surfaces;
+        let rest = 1.0 - share;
+        let mut spread: Symmetric =
+            std::array::from_fn(|k| share * share * near.covariance[k] + rest * rest * far.covariance[k]);
+        let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
+        for k in [0, 3, 5] {
+            spread[k] += floor;
+        }
+        let residual = std::array::from_fn(|p| own[p] - share * near.mean[p] - rest * far.mean[p]);
+        let step = solve(&spread, residual);
+        let (of_near, of_far) = (times(&near.covariance, step), times(&far.covariance, step));
+        let (up, down) = (rest.max(1e-3), share.max(1e-3));
+        std::array::from_fn(|p| {
+            let difference = near.mean[p] + share * of_near[p] - far.mean[p] - rest * of_far[p];
+            let most = ((1.0 - own[p]) / up).min(own[p] / down);
+            let least = -(own[p] / up).min((1.0 - own[p]) / down);
+            difference.clamp(least.min(0.0), most.max(0.0))
+        })
+    }
+}
+
+/// What the depth map says of a pixel at an edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Labels {
+    /// Whether it is of the near surface.
+    pub is_near: bool,
+    /// Whether a side of the pixel, and not only a corner, borders the other surface.
+    pub borders: bool,
+    /// Whether it is part of something so thin that no pixel need be covered by half.
+    pub is_thin: bool,
+}
+
+/// What is known of a pixel at an edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence {
+    pub edge: EdgePixel,
+    pub labels: Labels,
+    /// The place of the contrast that it was compared with.
+    pub contrast: u32,
+    /// Likelihood of the pixel's colour if it is pure, as the map says.
+    pure: f32,
+    /// The mean over shares of the map's side of one half (of all where it is thin), and of the same times the share.
+    half: [f32; 2],
+    /// The means over all shares.
+    any: [f32; 2],
+}
+
+impl Evidence {
+    /// Compares a pixel's colour `own` with those of both surfaces.
+    pub(super) fn new(edge: &EdgePixel, labels: Labels, own: [f32; 3], (place, contrast): (u32, &Contrast)) -> Self {
+        let Labels { is_near, is_thin, .. } = labels;
+        let projected = (dot(contrast.direction, own) - contrast.offset).clamp(-0.3, 1.3);
+        let likelihoods = gaussian(contrast.precision, projected);
+        let (mut half, mut any) = ([0.0; 2], [0.0; 2]);
+        let middle = STEPS / 2;
+        for (step, &value) in likelihoods.iter().enumerate() {
+            let weighed = [value, value * STEP * step as f32];
+            let on_side = if is_near { step >= middle } else { step <= middle };
+            for k in 0..2 {
+                any[k] += weighed[k] / STEPS as f32;
+                half[k] += if on_side { weighed[k] / (middle + 1) as f32 } else { 0.0 };
+            }
+        }
+        if is_thin {
+            half = any;
+        }
+        let pure = likelihoods[if is_near { STEPS - 1 } else { 0 }].max(OUTLIER / contrast.precision.sqrt());
+        Self { edge: *edge, labels, contrast: place, pure, half, any }
+    }
+}
+
+/// How likely pixels at edges are mixed at all in this frame, and how often the depth map errs: from a hard mask neither is,
+/// and from a camera half of them are. Found by expectation maximisation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    mixed: f32,
+    wrong: f32,
+}
+
+impl Prior {
+    /// What makes all that is known of a frame's pixels most likely.
+    pub fn of(evidence: &[Evidence]) -> Self {
+        const FLOOR: f32 = 0.002;
+        let mut prior = Self { mixed: 0.3, wrong: 0.01 };
+        for _ in 0..4 {
+            let (mut mixed, mut bordering, mut wrong, mut all) = (0.0, 0.0f32, 0.0, 0.0f32);
+            for one in evidence {
+                let [pure, half, any] = prior.weights(one);
+                let total = pure * one.pure + half * one.half[0] + any * one.any[0];
+                if total > f32::MIN_POSITIVE {
+                    wrong += any * one.any[0] / total;
+                    all += 1.0;
+                    if one.labels.borders {
+                        mixed += half * one.half[0] / total;
+                        bordering += 1.0;
+                    }
+                }
+            }
+            prior.mixed = (mixed / bordering.max(1.0)).clamp(FLOOR, 0.9);
+            prior.wrong = (wrong / all.max(1.0)).clamp(FLOOR, 0.3);
+        }
+        prior
+    }
+
+    /// How likely a pixel is pure, mixed and mostly what the map says, or anything.
+    fn weights(&self, evidence: &Evidence) -> [f32; 3] {
+        let mixed = if evidence.labels.borders { self.mixed } else { AT_CORNER * self.mixed };
+        [(1.0 - mixed - self.wrong).max(0.0), mixed, self.wrong]
+    }
+
+    /// The expected share of the near surface, 0 to 1.
+    pub fn share(&self, evidence: &Evidence) -> f32 {
+        let is_near = f32::from(u8::from(evidence.labels.is_near));
+        let [pure, half, any] = self.weights(evidence);
+        let total = pure * evidence.pure + half * evidence.half[0] + any * evidence.any[0];
+        if total > f32::MIN_POSITIVE {
+            (pure * evidence.pure * is_near + half * evidence.half[1] + any * evidence.any[1]) / total
+        } else {
+            is_near
+        }
+    }
+}
+
+/// exp(-precision (share - mean)^2 / 2) at all shares that are tried. From one to the next it changes by a factor that itself
+/// changes by a constant factor: four exponentials are enough.
+fn gaussian(precision: f32, mean: f32) -> [f32; STEPS] {
+    // As good as nothing. Smaller numbers soon have less precision, and processors take a hundred times as long for them.
+    const LEAST: f32 = 1e-18;
+    let peak = (mean / STEP + 0.5).clamp(0.0, (STEPS - 1) as f32).floor();
+    let off = peak * STEP - mean;
+    let curve = (-precision * STEP * STEP).exp();
+    let slope = |direction: f32| (-precision * STEP * (direction * off + 0.5 * STEP)).exp();
+    let (mut values, peak) = ([0.0; STEPS], peak as usize);
+    values[peak] = (-0.5 * precision * off * off).exp().max(LEAST);
+    let (mut up, mut down) = (slope(1.0), slope(-1.0));
+    for step in peak + 1..STEPS {
+        values[step] = (values[step - 1] * up).max(LEAST);
+        up = (up * curve).max(LEAST);
+    }
+    for step in (0..peak).rev() {
+        values[step] = (values[step + 1] * down).max(LEAST);
+        down = (down * curve).max(LEAST);
+    }
+    values
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `matrix` times `vector`.
+fn times(&[xx, xy, xz, yy, yz, zz]: &Symmetric, vector: [f32; 3]) -> [f32; 3] {
+    [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| dot(row, vector))
+}
+
+/// The solution x of `matrix` x = `right`, by the adjugate.
+fn solve(&[xx, xy, xz, yy, yz, zz]: &Symmetric, right: [f32; 3]) -> [f32; 3] {
+    let (a, b, c) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
+    let (d, e, f) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
+    let determinant = xx * a + xy * b + xz * c;
+    let scale = if determinant > 0.0 { 1.0 / determinant } else { 0.0 };
+    [[a, b, c], [b, d, e], [c, e, f]].map(|row| scale * dot(row, right))
+}
