@@ -13,6 +13,7 @@ use bokehcam::bokeh::{Bokeh, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
 use bokehcam::depth::focus::FocusRule;
+use bokehcam::depth::matting::{self, Matting};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::look::{CocRule, Effect, Look, Patch, Strength};
@@ -151,13 +152,17 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
         CocRule::Fixed(field) => field,
         CocRule::Depth { lens, range_m, max_coc_px, .. } => lens.field((focus_m, range_m), size.0, max_coc_px),
     };
+    let mut map = map.clone();
+    if let CocField::Depth(lens) = &field {
+        Matting::default().find(&mut map, color, lens.inverse_depth_of_px(matting::FROM_PX));
+    }
     // As a live run does it: one executor for all levels.
     let settings = look.settings(size, true).unwrap();
     let mut cpu = CpuBokeh::new(Plan::new(&settings, size.0, size.1), Some(2));
     cpu.submit(Job {
         ticket: 1,
         color: Pooled::detached(color.clone()),
-        depth: Some(Pooled::detached(map.clone())),
+        depth: Some(Pooled::detached(map)),
         coc: field,
         quality,
         place: Place::Memory,

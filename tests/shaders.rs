@@ -37,7 +37,7 @@ fn every_file_is_a_pass_or_shared_and_short() {
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let known = ["common", "work", "filter", "level", "range", "stereo_common", "stereo_path"]
+        let known = ["common", "work", "filter", "level", "mixed", "range", "stereo_common", "stereo_path"]
             .contains(&name.as_str())
             || ALL.iter().chain(&stereo::ALL).any(|shader| shader.name == name)
             || name == "present";

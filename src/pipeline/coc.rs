@@ -2,7 +2,7 @@
 
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
-use crate::depth::matting::Matting;
+use crate::depth::matting::{self, Matting};
 use crate::depth::refine::Refiner;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::CocRule;
@@ -25,9 +25,6 @@ impl Finish {
         if refine { Self::Refine } else { Self::Fill }
     }
 }
-
-/// Jumps of CoC from here on are outlines whose pixels are taken apart, in pixels.
-const MIXED_FROM_PX: f32 = 0.5;
 
 /// A [`CocRule`] at work, from frame to frame.
 pub struct CocMaker {
@@ -111,10 +108,15 @@ impl CocMaker {
             }
         }
         let field = lens.field((focus_m, range_m), color.width, max_coc_px);
-        if let CocField::Depth(lens) = &field {
-            self.matting.find(map, color, lens.inverse_depth_of_px(MIXED_FROM_PX));
-        }
+        self.find_matte(map, color, &field);
         field
+    }
+
+    /// Gives a map the matte of a picture. A map that several frames share needs that of each.
+    pub fn find_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
+        if let CocField::Depth(lens) = field {
+            self.matting.find(map, color, lens.inverse_depth_of_px(matting::FROM_PX));
+        }
     }
 }
 

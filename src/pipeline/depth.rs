@@ -136,6 +136,7 @@ impl Stage<'_> {
         if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
             let mut map = brought.unwrap_or_else(|| self.depths.take());
             rate.copy_held(&mut map);
+            coc.find_matte(&mut map, color, &field);
             *self.held += 1;
             return Ok((map, field));
         }

@@ -59,7 +59,8 @@ impl CpuBokeh {
     }
 
     /// A frame as the bins take it, per pixel: linear r, g, b with highlights expanded, and CoC. With `filled`, which
-    /// has to be the last frame, what near objects hide is filled in, as for the bins behind them.
+    /// has to be the last frame, what near objects hide is filled in, as for the bins behind them. Two surfaces of a pixel
+    /// are put together again, and the CoC is the nearer one's.
     pub fn scene(&self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField, filled: bool) -> Vec<[f32; 4]> {
         let (width, height) = (color.width as usize, color.height as usize);
         let source = Source { color, depth, coc, matte: self.plan.matte(depth, coc), expansion: self.plan.expansion };
@@ -73,8 +74,7 @@ impl CpuBokeh {
                 if let Some(behind) = &behind {
                     behind.put(x0 as isize, y, width, &mut surfaces);
                 }
-                let planes = &surfaces.back.0;
-                scene.extend((0..SPAN.min(width - x0)).map(|x| planes.each_ref().map(|plane| plane[x])));
+                scene.extend((0..SPAN.min(width - x0)).map(|x| surfaces.pixel(x)));
             }
         }
         scene

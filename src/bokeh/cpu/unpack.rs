@@ -72,6 +72,16 @@ impl<const W: usize> Surfaces<W> {
     pub fn new() -> Self {
         Self { back: Line([[0.0; W]; 4]), front: Line([[0.0; W]; 4]), share: Line([0.0; W]), mixed: false }
     }
+
+    /// A pixel with both its surfaces: linear r, g, b, and the CoC of the nearer one.
+    pub fn pixel(&self, x: usize) -> [f32; 4] {
+        let back = self.back.0.each_ref().map(|plane| plane[x]);
+        if !self.mixed || self.share.0[x] <= 0.0 {
+            return back;
+        }
+        let (front, share) = (self.front.0.each_ref().map(|plane| plane[x]), self.share.0[x]);
+        std::array::from_fn(|p| if p < 3 { back[p] + share * (front[p] - back[p]) } else { front[p] })
+    }
 }
 
 impl Source<'_> {

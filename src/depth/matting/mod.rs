@@ -16,6 +16,8 @@ use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use clusters::{Clusters, View};
 use share::{Evidence, Labels, Prior};
 
+/// Where the CoC jumps by so many pixels or more, pixels are worth taking apart.
+pub const FROM_PX: f32 = 0.5;
 /// Shares beyond this are those of a pure pixel.
 const NEARLY_PURE: f32 = 0.98;
 
