@@ -77,17 +77,10 @@ fn accumulate_columns<V: Simd>(simd: V, cells: &mut CellSums, x: usize, sums: [V
         let sum = simd.add_f32s(load::<V>(&cells.0[p], x), sums[p]);
         store::<V>(&mut cells.0[p], x, sum);
     }
-    if let Some(own) = own {
-        accumulate_range(simd, cells, x, sums[0], own);
-    }
-}
-
-/// Adds colours of a coverage to their lowest and highest.
-#[inline(always)]
-fn accumulate_range<V: Simd>(simd: V, cells: &mut CellSums, x: usize, coverage: V::f32s, own: [V::f32s; 3]) {
+    let Some(own) = own else { return };
     let cells = &mut cells.0;
     // Without coverage there is no colour: an addition puts it out of range.
-    let counts = simd.greater_than_f32s(coverage, simd.splat_f32s(COVERAGE_FLOOR));
+    let counts = simd.greater_than_f32s(sums[0], simd.splat_f32s(COVERAGE_FLOOR));
     let beyond = simd.select_f32s(counts, simd.splat_f32s(0.0), simd.splat_f32s(NO_COLOR));
     for p in 0..3 {
         let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own[p], beyond));
@@ -220,19 +213,19 @@ impl BinRows<'_> {
                     for p in 0..4 {
                         store::<V>(out, p * STRIP + x % STRIP, values[p]);
                     }
-                    // At full scale a pixel is its own mean: its colour counts whatever its share.
-                    let mut own = None;
-                    if self.ranged {
-                        let [r, g, b, _] = &surfaces.back.0;
-                        let at = MARGIN + x;
-                        own = Some([load::<V>(r, at), load::<V>(g, at), load::<V>(b, at)]);
-                        if surfaces.mixed {
-                            let [r, g, b, _] = &surfaces.front.0;
-                            let two = [load::<V>(r, at), load::<V>(g, at), load::<V>(b, at)];
-                            let share = load::<V>(&surfaces.share.0, at);
-                            accumulate_range(simd, &mut sums.cells, x, simd.mul_f32s(share, values[3]), two);
-                        }
-                    }
+                    // At full scale a pixel is its own mean: its colour counts whatever its share. Of two surfaces that is
+                    // the colour of what the bin takes of both.
+                    let own = self.ranged.then(|| {
+                        let inverse = surfaces.mixed.then(|| {
+                            let floor = simd.splat_f32s(COVERAGE_FLOOR);
+                            simd.div_f32s(simd.splat_f32s(1.0), simd.max_f32s(values[3], floor))
+                        });
+                        let of_plane = |p: usize| match inverse {
+                            Some(inverse) => simd.mul_f32s(values[p], inverse),
+                            None => load::<V>(&surfaces.back.0[p], MARGIN + x),
+                        };
+                        [of_plane(0), of_plane(1), of_plane(2)]
+                    });
                     accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
                 }
                 let blocks = self.blocks();
