@@ -74,13 +74,15 @@ pub struct Clusters {
     /// Per cell, the place of its last answer plus one: pixels side by side ask for the same.
     answered: Vec<u32>,
     answers: Vec<Answer>,
+    contrasts: Vec<Contrast>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Answer {
     near: f32,
     far: f32,
-    contrast: Option<Contrast>,
+    /// The place of the contrast.
+    contrast: Option<u32>,
 }
 
 impl Clusters {
@@ -93,6 +95,7 @@ impl Clusters {
         }
         self.clusters.clear();
         self.answers.clear();
+        self.contrasts.clear();
     }
 
     /// The place of the contrast between the near and the far surface around the cell of an edge pixel, for [`Self::at`];
@@ -105,18 +108,21 @@ impl Clusters {
         };
         let last = self.answered[cell].checked_sub(1);
         if let Some(answer) = last.map(|last| &self.answers[last as usize]).filter(same) {
-            return last.filter(|_| answer.contrast.is_some());
+            return answer.contrast;
         }
         let colors = REACHES_CELLS.into_iter().find_map(|reach| self.within(view, reach, edge));
-        let place = self.answers.len() as u32;
-        self.answers.push(Answer { near: edge.near, far: edge.far, contrast: colors.map(Contrast::of) });
-        self.answered[cell] = place + 1;
-        colors.map(|_| place)
+        let contrast = colors.map(|colors| {
+            self.contrasts.push(Contrast::of(colors));
+            self.contrasts.len() as u32 - 1
+        });
+        self.answers.push(Answer { near: edge.near, far: edge.far, contrast });
+        self.answered[cell] = self.answers.len() as u32;
+        contrast
     }
 
     /// A contrast that was found.
     pub(super) fn at(&self, place: u32) -> &Contrast {
-        self.answers[place as usize].contrast.as_ref().expect("its place was given, so there is one")
+        &self.contrasts[place as usize]
     }
 
     /// The same of so many cells in every direction.

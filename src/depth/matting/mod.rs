@@ -184,8 +184,7 @@ impl pulp::WithSimd for Survey<'_> {
         let (width, height) = (map.width as usize, map.height as usize);
         inverse.resize(width * height, 0.0);
         for (inverse, &metres) in inverse.iter_mut().zip(&map.metres) {
-            let known = metres > 0.0 && metres < f32::INFINITY;
-            *inverse = if known { 1.0 / metres } else { 0.0 };
+            *inverse = if DepthMap::is_known(metres) { 1.0 / metres } else { 0.0 };
         }
         at_edge.resize(width * height, false);
         edges.clear();
