@@ -1,5 +1,5 @@
 // Pass bin: a bin's share of each pixel, premultiplied and averaged down to the bin's scale, and the coarse grid over
-// it. Reads the scene; writes premultiplied r, g, b and coverage where there is any, and per cell of CELL x CELL bin pixels
+// it. Reads the scene as the layer of the bins sees it; writes premultiplied r, g, b and coverage where there is any, and per cell of CELL x CELL bin pixels
 // two vectors: coverage, coverage times |CoC|, lowest red and green; lowest blue, highest red, green and blue.
 
 @group(0) @binding(0) var<uniform> work: Work;
@@ -95,9 +95,11 @@ fn averaged(k: u32, pixel: vec2<u32>) -> array<f32, 5> {
             let weight = tent(i, scale) * tent(j, scale);
             if is_mixed(value) {
                 let place = first_mixed(at);
-                let share = mixed[place].share;
+                let near = near_surface(place);
+                // Where the nearer surface lies in front of the layer, behind it is the farther one.
+                let share = mixed[place].share * step_at(work.unhidden, near.w);
                 sum = plus(sum, taken(k, surface, weight * (1.0 - share)));
-                sum = plus(sum, taken(k, near_surface(place), weight * share));
+                sum = plus(sum, taken(k, near, weight * share));
             } else {
                 sum = plus(sum, taken(k, surface, weight));
             }

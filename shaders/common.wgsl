@@ -38,9 +38,21 @@ struct Frame {
     ramp: vec2<f32>,            // slope, max
     expansion: f32,             // 0: highlights stay as they are
     steps_per_px: f32,          // nodes of the bank per pixel of radius, below OCTAVES_FROM_PX
-    unhidden: vec2<f32>,        // what counts as lying behind the near bins: CoC of the step, slope
-    nearest_px: f32,            // no filled CoC is below this
     mixed: u32,                 // pixels that show two surfaces
+    unused_a: u32,
+    unused_b: u32,
+    unused_c: u32,
+}
+
+// What a dispatch does: some bins, of one layer where it goes over the picture.
+struct Work {
+    first: u32,                 // bin
+    count: u32,                 // of bins
+    group: u32,                 // of four terms: which
+    terms: u32,                 // how many of them are there
+    last: u32,                  // 1: the sum is complete
+    nearest_px: f32,            // of the layer: no filled CoC is below this
+    unhidden: vec2<f32>,        // of the layer: what counts as not lying in front of it: CoC of the step, slope
 }
 
 // One bin. Offsets are in elements of the buffers that all bins share.

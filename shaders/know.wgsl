@@ -1,10 +1,12 @@
-// Pass know: the finest level of the pyramid: colour and CoC as far as neither the pixel nor a neighbour is hidden.
+// Pass know: the finest level of the pyramid: colour and CoC as far as neither the pixel nor a neighbour is hidden by what
+// lies in front of the layer.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> scene: array<vec2<u32>>;
-@group(0) @binding(2) var<storage, read> hidden: array<f32>;
-@group(0) @binding(3) var<storage, read_write> pyramid: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read_write> known: array<f32>;
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(1) var<uniform> frame: Frame;
+@group(0) @binding(2) var<storage, read> scene: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> nearest_px: array<f32>;
+@group(0) @binding(4) var<storage, read_write> pyramid: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> known: array<f32>;
 
 @compute @workgroup_size(TILE, TILE)
 fn know(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -14,10 +16,10 @@ fn know(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let first = id.xy - min(id.xy, vec2(1u));
     let last = min(id.xy + 1u, size - 1u);
-    var most = 0.0;
+    var nearest = 0.0;
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
-            most = max(most, hidden[y * size.x + x]);
+            nearest = min(nearest, nearest_px[y * size.x + x]);
         }
     }
     var sum = vec4(0.0);
@@ -26,7 +28,7 @@ fn know(@builtin(global_invocation_id) id: vec3<u32>) {
         sum += 0.25 * scene_unpacked(scene[at.y * frame.size.x + at.x], frame.most_px);
     }
     let index = id.y * size.x + id.x;
-    let knows = 1.0 - most;
+    let knows = step_at(work.unhidden, nearest);
     pyramid[index] = sum * knows;
     known[index] = knows;
 }

@@ -1,17 +1,6 @@
 // Shared by the passes that do several bins at once: which part of which bin a workgroup does. Such a pass has the
 // uniforms `work` and `bins`, and says in `extent_of` what of a bin is divided into tiles.
 
-struct Work {
-    first: u32,     // bin
-    count: u32,     // of bins
-    group: u32,     // of four terms: which
-    terms: u32,     // how many of them are there
-    last: u32,      // 1: the sum is complete
-    unused_a: u32,
-    unused_b: u32,
-    unused_c: u32,
-}
-
 struct Place {
     bin: u32,
     tile: vec2<u32>,

@@ -116,6 +116,20 @@ fn every_effect_and_quality_agrees() {
 
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
+fn near_layers_agree() {
+    let (width, height) = (150, 80);
+    let image = noise(width, height);
+    // Staircases towards the camera, which hide each other and the wall.
+    let near_m = [0.25, 0.36, 0.5, 0.66, 0.8, 1.0, 4.0];
+    let map = depth(width, height, |x, y| near_m[((x + y / 3) / 12 % 7) as usize]);
+    for quality in Quality::ALL {
+        let settings = Settings { quality, near_max_px: 24.0, ..settings(CocKind::Depth) };
+        same(&settings, &image, &map, &coc(CocKind::Depth, height), &format!("{quality}"));
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
 fn every_aperture_and_rank_agrees() {
     let (image, map) = (noise(80, 60), three_depths(80, 60));
     for shape in shapes() {

@@ -70,9 +70,10 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             ramp,
             expansion,
             steps_per_px,
-            unhidden,
-            nearest_px,
-            mixed
+            mixed,
+            unused_a,
+            unused_b,
+            unused_c
         }),
         layout!(Bin {
             size,
@@ -96,7 +97,7 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             active_at,
             has_lobes
         }),
-        layout!(Work { first, count, group, terms, last, unused_a, unused_b, unused_c }),
+        layout!(Work { first, count, group, terms, last, nearest_px, unhidden }),
         layout!(Level { fine, coarse, fine_offset, coarse_offset, unused }),
     ];
     for (name, size, fields) in expected {

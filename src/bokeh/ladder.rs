@@ -100,9 +100,4 @@ impl Ladder {
     pub fn most_fine_bins(&self) -> usize {
         self.steps.iter().map(|step| step.rung.fine_bins()).max().unwrap_or(0)
     }
-
-    /// Whether any rung fills in what near objects hide.
-    pub fn fill(&self) -> bool {
-        self.steps.iter().any(|step| step.rung.fill)
-    }
 }

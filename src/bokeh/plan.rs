@@ -11,6 +11,7 @@
 //! 5. `blur`: per bin a horizontal and a vertical low-rank pass with the local radius.
 //! 6. `composite`: front to back as disjoint coverage, what stays open to the hindmost; back to 8-bit sRGB.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::bank::{Bank, MASK_CELLS};
@@ -34,6 +35,11 @@ pub const COVERAGE_FLOOR: f32 = 1e-3;
 
 /// From this coverage on, a bin counts fully when the colour of the hindmost is worked out.
 pub const HINDMOST_COVERAGE: f32 = 0.8;
+
+/// Into so many layers near bins are divided: each is filled for itself, which takes time.
+const MOST_NEAR_LAYERS: usize = 3;
+/// Those, and that of all other bins.
+pub const MOST_LAYERS: usize = MOST_NEAR_LAYERS + 1;
 
 /// No colour is brighter: a range that cuts nothing, for bins whose filters do not overshoot.
 pub const ANY_COLOR: f32 = 1e20;
@@ -86,8 +92,6 @@ pub struct Plan {
     pub bank: Arc<Bank>,
     /// Which of the ladder's banks that is.
     pub bank_index: usize,
-    /// Whether what near objects hide is filled in.
-    pub fill: bool,
     /// Highlight recovery: 1 + 1/M, or infinity when off.
     pub expansion: f32,
     /// Whether the rank is full and the method the paper's: an exact 2-D gather.
@@ -126,7 +130,6 @@ impl Plan {
             bins: Vec::with_capacity(MAX_BINS),
             bank: Arc::clone(&ladder.banks[level.bank]),
             bank_index: level.bank,
-            fill: level.rung.fill,
             expansion: 1.0 + 1.0 / settings.highlights.max(0.0),
             exact: compositing == Compositing::Gather && settings.rank == Some(Rank::Full),
             ladder,
@@ -147,7 +150,7 @@ impl Plan {
         if level.quality == self.quality {
             return;
         }
-        (self.quality, self.rung, self.fill) = (level.quality, level.rung, level.rung.fill);
+        (self.quality, self.rung) = (level.quality, level.rung);
         self.bank_index = level.bank;
         self.bank = Arc::clone(&self.ladder.banks[level.bank]);
         self.lay_out_pieces();
@@ -281,9 +284,19 @@ impl Plan {
         Share::new(index.checked_sub(1).and_then(|front| self.border(front)), self.border(index))
     }
 
-    /// The signed CoC, <= 0, from which on the near bins take no share: what is filled in behind them is not below it.
-    pub fn nearest_behind_px(&self) -> f32 {
-        self.bins.iter().rfind(|bin| bin.near).map_or(0.0, |bin| bin.high_px * (1.0 - HAND_OVER))
+    /// The bins of each layer, front to back: near bins, in at most [`MOST_NEAR_LAYERS`] groups, and all others. What the
+    /// layers in front hide is filled in for each: see [`Self::unhidden`].
+    pub fn layers(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let (near, all) = (self.bins.iter().filter(|bin| bin.near).count(), self.bins.len());
+        let groups = near.min(MOST_NEAR_LAYERS);
+        let in_front = (0..groups).map(move |k| k * near / groups..(k + 1) * near / groups);
+        in_front.chain(std::iter::once(near..all))
+    }
+
+    /// The signed CoC, <= 0, from which on the bins before `first` take no share: what is filled in behind them is not
+    /// below it.
+    pub fn nearest_behind_px(&self, first: usize) -> f32 {
+        first.checked_sub(1).map_or(f32::NEG_INFINITY, |front| self.bins[front].high_px * (1.0 - HAND_OVER))
     }
 
     /// The mixed pixels of a frame that are taken apart: only layers can, and only with depth of the picture's size.
@@ -294,11 +307,11 @@ impl Plan {
         (apart && some.contains(&map.matte.pixels.len())).then_some(&map.matte)
     }
 
-    /// How much of a pixel the bins behind the near ones take as it is; the rest counts as hidden and is filled in.
-    /// Just in front of the border that is all of it: a surface that comes nearer hides only its own continuation.
-    pub fn unhidden(&self) -> Share {
-        let near = self.bins.iter().filter(|bin| bin.near).count();
-        let border_px = near.checked_sub(1).map(|last| self.bins[last].high_px);
+    /// How much of a pixel the layer of bins from `first` on takes as it is; the rest counts as hidden by the near bins
+    /// before it and is filled in. Just in front of the border that is all of it: a surface that comes nearer hides only
+    /// its own continuation.
+    pub fn unhidden(&self, first: usize) -> Share {
+        let border_px = first.checked_sub(1).map(|front| self.bins[front].high_px);
         Share::new(
             border_px.map(|at_px| (at_px * (0.5 + 0.5 * HIDDEN_FROM), 1.0 / ((1.0 - HIDDEN_FROM) * at_px))),
             None,

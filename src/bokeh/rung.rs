@@ -29,8 +29,6 @@ pub struct Rung {
     pub near_from_share: f32,
     /// Smallest radius in a bin, in pixels of the picture, from which it is filtered at each of [`SCALES`].
     pub scale_from_px: [f32; SCALES.len()],
-    /// Whether what near objects hide is filled in.
-    pub fill: bool,
     /// Separable terms where one radius holds for the whole picture: more, as every pixel shows the missing ones there.
     pub even_rank: u32,
     /// Where one radius holds for the whole picture, it is reduced until that has no more bin pixels than this.
@@ -46,12 +44,11 @@ pub const LADDER: [Rung; Quality::ALL.len()] = {
         near_from_px: 2.5,
         near_from_share: 0.07,
         scale_from_px: [0.0, 3.0, 8.0, 20.0],
-        fill: true,
         even_rank: 3,
         even_radius_px: 9.0,
     };
     [
-        Rung { cost: 0.68, fill: false, even_rank: 2, even_radius_px: 6.0, ..fast },
+        Rung { cost: 0.68, even_rank: 2, even_radius_px: 6.0, ..fast },
         fast,
         Rung {
             cost: 1.0,

@@ -31,9 +31,10 @@ pub struct Band<'a> {
 pub enum Hidden<'a> {
     /// There is nothing to hide.
     Nothing,
-    /// Bins behind wait where anything is hidden (the share is that of all of them); the pyramid's base is laid.
-    Waits(Share, HalfRows<'a>),
-    /// Blocks that waited are done, for the bins behind alone.
+    /// All but the first `in_front` bins wait where anything is hidden: where not all is `unhidden` that lies behind
+    /// every near bin. The picture at half size is laid.
+    Waits { unhidden: Share, in_front: usize, halves: HalfRows<'a> },
+    /// Blocks that waited are done, for the bins of a layer alone.
     Filled(Behind<'a>),
 }
 
@@ -61,44 +62,43 @@ impl WithSimd for Band<'_> {
 
 impl Band<'_> {
     /// Adds one block of columns to every bin that it contributes to. In the first pass a block in which anything is hidden
-    /// does the bins in front alone, and waits for the fill with the others; the second pass ([`Hidden::Filled`]) does
-    /// those blocks.
+    /// does the foremost bins alone, and waits for the fill with the others; the passes for the layers behind
+    /// ([`Hidden::Filled`]) do those blocks.
     #[inline(always)]
     fn block<V: Simd>(&mut self, simd: V, block: usize) {
         // One tile more on every side: a cell's means take in pixels of its neighbours.
         let tile_columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
         let tile_rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
-        let (second_pass, waits) = match &self.hidden {
-            Hidden::Nothing => (false, false),
-            Hidden::Waits(behind, _) => {
-                (false, self.tiles.any_outside(behind, tile_columns.clone(), tile_rows.clone()))
+        let (mut waits, mut in_front) = (false, MAX_BINS);
+        match &self.hidden {
+            Hidden::Nothing => {}
+            Hidden::Waits { unhidden, in_front: count, .. } => {
+                waits = self.tiles.any_outside(unhidden, tile_columns.clone(), tile_rows.clone());
+                self.waits[block] = waits;
+                in_front = *count;
             }
-            Hidden::Filled(_) => (true, false),
-        };
-        if second_pass && !self.waits[block] {
-            return;
+            Hidden::Filled(_) if !self.waits[block] => return,
+            Hidden::Filled(_) => {}
         }
-        self.waits[block] = waits;
+        let is_filled = matches!(self.hidden, Hidden::Filled(_));
         let mut active = [false; MAX_BINS];
         let mut reach = 0;
-        for (bin, active) in self.bins.iter_mut().zip(&mut active) {
+        for ((k, bin), active) in self.bins.iter_mut().enumerate().zip(&mut active) {
             let Some(bin) = bin else { continue };
-            // What waits is written later, but for bins in front.
-            let front = |share: &Share| share.behind.0 <= 0.0;
-            *active = match &bin.share {
-                None => true,
-                Some(share) if waits => {
-                    front(share) && self.tiles.any_within(share, tile_columns.clone(), tile_rows.clone())
-                }
-                Some(share) => second_pass || self.tiles.any_within(share, tile_columns.clone(), tile_rows.clone()),
-            };
-            if *active {
-                reach = reach.max(bin.scale as isize / 2);
-            } else if !waits || bin.share.as_ref().is_some_and(front) {
-                bin.clear(block);
+            if waits && k >= in_front {
+                continue;
+            }
+            *active = is_filled
+                || bin
+                    .share
+                    .as_ref()
+                    .is_none_or(|share| self.tiles.any_within(share, tile_columns.clone(), tile_rows.clone()));
+            match *active {
+                true => reach = reach.max(bin.scale as isize / 2),
+                false => bin.clear(block),
             }
         }
-        if !active.contains(&true) && !matches!(self.hidden, Hidden::Waits(..)) {
+        if !active.contains(&true) && !matches!(self.hidden, Hidden::Waits { .. }) {
             return;
         }
         let mut surfaces: Surfaces<WIDE> = Surfaces::new();
@@ -116,9 +116,9 @@ impl Band<'_> {
             );
             match &mut self.hidden {
                 Hidden::Nothing => {}
-                Hidden::Waits(behind, halves) => {
+                Hidden::Waits { halves, .. } => {
                     if (first..end.min(height)).contains(&y) {
-                        halves.add(behind, block * BLOCK, MARGIN..MARGIN + columns, y as usize, &surfaces);
+                        halves.add(block * BLOCK, MARGIN..MARGIN + columns, y as usize, &surfaces);
                     }
                 }
                 Hidden::Filled(behind) => {

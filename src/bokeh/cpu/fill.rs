@@ -1,12 +1,13 @@
 //! Pass `fill`, the inpainting of disocclusions: what near objects hide is filled in from around them, colour and CoC,
 //! before the bins behind are taken. Pull-push: averages over ever larger areas, of known pixels only, flow back into
-//! the holes.
+//! the holes. Every layer is filled for itself, from what does not lie in front of it: behind a head are the trees that
+//! stand behind it, and behind both the sky.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use super::rows::Rows;
-use super::unpack::{Piece, Surfaces};
+use super::unpack::Surfaces;
 use crate::bokeh::plan::Share;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
@@ -19,11 +20,11 @@ const PART: usize = 8;
 
 /// The pyramid, finest level (half the picture's size) first.
 pub struct Pyramid {
+    /// The picture at half size.
+    halves: Rows<PLANES>,
     levels: Vec<Level>,
-    /// How far a pixel of the finest level is covered by something near.
-    hidden: Vec<f32>,
-    /// Which parts are handed out, for the two that are written at once: `rows` and `hidden`. As many as there can be.
-    taken: [Vec<AtomicBool>; 2],
+    /// Which parts are handed out, as many as there can be.
+    taken: Vec<AtomicBool>,
 }
 
 struct Level {
@@ -32,22 +33,20 @@ struct Level {
     rows: Rows<PLANES>,
 }
 
-/// The finest level, as the bands of the picture lay it.
-pub struct Base<'a> {
+/// The picture at half size, as the bands lay it: means of linear r, g, b and CoC, and the least CoC of any surface.
+pub struct Halves<'a> {
     width: usize,
     stride: usize,
     rows: DisjointParts<'a, f32>,
-    hidden: DisjointParts<'a, f32>,
 }
 
-/// A band of the finest level.
+/// A band of it.
 pub struct HalfRows<'a> {
     first: usize,
     width: usize,
     height: usize,
     stride: usize,
     rows: &'a mut [f32],
-    hidden: &'a mut [f32],
 }
 
 /// What was filled in.
@@ -70,32 +69,25 @@ impl Pyramid {
             }
             (w, h) = (w.div_ceil(2), h.div_ceil(2));
         }
-        let hidden = vec![0.0; levels[0].width * levels[0].height];
-        let taken = std::array::from_fn(|_| (0..height).map(|_| AtomicBool::new(false)).collect());
-        Self { levels, hidden, taken }
+        let taken = (0..height).map(|_| AtomicBool::new(false)).collect();
+        Self { halves: Rows::new(levels[0].width, levels[0].height, 0), levels, taken }
     }
 
-    /// The finest level, to be laid in bands of `rows` rows of the picture.
-    pub fn base(&mut self, rows: usize) -> Base<'_> {
-        let level = &mut self.levels[0];
-        let (width, stride, row_len) = (level.width, level.rows.stride, level.rows.row_len());
-        let [first, second] = &mut self.taken;
-        Base {
-            width,
-            stride,
-            rows: DisjointParts::new(&mut level.rows.data, rows / 2 * row_len, first),
-            hidden: DisjointParts::new(&mut self.hidden, rows / 2 * width, second),
-        }
+    /// The picture at half size, to be laid in bands of `rows` rows of the picture.
+    pub fn halves(&mut self, rows: usize) -> Halves<'_> {
+        let (stride, row_len) = (self.halves.stride, self.halves.row_len());
+        let rows = DisjointParts::new(&mut self.halves.data, rows / 2 * row_len, &mut self.taken);
+        Halves { width: self.levels[0].width, stride, rows }
     }
 
-    /// Fills the holes once the finest level is laid.
-    pub fn fill(&mut self, workers: &mut ThreadPool) {
-        self.finish_base(workers);
+    /// Fills what is hidden by all that is not `unhidden`, once the halves are laid.
+    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool) {
+        self.lay_base(unhidden, workers);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
             let (width, stride, row_len) = (coarse.width, coarse.rows.stride, coarse.rows.row_len());
-            let rows = DisjointParts::new(&mut coarse.rows.data, PART * row_len, &mut self.taken[0]);
+            let rows = DisjointParts::new(&mut coarse.rows.data, PART * row_len, &mut self.taken);
             workers.run(coarse.height.div_ceil(PART), &|part| {
                 for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
                     pull(fine, part * PART + k, row, stride, width);
@@ -106,7 +98,7 @@ impl Pyramid {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&mut fine[k - 1], &coarse[0]);
             let (width, stride, row_len) = (fine.width, fine.rows.stride, fine.rows.row_len());
-            let rows = DisjointParts::new(&mut fine.rows.data, PART * row_len, &mut self.taken[0]);
+            let rows = DisjointParts::new(&mut fine.rows.data, PART * row_len, &mut self.taken);
             workers.run(fine.height.div_ceil(PART), &|part| {
                 for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
                     push(coarse, part * PART + k, row, stride, width);
@@ -120,57 +112,47 @@ impl Pyramid {
         Behind { level: &self.levels[0], unhidden, nearest_px }
     }
 
-    /// Known is what nothing near touches, nor its neighbours.
-    fn finish_base(&mut self, workers: &mut ThreadPool) {
+    /// The finest level: known is what nothing that hides touches, nor its neighbours.
+    fn lay_base(&mut self, unhidden: &Share, workers: &mut ThreadPool) {
         let level = &mut self.levels[0];
         let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
-        let hidden = &self.hidden;
-        let data = DisjointParts::new(&mut level.rows.data, PART * row_len, &mut self.taken[0]);
+        let halves = &self.halves;
+        let data = DisjointParts::new(&mut level.rows.data, PART * row_len, &mut self.taken);
         workers.run(h.div_ceil(PART), &|part| {
             for (k, planes) in data.part(part).chunks_exact_mut(row_len).enumerate() {
                 let (planes, known) = planes.split_at_mut((PLANES - 1) * stride);
                 let y = part * PART + k;
-                let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(|y| &hidden[y * w..][..w]);
-                let column = |x: usize| rows[0][x].max(rows[1][x]).max(rows[2][x]);
-                let (mut left, mut here) = (0.0f32, column(0));
+                let nearest = |y: usize| &halves.row(y)[(PLANES - 1) * stride..][..w];
+                let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(nearest);
+                // What hides a pixel the most is what is nearest.
+                let column = |x: usize| rows[0][x].min(rows[1][x]).min(rows[2][x]);
+                let (mut left, mut here) = (f32::INFINITY, column(0));
                 for (x, known) in known[..w].iter_mut().enumerate() {
-                    let right = if x + 1 < w { column(x + 1) } else { 0.0 };
-                    *known = 1.0 - left.max(here).max(right);
+                    let right = if x + 1 < w { column(x + 1) } else { f32::INFINITY };
+                    *known = unhidden.at(left.min(here).min(right));
                     (left, here) = (here, right);
                 }
-                for plane in planes.chunks_exact_mut(stride) {
-                    plane[..w].iter_mut().zip(&*known).for_each(|(value, known)| *value *= known);
+                let own = halves.row(y).chunks_exact(stride);
+                for (plane, own) in planes.chunks_exact_mut(stride).zip(own) {
+                    let values = plane[..w].iter_mut().zip(own).zip(&*known);
+                    values.for_each(|((value, own), known)| *value = own * known);
                 }
             }
         });
     }
 }
 
-impl Base<'_> {
+impl Halves<'_> {
     /// A band of `rows` rows of the picture (`height` rows in all).
     pub fn band(&self, band: usize, rows: usize, height: usize) -> HalfRows<'_> {
-        HalfRows {
-            first: band * rows,
-            width: self.width,
-            height,
-            stride: self.stride,
-            rows: self.rows.part(band),
-            hidden: self.hidden.part(band),
-        }
+        HalfRows { first: band * rows, width: self.width, height, stride: self.stride, rows: self.rows.part(band) }
     }
 }
 
 impl HalfRows<'_> {
     /// Adds the inner columns of row `y`, `columns` of the piece, which begin at column `x0` of the picture.
     #[inline(always)]
-    pub fn add<const W: usize>(
-        &mut self,
-        behind: &Share,
-        x0: usize,
-        columns: Range<usize>,
-        y: usize,
-        surfaces: &Surfaces<W>,
-    ) {
+    pub fn add<const W: usize>(&mut self, x0: usize, columns: Range<usize>, y: usize, surfaces: &Surfaces<W>) {
         let (row, odd) = ((y - self.first) / 2, y % 2 == 1);
         let first = x0 / 2;
         let count = (columns.len() / 2).min(self.width - first);
@@ -178,25 +160,25 @@ impl HalfRows<'_> {
         // A last row without a partner stands for two.
         let share = if !odd && y + 1 == self.height { 0.5 } else { 0.25 };
         let planes = &mut self.rows[row * PLANES * self.stride..][..PLANES * self.stride];
-        for (p, plane) in planes.chunks_exact_mut(self.stride).take(4).enumerate() {
+        let (means, nearest) = planes.split_at_mut((PLANES - 1) * self.stride);
+        for (p, plane) in means.chunks_exact_mut(self.stride).enumerate() {
             for (value, &[a, b]) in plane[first..].iter_mut().zip(pairs(p)) {
                 let before = if odd { *value } else { 0.0 };
                 *value = before + share * (a + b);
             }
         }
-        for (value, &[a, b]) in self.hidden[row * self.width + first..].iter_mut().zip(pairs(3)) {
-            let (a, b) = (1.0 - behind.at(a), 1.0 - behind.at(b));
-            let here = if a > b { a } else { b };
-            *value = if odd && *value > here { *value } else { here };
+        let nearest = &mut nearest[first..];
+        for (value, &[a, b]) in nearest.iter_mut().zip(pairs(3)) {
+            let here = if a < b { a } else { b };
+            *value = if odd && *value < here { *value } else { here };
         }
         if surfaces.mixed {
             // What something near covers in part is not known either.
             let fronts = surfaces.front.0[3][columns.start..].as_chunks::<2>().0.iter().take(count);
             let shares = surfaces.share.0[columns.start..].as_chunks::<2>().0;
-            for ((value, cocs), shares) in self.hidden[row * self.width + first..].iter_mut().zip(fronts).zip(shares) {
-                for (coc_px, share) in cocs.iter().zip(shares) {
-                    let here = if *share > 0.0 { 1.0 - behind.at(*coc_px) } else { 0.0 };
-                    *value = if *value > here { *value } else { here };
+            for ((value, cocs_px), shares) in nearest.iter_mut().zip(fronts).zip(shares) {
+                for (coc_px, share) in cocs_px.iter().zip(shares) {
+                    *value = if *share > 0.0 && *coc_px < *value { *coc_px } else { *value };
                 }
             }
         }
@@ -207,16 +189,8 @@ impl Behind<'_> {
     /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
     #[inline(always)]
     pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
-        self.put_one(x0, y, width, &mut surfaces.back);
-        if surfaces.mixed {
-            self.put_one(x0, y, width, &mut surfaces.front);
-        }
-    }
-
-    #[inline(always)]
-    fn put_one<const W: usize>(&self, x0: isize, y: usize, width: usize, piece: &mut Piece<W>) {
         let row = self.level.rows.row(y / 2);
-        let [red, green, blue, coc] = &mut piece.0;
+        let [red, green, blue, coc] = &mut surfaces.back.0;
         for x in 0..W {
             // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
             let hidden = 1.0 - self.unhidden.at(coc[x]);
@@ -227,6 +201,12 @@ impl Behind<'_> {
                 let mix = |own: f32, p: usize| own + (fill(p) - own) * hidden;
                 (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
                 coc[x] = mix(coc[x], 3).max(self.nearest_px);
+            }
+        }
+        if surfaces.mixed {
+            // Behind the nearer surface of a pixel lies its farther one.
+            for (share, coc_px) in surfaces.share.0.iter_mut().zip(&surfaces.front.0[3]) {
+                *share *= self.unhidden.at(*coc_px);
             }
         }
     }

@@ -15,6 +15,7 @@ mod tent;
 mod tiles;
 mod unpack;
 
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -87,8 +88,7 @@ impl CpuBokeh {
         Self {
             encode: composite::EncodeTable::new(),
             tiles: Tiles::new(width, height),
-            pyramid: (plan.ladder.fill() && plan.compositing == Compositing::Layers)
-                .then(|| fill::Pyramid::new(width, height)),
+            pyramid: (plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
             waits: vec![false; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),
             taken: flags(height.max(slots.len())),
@@ -139,15 +139,14 @@ impl CpuBokeh {
         self.split(&frame);
         lap("split");
         // With something in front, blocks in which it hides anything get their bins behind after the fill.
-        let fills = self.filled();
-        self.bin(&frame, fills, false);
+        self.bin(&frame, None);
         lap("bin");
-        if fills {
+        for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
-                pyramid.fill(&mut self.workers);
+                pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers);
             }
             lap("fill");
-            self.bin(&frame, true, true);
+            self.bin(&frame, Some(layer));
             lap("bin");
         }
         if let Some(gather) = &mut self.gather {
@@ -181,19 +180,19 @@ impl CpuBokeh {
         if self.plan.bins.iter().any(|bin| bin.near) {
             self.tiles.idle.fill(false);
         }
-        let fills = self.filled();
+        let in_front = self.plan.layers().next().map_or(0, |layer| layer.end);
         for k in 0..self.plan.bins.len() {
             let bin = &self.plan.bins[k];
             let slot = &mut self.slots[bin.slot];
             let meets = || self.tiles.any_within(&self.plan.share(k), 0..self.tiles.across, 0..self.tiles.down);
             // What is filled in may be in any bin behind.
-            slot.present = !layered || (fills && !bin.near) || meets();
+            slot.present = !layered || k >= in_front || meets();
             slot.reshape(&self.plan, bin);
         }
     }
 
-    /// Pass `bin`. With `fills` it runs twice: `second_pass` does the bins behind, in blocks that waited for the fill.
-    fn bin(&mut self, frame: &Source<'_>, fills: bool, second_pass: bool) {
+    /// Pass `bin`: all bins, or those of a `layer` in blocks that waited for its fill.
+    fn bin(&mut self, frame: &Source<'_>, layer: Option<Range<usize>>) {
         let plan = &self.plan;
         let blocks = plan.width.div_ceil(BLOCK);
         // Bands of 32 rows at least, as each reads some rows of its neighbours again.
@@ -202,23 +201,26 @@ impl CpuBokeh {
         let mut shelves: [Option<BinShelves<'_>>; MAX_BINS] = [const { None }; MAX_BINS];
         for slot in self.slots.iter_mut().filter(|slot| slot.present) {
             let Some(k) = plan.bin_in(slot.index) else { continue };
-            if !(second_pass && plan.bins[k].near) {
+            if layer.as_ref().is_none_or(|layer| layer.contains(&k)) {
                 shelves[k] = Some(BinShelves::new(plan, k, slot, rows));
             }
         }
         let (arch, tiles) = (self.arch, &self.tiles);
         let bands = plan.height.div_ceil(rows);
         let waits = DisjointParts::new(&mut self.waits[..bands * blocks], blocks, &mut self.taken);
-        let unhidden = plan.unhidden();
-        let nearest_px = plan.nearest_behind_px();
-        let (base, filled) = match self.pyramid.as_mut().filter(|_| fills) {
-            Some(pyramid) if second_pass => (None, Some(pyramid.behind(unhidden, nearest_px))),
-            Some(pyramid) => (Some(pyramid.base(rows)), None),
-            None => (None, None),
+        let (first, last) = (plan.layers().next(), plan.layers().last().map_or(0, |layer| layer.start));
+        let in_front = first.map_or(0, |layer| layer.end);
+        let (halves, filled) = match (&mut self.pyramid, layer) {
+            (Some(pyramid), Some(layer)) => {
+                (None, Some(pyramid.behind(plan.unhidden(layer.start), plan.nearest_behind_px(layer.start))))
+            }
+            (Some(pyramid), None) if last > 0 => (Some(pyramid.halves(rows)), None),
+            _ => (None, None),
         };
+        let unhidden = plan.unhidden(last);
         self.workers.run_with(&mut self.members, bands, &|member: &mut Member, band| {
-            let hidden = match (&base, filled) {
-                (Some(base), _) => Hidden::Waits(unhidden, base.band(band, rows, plan.height)),
+            let hidden = match (&halves, filled) {
+                (Some(halves), _) => Hidden::Waits { unhidden, in_front, halves: halves.band(band, rows, plan.height) },
                 (_, Some(filled)) => Hidden::Filled(filled),
                 _ => Hidden::Nothing,
             };

@@ -59,13 +59,14 @@ impl CpuBokeh {
     }
 
     /// A frame as the bins take it, per pixel: linear r, g, b with highlights expanded, and CoC. With `filled`, which
-    /// has to be the last frame, what near objects hide is filled in, as for the bins behind them. Two surfaces of a pixel
+    /// has to be the last frame, what near objects hide is filled in, as for the bins behind all of them. Two surfaces of a pixel
     /// are put together again, and the CoC is the nearer one's.
     pub fn scene(&self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField, filled: bool) -> Vec<[f32; 4]> {
         let (width, height) = (color.width as usize, color.height as usize);
         let source = Source { color, depth, coc, matte: self.plan.matte(depth, coc), expansion: self.plan.expansion };
         let pyramid = self.pyramid.as_ref().filter(|_| filled && self.filled());
-        let behind = pyramid.map(|pyramid| pyramid.behind(self.plan.unhidden(), self.plan.nearest_behind_px()));
+        let last = self.last_layer();
+        let behind = pyramid.map(|pyramid| pyramid.behind(self.plan.unhidden(last), self.plan.nearest_behind_px(last)));
         let mut surfaces: Surfaces<SPAN> = Surfaces::new();
         let mut scene = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -82,13 +83,18 @@ impl CpuBokeh {
 
     /// Whether something in the last frame was in front, and what it hides was filled in.
     pub fn filled(&self) -> bool {
-        self.plan.fill && self.pyramid.is_some() && self.plan.bins.iter().any(|bin| bin.near)
+        self.pyramid.is_some() && self.last_layer() > 0
     }
 
-    /// How far a pixel of this CoC in the last frame, which was [`filled`](Self::filled), was replaced for the bins
-    /// behind, 0 to 1.
+    /// How far a pixel of this CoC in the last frame, which was [`filled`](Self::filled), was replaced for the bins that
+    /// do not lie in front of the focal plane, 0 to 1.
     pub fn hidden(&self, coc_px: f32) -> f32 {
-        1.0 - self.plan.unhidden().at(coc_px)
+        1.0 - self.plan.unhidden(self.last_layer()).at(coc_px)
+    }
+
+    /// The first bin that is not in front of the focal plane.
+    fn last_layer(&self) -> usize {
+        self.plan.layers().last().map_or(0, |layer| layer.start)
     }
 
     /// Whether a pixel of the last frame lies in a tile where nothing behind is blurred: unless something in front

@@ -4,7 +4,7 @@ use super::layout::Capacity;
 use super::shaders::{Bin, Frame, Level};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::plan::{MAX_BINS, Plan};
+use crate::bokeh::plan::{MAX_BINS, MOST_LAYERS, Plan};
 use crate::compute::device::Device;
 use crate::frame::{Matte, MixedPixel};
 
@@ -30,6 +30,9 @@ pub struct Buffers {
     pub mixed: wgpu::Buffer,
     /// Range of CoC of each tile of the picture.
     pub ranges: wgpu::Buffer,
+    /// The scene and its ranges as a layer sees them, behind others.
+    pub behind: wgpu::Buffer,
+    pub ranges_behind: wgpu::Buffer,
     /// The pictures of all bins.
     pub source: wgpu::Buffer,
     /// Coarse grids of all bins.
@@ -44,8 +47,8 @@ pub struct Buffers {
     /// Per tile of blurred bins, whether anything is there.
     pub active: wgpu::Buffer,
     pub result: wgpu::Buffer,
-    /// Half-size flags of what near objects touch.
-    pub hidden: wgpu::Buffer,
+    /// CoC of the nearest surface, at half size.
+    pub nearest_px: wgpu::Buffer,
     /// All levels of the pyramid.
     pub pyramid: wgpu::Buffer,
     /// How much each of its pixels knows.
@@ -70,10 +73,10 @@ pub fn picture_bytes(plan: &Plan) -> u64 {
     (plan.width * plan.height).div_ceil(4) as u64 * 12
 }
 
-/// How many uniforms `Work` a frame can need: two for the pass `bin`, one for `reach`, and for the filters one for
-/// every group of four terms of every batch of bins.
+/// How many uniforms `Work` a frame can need: one for each layer, one for all bins, and for the filters one for every group
+/// of four terms of every batch of bins.
 pub fn work_count(plan: &Plan) -> usize {
-    3 + MAX_BINS * plan.ladder.most_terms().div_ceil(4)
+    MOST_LAYERS + 1 + MAX_BINS * plan.ladder.most_terms().div_ceil(4)
 }
 
 /// Bytes of the largest buffer of filters or kernels.
@@ -106,8 +109,8 @@ impl Buffers {
         let storage = |label: &str, words: usize| buffer(label, words * 4, Usage::STORAGE | Usage::COPY_SRC);
         let (width, height) = (plan.width, plan.height);
         let layered = plan.compositing == Compositing::Layers;
-        let (levels, pyramid_pixels) =
-            if layered && plan.ladder.fill() { pyramid_steps(width, height) } else { (Vec::new(), 1) };
+        let (levels, pyramid_pixels) = if layered { pyramid_steps(width, height) } else { (Vec::new(), 1) };
+        let (behind, tiles) = (if layered { width * height } else { 1 }, width.div_ceil(16) * height.div_ceil(16));
         let mixed = if layered { Matte::most(width, height).max(1) } else { 1 };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
         let work_bytes = work_count(plan) * WORK_STRIDE as usize;
@@ -120,7 +123,9 @@ impl Buffers {
             color: storage("color", picture_bytes(plan) as usize / 4),
             scene: storage("scene", width * height * 2),
             mixed: storage("mixed", mixed * size_of::<MixedPixel>() / 4),
-            ranges: storage("ranges", width.div_ceil(16) * height.div_ceil(16) * 2),
+            ranges: storage("ranges", tiles * 2),
+            behind: storage("behind", behind * 2),
+            ranges_behind: storage("ranges behind", tiles * 2),
             source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),
             edges: storage("edges", capacity.edges * 8),
@@ -129,7 +134,7 @@ impl Buffers {
             filtered: storage("filtered", capacity.filtered),
             active: storage("active", capacity.active),
             result: storage("result", picture_bytes(plan) as usize / 4),
-            hidden: storage("hidden", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),
+            nearest_px: storage("nearest", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),
             pyramid: storage("pyramid", pyramid_pixels * 4),
             known: storage("known", pyramid_pixels),
             banks: plan

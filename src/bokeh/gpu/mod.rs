@@ -110,7 +110,6 @@ impl GpuBokeh {
     /// The uniform `Frame` of a job; `common.wgsl` says what the numbers mean.
     fn frame_uniform(&self, job: &Job) -> shaders::Frame {
         let plan = &self.plan;
-        let unhidden = plan.unhidden().front;
         let most_px = match job.coc {
             CocField::Uniform { radius_px } => radius_px,
             CocField::Ramp(ramp) => ramp.max_px,
@@ -141,9 +140,8 @@ impl GpuBokeh {
             ramp,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
-            unhidden: unhidden.into(),
-            nearest_px: plan.nearest_behind_px(),
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),
+            ..shaders::Frame::default()
         }
     }
 }
@@ -182,7 +180,7 @@ impl Bokeh for GpuBokeh {
         self.plan.set_quality(job.quality);
         self.plan.split(job.depth.as_deref(), &job.coc);
         self.layout.lay_out(&self.plan, &self.capacity);
-        self.passes.upload(&self.device, &self.buffers, &self.layout, self.plan.bank_index);
+        self.passes.upload(&self.device, &self.buffers, &self.plan, &self.layout);
         let frame = self.frame_uniform(&job);
         self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
 

@@ -6,14 +6,12 @@ use super::buffers::{Buffers, Filters, WORK_STRIDE, work_count};
 use super::layout::{Layout, tiles};
 use super::readback::MAX_QUERIES;
 use super::shaders::{self, Bin, LINE, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work};
-use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
+use crate::bokeh::plan::{CELL, MAX_BINS, MOST_LAYERS, Plan};
 use crate::compute::device::{Device, Shader, workgroups_2d};
 
-/// Which uniform `Work` a dispatch has: `bin` for the near bins and for the rest, `reach`, and the filters' batches.
-const NEAR: usize = 0;
-const REST: usize = 1;
-const ALL: usize = 2;
-const FIRST_BATCH: usize = 3;
+/// Which uniform `Work` a dispatch has: that of its layer, of `reach`, or of a batch of the filters.
+const ALL: usize = MOST_LAYERS;
+const FIRST_BATCH: usize = ALL + 1;
 
 /// One pass: a pipeline and its buffers.
 struct Step {
@@ -28,13 +26,22 @@ struct Fixed {
     workgroups: [u32; 2],
 }
 
+/// The passes of a layer.
+struct Layer {
+    /// What is known behind those in front of it, and the scene with that filled in; the foremost has the scene as it is.
+    fill: Option<[Fixed; 2]>,
+    bin: Step,
+}
+
 /// Everything that a frame runs.
 pub struct Passes {
     unpack: Fixed,
-    fill: Vec<Fixed>,
+    /// What may hide others.
+    hide: Fixed,
+    layers: Vec<Layer>,
+    /// From the finest level of the pyramid to the coarsest, and back.
+    pull_push: Vec<Fixed>,
     gather: Option<Fixed>,
-    /// Bins in front, and the rest.
-    bin: [Step; 2],
     reach: Step,
     /// For each bank, rows and columns of each batch of bins and group of terms.
     blur: Vec<Vec<[Step; 2]>>,
@@ -51,7 +58,7 @@ struct Maker<'a> {
     pipelines: Vec<(&'static str, wgpu::ComputePipeline)>,
 }
 
-impl Maker<'_> {
+impl<'a> Maker<'a> {
     /// The pipeline of a shader, shared by all passes that run it.
     fn pipeline(&mut self, shader: Shader) -> wgpu::ComputePipeline {
         if let Some((_, pipeline)) = self.pipelines.iter().find(|(name, _)| *name == shader.name) {
@@ -62,34 +69,39 @@ impl Maker<'_> {
         pipeline
     }
 
-    /// A pass over `size` invocations in workgroups of `tile` x `tile`, whose time counts for `name`.
-    fn fixed(
+    /// A pass with these uniforms first and then `buffers`; its time counts for `name`.
+    fn step(
         &mut self,
         name: &'static str,
         shader: Shader,
-        size: [u32; 2],
-        tile: u32,
+        uniforms: &[wgpu::BufferBinding<'_>],
         buffers: &[&wgpu::Buffer],
-    ) -> Fixed {
+    ) -> Step {
         let pipeline = self.pipeline(shader);
-        let bindings = self.device.bindings(&pipeline, buffers.iter().map(|buffer| buffer.as_entire_buffer_binding()));
-        Fixed { step: Step { name, pipeline, bindings }, workgroups: size.map(|size| size.div_ceil(tile)) }
+        let buffers = buffers.iter().map(|buffer| buffer.as_entire_buffer_binding());
+        let bindings = self.device.bindings(&pipeline, uniforms.iter().cloned().chain(buffers));
+        Step { name, pipeline, bindings }
+    }
+
+    /// Uniform `Work` number `index`.
+    fn work(&self, index: usize) -> wgpu::BufferBinding<'a> {
+        wgpu::BufferBinding {
+            buffer: &self.buffers.work,
+            offset: index as u64 * WORK_STRIDE,
+            size: wgpu::BufferSize::new(size_of::<Work>() as u64),
+        }
     }
 
     /// A pass over several bins at once, which are in uniform `Work` number `work`; binds that and the bins first.
     fn over_bins(&mut self, name: &'static str, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Step {
-        let pipeline = self.pipeline(shader);
-        let b = self.buffers;
-        let work = wgpu::BufferBinding {
-            buffer: &b.work,
-            offset: work as u64 * WORK_STRIDE,
-            size: wgpu::BufferSize::new(size_of::<Work>() as u64),
-        };
-        let uniforms = [work, b.bins.as_entire_buffer_binding()];
-        let buffers = buffers.iter().map(|buffer| buffer.as_entire_buffer_binding());
-        let bindings = self.device.bindings(&pipeline, uniforms.into_iter().chain(buffers));
-        Step { name, pipeline, bindings }
+        let uniforms = [self.work(work), self.buffers.bins.as_entire_buffer_binding()];
+        self.step(name, shader, &uniforms, buffers)
     }
+}
+
+/// A pass over `size` invocations in workgroups of `tile` x `tile`.
+fn over(step: Step, size: [u32; 2], tile: u32) -> Fixed {
+    Fixed { step, workgroups: size.map(|size| size.div_ceil(tile)) }
 }
 
 impl Passes {
@@ -99,26 +111,33 @@ impl Passes {
         let picture = [plan.width as u32, plan.height as u32];
         let half = picture.map(|v| v.div_ceil(2));
 
-        let mut fill = Vec::new();
-        if !b.levels.is_empty() {
-            fill.push(maker.fixed(
-                "fill",
-                shaders::HIDE,
-                half,
-                TILE,
-                &[&b.frame, &b.scene, &b.hidden, &b.ranges, &b.mixed],
-            ));
-            let known = [&b.frame, &b.scene, &b.hidden, &b.pyramid, &b.known];
-            fill.push(maker.fixed("fill", shaders::KNOW, half, TILE, &known));
-            for (level, (_, coarse)) in b.levels.iter().zip(&b.level_sizes) {
-                fill.push(maker.fixed("fill", shaders::PULL, *coarse, SMALL_TILE, &[level, &b.pyramid, &b.known]));
-            }
-            for (level, (fine, _)) in b.levels.iter().zip(&b.level_sizes).rev() {
-                fill.push(maker.fixed("fill", shaders::PUSH, *fine, SMALL_TILE, &[level, &b.pyramid, &b.known]));
-            }
-            let filled = [&b.frame, &b.pyramid, &b.scene, &b.ranges, &b.known, &b.mixed];
-            fill.push(maker.fixed("fill", shaders::FILL, picture, TILE, &filled));
+        let hide = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
+        let hide = over(maker.step("fill", shaders::HIDE, &[], &hide), half, TILE);
+        let mut level = |shader, level: &wgpu::Buffer, size: &[u32; 2]| {
+            over(maker.step("fill", shader, &[], &[level, &b.pyramid, &b.known]), *size, SMALL_TILE)
+        };
+        let mut pull_push = Vec::new();
+        for (uniform, (_, coarse)) in b.levels.iter().zip(&b.level_sizes) {
+            pull_push.push(level(shaders::PULL, uniform, coarse));
         }
+        for (uniform, (fine, _)) in b.levels.iter().zip(&b.level_sizes).rev() {
+            pull_push.push(level(shaders::PUSH, uniform, fine));
+        }
+        let layers = (0..MOST_LAYERS).map(|index| {
+            let fill = (index > 0).then(|| {
+                let known = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known];
+                let filled = [&b.frame, &b.pyramid, &b.known, &b.scene, &b.ranges, &b.behind, &b.ranges_behind];
+                let work = [maker.work(index)];
+                [
+                    over(maker.step("fill", shaders::KNOW, &work, &known), half, TILE),
+                    over(maker.step("fill", shaders::FILL, &work, &filled), picture, TILE),
+                ]
+            });
+            let (scene, ranges) = if index > 0 { (&b.behind, &b.ranges_behind) } else { (&b.scene, &b.ranges) };
+            let bin = [&b.frame, scene, &b.source, &b.grid, ranges, &b.mixed];
+            Layer { fill, bin: maker.over_bins("bin", shaders::BIN, index, &bin) }
+        });
+        let layers = layers.collect();
         let filters = |maker: &mut Maker, bank: &Filters, k: usize| {
             let ([horizontal, vertical], reach) = (&bank.taps, &bank.node_reach);
             let rows = [&b.frame, horizontal, reach, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered];
@@ -137,26 +156,22 @@ impl Passes {
         let gather = plan.exact.then(|| {
             let [starts, kernels] = &b.kernels;
             let buffers = [&b.frame, starts, kernels, &b.scene, &b.banks[plan.bank_index].node_reach, &b.blurred];
-            maker.fixed("gather", shaders::GATHER, picture, TILE, &buffers)
-        });
-        let bin = [NEAR, REST].map(|index| {
-            maker.over_bins("bin", shaders::BIN, index, &[&b.frame, &b.scene, &b.source, &b.grid, &b.ranges, &b.mixed])
+            over(maker.step("gather", shaders::GATHER, &[], &buffers), picture, TILE)
         });
         // Each invocation makes four pixels: three whole words.
         let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active];
-        let mut composite = maker.fixed("composite", shaders::COMPOSITE, [0; 2], LINE, &composite);
-        composite.workgroups = workgroups_2d(((plan.width * plan.height).div_ceil(4) as u32).div_ceil(LINE));
+        let pixels_in_fours = (plan.width * plan.height).div_ceil(4) as u32;
+        let composite = Fixed {
+            step: maker.step("composite", shaders::COMPOSITE, &[], &composite),
+            workgroups: workgroups_2d(pixels_in_fours.div_ceil(LINE)),
+        };
+        let unpack = [&b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed];
         Self {
-            unpack: maker.fixed(
-                "unpack",
-                shaders::UNPACK,
-                picture,
-                TILE,
-                &[&b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed],
-            ),
-            fill,
+            unpack: over(maker.step("unpack", shaders::UNPACK, &[], &unpack), picture, TILE),
+            hide,
+            layers,
+            pull_push,
             gather,
-            bin,
             reach: maker.over_bins("reach", shaders::REACH, ALL, &[&b.grid, &b.edges]),
             blur,
             composite,
@@ -171,9 +186,9 @@ impl Passes {
         self.unpack.step.bindings = device.bindings(&self.unpack.step.pipeline, buffers.into_iter());
     }
 
-    /// Uploads which bins each pass of this frame does, with the terms of a bank.
-    pub fn upload(&mut self, device: &Device, b: &Buffers, layout: &Layout, bank: usize) {
-        let terms = b.banks[bank].terms;
+    /// Uploads which bins each pass of this frame does, with the terms of the plan's bank.
+    pub fn upload(&mut self, device: &Device, b: &Buffers, plan: &Plan, layout: &Layout) {
+        let terms = b.banks[plan.bank_index].terms;
         let groups = terms.div_ceil(4);
         let mut set = |index: usize, bins: &Range<usize>, group: usize| {
             let work = Work {
@@ -182,15 +197,16 @@ impl Passes {
                 group: group as u32,
                 terms: (terms - 4 * group).min(4) as u32,
                 last: u32::from(group + 1 == groups),
-                ..Work::default()
+                nearest_px: plan.nearest_behind_px(bins.start).max(f32::MIN),
+                unhidden: plan.unhidden(bins.start).front.into(),
             };
             let bytes = bytemuck::bytes_of(&work);
             self.work[index * WORK_STRIDE as usize..][..bytes.len()].copy_from_slice(bytes);
         };
-        let count = layout.bins.len();
-        for (index, bins) in [(NEAR, 0..layout.near), (REST, layout.near..count), (ALL, 0..count)] {
+        for (index, bins) in plan.layers().enumerate() {
             set(index, &bins, 0);
         }
+        set(ALL, &(0..layout.bins.len()), 0);
         for (k, bins) in layout.batches.iter().enumerate() {
             (0..groups).for_each(|group| set(FIRST_BATCH + k * groups + group, bins, group));
         }
@@ -230,18 +246,21 @@ impl Passes {
         let workgroups = |bins: &[Bin], tile: [usize; 2], extent: fn(&Bin) -> [u32; 2]| {
             workgroups_2d(bins.iter().map(|bin| tiles(extent(bin).map(|size| size as usize), tile) as u32).sum())
         };
-        let (near, rest) = layout.bins.split_at(layout.near);
         let cells = |bin: &Bin| bin.cells.map(|cells| cells * CELL as u32);
         run(&self.unpack.step, self.unpack.workgroups);
         if let Some(gather) = &self.gather {
             run(&gather.step, gather.workgroups);
         } else {
-            if !near.is_empty() {
-                run(&self.bin[NEAR], workgroups(near, [TILE as usize; 2], cells));
-                let fill = self.fill.iter().filter(|_| plan.fill);
-                fill.for_each(|fill| run(&fill.step, fill.workgroups));
+            for ((index, bins), layer) in plan.layers().enumerate().zip(&self.layers) {
+                if index == 1 {
+                    run(&self.hide.step, self.hide.workgroups);
+                }
+                if let Some([know, fill]) = &layer.fill {
+                    let steps = std::iter::once(know).chain(&self.pull_push).chain([fill]);
+                    steps.for_each(|fixed| run(&fixed.step, fixed.workgroups));
+                }
+                run(&layer.bin, workgroups(&layout.bins[bins], [TILE as usize; 2], cells));
             }
-            run(&self.bin[REST], workgroups(rest, [TILE as usize; 2], cells));
             run(&self.reach, workgroups(&layout.bins, [SMALL_TILE as usize; 2], |bin| [bin.edges, bin.cells[1]]));
             let groups = plan.bank.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {

@@ -29,15 +29,15 @@ pub const BLUR_ROWS: Shader = shader!("blur_rows", "work", "filter");
 pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "work", "filter");
 /// The exact two-dimensional gather.
 pub const GATHER: Shader = shader!("gather");
-/// What near objects touch.
+/// The nearest surface.
 pub const HIDE: Shader = shader!("hide", "mixed");
-/// What is known behind them.
+/// What is known behind a layer.
 pub const KNOW: Shader = shader!("know");
 /// To the coarser level.
 pub const PULL: Shader = shader!("pull", "level");
 /// Back to the finer level.
 pub const PUSH: Shader = shader!("push", "level");
-pub const FILL: Shader = shader!("fill", "range", "mixed");
+pub const FILL: Shader = shader!("fill", "range");
 pub const COMPOSITE: Shader = shader!("composite");
 
 pub const ALL: [Shader; 12] =
@@ -90,9 +90,10 @@ pub struct Frame {
     pub ramp: [f32; 2],
     pub expansion: f32,
     pub steps_per_px: f32,
-    pub unhidden: [f32; 2],
-    pub nearest_px: f32,
     pub mixed: u32,
+    pub unused_a: u32,
+    pub unused_b: u32,
+    pub unused_c: u32,
 }
 
 /// `Bin` of `common.wgsl`.
@@ -122,7 +123,7 @@ pub struct Bin {
     pub has_lobes: u32,
 }
 
-/// `Work` of `work.wgsl`.
+/// `Work` of `common.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -132,9 +133,8 @@ pub struct Work {
     pub group: u32,
     pub terms: u32,
     pub last: u32,
-    pub unused_a: u32,
-    pub unused_b: u32,
-    pub unused_c: u32,
+    pub nearest_px: f32,
+    pub unhidden: [f32; 2],
 }
 
 /// `Level` of `level.wgsl`.
