@@ -17,6 +17,7 @@ mod places;
 mod playout;
 mod quality;
 mod rate;
+mod registration_check;
 pub mod still;
 mod view;
 mod wanted;
@@ -229,6 +230,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         tally: &tally,
         clock: &clock,
         times: depth_times,
+        check: registration_check::RegistrationCheck::default(),
         held,
     };
     let blur = blur::Stage {

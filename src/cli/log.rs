@@ -62,12 +62,19 @@ pub fn say(text: &str) {
 
 /// A warning, unless `--quiet` is given.
 pub fn warn(what: &str) {
-    if QUIET.load(Ordering::Relaxed) {
-        return;
-    }
+    remark("WARN", "warning", what);
+}
+
+/// What is done that was not asked for, unless `--quiet` is given.
+pub fn note(what: &str) {
+    remark("INFO", "note", what);
+}
+
+fn remark(level: &str, name: &str, what: &str) {
     match JSON.load(Ordering::Relaxed) {
-        true => message("WARN", what),
-        false => message("WARN", &format!("warning: {}", printable(what, &[]))),
+        _ if QUIET.load(Ordering::Relaxed) => {}
+        true => message(level, what),
+        false => message(level, &format!("{name}: {}", printable(what, &[]))),
     }
 }
 

@@ -1,6 +1,8 @@
 //! Where depth comes from, and what is made of it before the blur: a focus distance ([`focus`]), a map without
-//! holes ([`fill`]), and, for depth that was measured, one that agrees with the picture ([`refine`]).
+//! holes ([`fill`]), and, for depth that was measured, one that agrees with the picture ([`refine`]); whether it does
+//! before that is measured, too ([`agreement`]).
 
+pub mod agreement;
 pub mod beside;
 pub mod fill;
 pub mod focus;

@@ -28,7 +28,7 @@ impl Effect {
 named! {
     /// Whether depth is refined before the blur.
     pub enum Refine default Auto {
-        /// Depth of a recording in a stream; not exact depth, nor a picture on its own
+        /// Depth of a recording in a stream; of a picture on its own where its outlines are not those of the picture
         Auto = "auto",
         /// Always
         On = "on",

@@ -16,13 +16,16 @@ pub enum Finish {
     /// Holes are filled.
     Fill,
     /// It is fitted to the picture and steadied, and holes are filled.
-    Refine,
+    Refine {
+        /// As [`Refiner::from_coarse`] has it; 1 for frames of a stream.
+        coarsest: u32,
+    },
 }
 
 impl Finish {
     /// Of depth as it was measured.
     pub fn measured(refine: bool) -> Self {
-        if refine { Self::Refine } else { Self::Fill }
+        if refine { Self::Refine { coarsest: 1 } } else { Self::Fill }
     }
 }
 
@@ -37,7 +40,7 @@ pub struct CocMaker {
 enum Finisher {
     Keep,
     Fill(Filler),
-    Refine(Box<Refiner>),
+    Refine { coarsest: u32, refiner: Box<Refiner> },
 }
 
 impl Finisher {
@@ -45,7 +48,7 @@ impl Finisher {
         match finish {
             Finish::Keep => Self::Keep,
             Finish::Fill => Self::Fill(Filler::new()),
-            Finish::Refine => Self::Refine(Box::new(Refiner::new())),
+            Finish::Refine { coarsest } => Self::Refine { coarsest, refiner: Box::new(Refiner::from_coarse(coarsest)) },
         }
     }
 
@@ -54,7 +57,7 @@ impl Finisher {
             == match self {
                 Self::Keep => Finish::Keep,
                 Self::Fill(_) => Finish::Fill,
-                Self::Refine(_) => Finish::Refine,
+                Self::Refine { coarsest, .. } => Finish::Refine { coarsest: *coarsest },
             }
     }
 }
@@ -102,7 +105,7 @@ impl CocMaker {
         match &mut self.finisher {
             Finisher::Keep => {}
             Finisher::Fill(filler) => filler.fill_guided(map, color),
-            Finisher::Refine(refiner) => {
+            Finisher::Refine { refiner, .. } => {
                 refiner.set_focus(focus_m);
                 refiner.refine(map, color, time_ns);
             }
@@ -133,7 +136,7 @@ mod tests {
         let mut refiner_after = |refine| {
             coc.follow(rule, Finish::measured(refine));
             match &coc.finisher {
-                Finisher::Refine(refiner) => Some(std::ptr::from_ref(&**refiner)),
+                Finisher::Refine { refiner, .. } => Some(std::ptr::from_ref(&**refiner)),
                 Finisher::Fill(_) | Finisher::Keep => None,
             }
         };

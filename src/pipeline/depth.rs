@@ -7,6 +7,7 @@ use super::capture::Shot;
 use super::change::{Change, Executor, Swap};
 use super::coc::{CocMaker, Finish};
 use super::rate::Rate;
+use super::registration_check::RegistrationCheck;
 use super::{Ended, Fault, Frame, hand_on};
 use crate::clock::Clock;
 use crate::depth::{DepthError, DepthSource, Seen};
@@ -47,6 +48,8 @@ pub(super) struct Stage<'a> {
     /// How well and how often depth is made; `None` makes it as well as can be, for every frame.
     pub rate: Option<Rate>,
     pub times: &'a mut Histogram,
+    /// Notices depth that is not registered to the colours.
+    pub check: RegistrationCheck,
     /// Counts frames that took over the depth of the one before.
     pub held: &'a mut u64,
 }
@@ -142,6 +145,13 @@ impl Stage<'_> {
         }
         let seen = Seen { stamp, color, right: right.as_deref() };
         let mut map = brought.map_or_else(|| self.read(seen), Ok)?;
+        if self.check.fails(&map, color) {
+            tracing::warn!(
+                "{}: nowhere do the outlines of its depth meet those of its pictures: the depth may be of another camera, not \
+                 registered to the colours (--depth-calibration), or of another time",
+                self.source_name
+            );
+        }
         let field = coc.make(&mut map, color, stamp.time_ns);
         let now_ns = self.clock.now_ns();
         self.times.add(now_ns - began_ns);

@@ -4,9 +4,10 @@ use super::{CocMaker, Finish};
 use crate::bokeh::{BokehError, Job};
 use crate::compute::Place;
 use crate::computing::Computing;
+use crate::depth::agreement::Agreement;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
-use crate::look::Look;
+use crate::look::{Look, Refine};
 use crate::optics::CocField;
 
 /// A depth map for one picture.
@@ -17,8 +18,49 @@ pub enum Depth {
     Final(DepthMap),
 }
 
+/// Why a depth map does not fit its picture as it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Misfit {
+    /// It has fewer pixels.
+    Smaller {
+        /// Columns and rows.
+        size: (u32, u32),
+    },
+    /// Its outlines lie beside those of the picture.
+    Beside {
+        /// By so many pixels of the picture.
+        distance_px: u32,
+    },
+    /// Its outlines have nothing to do with the picture's.
+    Unrelated,
+}
+
+impl Misfit {
+    /// Of the measured depth `map` and its picture, if there is any.
+    pub fn of(map: &DepthMap, color: &ColorImage) -> Option<Self> {
+        match Agreement::of(map, color) {
+            Agreement::Unrelated => Some(Self::Unrelated),
+            _ if map.width < color.width => Some(Self::Smaller { size: map.size() }),
+            Agreement::Beside { distance_px } => Some(Self::Beside { distance_px }),
+            Agreement::Meets | Agreement::Unknown => None,
+        }
+    }
+
+    /// What mends it: see [`Refiner::from_coarse`](crate::depth::refine::Refiner::from_coarse).
+    fn finish(self, color: &ColorImage) -> Finish {
+        // At each scale, edges move by some three pixels.
+        let coarsest = match self {
+            Self::Unrelated => return Finish::Fill,
+            Self::Smaller { size } => color.width.div_ceil(size.0.max(1)),
+            Self::Beside { distance_px } => distance_px.div_ceil(3),
+        };
+        Finish::Refine { coarsest }
+    }
+}
+
 /// What `color` is blurred by: the circle of confusion of every pixel, and the depth map if that follows depth. A
-/// measured map is returned with its holes filled, and refined if the look asks for it.
+/// measured map is returned with its holes filled, and refined if the look asks for it; or where it leaves that open and
+/// the map does not fit the picture.
 ///
 /// # Errors
 /// [`BokehError::NoDepth`] when the blur follows depth and there is none.
@@ -28,7 +70,11 @@ pub fn coc_and_depth(
     depth: Option<Depth>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
     let (finish, map) = match depth {
-        Some(Depth::Measured(map)) => (Finish::measured(look.refines(false)), Some(map)),
+        Some(Depth::Measured(map)) => {
+            let misfit = if look.refine == Refine::Off { None } else { Misfit::of(&map, color) };
+            let plain = Finish::measured(look.refines(false));
+            (misfit.map_or(plain, |misfit| misfit.finish(color)), Some(map))
+        }
         Some(Depth::Final(map)) => (Finish::Keep, Some(map)),
         None => (Finish::Keep, None),
     };

@@ -20,6 +20,7 @@ use self::smooth::Smoother;
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
+use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
 
 /// A step of inverse depth from here on is an edge: 0.6 px of CoC at a radius of 10 px at infinity; less shows no edge
@@ -45,6 +46,20 @@ pub struct Refiner {
     aligner: Aligner,
     temporal: TemporalFilter,
     focus: Focus,
+    coarsest: Coarsest,
+    /// The picture, reduced.
+    reduced: ColorImage,
+    fit: Fit,
+}
+
+/// The scale at which refinement begins: one pixel for so many of the picture, each way.
+#[derive(Clone, Copy, Debug)]
+struct Coarsest(u32);
+
+impl Default for Coarsest {
+    fn default() -> Self {
+        Self(1)
+    }
 }
 
 /// The distance in focus, in metres. Inverse depth is this over the depth, so that equal steps of it blur equally.
@@ -63,6 +78,13 @@ impl Refiner {
         Self::default()
     }
 
+    /// Refines from a scale on at which `coarsest` pixels of the picture, each way, are one, and halves it until it is that of
+    /// the picture. At each scale an edge moves by a few pixels, so that edges are found that are `coarsest` times as far
+    /// off. For pictures on their own: frames are only compared with earlier ones where this is 1.
+    pub fn from_coarse(coarsest: u32) -> Self {
+        Self { coarsest: Coarsest(coarsest.clamp(1, 1 << 5).next_power_of_two()), ..Self::default() }
+    }
+
     /// What is in focus from the next frame on, in metres: for a street, a step of depth counts less than for a desk. A
     /// metre before the first call.
     pub fn set_focus(&mut self, focus_m: f32) {
@@ -76,6 +98,21 @@ impl Refiner {
     /// A frame that does not follow the one before (another size, a seek, a gap) starts anew. Where no depth was ever
     /// known, the map stays unknown (0) everywhere.
     pub fn refine(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
+        let mut scale = self.coarsest.0;
+        while scale > 1 {
+            let size = |side: u32| side.div_ceil(scale);
+            let mut reduced = std::mem::take(&mut self.reduced);
+            reduced.resize(size(color.width), size(color.height));
+            self.fit.fit(color, &mut reduced);
+            self.refine_at(map, &reduced, time_ns);
+            self.reduced = reduced;
+            scale /= 2;
+        }
+        self.refine_at(map, color, time_ns);
+    }
+
+    /// Refines `map` at the size of `color`.
+    fn refine_at(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
         self.upsampler.resize(map, color.size());
         self.unknown.clear();
         self.unknown.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));

@@ -3,6 +3,7 @@
 mod debug;
 mod debug_pictures;
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -20,9 +21,12 @@ use crate::cli::terminal;
 use crate::compute::Backend;
 use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
-use crate::look::{ApertureName, Look, Strength};
+use crate::look::{ApertureName, Look, Refine, Strength};
 use crate::optics::StereoRig;
-use crate::pipeline::{self, still::Depth};
+use crate::pipeline::{
+    self,
+    still::{Depth, Misfit},
+};
 use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::recording::{Extras, snapshot};
 use crate::source::{self, DepthChoice, DepthFrom};
@@ -90,7 +94,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     let look = look::look(&command.blur, &command.computing.quality)?;
     let (color, extras, depth) = read(command, &look)?;
     let look = source::fitting_look(&look, &command.blur.depth, depth.is_some())?;
-    command.warn(&look, color.size(), depth.as_ref(), given);
+    command.warn(&look, &color, depth.as_ref(), given);
     let computing = command.computing.choice();
     make_folder_of(&command.out)?;
     let (result, executor) = match &command.debug_dir {
@@ -105,7 +109,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     still::write_photo(&command.out, &result, &extras, command.output.force)?;
     if !global.quiet {
         if !extras.left_behind.is_empty() {
-            terminal::say(&format!("note: not in {}: {}", command.out.display(), extras.left_behind.join(", ")));
+            log::note(&format!("not in {}: {}", command.out.display(), extras.left_behind.join(", ")));
         }
         terminal::say(&format!("{}: written ({executor})", command.out.display()));
     }
@@ -114,7 +118,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
 
 impl RenderCommand {
     /// Warns of settings without effect, and of a focus outside the depth of the picture.
-    fn warn(&self, look: &Look, size: (u32, u32), depth: Option<&Depth>, given: &Given) {
+    fn warn(&self, look: &Look, color: &ColorImage, depth: Option<&Depth>, given: &Given) {
         let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
         let in_units = self.depth_map.as_ref().is_some_and(in_units);
         let uses_depth = look.effect.follows_depth();
@@ -140,9 +144,32 @@ impl RenderCommand {
             Some(_) if self.depth_map.is_some() && !uses_depth => {
                 log::warn("--depth-map has no effect: the effect does not use depth");
             }
-            Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, size, map, in_units),
+            Some(Depth::Measured(map) | Depth::Final(map)) => focus::warn_of_focus(look, color.size(), map, in_units),
             None => {}
         }
+        if let (Some(Depth::Measured(map)), Some(file), true) = (depth, &self.depth_map, uses_depth) {
+            say_of_misfit(&file.display(), look, map, color);
+        }
+    }
+}
+
+/// Says how a depth map does not fit its picture, and what is done about it.
+fn say_of_misfit(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
+    let how = match Misfit::of(map, color) {
+        Some(Misfit::Unrelated) => {
+            return log::warn(&format!(
+                "{file}: nowhere do its outlines meet those of the picture: it may be the depth of another one, or of a \
+                 camera beside it that is not registered to the colours"
+            ));
+        }
+        Some(Misfit::Smaller { size: (width, height) }) => format!("it has {width} x {height} pixels"),
+        Some(Misfit::Beside { distance_px }) => {
+            format!("its outlines lie about {distance_px} px beside those of the picture")
+        }
+        None => return,
+    };
+    if look.refine == Refine::Auto {
+        log::note(&format!("{file}: refined, as {how}; --refine off takes it as it is"));
     }
 }
 
