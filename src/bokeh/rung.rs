@@ -79,7 +79,6 @@ pub const LADDER: [Rung; Quality::ALL.len()] = {
             scale_from_px: [0.0, 8.0, 32.0, 80.0],
             even_rank: 6,
             even_radius_px: 96.0,
-            ..fast
         },
     ]
 };

@@ -12,8 +12,12 @@ use crate::frame::{ColorImage, DepthMap};
 /// Pixels to either side of a jump that are looked at, in a picture that is reduced to at most [`MOST_COLUMNS`].
 const REACH: usize = 12;
 const MOST_COLUMNS: usize = 640;
-/// A jump is spread over at most so many pixels to either side: estimated depth is smooth.
-const SPREAD: usize = 5;
+/// A jump is spread over at most so many pixels to either side: estimated depth is smooth. At its ends there is less than
+/// this share of its steepest change, or it is a slope.
+const SPREAD: usize = 10;
+const END: f32 = 0.3;
+/// From this mean width on, in pixels, outlines are soft.
+const SOFT_PX: f32 = 4.0;
 /// Least step of a jump, as a share of the inverse depth of near things.
 const JUMP: f32 = 0.1;
 /// Where luma changes less than this from pixel to pixel (of 255), there is nothing to be seen.
@@ -34,10 +38,16 @@ pub enum Agreement {
     Unknown,
     /// They meet.
     Meets,
-    /// The picture's edges lie so many pixels of the picture beside the depth's, on average.
+    /// The picture's edges lie beside the depth's.
     Beside {
-        /// At least one, rounded.
-        distance_px: u32,
+        /// How far outside the depth's, seen from the nearer surface, on average; negative, inside: near things are fat. In
+        /// pixels of the picture, rounded, not 0.
+        distance_px: i32,
+    },
+    /// They meet, but the depth goes from one surface to the other over so many pixels of the picture, on average.
+    Soft {
+        /// Several.
+        width_px: u32,
     },
     /// Nowhere near the depth's outlines has the picture more edges than elsewhere.
     Unrelated,
@@ -50,6 +60,7 @@ struct Lines {
     luma: Vec<f32>,
     /// One over the depth in metres; where none was measured, as if the farther surface beside it went on.
     inverse: Vec<f32>,
+    known: Vec<bool>,
 }
 
 impl Agreement {
@@ -62,27 +73,48 @@ impl Agreement {
         let mut near = lines.inverse.clone();
         let at = near.len() * 19 / 20;
         let jump = JUMP * *near.select_nth_unstable_by(at, f32::total_cmp).1;
-        let (mut profile, mut jumps) = ([0.0; 2 * REACH + 1], 0);
+        let (mut all, mut measured) = (Outlines::default(), Outlines::default());
         for y in (0..lines.height).step_by(2) {
-            lines.scan((y * lines.width, 1, lines.width), jump, &mut profile, &mut jumps);
+            lines.scan((y * lines.width, 1, lines.width), jump, [&mut all, &mut measured]);
         }
         for x in (0..lines.width).step_by(2) {
-            lines.scan((x, lines.width, lines.height), jump, &mut profile, &mut jumps);
+            lines.scan((x, lines.width, lines.height), jump, [&mut all, &mut measured]);
         }
-        if jumps < LEAST_JUMPS {
-            return Self::Unknown;
-        }
-        // Over three places, as edges are.
-        let smooth = |at: usize| (profile[at - 1] + profile[at] + profile[at + 1]) / (3 * jumps) as f32;
-        let best = (1..2 * REACH).max_by(|&a, &b| smooth(a).total_cmp(&smooth(b))).unwrap_or(REACH);
-        let distance_px = best.abs_diff(REACH) as f32 * color.width as f32 / lines.width as f32;
-        match (smooth(REACH), smooth(best)) {
-            (_, peak) if peak < FLAT => Self::Unrelated,
-            (middle, peak) if peak >= PEAK && middle < OFF * peak => {
-                Self::Beside { distance_px: (distance_px.round() as u32).max(1) }
+        // One pixel of the reduced picture, in pixels of the picture.
+        let scale = color.width as f32 / lines.width as f32;
+        match (all.peak(), measured.peak()) {
+            (Some((_, _, peak)), _) if peak < FLAT => Self::Unrelated,
+            (_, Some((at_px, middle, peak))) if peak >= PEAK && middle < OFF * peak => {
+                Self::Beside { distance_px: ((at_px * scale).abs().ceil() * at_px.signum()) as i32 }
             }
-            _ => Self::Meets,
+            (_, Some(_)) => match measured.widths_px / measured.jumps as f32 {
+                width_px if width_px >= SOFT_PX => Self::Soft { width_px: (width_px * scale).round() as u32 },
+                _ => Self::Meets,
+            },
+            (Some(_), None) => Self::Meets,
+            (None, None) => Self::Unknown,
         }
+    }
+}
+
+/// What was found at the jumps.
+#[derive(Default)]
+struct Outlines {
+    /// Sum of the changes of luma around a jump, each relative to the mean there, from its near side to its far one.
+    profile: [f32; 2 * REACH + 1],
+    jumps: u32,
+    /// Sum of the widths of the jumps: their heights over their steepest changes.
+    widths_px: f32,
+}
+
+impl Outlines {
+    /// Where the profile has its peak, in pixels from the jump towards the far side; its middle, and that peak, both over
+    /// three places, as edges are. `None` if there are too few jumps to tell.
+    fn peak(&self) -> Option<(f32, f32, f32)> {
+        let smooth = |at: usize| self.profile[at - 1..=at + 1].iter().sum::<f32>() / (3 * self.jumps) as f32;
+        let best = (1..2 * REACH).max_by(|&a, &b| smooth(a).total_cmp(&smooth(b)))?;
+        let enough = self.jumps >= LEAST_JUMPS;
+        enough.then(|| (best as f32 - REACH as f32, smooth(REACH), smooth(best)))
     }
 }
 
@@ -110,31 +142,30 @@ impl Lines {
                 reduced.metres.push(map.metres[depth + middle(x, width, map.width as usize)]);
             }
         }
+        let known = reduced.metres.iter().map(|&z_m| DepthMap::is_known(z_m)).collect();
         Filler::new().fill(&mut reduced);
         let inverse_of = |&z_m: &f32| if DepthMap::is_known(z_m) { z_m.recip() } else { 0.0 };
         let inverse = reduced.metres.iter().map(inverse_of).collect();
-        Self { width, height, luma, inverse }
+        Self { width, height, luma, inverse, known }
     }
 
-    /// Adds the jumps of a line of `len` pixels, `step` apart, to the profile.
-    fn scan(
-        &self,
-        (first, step, len): (usize, usize, usize),
-        jump: f32,
-        profile: &mut [f32; 2 * REACH + 1],
-        jumps: &mut u32,
-    ) {
-        let change = |at: usize| (self.inverse[first + (at + 1) * step] - self.inverse[first + at * step]).abs();
+    /// Adds the jumps of a line of `len` pixels, `step` apart, that are at least `jump` high: to the first all, to the second
+    /// those that were measured. In a hole, which every sensor has beside a near thing, the jump is where nobody knows.
+    fn scan(&self, (first, step, len): (usize, usize, usize), jump: f32, [all, measured]: [&mut Outlines; 2]) {
+        let inverse = |at: usize| self.inverse[first + at * step];
+        let change = |at: usize| (inverse(at + 1) - inverse(at)).abs();
         let mut at = REACH;
         while at + REACH + 1 < len {
             let here = at;
             at += 1;
-            let [before, after] = [here - SPREAD, here + SPREAD + 1].map(|at| self.inverse[first + at * step]);
-            if (after - before).abs() < jump || change(here) == 0.0 {
-                continue;
-            }
-            let around = here - SPREAD..here + SPREAD + 1;
-            if around.clone().any(|at| change(at) > change(here)) {
+            let (before, after) = (inverse(here - SPREAD), inverse(here + SPREAD + 1));
+            let (height, steepest) = ((after - before).abs(), change(here));
+            let is_slope = || change(here - SPREAD).max(change(here + SPREAD)) > END * steepest;
+            if height < jump
+                || height == 0.0
+                || (here - SPREAD..=here + SPREAD).any(|at| change(at) > steepest)
+                || is_slope()
+            {
                 continue;
             }
             let mut changes = [0.0; 2 * REACH + 1];
@@ -149,8 +180,12 @@ impl Lines {
             if after > before {
                 changes.reverse();
             }
-            profile.iter_mut().zip(&changes).for_each(|(sum, change)| *sum += change / mean);
-            *jumps += 1;
+            let is_measured = (here - SPREAD..=here + SPREAD + 1).all(|at| self.known[first + at * step]);
+            for outlines in [Some(&mut *all), is_measured.then_some(&mut *measured)].into_iter().flatten() {
+                outlines.profile.iter_mut().zip(&changes).for_each(|(sum, change)| *sum += change / mean);
+                outlines.jumps += 1;
+                outlines.widths_px += height / steepest;
+            }
             at = here + SPREAD;
         }
     }

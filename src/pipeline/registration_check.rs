@@ -30,7 +30,7 @@ impl RegistrationCheck {
         match Agreement::of(map, color) {
             Agreement::Unknown => {}
             Agreement::Unrelated => self.unrelated += 1,
-            Agreement::Meets | Agreement::Beside { .. } => self.frames = LAST,
+            Agreement::Meets | Agreement::Beside { .. } | Agreement::Soft { .. } => self.frames = LAST,
         }
         let fails = self.unrelated == DECISION;
         if fails {

@@ -5,6 +5,7 @@ use crate::bokeh::{BokehError, Job};
 use crate::compute::Place;
 use crate::computing::Computing;
 use crate::depth::agreement::Agreement;
+use crate::depth::refine;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::look::{Look, Refine};
@@ -19,42 +20,38 @@ pub enum Depth {
 }
 
 /// Why a depth map does not fit its picture as it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Misfit {
-    /// It has fewer pixels.
-    Smaller {
-        /// Columns and rows.
-        size: (u32, u32),
-    },
-    /// Its outlines lie beside those of the picture.
-    Beside {
-        /// By so many pixels of the picture.
-        distance_px: u32,
-    },
-    /// Its outlines have nothing to do with the picture's.
-    Unrelated,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misfit {
+    /// Its columns and rows, where it has fewer than the picture.
+    pub smaller: Option<(u32, u32)>,
+    /// How its outlines and those of the picture lie.
+    pub outlines: Agreement,
 }
 
 impl Misfit {
     /// Of the measured depth `map` and its picture, if there is any.
     pub fn of(map: &DepthMap, color: &ColorImage) -> Option<Self> {
-        match Agreement::of(map, color) {
-            Agreement::Unrelated => Some(Self::Unrelated),
-            _ if map.width < color.width => Some(Self::Smaller { size: map.size() }),
-            Agreement::Beside { distance_px } => Some(Self::Beside { distance_px }),
-            Agreement::Meets | Agreement::Unknown => None,
-        }
+        let smaller = (map.width < color.width).then(|| map.size());
+        let outlines = Agreement::of(map, color);
+        let fits = smaller.is_none() && matches!(outlines, Agreement::Meets | Agreement::Unknown);
+        (!fits).then_some(Self { smaller, outlines })
     }
 
-    /// What mends it: see [`Refiner::from_coarse`](crate::depth::refine::Refiner::from_coarse).
-    fn finish(self, color: &ColorImage) -> Finish {
+    /// Mends what colours cannot, and returns at which scale they may begin to find the outlines
+    /// ([`Refiner::from_coarse`](crate::depth::refine::Refiner::from_coarse)); `None`: they do not know.
+    fn mend(self, map: &mut DepthMap, color: &ColorImage) -> Option<u32> {
+        let mut outlines = self.outlines;
+        if let Agreement::Beside { distance_px } = outlines {
+            refine::move_outlines(map, distance_px * map.width as i32 / color.width as i32);
+            outlines = Agreement::of(map, color);
+        }
         // At each scale, edges move by some three pixels.
-        let coarsest = match self {
-            Self::Unrelated => return Finish::Fill,
-            Self::Smaller { size } => color.width.div_ceil(size.0.max(1)),
-            Self::Beside { distance_px } => distance_px.div_ceil(3),
-        };
-        Finish::Refine { coarsest }
+        let of_size = self.smaller.map_or(1, |(width, _)| color.width.div_ceil(width.max(1)));
+        match outlines {
+            Agreement::Unrelated => None,
+            Agreement::Soft { width_px } => Some(width_px.div_ceil(3).max(of_size)),
+            Agreement::Meets | Agreement::Unknown | Agreement::Beside { .. } => Some(of_size),
+        }
     }
 }
 
@@ -70,10 +67,11 @@ pub fn coc_and_depth(
     depth: Option<Depth>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
     let (finish, map) = match depth {
-        Some(Depth::Measured(map)) => {
+        Some(Depth::Measured(mut map)) => {
             let misfit = if look.refine == Refine::Off { None } else { Misfit::of(&map, color) };
+            let coarsest = misfit.and_then(|misfit| misfit.mend(&mut map, color));
             let plain = Finish::measured(look.refines(false));
-            (misfit.map_or(plain, |misfit| misfit.finish(color)), Some(map))
+            (coarsest.map_or(plain, |coarsest| Finish::Refine { coarsest }), Some(map))
         }
         Some(Depth::Final(map)) => (Finish::Keep, Some(map)),
         None => (Finish::Keep, None),

@@ -7,6 +7,7 @@
 //! *Accuracy and resolution of Kinect depth data*, 2012).
 
 mod align;
+mod outlines;
 mod planes;
 mod smooth;
 mod temporal;
@@ -14,6 +15,8 @@ mod upsample;
 mod votes;
 
 use pulp::Arch;
+
+pub use self::outlines::move_outlines;
 
 use self::align::Aligner;
 use self::smooth::Smoother;

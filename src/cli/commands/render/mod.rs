@@ -19,6 +19,7 @@ use crate::cli::settings::unused;
 use crate::cli::settings::unused::From;
 use crate::cli::terminal;
 use crate::compute::Backend;
+use crate::depth::agreement::Agreement;
 use crate::files::place;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::{ApertureName, Look, Refine, Strength};
@@ -155,21 +156,25 @@ impl RenderCommand {
 
 /// Says how a depth map does not fit its picture, and what is done about it.
 fn say_of_misfit(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
-    let how = match Misfit::of(map, color) {
-        Some(Misfit::Unrelated) => {
+    let Some(Misfit { smaller, outlines }) = Misfit::of(map, color) else { return };
+    let smaller = smaller.map(|(width, height)| format!("it has {width} x {height} pixels"));
+    let outlines = match outlines {
+        Agreement::Unrelated => {
             return log::warn(&format!(
                 "{file}: nowhere do its outlines meet those of the picture: it may be the depth of another one, or of a \
                  camera beside it that is not registered to the colours"
             ));
         }
-        Some(Misfit::Smaller { size: (width, height) }) => format!("it has {width} x {height} pixels"),
-        Some(Misfit::Beside { distance_px }) => {
-            format!("its outlines lie about {distance_px} px beside those of the picture")
+        Agreement::Beside { distance_px } => {
+            let side = if distance_px < 0 { "outside" } else { "inside" };
+            Some(format!("its outlines lie about {} px {side} those of the picture", distance_px.abs()))
         }
-        None => return,
+        Agreement::Soft { width_px } => Some(format!("its outlines are about {width_px} px wide")),
+        Agreement::Meets | Agreement::Unknown => None,
     };
     if look.refine == Refine::Auto {
-        log::note(&format!("{file}: refined, as {how}; --refine off takes it as it is"));
+        let reasons: Vec<String> = smaller.into_iter().chain(outlines).collect();
+        log::note(&format!("{file}: refined, as {}; --refine off takes it as it is", reasons.join(" and ")));
     }
 }
 
