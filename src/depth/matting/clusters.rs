@@ -11,7 +11,10 @@ const CELL_PX: usize = 8;
 /// So many cells in every direction are looked at; more where they have nothing of a surface, as at the tips of hair.
 const REACHES_CELLS: [usize; 3] = [1, 2, 5];
 /// Pixels at an edge may be mixed themselves. They count so little that they matter only where nothing is pure.
-const AT_EDGE_WEIGHT: f32 = 0.02;
+const AT_EDGE_WEIGHT: f32 = 4e-4;
+/// So many pixels beside an edge, too, the map may be wrong: they count less than those further away.
+const CLOSE_PX: usize = 3;
+const CLOSE_WEIGHT: f32 = 0.02;
 /// A cluster's weight falls to an eighth at this distance, in pixels; its long tail reaches hair.
 const HALF_PX: f32 = 6.0;
 
@@ -195,7 +198,8 @@ fn split(view: &View, column: usize, row: usize) -> [Cluster; 2] {
     let one = high - low <= jump;
     let tolerance = if one { 2.0 * jump } else { jump };
     let mut clusters = [Cluster::default(); 2];
-    for y in ys {
+    let close = close_to_edge(view, xs.start, ys.start);
+    for (y, close) in ys.zip(close) {
         // Every other pixel, as on a chessboard, tells enough.
         for x in (xs.start + y % 2..xs.end).step_by(2) {
             let at = y * width + x;
@@ -205,7 +209,11 @@ fn split(view: &View, column: usize, row: usize) -> [Cluster; 2] {
                 continue;
             }
             let cluster = &mut clusters[far];
-            let weight = if at_edge[at] { AT_EDGE_WEIGHT } else { 1.0 };
+            let weight = match close >> (x - xs.start) & 1 {
+                _ if at_edge[at] => AT_EDGE_WEIGHT,
+                0 => 1.0,
+                _ => CLOSE_WEIGHT,
+            };
             let light = view.light(at);
             cluster.weight += weight;
             cluster.x += weight * x as f32;
@@ -224,4 +232,20 @@ fn split(view: &View, column: usize, row: usize) -> [Cluster; 2] {
         (cluster.x, cluster.y, cluster.inverse) = (scale * cluster.x, scale * cluster.y, scale * cluster.inverse);
     }
     clusters
+}
+
+/// Which pixels of the rows of a cell are at an edge or close to one, a bit for each.
+fn close_to_edge(view: &View, left: usize, top: usize) -> [u32; CELL_PX] {
+    let (width, height) = view.size;
+    let mut rows = [0u32; CELL_PX + 2 * CLOSE_PX];
+    for (k, row) in rows.iter_mut().enumerate() {
+        let Some(y) = (top + k).checked_sub(CLOSE_PX).filter(|&y| y < height) else { continue };
+        let columns = left.saturating_sub(CLOSE_PX)..(left + CELL_PX + CLOSE_PX).min(width);
+        let shift = columns.start + CLOSE_PX - left;
+        let bits = view.at_edge[y * width + columns.start..y * width + columns.end].iter().enumerate();
+        let edges = bits.fold(0, |bits, (x, &at_edge)| bits | u32::from(at_edge) << (x + shift));
+        // The bit of column `left` of the cell is that of its first `2 CLOSE_PX + 1` columns.
+        *row = (0..=2 * CLOSE_PX).fold(0, |close, by| close | edges >> by);
+    }
+    std::array::from_fn(|k| rows[k..=k + 2 * CLOSE_PX].iter().fold(0, |close, row| close | row))
 }

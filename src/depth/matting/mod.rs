@@ -11,7 +11,7 @@ mod share;
 use std::ops::Range;
 
 use crate::color::srgb_to_linear;
-use crate::frame::{ColorImage, DepthMap, MixedPixel};
+use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
 use clusters::{Clusters, View};
 use share::{Evidence, Labels, Prior};
@@ -76,7 +76,7 @@ impl Default for Matting {
 
 impl Matting {
     /// Finds the mixed pixels of a map as large as its picture, beside jumps of inverse depth of more than `jump`, in 1/m.
-    /// Of another size, or where `jump` is not finite, it has none.
+    /// Of another size, or where `jump` is not finite, or with more edges than [`Matte::most`], it has none.
     pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, jump: f32) {
         map.matte.pixels.clear();
         if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
@@ -84,6 +84,11 @@ impl Matting {
         }
         pulp::Arch::new().dispatch(Survey { matting: self, map, jump });
         let size = (map.width as usize, map.height as usize);
+        let most = Matte::most(size.0, size.1);
+        if self.edges.len() > most {
+            // Noise: so many edges no picture has.
+            return;
+        }
         self.clusters.clear(size);
         self.evidence.clear();
         let Self { light, inverse, at_edge, edges, clusters, evidence, .. } = self;
@@ -95,7 +100,7 @@ impl Matting {
         }));
         let prior = Prior::of(&self.evidence);
         let on_edges = self.evidence.len();
-        self.trace(size, jump, &prior, &color.rgb);
+        self.trace((size, most), jump, &prior, &color.rgb);
         let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
         let view = View { size, inverse, jump, at_edge, rgb: &color.rgb, light };
         map.matte.pixels.extend(evidence.iter().filter_map(|evidence| {
@@ -116,11 +121,12 @@ impl Matting {
     }
 
     /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near
-    /// though the map has none there, to neighbours that do so, too (hysteresis, as edges are traced).
-    fn trace(&mut self, size: (usize, usize), jump: f32, prior: &Prior, rgb: &[u8]) {
+    /// though the map has none there, to neighbours that do so, too (hysteresis, as edges are traced); no further where there
+    /// are `most` pixels already.
+    fn trace(&mut self, (size, most): ((usize, usize), usize), jump: f32, prior: &Prior, rgb: &[u8]) {
         let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
         let (mut from, mut steps) = (0, 0);
-        while from < evidence.len() && steps < MOST_STEPS {
+        while from < evidence.len() && evidence.len() < most && steps < MOST_STEPS {
             let end = evidence.len();
             for k in from..end {
                 let Evidence { edge, labels, .. } = evidence[k];
