@@ -6,7 +6,9 @@ use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Job, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
-use bokehcam::depth::{fill::Filler, refine::Refiner};
+use bokehcam::depth::fill::Filler;
+use bokehcam::depth::matting::{self, Matting};
+use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
@@ -37,6 +39,8 @@ pub enum Method {
     Scatter,
     /// See [`rivals::gaussian`].
     Gaussian,
+    /// See [`rivals::blended`].
+    Blended,
     /// This crate's layers, by default on the depth map as it is but for its holes.
     Layered(Quality),
     /// This crate's layers at the default quality, on depth that was refined first: what a recording gets.
@@ -46,8 +50,8 @@ pub enum Method {
 impl Method {
     /// All methods, in the order in which they are shown.
     pub fn all() -> Vec<Method> {
-        use Method::{Gather, Gather3, Gaussian, GoldenAngle, NearFocusFar, None, Scatter};
-        let others = [None, Gaussian, Gather3, Gather, NearFocusFar, GoldenAngle, Scatter];
+        use Method::{Blended, Gather, Gather3, Gaussian, GoldenAngle, NearFocusFar, None, Scatter};
+        let others = [None, Gaussian, Blended, Gather3, Gather, NearFocusFar, GoldenAngle, Scatter];
         others.into_iter().chain(Quality::ALL.map(Method::Layered)).chain([Method::Refined]).collect()
     }
 
@@ -61,6 +65,7 @@ impl Method {
             Method::NearFocusFar => "near-focus-far",
             Method::Scatter => "scatter",
             Method::Gaussian => "gaussian",
+            Method::Blended => "blended",
             Method::Layered(quality) => quality.name(),
             Method::Refined => "refined",
         }
@@ -112,6 +117,7 @@ pub struct Blurrer {
     bokeh: Option<Box<dyn Bokeh>>,
     filler: Filler,
     refiner: Refiner,
+    matting: Matting,
     time_ns: u64,
 }
 
@@ -148,7 +154,7 @@ impl Blurrer {
     }
 
     fn of(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
-        Self { method, bokeh, filler: Filler::new(), refiner: Refiner::new(), time_ns: 0 }
+        Self { method, bokeh, filler: Filler::new(), refiner: Refiner::new(), matting: Matting::default(), time_ns: 0 }
     }
 
     /// The blurred picture.
@@ -162,6 +168,7 @@ impl Blurrer {
             Method::None => Ok(shot.image.clone()),
             Method::GoldenAngle => rival(&|| rivals::golden_angle(&light(), &shot.coc())),
             Method::NearFocusFar => rival(&|| rivals::near_focus_far(&light(), &shot.coc())),
+            Method::Blended => rival(&|| rivals::blended(&light(), &shot.coc())),
             Method::Gaussian => rival(&|| rivals::gaussian(&light(), &shot.coc())),
             Method::Scatter => rival(&|| rivals::scatter(&light(), &shot.coc(), &shot.aperture.shape)),
             // The gathers get what the other rivals get, the layers what the product makes of the depth map.
@@ -173,15 +180,21 @@ impl Blurrer {
             Method::Layered(_) => {
                 let mut depth = shot.depth.clone();
                 self.filler.fill_guided(&mut depth, &shot.image);
-                self.run(shot, depth)
+                self.layered(shot, depth)
             }
             Method::Refined => {
                 let mut depth = shot.depth.clone();
                 self.refiner.refine(&mut depth, &shot.image, self.time_ns);
                 self.time_ns += PERIOD_NS;
-                self.run(shot, depth)
+                self.layered(shot, depth)
             }
         }
+    }
+
+    /// The layers, with the matte that every source gets.
+    fn layered(&mut self, shot: &Shot, mut depth: DepthMap) -> Result<ColorImage, BokehError> {
+        self.matting.find(&mut depth, &shot.image, shot.lens.inverse_depth_of_px(matting::FROM_PX));
+        self.run(shot, depth)
     }
 
     fn run(&mut self, shot: &Shot, depth: DepthMap) -> Result<ColorImage, BokehError> {

@@ -102,6 +102,45 @@ pub fn gaussian(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
     .map(|[r, g, b, _]| [r, g, b])
 }
 
+/// Depth-aware blending of smoothed images: the picture and three Gaussian-smoothed copies of it, up to the largest CoC;
+/// each pixel is a blend of the two between which its own CoC lies.
+///
+/// S. Dutta, *Depth-aware blending of smoothed images for bokeh effect generation* (2021), with the exact depth in place of
+/// the blending weights that a network makes of it.
+pub fn blended(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
+    const COPIES: usize = 3;
+    let most_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs())).max(1e-3);
+    let radius_px = |copy: usize| most_px * copy as f32 / COPIES as f32;
+    let copies: Vec<Plane<Rgb>> = (0..=COPIES)
+        .map(|copy| if copy == 0 { image.clone() } else { smoothed(image, 0.5 * radius_px(copy)) })
+        .collect();
+    Plane::from_fn(image.width, image.height, |x, y| {
+        let at = y * image.width + x;
+        let place = coc_px.data[at].abs() / most_px * COPIES as f32;
+        let below = (place as usize).min(COPIES - 1);
+        let (a, b, share) = (copies[below].data[at], copies[below + 1].data[at], place - below as f32);
+        [0, 1, 2].map(|k| a[k] + share * (b[k] - a[k]))
+    })
+}
+
+/// A Gaussian of `sigma_px`, cut at three of them, one axis after the other.
+fn smoothed(image: &Plane<Rgb>, sigma_px: f32) -> Plane<Rgb> {
+    let reach = (3.0 * sigma_px).ceil() as i32;
+    let taps: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma_px).powi(2)).exp()).collect();
+    let all: f32 = taps.iter().sum();
+    let along = |of: &Plane<Rgb>, dx: i32, dy: i32| {
+        Plane::from_fn(of.width, of.height, |x, y| {
+            let mut sum = [0.0; 3];
+            for (tap, d) in taps.iter().zip(-reach..) {
+                let color = of.at(x as i32 + d * dx, y as i32 + d * dy);
+                (0..3).for_each(|k| sum[k] += tap / all * color[k]);
+            }
+            sum
+        })
+    };
+    along(&along(image, 1, 0), 0, 1)
+}
+
 /// Classic near, focus and far layers: far pixels gathered from far pixels alone, near ones with the largest near CoC
 /// around and their own coverage, both premultiplied and stacked by `mix`.
 ///

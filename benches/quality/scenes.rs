@@ -29,7 +29,7 @@ pub struct Kind {
 }
 
 /// Every scene.
-pub const KINDS: [Kind; 15] = [
+pub const KINDS: [Kind; 16] = [
     still("wall", "a flat wall, 12 px", |_| Stage::new(14.0).wall(12.0, Pattern::Checks(24.0), 1).scene),
     still("slant", "a slanted wall, 2 to 17 px, behind a subject", |_| slant()),
     still("ground", "a ground plane through focus, -11 to 11 px", |_| ground()),
@@ -37,6 +37,9 @@ pub const KINDS: [Kind; 15] = [
     still("hair", "a head with strands of hair before a wall, 12 px", |_| hair()),
     still("fence", "a fence before the subject, -10 px", |_| fence(0)),
     still("depths", "a subject in the middle of three depths, -9, 0 and 11 px", |_| depths()),
+    still("overlook", "the focus behind two near things that hide each other, -22, -7 and 0 px, and a light", |_| {
+        overlook()
+    }),
     still("frame", "a near object cut by the frame's edge, -14 px, the world goes on", |_| frame()),
     still("weak", "weak blur, 2 to 4 px", |_| weak()),
     still("strong", "strong blur, 30 px", |_| strong()),
@@ -205,6 +208,23 @@ fn depths() -> Scene {
         .wall(11.0, Pattern::Checks(18.0), 13)
         .bust(320.0, 14)
         .cutout(-9.0, near, |p| paint(p, LEAF, Pattern::Stripes(8.0), 15))
+        .scene
+}
+
+/// A person before a hedge before a far hill in focus, and something bright elsewhere in the frame.
+fn overlook() -> Scene {
+    let hedge = |p: Vec2| 190.0 + 14.0 * (p.x / 37.0).sin() + 9.0 * (p.x / 11.0).sin() - p.y;
+    Stage::new(3.0)
+        .cutout(
+            0.0,
+            |_| -1.0,
+            |p| {
+                let lamp = disc(p, Vec2::new(590.0, 40.0), 18.0) < 0.0;
+                if lamp { [1.0; 3] } else { paint(p, SKY, Pattern::Noise, 60) }
+            },
+        )
+        .cutout(-7.0, hedge, |p| paint(p, LEAF, Pattern::Checks(9.0), 61).map(|light| 0.6 * light))
+        .cutout(-22.0, |p| bust(p, 270.0), |p| if p.y < 255.0 { face(p, 62) } else { coat(p, 62) })
         .scene
 }
 

@@ -18,6 +18,13 @@ const CLOSE_WEIGHT: f32 = 0.02;
 /// A cluster's weight falls to an eighth at this distance, in pixels; its long tail reaches hair.
 const HALF_PX: f32 = 6.0;
 
+/// The place of the cluster of the near surface's pixels at edges, after those of the near and the far surface.
+const FRINGE: usize = 2;
+/// So much of a pixel at an edge that the map gives to the near surface is that, on average.
+const FRINGE_SHARE: f32 = 0.75;
+/// From the first share down, the colour of such pixels is not that of the near surface; from the second up, it is.
+const FRINGE_SHARES: [f32; 2] = [-0.1, 0.25];
+
 /// Pixels of one surface in a cell, weighted: sums, but for the means of position and inverse depth.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cluster {
@@ -73,7 +80,8 @@ pub struct Clusters {
     down: usize,
     /// Per cell, the place of its clusters plus one; 0 where none were made yet.
     place: Vec<u32>,
-    clusters: Vec<[Cluster; 2]>,
+    /// Near, far, and what of the near surface is at edges.
+    clusters: Vec<[Cluster; 3]>,
     /// Per cell, the place of its last answer plus one: pixels side by side ask for the same.
     answered: Vec<u32>,
     answers: Vec<Answer>,
@@ -115,7 +123,7 @@ impl Clusters {
         }
         let colors = REACHES_CELLS.into_iter().find_map(|reach| self.within(view, reach, edge));
         let contrast = colors.map(|colors| {
-            self.contrasts.push(Contrast::of(colors));
+            self.contrasts.push(contrast(colors));
             self.contrasts.len() as u32 - 1
         });
         self.answers.push(Answer { near: edge.near, far: edge.far, contrast });
@@ -129,24 +137,26 @@ impl Clusters {
     }
 
     /// The same of so many cells in every direction.
-    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<[Color; 2]> {
+    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<([Color; 2], Option<Color>)> {
         // A surface's inverse depth may change on the way, but by less than would make it the other one.
         let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
         let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
         let [x, y] = [column, row].map(|cell| (cell * CELL_PX) as f32 + 0.5 * (CELL_PX - 1) as f32);
-        let mut sums = [Cluster::default(); 2];
+        let mut sums = [Cluster::default(); 3];
         for row in row.saturating_sub(reach)..(row + reach + 1).min(self.down) {
             for column in column.saturating_sub(reach)..(column + reach + 1).min(self.across) {
-                for cluster in self.of_cell(view, (column, row)) {
+                for (k, cluster) in self.of_cell(view, (column, row)).into_iter().enumerate() {
                     let is_near = edge.is_near(cluster.inverse);
+                    let is_fringe = k == FRINGE;
                     let surface = if is_near { edge.near } else { edge.far };
-                    if cluster.weight <= 0.0 || (cluster.inverse - surface).abs() > tolerance {
+                    let is_other = (cluster.inverse - surface).abs() > tolerance || is_fringe && !is_near;
+                    if cluster.weight <= 0.0 || is_other {
                         continue;
                     }
                     let square = (cluster.x - x) * (cluster.x - x) + (cluster.y - y) * (cluster.y - y);
                     let falloff = 1.0 / (1.0 + square / (HALF_PX * HALF_PX));
                     let weight = falloff * falloff * falloff;
-                    let sum = &mut sums[usize::from(!is_near)];
+                    let sum = &mut sums[if is_fringe { FRINGE } else { usize::from(!is_near) }];
                     sum.weight += weight * cluster.weight;
                     for (sum, light) in sum.light.iter_mut().zip(cluster.light) {
                         *sum += weight * light;
@@ -157,10 +167,11 @@ impl Clusters {
                 }
             }
         }
-        sums.iter().all(|sum| sum.weight > 0.0).then(|| sums.map(|sum| sum.color()))
+        let [near, far, fringe] = sums.map(|sum| (sum.weight > 0.0).then(|| sum.color()));
+        Some(([near?, far?], fringe))
     }
 
-    fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> [Cluster; 2] {
+    fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> [Cluster; 3] {
         let place = &mut self.place[row * self.across + column];
         if *place == 0 {
             self.clusters.push(split(view, column, row));
@@ -171,6 +182,19 @@ impl Clusters {
 }
 
 impl Cluster {
+    fn add(&mut self, weight: f32, (x, y): (usize, usize), inverse: f32, light: [f32; 3]) {
+        self.weight += weight;
+        self.x += weight * x as f32;
+        self.y += weight * y as f32;
+        self.inverse += weight * inverse;
+        for (sum, light) in self.light.iter_mut().zip(light) {
+            *sum += weight * light;
+        }
+        for (sum, square) in self.squares.iter_mut().zip(outer(light)) {
+            *sum += weight * square;
+        }
+    }
+
     fn color(&self) -> Color {
         let mean = self.light.map(|light| light / self.weight);
         let (squares, of_mean) = (self.squares, outer(mean));
@@ -178,9 +202,25 @@ impl Cluster {
     }
 }
 
+/// The contrast of the colours of two surfaces. What `fringe` has, the pixels at edges that the map gives to the near one, is
+/// mostly that surface. If its colour says otherwise, the near surface has other colours here than where its pixels are
+/// pure, as hair beside a face has: then it has those of the fringe, less the far surface that is mixed in.
+fn contrast(([near, far], fringe): ([Color; 2], Option<Color>)) -> Contrast {
+    let pure = Contrast::of([near, far]);
+    let Some(fringe) = fringe else { return pure };
+    let other = ((FRINGE_SHARES[1] - pure.share(fringe.mean)) / (FRINGE_SHARES[1] - FRINGE_SHARES[0])).clamp(0.0, 1.0);
+    if other <= 0.0 {
+        return pure;
+    }
+    let own = |p: usize| (far.mean[p] + (fringe.mean[p] - far.mean[p]) / FRINGE_SHARE).clamp(0.0, 1.0);
+    let mean = std::array::from_fn(|p| near.mean[p] + other * (own(p) - near.mean[p]));
+    let covariance = std::array::from_fn(|k| near.covariance[k] + other * (fringe.covariance[k] - near.covariance[k]));
+    Contrast::of([Color { mean, covariance }, far])
+}
+
 /// The clusters of a cell: one where inverse depths differ by no more than `jump`, or else those of its nearest and of its
 /// farthest surface.
-fn split(view: &View, column: usize, row: usize) -> [Cluster; 2] {
+fn split(view: &View, column: usize, row: usize) -> [Cluster; 3] {
     let View { size: (width, height), inverse, jump, at_edge, .. } = *view;
     let (xs, ys) =
         (column * CELL_PX..((column + 1) * CELL_PX).min(width), row * CELL_PX..((row + 1) * CELL_PX).min(height));
@@ -197,9 +237,9 @@ fn split(view: &View, column: usize, row: usize) -> [Cluster; 2] {
     let (high, low) = if pure.0 >= pure.1 { pure } else { all };
     let one = high - low <= jump;
     let tolerance = if one { 2.0 * jump } else { jump };
-    let mut clusters = [Cluster::default(); 2];
+    let mut clusters = [Cluster::default(); 3];
     let close = close_to_edge(view, xs.start, ys.start);
-    for (y, close) in ys.zip(close) {
+    for (y, close) in ys.clone().zip(close) {
         // Every other pixel, as on a chessboard, tells enough.
         for x in (xs.start + y % 2..xs.end).step_by(2) {
             let at = y * width + x;
@@ -208,22 +248,19 @@ fn split(view: &View, column: usize, row: usize) -> [Cluster; 2] {
             if (value - [high, low][far]).abs() > tolerance {
                 continue;
             }
-            let cluster = &mut clusters[far];
             let weight = match close >> (x - xs.start) & 1 {
                 _ if at_edge[at] => AT_EDGE_WEIGHT,
                 0 => 1.0,
                 _ => CLOSE_WEIGHT,
             };
-            let light = view.light(at);
-            cluster.weight += weight;
-            cluster.x += weight * x as f32;
-            cluster.y += weight * y as f32;
-            cluster.inverse += weight * value;
-            for (sum, light) in cluster.light.iter_mut().zip(light) {
-                *sum += weight * light;
-            }
-            for (sum, square) in cluster.squares.iter_mut().zip(outer(light)) {
-                *sum += weight * square;
+            clusters[far].add(weight, (x, y), value, view.light(at));
+        }
+    }
+    if all.0 - all.1 > jump {
+        for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
+            let at = y * width + x;
+            if at_edge[at] && inverse[at] > 0.5 * (all.0 + all.1) {
+                clusters[FRINGE].add(1.0, (x, y), inverse[at], view.light(at));
             }
         }
     }

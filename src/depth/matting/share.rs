@@ -46,6 +46,11 @@ impl Contrast {
         Self { surfaces, direction, offset: dot(direction, far.mean), precision }
     }
 
+    /// The share of the near surface that a colour is, from below 0 to above 1.
+    pub(super) fn share(&self, color: [f32; 3]) -> f32 {
+        dot(self.direction, color) - self.offset
+    }
+
     /// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
     /// ones of those that add up to the pixel's `own` (Chuang et al. 2001, equation 9, with the pixel as exact). None is
     /// darker than black, or brighter than white.
@@ -101,7 +106,7 @@ impl Evidence {
     /// Compares a pixel's colour `own` with those of both surfaces.
     pub(super) fn new(edge: &EdgePixel, labels: Labels, own: [f32; 3], (place, contrast): (u32, &Contrast)) -> Self {
         let Labels { is_near, is_thin, .. } = labels;
-        let projected = (dot(contrast.direction, own) - contrast.offset).clamp(-0.3, 1.3);
+        let projected = contrast.share(own).clamp(-0.3, 1.3);
         let likelihoods = gaussian(contrast.precision, projected);
         let (mut half, mut any) = ([0.0; 2], [0.0; 2]);
         let middle = STEPS / 2;
