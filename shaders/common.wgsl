@@ -6,6 +6,8 @@ override SEGMENT: u32;              // bin pixels between two edges
 override ANY_COLOR: f32;            // no colour is brighter
 override COVERAGE_FLOOR: f32;       // less coverage than this has no colour of its own
 override FAR_WEIGHT: f32;           // weight of far cells in the local radius
+override OTHER_FROM: f32;           // what comes nearer is one surface with what is behind it up to this step of the CoC
+override OTHER_TO: f32;             // and another one from here on
 override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the hindmost is looked for
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes of the bank lie evenly in each octave
 override OCTAVE_SHIFT: u32;         // bits of a float below those that tell the node within its octave

@@ -10,6 +10,13 @@
 @group(0) @binding(6) var<storage, read_write> behind: array<vec2<u32>>;
 @group(0) @binding(7) var<storage, read_write> ranges_behind: array<vec2<f32>>;
 
+// How far what is filled in behind a pixel is another surface, told by their CoC: what comes nearer, such as the ground, hides
+// its own continuation, which looks like it.
+fn other_surface(own_px: f32, behind_px: f32) -> f32 {
+    let step = (own_px - behind_px) / min(own_px, -1.0e-3);
+    return clamp((step - OTHER_FROM) / (OTHER_TO - OTHER_FROM), 0.0, 1.0);
+}
+
 @compute @workgroup_size(TILE, TILE)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
         @builtin(workgroup_id) tile: vec3<u32>, @builtin(num_workgroups) tiles: vec3<u32>) {
@@ -24,12 +31,13 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
         var value = scene[pixel];
         let own = scene_unpacked(value, frame.most_px);
         let half = id.y / 2u * ((frame.size.x + 1u) / 2u) + id.x / 2u;
-        let hidden = 1.0 - step_at(work.unhidden, own.w);
+        let filled = vec4(pyramid[half].rgb, max(pyramid[half].w, work.nearest_px));
+        let hidden = (1.0 - step_at(work.unhidden, own.w)) * other_surface(own.w, pyramid[half].w);
         // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it. Where something near
         // touches every pixel nothing is known, and nothing lies behind.
         if hidden > 0.0 && known[half] > 0.5 {
-            let mixture = mix(own, pyramid[half], hidden);
-            let result = scene_packed(mixture.rgb, max(mixture.w, work.nearest_px), frame.most_px);
+            let mixture = mix(own, filled, hidden);
+            let result = scene_packed(mixture.rgb, mixture.w, frame.most_px);
             range_add(scene_unpacked(result, frame.most_px).w);
             value = vec2(result.x, result.y | (value.y & MIXED));
         }

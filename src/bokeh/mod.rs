@@ -17,6 +17,7 @@ pub mod gpu;
 pub mod ladder;
 mod limit;
 pub mod low_rank;
+mod occlusion;
 mod picture;
 #[doc(hidden)]
 pub mod plan;

@@ -11,7 +11,6 @@
 //! 5. `blur`: per bin a horizontal and a vertical low-rank pass with the local radius.
 //! 6. `composite`: front to back as disjoint coverage, what stays open to the hindmost; back to 8-bit sRGB.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use super::bank::{Bank, MASK_CELLS};
@@ -35,11 +34,6 @@ pub const COVERAGE_FLOOR: f32 = 1e-3;
 
 /// From this coverage on, a bin counts fully when the colour of the hindmost is worked out.
 pub const HINDMOST_COVERAGE: f32 = 0.8;
-
-/// Into so many layers near bins are divided: each is filled for itself, which takes time.
-const MOST_NEAR_LAYERS: usize = 3;
-/// Those, and that of all other bins.
-pub const MOST_LAYERS: usize = MOST_NEAR_LAYERS + 1;
 
 /// No colour is brighter: a range that cuts nothing, for bins whose filters do not overshoot.
 pub const ANY_COLOR: f32 = 1e20;
@@ -284,38 +278,12 @@ impl Plan {
         Share::new(index.checked_sub(1).and_then(|front| self.border(front)), self.border(index))
     }
 
-    /// The bins of each layer, front to back: near bins, in at most [`MOST_NEAR_LAYERS`] groups, and all others. What the
-    /// layers in front hide is filled in for each: see [`Self::unhidden`].
-    pub fn layers(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let (near, all) = (self.bins.iter().filter(|bin| bin.near).count(), self.bins.len());
-        let groups = near.min(MOST_NEAR_LAYERS);
-        let in_front = (0..groups).map(move |k| k * near / groups..(k + 1) * near / groups);
-        in_front.chain(std::iter::once(near..all))
-    }
-
-    /// The signed CoC, <= 0, from which on the bins before `first` take no share: what is filled in behind them is not
-    /// below it.
-    pub fn nearest_behind_px(&self, first: usize) -> f32 {
-        first.checked_sub(1).map_or(f32::NEG_INFINITY, |front| self.bins[front].high_px * (1.0 - HAND_OVER))
-    }
-
     /// The mixed pixels of a frame that are taken apart: only layers can, and only with depth of the picture's size.
     pub fn matte<'a>(&self, depth: Option<&'a DepthMap>, coc: &CocField) -> Option<&'a Matte> {
         let map = depth.filter(|map| (map.width as usize, map.height as usize) == (self.width, self.height))?;
         let some = 1..=Matte::most(self.width, self.height);
         let apart = self.compositing == Compositing::Layers && matches!(coc, CocField::Depth(_));
         (apart && some.contains(&map.matte.pixels.len())).then_some(&map.matte)
-    }
-
-    /// How much of a pixel the layer of bins from `first` on takes as it is; the rest counts as hidden by the near bins
-    /// before it and is filled in. Just in front of the border that is all of it: a surface that comes nearer hides only
-    /// its own continuation.
-    pub fn unhidden(&self, first: usize) -> Share {
-        let border_px = first.checked_sub(1).map(|front| self.bins[front].high_px);
-        Share::new(
-            border_px.map(|at_px| (at_px * (0.5 + 0.5 * HIDDEN_FROM), 1.0 / ((1.0 - HIDDEN_FROM) * at_px))),
-            None,
-        )
     }
 
     /// The border between bin `index` and the one behind it: its CoC, and 1 over the width of the hand-over.
@@ -326,10 +294,7 @@ impl Plan {
 }
 
 /// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
-const HAND_OVER: f32 = 0.15;
-/// What has this many times the CoC of the near bins' border, or more, hides what is behind it.
-const HIDDEN_FROM: f32 = 1.5;
-
+pub(super) const HAND_OVER: f32 = 0.15;
 /// Splits the radii of a ramp into pieces of one ratio, as a blur's look goes with the ratio; none where the largest
 /// radius is hardly above that of the bin in focus.
 fn geometric_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {

@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::rows::Rows;
 use super::unpack::Surfaces;
+use crate::bokeh::occlusion::other_surface;
 use crate::bokeh::plan::Share;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
@@ -198,9 +199,10 @@ impl Behind<'_> {
             let fill = |p: usize| row[p * self.level.rows.stride + half];
             // Where something near touches every pixel nothing is known, and nothing lies behind.
             if hidden > 0.0 && fill(PLANES - 1) > KNOWN {
+                let hidden = hidden * other_surface(coc[x], fill(3));
                 let mix = |own: f32, p: usize| own + (fill(p) - own) * hidden;
                 (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
-                coc[x] = mix(coc[x], 3).max(self.nearest_px);
+                coc[x] += (fill(3).max(self.nearest_px) - coc[x]) * hidden;
             }
         }
         if surfaces.mixed {

@@ -4,7 +4,8 @@ use super::layout::Capacity;
 use super::shaders::{Bin, Frame, Level};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::plan::{MAX_BINS, MOST_LAYERS, Plan};
+use crate::bokeh::occlusion::MOST_LAYERS;
+use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::Device;
 use crate::frame::{Matte, MixedPixel};
 

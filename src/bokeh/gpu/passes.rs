@@ -6,7 +6,8 @@ use super::buffers::{Buffers, Filters, WORK_STRIDE, work_count};
 use super::layout::{Layout, tiles};
 use super::readback::MAX_QUERIES;
 use super::shaders::{self, Bin, LINE, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work};
-use crate::bokeh::plan::{CELL, MAX_BINS, MOST_LAYERS, Plan};
+use crate::bokeh::occlusion::MOST_LAYERS;
+use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
 use crate::compute::device::{Device, Shader, workgroups_2d};
 
 /// Which uniform `Work` a dispatch has: that of its layer, of `reach`, or of a batch of the filters.

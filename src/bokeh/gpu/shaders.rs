@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
+use crate::bokeh::occlusion::{OTHER_FROM, OTHER_TO};
 use crate::bokeh::plan::{ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HINDMOST_COVERAGE, SEGMENT};
 use crate::compute::device::Shader;
 
@@ -53,12 +54,14 @@ pub const ROWS_TILE: [usize; 2] = [64, 4];
 pub const RESULT_TILE: [usize; 2] = [8, 32];
 
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 15] = [
+pub const CONSTANTS: [(&str, f64); 17] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("ANY_COLOR", ANY_COLOR as f64),
     ("COVERAGE_FLOOR", COVERAGE_FLOOR as f64),
     ("FAR_WEIGHT", FAR_WEIGHT as f64),
+    ("OTHER_FROM", OTHER_FROM as f64),
+    ("OTHER_TO", OTHER_TO as f64),
     ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),
