@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::plan::{HAND_OVER, Plan, Share};
 
 /// Into so many layers near bins are divided: each is filled for itself, which takes time.
-const MOST_NEAR_LAYERS: usize = 3;
+const MOST_NEAR_LAYERS: usize = 2;
 /// Those, and that of all other bins.
 pub const MOST_LAYERS: usize = MOST_NEAR_LAYERS + 1;
 

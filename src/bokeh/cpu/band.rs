@@ -21,8 +21,8 @@ pub struct Band<'a> {
     pub bins: [Option<BinRows<'a>>; MAX_BINS],
     /// What near objects hide is left out (to be done when it is filled in), or put in.
     pub hidden: Hidden<'a>,
-    /// Per block, whether it has to wait for the fill.
-    pub waits: &'a mut [bool],
+    /// Per block, the first bin that has to wait for a fill, or [`NONE`].
+    pub waits: &'a mut [usize],
     /// Memory of the thread.
     pub sums: &'a mut BandSums,
 }
@@ -31,12 +31,21 @@ pub struct Band<'a> {
 pub enum Hidden<'a> {
     /// There is nothing to hide.
     Nothing,
-    /// All but the first `in_front` bins wait where anything is hidden: where not all is `unhidden` that lies behind
-    /// every near bin. The picture at half size is laid.
-    Waits { unhidden: Share, in_front: usize, halves: HalfRows<'a> },
-    /// Blocks that waited are done, for the bins of a layer alone.
-    Filled(Behind<'a>),
+    /// A layer and those behind it wait where not all is unhidden to it. The picture at half size is laid.
+    Waits { layers: &'a [Layer], halves: HalfRows<'a> },
+    /// Blocks where a layer waited are done, for its bins alone.
+    Filled { first: usize, behind: Behind<'a> },
 }
+
+/// A layer behind others: its first bin, and what of a pixel is not hidden from it.
+#[derive(Clone, Copy)]
+pub struct Layer {
+    pub first: usize,
+    pub unhidden: Share,
+}
+
+/// No bin waits.
+pub const NONE: usize = usize::MAX;
 
 /// Sums of a thread, for each bin.
 pub struct BandSums(Vec<BinSums>);
@@ -62,30 +71,29 @@ impl WithSimd for Band<'_> {
 
 impl Band<'_> {
     /// Adds one block of columns to every bin that it contributes to. In the first pass a block in which anything is hidden
-    /// does the foremost bins alone, and waits for the fill with the others; the passes for the layers behind
-    /// ([`Hidden::Filled`]) do those blocks.
+    /// does the bins that it hides nothing from, and waits for the fill with the others; the passes for the layers behind
+    /// ([`Hidden::Filled`]) do those.
     #[inline(always)]
     fn block<V: Simd>(&mut self, simd: V, block: usize) {
         // One tile more on every side: a cell's means take in pixels of its neighbours.
         let tile_columns = (block * (BLOCK / TILE_W)).saturating_sub(1)..(block + 1) * (BLOCK / TILE_W) + 1;
         let tile_rows = (self.rows.start / TILE_H).saturating_sub(1)..self.rows.end.div_ceil(TILE_H) + 1;
-        let (mut waits, mut in_front) = (false, MAX_BINS);
         match &self.hidden {
-            Hidden::Nothing => {}
-            Hidden::Waits { unhidden, in_front: count, .. } => {
-                waits = self.tiles.any_outside(unhidden, tile_columns.clone(), tile_rows.clone());
-                self.waits[block] = waits;
-                in_front = *count;
+            Hidden::Nothing => self.waits[block] = NONE,
+            Hidden::Waits { layers, .. } => {
+                let hides =
+                    |layer: &&Layer| self.tiles.any_outside(&layer.unhidden, tile_columns.clone(), tile_rows.clone());
+                self.waits[block] = layers.iter().find(hides).map_or(NONE, |layer| layer.first);
             }
-            Hidden::Filled(_) if !self.waits[block] => return,
-            Hidden::Filled(_) => {}
+            Hidden::Filled { first, .. } if self.waits[block] > *first => return,
+            Hidden::Filled { .. } => {}
         }
-        let is_filled = matches!(self.hidden, Hidden::Filled(_));
+        let is_filled = matches!(self.hidden, Hidden::Filled { .. });
         let mut active = [false; MAX_BINS];
         let mut reach = 0;
         for ((k, bin), active) in self.bins.iter_mut().enumerate().zip(&mut active) {
             let Some(bin) = bin else { continue };
-            if waits && k >= in_front {
+            if !is_filled && k >= self.waits[block] {
                 continue;
             }
             *active = is_filled
@@ -121,7 +129,7 @@ impl Band<'_> {
                         halves.add(block * BLOCK, MARGIN..MARGIN + columns, y as usize, &surfaces);
                     }
                 }
-                Hidden::Filled(behind) => {
+                Hidden::Filled { behind, .. } => {
                     let width = self.source.color.width as usize;
                     behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
                 }

@@ -19,7 +19,7 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use band::{Band, BandSums, Hidden};
+use band::{Band, BandSums, Hidden, Layer, NONE};
 use blur::{Scratch, Strip};
 use gather::Gather;
 use pulp::Arch;
@@ -29,6 +29,7 @@ use tiles::{BLOCK, Survey, TILE_H, Tiles};
 use unpack::Source;
 
 use super::ladder::Compositing;
+use super::occlusion::MOST_LAYERS;
 use super::plan::{CELL, MAX_BINS, Plan};
 use super::rung::SCALES;
 use super::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
@@ -49,8 +50,8 @@ pub struct CpuBokeh {
     tiles: Tiles,
     slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
-    /// Per band and block, whether its bins behind wait for the fill.
-    waits: Vec<bool>,
+    /// Per band and block, the first bin that waits for a fill.
+    waits: Vec<usize>,
     gather: Option<Gather>,
     members: Vec<Member>,
     /// Flags for [`DisjointParts`]: as many as any pass has parts.
@@ -89,7 +90,7 @@ impl CpuBokeh {
             encode: composite::EncodeTable::new(),
             tiles: Tiles::new(width, height),
             pyramid: (plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
-            waits: vec![false; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
+            waits: vec![NONE; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
             arch: Arch::new(),
             taken: flags(height.max(slots.len())),
             plan,
@@ -208,20 +209,24 @@ impl CpuBokeh {
         let (arch, tiles) = (self.arch, &self.tiles);
         let bands = plan.height.div_ceil(rows);
         let waits = DisjointParts::new(&mut self.waits[..bands * blocks], blocks, &mut self.taken);
-        let (first, last) = (plan.layers().next(), plan.layers().last().map_or(0, |layer| layer.start));
-        let in_front = first.map_or(0, |layer| layer.end);
+        let behind = |first: usize| Layer { first, unhidden: plan.unhidden(first) };
+        let mut layers = [behind(0); MOST_LAYERS];
+        let mut count = 0;
+        for (layer, range) in layers.iter_mut().zip(plan.layers().skip(1)) {
+            (*layer, count) = (behind(range.start), count + 1);
+        }
+        let layers = &layers[..count];
         let (halves, filled) = match (&mut self.pyramid, layer) {
-            (Some(pyramid), Some(layer)) => {
-                (None, Some(pyramid.behind(plan.unhidden(layer.start), plan.nearest_behind_px(layer.start))))
+            (Some(pyramid), Some(Range { start: first, .. })) => {
+                (None, Some((first, pyramid.behind(plan.unhidden(first), plan.nearest_behind_px(first)))))
             }
-            (Some(pyramid), None) if last > 0 => (Some(pyramid.halves(rows)), None),
+            (Some(pyramid), None) if !layers.is_empty() => (Some(pyramid.halves(rows)), None),
             _ => (None, None),
         };
-        let unhidden = plan.unhidden(last);
         self.workers.run_with(&mut self.members, bands, &|member: &mut Member, band| {
             let hidden = match (&halves, filled) {
-                (Some(halves), _) => Hidden::Waits { unhidden, in_front, halves: halves.band(band, rows, plan.height) },
-                (_, Some(filled)) => Hidden::Filled(filled),
+                (Some(halves), _) => Hidden::Waits { layers, halves: halves.band(band, rows, plan.height) },
+                (_, Some((first, behind))) => Hidden::Filled { first, behind },
                 _ => Hidden::Nothing,
             };
             arch.dispatch(Band {
