@@ -48,7 +48,7 @@ pub const LADDER: [Rung; Quality::ALL.len()] = {
         even_radius_px: 9.0,
     };
     [
-        Rung { cost: 0.62, scale_from_px: [0.0, 2.5, 6.0, 14.0], even_rank: 2, even_radius_px: 6.0, ..fast },
+        Rung { cost: 0.68, even_rank: 2, even_radius_px: 6.0, ..fast },
         fast,
         Rung {
             cost: 1.0,
