@@ -181,6 +181,7 @@ fn rivals_keep_a_constant_picture() {
         rivals::scatter(&constant, &coc_px, &polygon),
         rivals::golden_angle(&constant, &coc_px),
         rivals::gaussian(&constant, &coc_px),
+        rivals::blended(&constant, &coc_px),
         rivals::near_focus_far(&constant, &coc_px),
     ] {
         assert!(worst(&blurred, &constant) < 1e-3);

@@ -25,6 +25,9 @@ const FRINGE_SHARE: f32 = 0.75;
 /// From the first share down, the colour of such pixels is not that of the near surface; from the second up, it is.
 const FRINGE_SHARES: [f32; 2] = [-0.1, 0.25];
 
+/// So many pixels of it, near ones above all, tell nothing, as a lone hair is mostly what is behind it; so many are enough.
+const FRINGE_PIXELS: [f32; 2] = [6.0, 14.0];
+
 /// Pixels of one surface in a cell, weighted: sums, but for the means of position and inverse depth.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cluster {
@@ -137,7 +140,7 @@ impl Clusters {
     }
 
     /// The same of so many cells in every direction.
-    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<([Color; 2], Option<Color>)> {
+    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<([Color; 2], Option<(Color, f32)>)> {
         // A surface's inverse depth may change on the way, but by less than would make it the other one.
         let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
         let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
@@ -168,7 +171,9 @@ impl Clusters {
             }
         }
         let [near, far, fringe] = sums.map(|sum| (sum.weight > 0.0).then(|| sum.color()));
-        Some(([near?, far?], fringe))
+        let [few, enough] = FRINGE_PIXELS;
+        let weight = ((sums[FRINGE].weight - few) / (enough - few)).clamp(0.0, 1.0);
+        Some(([near?, far?], fringe.zip(Some(weight))))
     }
 
     fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> [Cluster; 3] {
@@ -205,10 +210,11 @@ impl Cluster {
 /// The contrast of the colours of two surfaces. What `fringe` has, the pixels at edges that the map gives to the near one, is
 /// mostly that surface. If its colour says otherwise, the near surface has other colours here than where its pixels are
 /// pure, as hair beside a face has: then it has those of the fringe, less the far surface that is mixed in.
-fn contrast(([near, far], fringe): ([Color; 2], Option<Color>)) -> Contrast {
+fn contrast(([near, far], fringe): ([Color; 2], Option<(Color, f32)>)) -> Contrast {
     let pure = Contrast::of([near, far]);
-    let Some(fringe) = fringe else { return pure };
-    let other = ((FRINGE_SHARES[1] - pure.share(fringe.mean)) / (FRINGE_SHARES[1] - FRINGE_SHARES[0])).clamp(0.0, 1.0);
+    let Some((fringe, weight)) = fringe else { return pure };
+    let other =
+        weight * ((FRINGE_SHARES[1] - pure.share(fringe.mean)) / (FRINGE_SHARES[1] - FRINGE_SHARES[0])).clamp(0.0, 1.0);
     if other <= 0.0 {
         return pure;
     }
