@@ -54,6 +54,14 @@ pub struct Color {
     pub covariance: Symmetric,
 }
 
+/// The colours around a mixed pixel.
+struct Surfaces {
+    near: Color,
+    far: Color,
+    /// What the near surface has at edges, and how far that counts, 0 to 1.
+    fringe: Option<(Color, f32)>,
+}
+
 /// What clusters are made of.
 pub(super) struct View<'a> {
     /// Columns and rows.
@@ -140,7 +148,7 @@ impl Clusters {
     }
 
     /// The same of so many cells in every direction.
-    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<([Color; 2], Option<(Color, f32)>)> {
+    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<Surfaces> {
         // A surface's inverse depth may change on the way, but by less than would make it the other one.
         let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
         let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
@@ -173,7 +181,7 @@ impl Clusters {
         let [near, far, fringe] = sums.map(|sum| (sum.weight > 0.0).then(|| sum.color()));
         let [few, enough] = FRINGE_PIXELS;
         let weight = ((sums[FRINGE].weight - few) / (enough - few)).clamp(0.0, 1.0);
-        Some(([near?, far?], fringe.zip(Some(weight))))
+        Some(Surfaces { near: near?, far: far?, fringe: fringe.zip(Some(weight)) })
     }
 
     fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> [Cluster; 3] {
@@ -210,7 +218,7 @@ impl Cluster {
 /// The contrast of the colours of two surfaces. What `fringe` has, the pixels at edges that the map gives to the near one, is
 /// mostly that surface. If its colour says otherwise, the near surface has other colours here than where its pixels are
 /// pure, as hair beside a face has: then it has those of the fringe, less the far surface that is mixed in.
-fn contrast(([near, far], fringe): ([Color; 2], Option<(Color, f32)>)) -> Contrast {
+fn contrast(Surfaces { near, far, fringe }: Surfaces) -> Contrast {
     let pure = Contrast::of([near, far]);
     let Some((fringe, weight)) = fringe else { return pure };
     let other =
