@@ -1,6 +1,7 @@
 // Pass bin: a bin's share of each pixel, premultiplied and averaged down to the bin's scale, and the coarse grid over
-// it. Reads the scene as the layer of the bins sees it; writes premultiplied r, g, b and coverage where there is any, and per cell of CELL x CELL bin pixels
-// two vectors: coverage, coverage times |CoC|, lowest red and green; lowest blue, highest red, green and blue.
+// it. Reads the scene as the layer of the bins sees it; writes premultiplied r, g, b and coverage where there is any, and per
+// cell of CELL x CELL bin pixels two vectors: coverage, coverage times |CoC|, lowest red and green; lowest blue, highest red,
+// green and blue.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;

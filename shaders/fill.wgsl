@@ -31,15 +31,18 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
         var value = scene[pixel];
         let own = scene_unpacked(value, frame.most_px);
         let half = id.y / 2u * ((frame.size.x + 1u) / 2u) + id.x / 2u;
-        let filled = vec4(pyramid[half].rgb, max(pyramid[half].w, work.nearest_px));
-        let hidden = (1.0 - step_at(work.unhidden, own.w)) * other_surface(own.w, pyramid[half].w);
+        let unhidden = step_at(work.unhidden, own.w);
         // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it. Where something near
         // touches every pixel nothing is known, and nothing lies behind.
-        if hidden > 0.0 && known[half] > 0.5 {
-            let mixture = mix(own, filled, hidden);
-            let result = scene_packed(mixture.rgb, mixture.w, frame.most_px);
-            range_add(scene_unpacked(result, frame.most_px).w);
-            value = vec2(result.x, result.y | (value.y & MIXED));
+        if unhidden < 1.0 && known[half] > 0.5 {
+            let found = pyramid[half];
+            let hidden = (1.0 - unhidden) * other_surface(own.w, found.w);
+            if hidden > 0.0 {
+                let mixture = mix(own, vec4(found.rgb, max(found.w, work.nearest_px)), hidden);
+                let result = scene_packed(mixture.rgb, mixture.w, frame.most_px);
+                range_add(scene_unpacked(result, frame.most_px).w);
+                value = vec2(result.x, result.y | (value.y & MIXED));
+            }
         }
         behind[pixel] = value;
     }

@@ -33,7 +33,7 @@ impl Plan {
     /// The signed CoC, <= 0, from which on the bins before `first` take no share: what is filled in behind them is not
     /// below it.
     pub fn nearest_behind_px(&self, first: usize) -> f32 {
-        first.checked_sub(1).map_or(f32::NEG_INFINITY, |front| self.bins[front].high_px * (1.0 - HAND_OVER))
+        first.checked_sub(1).map_or(f32::MIN, |front| self.bins[front].high_px * (1.0 - HAND_OVER))
     }
 
     /// How much of a pixel the layer of bins from `first` on takes as it is; the rest counts as hidden by the near bins

@@ -295,6 +295,7 @@ impl Plan {
 
 /// Half the width of the hand-over between two bins, as a fraction of the border's CoC.
 pub(super) const HAND_OVER: f32 = 0.15;
+
 /// Splits the radii of a ramp into pieces of one ratio, as a blur's look goes with the ratio; none where the largest
 /// radius is hardly above that of the bin in focus.
 fn geometric_pieces(max_px: f32, bins: u32) -> impl Iterator<Item = Piece> {

@@ -6,8 +6,7 @@
 //! that is not of this picture has none.
 
 use super::fill::Filler;
-use crate::color::luminance;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, GrayImage};
 
 /// Pixels to either side of a jump that are looked at, in a picture that is reduced to at most [`MOST_COLUMNS`].
 const REACH: usize = 12;
@@ -124,6 +123,8 @@ impl Lines {
         let (from_width, from_height) = (color.width as usize, color.height as usize);
         let width = from_width.min(map.width as usize).min(MOST_COLUMNS);
         let height = (from_height * width / from_width).max(1);
+        let mut gray = GrayImage::default();
+        gray.set_luma_of(color);
         let mut luma = Vec::with_capacity(width * height);
         let mut reduced = DepthMap { width: width as u32, height: height as u32, ..DepthMap::default() };
         let place = |at: usize, to: usize, of: usize| at * of / to..((at + 1) * of / to).max(at * of / to + 1);
@@ -133,12 +134,9 @@ impl Lines {
             let depth = middle(y, height, map.height as usize) * map.width as usize;
             for x in 0..width {
                 let columns = place(x, width, from_width);
-                let mut sum = 0.0;
-                for row in rows.clone() {
-                    let pixels = &color.rgb[3 * row * from_width..][3 * columns.start..3 * columns.end];
-                    sum += pixels.as_chunks::<3>().0.iter().map(|p| luma_of(*p)).sum::<f32>();
-                }
-                luma.push(sum / (rows.len() * columns.len()) as f32);
+                let of_row =
+                    |row: usize| gray.luma[row * from_width..][columns.clone()].iter().map(|&luma| f32::from(luma));
+                luma.push(rows.clone().flat_map(of_row).sum::<f32>() / (rows.len() * columns.len()) as f32);
                 reduced.metres.push(map.metres[depth + middle(x, width, map.width as usize)]);
             }
         }
@@ -189,9 +187,4 @@ impl Lines {
             at = here + SPREAD;
         }
     }
-}
-
-fn luma_of(rgb: [u8; 3]) -> f32 {
-    let [red, green, blue] = rgb.map(f32::from);
-    luminance(red, green, blue)
 }

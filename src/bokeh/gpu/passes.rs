@@ -198,7 +198,7 @@ impl Passes {
                 group: group as u32,
                 terms: (terms - 4 * group).min(4) as u32,
                 last: u32::from(group + 1 == groups),
-                nearest_px: plan.nearest_behind_px(bins.start).max(f32::MIN),
+                nearest_px: plan.nearest_behind_px(bins.start),
                 unhidden: plan.unhidden(bins.start).front.into(),
             };
             let bytes = bytemuck::bytes_of(&work);

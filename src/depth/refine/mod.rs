@@ -49,20 +49,11 @@ pub struct Refiner {
     aligner: Aligner,
     temporal: TemporalFilter,
     focus: Focus,
-    coarsest: Coarsest,
+    /// The scale at which refinement begins: one pixel for so many of the picture, each way. Up to 1 it is the picture's.
+    coarsest: u32,
     /// The picture, reduced.
     reduced: ColorImage,
     fit: Fit,
-}
-
-/// The scale at which refinement begins: one pixel for so many of the picture, each way.
-#[derive(Clone, Copy, Debug)]
-struct Coarsest(u32);
-
-impl Default for Coarsest {
-    fn default() -> Self {
-        Self(1)
-    }
 }
 
 /// The distance in focus, in metres. Inverse depth is this over the depth, so that equal steps of it blur equally.
@@ -85,7 +76,7 @@ impl Refiner {
     /// the picture. At each scale an edge moves by a few pixels, so that edges are found that are `coarsest` times as far
     /// off. For pictures on their own: frames are only compared with earlier ones where this is 1.
     pub fn from_coarse(coarsest: u32) -> Self {
-        Self { coarsest: Coarsest(coarsest.clamp(1, 1 << 5).next_power_of_two()), ..Self::default() }
+        Self { coarsest: coarsest.clamp(1, 1 << 5).next_power_of_two(), ..Self::default() }
     }
 
     /// What is in focus from the next frame on, in metres: for a street, a step of depth counts less than for a desk. A
@@ -101,7 +92,7 @@ impl Refiner {
     /// A frame that does not follow the one before (another size, a seek, a gap) starts anew. Where no depth was ever
     /// known, the map stays unknown (0) everywhere.
     pub fn refine(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
-        let mut scale = self.coarsest.0;
+        let mut scale = self.coarsest;
         while scale > 1 {
             let size = |side: u32| side.div_ceil(scale);
             let mut reduced = std::mem::take(&mut self.reduced);
