@@ -4,7 +4,7 @@ pub mod fit;
 mod matte;
 pub mod scale;
 
-pub use matte::{Matte, MixedPixel};
+pub use matte::{Mask, Matte, MixedPixel};
 
 /// Number of a captured frame: counts from 0 in capture order, dropped frames included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -139,6 +139,9 @@ pub struct DepthMap {
     pub metres: Vec<f32>,
     /// The pixels that show two surfaces at once, as far as that is known; none by default.
     pub matte: Matte,
+    /// The distance of the subject that the map was made around, in metres, such as a person whom a mask shows. Such a map
+    /// has its matte and no holes; what is in focus by default is the subject.
+    pub subject_m: Option<f32>,
 }
 
 impl DepthMap {

@@ -30,7 +30,7 @@
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
 //! | 3 | `link`, [`budget`], [`stats`], [`recording`], `scene`, `v4l2` |
-//! | 2 | `compute`, [`calibration`] |
+//! | 2 | `compute`, [`calibration`], [`network`] |
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
 //!
@@ -61,6 +61,8 @@ pub mod knob;
 pub mod link;
 pub mod look;
 mod names;
+#[cfg(feature = "networks")]
+pub mod network;
 pub mod optics;
 pub mod pipeline;
 #[cfg(feature = "window")]

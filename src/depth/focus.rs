@@ -91,6 +91,7 @@ impl Focus {
     pub fn focus_m(&mut self, map: &DepthMap, time_ns: u64) -> f32 {
         let target_m = match self.rule {
             FocusRule::Metres(focus_m) => Some(focus_m),
+            FocusRule::Auto if map.subject_m.is_some() => map.subject_m,
             FocusRule::Auto => {
                 let Self { subject, loyalty, .. } = self;
                 let found_m = subject.distance_m(map);

@@ -13,6 +13,8 @@ pub mod matting;
 pub mod recorded;
 pub mod refine;
 pub mod registration;
+#[cfg(feature = "networks")]
+pub mod single_camera;
 pub mod stereo;
 
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
@@ -80,6 +82,18 @@ pub enum DepthError {
     OneEye {
         /// Where the frames come from.
         source_name: String,
+    },
+    /// A network cannot be loaded.
+    #[cfg(feature = "networks")]
+    #[error(transparent)]
+    Load(#[from] crate::network::NetworkError),
+    /// A network failed.
+    #[error("{name}: {why}")]
+    Network {
+        /// Its file.
+        name: String,
+        /// What failed.
+        why: String,
     },
     /// There is no depth at all.
     #[error("the effect dof needs depth, and {source_name} has none; use --effect blur or tilt-shift")]

@@ -23,6 +23,26 @@ pub struct MixedPixel {
     pub difference: [f32; 3],
 }
 
+/// How much of each pixel a nearer surface covers, as far as a network or a person knows: `height` x `width` shares, 0 to 1,
+/// row-major. It covers the same view as its picture, and mostly has far fewer pixels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mask {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `height * width` shares.
+    pub share: Vec<f32>,
+}
+
+impl Mask {
+    /// Gives the mask another size, keeping its memory where that suffices. The content is unspecified after.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        (self.width, self.height) = (width, height);
+        self.share.resize(width as usize * height as usize, 0.0);
+    }
+}
+
 /// The mixed pixels of a picture, row by row and from left to right.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Matte {

@@ -102,6 +102,9 @@ impl CocMaker {
             CocRule::Depth { lens, range_m, max_coc_px, .. } => (lens, range_m, max_coc_px),
         };
         let focus_m = self.focus.focus_m(map, time_ns);
+        if map.subject_m.is_some() {
+            return lens.field((focus_m, range_m), color.width, max_coc_px);
+        }
         match &mut self.finisher {
             Finisher::Keep => {}
             Finisher::Fill(filler) => filler.fill_guided(map, color),

@@ -83,6 +83,7 @@ impl Rate {
 fn copy(from: &DepthMap, to: &mut DepthMap) {
     to.resize(from.width, from.height);
     to.metres.copy_from_slice(&from.metres);
+    to.subject_m = from.subject_m;
 }
 
 #[cfg(test)]

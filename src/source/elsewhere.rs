@@ -1,7 +1,7 @@
 //! External depth for a source: from another recording, or from a depth camera.
 
 use super::opened::depth_of;
-use super::{DepthChoice, DepthFrom, Options, Source, SourceError, Wanted, options};
+use super::{DepthChoice, DepthFrom, Options, Source, SourceError, Wanted, networks, options};
 use crate::capture::Brings;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
@@ -38,6 +38,7 @@ pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthFrom::Units),
+        DepthChoice::Networks(chosen) => (networks::open(chosen, wanted)?, DepthFrom::Networks),
     };
     Ok(Source { depth: Some(external), depth_from, first_depth, ..source })
 }
@@ -54,7 +55,7 @@ fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Res
         Ok(camera) => Ok(Box::new(camera)),
         // Probably a mistyped keyword or folder.
         Err(error @ OpenError::Name(_)) => Err(SourceError::Usage(format!(
-            "--depth {name}: {error}; or use auto, recorded, stereo, none or a folder with a recording"
+            "--depth {name}: {error}; or use auto, recorded, stereo, none, matte, mono or a folder with a recording"
         ))),
         Err(error) => Err(error.into()),
     }

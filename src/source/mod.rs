@@ -19,6 +19,7 @@ mod error;
 mod eyes;
 mod name;
 mod near;
+mod networks;
 mod opened;
 pub mod options;
 #[cfg(feature = "camera")]
@@ -27,7 +28,7 @@ pub mod registration;
 pub use error::SourceError;
 pub use name::{Kind, SourceName};
 use opened::Opened;
-pub use options::{DepthChoice, Frames, Size};
+pub use options::{ChosenNetworks, DepthChoice, Frames, NetworkFile, Size};
 
 use crate::capture::side_by_side::SideBySide;
 use crate::capture::{Brings, Camera, CaptureError};
@@ -51,6 +52,8 @@ pub enum DepthFrom {
     Metres,
     /// Two eyes.
     Eyes,
+    /// Networks: relative distances.
+    Networks,
 }
 
 /// An opened source.
@@ -76,6 +79,8 @@ pub struct Options {
     pub depth: options::Depth,
     /// Layout and geometry of its two eyes.
     pub stereo: options::Stereo,
+    /// How networks are run.
+    pub networks: options::Networks,
     /// Where depth comes from.
     pub depth_choice: DepthChoice,
     /// What runs the stereo matching.
@@ -104,7 +109,9 @@ impl Source {
     /// It cannot be read, it has no frame between `--start` and `--end`, or an option does not apply to it.
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
         let wanted = Wanted { options, look };
-        elsewhere::with_external_depth(Self::open_with_own_depth(name, &wanted)?, &wanted, &Clock::system())
+        let source = Self::open_with_own_depth(name, &wanted)?;
+        let source = networks::for_lone_camera(source, name, &wanted)?;
+        elsewhere::with_external_depth(source, &wanted, &Clock::system())
     }
 
     /// A source from a camera that the caller has opened; `depth` gives depth in metres for its frames.
@@ -175,7 +182,8 @@ impl Source {
 
     /// Whether its depth was measured (and not computed exactly), so that refinement improves it.
     pub fn is_measured(&self) -> bool {
-        self.depth.is_some() && (self.rig.is_none() || REFINES_STEREO)
+        let is_made = self.depth_from == DepthFrom::Networks;
+        self.depth.is_some() && !is_made && (self.rig.is_none() || REFINES_STEREO)
     }
 }
 

@@ -4,7 +4,7 @@ use clap::Args;
 
 #[cfg(feature = "window")]
 use super::Window;
-use super::{Blur, Computing, Depth, Frames, Output, Stereo, Stream};
+use super::{Blur, Computing, Depth, Frames, Networks, Output, Stereo, Stream};
 use crate::source::Options;
 
 /// What is needed to blur a stream, wherever it goes.
@@ -22,6 +22,9 @@ pub struct Streaming {
     /// Two eyes.
     #[command(flatten)]
     pub stereo: Stereo,
+    /// Networks.
+    #[command(flatten)]
+    pub networks: Networks,
     /// The executor.
     #[command(flatten)]
     pub computing: Computing,
@@ -40,6 +43,7 @@ impl Streaming {
             frames: self.frames.clone(),
             depth: self.depth.clone(),
             stereo: self.stereo.clone(),
+            networks: self.networks.clone(),
             depth_choice: self.blur.depth.clone(),
             computing: self.computing.choice(),
             keep_going: self.stream.keep_going,
@@ -60,6 +64,9 @@ pub struct Every {
     /// Two eyes.
     #[command(flatten)]
     pub stereo: Stereo,
+    /// Networks.
+    #[command(flatten)]
+    pub networks: Networks,
     /// The blur.
     #[command(flatten)]
     pub blur: Blur,

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{BoolishValueParser, OsStringValueParser, RangedI64ValueParser, TypedValueParser};
 
-pub use crate::source::options::{Depth, Frames, Stereo};
+pub use crate::source::options::{Depth, Frames, Networks, Stereo};
 pub use groups::{Every, Streaming};
 pub use look::{LookSettings, named};
 
@@ -62,8 +62,9 @@ pub struct Blur {
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
     /// Where depth comes from: auto (the source's, when the effect needs it: recorded, else from its two eyes), recorded
-    /// (the source's), stereo (from its two eyes), none, a folder with a recording whose depth is played in a loop, or a
-    /// depth camera (/dev/videoN, N, or part of its name)
+    /// (the source's), stereo (from its two eyes), none, a folder with a recording whose depth is played in a loop, a depth
+    /// camera (/dev/videoN, N, or part of its name), or networks that need one camera alone: matte[:FILE.onnx] (where a
+    /// person is), mono[:FILE.onnx] (how near all is), or matte,mono; without FILE, the best that is installed
     #[arg(long, value_name = "FROM", default_value = "auto")]
     pub depth: DepthChoice,
     /// The look, but for its quality.

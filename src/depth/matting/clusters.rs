@@ -43,7 +43,8 @@ struct Cluster {
 pub type Symmetric = [f32; 6];
 
 /// The upper triangle of `a` times its transpose.
-fn outer(a: [f32; 3]) -> Symmetric {
+#[inline(always)]
+pub(super) fn outer(a: [f32; 3]) -> Symmetric {
     [a[0] * a[0], a[0] * a[1], a[0] * a[2], a[1] * a[1], a[1] * a[2], a[2] * a[2]]
 }
 
@@ -52,6 +53,15 @@ fn outer(a: [f32; 3]) -> Symmetric {
 pub struct Color {
     pub mean: [f32; 3],
     pub covariance: Symmetric,
+}
+
+impl Color {
+    /// Of pixels of this total weight, and the weighted sums of their light and of the products of that.
+    pub(super) fn of_sums(weight: f32, light: [f32; 3], squares: Symmetric) -> Self {
+        let mean = light.map(|light| light / weight);
+        let of_mean = outer(mean);
+        Self { mean, covariance: std::array::from_fn(|k| squares[k] / weight - of_mean[k]) }
+    }
 }
 
 /// The colours around a mixed pixel.
@@ -209,9 +219,7 @@ impl Cluster {
     }
 
     fn color(&self) -> Color {
-        let mean = self.light.map(|light| light / self.weight);
-        let (squares, of_mean) = (self.squares, outer(mean));
-        Color { mean, covariance: std::array::from_fn(|k| squares[k] / self.weight - of_mean[k]) }
+        Color::of_sums(self.weight, self.light, self.squares)
     }
 }
 

@@ -6,6 +6,8 @@
 //! Everything is local, from one frame, and in time that grows with the length of the outlines.
 
 mod clusters;
+pub mod mask;
+mod posterior;
 mod share;
 
 use std::ops::Range;

@@ -51,6 +51,11 @@ impl Contrast {
         dot(self.direction, color) - self.offset
     }
 
+    /// The reciprocal variance of [`Self::share`] over the pixels of one surface.
+    pub(super) fn precision(&self) -> f32 {
+        self.precision
+    }
+
     /// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
     /// ones of those that add up to the pixel's `own` (Chuang et al. 2001, equation 9, with the pixel as exact). None is
     /// darker than black, or brighter than white.

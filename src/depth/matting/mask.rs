@@ -1,0 +1,283 @@
+//! From a mask of the nearer surface, coarse and soft as a network gives it, to the matte of its picture.
+//!
+//! Where the mask is sure, pixels tell the colours of both surfaces close by: means and covariances, gathered in cells.
+//! Along Fisher's discriminant between them, each pixel of the band where the mask is not sure has a place, and with that
+//! a share: 0 or 1 as likely as the mask says, or anything between (mixed pixels, as in Bayesian matting, Chuang et al.
+//! 2001).
+
+use crate::color::srgb_to_linear;
+use crate::frame::{ColorImage, DepthMap, Mask, MixedPixel};
+
+use super::clusters::{Color, Symmetric, outer};
+use super::posterior::Posterior;
+use super::share::Contrast;
+
+/// From here on the mask is sure that a pixel is of the nearer surface, and below 1 less this, that it is not.
+const SURE: f32 = 0.95;
+/// Side of a cell in pixels of the mask, and the least in pixels of the picture.
+const CELL_OF_MASK: f32 = 1.6;
+const LEAST_CELL_PX: usize = 4;
+/// So many cells in every direction tell the colours around one.
+const REACH: usize = 5;
+/// The weight of a cell falls to an eighth at this distance, in cells.
+const HALF_CELLS: f32 = 1.5;
+/// Less weight of pixels than this, of either surface, tells no colour.
+const LEAST_WEIGHT: f32 = 0.5;
+/// Shares beyond this are those of a pure pixel.
+const NEARLY_PURE: f32 = 0.98;
+
+/// Finds mattes; owns the memory for it.
+#[derive(Debug)]
+pub struct MaskMatting {
+    light: Box<[f32; 256]>,
+    posterior: Posterior,
+    /// What the weights of the cells around one are, by row and column.
+    kernel: [[f32; 2 * REACH + 1]; 2 * REACH + 1],
+    cells: Vec<Cell>,
+    sums: Vec<[Sums; 2]>,
+    columns: Vec<(usize, usize, f32)>,
+}
+
+/// What a mask says of a cell of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cell {
+    Near,
+    Far,
+    /// In the band, or beside it.
+    Band,
+}
+
+/// Pixels of a surface in a cell: how many, sums of their light, and of the products of that.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    weight: f32,
+    light: [f32; 3],
+    squares: Symmetric,
+}
+
+impl Sums {
+    fn add(&mut self, light: [f32; 3]) {
+        self.weight += 1.0;
+        for (sum, light) in self.light.iter_mut().zip(light) {
+            *sum += light;
+        }
+        for (sum, square) in self.squares.iter_mut().zip(outer(light)) {
+            *sum += square;
+        }
+    }
+
+    fn add_all(&mut self, other: &Self, weight: f32) {
+        self.weight += weight * other.weight;
+        for (sum, light) in self.light.iter_mut().zip(other.light) {
+            *sum += weight * light;
+        }
+        for (sum, square) in self.squares.iter_mut().zip(other.squares) {
+            *sum += weight * square;
+        }
+    }
+
+    fn color(&self) -> Color {
+        Color::of_sums(self.weight, self.light, self.squares)
+    }
+}
+
+impl Default for MaskMatting {
+    fn default() -> Self {
+        let weight = |row: usize, column: usize| {
+            let square = (row.abs_diff(REACH).pow(2) + column.abs_diff(REACH).pow(2)) as f32;
+            (1.0 + square / (HALF_CELLS * HALF_CELLS)).powi(-3)
+        };
+        Self {
+            light: Box::new(std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0))),
+            posterior: Posterior::new(),
+            kernel: std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column))),
+            cells: Vec::new(),
+            sums: Vec::new(),
+            columns: Vec::new(),
+        }
+    }
+}
+
+/// A picture, and what is sought in it.
+struct View<'a> {
+    mask: &'a Mask,
+    color: &'a ColorImage,
+    light: &'a [f32; 256],
+    /// Per column of the picture, those of the mask on both sides, and how far it is to the second.
+    columns: &'a [(usize, usize, f32)],
+    cell_px: usize,
+    across: usize,
+    down: usize,
+}
+
+impl MaskMatting {
+    /// Gives `map`, as large as its picture, which has the metres of what is behind everywhere, those of the nearer surface,
+    /// `near_m`, where `mask` and the colours say that it is; and the mixed pixels between the two.
+    pub fn find(&mut self, mask: &Mask, color: &ColorImage, near_m: f32, map: &mut DepthMap) {
+        map.matte.pixels.clear();
+        let (width, height) = (color.width as usize, color.height as usize);
+        if map.size() != color.size() || mask.share.is_empty() || width * height == 0 {
+            return;
+        }
+        let cell_px = ((CELL_OF_MASK * width as f32 / mask.width as f32).round() as usize).max(LEAST_CELL_PX);
+        self.columns.clear();
+        self.columns.extend((0..width).map(|x| between(x, width, mask.width as usize)));
+        let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
+        let Self { light, posterior, kernel, cells, sums, columns } = self;
+        let view = View { mask, color, light, columns, cell_px, across, down };
+        view.classify(cells);
+        view.gather(cells, sums);
+        for row in 0..down {
+            for column in 0..across {
+                match cells[row * across + column] {
+                    Cell::Far => {}
+                    Cell::Near => view.pixels_of(row, column).for_each(|(x, y)| map.metres[y * width + x] = near_m),
+                    Cell::Band => {
+                        let contrast = view.contrast(kernel, sums, (row, column));
+                        view.take_apart(posterior, contrast.as_ref(), (row, column), near_m, map);
+                    }
+                }
+            }
+        }
+        map.matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
+    }
+}
+
+impl View<'_> {
+    fn pixels_of(&self, row: usize, column: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (side, width, height) = (self.cell_px, self.color.width as usize, self.color.height as usize);
+        let xs = column * side..((column + 1) * side).min(width);
+        (row * side..((row + 1) * side).min(height)).flat_map(move |y| xs.clone().map(move |x| (x, y)))
+    }
+
+    fn light_at(&self, at: usize) -> [f32; 3] {
+        [0, 1, 2].map(|p| self.light[usize::from(self.color.rgb[3 * at + p])])
+    }
+
+    /// The mask at a pixel, linear between its own.
+    fn share_at(&self, x: usize, y: usize) -> f32 {
+        let (above, below, down) = between(y, self.color.height as usize, self.mask.height as usize);
+        let (left, right, along) = self.columns[x];
+        let row = |row: usize| {
+            let row = &self.mask.share[row * self.mask.width as usize..];
+            row[left] + (row[right] - row[left]) * along
+        };
+        row(above) + (row(below) - row(above)) * down
+    }
+
+    fn classify(&self, cells: &mut Vec<Cell>) {
+        let (across, down, mask) = (self.across, self.down, self.mask);
+        let range = |of: usize, count: usize, side: usize| {
+            // The pixels of the mask around a cell, with those beside them: the band is a cell wider than it needs be.
+            let scale = side as f32 / count as f32;
+            let start = (of as f32 * scale - 1.0).max(0.0) as usize;
+            start.min(side - 1)..(((of + 1) as f32 * scale + 1.0).ceil() as usize).min(side)
+        };
+        cells.clear();
+        for row in 0..down {
+            let ys = range(row, down, mask.height as usize);
+            for column in 0..across {
+                let xs = range(column, across, mask.width as usize);
+                let (mut low, mut high) = (1.0f32, 0.0f32);
+                for y in ys.clone() {
+                    for &share in &mask.share[y * mask.width as usize..][xs.clone()] {
+                        (low, high) = (low.min(share), high.max(share));
+                    }
+                }
+                cells.push(match () {
+                    () if low > SURE => Cell::Near,
+                    () if high < 1.0 - SURE => Cell::Far,
+                    () => Cell::Band,
+                });
+            }
+        }
+    }
+
+    /// The colours of the cells that are in the band, or in reach of it.
+    fn gather(&self, cells: &[Cell], sums: &mut Vec<[Sums; 2]>) {
+        let (across, down) = (self.across, self.down);
+        sums.clear();
+        sums.resize(across * down, [Sums::default(); 2]);
+        let mut wanted = vec![false; across * down];
+        for row in 0..down {
+            for column in (0..across).filter(|column| cells[row * across + column] == Cell::Band) {
+                for row in row.saturating_sub(REACH)..(row + REACH + 1).min(down) {
+                    let columns = column.saturating_sub(REACH)..(column + REACH + 1).min(across);
+                    wanted[row * across..][columns].fill(true);
+                }
+            }
+        }
+        for at in (0..across * down).filter(|&at| wanted[at]) {
+            let [near, far] = &mut sums[at];
+            for (x, y) in self.pixels_of(at / across, at % across).filter(|(x, y)| (x + y) % 2 == 0) {
+                let light = || self.light_at(y * self.color.width as usize + x);
+                match cells[at] {
+                    Cell::Near => near.add(light()),
+                    Cell::Far => far.add(light()),
+                    Cell::Band => {
+                        let share = self.share_at(x, y);
+                        if share > SURE {
+                            near.add(light());
+                        } else if share < 1.0 - SURE {
+                            far.add(light());
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// How the colours around a cell differ; `None` where one of the surfaces has none.
+    fn contrast(
+        &self,
+        kernel: &[[f32; 2 * REACH + 1]; 2 * REACH + 1],
+        sums: &[[Sums; 2]],
+        (row, column): (usize, usize),
+    ) -> Option<Contrast> {
+        let mut around = [Sums::default(); 2];
+        for other_row in row.saturating_sub(REACH)..(row + REACH + 1).min(self.down) {
+            let weights = &kernel[other_row + REACH - row];
+            for other in column.saturating_sub(REACH)..(column + REACH + 1).min(self.across) {
+                let cell = &sums[other_row * self.across + other];
+                for (sum, cell) in around.iter_mut().zip(cell) {
+                    sum.add_all(cell, weights[other + REACH - column]);
+                }
+            }
+        }
+        let known = around.iter().all(|sums| sums.weight > LEAST_WEIGHT);
+        known.then(|| Contrast::of(around.map(|sums| sums.color())))
+    }
+
+    fn take_apart(
+        &self,
+        posterior: &Posterior,
+        contrast: Option<&Contrast>,
+        (row, column): (usize, usize),
+        near_m: f32,
+        map: &mut DepthMap,
+    ) {
+        let slice = contrast.map(|contrast| (contrast, posterior.slice(contrast.precision())));
+        for (x, y) in self.pixels_of(row, column) {
+            let at = y * self.color.width as usize + x;
+            let own = self.light_at(at);
+            let mask = self.share_at(x, y);
+            let share = slice.as_ref().map_or(mask, |(contrast, slice)| slice.share(mask, contrast.share(own)));
+            let far_m = map.metres[at];
+            if share > 0.5 {
+                map.metres[at] = near_m;
+            }
+            if (1.0 - NEARLY_PURE..=NEARLY_PURE).contains(&share) {
+                let difference = contrast.map_or([0.0; 3], |contrast| contrast.difference(own, share));
+                map.matte.pixels.push(MixedPixel { at: at as u32, near_m, far_m, share, difference });
+            }
+        }
+    }
+}
+
+/// The samples on both sides of the centre of pixel `at`, where `to` pixels and `from` samples cover the same length; and
+/// how far it is to the second.
+fn between(at: usize, to: usize, from: usize) -> (usize, usize, f32) {
+    let place = ((at as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
+    let first = place as usize;
+    (first, (first + 1).min(from - 1), place - first as f32)
+}

@@ -1,0 +1,206 @@
+//! How a network is shown a picture, and which of its answers is meant.
+
+use crate::frame::ColorImage;
+use crate::frame::scale::Scale;
+use crate::network::{Loaded, Network, Port, Scaling, Task, Tensor};
+
+/// Longest side of the picture that a network is shown, in pixels.
+const MOST_SIDE: usize = 1024;
+
+/// What the user says of a network that is not known; `None` is guessed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hints {
+    /// What the codes of the picture become.
+    pub scaling: Option<Scaling>,
+    /// Whether blue comes first.
+    pub bgr: Option<bool>,
+}
+
+/// A network that is shown pictures.
+pub struct Feed {
+    network: Box<dyn Network>,
+    /// Columns and rows of the picture that it is shown.
+    size: (usize, usize),
+    /// Whether the three channels of its picture lie in planes, or beside each other.
+    planes: bool,
+    scaling: Scaling,
+    bgr: bool,
+    /// Which input the picture is, and which output the answer.
+    picture: usize,
+    answer: usize,
+    /// The outputs that are inputs for the next picture: input, output.
+    memory: Vec<(usize, usize)>,
+    inputs: Vec<Tensor>,
+    outputs: Vec<Tensor>,
+    scale: Scale,
+    row: Vec<u16>,
+    small: Vec<u8>,
+}
+
+/// What a network says: some planes of numbers, as large as it likes.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer<'a> {
+    /// Columns and rows.
+    pub size: (usize, usize),
+    /// How many numbers each pixel has.
+    pub channels: usize,
+    values: &'a [f32],
+    planes: bool,
+}
+
+impl Answer<'_> {
+    /// The number of a channel at a pixel.
+    #[inline(always)]
+    pub fn at(&self, pixel: usize, channel: usize) -> f32 {
+        let pixels = self.size.0 * self.size.1;
+        self.values[if self.planes { channel * pixels + pixel } else { pixel * self.channels + channel }]
+    }
+}
+
+impl Feed {
+    /// Finds out how a network is shown pictures.
+    ///
+    /// # Errors
+    /// It does not take a picture, or more than one.
+    pub fn new(Loaded { network, known }: Loaded, task: Task, hints: &Hints) -> Result<Self, String> {
+        let inputs = network.inputs();
+        let pictures: Vec<usize> = (0..inputs.len()).filter(|&k| channels_at(&inputs[k], &[3]).is_some()).collect();
+        let &[picture] = pictures.as_slice() else {
+            return Err(format!("{} of its inputs are pictures of three channels, where one is wanted", pictures.len()));
+        };
+        let planes = channels_at(&inputs[picture], &[3]) == Some(1);
+        let sides = if planes { [3, 2] } else { [2, 1] };
+        // Where it takes any size: small, and a multiple of what networks halve their pictures to.
+        let usual = match task {
+            Task::Matte => [256, 144],
+            Task::Mono => [320, 192],
+        };
+        let [width, height] = [0, 1].map(|k| inputs[picture].shape[sides[k]].unwrap_or(usual[k]));
+        if !(1..=MOST_SIDE).contains(&width) || !(1..=MOST_SIDE).contains(&height) {
+            return Err(format!("it is shown pictures of {width} x {height}: at most {MOST_SIDE} a side are sensible"));
+        }
+        let outputs = network.outputs();
+        let answers = |named: bool| {
+            (0..outputs.len()).find(|&k| {
+                let name = outputs[k].name.to_lowercase();
+                (!named || ["pha", "alpha", "mask", "depth"].iter().any(|part| name.contains(part)))
+                    && channels_at(&outputs[k], &[1, 2]).is_some()
+            })
+        };
+        let answer = answers(true).or_else(|| answers(false)).or((outputs.len() == 1).then_some(0));
+        let answer = answer.ok_or("none of its outputs is a picture of one channel or two")?;
+        // What else it takes is what it gave the last time, in the same order (as Robust Video Matting has it); or a ratio.
+        let others = (0..inputs.len()).filter(|&k| k != picture && !is_ratio(&inputs[k]));
+        let states = (outputs.len() + 1).saturating_sub(inputs.iter().filter(|port| !is_ratio(port)).count())..outputs.len();
+        let memory: Vec<(usize, usize)> = others.clone().zip(states).collect();
+        if memory.len() != others.count() || memory.iter().any(|&(_, output)| output == answer) {
+            return Err("it takes more than a picture and what it gave before".to_owned());
+        }
+        let inputs = (0..inputs.len()).map(|k| match k {
+            _ if k == picture => Tensor::zeros(&if planes { [1, 3, height, width] } else { [1, height, width, 3] }),
+            _ if is_ratio(&inputs[k]) => Tensor { shape: vec![1], values: vec![1.0] },
+            // Sizes that it leaves open are 1 at first: one number stands for all.
+            _ => Tensor::zeros(&inputs[k].shape.iter().map(|side| side.unwrap_or(1)).collect::<Vec<_>>()),
+        });
+        let inputs = inputs.collect();
+        let usual = match task {
+            Task::Matte => Scaling::UNIT,
+            Task::Mono => Scaling::IMAGENET,
+        };
+        let scaling = hints.scaling.or(known.map(|known| known.scaling)).unwrap_or(usual);
+        let bgr = hints.bgr.or(known.map(|known| known.bgr)).unwrap_or(false);
+        Ok(Self {
+            network,
+            size: (width, height),
+            planes,
+            scaling,
+            bgr,
+            picture,
+            answer,
+            memory,
+            inputs,
+            outputs: Vec::new(),
+            scale: Scale::default(),
+            row: Vec::new(),
+            small: Vec::new(),
+        })
+    }
+
+    /// What runs it.
+    pub fn runtime(&self) -> &str {
+        self.network.runtime()
+    }
+
+    /// Forgets what it gave for the picture before: the next one is another scene.
+    pub fn forget(&mut self) {
+        for &(input, _) in &self.memory {
+            self.inputs[input].values.fill(0.0);
+        }
+    }
+
+    /// Shows it a picture.
+    ///
+    /// # Errors
+    /// What the runtime says, or the answer is no picture of finite numbers.
+    pub fn see(&mut self, color: &ColorImage) -> Result<Answer<'_>, String> {
+        self.shrink(color);
+        self.network.run(&self.inputs, &mut self.outputs)?;
+        for &(input, output) in &self.memory {
+            std::mem::swap(&mut self.inputs[input], &mut self.outputs[output]);
+        }
+        let answer = self.outputs.get(self.answer).ok_or("it gives no answer")?;
+        let answer = picture_of(answer).ok_or_else(|| format!("its answer is no picture: {:?}", answer.shape))?;
+        match answer.values.iter().all(|value| value.is_finite()) {
+            true => Ok(answer),
+            false => Err("its answer has what is no number".to_owned()),
+        }
+    }
+
+    fn shrink(&mut self, color: &ColorImage) {
+        let (width, height) = self.size;
+        self.scale.adapt((color.width as usize, color.height as usize), self.size);
+        self.small.resize(3 * width, 0);
+        let order = if self.bgr { [2, 1, 0] } else { [0, 1, 2] };
+        let factor = self.scaling.divisor.map(f32::recip);
+        let values = &mut self.inputs[self.picture].values;
+        for y in 0..height {
+            self.scale.row(&color.rgb, y, 0..width, &mut self.row, &mut self.small);
+            for (x, pixel) in self.small.as_chunks::<3>().0.iter().enumerate() {
+                for c in 0..3 {
+                    let at = if self.planes { (c * height + y) * width + x } else { (y * width + x) * 3 + c };
+                    values[at] = (f32::from(pixel[order[c]]) - self.scaling.mean[c]) * factor[c];
+                }
+            }
+        }
+    }
+}
+
+/// The place of the channels in a port of pictures that have so many, 1 or 3; `None` if it is no such port.
+fn channels_at(port: &Port, channels: &[usize]) -> Option<usize> {
+    let &[batch, planes, _, last] = port.shape.as_slice() else { return None };
+    let has = |side: Option<usize>| side.is_some_and(|side| channels.contains(&side));
+    match () {
+        () if batch.is_some_and(|batch| batch != 1) => None,
+        () if has(planes) => Some(1),
+        () if has(last) => Some(3),
+        () => None,
+    }
+}
+
+/// Whether it is one number, such as the ratio by which a network may shrink its picture.
+fn is_ratio(port: &Port) -> bool {
+    port.shape.len() <= 1
+}
+
+/// The picture that a tensor is: the one of one channel or two whose sizes say so.
+fn picture_of(tensor: &Tensor) -> Option<Answer<'_>> {
+    let values = tensor.values.as_slice();
+    let (planes, channels, height, width) = match *tensor.shape.as_slice() {
+        [1, channels @ 1..=2, height, width] => (true, channels, height, width),
+        [1, height, width, channels @ 1..=2] => (false, channels, height, width),
+        [1, height, width] | [height, width] => (true, 1, height, width),
+        _ => return None,
+    };
+    let whole = width > 1 && height > 1 && width * height * channels == values.len();
+    whole.then_some(Answer { size: (width, height), channels, values, planes })
+}

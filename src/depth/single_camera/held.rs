@@ -1,0 +1,119 @@
+//! What belongs to a subject: what is as near and joined to it, such as a mug that is held; and what does not: others, who
+//! are further away.
+
+use super::relief::Relief;
+use crate::frame::Mask;
+
+/// From here on, what is no person is as near as the subject.
+const AS_NEAR: [f32; 2] = [0.85, 0.95];
+/// A person of whom less is as near as this is another one, further away.
+const OTHERS: f32 = 0.55;
+/// A part of the mask begins here.
+const PART: f32 = 0.5;
+
+/// Joins masks with what belongs to them; owns the memory for it.
+#[derive(Default)]
+pub struct Held {
+    mask: Mask,
+    /// Of each pixel of the mask, how near it is.
+    nearness: Vec<f32>,
+    /// Whether a pixel was seen to be part of what is looked at, and those that are yet to be looked around.
+    seen: Vec<bool>,
+    front: Vec<u32>,
+}
+
+impl Held {
+    /// The mask of the subject and all that is theirs.
+    pub fn mask(&self) -> &Mask {
+        &self.mask
+    }
+
+    /// Joins a mask with what is as near, and takes others away.
+    pub fn join(&mut self, mask: &Mask, relief: &Relief) {
+        let (width, height) = (mask.width as usize, mask.height as usize);
+        self.mask.clone_from(mask);
+        let (columns, rows) = relief.size();
+        let near = |at: usize| relief.nearness()[at / width * rows / height * columns + at % width * columns / width];
+        self.nearness.clear();
+        self.nearness.extend((0..width * height).map(near));
+        self.take_others_away();
+        self.add_what_is_held();
+    }
+
+    /// Parts of the mask that are mostly far away are other people's.
+    fn take_others_away(&mut self) {
+        self.seen.clear();
+        self.seen.resize(self.mask.share.len(), false);
+        for start in 0..self.mask.share.len() {
+            if self.seen[start] || self.mask.share[start] < PART {
+                continue;
+            }
+            self.front.clear();
+            self.flood(start, |held, at| held.mask.share[at] >= PART);
+            let near: f32 = self.front.iter().map(|&at| self.nearness[at as usize]).sum();
+            if near < OTHERS * self.front.len() as f32 {
+                // Their soft outlines go with them.
+                let part = std::mem::take(&mut self.front);
+                for &at in &part {
+                    self.clear_around(at as usize);
+                }
+                self.front = part;
+            }
+        }
+    }
+
+    /// What is as near as the subject and joined to it, step by step.
+    fn add_what_is_held(&mut self) {
+        let [from, to] = AS_NEAR;
+        self.seen.fill(false);
+        self.front.clear();
+        for start in 0..self.mask.share.len() {
+            if !self.seen[start] && self.mask.share[start] > 0.9 {
+                self.flood(start, |held, at| held.mask.share[at] > PART || held.nearness[at] > from);
+            }
+        }
+        for &at in &self.front {
+            let at = at as usize;
+            let near = ((self.nearness[at] - from) / (to - from)).clamp(0.0, 1.0);
+            self.mask.share[at] = self.mask.share[at].max(near);
+        }
+    }
+
+    /// Adds to `front` what is connected to `start` and belongs to it.
+    fn flood(&mut self, start: usize, belongs: impl Fn(&Self, usize) -> bool) {
+        let (width, height) = (self.mask.width as usize, self.mask.height as usize);
+        let mut next = self.front.len();
+        self.seen[start] = true;
+        self.front.push(start as u32);
+        while let Some(&at) = self.front.get(next) {
+            next += 1;
+            let (x, y) = (at as usize % width, at as usize / width);
+            let beside = [
+                (x > 0, (at as usize).wrapping_sub(1)),
+                (x + 1 < width, at as usize + 1),
+                (y > 0, (at as usize).wrapping_sub(width)),
+                (y + 1 < height, at as usize + width),
+            ];
+            for (_, at) in beside.into_iter().filter(|(inside, _)| *inside) {
+                if !self.seen[at] && belongs(self, at) {
+                    self.seen[at] = true;
+                    self.front.push(at as u32);
+                }
+            }
+        }
+    }
+
+    fn clear_around(&mut self, at: usize) {
+        const REACH: usize = 3;
+        let (width, height) = (self.mask.width as usize, self.mask.height as usize);
+        let (x, y) = (at % width, at / width);
+        for y in y.saturating_sub(REACH)..(y + REACH + 1).min(height) {
+            for x in x.saturating_sub(REACH)..(x + REACH + 1).min(width) {
+                // Not those of a subject beside them.
+                if self.nearness[y * width + x] < OTHERS {
+                    self.mask.share[y * width + x] = 0.0;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Where a person is: a network's mask, steady where it is undecided.
+
+use super::feed::{Answer, Feed};
+use crate::frame::{ColorImage, Mask};
+
+/// How far an undecided pixel stays what it was in the frame before.
+const STEADINESS: f32 = 0.8;
+
+/// Finds persons, from frame to frame.
+pub struct Person {
+    feed: Feed,
+    mask: Mask,
+    /// Whether the numbers are those before the last step of a network: they were seen beyond 0 to 1.
+    is_raw: bool,
+    seen: bool,
+}
+
+impl Person {
+    pub fn new(feed: Feed) -> Self {
+        Self { feed, mask: Mask::default(), is_raw: false, seen: false }
+    }
+
+    /// Forgets the frame before: the next one is another scene.
+    pub fn forget(&mut self) {
+        self.feed.forget();
+        self.seen = false;
+    }
+
+    /// The mask of the last picture.
+    pub fn mask(&self) -> &Mask {
+        &self.mask
+    }
+
+    /// Finds the mask of a picture; undecided pixels are averaged with those of the one before, and decided ones not, so
+    /// that nothing lags (as MediaPipe has it).
+    ///
+    /// # Errors
+    /// As for [`Feed::see`].
+    pub fn look(&mut self, color: &ColorImage) -> Result<(), String> {
+        let answer = self.feed.see(color)?;
+        let pixels = answer.size.0 * answer.size.1;
+        let beyond = |share: f32| !(-0.01..=1.01).contains(&share);
+        self.is_raw |= (0..pixels).any(|pixel| beyond(answer.at(pixel, answer.channels - 1)));
+        let size = (answer.size.0 as u32, answer.size.1 as u32);
+        let fresh = !self.seen || (self.mask.width, self.mask.height) != size;
+        self.mask.resize(size.0, size.1);
+        for (pixel, share) in self.mask.share.iter_mut().enumerate() {
+            let new = share_of(&answer, pixel, self.is_raw);
+            let keeps = if fresh { 0.0 } else { STEADINESS * uncertainty(new) };
+            *share = new + (*share - new) * keeps;
+        }
+        self.seen = true;
+        Ok(())
+    }
+}
+
+/// The share of a person: of two channels, the second is theirs.
+fn share_of(answer: &Answer, pixel: usize, is_raw: bool) -> f32 {
+    let own = answer.at(pixel, answer.channels - 1);
+    match (is_raw, answer.channels) {
+        (false, _) => own.clamp(0.0, 1.0),
+        (true, 1) => sigmoid(own),
+        (true, _) => sigmoid(own - answer.at(pixel, 0)),
+    }
+}
+
+fn sigmoid(value: f32) -> f32 {
+    1.0 / (1.0 + (-value).exp())
+}
+
+/// How undecided a share is: 1 at one half, 0 at 0 and at 1. Binary entropy is close to this parabola's root.
+fn uncertainty(share: f32) -> f32 {
+    let off = 2.0 * share - 1.0;
+    (1.0 - off * off).max(0.0).powf(0.75)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uncertainty_is_that_of_a_coin() {
+        for step in 1..100 {
+            let share = step as f32 / 100.0;
+            let entropy = -share * share.log2() - (1.0 - share) * (1.0 - share).log2();
+            assert!((uncertainty(share) - entropy).abs() < 0.03, "{share}: {} {entropy}", uncertainty(share));
+        }
+        assert_eq!((uncertainty(0.0), uncertainty(1.0), uncertainty(0.5)), (0.0, 0.0, 1.0));
+    }
+}

@@ -1,0 +1,174 @@
+//! How near everything is: a network's relative inverse depth, and what it is measured against.
+//!
+//! Its numbers grow with nearness, in a scale and from a zero that wander from frame to frame. Two anchors of the picture
+//! itself do away with both: the subject, and what is farthest.
+
+use super::feed::Feed;
+use crate::frame::{ColorImage, Mask};
+
+/// Of all numbers, sorted, this share is farther than what counts as the farthest, or nearer than the nearest.
+const OUTLIERS: f32 = 0.03;
+/// How far the network's outlines are off, in its pixels: so far around a person nothing is told of what is behind.
+const MARGIN_PX: usize = 7;
+/// What is around a person is carried on behind them over so many pixels and more.
+const SPREAD_PX: usize = 24;
+/// Nothing behind a subject is nearer than this: it would be the subject's own.
+const NEAREST_BEHIND: f32 = 0.9;
+
+/// Nearness from frame to frame.
+pub struct Relief {
+    feed: Feed,
+    size: (usize, usize),
+    /// Relative inverse depth: 1 at the subject, 0 at what is farthest.
+    nearness: Vec<f32>,
+    /// The same of what is behind the subject.
+    behind: Vec<f32>,
+    known: Vec<f32>,
+    spread: Vec<f32>,
+    sorted: Vec<f32>,
+    line: Vec<f32>,
+}
+
+impl Relief {
+    pub fn new(feed: Feed) -> Self {
+        Self {
+            feed,
+            size: (0, 0),
+            nearness: Vec::new(),
+            behind: Vec::new(),
+            known: Vec::new(),
+            spread: Vec::new(),
+            sorted: Vec::new(),
+            line: Vec::new(),
+        }
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    /// Relative inverse depth of the last picture, 1 at the subject and 0 at what is farthest.
+    pub fn nearness(&self) -> &[f32] {
+        &self.nearness
+    }
+
+    /// The same, with the subject away: below 1.
+    pub fn behind(&self) -> &[f32] {
+        &self.behind
+    }
+
+    /// Finds the nearness of all that a picture shows, the subject being what `mask` has, or else what is nearest.
+    ///
+    /// # Errors
+    /// As for [`Feed::see`].
+    pub fn look(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
+        let answer = self.feed.see(color)?;
+        self.size = answer.size;
+        let pixels = answer.size.0 * answer.size.1;
+        self.nearness.clear();
+        self.nearness.extend((0..pixels).map(|pixel| answer.at(pixel, 0)));
+        self.measure(mask);
+        self.look_behind(mask);
+        Ok(())
+    }
+
+    /// Scales the network's numbers by the two anchors.
+    fn measure(&mut self, mask: Option<&Mask>) {
+        let size = self.size;
+        let Self { nearness, sorted, .. } = self;
+        let mut anchor = |share: f32, counts: &dyn Fn(usize) -> bool| {
+            sorted.clear();
+            sorted.extend(nearness.iter().enumerate().filter(|(at, _)| counts(*at)).map(|(_, &value)| value));
+            let at = (share * sorted.len().saturating_sub(1) as f32) as usize;
+            (!sorted.is_empty()).then(|| *sorted.select_nth_unstable_by(at, f32::total_cmp).1)
+        };
+        let person = |at: usize| mask.is_some_and(|mask| sample(mask, at, size) > 0.9);
+        let farthest = anchor(OUTLIERS, &|at| !person(at)).or_else(|| anchor(OUTLIERS, &|_| true));
+        let subject = anchor(0.5, &person).or_else(|| anchor(1.0 - OUTLIERS, &|_| true));
+        let (Some(farthest), Some(subject)) = (farthest, subject) else { return };
+        let scale = 1.0 / (subject - farthest).max(1e-6);
+        self.nearness.iter_mut().for_each(|value| *value = (*value - farthest) * scale);
+    }
+
+    /// What is around the subject, carried on behind it.
+    fn look_behind(&mut self, mask: Option<&Mask>) {
+        let size @ (width, height) = self.size;
+        let Self { nearness, behind, known, spread, line, .. } = self;
+        behind.clone_from(nearness);
+        let Some(mask) = mask else { return };
+        known.clear();
+        known.extend((0..width * height).map(|at| f32::from(u8::from(sample(mask, at, size) < 0.5))));
+        // Near an outline the numbers of both surfaces are mixed.
+        erode(known, line, size);
+        for (value, known) in behind.iter_mut().zip(&*known) {
+            *value *= known;
+        }
+        let total = |plane: &[f32]| plane.iter().sum::<f32>();
+        let elsewhere = total(behind) / total(known).max(1.0);
+        spread.clone_from(known);
+        for plane in [&mut *behind, &mut *spread] {
+            // A mean over a square, twice: smooth, and as far as a person is wide.
+            for _ in 0..2 {
+                mean(plane, line, size);
+            }
+        }
+        for at in 0..width * height {
+            behind[at] = match () {
+                () if known[at] > 0.0 => nearness[at],
+                () if spread[at] > 1e-3 => behind[at] / spread[at],
+                () => elsewhere,
+            }
+            .min(NEAREST_BEHIND);
+        }
+    }
+}
+
+/// A mask at a pixel of a picture of another size.
+pub fn sample(mask: &Mask, at: usize, (width, height): (usize, usize)) -> f32 {
+    let (x, y) = (at % width * mask.width as usize / width, at / width * mask.height as usize / height);
+    mask.share[y * mask.width as usize + x]
+}
+
+/// Calls `change` with every row of a plane and then with every column, each as a line.
+fn by_lines(plane: &mut [f32], line: &mut Vec<f32>, (width, height): (usize, usize), change: impl Fn(&[f32], &mut dyn FnMut(usize, f32))) {
+    for y in 0..height {
+        line.clear();
+        line.extend_from_slice(&plane[y * width..][..width]);
+        change(line, &mut |x, value| plane[y * width + x] = value);
+    }
+    for x in 0..width {
+        line.clear();
+        line.extend((0..height).map(|y| plane[y * width + x]));
+        change(line, &mut |y, value| plane[y * width + x] = value);
+    }
+}
+
+/// Where anything within [`MARGIN_PX`] is 0, all becomes 0.
+fn erode(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
+    by_lines(plane, line, size, |line, set| {
+        let mut last = None;
+        for (at, &value) in line.iter().enumerate() {
+            if value == 0.0 {
+                let from = last.map_or(0, |last| last + 1).max(at.saturating_sub(MARGIN_PX));
+                (from..at).for_each(|before| set(before, 0.0));
+                last = Some(at);
+            } else if last.is_some_and(|last| at <= last + MARGIN_PX) {
+                set(at, 0.0);
+            }
+        }
+    });
+}
+
+/// The mean of every pixel and those within [`SPREAD_PX`], row by row and column by column.
+fn mean(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
+    by_lines(plane, line, size, |line, set| {
+        let (mut sum, reach) = (0.0f64, SPREAD_PX.min(line.len() - 1));
+        line[..reach].iter().for_each(|&value| sum += f64::from(value));
+        for at in 0..line.len() {
+            sum += line.get(at + reach).map_or(0.0, |&value| f64::from(value));
+            set(at, (sum / (2 * reach + 1) as f64) as f32);
+            sum -= at.checked_sub(reach).map_or(0.0, |left| f64::from(line[left]));
+        }
+    });
+}

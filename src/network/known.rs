@@ -1,0 +1,146 @@
+//! Networks that are recognised by their content: what they are for, how they are fed, where they are to be had.
+
+use sha2::{Digest, Sha256};
+
+use crate::names::named;
+
+named! {
+    /// What a network finds in a picture.
+    pub enum Task default Matte {
+        /// Where a person is
+        Matte = "matte",
+        /// How near everything is
+        Mono = "mono",
+    }
+}
+
+/// What the codes 0 to 255 of a picture become.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scaling {
+    /// Subtracted from a code, per channel in the network's order.
+    pub mean: [f32; 3],
+    /// What the rest is divided by.
+    pub divisor: [f32; 3],
+}
+
+impl Scaling {
+    /// 0 to 1.
+    pub const UNIT: Self = Self { mean: [0.0; 3], divisor: [255.0; 3] };
+    /// -1 to 1.
+    pub const SIGNED: Self = Self { mean: [127.5; 3], divisor: [127.5; 3] };
+    /// Codes as they are.
+    pub const CODES: Self = Self { mean: [0.0; 3], divisor: [1.0; 3] };
+    /// As networks trained on ImageNet have it.
+    pub const IMAGENET: Self =
+        Self { mean: [123.675, 116.28, 103.53], divisor: [58.395, 57.12, 57.375] };
+}
+
+/// A network that is recognised.
+#[derive(Debug)]
+pub struct Known {
+    /// What it is called here.
+    pub name: &'static str,
+    /// What it finds.
+    pub task: Task,
+    /// SHA-256 of its file, in hexadecimal.
+    pub sha256: &'static str,
+    /// Bytes of its file.
+    pub bytes: u64,
+    /// Licence of the network.
+    pub license: &'static str,
+    /// Where its file is to be had.
+    pub address: &'static str,
+    /// How it is fed.
+    pub scaling: Scaling,
+    /// Blue comes first.
+    pub bgr: bool,
+}
+
+/// The best of each task first.
+pub const KNOWN: [Known; 6] = [
+    Known {
+        name: "selfie-landscape",
+        task: Task::Matte,
+        sha256: "b580fea1ee4a608472e07e4c2a21af1771d9022bb444e34b7f83719483cb5026",
+        bytes: 453_831,
+        license: "Apache-2.0 (MediaPipe Selfie Segmentation)",
+        address: "https://github.com/google-ai-edge/mediapipe/raw/98efaed723c5/mediapipe/modules/selfie_segmentation/selfie_segmentation_landscape.onnx",
+        scaling: Scaling::UNIT,
+        bgr: false,
+    },
+    Known {
+        name: "selfie",
+        task: Task::Matte,
+        sha256: "1511ab5564cb0ae179cba9bcad6ad931003ccc71656f11fd270967023678c6a5",
+        bytes: 447_596,
+        license: "Apache-2.0 (MediaPipe Selfie Segmentation)",
+        address: "https://github.com/royshil/obs-backgroundremoval/raw/875ffda175fc/data/models/selfie_segmentation.onnx",
+        scaling: Scaling::UNIT,
+        bgr: false,
+    },
+    Known {
+        name: "selfie-planes",
+        task: Task::Matte,
+        sha256: "3241ac4ad8aa35bdaf33946776db29f7c283a413aa0b0dacb9483594b4531aad",
+        bytes: 462_352,
+        license: "Apache-2.0 (MediaPipe Selfie Segmentation)",
+        address: "https://github.com/kaito-tokyo/live-backgroundremoval-lite/raw/3b0b5707dcf2/data/models/model.onnx",
+        scaling: Scaling::UNIT,
+        bgr: false,
+    },
+    Known {
+        name: "selfie-int8",
+        task: Task::Matte,
+        sha256: "9bc3d56b0b1397acbdafb631ab5c7bf14a889c00fbe2018e36503c65a2b65983",
+        bytes: 223_977,
+        license: "Apache-2.0 (MediaPipe Selfie Segmentation)",
+        address: "https://github.com/kaito-tokyo/live-backgroundremoval-lite/raw/3b0b5707dcf2/data/models/model_int8.onnx",
+        scaling: Scaling::UNIT,
+        bgr: false,
+    },
+    Known {
+        name: "sinet",
+        task: Task::Matte,
+        sha256: "17a75acc69747e443717dfaef152ee3c4615f2d81b0269f7c0224c47584af46a",
+        bytes: 395_434,
+        license: "MIT (SINet, clovaai)",
+        address: "https://github.com/royshil/obs-backgroundremoval/raw/875ffda175fc/data/models/SINet_Softmax_simple.onnx",
+        // As it was trained: blue first, and a mean and deviation of its own, over 255 once more.
+        scaling: Scaling {
+            mean: [102.890_434, 111.252_47, 126.912_12],
+            divisor: [62.932_92 * 255.0, 62.821_38 * 255.0, 66.355_705 * 255.0],
+        },
+        bgr: true,
+    },
+    Known {
+        name: "tcmonodepth-small",
+        task: Task::Mono,
+        sha256: "902b886beaebd3f68deb40bab2fd636a0c112c1ef1cbdd15fa26e5c55b389b4d",
+        bytes: 790_459,
+        license: "MIT (TCMonoDepth, Yu Li)",
+        address: "https://github.com/royshil/obs-backgroundremoval/raw/875ffda175fc/data/models/tcmonodepth_tcsmallnet_192x320.onnx",
+        scaling: Scaling::CODES,
+        bgr: false,
+    },
+];
+
+impl Known {
+    /// The one that a file's content is.
+    pub fn of(bytes: &[u8]) -> Option<&'static Self> {
+        let same_size = KNOWN.iter().filter(|known| known.bytes == bytes.len() as u64).collect::<Vec<_>>();
+        if same_size.is_empty() {
+            return None;
+        }
+        let digest = hex(&Sha256::digest(bytes));
+        same_size.into_iter().find(|known| known.sha256 == digest)
+    }
+
+    /// The file name that it is installed under.
+    pub fn file_name(&self) -> String {
+        format!("{}.onnx", self.name)
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

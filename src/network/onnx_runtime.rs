@@ -1,0 +1,138 @@
+//! ONNX Runtime, loaded when the program runs, from where the user has it.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use ort::environment::Environment;
+use ort::session::{Session, SessionInputValue};
+use ort::value::{TensorRef, ValueType};
+
+use super::{Network, Port, Tensor, guarded, one_line};
+
+/// Where its library usually is: as the loader finds it, and in Python's packages.
+pub const PLACES: [&str; 2] = ["libonnxruntime.so.1", "libonnxruntime.so"];
+
+/// A network that ONNX Runtime runs.
+pub struct OnnxRuntime {
+    session: Session,
+    inputs: Vec<Port>,
+    outputs: Vec<Port>,
+    name: String,
+}
+
+/// The runtime: opened once, at the first call.
+///
+/// # Errors
+/// There is none, or it cannot be used.
+pub fn environment() -> Result<Environment, String> {
+    static OPENED: OnceLock<Result<Environment, String>> = OnceLock::new();
+    OPENED.get_or_init(|| guarded(open)).clone()
+}
+
+fn open() -> Result<Environment, String> {
+    let mut why = "not installed (Debian 13: apt install libonnxruntime1.21; anywhere: pip install onnxruntime, and \
+                   ORT_DYLIB_PATH naming its capi/libonnxruntime.so.*)"
+        .to_owned();
+    for path in candidates() {
+        let opened = ort::init_from(&path).map_err(one_line);
+        match opened.and_then(|builder| builder.with_telemetry(false).build().map_err(one_line)) {
+            Ok(environment) => return Ok(environment),
+            // A bare name that the loader does not know says nothing.
+            Err(error) if path.is_absolute() => why = error,
+            Err(_) => {}
+        }
+    }
+    Err(why)
+}
+
+/// The libraries that may be tried, the user's choice alone where there is one.
+fn candidates() -> Vec<PathBuf> {
+    if let Some(chosen) = env::var_os("ORT_DYLIB_PATH") {
+        return vec![PathBuf::from(chosen)];
+    }
+    let mut found: Vec<PathBuf> = PLACES.iter().map(PathBuf::from).collect();
+    // What pip installs for the user, or in the virtual environment that is active.
+    let roots = [env::var_os("VIRTUAL_ENV").map(PathBuf::from), env::var_os("HOME").map(|home| Path::new(&home).join(".local"))];
+    for python in roots.into_iter().flatten().flat_map(|root| entries(&root.join("lib"))) {
+        let capi = python.join("site-packages/onnxruntime/capi");
+        found.extend(entries(&capi).into_iter().filter(|file| {
+            file.file_name().is_some_and(|name| name.to_string_lossy().starts_with("libonnxruntime.so"))
+        }));
+    }
+    found
+}
+
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    listed.map(|entry| entry.path()).collect()
+}
+
+/// Which ONNX Runtime there is.
+///
+/// # Errors
+/// Why there is none.
+pub fn installed() -> Result<String, String> {
+    environment().map(|_| name())
+}
+
+fn name() -> String {
+    // "ORT Build Info: git-branch=rel-1.21.0, ...".
+    let version = ort::info().split("rel-").nth(1).and_then(|rest| rest.split(',').next());
+    version.map_or_else(|| "ONNX Runtime".to_owned(), |version| format!("ONNX Runtime {version}"))
+}
+
+impl OnnxRuntime {
+    pub fn load(environment: &Environment, bytes: &[u8]) -> Result<Box<dyn Network>, String> {
+        let builder = Session::builder(environment).map_err(one_line)?;
+        // One thread, which does not wait busily: the others are for the blur.
+        let builder = builder.with_intra_threads(1).map_err(one_line)?.with_inter_threads(1).map_err(one_line)?;
+        let mut builder = builder.with_intra_op_spinning(false).map_err(one_line)?;
+        let session = builder.commit_from_memory(bytes).map_err(one_line)?;
+        let ports = |outlets: &[ort::value::Outlet]| outlets.iter().map(port).collect::<Result<Vec<_>, _>>();
+        let (inputs, outputs) = (ports(session.inputs())?, ports(session.outputs())?);
+        Ok(Box::new(Self { session, inputs, outputs, name: name() }))
+    }
+}
+
+fn port(outlet: &ort::value::Outlet) -> Result<Port, String> {
+    let ValueType::Tensor { shape, .. } = outlet.dtype() else {
+        return Err(format!("{} is no tensor", outlet.name()));
+    };
+    let shape = shape.iter().map(|&side| usize::try_from(side).ok()).collect();
+    Ok(Port { name: outlet.name().to_owned(), shape })
+}
+
+impl Network for OnnxRuntime {
+    fn inputs(&self) -> &[Port] {
+        &self.inputs
+    }
+
+    fn outputs(&self) -> &[Port] {
+        &self.outputs
+    }
+
+    fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
+        guarded(|| {
+            let given = inputs.iter().map(|tensor| {
+                let view = TensorRef::from_array_view((tensor.shape.as_slice(), tensor.values.as_slice()));
+                view.map(SessionInputValue::from).map_err(one_line)
+            });
+            let given = given.collect::<Result<Vec<_>, String>>()?;
+            let results = self.session.run(given.as_slice()).map_err(one_line)?;
+            outputs.resize_with(results.len(), Tensor::default);
+            for (k, output) in outputs.iter_mut().enumerate() {
+                let (shape, values) = results[k].try_extract_tensor::<f32>().map_err(one_line)?;
+                output.shape.clear();
+                output.shape.extend(shape.iter().map(|&side| side as usize));
+                output.values.clear();
+                output.values.extend_from_slice(values);
+            }
+            Ok(())
+        })
+    }
+
+    fn runtime(&self) -> &str {
+        &self.name
+    }
+}

@@ -1,0 +1,41 @@
+//! Where networks are looked for: the folders of the user and of the system for a program's data.
+
+use std::env;
+use std::path::PathBuf;
+
+use super::{Known, MOST_BYTES, Task};
+use crate::files::input;
+
+/// The folders, the user's own first: `bokehcam/models` in `$XDG_DATA_HOME` and in each of `$XDG_DATA_DIRS`.
+pub fn folders() -> Vec<PathBuf> {
+    let home = env::var_os("HOME").map(|home| PathBuf::from(home).join(".local/share"));
+    let own = env::var_os("XDG_DATA_HOME").map(PathBuf::from).filter(|path| path.is_absolute()).or(home);
+    let system = env::var_os("XDG_DATA_DIRS").filter(|dirs| !dirs.is_empty());
+    let system = system.unwrap_or_else(|| "/usr/local/share:/usr/share".into());
+    let system: Vec<PathBuf> = env::split_paths(&system).filter(|path| path.is_absolute()).collect();
+    own.into_iter().chain(system).map(|folder| folder.join("bokehcam/models")).collect()
+}
+
+/// The known networks that are installed, with their files: the best of each task first.
+pub fn installed() -> Vec<(&'static Known, PathBuf)> {
+    let files = folders().into_iter().flat_map(|folder| {
+        let mut files: Vec<PathBuf> =
+            std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+        files.sort();
+        files
+    });
+    let is_network = |file: &PathBuf| file.extension().is_some_and(|extension| extension == "onnx");
+    let mut found: Vec<(&'static Known, PathBuf)> = files
+        .filter(is_network)
+        .filter_map(|file| Some((Known::of(&input::read(&file, MOST_BYTES).ok()?)?, file)))
+        .collect();
+    let rank = |known: &Known| super::KNOWN.iter().position(|other| std::ptr::eq(other, known));
+    found.sort_by_key(|(known, _)| rank(known));
+    found.dedup_by_key(|(known, _)| known.sha256);
+    found
+}
+
+/// The best installed network of a task.
+pub fn best(task: Task) -> Option<PathBuf> {
+    installed().into_iter().find(|(known, _)| known.task == task).map(|(_, file)| file)
+}
