@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use rten::{Dimension, Model, NodeId, RunOptions, Value, ValueOrView, ThreadPool};
-use rten_tensor::prelude::*;
+use rten::{Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueOrView};
 use rten_tensor::TensorView;
+use rten_tensor::prelude::*;
 
 use super::{Network, Port, Tensor, guarded, one_line, onnx};
 

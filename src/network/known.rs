@@ -31,8 +31,7 @@ impl Scaling {
     /// Codes as they are.
     pub const CODES: Self = Self { mean: [0.0; 3], divisor: [1.0; 3] };
     /// As networks trained on ImageNet have it.
-    pub const IMAGENET: Self =
-        Self { mean: [123.675, 116.28, 103.53], divisor: [58.395, 57.12, 57.375] };
+    pub const IMAGENET: Self = Self { mean: [123.675, 116.28, 103.53], divisor: [58.395, 57.12, 57.375] };
 }
 
 /// A network that is recognised.
@@ -57,7 +56,7 @@ pub struct Known {
 }
 
 /// The best of each task first.
-pub const KNOWN: [Known; 6] = [
+pub static KNOWN: [Known; 6] = [
     Known {
         name: "selfie-landscape",
         task: Task::Matte,

@@ -12,7 +12,7 @@ mod place;
 use std::path::{Path, PathBuf};
 
 pub use known::{KNOWN, Known, Scaling, Task};
-pub use onnx_runtime::{PLACES as ONNX_RUNTIME_PLACES, installed as onnx_runtime_installed};
+pub use onnx_runtime::installed as onnx_runtime_installed;
 pub use place::{best, folders, installed};
 
 use crate::compute::catch_panic;
@@ -130,7 +130,12 @@ pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
     })
     .map_err(refused)?;
     for port in network.inputs().iter().chain(network.outputs()) {
-        if port.shape.iter().try_fold(1usize, |all, side| all.checked_mul(side.unwrap_or(1))).is_none_or(|all| all > MOST_VALUES) {
+        if port
+            .shape
+            .iter()
+            .try_fold(1usize, |all, side| all.checked_mul(side.unwrap_or(1)))
+            .is_none_or(|all| all > MOST_VALUES)
+        {
             return Err(refused(format!("{} has more than {MOST_VALUES} values: {:?}", port.name, port.shape)));
         }
     }

@@ -10,8 +10,8 @@ use ort::value::{TensorRef, ValueType};
 
 use super::{Network, Port, Tensor, guarded, one_line};
 
-/// Where its library usually is: as the loader finds it, and in Python's packages.
-pub const PLACES: [&str; 2] = ["libonnxruntime.so.1", "libonnxruntime.so"];
+/// What its library is called, where the loader finds it.
+const NAMES: [&str; 2] = ["libonnxruntime.so.1", "libonnxruntime.so"];
 
 /// A network that ONNX Runtime runs.
 pub struct OnnxRuntime {
@@ -51,9 +51,12 @@ fn candidates() -> Vec<PathBuf> {
     if let Some(chosen) = env::var_os("ORT_DYLIB_PATH") {
         return vec![PathBuf::from(chosen)];
     }
-    let mut found: Vec<PathBuf> = PLACES.iter().map(PathBuf::from).collect();
+    let mut found: Vec<PathBuf> = NAMES.iter().map(PathBuf::from).collect();
     // What pip installs for the user, or in the virtual environment that is active.
-    let roots = [env::var_os("VIRTUAL_ENV").map(PathBuf::from), env::var_os("HOME").map(|home| Path::new(&home).join(".local"))];
+    let roots = [
+        env::var_os("VIRTUAL_ENV").map(PathBuf::from),
+        env::var_os("HOME").map(|home| Path::new(&home).join(".local")),
+    ];
     for python in roots.into_iter().flatten().flat_map(|root| entries(&root.join("lib"))) {
         let capi = python.join("site-packages/onnxruntime/capi");
         found.extend(entries(&capi).into_iter().filter(|file| {

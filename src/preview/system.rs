@@ -17,6 +17,9 @@ use crate::source::{Kind, Options, Source, SourceName};
 /// Shown when there is no camera, and the synthetic scene takes its place.
 const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
                          `bokehcam doctor` says what is missing.";
+/// Shown where a camera gives no depth, so that a portrait never comes.
+const NO_DEPTH: &str = "This camera has no depth, so a band of the picture stays sharp. `bokehcam models` says which free \
+                        network gives one camera a portrait.";
 /// The source that needs no camera.
 const SYNTHETIC: &str = "synthetic";
 
@@ -100,6 +103,10 @@ impl Services for System {
             name => name.to_owned(),
         };
         let (source, source_name) = self.open_source(&name)?;
+        notes.extend(source.networks.iter().map(|networks| format!("Depth by {networks}.")));
+        if source_name.kind() == Kind::Camera && !source.has_depth() && cfg!(feature = "networks") {
+            notes.push(NO_DEPTH.to_owned());
+        }
         self.turned.clear();
         self.first.get_or_insert_with(|| Choice { name: name.clone(), label: name.clone() });
         self.camera = devices::camera_of(&source_name);

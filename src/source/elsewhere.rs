@@ -28,9 +28,23 @@ pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock
     if source.camera.info().brings == Brings::Depth {
         return SourceError::usage("the source knows its depth: leave --depth out");
     }
+    if let DepthChoice::Networks(chosen) = choice {
+        let (depth, about) = networks::open(chosen, wanted)?;
+        return Ok(Source {
+            depth: Some(depth),
+            depth_from: DepthFrom::Networks,
+            networks: Some(about),
+            first_depth: None,
+            ..source
+        });
+    }
     let mut first_depth = None;
     let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
-        DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
+        DepthChoice::Auto
+        | DepthChoice::Recorded
+        | DepthChoice::Stereo
+        | DepthChoice::None
+        | DepthChoice::Networks(_) => return Ok(source),
         DepthChoice::Folder(folder) => {
             let recording = Recording::open(folder, &wanted.reading())?;
             let depth_from = depth_of(&recording);
@@ -38,7 +52,6 @@ pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthFrom::Units),
-        DepthChoice::Networks(chosen) => (networks::open(chosen, wanted)?, DepthFrom::Networks),
     };
     Ok(Source { depth: Some(external), depth_from, first_depth, ..source })
 }

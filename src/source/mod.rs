@@ -34,9 +34,9 @@ use crate::capture::side_by_side::SideBySide;
 use crate::capture::{Brings, Camera, CaptureError};
 use crate::clock::Clock;
 use crate::computing::Computing;
-use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
-use crate::frame::DepthMap;
+use crate::depth::{DepthSource, Seen};
+use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::{Effect, Look, Strength};
 use crate::optics::StereoRig;
 use crate::recording::{Options as Reading, Recording, Scratch};
@@ -66,6 +66,8 @@ pub struct Source {
     pub rig: Option<StereoRig>,
     /// What depth comes from.
     pub depth_from: DepthFrom,
+    /// What makes the depth, where networks do.
+    pub networks: Option<String>,
     /// The first map of recorded depth, where a distance was given that it can be compared with.
     pub first_depth: Option<DepthMap>,
 }
@@ -110,7 +112,7 @@ impl Source {
     pub fn open(name: &SourceName, options: &Options, look: Option<&Look>) -> Result<Self, SourceError> {
         let wanted = Wanted { options, look };
         let source = Self::open_with_own_depth(name, &wanted)?;
-        let source = networks::for_lone_camera(source, name, &wanted)?;
+        let source = networks::for_lone_camera(source, name, &wanted);
         elsewhere::with_external_depth(source, &wanted, &Clock::system())
     }
 
@@ -118,7 +120,7 @@ impl Source {
     pub fn of(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
         let has_depth = depth.is_some() || camera.info().brings == Brings::Depth;
         let depth_from = if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing };
-        Self { camera, depth, rig: None, depth_from, first_depth: None }
+        Self { camera, depth, rig: None, depth_from, networks: None, first_depth: None }
     }
 
     /// Opens a source with the depth it has by itself: recorded, exact, or matched from its two eyes. Depth from
@@ -161,10 +163,10 @@ impl Source {
             }
             let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
             let depth_from = DepthFrom::Eyes;
-            return Ok(Self { camera: source.camera, depth, rig: Some(rig), depth_from, first_depth: None });
+            return Ok(Self { rig: Some(rig), depth_from, ..Self::of(source.camera, depth) });
         }
         let Opened { camera, depth, first_depth, .. } = source;
-        Ok(Self { camera, depth, rig: None, depth_from, first_depth })
+        Ok(Self { depth_from, first_depth, ..Self::of(camera, depth) })
     }
 
     /// Whether its frames have depth.
@@ -231,6 +233,31 @@ impl Wanted<'_> {
             _ => false,
         }
     }
+}
+
+/// The depth of one picture, made by the networks `chosen`.
+///
+/// # Errors
+/// One is not installed or cannot be used, it failed, or the look needs real distances.
+pub fn depth_by_networks(
+    chosen: &ChosenNetworks,
+    options: &Options,
+    look: &Look,
+    color: &ColorImage,
+) -> Result<DepthMap, SourceError> {
+    let (mut networks, _) = networks::open(chosen, &Wanted { options, look: Some(look) })?;
+    let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
+    let mut map = DepthMap::default();
+    networks.read(Seen { stamp, color, right: None }, &mut map)?;
+    Ok(map)
+}
+
+/// Refuses a look that needs real distances, for depth in which `who` knows only relative ones.
+///
+/// # Errors
+/// It does.
+pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
+    networks::refuse_metres(look, who)
 }
 
 /// The look adapted to a source with or without depth: without, depth of field becomes tilt-shift.

@@ -2,25 +2,35 @@
 
 use super::{ChosenNetworks, Source, SourceError, SourceName, Wanted};
 use crate::depth::DepthSource;
+use crate::look::Look;
 
 #[cfg(feature = "networks")]
 use super::{DepthChoice, DepthFrom, Kind, NetworkFile};
 
-/// Opens the networks `chosen`.
+/// Networks at work, and what they are in a few words.
+type Opened = (Box<dyn DepthSource>, String);
+
+/// Refuses a look that needs real distances; `who` knows only relative ones.
+pub(super) fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
+    match look.needs_metres() {
+        None => Ok(()),
+        Some(needs) => SourceError::usage(format!(
+            "{needs} needs distances, and {who} only what is nearer than what: use --focus auto or X,Y, and --coc-at-infinity"
+        )),
+    }
+}
+
+/// Opens the networks `chosen`, for a look.
 ///
 /// # Errors
 /// One is not installed or cannot be used, or the look needs real distances.
 #[cfg(feature = "networks")]
-pub(super) fn open(chosen: &ChosenNetworks, wanted: &Wanted) -> Result<Box<dyn DepthSource>, SourceError> {
+pub(super) fn open(chosen: &ChosenNetworks, wanted: &Wanted) -> Result<Opened, SourceError> {
     use crate::depth::single_camera::{Hints, SingleCamera};
     use crate::network::{Task, best};
-    if let Some(needs) = wanted.look.and_then(crate::look::Look::needs_metres) {
-        return SourceError::usage(format!(
-            "{needs} needs distances, and networks know only what is nearer than what: use --focus auto or X,Y, and \
-             --coc-at-infinity"
-        ));
-    }
-    let file = |chosen: &Option<NetworkFile>, task: Task| match chosen {
+    wanted.look.map_or(Ok(()), |look| refuse_metres(look, "networks know"))?;
+    let file = |chosen: &Option<NetworkFile>, task: Task| {
+        match chosen {
         None => Ok(None),
         Some(NetworkFile::At(file)) => Ok(Some(file.clone())),
         Some(NetworkFile::Installed) => best(task).map(Some).ok_or_else(|| {
@@ -30,6 +40,7 @@ pub(super) fn open(chosen: &ChosenNetworks, wanted: &Wanted) -> Result<Box<dyn D
                 task = task.name()
             ))
         }),
+    }
     };
     let (matte, mono) = (file(&chosen.matte, Task::Matte)?, file(&chosen.mono, Task::Mono)?);
     let options = &wanted.options.networks;
@@ -38,36 +49,45 @@ pub(super) fn open(chosen: &ChosenNetworks, wanted: &Wanted) -> Result<Box<dyn D
         bgr: options.network_order.map(|order| order == super::options::Order::Bgr),
     };
     let runtime = options.network_runtime.unwrap_or_default();
-    Ok(Box::new(SingleCamera::open(matte.as_deref(), mono.as_deref(), &hints, runtime)?))
+    let networks = SingleCamera::open(matte.as_deref(), mono.as_deref(), &hints, runtime)?;
+    let about = networks.describe();
+    Ok((Box::new(networks), about))
 }
 
 /// Gives a camera that has no depth that of the installed networks, if there are any and nothing else is asked for.
-///
-/// # Errors
-/// As for [`open`].
 #[cfg(feature = "networks")]
-pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted) -> Result<Source, SourceError> {
+pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted) -> Source {
     use crate::network::{Task, best};
-    let is_lone = name.kind() == Kind::Camera && !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
+    let is_lone =
+        name.kind() == Kind::Camera && !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
     let needs_metres = wanted.look.is_some_and(|look| look.needs_metres().is_some());
     // A source that is recorded has no look: what it shows is kept, and not what can be made of it at any time.
     if !is_lone || needs_metres || !wanted.look.is_some_and(|look| look.effect.follows_depth()) {
-        return Ok(source);
+        return source;
     }
     let installed = |task| best(task).map(NetworkFile::At);
     let chosen = ChosenNetworks { matte: installed(Task::Matte), mono: installed(Task::Mono) };
     if chosen.matte.is_none() {
-        return Ok(source);
+        return source;
     }
-    Ok(Source { depth: Some(open(&chosen, wanted)?), depth_from: DepthFrom::Networks, ..source })
+    match open(&chosen, wanted) {
+        Ok((depth, about)) => {
+            Source { depth: Some(depth), depth_from: DepthFrom::Networks, networks: Some(about), ..source }
+        }
+        // They were not asked for.
+        Err(error) => {
+            tracing::warn!("{error}; going on without it");
+            source
+        }
+    }
 }
 
 #[cfg(not(feature = "networks"))]
-pub(super) fn open(_: &ChosenNetworks, _: &Wanted) -> Result<Box<dyn DepthSource>, SourceError> {
+pub(super) fn open(_: &ChosenNetworks, _: &Wanted) -> Result<Opened, SourceError> {
     SourceError::usage("--depth matte and mono: this build leaves networks out (feature `networks`)")
 }
 
 #[cfg(not(feature = "networks"))]
-pub(super) fn for_lone_camera(source: Source, _: &SourceName, _: &Wanted) -> Result<Source, SourceError> {
-    Ok(source)
+pub(super) fn for_lone_camera(source: Source, _: &SourceName, _: &Wanted) -> Source {
+    source
 }

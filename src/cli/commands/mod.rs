@@ -5,6 +5,8 @@ mod bench;
 mod depth;
 mod devices;
 mod doctor;
+#[cfg(feature = "networks")]
+mod models;
 #[cfg(feature = "window")]
 mod preview;
 mod record;
@@ -51,6 +53,8 @@ pub enum Command {
     Bench(Box<bench::BenchCommand>),
     Devices(devices::DevicesCommand),
     Doctor(doctor::DoctorCommand),
+    #[cfg(feature = "networks")]
+    Models(models::ModelsCommand),
     /// Print a script that completes commands and options in a shell
     #[command(after_help = "\
 Examples:
@@ -107,6 +111,8 @@ pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Lay
         Command::Bench(command) => bench::run(&command, &layers.given(matches)),
         Command::Devices(command) => devices::run(&command),
         Command::Doctor(command) => doctor::run(&command),
+        #[cfg(feature = "networks")]
+        Command::Models(command) => models::run(&command),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "bokehcam", &mut script);

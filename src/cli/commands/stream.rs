@@ -118,6 +118,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     sinks::try_report(stream.report.as_deref())?;
     let sink = sinks::open(&command.to, &sink_options)?;
 
+    if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
+        terminal::say(&format!("depth by {networks}"));
+    }
     if info.live && !global.quiet {
         terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
     }

@@ -162,6 +162,9 @@ pub fn warn_of_no_depth(source: From) {
     let fix = match source {
         From::Picture => "--depth-map FILE gives its depth",
         From::Source(Kind::Recording) => "--depth FOLDER takes another recording's",
+        From::Source(Kind::Camera) if cfg!(feature = "networks") => {
+            "`bokehcam models` says how one camera alone gives a portrait"
+        }
         From::Source(_) | From::Bench => "--depth NAME takes a depth camera's",
     };
     log::warn(&format!(

@@ -12,6 +12,11 @@ use super::clusters::{Color, Symmetric, outer};
 use super::posterior::Posterior;
 use super::share::Contrast;
 
+/// Distance that a subject is given where distances are only relative, in metres.
+pub const SUBJECT_M: f32 = 1.0;
+/// What is then as good as infinitely far, in metres.
+pub const FAR_M: f32 = 1e3;
+
 /// From here on the mask is sure that a pixel is of the nearer surface, and below 1 less this, that it is not.
 const SURE: f32 = 0.95;
 /// Side of a cell in pixels of the mask, and the least in pixels of the picture.
@@ -35,7 +40,16 @@ pub struct MaskMatting {
     kernel: [[f32; 2 * REACH + 1]; 2 * REACH + 1],
     cells: Vec<Cell>,
     sums: Vec<[Sums; 2]>,
+    contrasts: Vec<Option<Contrast>>,
     columns: Vec<(usize, usize, f32)>,
+}
+
+/// The depth of a picture in which `mask` has the subject, all else being far.
+pub fn depth_around(mask: &Mask, color: &ColorImage) -> DepthMap {
+    let mut map = DepthMap { subject_m: Some(SUBJECT_M), ..DepthMap::new(color.width, color.height) };
+    map.metres.fill(FAR_M);
+    MaskMatting::default().find(mask, color, SUBJECT_M, &mut map);
+    map
 }
 
 /// What a mask says of a cell of the picture.
@@ -93,6 +107,7 @@ impl Default for MaskMatting {
             kernel: std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column))),
             cells: Vec::new(),
             sums: Vec::new(),
+            contrasts: Vec::new(),
             columns: Vec::new(),
         }
     }
@@ -123,19 +138,21 @@ impl MaskMatting {
         self.columns.clear();
         self.columns.extend((0..width).map(|x| between(x, width, mask.width as usize)));
         let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
-        let Self { light, posterior, kernel, cells, sums, columns } = self;
+        let Self { light, posterior, kernel, cells, sums, contrasts, columns } = self;
         let view = View { mask, color, light, columns, cell_px, across, down };
         view.classify(cells);
         view.gather(cells, sums);
+        contrasts.clear();
+        contrasts.extend((0..across * down).map(|at| {
+            let beside = || view.around(at, 1).any(|at| cells[at] == Cell::Band);
+            beside().then(|| view.contrast(kernel, sums, (at / across, at % across))).flatten()
+        }));
         for row in 0..down {
             for column in 0..across {
                 match cells[row * across + column] {
                     Cell::Far => {}
                     Cell::Near => view.pixels_of(row, column).for_each(|(x, y)| map.metres[y * width + x] = near_m),
-                    Cell::Band => {
-                        let contrast = view.contrast(kernel, sums, (row, column));
-                        view.take_apart(posterior, contrast.as_ref(), (row, column), near_m, map);
-                    }
+                    Cell::Band => view.take_apart(posterior, contrasts, (row, column), near_m, map),
                 }
             }
         }
@@ -248,29 +265,60 @@ impl View<'_> {
         known.then(|| Contrast::of(around.map(|sums| sums.color())))
     }
 
+    /// The cells up to so many away from one, and itself.
+    fn around(&self, at: usize, reach: usize) -> impl Iterator<Item = usize> + use<> {
+        let (across, row, column) = (self.across, at / self.across, at % self.across);
+        let columns = column.saturating_sub(reach)..(column + reach + 1).min(across);
+        let rows = row.saturating_sub(reach)..(row + reach + 1).min(self.down);
+        rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
+    }
+
     fn take_apart(
         &self,
         posterior: &Posterior,
-        contrast: Option<&Contrast>,
+        contrasts: &[Option<Contrast>],
         (row, column): (usize, usize),
         near_m: f32,
         map: &mut DepthMap,
     ) {
-        let slice = contrast.map(|contrast| (contrast, posterior.slice(contrast.precision())));
+        let cell = row * self.across + column;
+        let own_contrast = contrasts[cell].as_ref();
+        let slice = own_contrast.map(|contrast| (contrast, posterior.slice(contrast.precision())));
         for (x, y) in self.pixels_of(row, column) {
             let at = y * self.color.width as usize + x;
             let own = self.light_at(at);
             let mask = self.share_at(x, y);
-            let share = slice.as_ref().map_or(mask, |(contrast, slice)| slice.share(mask, contrast.share(own)));
+            let place = |contrast: &Contrast| self.place(contrasts, contrast, (x, y), own);
+            let share = slice.as_ref().map_or(mask, |(contrast, slice)| slice.share(mask, place(contrast)));
             let far_m = map.metres[at];
             if share > 0.5 {
                 map.metres[at] = near_m;
             }
             if (1.0 - NEARLY_PURE..=NEARLY_PURE).contains(&share) {
-                let difference = contrast.map_or([0.0; 3], |contrast| contrast.difference(own, share));
+                let difference = own_contrast.map_or([0.0; 3], |contrast| contrast.difference(own, share));
                 map.matte.pixels.push(MixedPixel { at: at as u32, near_m, far_m, share, difference });
             }
         }
+    }
+
+    /// Where the colour of a pixel lies between those of the two surfaces, linear between the cells around it, so that cells
+    /// are not seen; `own` is the contrast of its cell.
+    fn place(&self, contrasts: &[Option<Contrast>], own: &Contrast, (x, y): (usize, usize), light: [f32; 3]) -> f32 {
+        let half = 0.5 * self.cell_px as f32;
+        let axis = |at: usize, count: usize| {
+            let place = ((at as f32 + 0.5 - half) / self.cell_px as f32).clamp(0.0, (count - 1) as f32);
+            (place as usize, (place as usize + 1).min(count - 1), place.fract())
+        };
+        let ((left, right, along), (above, below, down)) = (axis(x, self.across), axis(y, self.down));
+        let at = |row: usize, column: usize| {
+            contrasts[row * self.across + column].as_ref().unwrap_or(own).share(light).clamp(-0.5, 1.5)
+        };
+        let row = |row: usize| {
+            let first = at(row, left);
+            first + (at(row, right) - first) * along
+        };
+        let first = row(above);
+        first + (row(below) - first) * down
     }
 }
 

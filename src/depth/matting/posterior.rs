@@ -2,12 +2,13 @@
 
 /// Shares are tried in steps of an eighth.
 const STEPS: usize = 9;
-/// So likely a pixel of the band is mixed, any share being as likely as another.
+/// So likely a pixel is mixed where the mask is undecided, any share being as likely as another; the less, the surer it is,
+/// so that the mean share is close to the mask where colours tell nothing.
 const MIXED: f32 = 0.25;
 /// No mask is surer than this.
-const MOST_SURE: f32 = 0.97;
+const MOST_SURE: f32 = 0.985;
 /// Surfaces have spots that no pixel around is like: so likely a pure pixel is one, times what evens out densities.
-const OUTLIER: f32 = 0.02;
+const OUTLIER: f32 = 0.05;
 
 /// Entries of the table: values of the mask, places of the colour from [`LEAST`] on in steps of [`STEP`], and precisions,
 /// each twice the last.
@@ -62,16 +63,17 @@ impl Default for Posterior {
 
 fn mean_share(mask: f32, place: f32, precision: f32) -> f32 {
     let mask = mask.clamp(1.0 - MOST_SURE, MOST_SURE);
+    let mixed = MIXED * 4.0 * mask * (1.0 - mask);
     let (mut sum, mut all) = (0.0, 0.0);
     for step in 0..STEPS {
         let share = step as f32 / (STEPS - 1) as f32;
         let likelihood = (-0.5 * precision * (place - share) * (place - share)).exp();
         let (prior, likelihood) = match step {
-            0 => ((1.0 - MIXED) * (1.0 - mask), likelihood.max(OUTLIER / precision.sqrt())),
-            _ if step == STEPS - 1 => ((1.0 - MIXED) * mask, likelihood.max(OUTLIER / precision.sqrt())),
+            0 => ((1.0 - mixed) * (1.0 - mask), likelihood.max(OUTLIER / precision.sqrt())),
+            _ if step == STEPS - 1 => ((1.0 - mixed) * mask, likelihood.max(OUTLIER / precision.sqrt())),
             _ => (0.0, likelihood),
         };
-        let weight = (prior + MIXED / STEPS as f32) * likelihood;
+        let weight = (prior + mixed / STEPS as f32) * likelihood;
         (sum, all) = (sum + weight * share, all + weight);
     }
     sum / all

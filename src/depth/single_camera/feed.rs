@@ -66,7 +66,10 @@ impl Feed {
         let inputs = network.inputs();
         let pictures: Vec<usize> = (0..inputs.len()).filter(|&k| channels_at(&inputs[k], &[3]).is_some()).collect();
         let &[picture] = pictures.as_slice() else {
-            return Err(format!("{} of its inputs are pictures of three channels, where one is wanted", pictures.len()));
+            return Err(format!(
+                "{} of its inputs are pictures of three channels, where one is wanted",
+                pictures.len()
+            ));
         };
         let planes = channels_at(&inputs[picture], &[3]) == Some(1);
         let sides = if planes { [3, 2] } else { [2, 1] };
@@ -91,7 +94,8 @@ impl Feed {
         let answer = answer.ok_or("none of its outputs is a picture of one channel or two")?;
         // What else it takes is what it gave the last time, in the same order (as Robust Video Matting has it); or a ratio.
         let others = (0..inputs.len()).filter(|&k| k != picture && !is_ratio(&inputs[k]));
-        let states = (outputs.len() + 1).saturating_sub(inputs.iter().filter(|port| !is_ratio(port)).count())..outputs.len();
+        let states =
+            (outputs.len() + 1).saturating_sub(inputs.iter().filter(|port| !is_ratio(port)).count())..outputs.len();
         let memory: Vec<(usize, usize)> = others.clone().zip(states).collect();
         if memory.len() != others.count() || memory.iter().any(|&(_, output)| output == answer) {
             return Err("it takes more than a picture and what it gave before".to_owned());
@@ -124,11 +128,6 @@ impl Feed {
             row: Vec::new(),
             small: Vec::new(),
         })
-    }
-
-    /// What runs it.
-    pub fn runtime(&self) -> &str {
-        self.network.runtime()
     }
 
     /// Forgets what it gave for the picture before: the next one is another scene.

@@ -18,21 +18,18 @@ use held::Held;
 use person::Person;
 use relief::Relief;
 
-use super::matting::mask::MaskMatting;
+use super::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
 use super::{DepthError, DepthSource, Seen};
-use crate::frame::{DepthMap, Mask};
+use crate::frame::{ColorImage, DepthMap};
 use crate::network::{self, Runtime, Task};
 
-/// Distance that a subject is given, in metres: only ratios of distances matter.
-const SUBJECT_M: f32 = 1.0;
-/// Nothing is nearer to 0, so that distances are numbers: what is as good as infinitely far.
-const LEAST_NEARNESS: f32 = 1e-3;
 /// Between two frames further apart than this, the first is no guide to the second.
 const APART_NS: u64 = 500_000_000;
 
 /// Networks at work on the pictures of a camera.
 pub struct SingleCamera {
     name: String,
+    runtime: String,
     person: Option<Person>,
     relief: Option<Relief>,
     held: Held,
@@ -41,6 +38,8 @@ pub struct SingleCamera {
     looks_at_all: bool,
     frames: u64,
     last_ns: Option<u64>,
+    /// Whether persons are to be found.
+    has_subject: bool,
 }
 
 impl SingleCamera {
@@ -48,23 +47,30 @@ impl SingleCamera {
     ///
     /// # Errors
     /// One cannot be loaded, or is none for its task.
-    pub fn open(matte: Option<&Path>, mono: Option<&Path>, hints: &Hints, runtime: Runtime) -> Result<Self, DepthError> {
-        let load = |path: &Path, task| {
+    pub fn open(
+        matte: Option<&Path>,
+        mono: Option<&Path>,
+        hints: &Hints,
+        runtime: Runtime,
+    ) -> Result<Self, DepthError> {
+        let (mut names, mut run_by) = (Vec::new(), String::new());
+        let mut load = |path: &Path, task| {
             let name = path.display().to_string();
             let failed = |why: String| DepthError::Network { name: name.clone(), why };
             let loaded = network::load(path, runtime)?;
             if let Some(known) = loaded.known.filter(|known| known.task != task) {
                 return Err(failed(format!("this is {}, a network for --depth {}", known.name, known.task.name())));
             }
-            let feed = Feed::new(loaded, task, hints).map_err(failed)?;
-            tracing::info!("{name}: run by {}", feed.runtime());
-            Ok(feed)
+            names.push(loaded.known.map_or_else(|| name.clone(), |known| known.name.to_owned()));
+            run_by = loaded.network.runtime().to_owned();
+            Feed::new(loaded, task, hints).map_err(failed)
         };
         let person = matte.map(|path| load(path, Task::Matte)).transpose()?.map(Person::new);
         let relief = mono.map(|path| load(path, Task::Mono)).transpose()?.map(Relief::new);
-        let names = [matte, mono].into_iter().flatten().map(|path| path.display().to_string());
-        Ok(Self {
-            name: names.collect::<Vec<_>>().join(", "),
+        let has_subject = person.is_some();
+        let mut networks = Self {
+            name: names.join(" and "),
+            runtime: run_by,
             person,
             relief,
             held: Held::default(),
@@ -72,45 +78,70 @@ impl SingleCamera {
             looks_at_all: true,
             frames: 0,
             last_ns: None,
-        })
+            has_subject,
+        };
+        networks.try_out()?;
+        Ok(networks)
+    }
+}
+
+impl SingleCamera {
+    /// What they are, in a few words: their names, and what runs them.
+    pub fn describe(&self) -> String {
+        format!("{}, run by {}", self.name, self.runtime)
+    }
+
+    /// Shows the networks a grey picture: what cannot be run is told before there are others.
+    fn try_out(&mut self) -> Result<(), DepthError> {
+        let Self { name, person, relief, .. } = self;
+        let failed = |why| DepthError::Network { name: name.clone(), why };
+        let mut grey = ColorImage::new(64, 48);
+        grey.rgb.fill(128);
+        person.as_mut().map_or(Ok(()), |person| person.look(&grey)).map_err(failed)?;
+        relief.as_mut().map_or(Ok(()), |relief| relief.look(&grey, None)).map_err(failed)
+    }
+
+    /// Lets the networks look at a picture; one that fails is turned off.
+    fn look(&mut self, color: &ColorImage) {
+        let Self { name, person, relief, held, .. } = self;
+        if let Some(Err(why)) = person.as_mut().map(|person| person.look(color)) {
+            tracing::error!("{name}: the person's network is turned off, and all is blurred: {why}");
+            *person = None;
+        }
+        let mask = person.as_ref().map(Person::mask);
+        if let Some(Err(why)) = relief.as_mut().map(|relief| relief.look(color, mask)) {
+            tracing::error!("{name}: the network for depth is turned off: {why}");
+            *relief = None;
+        }
+        if let (Some(mask), Some(relief)) = (mask, relief) {
+            held.join(mask, relief);
+        }
     }
 }
 
 impl DepthSource for SingleCamera {
     fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
-        let Self { name, person, relief, held, matting, .. } = self;
-        let failed = |why| DepthError::Network { name: name.clone(), why };
         let apart = self.last_ns.is_none_or(|last_ns| stamp.time_ns.abs_diff(last_ns) > APART_NS);
         self.last_ns = Some(stamp.time_ns);
         if apart {
-            person.iter_mut().for_each(Person::forget);
+            self.person.iter_mut().for_each(Person::forget);
         }
-        let looks = apart || self.looks_at_all || self.frames.is_multiple_of(2);
+        if apart || self.looks_at_all || self.frames.is_multiple_of(2) {
+            self.look(color);
+        }
         self.frames += 1;
-        if looks {
-            if let Some(person) = person {
-                person.look(color).map_err(failed)?;
-            }
-            let mask = person.as_ref().map(Person::mask);
-            if let Some(relief) = relief {
-                relief.look(color, mask).map_err(failed)?;
-            }
-            if let (Some(mask), Some(relief)) = (mask, &relief) {
-                held.join(mask, relief);
-            }
-        }
+        let Self { person, relief, held, matting, .. } = self;
         map.resize(color.width, color.height);
         map.matte.pixels.clear();
         match &relief {
-            Some(relief) => {
-                let plane = if person.is_some() { relief.behind() } else { relief.nearness() };
-                spread_over(plane, relief.size(), map);
-            }
-            None => map.metres.fill(SUBJECT_M / LEAST_NEARNESS),
+            Some(relief) if person.is_some() => spread_over(relief.behind(), relief.size(), map),
+            Some(relief) if !self.has_subject => spread_over(relief.nearness(), relief.size(), map),
+            _ => map.metres.fill(FAR_M),
         }
-        map.subject_m = person.is_some().then_some(SUBJECT_M);
+        // Without a mask there is a subject only where there was to be one, and then nothing is in focus.
+        map.subject_m = (self.has_subject || relief.is_none()).then_some(SUBJECT_M);
         if let Some(person) = &person {
-            let mask: &Mask = if relief.is_some() { held.mask() } else { person.mask() };
+            let mask = if relief.is_some() { held.mask() } else { person.mask() };
             matting.find(mask, color, SUBJECT_M, map);
         }
         Ok(())
@@ -139,7 +170,7 @@ fn spread_over(nearness: &[f32], (width, height): (usize, usize), map: &mut Dept
             let (left, right, along) = place(x, to_width, width);
             let upper = above[left] + (above[right] - above[left]) * along;
             let lower = below[left] + (below[right] - below[left]) * along;
-            *metres = SUBJECT_M / (upper + (lower - upper) * down).max(LEAST_NEARNESS);
+            *metres = SUBJECT_M / (upper + (lower - upper) * down).max(SUBJECT_M / FAR_M);
         }
     }
 }

@@ -131,7 +131,12 @@ pub fn sample(mask: &Mask, at: usize, (width, height): (usize, usize)) -> f32 {
 }
 
 /// Calls `change` with every row of a plane and then with every column, each as a line.
-fn by_lines(plane: &mut [f32], line: &mut Vec<f32>, (width, height): (usize, usize), change: impl Fn(&[f32], &mut dyn FnMut(usize, f32))) {
+fn by_lines(
+    plane: &mut [f32],
+    line: &mut Vec<f32>,
+    (width, height): (usize, usize),
+    change: impl Fn(&[f32], &mut dyn FnMut(usize, f32)),
+) {
     for y in 0..height {
         line.clear();
         line.extend_from_slice(&plane[y * width..][..width]);

@@ -8,11 +8,39 @@ use crate::computing::Computing;
 use crate::look::{Effect, Look};
 
 const BLUR: &str = "blur";
+#[cfg(feature = "networks")]
+const NETWORKS: &str = "networks";
 const PROGRAMS: &str = "programs";
 
 /// Checks what runs the blur, and whether other programs are installed.
 pub fn findings() -> Vec<Finding> {
-    vec![check_blur(), check_ffmpeg()]
+    let mut findings = vec![check_blur()];
+    #[cfg(feature = "networks")]
+    findings.extend(check_networks());
+    findings.push(check_ffmpeg());
+    findings
+}
+
+/// Whether one camera alone gives a portrait, and how fast its network is run.
+#[cfg(feature = "networks")]
+fn check_networks() -> Vec<Finding> {
+    use crate::network::{self, Task};
+    let installed = network::installed();
+    let names: Vec<&str> = installed.iter().map(|(known, _)| known.name).collect();
+    let persons = installed.iter().any(|(known, _)| known.task == Task::Matte);
+    let of_networks = match persons {
+        true => Finding::good(NETWORKS, format!("one camera alone gives a portrait: {}", names.join(", "))),
+        false => Finding::note(
+            NETWORKS,
+            "none that finds persons, so one camera alone gives no portrait",
+            "`bokehcam models` says which is known and where to get it (450 kB)",
+        ),
+    };
+    let of_runtime = match network::onnx_runtime_installed() {
+        Ok(name) => Finding::good(NETWORKS, format!("run by {name}")),
+        Err(why) => Finding::note(NETWORKS, "run by what is built in; ONNX Runtime is five times as fast", why),
+    };
+    vec![of_networks, of_runtime]
 }
 
 /// Which executor `--backend auto` chooses here.

@@ -20,9 +20,11 @@ use crate::cli::settings::unused::From;
 use crate::cli::terminal;
 use crate::compute::Backend;
 use crate::depth::agreement::Agreement;
+use crate::depth::matting::mask;
 use crate::files::place;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::look::{ApertureName, Look, Refine, Strength};
+use crate::names;
 use crate::optics::StereoRig;
 use crate::pipeline::{
     self,
@@ -32,12 +34,25 @@ use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::recording::{Extras, snapshot};
 use crate::source::{self, DepthChoice, DepthFrom};
 
+names::named! {
+    /// What the numbers of a depth map are.
+    pub enum DepthUnit default Metres {
+        /// Distances
+        Metres = "metres",
+        /// Relative inverse depth
+        Inverse = "inverse",
+    }
+}
+
 /// Blur one still picture
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png
   bokehcam render photo.jpg --depth-map depth.pfm --focus 0.5,0.4 --aperture polygon:6 --out portrait.png
+  bokehcam render photo.jpg --depth matte --out portrait.png
+  bokehcam render photo.jpg --mask person.png --out portrait.png
+  bokehcam render photo.jpg --depth-map midas.png --depth-unit inverse --out portrait.png
   bokehcam render photo.jpg --effect tilt-shift --tilt 0.6:0.1:10 --out small-world.png
   bokehcam render photo.jpg --effect blur --coc-at-infinity 12 --aperture heart --out hearts.png
   bokehcam render photo.jpg --depth-map depth.png --out portrait.png --debug-dir within/
@@ -50,6 +65,17 @@ pub struct RenderCommand {
     /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity that `depth` wrote
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
+    /// What the numbers of the depth map are: metres (as --depth-scale has them), or inverse (relative inverse depth, as
+    /// networks and phones give it: 8 or 16 bits, PNG, JPEG or PFM, white is near)
+    #[arg(long, value_name = "UNIT", value_parser = options::named::<DepthUnit>(), default_value = "metres",
+          requires = "depth_map")]
+    depth_unit: DepthUnit,
+    /// White is far in a depth map of inverse depth
+    #[arg(long, requires = "depth_map")]
+    depth_invert: bool,
+    /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_map", "like"])]
+    mask: Option<PathBuf>,
     /// Take the settings of a snapshot of the preview; flags go before them. Without IMAGE, its NAME-color.png and, without
     /// --depth-map, its NAME-depth.pfm are blurred, which gives the same picture again
     #[arg(long, value_name = "NAME.png")]
@@ -65,6 +91,8 @@ pub struct RenderCommand {
     blur: options::Blur,
     #[command(flatten)]
     depth: options::Depth,
+    #[command(flatten)]
+    networks: options::Networks,
     #[command(flatten)]
     computing: options::Computing,
     #[command(flatten)]
@@ -88,7 +116,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
             refuse_source("--debug-dir", dir, source)?;
         }
     }
-    if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
+    if matches!(command.blur.depth, DepthChoice::Folder(_) | DepthChoice::Device(_) | DepthChoice::Stereo) {
         let what = "--depth FOLDER, stereo or a depth camera are for `stream`: give a picture's depth with --depth-map";
         return Err(CliError::Usage(what.to_string()));
     }
@@ -188,7 +216,13 @@ fn sources(command: &RenderCommand) -> Vec<PathBuf> {
         Some(ApertureName::Image(file)) => Some(file),
         _ => None,
     };
-    [&command.image, &command.depth_map].into_iter().flatten().chain(aperture).cloned().chain(of_snapshot).collect()
+    [&command.image, &command.depth_map, &command.mask]
+        .into_iter()
+        .flatten()
+        .chain(aperture)
+        .cloned()
+        .chain(of_snapshot)
+        .collect()
 }
 
 /// Reads the picture, its metadata, and its depth if there is any. What the command does not name comes from the files
@@ -213,13 +247,62 @@ fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Opt
     if let (Some(Depth::Measured(map)), Some(file)) = (&depth, &command.depth_map) {
         still::check_depth_size(file, map.size(), color.size())?;
     }
-    Ok((color, extras, depth))
+    let made = made_depth(command, look, &color)?;
+    Ok((color, extras, made.or(depth)))
+}
+
+/// The depth that is made for the picture: from a mask, or by networks; `None` where nothing of that is asked for.
+fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
+    let is_given = command.depth_map.is_some() || command.mask.is_some();
+    match (&command.mask, &command.blur.depth) {
+        (_, DepthChoice::Networks(_)) if is_given => {
+            let what = "--depth matte and mono make the depth: leave --depth-map and --mask out";
+            Err(CliError::Usage(what.to_string()))
+        }
+        (Some(file), _) => {
+            source::refuse_metres(look, "a mask tells")?;
+            let (width, height, share) = still::read_grey(file)?;
+            still::check_depth_size(file, (width, height), color.size())?;
+            Ok(Some(Depth::Final(mask::depth_around(&Mask { width, height, share }, color))))
+        }
+        (None, DepthChoice::Networks(chosen)) => {
+            let options = source::Options { networks: command.networks.clone(), ..source::Options::default() };
+            let map = source::depth_by_networks(chosen, &options, look, color)?;
+            // Around a subject it has its matte already; else its outlines are soft, and are fitted to the picture.
+            Ok(Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }))
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Reads relative inverse depth as distances in units of the nearest one.
+fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
+    let (width, height, mut nearness) = match still::map_format(file) {
+        Ok(MapFormat::Pfm) => match still::read_map(file, None, None)? {
+            still::Map::Depth(map) => (map.width, map.height, map.metres),
+            still::Map::Disparity(map, _) => (map.width, map.height, map.px),
+        },
+        _ => still::read_grey(file)?,
+    };
+    let known = nearness.iter().copied().filter(|value| value.is_finite());
+    let (low, high) = known.fold((f32::MAX, f32::MIN), |(low, high), value| (low.min(value), high.max(value)));
+    let scale = 1.0 / (high - low).max(f32::MIN_POSITIVE);
+    for value in &mut nearness {
+        let near = (*value - low) * scale;
+        let near = if invert { 1.0 - near } else { near };
+        *value = if near.is_finite() { mask::SUBJECT_M / near.max(mask::SUBJECT_M / mask::FAR_M) } else { 0.0 };
+    }
+    Ok(DepthMap { width, height, metres: nearness, ..DepthMap::default() })
 }
 
 /// Reads depth in metres from a file of depth or disparity. Disparity without stereo geometry gives depth of unknown
 /// scale, which is an error where the look needs real metres.
 fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
     let name = file.display();
+    if command.depth_unit == DepthUnit::Inverse {
+        source::refuse_metres(look, "inverse depth without a scale tells")?;
+        return read_inverse_depth(file, command.depth_invert);
+    }
     let options::Depth { depth_scale, depth_invalid, .. } = command.depth;
     let (map, rig) = match still::read_map(file, depth_scale, Some(depth_invalid))? {
         still::Map::Depth(map) => return Ok(map),
