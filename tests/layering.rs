@@ -4,10 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the crate by layer, the lowest first.
-const LAYERS: [&[&str]; 12] = [
+const LAYERS: [&[&str]; 13] = [
     &["names"],
     &["color", "frame", "optics", "clock", "files", "knob"],
     &["compute", "calibration"],
+    &["network"],
     &["link", "budget", "stats", "recording", "scene", "v4l2"],
     &["capture", "depth", "bokeh", "sink"],
     &["look"],
@@ -20,7 +21,7 @@ const LAYERS: [&[&str]; 12] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 20] = [
+const DOORS: [(&str, &[&str]); 24] = [
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
@@ -30,13 +31,17 @@ const DOORS: [(&str, &[&str]); 20] = [
     ("egui_winit", &["preview/window"]),
     ("image", &["recording", "sink"]),
     ("indicatif", &["cli"]),
+    ("ort", &["network/onnx_runtime"]),
     ("plotters", &["cli"]),
     ("png", &["recording", "sink"]),
     (
         "rustix",
         &["capture/synthetic", "compute/memory", "clock", "files", "link/bell", "sink/ffmpeg", "sink/pipe", "v4l2"],
     ),
+    ("rten", &["network/built_in"]),
+    ("rten_tensor", &["network/built_in"]),
     ("saphyr_parser", &["calibration"]),
+    ("sha2", &["network/known"]),
     ("softbuffer", &["preview/present"]),
     ("strsim", &["source", "v4l2"]),
     ("toml_edit", &["cli"]),
