@@ -29,8 +29,8 @@
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 3 | `link`, [`budget`], [`stats`], [`recording`], `scene`, `v4l2` |
-//! | 2 | `compute`, [`calibration`], [`network`] |
+//! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `scene`, `v4l2` |
+//! | 2 | `compute`, [`calibration`] |
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
 //!

@@ -4,12 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules of the crate by layer, the lowest first.
-const LAYERS: [&[&str]; 13] = [
+const LAYERS: [&[&str]; 12] = [
     &["names"],
     &["color", "frame", "optics", "clock", "files", "knob"],
     &["compute", "calibration"],
-    &["network"],
-    &["link", "budget", "stats", "recording", "scene", "v4l2"],
+    &["link", "budget", "network", "stats", "recording", "scene", "v4l2"],
     &["capture", "depth", "bokeh", "sink"],
     &["look"],
     &["computing"],
