@@ -5,7 +5,7 @@
 //! | `scenes`, `texture` | scenes made by code |
 //! | `lens`, `truth` | the exact renderer, and its pictures kept between runs |
 //! | `damage` | depth maps as sensors give them |
-//! | `methods`, `rivals` | what is compared |
+//! | `methods`, `rivals`, `masks` | what is compared |
 //! | `metrics`, `flip`, `highlight` | how it is measured |
 //! | `report`, `markdown`, `sheet` | what comes out |
 //!
@@ -18,6 +18,7 @@ mod flip;
 mod highlight;
 mod lens;
 mod markdown;
+mod masks;
 mod methods;
 mod metrics;
 mod options;
@@ -45,6 +46,8 @@ use truth::{Views, views};
 
 /// Scenes whose depth is damaged, too.
 const DAMAGED: [&str; 3] = ["hair", "fence", "depths"];
+/// Scenes that are portraits, with nothing in front of the subject.
+const MASKED: [&str; 3] = ["slant", "hair", "pentagon"];
 /// The scene that is looked at for flicker, and for how many frames.
 const STATIC: &str = "depths";
 const STATIC_FRAMES: u64 = 8;
@@ -94,6 +97,13 @@ fn run(options: &Options) -> Outcome<()> {
                 let shots: Vec<Views> = shots.iter().map(|views| damaged(views, damage, SEED)).collect();
                 scene(options, kind, Some(damage), &shots, &mut results)?;
             }
+        }
+        if options.parts.contains(&Part::Masks) && MASKED.contains(&kind.name) {
+            let portraits = masks::measure(kind.name, &(kind.at)(0), &shots[0])?;
+            for portrait in &portraits {
+                say(options, portrait.line(), Some(portrait))?;
+            }
+            results.portraits.extend(portraits);
         }
         if options.parts.contains(&Part::Flicker) && kind.name == STATIC {
             flicker(options, &shots[0], &mut results)?;

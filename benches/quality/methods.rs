@@ -197,6 +197,14 @@ impl Blurrer {
         self.run(shot, depth)
     }
 
+    /// The blurred picture, with the depth and matte that the shot has.
+    ///
+    /// # Errors
+    /// As for [`Self::blur`].
+    pub fn blur_as_is(&mut self, shot: &Shot) -> Result<ColorImage, BokehError> {
+        self.run(shot, shot.depth.clone())
+    }
+
     fn run(&mut self, shot: &Shot, depth: DepthMap) -> Result<ColorImage, BokehError> {
         let Some(bokeh) = &mut self.bokeh else { return Ok(shot.image.clone()) };
         bokeh.submit(Job {

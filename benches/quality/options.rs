@@ -19,6 +19,8 @@ pub enum Part {
     Highlight,
     /// A static scene with noisy depth
     Flicker,
+    /// Portraits from a coarse mask alone
+    Masks,
 }
 
 /// Quality of the blur against thin-lens truth, beside other methods
@@ -47,7 +49,7 @@ pub struct Options {
         value_name = "LIST",
         value_delimiter = ',',
         value_enum,
-        default_value = "exact,damaged,highlight,flicker"
+        default_value = "exact,damaged,highlight,flicker,masks"
     )]
     pub parts: Vec<Part>,
     /// Frames of the scenes that move

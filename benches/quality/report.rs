@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::highlight::Profile;
+use super::masks::Portrait;
 use super::methods::Method;
 
 /// Name of a scene, and what was done to its depth map, if anything.
@@ -60,6 +61,8 @@ pub struct Results {
     pub highlights: Vec<Highlight>,
     /// The static scene.
     pub flicker: Vec<Flicker>,
+    /// Portraits from a coarse mask.
+    pub portraits: Vec<Portrait>,
 }
 
 impl Record {

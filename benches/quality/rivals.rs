@@ -124,7 +124,7 @@ pub fn blended(image: &Plane<Rgb>, coc_px: &Plane<f32>) -> Plane<Rgb> {
 }
 
 /// A Gaussian of `sigma_px`, cut at three of them, one axis after the other.
-fn smoothed(image: &Plane<Rgb>, sigma_px: f32) -> Plane<Rgb> {
+pub fn smoothed(image: &Plane<Rgb>, sigma_px: f32) -> Plane<Rgb> {
     let reach = (3.0 * sigma_px).ceil() as i32;
     let taps: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma_px).powi(2)).exp()).collect();
     let all: f32 = taps.iter().sum();

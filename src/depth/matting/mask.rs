@@ -39,7 +39,9 @@ pub struct MaskMatting {
     /// What the weights of the cells around one are, by row and column.
     kernel: [[f32; 2 * REACH + 1]; 2 * REACH + 1],
     cells: Vec<Cell>,
-    sums: Vec<[Sums; 2]>,
+    /// Whether the colours of a cell are wanted.
+    wanted: Vec<bool>,
+    sums: Vec<Sums>,
     contrasts: Vec<Option<Contrast>>,
     columns: Vec<(usize, usize, f32)>,
 }
@@ -61,37 +63,41 @@ enum Cell {
     Band,
 }
 
-/// Pixels of a surface in a cell: how many, sums of their light, and of the products of that.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    weight: f32,
-    light: [f32; 3],
-    squares: Symmetric,
-}
+/// Pixels of both surfaces in a cell, [`SURFACE`] sums each: how many, their light, and the products of that.
+#[derive(Clone, Copy, Debug)]
+struct Sums([f32; 2 * SURFACE]);
+
+/// Sums of a surface: ten, and up to whole vectors.
+const SURFACE: usize = 12;
+/// Places of the near and of the far surface.
+const NEAR: usize = 0;
+const FAR: usize = 1;
 
 impl Sums {
-    fn add(&mut self, light: [f32; 3]) {
-        self.weight += 1.0;
-        for (sum, light) in self.light.iter_mut().zip(light) {
-            *sum += light;
-        }
-        for (sum, square) in self.squares.iter_mut().zip(outer(light)) {
-            *sum += square;
-        }
+    const NONE: Self = Self([0.0; 2 * SURFACE]);
+
+    #[inline(always)]
+    fn add(&mut self, surface: usize, light: [f32; 3]) {
+        let sums = &mut self.0[surface * SURFACE..][..SURFACE];
+        let [xx, xy, xz, yy, yz, zz] = outer(light);
+        let values = [1.0, light[0], light[1], light[2], xx, xy, xz, yy, yz, zz, 0.0, 0.0];
+        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
     }
 
+    #[inline(always)]
     fn add_all(&mut self, other: &Self, weight: f32) {
-        self.weight += weight * other.weight;
-        for (sum, light) in self.light.iter_mut().zip(other.light) {
-            *sum += weight * light;
-        }
-        for (sum, square) in self.squares.iter_mut().zip(other.squares) {
-            *sum += weight * square;
-        }
+        self.0.iter_mut().zip(&other.0).for_each(|(sum, value)| *sum += weight * value);
     }
 
-    fn color(&self) -> Color {
-        Color::of_sums(self.weight, self.light, self.squares)
+    /// The colours of both; `None` where there are too few pixels of one.
+    fn colors(&self) -> Option<[Color; 2]> {
+        let weights = [self.0[0], self.0[SURFACE]];
+        let color = |k: usize| {
+            let sums = &self.0[k * SURFACE + 1..];
+            let squares: Symmetric = std::array::from_fn(|k| sums[3 + k]);
+            Color::of_sums(weights[k], std::array::from_fn(|k| sums[k]), squares)
+        };
+        weights.iter().all(|&weight| weight > LEAST_WEIGHT).then(|| [color(NEAR), color(FAR)])
     }
 }
 
@@ -106,6 +112,7 @@ impl Default for MaskMatting {
             posterior: Posterior::new(),
             kernel: std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column))),
             cells: Vec::new(),
+            wanted: Vec::new(),
             sums: Vec::new(),
             contrasts: Vec::new(),
             columns: Vec::new(),
@@ -134,19 +141,40 @@ impl MaskMatting {
         if map.size() != color.size() || mask.share.is_empty() || width * height == 0 {
             return;
         }
+        pulp::Arch::new().dispatch(Finding { matting: self, mask, color, near_m, map });
+    }
+}
+
+/// What [`MaskMatting::find`] is given.
+struct Finding<'a> {
+    matting: &'a mut MaskMatting,
+    mask: &'a Mask,
+    color: &'a ColorImage,
+    near_m: f32,
+    map: &'a mut DepthMap,
+}
+
+impl pulp::WithSimd for Finding<'_> {
+    type Output = ();
+    // No vectors by hand: the call lets the compiler make them of these loops, as wide as the processor has them.
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { matting, mask, color, near_m, map } = self;
+        let (width, height) = (color.width as usize, color.height as usize);
         let cell_px = ((CELL_OF_MASK * width as f32 / mask.width as f32).round() as usize).max(LEAST_CELL_PX);
-        self.columns.clear();
-        self.columns.extend((0..width).map(|x| between(x, width, mask.width as usize)));
+        matting.columns.clear();
+        matting.columns.extend((0..width).map(|x| between(x, width, mask.width as usize)));
         let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
-        let Self { light, posterior, kernel, cells, sums, contrasts, columns } = self;
+        let MaskMatting { light, posterior, kernel, cells, wanted, sums, contrasts, columns } = matting;
         let view = View { mask, color, light, columns, cell_px, across, down };
         view.classify(cells);
-        view.gather(cells, sums);
+        view.gather(cells, wanted, sums);
         contrasts.clear();
-        contrasts.extend((0..across * down).map(|at| {
-            let beside = || view.around(at, 1).any(|at| cells[at] == Cell::Band);
-            beside().then(|| view.contrast(kernel, sums, (at / across, at % across))).flatten()
-        }));
+        for at in 0..across * down {
+            let is_beside = cells[at] == Cell::Band || view.around(at, 1).any(|at| cells[at] == Cell::Band);
+            let contrast = if is_beside { view.contrast(kernel, sums, (at / across, at % across)) } else { None };
+            contrasts.push(contrast);
+        }
         for row in 0..down {
             for column in 0..across {
                 match cells[row * across + column] {
@@ -161,17 +189,20 @@ impl MaskMatting {
 }
 
 impl View<'_> {
+    #[inline(always)]
     fn pixels_of(&self, row: usize, column: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
         let (side, width, height) = (self.cell_px, self.color.width as usize, self.color.height as usize);
         let xs = column * side..((column + 1) * side).min(width);
         (row * side..((row + 1) * side).min(height)).flat_map(move |y| xs.clone().map(move |x| (x, y)))
     }
 
+    #[inline(always)]
     fn light_at(&self, at: usize) -> [f32; 3] {
         [0, 1, 2].map(|p| self.light[usize::from(self.color.rgb[3 * at + p])])
     }
 
     /// The mask at a pixel, linear between its own.
+    #[inline(always)]
     fn share_at(&self, x: usize, y: usize) -> f32 {
         let (above, below, down) = between(y, self.color.height as usize, self.mask.height as usize);
         let (left, right, along) = self.columns[x];
@@ -211,11 +242,13 @@ impl View<'_> {
     }
 
     /// The colours of the cells that are in the band, or in reach of it.
-    fn gather(&self, cells: &[Cell], sums: &mut Vec<[Sums; 2]>) {
+    #[inline(always)]
+    fn gather(&self, cells: &[Cell], wanted: &mut Vec<bool>, sums: &mut Vec<Sums>) {
         let (across, down) = (self.across, self.down);
         sums.clear();
-        sums.resize(across * down, [Sums::default(); 2]);
-        let mut wanted = vec![false; across * down];
+        sums.resize(across * down, Sums::NONE);
+        wanted.clear();
+        wanted.resize(across * down, false);
         for row in 0..down {
             for column in (0..across).filter(|column| cells[row * across + column] == Cell::Band) {
                 for row in row.saturating_sub(REACH)..(row + REACH + 1).min(down) {
@@ -225,18 +258,18 @@ impl View<'_> {
             }
         }
         for at in (0..across * down).filter(|&at| wanted[at]) {
-            let [near, far] = &mut sums[at];
+            let sums = &mut sums[at];
             for (x, y) in self.pixels_of(at / across, at % across).filter(|(x, y)| (x + y) % 2 == 0) {
                 let light = || self.light_at(y * self.color.width as usize + x);
                 match cells[at] {
-                    Cell::Near => near.add(light()),
-                    Cell::Far => far.add(light()),
+                    Cell::Near => sums.add(NEAR, light()),
+                    Cell::Far => sums.add(FAR, light()),
                     Cell::Band => {
                         let share = self.share_at(x, y);
                         if share > SURE {
-                            near.add(light());
+                            sums.add(NEAR, light());
                         } else if share < 1.0 - SURE {
-                            far.add(light());
+                            sums.add(FAR, light());
                         }
                     }
                 }
@@ -245,24 +278,21 @@ impl View<'_> {
     }
 
     /// How the colours around a cell differ; `None` where one of the surfaces has none.
+    #[inline(always)]
     fn contrast(
         &self,
         kernel: &[[f32; 2 * REACH + 1]; 2 * REACH + 1],
-        sums: &[[Sums; 2]],
+        sums: &[Sums],
         (row, column): (usize, usize),
     ) -> Option<Contrast> {
-        let mut around = [Sums::default(); 2];
+        let mut around = Sums::NONE;
         for other_row in row.saturating_sub(REACH)..(row + REACH + 1).min(self.down) {
             let weights = &kernel[other_row + REACH - row];
             for other in column.saturating_sub(REACH)..(column + REACH + 1).min(self.across) {
-                let cell = &sums[other_row * self.across + other];
-                for (sum, cell) in around.iter_mut().zip(cell) {
-                    sum.add_all(cell, weights[other + REACH - column]);
-                }
+                around.add_all(&sums[other_row * self.across + other], weights[other + REACH - column]);
             }
         }
-        let known = around.iter().all(|sums| sums.weight > LEAST_WEIGHT);
-        known.then(|| Contrast::of(around.map(|sums| sums.color())))
+        around.colors().map(Contrast::of)
     }
 
     /// The cells up to so many away from one, and itself.
@@ -273,6 +303,7 @@ impl View<'_> {
         rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
     }
 
+    #[inline(always)]
     fn take_apart(
         &self,
         posterior: &Posterior,
@@ -303,6 +334,7 @@ impl View<'_> {
 
     /// Where the colour of a pixel lies between those of the two surfaces, linear between the cells around it, so that cells
     /// are not seen; `own` is the contrast of its cell.
+    #[inline(always)]
     fn place(&self, contrasts: &[Option<Contrast>], own: &Contrast, (x, y): (usize, usize), light: [f32; 3]) -> f32 {
         let half = 0.5 * self.cell_px as f32;
         let axis = |at: usize, count: usize| {

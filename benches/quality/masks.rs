@@ -1,0 +1,235 @@
+//! Portraits from a coarse mask alone, as one camera and a network give it: this crate's outlines and blur beside what
+//! programs for video calls do with the same mask.
+//!
+//! The mask is the subject's true coverage, shrunk to a network's size, softened and hardened. What lies behind counts as
+//! being at one distance, for everybody. Rivals, after their own descriptions: `threshold` cuts the mask at one half and
+//! feathers it (OBS plugins); `guided` filters it by the picture's luma (live-backgroundremoval-lite); both blend the
+//! picture with a Gaussian blur of all of it.
+
+use bokehcam::bokeh::BokehError;
+use bokehcam::budget::Quality;
+use bokehcam::depth::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
+use bokehcam::frame::{ColorImage, DepthMap, Mask, luma_of};
+use serde::Serialize;
+
+use super::lens::Scene;
+use super::methods::{Blurrer, Method, Shot};
+use super::metrics;
+use super::picture::{Plane, Rgb, decode, encode};
+use super::rivals::smoothed;
+use super::texture::Dice;
+use super::truth::Views;
+
+/// Columns and rows of the mask.
+const SIZE: (usize, usize) = (256, 144);
+/// Standard deviation that the network blurs with, in its pixels, and slope with which it hardens.
+const SOFT_PX: f32 = 0.85;
+const HARD: f32 = 8.0;
+/// Reach of the guided filter in pixels, and its regularisation.
+const GUIDED_PX: i32 = 8;
+const GUIDED: f32 = 1e-4;
+/// Noise of the camera for the flicker, in codes, and frames.
+const NOISE_CODES: f32 = 2.0;
+const FRAMES: u64 = 6;
+
+/// What was measured of a scene and a way to make a portrait from a mask.
+#[derive(Clone, Debug, Serialize)]
+pub struct Portrait {
+    pub scene: &'static str,
+    pub method: &'static str,
+    /// Mean error of the share in the band around the outline, in thousandths.
+    pub share_error: f64,
+    /// Mean change of the share in that band from frame to frame, with a noisy camera, in thousandths.
+    pub share_flicker: f64,
+    /// Of the picture to what the lens sees, in sRGB; whole, and around outlines.
+    pub psnr_db: f64,
+    pub edge_db: f64,
+}
+
+impl Portrait {
+    pub const HEAD: &'static str = "scene     method       share error  flicker   PSNR dB  edge dB";
+
+    pub fn line(&self) -> String {
+        let Self { scene, method, share_error, share_flicker, psnr_db, edge_db } = self;
+        format!("{scene:9} {method:12} {share_error:11.1} {share_flicker:8.1} {psnr_db:9.2} {edge_db:8.2}")
+    }
+}
+
+/// A way to get the share of every pixel from a mask.
+type Refine = fn(&Mask, &ColorImage) -> Plane<f32>;
+
+/// Measures all ways on a scene.
+///
+/// # Errors
+/// This crate's executor failed.
+pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<Portrait>, BokehError> {
+    let truth = coverage(scene);
+    let mask = as_network(&truth);
+    let band = band(&mask, &truth);
+    let edges = metrics::edge_band(&views.coc_px);
+    let behind_px = behind_px(views, &truth);
+    let noisy: Vec<ColorImage> = (0..FRAMES).map(|frame| with_noise(&views.shot.image, frame)).collect();
+    let ways: [(&str, Refine); 4] =
+        [("upscaled", upscaled), ("threshold", threshold), ("guided", guided), ("bokehcam", ours)];
+    let mut measured = Vec::new();
+    for (method, refine) in ways {
+        let share = refine(&mask, &views.shot.image);
+        let frames: Vec<Plane<f32>> = noisy.iter().map(|image| refine(&mask, image)).collect();
+        let flicker: f64 = frames.windows(2).map(|pair| error(&pair[0], &pair[1], &band)).sum();
+        let picture = match method {
+            "bokehcam" => portrait(&mask, &views.shot, behind_px)?,
+            _ => encode(&blended(&decode(&views.shot.image), &share, behind_px)),
+        };
+        measured.push(Portrait {
+            scene: name,
+            method,
+            share_error: error(&share, &truth, &band),
+            share_flicker: flicker / (FRAMES - 1) as f64,
+            psnr_db: metrics::psnr(&picture, &views.truth, None),
+            edge_db: metrics::psnr(&picture, &views.truth, Some(&edges)),
+        });
+    }
+    Ok(measured)
+}
+
+/// How much of each pixel what is in focus covers.
+fn coverage(scene: &Scene) -> Plane<f32> {
+    let mut scene = scene.clone();
+    for surface in &mut scene.surfaces {
+        let is_subject = surface.coc_px == 0.0 && surface.slope == glam::Vec2::ZERO;
+        surface.texture = surface.texture.map(|[_, _, _, alpha]| {
+            let light = if is_subject { alpha } else { 0.0 };
+            [light, light, light, alpha]
+        });
+    }
+    scene.pinhole().map(|[share, _, _]| share)
+}
+
+/// The mask that a network would give.
+fn as_network(truth: &Plane<f32>) -> Mask {
+    let small = Plane::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let edge = |at: usize, small: usize, size: usize| at * size / small;
+        let (xs, ys) = (
+            edge(x, SIZE.0, truth.width)..edge(x + 1, SIZE.0, truth.width),
+            edge(y, SIZE.1, truth.height)..edge(y + 1, SIZE.1, truth.height),
+        );
+        let count = (xs.len() * ys.len()) as f32;
+        ys.flat_map(|y| xs.clone().map(move |x| (x, y))).map(|(x, y)| truth.at(x as i32, y as i32)).sum::<f32>() / count
+    });
+    let soft = smoothed(&small.map(|share| [share; 3]), SOFT_PX);
+    let share = soft.map(|[share, _, _]| 1.0 / (1.0 + (-HARD * (share - 0.5)).exp())).data;
+    Mask { width: SIZE.0 as u32, height: SIZE.1 as u32, share }
+}
+
+/// Where the mask is undecided, or the truth is.
+fn band(mask: &Mask, truth: &Plane<f32>) -> Plane<bool> {
+    let wide = upscaled(mask, &ColorImage::new(truth.width as u32, truth.height as u32));
+    let undecided = |share: f32| share > 0.02 && share < 0.98;
+    Plane::from_fn(truth.width, truth.height, |x, y| {
+        (-2..=2).any(|dy| {
+            (-2..=2).any(|dx| {
+                let (x, y) = (x as i32 + dx, y as i32 + dy);
+                undecided(wide.at(x, y)) || undecided(truth.at(x, y))
+            })
+        })
+    })
+}
+
+fn error(a: &Plane<f32>, b: &Plane<f32>, band: &Plane<bool>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for ((a, b), _) in a.data.iter().zip(&b.data).zip(&band.data).filter(|(_, counts)| **counts) {
+        sum += f64::from((a - b).abs());
+        count += 1.0;
+    }
+    1000.0 * sum / count
+}
+
+/// The mean CoC of what is behind.
+fn behind_px(views: &Views, truth: &Plane<f32>) -> f32 {
+    let behind: Vec<f32> =
+        views.coc_px.data.iter().zip(&truth.data).filter(|(_, share)| **share < 0.5).map(|(coc, _)| *coc).collect();
+    behind.iter().sum::<f32>() / behind.len() as f32
+}
+
+fn with_noise(image: &ColorImage, seed: u64) -> ColorImage {
+    let mut dice = Dice::new(seed + 1);
+    let noisy = |code: &u8| (f32::from(*code) + NOISE_CODES * dice.normal()).round().clamp(0.0, 255.0) as u8;
+    ColorImage { rgb: image.rgb.iter().map(noisy).collect(), ..*image }
+}
+
+fn upscaled(mask: &Mask, image: &ColorImage) -> Plane<f32> {
+    let small = Plane { width: SIZE.0, height: SIZE.1, data: mask.share.clone() };
+    let (width, height) = (image.width as usize, image.height as usize);
+    Plane::from_fn(width, height, |x, y| {
+        let place = |at: usize, of: usize, from: usize| (at as f32 + 0.5) * from as f32 / of as f32 - 0.5;
+        let (u, v) = (place(x, width, SIZE.0), place(y, height, SIZE.1));
+        let (column, row, fu, fv) = (u.floor() as i32, v.floor() as i32, u - u.floor(), v - v.floor());
+        let across = |row| small.at(column, row) * (1.0 - fu) + small.at(column + 1, row) * fu;
+        across(row) * (1.0 - fv) + across(row + 1) * fv
+    })
+}
+
+fn threshold(mask: &Mask, image: &ColorImage) -> Plane<f32> {
+    let cut = upscaled(mask, image).map(|share| [f32::from(u8::from(share > 0.5)); 3]);
+    smoothed(&cut, 2.0).map(|[share, _, _]| share)
+}
+
+fn guided(mask: &Mask, image: &ColorImage) -> Plane<f32> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let mut luma = vec![0; width * height];
+    luma_of(&image.rgb, &mut luma);
+    let luma = Plane { width, height, data: luma.iter().map(|&code| f32::from(code) / 255.0).collect() };
+    let share = upscaled(mask, image);
+    let mean = |of: &(dyn Fn(usize) -> f32 + Sync)| {
+        let own = Plane::from_fn(width, height, |x, y| of(y * width + x));
+        let line = |plane: &Plane<f32>, dx: i32, dy: i32| {
+            Plane::from_fn(width, height, |x, y| {
+                let sum: f32 = (-GUIDED_PX..=GUIDED_PX).map(|d| plane.at(x as i32 + d * dx, y as i32 + d * dy)).sum();
+                sum / (2 * GUIDED_PX + 1) as f32
+            })
+        };
+        line(&line(&own, 1, 0), 0, 1)
+    };
+    let (of_luma, of_share) = (mean(&|k| luma.data[k]), mean(&|k| share.data[k]));
+    let (product, square) = (mean(&|k| luma.data[k] * share.data[k]), mean(&|k| luma.data[k] * luma.data[k]));
+    let slope = |k: usize| {
+        (product.data[k] - of_luma.data[k] * of_share.data[k])
+            / (square.data[k] - of_luma.data[k] * of_luma.data[k] + GUIDED)
+    };
+    let (slopes, offsets) = (mean(&slope), mean(&|k| of_share.data[k] - slope(k) * of_luma.data[k]));
+    Plane::from_fn(width, height, |x, y| {
+        let k = y * width + x;
+        (slopes.data[k] * luma.data[k] + offsets.data[k]).clamp(0.0, 1.0)
+    })
+}
+
+fn matte(mask: &Mask, image: &ColorImage) -> DepthMap {
+    let mut map = DepthMap::new(image.width, image.height);
+    map.metres.fill(FAR_M);
+    MaskMatting::default().find(mask, image, SUBJECT_M, &mut map);
+    map
+}
+
+fn ours(mask: &Mask, image: &ColorImage) -> Plane<f32> {
+    let map = matte(mask, image);
+    let mut share: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= SUBJECT_M))).collect();
+    map.matte.pixels.iter().for_each(|pixel| share[pixel.at as usize] = pixel.share);
+    Plane { width: image.width as usize, height: image.height as usize, data: share }
+}
+
+/// This crate's portrait, at the default quality.
+fn portrait(mask: &Mask, shot: &Shot, behind_px: f32) -> Result<ColorImage, BokehError> {
+    let lens = Shot::lens(behind_px, SUBJECT_M, shot.image.height as usize);
+    let shot = Shot { depth: matte(mask, &shot.image), lens, ..shot.clone() };
+    Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)
+}
+
+/// The picture, and behind the subject a Gaussian blur of all of it.
+fn blended(image: &Plane<Rgb>, share: &Plane<f32>, behind_px: f32) -> Plane<Rgb> {
+    let blurred = smoothed(image, 0.5 * behind_px);
+    Plane::from_fn(image.width, image.height, |x, y| {
+        let k = y * image.width + x;
+        let share = share.data[k];
+        [0, 1, 2].map(|p| share * image.data[k][p] + (1.0 - share) * blurred.data[k][p])
+    })
+}
