@@ -28,6 +28,11 @@ const REACH: usize = 5;
 const HALF_CELLS: f32 = 1.5;
 /// Less weight of pixels than this, of either surface, tells no colour.
 const LEAST_WEIGHT: f32 = 0.5;
+/// What is of the nearer surface by mask and colour is so from here on; what is joined to it, from the second on.
+const NEAR_FROM: f32 = 0.6;
+const JOINED_FROM: f32 = 0.15;
+/// Marks a share that is found to be joined.
+const FOUND: f32 = 2.0;
 /// Shares beyond this are those of a pure pixel.
 const NEARLY_PURE: f32 = 0.98;
 
@@ -43,6 +48,9 @@ pub struct MaskMatting {
     wanted: Vec<bool>,
     sums: Vec<Sums>,
     contrasts: Vec<Option<Contrast>>,
+    /// The share of each pixel of the band, and [`FOUND`] more where it is joined to the rest of the surface.
+    shares: Vec<f32>,
+    front: Vec<u32>,
     columns: Vec<(usize, usize, f32)>,
 }
 
@@ -115,6 +123,8 @@ impl Default for MaskMatting {
             wanted: Vec::new(),
             sums: Vec::new(),
             contrasts: Vec::new(),
+            shares: Vec::new(),
+            front: Vec::new(),
             columns: Vec::new(),
         }
     }
@@ -165,7 +175,7 @@ impl pulp::WithSimd for Finding<'_> {
         matting.columns.clear();
         matting.columns.extend((0..width).map(|x| between(x, width, mask.width as usize)));
         let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
-        let MaskMatting { light, posterior, kernel, cells, wanted, sums, contrasts, columns } = matting;
+        let MaskMatting { light, posterior, kernel, cells, wanted, sums, contrasts, shares, front, columns } = matting;
         let view = View { mask, color, light, columns, cell_px, across, down };
         view.classify(cells);
         view.gather(cells, wanted, sums);
@@ -175,13 +185,19 @@ impl pulp::WithSimd for Finding<'_> {
             let contrast = if is_beside { view.contrast(kernel, sums, (at / across, at % across)) } else { None };
             contrasts.push(contrast);
         }
-        for row in 0..down {
-            for column in 0..across {
-                match cells[row * across + column] {
-                    Cell::Far => {}
-                    Cell::Near => view.pixels_of(row, column).for_each(|(x, y)| map.metres[y * width + x] = near_m),
-                    Cell::Band => view.take_apart(posterior, contrasts, (row, column), near_m, map),
+        shares.resize(width * height, 0.0);
+        front.clear();
+        for cell in (0..across * down).filter(|&cell| cells[cell] == Cell::Band) {
+            view.weigh(posterior, contrasts, cell, shares, front);
+        }
+        view.connect(cells, shares, front);
+        for cell in 0..across * down {
+            match cells[cell] {
+                Cell::Far => {}
+                Cell::Near => {
+                    view.pixels_of(cell).for_each(|(x, y)| map.metres[y * width + x] = near_m);
                 }
+                Cell::Band => view.take_apart(contrasts[cell].as_ref(), cell, shares, near_m, map),
             }
         }
         map.matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
@@ -190,8 +206,9 @@ impl pulp::WithSimd for Finding<'_> {
 
 impl View<'_> {
     #[inline(always)]
-    fn pixels_of(&self, row: usize, column: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+    fn pixels_of(&self, cell: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
         let (side, width, height) = (self.cell_px, self.color.width as usize, self.color.height as usize);
+        let (row, column) = (cell / self.across, cell % self.across);
         let xs = column * side..((column + 1) * side).min(width);
         (row * side..((row + 1) * side).min(height)).flat_map(move |y| xs.clone().map(move |x| (x, y)))
     }
@@ -259,7 +276,7 @@ impl View<'_> {
         }
         for at in (0..across * down).filter(|&at| wanted[at]) {
             let sums = &mut sums[at];
-            for (x, y) in self.pixels_of(at / across, at % across).filter(|(x, y)| (x + y) % 2 == 0) {
+            for (x, y) in self.pixels_of(at).filter(|(x, y)| (x + y) % 2 == 0) {
                 let light = || self.light_at(y * self.color.width as usize + x);
                 match cells[at] {
                     Cell::Near => sums.add(NEAR, light()),
@@ -303,30 +320,65 @@ impl View<'_> {
         rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
     }
 
+    /// The shares of the pixels of a cell; those that are sure to be of the nearer surface are added to `front`.
     #[inline(always)]
-    fn take_apart(
+    fn weigh(
         &self,
         posterior: &Posterior,
         contrasts: &[Option<Contrast>],
-        (row, column): (usize, usize),
-        near_m: f32,
-        map: &mut DepthMap,
+        cell: usize,
+        shares: &mut [f32],
+        front: &mut Vec<u32>,
     ) {
-        let cell = row * self.across + column;
-        let own_contrast = contrasts[cell].as_ref();
-        let slice = own_contrast.map(|contrast| (contrast, posterior.slice(contrast.precision())));
-        for (x, y) in self.pixels_of(row, column) {
+        let own = contrasts[cell].as_ref();
+        let slice = own.map(|contrast| (contrast, posterior.slice(contrast.precision())));
+        for (x, y) in self.pixels_of(cell) {
             let at = y * self.color.width as usize + x;
-            let own = self.light_at(at);
             let mask = self.share_at(x, y);
-            let place = |contrast: &Contrast| self.place(contrasts, contrast, (x, y), own);
+            let place = |contrast: &Contrast| self.place(contrasts, contrast, (x, y), self.light_at(at));
             let share = slice.as_ref().map_or(mask, |(contrast, slice)| slice.share(mask, place(contrast)));
+            shares[at] = share;
+            if mask > NEAR_FROM && share > NEAR_FROM {
+                shares[at] += FOUND;
+                front.push(at as u32);
+            }
+        }
+    }
+
+    /// Marks what is joined to the surest pixels: what only has the colours of the nearer surface is not.
+    fn connect(&self, cells: &[Cell], shares: &mut [f32], front: &mut Vec<u32>) {
+        let (width, height) = (self.color.width as usize, self.color.height as usize);
+        let is_band = |x: usize, y: usize| cells[y / self.cell_px * self.across + x / self.cell_px] == Cell::Band;
+        while let Some(at) = front.pop() {
+            let (x, y) = (at as usize % width, at as usize / width);
+            for y in y.saturating_sub(1)..(y + 2).min(height) {
+                for x in x.saturating_sub(1)..(x + 2).min(width) {
+                    let share = &mut shares[y * width + x];
+                    if (JOINED_FROM..FOUND).contains(share) && is_band(x, y) {
+                        *share += FOUND;
+                        front.push((y * width + x) as u32);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn take_apart(&self, contrast: Option<&Contrast>, cell: usize, shares: &[f32], near_m: f32, map: &mut DepthMap) {
+        for (x, y) in self.pixels_of(cell) {
+            let at = y * self.color.width as usize + x;
+            let share = match shares[at] {
+                found if found >= FOUND => found - FOUND,
+                faint if faint < JOINED_FROM => faint,
+                _ => 0.0,
+            };
             let far_m = map.metres[at];
             if share > 0.5 {
                 map.metres[at] = near_m;
             }
             if (1.0 - NEARLY_PURE..=NEARLY_PURE).contains(&share) {
-                let difference = own_contrast.map_or([0.0; 3], |contrast| contrast.difference(own, share));
+                let own = self.light_at(at);
+                let difference = contrast.map_or([0.0; 3], |contrast| contrast.difference(own, share));
                 map.matte.pixels.push(MixedPixel { at: at as u32, near_m, far_m, share, difference });
             }
         }
