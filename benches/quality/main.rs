@@ -100,6 +100,7 @@ fn run(options: &Options) -> Outcome<()> {
         }
         if options.parts.contains(&Part::Masks) && MASKED.contains(&kind.name) {
             let portraits = masks::measure(kind.name, &(kind.at)(0), &shots[0])?;
+            say(options, masks::Portrait::HEAD.to_owned(), None::<&Record>)?;
             for portrait in &portraits {
                 say(options, portrait.line(), Some(portrait))?;
             }

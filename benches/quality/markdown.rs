@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use bokehcam::budget::Quality;
 
+use super::masks::Portrait;
 use super::methods::Method;
 use super::report::{Case, Record, Results};
 
@@ -23,6 +24,7 @@ pub fn markdown(results: &Results) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
     let _ = tables(results, &mut text);
+    let _ = portraits(results, &mut text);
     for method in [BALANCED, BEST, Method::Refined] {
         let _ = verdict(results, method, &mut text);
     }
@@ -33,6 +35,19 @@ fn cell(record: Option<&Record>) -> String {
     let Some(record) = record else { return "-".to_owned() };
     let edge = record.edge_db.map_or("-".to_owned(), |edge_db| format!("{edge_db:.1}"));
     format!("{:.2} / {edge} / {:.4} / {:.4}", record.psnr_db, record.ssim, record.flip)
+}
+
+fn portraits(results: &Results, text: &mut String) -> std::fmt::Result {
+    if results.portraits.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "## Portraits from a mask\n")?;
+    writeln!(text, "| scene | way | share error | flicker | PSNR dB | edge dB |\n|---|---|---|---|---|---|")?;
+    for portrait in &results.portraits {
+        let Portrait { scene, method, share_error, share_flicker, psnr_db, edge_db } = portrait;
+        writeln!(text, "| {scene} | {method} | {share_error:.1} | {share_flicker:.1} | {psnr_db:.2} | {edge_db:.2} |")?;
+    }
+    writeln!(text)
 }
 
 fn tables(results: &Results, text: &mut String) -> std::fmt::Result {

@@ -7,7 +7,6 @@
 
 mod clusters;
 pub mod mask;
-mod posterior;
 mod share;
 
 use std::ops::Range;

@@ -18,11 +18,15 @@ use held::Held;
 use person::Person;
 use relief::Relief;
 
-use super::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
+use super::matting::mask::{FAR_M, MaskMatting, SUBJECT_M, between};
 use super::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap};
 use crate::network::{self, Runtime, Task};
 
+/// Nothing is less near, so that distances are numbers.
+const LEAST: f32 = SUBJECT_M / FAR_M;
+/// Of so many frames, persons are looked for in one, and all else is looked at in one, by effort: a room hardly moves.
+const EVERY: [(u64, u64); 3] = [(2, 8), (1, 4), (1, 2)];
 /// Between two frames further apart than this, the first is no guide to the second.
 const APART_NS: u64 = 500_000_000;
 
@@ -33,9 +37,10 @@ pub struct SingleCamera {
     person: Option<Person>,
     relief: Option<Relief>,
     held: Held,
+    spread: Spread,
     matting: MaskMatting,
-    /// With less effort, networks look at every second picture.
-    looks_at_all: bool,
+    /// As its place in [`EVERY`].
+    effort: usize,
     frames: u64,
     last_ns: Option<u64>,
     /// Whether persons are to be found.
@@ -74,8 +79,9 @@ impl SingleCamera {
             person,
             relief,
             held: Held::default(),
+            spread: Spread::default(),
             matting: MaskMatting::default(),
-            looks_at_all: true,
+            effort: EVERY.len() - 1,
             frames: 0,
             last_ns: None,
             has_subject,
@@ -101,15 +107,22 @@ impl SingleCamera {
         relief.as_mut().map_or(Ok(()), |relief| relief.look(&grey, None)).map_err(failed)
     }
 
-    /// Lets the networks look at a picture; one that fails is turned off.
-    fn look(&mut self, color: &ColorImage) {
+    /// Lets the networks look at a picture, if it is their turn or the first of a scene; one that fails is turned off.
+    fn look(&mut self, color: &ColorImage, is_first: bool) {
+        let is_turn = |every: u64| is_first || self.frames.is_multiple_of(every);
+        let (for_persons, for_all) = match EVERY[self.effort] {
+            // Alone, it is what outlines come from.
+            (persons, _) if self.person.is_none() => (persons, persons),
+            every => every,
+        };
+        let (for_persons, for_all) = (is_turn(for_persons), is_turn(for_all));
         let Self { name, person, relief, held, .. } = self;
-        if let Some(Err(why)) = person.as_mut().map(|person| person.look(color)) {
+        if let Some(Err(why)) = person.as_mut().filter(|_| for_persons).map(|person| person.look(color)) {
             tracing::error!("{name}: the person's network is turned off, and all is blurred: {why}");
             *person = None;
         }
         let mask = person.as_ref().map(Person::mask);
-        if let Some(Err(why)) = relief.as_mut().map(|relief| relief.look(color, mask)) {
+        if let Some(Err(why)) = relief.as_mut().filter(|_| for_all).map(|relief| relief.look(color, mask)) {
             tracing::error!("{name}: the network for depth is turned off: {why}");
             *relief = None;
         }
@@ -126,16 +139,14 @@ impl DepthSource for SingleCamera {
         if apart {
             self.person.iter_mut().for_each(Person::forget);
         }
-        if apart || self.looks_at_all || self.frames.is_multiple_of(2) {
-            self.look(color);
-        }
+        self.look(color, apart);
         self.frames += 1;
-        let Self { person, relief, held, matting, .. } = self;
+        let Self { person, relief, held, spread, matting, .. } = self;
         map.resize(color.width, color.height);
         map.matte.pixels.clear();
         match &relief {
-            Some(relief) if person.is_some() => spread_over(relief.behind(), relief.size(), map),
-            Some(relief) if !self.has_subject => spread_over(relief.nearness(), relief.size(), map),
+            Some(relief) if person.is_some() => spread.over(relief.behind(), relief.size(), map),
+            Some(relief) if !self.has_subject => spread.over(relief.nearness(), relief.size(), map),
             _ => map.metres.fill(FAR_M),
         }
         // Without a mask there is a subject only where there was to be one, and then nothing is in focus.
@@ -148,29 +159,40 @@ impl DepthSource for SingleCamera {
     }
 
     fn efforts(&self) -> &'static [f64] {
-        &[0.6, 1.0]
+        &[0.5, 0.8, 1.0]
     }
 
     fn set_effort(&mut self, effort: usize) {
-        self.looks_at_all = effort > 0;
+        self.effort = effort.min(EVERY.len() - 1);
     }
 }
 
 /// Distances of a picture from nearness in fewer pixels, linear between them.
-fn spread_over(nearness: &[f32], (width, height): (usize, usize), map: &mut DepthMap) {
-    let (to_width, to_height) = (map.width as usize, map.height as usize);
-    let place = |at: usize, to: usize, from: usize| {
-        let place = ((at as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
-        (place as usize, (place as usize + 1).min(from - 1), place.fract())
-    };
-    for (y, row) in map.metres.chunks_exact_mut(to_width.max(1)).enumerate() {
-        let (above, below, down) = place(y, to_height, height);
-        let (above, below) = (&nearness[above * width..][..width], &nearness[below * width..][..width]);
-        for (x, metres) in row.iter_mut().enumerate() {
-            let (left, right, along) = place(x, to_width, width);
-            let upper = above[left] + (above[right] - above[left]) * along;
-            let lower = below[left] + (below[right] - below[left]) * along;
-            *metres = SUBJECT_M / (upper + (lower - upper) * down).max(SUBJECT_M / FAR_M);
+#[derive(Default)]
+struct Spread {
+    /// Per column of the picture, those of the nearness on both sides, and how far it is to the second.
+    columns: Vec<(u32, u32, f32)>,
+    row: Vec<f32>,
+}
+
+impl Spread {
+    fn over(&mut self, nearness: &[f32], (width, height): (usize, usize), map: &mut DepthMap) {
+        let (to_width, to_height) = (map.width as usize, map.height as usize);
+        self.columns.clear();
+        self.columns.extend((0..to_width).map(|x| {
+            let (left, right, along) = between(x, to_width, width);
+            (left as u32, right as u32, along)
+        }));
+        for (y, row) in map.metres.chunks_exact_mut(to_width.max(1)).enumerate() {
+            let (above, below, down) = between(y, to_height, height);
+            let (above, below) = (&nearness[above * width..][..width], &nearness[below * width..][..width]);
+            self.row.clear();
+            self.row.extend(above.iter().zip(below).map(|(a, b)| a + (b - a) * down));
+            for (metres, &(left, right, along)) in row.iter_mut().zip(&self.columns) {
+                let (left, right) = (self.row[left as usize], self.row[right as usize]);
+                let nearness = left + (right - left) * along;
+                *metres = SUBJECT_M / if nearness > LEAST { nearness } else { LEAST };
+            }
         }
     }
 }

@@ -21,6 +21,8 @@ pub struct Relief {
     size: (usize, usize),
     /// Relative inverse depth: 1 at the subject, 0 at what is farthest.
     nearness: Vec<f32>,
+    /// How far each is the subject's.
+    subject: Vec<f32>,
     /// The same of what is behind the subject.
     behind: Vec<f32>,
     known: Vec<f32>,
@@ -35,6 +37,7 @@ impl Relief {
             feed,
             size: (0, 0),
             nearness: Vec::new(),
+            subject: Vec::new(),
             behind: Vec::new(),
             known: Vec::new(),
             spread: Vec::new(),
@@ -68,22 +71,23 @@ impl Relief {
         let pixels = answer.size.0 * answer.size.1;
         self.nearness.clear();
         self.nearness.extend((0..pixels).map(|pixel| answer.at(pixel, 0)));
-        self.measure(mask);
-        self.look_behind(mask);
+        self.subject.clear();
+        self.subject.extend((0..pixels).map(|at| mask.map_or(0.0, |mask| sample(mask, at, answer.size))));
+        self.measure();
+        self.look_behind();
         Ok(())
     }
 
     /// Scales the network's numbers by the two anchors.
-    fn measure(&mut self, mask: Option<&Mask>) {
-        let size = self.size;
-        let Self { nearness, sorted, .. } = self;
+    fn measure(&mut self) {
+        let Self { nearness, subject: shares, sorted, .. } = self;
         let mut anchor = |share: f32, counts: &dyn Fn(usize) -> bool| {
             sorted.clear();
             sorted.extend(nearness.iter().enumerate().filter(|(at, _)| counts(*at)).map(|(_, &value)| value));
             let at = (share * sorted.len().saturating_sub(1) as f32) as usize;
             (!sorted.is_empty()).then(|| *sorted.select_nth_unstable_by(at, f32::total_cmp).1)
         };
-        let person = |at: usize| mask.is_some_and(|mask| sample(mask, at, size) > 0.9);
+        let person = |at: usize| shares[at] > 0.9;
         let farthest = anchor(OUTLIERS, &|at| !person(at)).or_else(|| anchor(OUTLIERS, &|_| true));
         let subject = anchor(0.5, &person).or_else(|| anchor(1.0 - OUTLIERS, &|_| true));
         let (Some(farthest), Some(subject)) = (farthest, subject) else { return };
@@ -92,13 +96,15 @@ impl Relief {
     }
 
     /// What is around the subject, carried on behind it.
-    fn look_behind(&mut self, mask: Option<&Mask>) {
-        let size @ (width, height) = self.size;
-        let Self { nearness, behind, known, spread, line, .. } = self;
+    fn look_behind(&mut self) {
+        let size = self.size;
+        let Self { nearness, subject, behind, known, spread, line, .. } = self;
         behind.clone_from(nearness);
-        let Some(mask) = mask else { return };
+        if subject.iter().all(|&share| share < 0.5) {
+            return;
+        }
         known.clear();
-        known.extend((0..width * height).map(|at| f32::from(u8::from(sample(mask, at, size) < 0.5))));
+        known.extend(subject.iter().map(|&share| f32::from(u8::from(share < 0.5))));
         // Near an outline the numbers of both surfaces are mixed.
         erode(known, line, size);
         for (value, known) in behind.iter_mut().zip(&*known) {
@@ -113,7 +119,7 @@ impl Relief {
                 mean(plane, line, size);
             }
         }
-        for at in 0..width * height {
+        for at in 0..nearness.len() {
             behind[at] = match () {
                 () if known[at] > 0.0 => nearness[at],
                 () if spread[at] > 1e-3 => behind[at] / spread[at],
@@ -125,7 +131,7 @@ impl Relief {
 }
 
 /// A mask at a pixel of a picture of another size.
-pub fn sample(mask: &Mask, at: usize, (width, height): (usize, usize)) -> f32 {
+fn sample(mask: &Mask, at: usize, (width, height): (usize, usize)) -> f32 {
     let (x, y) = (at % width * mask.width as usize / width, at / width * mask.height as usize / height);
     mask.share[y * mask.width as usize + x]
 }
@@ -176,4 +182,27 @@ fn mean(plane: &mut [f32], line: &mut Vec<f32>, size: (usize, usize)) {
             sum -= at.checked_sub(reach).map_or(0.0, |left| f64::from(line[left]));
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_pixels_spread_and_means_are_means() {
+        let size = (40, 3);
+        let mut plane = vec![1.0; 120];
+        plane[40 + 20] = 0.0;
+        erode(&mut plane, &mut Vec::new(), size);
+        let row: Vec<usize> = (0..40).filter(|&x| plane[40 + x] == 0.0).collect();
+        assert_eq!((row[0], row[row.len() - 1], row.len()), (20 - MARGIN_PX, 20 + MARGIN_PX, 2 * MARGIN_PX + 1));
+        assert_eq!(plane[20], 0.0, "rows above and below, too");
+        let mut wide = vec![0.0; 101];
+        wide[50] = 49.0;
+        mean(&mut wide, &mut Vec::new(), (101, 1));
+        for (x, value) in wide.iter().enumerate() {
+            let expected = if x.abs_diff(50) <= SPREAD_PX { 1.0 } else { 0.0 };
+            assert!((value - expected).abs() < 1e-5, "{x}: {value}");
+        }
+    }
 }

@@ -5,29 +5,27 @@
 //! a share: 0 or 1 as likely as the mask says, or anything between (mixed pixels, as in Bayesian matting, Chuang et al.
 //! 2001).
 
+mod cells;
+mod posterior;
+
 use crate::color::srgb_to_linear;
 use crate::frame::{ColorImage, DepthMap, Mask, MixedPixel};
 
-use super::clusters::{Color, Symmetric, outer};
-use super::posterior::Posterior;
 use super::share::Contrast;
+pub(in crate::depth) use cells::between;
+use cells::{Cell, Kernel, REACH, Sums, View};
+use posterior::Posterior;
 
 /// Distance that a subject is given where distances are only relative, in metres.
 pub const SUBJECT_M: f32 = 1.0;
 /// What is then as good as infinitely far, in metres.
 pub const FAR_M: f32 = 1e3;
 
-/// From here on the mask is sure that a pixel is of the nearer surface, and below 1 less this, that it is not.
-const SURE: f32 = 0.95;
 /// Side of a cell in pixels of the mask, and the least in pixels of the picture.
 const CELL_OF_MASK: f32 = 1.6;
 const LEAST_CELL_PX: usize = 4;
-/// So many cells in every direction tell the colours around one.
-const REACH: usize = 5;
 /// The weight of a cell falls to an eighth at this distance, in cells.
 const HALF_CELLS: f32 = 1.5;
-/// Less weight of pixels than this, of either surface, tells no colour.
-const LEAST_WEIGHT: f32 = 0.5;
 /// What is of the nearer surface by mask and colour is so from here on; what is joined to it, from the second on.
 const NEAR_FROM: f32 = 0.6;
 const JOINED_FROM: f32 = 0.15;
@@ -41,8 +39,7 @@ const NEARLY_PURE: f32 = 0.98;
 pub struct MaskMatting {
     light: Box<[f32; 256]>,
     posterior: Posterior,
-    /// What the weights of the cells around one are, by row and column.
-    kernel: [[f32; 2 * REACH + 1]; 2 * REACH + 1],
+    kernel: Kernel,
     cells: Vec<Cell>,
     /// Whether the colours of a cell are wanted.
     wanted: Vec<bool>,
@@ -60,53 +57,6 @@ pub fn depth_around(mask: &Mask, color: &ColorImage) -> DepthMap {
     map.metres.fill(FAR_M);
     MaskMatting::default().find(mask, color, SUBJECT_M, &mut map);
     map
-}
-
-/// What a mask says of a cell of the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Cell {
-    Near,
-    Far,
-    /// In the band, or beside it.
-    Band,
-}
-
-/// Pixels of both surfaces in a cell, [`SURFACE`] sums each: how many, their light, and the products of that.
-#[derive(Clone, Copy, Debug)]
-struct Sums([f32; 2 * SURFACE]);
-
-/// Sums of a surface: ten, and up to whole vectors.
-const SURFACE: usize = 12;
-/// Places of the near and of the far surface.
-const NEAR: usize = 0;
-const FAR: usize = 1;
-
-impl Sums {
-    const NONE: Self = Self([0.0; 2 * SURFACE]);
-
-    #[inline(always)]
-    fn add(&mut self, surface: usize, light: [f32; 3]) {
-        let sums = &mut self.0[surface * SURFACE..][..SURFACE];
-        let [xx, xy, xz, yy, yz, zz] = outer(light);
-        let values = [1.0, light[0], light[1], light[2], xx, xy, xz, yy, yz, zz, 0.0, 0.0];
-        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-    }
-
-    #[inline(always)]
-    fn add_all(&mut self, other: &Self, weight: f32) {
-        self.0.iter_mut().zip(&other.0).for_each(|(sum, value)| *sum += weight * value);
-    }
-
-    /// The colours of both; `None` where there are too few pixels of one.
-    fn colors(&self) -> Option<[Color; 2]> {
-        let weights = [self.0[0], self.0[SURFACE]];
-        let color = |k: usize| {
-            let sums = &self.0[k * SURFACE + 1..];
-            let squares: Symmetric = std::array::from_fn(|k| sums[3 + k]);
-            Color::of_sums(weights[k], std::array::from_fn(|k| sums[k]), squares)
-        };
-        weights.iter().all(|&weight| weight > LEAST_WEIGHT).then(|| [color(NEAR), color(FAR)])
-    }
 }
 
 impl Default for MaskMatting {
@@ -128,18 +78,6 @@ impl Default for MaskMatting {
             columns: Vec::new(),
         }
     }
-}
-
-/// A picture, and what is sought in it.
-struct View<'a> {
-    mask: &'a Mask,
-    color: &'a ColorImage,
-    light: &'a [f32; 256],
-    /// Per column of the picture, those of the mask on both sides, and how far it is to the second.
-    columns: &'a [(usize, usize, f32)],
-    cell_px: usize,
-    across: usize,
-    down: usize,
 }
 
 impl MaskMatting {
@@ -205,121 +143,6 @@ impl pulp::WithSimd for Finding<'_> {
 }
 
 impl View<'_> {
-    #[inline(always)]
-    fn pixels_of(&self, cell: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let (side, width, height) = (self.cell_px, self.color.width as usize, self.color.height as usize);
-        let (row, column) = (cell / self.across, cell % self.across);
-        let xs = column * side..((column + 1) * side).min(width);
-        (row * side..((row + 1) * side).min(height)).flat_map(move |y| xs.clone().map(move |x| (x, y)))
-    }
-
-    #[inline(always)]
-    fn light_at(&self, at: usize) -> [f32; 3] {
-        [0, 1, 2].map(|p| self.light[usize::from(self.color.rgb[3 * at + p])])
-    }
-
-    /// The mask at a pixel, linear between its own.
-    #[inline(always)]
-    fn share_at(&self, x: usize, y: usize) -> f32 {
-        let (above, below, down) = between(y, self.color.height as usize, self.mask.height as usize);
-        let (left, right, along) = self.columns[x];
-        let row = |row: usize| {
-            let row = &self.mask.share[row * self.mask.width as usize..];
-            row[left] + (row[right] - row[left]) * along
-        };
-        row(above) + (row(below) - row(above)) * down
-    }
-
-    fn classify(&self, cells: &mut Vec<Cell>) {
-        let (across, down, mask) = (self.across, self.down, self.mask);
-        let range = |of: usize, count: usize, side: usize| {
-            // The pixels of the mask around a cell, with those beside them: the band is a cell wider than it needs be.
-            let scale = side as f32 / count as f32;
-            let start = (of as f32 * scale - 1.0).max(0.0) as usize;
-            start.min(side - 1)..(((of + 1) as f32 * scale + 1.0).ceil() as usize).min(side)
-        };
-        cells.clear();
-        for row in 0..down {
-            let ys = range(row, down, mask.height as usize);
-            for column in 0..across {
-                let xs = range(column, across, mask.width as usize);
-                let (mut low, mut high) = (1.0f32, 0.0f32);
-                for y in ys.clone() {
-                    for &share in &mask.share[y * mask.width as usize..][xs.clone()] {
-                        (low, high) = (low.min(share), high.max(share));
-                    }
-                }
-                cells.push(match () {
-                    () if low > SURE => Cell::Near,
-                    () if high < 1.0 - SURE => Cell::Far,
-                    () => Cell::Band,
-                });
-            }
-        }
-    }
-
-    /// The colours of the cells that are in the band, or in reach of it.
-    #[inline(always)]
-    fn gather(&self, cells: &[Cell], wanted: &mut Vec<bool>, sums: &mut Vec<Sums>) {
-        let (across, down) = (self.across, self.down);
-        sums.clear();
-        sums.resize(across * down, Sums::NONE);
-        wanted.clear();
-        wanted.resize(across * down, false);
-        for row in 0..down {
-            for column in (0..across).filter(|column| cells[row * across + column] == Cell::Band) {
-                for row in row.saturating_sub(REACH)..(row + REACH + 1).min(down) {
-                    let columns = column.saturating_sub(REACH)..(column + REACH + 1).min(across);
-                    wanted[row * across..][columns].fill(true);
-                }
-            }
-        }
-        for at in (0..across * down).filter(|&at| wanted[at]) {
-            let sums = &mut sums[at];
-            for (x, y) in self.pixels_of(at).filter(|(x, y)| (x + y) % 2 == 0) {
-                let light = || self.light_at(y * self.color.width as usize + x);
-                match cells[at] {
-                    Cell::Near => sums.add(NEAR, light()),
-                    Cell::Far => sums.add(FAR, light()),
-                    Cell::Band => {
-                        let share = self.share_at(x, y);
-                        if share > SURE {
-                            sums.add(NEAR, light());
-                        } else if share < 1.0 - SURE {
-                            sums.add(FAR, light());
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// How the colours around a cell differ; `None` where one of the surfaces has none.
-    #[inline(always)]
-    fn contrast(
-        &self,
-        kernel: &[[f32; 2 * REACH + 1]; 2 * REACH + 1],
-        sums: &[Sums],
-        (row, column): (usize, usize),
-    ) -> Option<Contrast> {
-        let mut around = Sums::NONE;
-        for other_row in row.saturating_sub(REACH)..(row + REACH + 1).min(self.down) {
-            let weights = &kernel[other_row + REACH - row];
-            for other in column.saturating_sub(REACH)..(column + REACH + 1).min(self.across) {
-                around.add_all(&sums[other_row * self.across + other], weights[other + REACH - column]);
-            }
-        }
-        around.colors().map(Contrast::of)
-    }
-
-    /// The cells up to so many away from one, and itself.
-    fn around(&self, at: usize, reach: usize) -> impl Iterator<Item = usize> + use<> {
-        let (across, row, column) = (self.across, at / self.across, at % self.across);
-        let columns = column.saturating_sub(reach)..(column + reach + 1).min(across);
-        let rows = row.saturating_sub(reach)..(row + reach + 1).min(self.down);
-        rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
-    }
-
     /// The shares of the pixels of a cell; those that are sure to be of the nearer surface are added to `front`.
     #[inline(always)]
     fn weigh(
@@ -404,12 +227,4 @@ impl View<'_> {
         let first = row(above);
         first + (row(below) - first) * down
     }
-}
-
-/// The samples on both sides of the centre of pixel `at`, where `to` pixels and `from` samples cover the same length; and
-/// how far it is to the second.
-fn between(at: usize, to: usize, from: usize) -> (usize, usize, f32) {
-    let place = ((at as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
-    let first = place as usize;
-    (first, (first + 1).min(from - 1), place - first as f32)
 }

@@ -1,0 +1,92 @@
+//! What the open networks find in a real sequence, beside what a depth sensor saw.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use bokehcam::depth::single_camera::{Hints, SingleCamera};
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::network::{KNOWN, Known, Runtime, Task};
+use bokehcam::recording::{Options, Recording, Scratch};
+
+use super::read;
+
+/// Pixels of a real sequence that a sensor knows to be of a person, and of the wall, three pixels away from all else.
+fn sure(depth: &DepthMap) -> (Vec<bool>, Vec<bool>) {
+    let (width, height) = (depth.width as usize, depth.height as usize);
+    let within = |range: std::ops::Range<f32>| {
+        let all = |x: usize, y: usize| {
+            x >= 3
+                && y >= 3
+                && x + 3 < width
+                && y + 3 < height
+                && (y - 3..=y + 3)
+                    .all(|y| depth.metres[y * width + x - 3..=y * width + x + 3].iter().all(|m| range.contains(m)))
+        };
+        (0..width * height).map(|at| all(at % width, at / width)).collect()
+    };
+    (within(0.4..1.5), within(2.0..4.0))
+}
+
+#[test]
+#[ignore = "needs BOKEHCAM_DATA, a folder with models and rgbd/person_turning"]
+fn a_real_person_is_found_and_what_rests_rests() {
+    let data = PathBuf::from(std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data"));
+    let model = |task| {
+        let known = KNOWN.iter().find(|known| known.task == task).unwrap();
+        let files = fs::read_dir(data.join("models")).unwrap().flatten().map(|entry| entry.path());
+        files
+            .into_iter()
+            .find(|file| Known::of(&fs::read(file).unwrap()).is_some_and(|found| found.name == known.name))
+            .unwrap()
+    };
+    let (matte, mono) = (model(Task::Matte), model(Task::Mono));
+    let open = |matte: Option<&Path>, mono: Option<&Path>| {
+        SingleCamera::open(matte, mono, &Hints::default(), Runtime::Auto).unwrap()
+    };
+    let options = Options { depth_scale: 1000.0, ..Options::default() };
+    let recording = Recording::open(&data.join("rgbd/person_turning"), &options).unwrap();
+    let (mut scratch, mut color, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
+    let mut both = open(Some(&matte), Some(&mono));
+    let mut relief = open(None, Some(&mono));
+    let mut last: Option<(Vec<f32>, Vec<bool>, Vec<bool>)> = None;
+    let (mut joint, mut any, mut rest, mut resting) = (0u64, 0u64, [0.0f64; 2], [0u64; 2]);
+    let (mut ordered, mut pairs) = (0u64, 0u64);
+    for index in 0..recording.len() {
+        recording.read_color(index, &mut scratch, &mut color).unwrap();
+        recording.read_depth(index, &mut scratch, &mut depth).unwrap();
+        let (person, wall) = sure(&depth);
+        let map = read(&mut both, &color, index as u64);
+        let mut shares: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= 1.0))).collect();
+        map.matte.pixels.iter().for_each(|pixel| shares[pixel.at as usize] = pixel.share);
+        for at in 0..shares.len() {
+            joint += u64::from(person[at] && shares[at] > 0.5);
+            any += u64::from(person[at] || wall[at] && shares[at] > 0.5);
+        }
+        if let Some((before, person_before, wall_before)) = &last {
+            for at in 0..shares.len() {
+                for (k, (now, then)) in [(&wall, wall_before), (&person, person_before)].into_iter().enumerate() {
+                    if now[at] && then[at] {
+                        rest[k] += f64::from((shares[at] - before[at]).abs());
+                        resting[k] += 1;
+                    }
+                }
+            }
+        }
+        last = Some((shares, person.clone(), wall.clone()));
+        let near = read(&mut relief, &color, index as u64).metres;
+        let (of_person, of_wall): (Vec<f32>, Vec<f32>) = {
+            let pick = |is: &[bool]| {
+                is.iter().zip(&near).filter(|(is, _)| **is).step_by(97).map(|(_, metres)| *metres).collect()
+            };
+            (pick(&person), pick(&wall))
+        };
+        for near_m in &of_person {
+            ordered += of_wall.iter().filter(|far_m| near_m < *far_m).count() as u64;
+            pairs += of_wall.len() as u64;
+        }
+    }
+    let (overlap, order) = (joint as f64 / any as f64, ordered as f64 / pairs as f64);
+    let flicker = [0, 1].map(|k| 1e3 * rest[k] / resting[k] as f64);
+    eprintln!("overlap {overlap:.4}, flicker of wall and person {flicker:.3?}e-3, order of pairs {order:.4}");
+    assert!(overlap >= 0.998 && flicker[0] <= 0.3 && order >= 0.99, "{overlap} {flicker:?} {order}");
+}
