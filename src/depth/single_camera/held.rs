@@ -124,41 +124,43 @@ mod tests {
 
     const SIZE: (usize, usize) = (32, 16);
 
-    /// What is joined of a mask and a nearness, each 0.95 or 1 inside of some columns, and 0 or 0.1 elsewhere.
-    fn joined(persons: &[std::ops::Range<usize>], near: &[(std::ops::Range<usize>, f32)]) -> Vec<bool> {
-        let inside = |at: usize| near.iter().find(|(columns, _)| columns.contains(&(at % SIZE.0)));
+    /// From one column to before another.
+    type Columns = (usize, usize);
+
+    /// Which columns are the subject's, where a mask has persons in some of them, and these are so near; others are far.
+    fn joined(persons: &[Columns], near: &[(Columns, f32)]) -> Vec<bool> {
+        let inside = |at: usize| near.iter().find(|((from, to), _)| (*from..*to).contains(&(at % SIZE.0)));
+        let persons = columns(persons);
         let mut held = Held {
             mask: Mask {
                 width: SIZE.0 as u32,
                 height: SIZE.1 as u32,
-                share: (0..SIZE.0 * SIZE.1)
-                    .map(|at| f32::from(u8::from(persons.iter().any(|columns| columns.contains(&(at % SIZE.0))))))
-                    .collect(),
+                share: (0..SIZE.0 * SIZE.1).map(|at| f32::from(u8::from(persons[at % SIZE.0]))).collect(),
             },
             nearness: (0..SIZE.0 * SIZE.1).map(|at| inside(at).map_or(0.1, |(_, nearness)| *nearness)).collect(),
             ..Held::default()
         };
         held.take_others_away();
         held.add_what_is_held();
-        held.mask.share[8 * SIZE.0..9 * SIZE.0].iter().map(|share| *share > 0.5).collect()
+        held.mask.share[8 * SIZE.0..][..SIZE.0].iter().map(|share| *share > 0.5).collect()
     }
 
-    fn columns(ranges: &[std::ops::Range<usize>]) -> Vec<bool> {
-        (0..SIZE.0).map(|column| ranges.iter().any(|range| range.contains(&column))).collect()
+    fn columns(ranges: &[Columns]) -> Vec<bool> {
+        (0..SIZE.0).map(|column| ranges.iter().any(|&(from, to)| (from..to).contains(&column))).collect()
     }
 
     #[test]
     fn what_is_held_is_the_subjects_and_what_is_as_near_elsewhere_is_not() {
-        let near = [(4..14, 1.0), (20..24, 1.0)];
-        assert_eq!(joined(&[4..10], &near), columns(&[4..14]));
+        let near = [((4, 14), 1.0), ((20, 24), 1.0)];
+        assert_eq!(joined(&[(4, 10)], &near), columns(&[(4, 14)]));
     }
 
     #[test]
     fn others_further_away_are_not_the_subject() {
-        let near = [(4..10, 1.0), (20..26, 0.3)];
-        assert_eq!(joined(&[4..10, 20..26], &near), columns(&[4..10]));
+        let near = [((4, 10), 1.0), ((20, 26), 0.3)];
+        assert_eq!(joined(&[(4, 10), (20, 26)], &near), columns(&[(4, 10)]));
         // Two side by side, as near as each other, both are.
-        let near = [(4..10, 1.0), (20..26, 0.9)];
-        assert_eq!(joined(&[4..10, 20..26], &near), columns(&[4..10, 20..26]));
+        let near = [((4, 10), 1.0), ((20, 26), 0.9)];
+        assert_eq!(joined(&[(4, 10), (20, 26)], &near), columns(&[(4, 10), (20, 26)]));
     }
 }
