@@ -10,15 +10,41 @@ use bokehcam::recording::still::{read_photo, write_photo};
 use image::{ImageBuffer, Rgba};
 use tempfile::TempDir;
 
-/// Blurs `image` in `dir`; gives what was said.
-fn render(dir: &Path, image: &str, out: &str) -> String {
+/// Runs `render` with these arguments in `dir`; gives the exit code, and what was said.
+fn run(dir: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
     command.env_clear().env("XDG_CONFIG_HOME", dir).current_dir(dir).stdin(Stdio::null());
-    command.args(["render", image, "--effect", "blur", "--coc-at-infinity", "3", "--backend", "cpu", "--out", out]);
-    let output = command.output().unwrap();
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{stderr}");
-    stderr
+    let output = command.arg("render").args(arguments).args(["--backend", "cpu"]).output().unwrap();
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+/// Blurs `image` in `dir`; gives what was said.
+fn render(dir: &Path, image: &str, out: &str) -> String {
+    let (code, said) = run(dir, &[image, "--effect", "blur", "--coc-at-infinity", "3", "--out", out]);
+    assert_eq!(code, Some(0), "{said}");
+    said
+}
+
+/// Checks of 8 by 8 pixels, light on the left half and dark on the right.
+fn halves(dir: &Path) -> ColorImage {
+    let mut picture = ColorImage::new(160, 96);
+    for (k, pixel) in picture.rgb.chunks_exact_mut(3).enumerate() {
+        let (x, y) = (k % 160, k / 160);
+        let check = if (x / 8 + y / 8) % 2 == 0 { 60 } else { 0 };
+        let code = if x < 80 { 180 + check } else { 20 + check };
+        pixel.fill(code as u8);
+    }
+    write_photo(&dir.join("in.png"), &picture, &Extras::default(), false).unwrap();
+    picture
+}
+
+/// The mean difference of two pictures in some columns, in codes.
+fn difference(a: &ColorImage, b: &ColorImage, columns: std::ops::Range<usize>) -> f32 {
+    let width = a.width as usize;
+    let bytes = (0..a.rgb.len()).filter(|byte| columns.contains(&(byte / 3 % width)));
+    let (sum, count) =
+        bytes.fold((0.0, 0.0), |(sum, count), k| (sum + f32::from(a.rgb[k].abs_diff(b.rgb[k])), count + 1.0));
+    sum / count
 }
 
 #[test]
@@ -44,4 +70,56 @@ fn what_does_not_fit_is_said_once() {
     let said = render(dir.path(), "in.png", "out.png");
     assert_eq!(said.lines().count(), 2, "{said}");
     assert!(said.starts_with("note: not in out.png: transparency, 16 bits a channel\n"), "{said}");
+}
+
+#[test]
+fn a_mask_says_what_stays_sharp_in_any_size() {
+    let dir = TempDir::new().unwrap();
+    let picture = halves(dir.path());
+    // A twentieth of the picture's size, and its first column and a half white.
+    let mask = image::GrayImage::from_fn(10, 6, |x, _| [if x < 5 { 255 } else { 0 }].into());
+    mask.save(dir.path().join("mask.png")).unwrap();
+    let (code, said) = run(dir.path(), &["in.png", "--mask", "mask.png", "--coc-at-infinity", "8", "--out", "out.png"]);
+    assert_eq!((code, said.lines().count()), (Some(0), 1), "{said}");
+    let out = read_photo(&dir.path().join("out.png")).unwrap().0;
+    assert_eq!(difference(&picture, &out, 0..70), 0.0, "the subject is not touched");
+    assert!(difference(&picture, &out, 90..160) > 10.0);
+    // The outline lies where the colours have it, though the mask is coarse.
+    assert!(difference(&picture, &out, 76..80) < 2.0, "{}", difference(&picture, &out, 76..80));
+    for (arguments, expected) in [
+        (vec!["in.png", "--mask", "mask.png", "--focus", "2", "--out", "no.png"], "--focus 2 needs distances"),
+        (
+            vec!["in.png", "--mask", "mask.png", "--depth", "matte", "--out", "no.png"],
+            "leave --depth-map and --mask out",
+        ),
+    ] {
+        let (code, said) = run(dir.path(), &arguments);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(expected), "{said}");
+    }
+}
+
+#[test]
+fn relative_inverse_depth_has_white_near_or_far() {
+    let dir = TempDir::new().unwrap();
+    let picture = halves(dir.path());
+    let near_left = image::GrayImage::from_fn(160, 96, |x, _| [if x < 80 { 200 } else { 40 }].into());
+    near_left.save(dir.path().join("near.png")).unwrap();
+    let mut far_left = near_left;
+    far_left.pixels_mut().for_each(|pixel| pixel.0[0] = 240 - pixel.0[0]);
+    far_left.save(dir.path().join("far.png")).unwrap();
+    let blur = |map: &str, out: &str, more: &[&str]| {
+        let arguments =
+            [&["in.png", "--depth-map", map, "--depth-unit", "inverse", "--focus", "0.2,0.5", "--out", out], more]
+                .concat();
+        let (code, said) = run(dir.path(), &arguments);
+        assert_eq!(code, Some(0), "{said}");
+        read_photo(&dir.path().join(out)).unwrap().0
+    };
+    let (near, inverted) = (blur("near.png", "a.png", &[]), blur("far.png", "b.png", &["--depth-invert"]));
+    assert_eq!(near, inverted);
+    assert_eq!(difference(&picture, &near, 0..70), 0.0);
+    assert!(difference(&picture, &near, 90..160) > 5.0);
+    let (code, said) = run(dir.path(), &["in.png", "--depth-map", "near.png", "--out", "no.png"]);
+    assert_eq!(code, Some(1), "8 bits are too few for metres: {said}");
 }
