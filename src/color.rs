@@ -5,6 +5,11 @@ pub fn srgb_to_linear(code: f32) -> f32 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 
+/// The linear light of every 8-bit code.
+pub fn light_of_codes() -> Box<[f32; 256]> {
+    Box::new(std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0)))
+}
+
 /// sRGB code value in [0, 1] of linear light.
 pub fn linear_to_srgb(light: f32) -> f32 {
     if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }

@@ -16,6 +16,7 @@ pub mod registration;
 #[cfg(feature = "networks")]
 pub mod single_camera;
 pub mod stereo;
+mod tap;
 
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::recording::RecordingError;

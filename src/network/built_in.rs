@@ -6,23 +6,22 @@ use rten::{Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueOrView}
 use rten_tensor::TensorView;
 use rten_tensor::prelude::*;
 
-use super::{Network, Port, Tensor, guarded, one_line, onnx};
+use super::{Engine, Network, Port, Tensor, one_line, onnx};
 
 /// A network that the built-in runtime runs.
 pub struct BuiltIn {
     model: Model,
-    inputs: Vec<Port>,
-    outputs: Vec<Port>,
     /// One thread: the others are for the blur.
     threads: Arc<ThreadPool>,
 }
 
 impl BuiltIn {
-    pub fn load(bytes: Vec<u8>) -> Result<Box<dyn Network>, String> {
+    pub fn load(bytes: Vec<u8>) -> Result<Network, String> {
         let model = Model::load(onnx::without_output_shapes(bytes)?).map_err(one_line)?;
         let ports = |ids: &[NodeId]| ids.iter().map(|&id| port(&model, id)).collect::<Result<Vec<_>, _>>();
         let (inputs, outputs) = (ports(model.input_ids())?, ports(model.output_ids())?);
-        Ok(Box::new(Self { model, inputs, outputs, threads: Arc::new(ThreadPool::with_num_threads(1)) }))
+        let engine = Box::new(Self { model, threads: Arc::new(ThreadPool::with_num_threads(1)) });
+        Ok(Network { engine, inputs, outputs, runtime: "the built-in runtime".to_owned() })
     }
 }
 
@@ -36,37 +35,20 @@ fn port(model: &Model, id: NodeId) -> Result<Port, String> {
     Ok(Port { name: info.name().unwrap_or_default().to_owned(), shape: shape.iter().map(side).collect() })
 }
 
-impl Network for BuiltIn {
-    fn inputs(&self) -> &[Port] {
-        &self.inputs
-    }
-
-    fn outputs(&self) -> &[Port] {
-        &self.outputs
-    }
-
+impl Engine for BuiltIn {
     fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
-        guarded(|| {
-            let given = self.model.input_ids().iter().zip(inputs).map(|(&id, Tensor { shape, values })| {
-                let view = TensorView::try_from_data(shape.as_slice(), values.as_slice());
-                Ok((id, ValueOrView::from(view.map_err(one_line)?)))
-            });
-            let given = given.collect::<Result<Vec<_>, String>>()?;
-            let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&self.threads)));
-            let results = self.model.run(given, self.model.output_ids(), Some(options)).map_err(one_line)?;
-            outputs.resize_with(results.len(), Tensor::default);
-            for (output, result) in outputs.iter_mut().zip(results) {
-                let Value::FloatTensor(result) = result else { return Err("an output is not of floats".to_owned()) };
-                output.shape.clear();
-                output.shape.extend_from_slice(result.shape());
-                output.values.clear();
-                output.values.extend(result.iter());
-            }
-            Ok(())
-        })
-    }
-
-    fn runtime(&self) -> &str {
-        "the built-in runtime"
+        let given = self.model.input_ids().iter().zip(inputs).map(|(&id, Tensor { shape, values })| {
+            let view = TensorView::try_from_data(shape.as_slice(), values.as_slice());
+            Ok((id, ValueOrView::from(view.map_err(one_line)?)))
+        });
+        let given = given.collect::<Result<Vec<_>, String>>()?;
+        let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&self.threads)));
+        let results = self.model.run(given, self.model.output_ids(), Some(options)).map_err(one_line)?;
+        outputs.resize_with(results.len(), Tensor::default);
+        for (output, result) in outputs.iter_mut().zip(results) {
+            let Value::FloatTensor(result) = result else { return Err("an output is not of floats".to_owned()) };
+            output.set(result.shape().iter().copied(), result.iter().copied());
+        }
+        Ok(())
     }
 }

@@ -126,12 +126,16 @@ pub static KNOWN: [Known; 6] = [
 impl Known {
     /// The one that a file's content is.
     pub fn of(bytes: &[u8]) -> Option<&'static Self> {
-        let same_size = KNOWN.iter().filter(|known| known.bytes == bytes.len() as u64).collect::<Vec<_>>();
-        if same_size.is_empty() {
+        if !Self::any_has(bytes.len() as u64) {
             return None;
         }
         let digest = hex(&Sha256::digest(bytes));
-        same_size.into_iter().find(|known| known.sha256 == digest)
+        KNOWN.iter().find(|known| known.sha256 == digest)
+    }
+
+    /// Whether one of them has so many bytes: others need not be read.
+    pub(super) fn any_has(bytes: u64) -> bool {
+        KNOWN.iter().any(|known| known.bytes == bytes)
     }
 
     /// The file name that it is installed under.

@@ -59,24 +59,41 @@ impl Tensor {
     pub fn zeros(shape: &[usize]) -> Self {
         Self { shape: shape.to_vec(), values: vec![0.0; shape.iter().product()] }
     }
+
+    /// Takes other sizes and values, keeping its memory where that suffices.
+    fn set(&mut self, shape: impl IntoIterator<Item = usize>, values: impl IntoIterator<Item = f32>) {
+        self.shape.clear();
+        self.shape.extend(shape);
+        self.values.clear();
+        self.values.extend(values);
+    }
+}
+
+/// What runs a network that it has loaded.
+trait Engine: Send {
+    /// As [`Network::run`]; it may panic.
+    fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String>;
 }
 
 /// A network that was loaded.
-pub trait Network: Send {
+pub struct Network {
+    engine: Box<dyn Engine>,
     /// What it takes.
-    fn inputs(&self) -> &[Port];
-
+    pub inputs: Vec<Port>,
     /// What it gives.
-    fn outputs(&self) -> &[Port];
+    pub outputs: Vec<Port>,
+    /// What runs it, such as `ONNX Runtime 1.21.0`.
+    pub runtime: String,
+}
 
+impl Network {
     /// Runs it on one value of each input, in their order; `outputs` then holds one of each output.
     ///
     /// # Errors
     /// What the runtime says.
-    fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String>;
-
-    /// What runs it, such as `ONNX Runtime 1.21.0`.
-    fn runtime(&self) -> &str;
+    pub fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
+        guarded(|| self.engine.run(inputs, outputs))
+    }
 }
 
 /// Why a network is not used.
@@ -106,7 +123,7 @@ pub enum NetworkError {
 /// A network and how its file begins.
 pub struct Loaded {
     /// Ready to run.
-    pub network: Box<dyn Network>,
+    pub network: Network,
     /// What is known of this very file.
     pub known: Option<&'static Known>,
 }
@@ -129,7 +146,7 @@ pub fn load(path: &Path, runtime: Runtime) -> Result<Loaded, NetworkError> {
         None => built_in::BuiltIn::load(bytes),
     })
     .map_err(refused)?;
-    for port in network.inputs().iter().chain(network.outputs()) {
+    for port in network.inputs.iter().chain(&network.outputs) {
         if port
             .shape
             .iter()

@@ -8,18 +8,13 @@ use ort::environment::Environment;
 use ort::session::{Session, SessionInputValue};
 use ort::value::{TensorRef, ValueType};
 
-use super::{Network, Port, Tensor, guarded, one_line};
+use super::{Engine, Network, Port, Tensor, guarded, one_line};
 
 /// What its library is called, where the loader finds it.
 const NAMES: [&str; 2] = ["libonnxruntime.so.1", "libonnxruntime.so"];
 
 /// A network that ONNX Runtime runs.
-pub struct OnnxRuntime {
-    session: Session,
-    inputs: Vec<Port>,
-    outputs: Vec<Port>,
-    name: String,
-}
+pub struct OnnxRuntime(Session);
 
 /// The runtime: opened once, at the first call.
 ///
@@ -86,7 +81,7 @@ fn name() -> String {
 }
 
 impl OnnxRuntime {
-    pub fn load(environment: &Environment, bytes: &[u8]) -> Result<Box<dyn Network>, String> {
+    pub fn load(environment: &Environment, bytes: &[u8]) -> Result<Network, String> {
         let builder = Session::builder(environment).map_err(one_line)?;
         // One thread, which does not wait busily: the others are for the blur.
         let builder = builder.with_intra_threads(1).map_err(one_line)?.with_inter_threads(1).map_err(one_line)?;
@@ -94,7 +89,7 @@ impl OnnxRuntime {
         let session = builder.commit_from_memory(bytes).map_err(one_line)?;
         let ports = |outlets: &[ort::value::Outlet]| outlets.iter().map(port).collect::<Result<Vec<_>, _>>();
         let (inputs, outputs) = (ports(session.inputs())?, ports(session.outputs())?);
-        Ok(Box::new(Self { session, inputs, outputs, name: name() }))
+        Ok(Network { engine: Box::new(Self(session)), inputs, outputs, runtime: name() })
     }
 }
 
@@ -106,36 +101,19 @@ fn port(outlet: &ort::value::Outlet) -> Result<Port, String> {
     Ok(Port { name: outlet.name().to_owned(), shape })
 }
 
-impl Network for OnnxRuntime {
-    fn inputs(&self) -> &[Port] {
-        &self.inputs
-    }
-
-    fn outputs(&self) -> &[Port] {
-        &self.outputs
-    }
-
+impl Engine for OnnxRuntime {
     fn run(&mut self, inputs: &[Tensor], outputs: &mut Vec<Tensor>) -> Result<(), String> {
-        guarded(|| {
-            let given = inputs.iter().map(|tensor| {
-                let view = TensorRef::from_array_view((tensor.shape.as_slice(), tensor.values.as_slice()));
-                view.map(SessionInputValue::from).map_err(one_line)
-            });
-            let given = given.collect::<Result<Vec<_>, String>>()?;
-            let results = self.session.run(given.as_slice()).map_err(one_line)?;
-            outputs.resize_with(results.len(), Tensor::default);
-            for (k, output) in outputs.iter_mut().enumerate() {
-                let (shape, values) = results[k].try_extract_tensor::<f32>().map_err(one_line)?;
-                output.shape.clear();
-                output.shape.extend(shape.iter().map(|&side| side as usize));
-                output.values.clear();
-                output.values.extend_from_slice(values);
-            }
-            Ok(())
-        })
-    }
-
-    fn runtime(&self) -> &str {
-        &self.name
+        let given = inputs.iter().map(|tensor| {
+            let view = TensorRef::from_array_view((tensor.shape.as_slice(), tensor.values.as_slice()));
+            view.map(SessionInputValue::from).map_err(one_line)
+        });
+        let given = given.collect::<Result<Vec<_>, String>>()?;
+        let results = self.0.run(given.as_slice()).map_err(one_line)?;
+        outputs.resize_with(results.len(), Tensor::default);
+        for (k, output) in outputs.iter_mut().enumerate() {
+            let (shape, values) = results[k].try_extract_tensor::<f32>().map_err(one_line)?;
+            output.set(shape.iter().map(|&side| side as usize), values.iter().copied());
+        }
+        Ok(())
     }
 }

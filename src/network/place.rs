@@ -24,9 +24,12 @@ pub fn installed() -> Vec<(&'static Known, PathBuf)> {
         files.sort();
         files
     });
-    let is_network = |file: &PathBuf| file.extension().is_some_and(|extension| extension == "onnx");
+    let may_be_known = |file: &PathBuf| {
+        let is_network = file.extension().is_some_and(|extension| extension == "onnx");
+        is_network && file.metadata().is_ok_and(|metadata| Known::any_has(metadata.len()))
+    };
     let mut found: Vec<(&'static Known, PathBuf)> = files
-        .filter(is_network)
+        .filter(may_be_known)
         .filter_map(|file| Some((Known::of(&input::read(&file, MOST_BYTES).ok()?)?, file)))
         .collect();
     let rank = |known: &Known| super::KNOWN.iter().position(|other| std::ptr::eq(other, known));

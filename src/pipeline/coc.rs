@@ -102,19 +102,19 @@ impl CocMaker {
             CocRule::Depth { lens, range_m, max_coc_px, .. } => (lens, range_m, max_coc_px),
         };
         let focus_m = self.focus.focus_m(map, time_ns);
-        if map.subject_m.is_some() {
-            return lens.field((focus_m, range_m), color.width, max_coc_px);
-        }
-        match &mut self.finisher {
-            Finisher::Keep => {}
-            Finisher::Fill(filler) => filler.fill_guided(map, color),
-            Finisher::Refine { refiner, .. } => {
-                refiner.set_focus(focus_m);
-                refiner.refine(map, color, time_ns);
-            }
-        }
         let field = lens.field((focus_m, range_m), color.width, max_coc_px);
-        self.find_matte(map, color, &field);
+        // A map that was made around a subject is finished.
+        if map.subject_m.is_none() {
+            match &mut self.finisher {
+                Finisher::Keep => {}
+                Finisher::Fill(filler) => filler.fill_guided(map, color),
+                Finisher::Refine { refiner, .. } => {
+                    refiner.set_focus(focus_m);
+                    refiner.refine(map, color, time_ns);
+                }
+            }
+            self.find_matte(map, color, &field);
+        }
         field
     }
 

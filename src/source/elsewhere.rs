@@ -28,23 +28,9 @@ pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock
     if source.camera.info().brings == Brings::Depth {
         return SourceError::usage("the source knows its depth: leave --depth out");
     }
-    if let DepthChoice::Networks(chosen) = choice {
-        let (depth, about) = networks::open(chosen, wanted)?;
-        return Ok(Source {
-            depth: Some(depth),
-            depth_from: DepthFrom::Networks,
-            networks: Some(about),
-            first_depth: None,
-            ..source
-        });
-    }
-    let mut first_depth = None;
+    let (mut first_depth, mut about) = (None, None);
     let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
-        DepthChoice::Auto
-        | DepthChoice::Recorded
-        | DepthChoice::Stereo
-        | DepthChoice::None
-        | DepthChoice::Networks(_) => return Ok(source),
+        DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
             let recording = Recording::open(folder, &wanted.reading())?;
             let depth_from = depth_of(&recording);
@@ -52,8 +38,13 @@ pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthFrom::Units),
+        DepthChoice::Networks(chosen) => {
+            let (depth, said) = networks::open(chosen, wanted)?;
+            about = Some(said);
+            (depth, DepthFrom::Networks)
+        }
     };
-    Ok(Source { depth: Some(external), depth_from, first_depth, ..source })
+    Ok(Source { depth: Some(external), depth_from, networks: about, first_depth, ..source })
 }
 
 /// Opens the depth camera `name` with the scale and registration that the options state.

@@ -27,6 +27,7 @@ pub mod registration;
 
 pub use error::SourceError;
 pub use name::{Kind, SourceName};
+pub use networks::refuse_metres;
 use opened::Opened;
 pub use options::{ChosenNetworks, DepthChoice, Frames, NetworkFile, Size};
 
@@ -250,14 +251,6 @@ pub fn depth_by_networks(
     let mut map = DepthMap::default();
     networks.read(Seen { stamp, color, right: None }, &mut map)?;
     Ok(map)
-}
-
-/// Refuses a look that needs real distances, for depth in which `who` knows only relative ones.
-///
-/// # Errors
-/// It does.
-pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
-    networks::refuse_metres(look, who)
 }
 
 /// The look adapted to a source with or without depth: without, depth of field becomes tilt-shift.

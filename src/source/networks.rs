@@ -10,8 +10,11 @@ use super::{DepthChoice, DepthFrom, Kind, NetworkFile};
 /// Networks at work, and what they are in a few words.
 type Opened = (Box<dyn DepthSource>, String);
 
-/// Refuses a look that needs real distances; `who` knows only relative ones.
-pub(super) fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
+/// Refuses a look that needs real distances, for depth in which `who` knows only relative ones.
+///
+/// # Errors
+/// It does.
+pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
     match look.needs_metres() {
         None => Ok(()),
         Some(needs) => SourceError::usage(format!(
@@ -57,7 +60,7 @@ pub(super) fn open(chosen: &ChosenNetworks, wanted: &Wanted) -> Result<Opened, S
 /// Gives a camera that has no depth that of the installed networks, if there are any and nothing else is asked for.
 #[cfg(feature = "networks")]
 pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted) -> Source {
-    use crate::network::{Task, best};
+    use crate::network::{Task, installed};
     let is_lone =
         name.kind() == Kind::Camera && !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
     let needs_metres = wanted.look.is_some_and(|look| look.needs_metres().is_some());
@@ -65,8 +68,10 @@ pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted
     if !is_lone || needs_metres || !wanted.look.is_some_and(|look| look.effect.follows_depth()) {
         return source;
     }
-    let installed = |task| best(task).map(NetworkFile::At);
-    let chosen = ChosenNetworks { matte: installed(Task::Matte), mono: installed(Task::Mono) };
+    let installed = installed();
+    let best =
+        |task| installed.iter().find(|(known, _)| known.task == task).map(|(_, file)| NetworkFile::At(file.clone()));
+    let chosen = ChosenNetworks { matte: best(Task::Matte), mono: best(Task::Mono) };
     if chosen.matte.is_none() {
         return source;
     }

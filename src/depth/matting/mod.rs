@@ -11,7 +11,7 @@ mod share;
 
 use std::ops::Range;
 
-use crate::color::srgb_to_linear;
+use crate::color::light_of_codes;
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
 use clusters::{Clusters, View};
@@ -64,7 +64,7 @@ impl EdgePixel {
 impl Default for Matting {
     fn default() -> Self {
         Self {
-            light: Box::new(std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0))),
+            light: light_of_codes(),
             inverse: Vec::new(),
             at_edge: Vec::new(),
             ranges: [Vec::new(), Vec::new()],

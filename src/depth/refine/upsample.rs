@@ -4,6 +4,7 @@
 //! nearest depth is taken, so that no depth comes out that nobody measured; where the edge runs exactly is then for
 //! the colours to say.
 
+use crate::depth::tap::Tap;
 use crate::frame::DepthMap;
 
 /// Neighbours whose inverse depths differ by less than this share of the larger are one surface.
@@ -14,23 +15,6 @@ const SAME_SURFACE: f32 = 0.05;
 pub struct Upsampler {
     metres: Vec<f32>,
     columns: Vec<Tap>,
-}
-
-/// Two neighbouring samples and the share of the second.
-#[derive(Clone, Copy, Debug)]
-struct Tap {
-    first: usize,
-    second: usize,
-    share: f32,
-}
-
-impl Tap {
-    /// The samples around the centre of pixel `at`, where `to` pixels and `from` samples cover the same length.
-    fn new(at: usize, to: usize, from: usize) -> Self {
-        let place = ((at as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
-        let first = place as usize;
-        Self { first, second: (first + 1).min(from - 1), share: place - first as f32 }
-    }
 }
 
 impl Upsampler {

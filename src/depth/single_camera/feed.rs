@@ -18,7 +18,7 @@ pub struct Hints {
 
 /// A network that is shown pictures.
 pub struct Feed {
-    network: Box<dyn Network>,
+    network: Network,
     /// Columns and rows of the picture that it is shown.
     size: (usize, usize),
     /// Whether the three channels of its picture lie in planes, or beside each other.
@@ -63,7 +63,7 @@ impl Feed {
     /// # Errors
     /// It does not take a picture, or more than one.
     pub fn new(Loaded { network, known }: Loaded, task: Task, hints: &Hints) -> Result<Self, String> {
-        let inputs = network.inputs();
+        let inputs = &network.inputs;
         let pictures: Vec<usize> = (0..inputs.len()).filter(|&k| channels_at(&inputs[k], &[3]).is_some()).collect();
         let &[picture] = pictures.as_slice() else {
             return Err(format!(
@@ -82,7 +82,7 @@ impl Feed {
         if !(1..=MOST_SIDE).contains(&width) || !(1..=MOST_SIDE).contains(&height) {
             return Err(format!("it is shown pictures of {width} x {height}: at most {MOST_SIDE} a side are sensible"));
         }
-        let outputs = network.outputs();
+        let outputs = &network.outputs;
         let answers = |named: bool| {
             (0..outputs.len()).find(|&k| {
                 let name = outputs[k].name.to_lowercase();

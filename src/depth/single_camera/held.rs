@@ -1,6 +1,7 @@
 //! What belongs to a subject: what is as near and joined to it, such as a mug that is held; and what does not: others, who
 //! are further away.
 
+use super::nearest;
 use super::relief::Relief;
 use crate::frame::Mask;
 
@@ -32,8 +33,7 @@ impl Held {
     pub fn join(&mut self, mask: &Mask, relief: &Relief) {
         let (width, height) = (mask.width as usize, mask.height as usize);
         self.mask.clone_from(mask);
-        let (columns, rows) = relief.size();
-        let near = |at: usize| relief.nearness()[at / width * rows / height * columns + at % width * columns / width];
+        let near = |at: usize| relief.nearness()[nearest(at, (width, height), relief.size())];
         self.nearness.clear();
         self.nearness.extend((0..width * height).map(near));
         self.take_others_away();

@@ -18,7 +18,8 @@ use held::Held;
 use person::Person;
 use relief::Relief;
 
-use super::matting::mask::{FAR_M, MaskMatting, SUBJECT_M, between};
+use super::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
+use super::tap::Tap;
 use super::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap};
 use crate::network::{self, Runtime, Task};
@@ -67,7 +68,7 @@ impl SingleCamera {
                 return Err(failed(format!("this is {}, a network for --depth {}", known.name, known.task.name())));
             }
             names.push(loaded.known.map_or_else(|| name.clone(), |known| known.name.to_owned()));
-            run_by = loaded.network.runtime().to_owned();
+            run_by = loaded.network.runtime.clone();
             Feed::new(loaded, task, hints).map_err(failed)
         };
         let person = matte.map(|path| load(path, Task::Matte)).transpose()?.map(Person::new);
@@ -89,9 +90,7 @@ impl SingleCamera {
         networks.try_out()?;
         Ok(networks)
     }
-}
 
-impl SingleCamera {
     /// What they are, in a few words: their names, and what runs them.
     pub fn describe(&self) -> String {
         format!("{}, run by {}", self.name, self.runtime)
@@ -132,6 +131,11 @@ impl SingleCamera {
     }
 }
 
+/// The pixel of a plane of other sizes that pixel `at` of one of `size` falls on.
+fn nearest(at: usize, size: (usize, usize), (width, height): (usize, usize)) -> usize {
+    at / size.0 * height / size.1 * width + at % size.0 * width / size.0
+}
+
 impl DepthSource for SingleCamera {
     fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
         let apart = self.last_ns.is_none_or(|last_ns| stamp.time_ns.abs_diff(last_ns) > APART_NS);
@@ -170,8 +174,8 @@ impl DepthSource for SingleCamera {
 /// Distances of a picture from nearness in fewer pixels, linear between them.
 #[derive(Default)]
 struct Spread {
-    /// Per column of the picture, those of the nearness on both sides, and how far it is to the second.
-    columns: Vec<(u32, u32, f32)>,
+    /// Per column of the picture, those of the nearness on both sides.
+    columns: Vec<Tap>,
     row: Vec<f32>,
 }
 
@@ -179,18 +183,15 @@ impl Spread {
     fn over(&mut self, nearness: &[f32], (width, height): (usize, usize), map: &mut DepthMap) {
         let (to_width, to_height) = (map.width as usize, map.height as usize);
         self.columns.clear();
-        self.columns.extend((0..to_width).map(|x| {
-            let (left, right, along) = between(x, to_width, width);
-            (left as u32, right as u32, along)
-        }));
+        self.columns.extend((0..to_width).map(|x| Tap::new(x, to_width, width)));
         for (y, row) in map.metres.chunks_exact_mut(to_width.max(1)).enumerate() {
-            let (above, below, down) = between(y, to_height, height);
-            let (above, below) = (&nearness[above * width..][..width], &nearness[below * width..][..width]);
+            let Tap { first, second, share: down } = Tap::new(y, to_height, height);
+            let (above, below) = (&nearness[first * width..][..width], &nearness[second * width..][..width]);
             self.row.clear();
             self.row.extend(above.iter().zip(below).map(|(a, b)| a + (b - a) * down));
-            for (metres, &(left, right, along)) in row.iter_mut().zip(&self.columns) {
-                let (left, right) = (self.row[left as usize], self.row[right as usize]);
-                let nearness = left + (right - left) * along;
+            for (metres, tap) in row.iter_mut().zip(&self.columns) {
+                let (left, right) = (self.row[tap.first], self.row[tap.second]);
+                let nearness = left + (right - left) * tap.share;
                 *metres = SUBJECT_M / if nearness > LEAST { nearness } else { LEAST };
             }
         }

@@ -4,6 +4,7 @@
 //! itself do away with both: the subject, and what is farthest.
 
 use super::feed::Feed;
+use super::nearest;
 use crate::frame::{ColorImage, Mask};
 
 /// Of all numbers, sorted, this share is farther than what counts as the farthest, or nearer than the nearest.
@@ -72,7 +73,10 @@ impl Relief {
         self.nearness.clear();
         self.nearness.extend((0..pixels).map(|pixel| answer.at(pixel, 0)));
         self.subject.clear();
-        self.subject.extend((0..pixels).map(|at| mask.map_or(0.0, |mask| sample(mask, at, answer.size))));
+        let subject = |at: usize| {
+            mask.map_or(0.0, |mask| mask.share[nearest(at, answer.size, (mask.width as usize, mask.height as usize))])
+        };
+        self.subject.extend((0..pixels).map(subject));
         self.measure();
         self.look_behind();
         Ok(())
@@ -128,12 +132,6 @@ impl Relief {
             .min(NEAREST_BEHIND);
         }
     }
-}
-
-/// A mask at a pixel of a picture of another size.
-fn sample(mask: &Mask, at: usize, (width, height): (usize, usize)) -> f32 {
-    let (x, y) = (at % width * mask.width as usize / width, at / width * mask.height as usize / height);
-    mask.share[y * mask.width as usize + x]
 }
 
 /// Calls `change` with every row of a plane and then with every column, each as a line.

@@ -18,16 +18,16 @@ use crate::network::{Runtime, Scaling};
 pub struct Networks {
     /// What runs networks [default: auto]
     #[cfg(feature = "networks")]
-    #[arg(long, value_name = "WHICH", value_parser = runtime)]
+    #[arg(long, value_name = "WHICH", value_parser = names::parse::<Runtime>)]
     pub network_runtime: Option<Runtime>,
     /// What a network that is not known takes for black and white: unit (0 to 1), signed (-1 to 1), codes (0 to 255) or
     /// imagenet (the mean and deviation of that collection) [default: unit for a matte, imagenet for depth]
     #[cfg(feature = "networks")]
-    #[arg(long, value_name = "RANGE", value_parser = range)]
+    #[arg(long, value_name = "RANGE", value_parser = names::parse::<Range>)]
     pub network_range: Option<Range>,
     /// The order of its colours: rgb or bgr [default: rgb]
     #[cfg(feature = "networks")]
-    #[arg(long, value_name = "ORDER", value_parser = order)]
+    #[arg(long, value_name = "ORDER", value_parser = names::parse::<Order>)]
     pub network_order: Option<Order>,
 }
 
@@ -68,21 +68,6 @@ names::named! {
         /// Blue first
         Bgr = "bgr",
     }
-}
-
-#[cfg(feature = "networks")]
-fn runtime(text: &str) -> Result<Runtime, String> {
-    names::parse(text)
-}
-
-#[cfg(feature = "networks")]
-fn range(text: &str) -> Result<Range, String> {
-    names::parse(text)
-}
-
-#[cfg(feature = "networks")]
-fn order(text: &str) -> Result<Order, String> {
-    names::parse(text)
 }
 
 /// A network: the best that is installed for its task, or a file.

@@ -2,6 +2,7 @@
 
 use crate::depth::matting::clusters::{Color, Symmetric, outer};
 use crate::depth::matting::share::Contrast;
+use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, Mask};
 
 /// From here on the mask is sure that a pixel is of the nearer surface, and below 1 less this, that it is not.
@@ -66,8 +67,8 @@ pub struct View<'a> {
     pub mask: &'a Mask,
     pub color: &'a ColorImage,
     pub light: &'a [f32; 256],
-    /// Per column of the picture, those of the mask on both sides, and how far it is to the second.
-    pub columns: &'a [(usize, usize, f32)],
+    /// Per column of the picture, those of the mask on both sides.
+    pub columns: &'a [Tap],
     pub cell_px: usize,
     pub across: usize,
     pub down: usize,
@@ -92,13 +93,12 @@ impl View<'_> {
     /// The mask at a pixel, linear between its own.
     #[inline(always)]
     pub fn share_at(&self, x: usize, y: usize) -> f32 {
-        let (above, below, down) = between(y, self.color.height as usize, self.mask.height as usize);
-        let (left, right, along) = self.columns[x];
+        let (down, across) = (Tap::new(y, self.color.height as usize, self.mask.height as usize), &self.columns[x]);
         let row = |row: usize| {
             let row = &self.mask.share[row * self.mask.width as usize..];
-            row[left] + (row[right] - row[left]) * along
+            row[across.first] + (row[across.second] - row[across.first]) * across.share
         };
-        row(above) + (row(below) - row(above)) * down
+        row(down.first) + (row(down.second) - row(down.first)) * down.share
     }
 
     /// What the mask says of every cell: it is sure of all of it, or not.
@@ -186,12 +186,4 @@ impl View<'_> {
         let rows = row.saturating_sub(reach)..(row + reach + 1).min(self.down);
         rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
     }
-}
-
-/// The samples on both sides of the centre of pixel `at`, where `to` pixels and `from` samples cover the same length; and
-/// how far it is to the second.
-pub fn between(at: usize, to: usize, from: usize) -> (usize, usize, f32) {
-    let place = ((at as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
-    let first = place as usize;
-    (first, (first + 1).min(from - 1), place - first as f32)
 }

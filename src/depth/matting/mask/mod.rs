@@ -8,11 +8,12 @@
 mod cells;
 mod posterior;
 
-use crate::color::srgb_to_linear;
+use crate::color::light_of_codes;
+use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap, Mask, MixedPixel};
 
+use super::NEARLY_PURE;
 use super::share::Contrast;
-pub(in crate::depth) use cells::between;
 use cells::{Cell, Kernel, REACH, Sums, View};
 use posterior::Posterior;
 
@@ -31,8 +32,6 @@ const NEAR_FROM: f32 = 0.6;
 const JOINED_FROM: f32 = 0.15;
 /// Marks a share that is found to be joined.
 const FOUND: f32 = 2.0;
-/// Shares beyond this are those of a pure pixel.
-const NEARLY_PURE: f32 = 0.98;
 
 /// Finds mattes; owns the memory for it.
 #[derive(Debug)]
@@ -48,7 +47,7 @@ pub struct MaskMatting {
     /// The share of each pixel of the band, and [`FOUND`] more where it is joined to the rest of the surface.
     shares: Vec<f32>,
     front: Vec<u32>,
-    columns: Vec<(usize, usize, f32)>,
+    columns: Vec<Tap>,
 }
 
 /// The depth of a picture in which `mask` has the subject, all else being far.
@@ -66,7 +65,7 @@ impl Default for MaskMatting {
             (1.0 + square / (HALF_CELLS * HALF_CELLS)).powi(-3)
         };
         Self {
-            light: Box::new(std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0))),
+            light: light_of_codes(),
             posterior: Posterior::new(),
             kernel: std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column))),
             cells: Vec::new(),
@@ -111,7 +110,7 @@ impl pulp::WithSimd for Finding<'_> {
         let (width, height) = (color.width as usize, color.height as usize);
         let cell_px = ((CELL_OF_MASK * width as f32 / mask.width as f32).round() as usize).max(LEAST_CELL_PX);
         matting.columns.clear();
-        matting.columns.extend((0..width).map(|x| between(x, width, mask.width as usize)));
+        matting.columns.extend((0..width).map(|x| Tap::new(x, width, mask.width as usize)));
         let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
         let MaskMatting { light, posterior, kernel, cells, wanted, sums, contrasts, shares, front, columns } = matting;
         let view = View { mask, color, light, columns, cell_px, across, down };
