@@ -51,6 +51,9 @@ pub enum CliError {
     #[error("{0}")]
     #[cfg(feature = "window")]
     OutputFailed(String),
+    /// No plate could be taken.
+    #[error("no plate: {0}")]
+    NoPlate(String),
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),

@@ -1,5 +1,6 @@
 //! What the user sees while a command runs, and how it is ended.
 
+use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,6 +12,7 @@ use super::log;
 pub use super::log::say;
 use super::options::Global;
 use super::screen::{Count, Screen};
+use crate::depth::plate::{Guide, Step};
 
 /// The first Ctrl-C (or a termination signal) sets the flag, so that the file in hand is finished; the second ends
 /// the program at once.
@@ -60,6 +62,36 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.0.iter().for_each(|(screen, count)| screen.end(count));
+    }
+}
+
+/// Tells a person who takes a plate what to do, once each.
+pub struct Guidance {
+    guide: Option<Arc<Guide>>,
+    is_quiet: bool,
+    told: Cell<Option<Step>>,
+}
+
+impl Guidance {
+    /// Tells of the plate that is taken or used, if there is one.
+    pub fn new(guide: Option<Arc<Guide>>, global: &Global) -> Self {
+        Self { guide, is_quiet: global.quiet, told: Cell::new(None) }
+    }
+
+    /// How far the plate is.
+    pub fn step(&self) -> Option<Step> {
+        self.guide.as_ref().map(|guide| guide.step())
+    }
+
+    /// Says what is new.
+    pub fn tell(&self) {
+        let Some(step) = self.step() else { return };
+        // How much of it is taken is no news, nor is a plate that was there from the start.
+        let news = if matches!(step, Step::Taking(_)) { Step::Taking(0) } else { step };
+        let told = self.told.replace(Some(news));
+        if !self.is_quiet && told != Some(news) && (told.is_some() || news != Step::Ready) {
+            say(&step.to_string());
+        }
     }
 }
 

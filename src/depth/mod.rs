@@ -12,6 +12,7 @@ pub mod live;
 pub mod matting;
 pub mod recorded;
 pub mod refine;
+pub mod plate;
 pub mod registration;
 #[cfg(feature = "networks")]
 pub mod single_camera;
@@ -94,6 +95,14 @@ pub enum DepthError {
         /// Its file.
         name: String,
         /// What failed.
+        why: String,
+    },
+    /// A plate cannot be used.
+    #[error("{name}: {why}")]
+    Plate {
+        /// Its file.
+        name: String,
+        /// Why not.
         why: String,
     },
     /// There is no depth at all.

@@ -1,7 +1,7 @@
 //! External depth for a source: from another recording, or from a depth camera.
 
 use super::opened::depth_of;
-use super::{DepthChoice, DepthFrom, Options, Source, SourceError, Wanted, networks, options};
+use super::{DepthChoice, DepthFrom, Options, Source, SourceError, SourceName, Wanted, networks, options, plate};
 use crate::capture::Brings;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
@@ -12,7 +12,12 @@ use crate::recording::Recording;
 ///
 /// # Errors
 /// It cannot be opened, or an option does not apply to it.
-pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock) -> Result<Source, SourceError> {
+pub(super) fn with_external_depth(
+    source: Source,
+    name: &SourceName,
+    wanted: &Wanted,
+    clock: &Clock,
+) -> Result<Source, SourceError> {
     let Options { depth, depth_choice: choice, .. } = wanted.options;
     if depth.depth_calibration.is_some() && !matches!(choice, DepthChoice::Device(_)) {
         return SourceError::usage(
@@ -28,7 +33,7 @@ pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock
     if source.camera.info().brings == Brings::Depth {
         return SourceError::usage("the source knows its depth: leave --depth out");
     }
-    let (mut first_depth, mut about) = (None, None);
+    let (mut first_depth, mut about, mut guide) = (None, None, None);
     let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
@@ -43,8 +48,13 @@ pub(super) fn with_external_depth(source: Source, wanted: &Wanted, clock: &Clock
             about = Some(said);
             (depth, DepthFrom::Networks)
         }
+        DepthChoice::Plate(file) => {
+            let depth = plate::open(file.as_deref(), &source, name, wanted)?;
+            guide = Some(depth.guide());
+            (Box::new(depth), DepthFrom::Plate)
+        }
     };
-    Ok(Source { depth: Some(external), depth_from, networks: about, first_depth, ..source })
+    Ok(Source { depth: Some(external), depth_from, networks: about, guide, first_depth, ..source })
 }
 
 /// Opens the depth camera `name` with the scale and registration that the options state.
@@ -59,7 +69,7 @@ fn open_depth_camera(name: &str, options: &options::Depth, clock: &Clock) -> Res
         Ok(camera) => Ok(Box::new(camera)),
         // Probably a mistyped keyword or folder.
         Err(error @ OpenError::Name(_)) => Err(SourceError::Usage(format!(
-            "--depth {name}: {error}; or use auto, recorded, stereo, none, matte, mono or a folder with a recording"
+            "--depth {name}: {error}; or use auto, recorded, stereo, none, matte, mono, plate or a folder with a recording"
         ))),
         Err(error) => Err(error.into()),
     }

@@ -22,6 +22,7 @@ mod near;
 mod networks;
 mod opened;
 pub mod options;
+pub mod plate;
 #[cfg(feature = "camera")]
 pub mod registration;
 
@@ -31,11 +32,14 @@ pub use networks::refuse_metres;
 use opened::Opened;
 pub use options::{ChosenNetworks, DepthChoice, Frames, NetworkFile, Size};
 
+use std::sync::Arc;
+
 use crate::capture::side_by_side::SideBySide;
 use crate::capture::{Brings, Camera, CaptureError};
 use crate::clock::Clock;
 use crate::computing::Computing;
 use crate::depth::focus::FocusRule;
+use crate::depth::plate::Guide;
 use crate::depth::{DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::look::{Effect, Look, Strength};
@@ -55,6 +59,8 @@ pub enum DepthFrom {
     Eyes,
     /// Networks: relative distances.
     Networks,
+    /// A picture of what is behind: what stands before it, and what does not.
+    Plate,
 }
 
 /// An opened source.
@@ -69,6 +75,8 @@ pub struct Source {
     pub depth_from: DepthFrom,
     /// What makes the depth, where networks do.
     pub networks: Option<String>,
+    /// How far the plate is, where that makes the depth.
+    pub guide: Option<Arc<Guide>>,
     /// The first map of recorded depth, where a distance was given that it can be compared with.
     pub first_depth: Option<DepthMap>,
 }
@@ -114,14 +122,14 @@ impl Source {
         let wanted = Wanted { options, look };
         let source = Self::open_with_own_depth(name, &wanted)?;
         let source = networks::for_lone_camera(source, name, &wanted);
-        elsewhere::with_external_depth(source, &wanted, &Clock::system())
+        elsewhere::with_external_depth(source, name, &wanted, &Clock::system())
     }
 
     /// A source from a camera that the caller has opened; `depth` gives depth in metres for its frames.
     pub fn of(camera: Box<dyn Camera>, depth: Option<Box<dyn DepthSource>>) -> Self {
         let has_depth = depth.is_some() || camera.info().brings == Brings::Depth;
         let depth_from = if has_depth { DepthFrom::Metres } else { DepthFrom::Nothing };
-        Self { camera, depth, rig: None, depth_from, networks: None, first_depth: None }
+        Self { camera, depth, rig: None, depth_from, networks: None, guide: None, first_depth: None }
     }
 
     /// Opens a source with the depth it has by itself: recorded, exact, or matched from its two eyes. Depth from
@@ -185,7 +193,7 @@ impl Source {
 
     /// Whether its depth was measured (and not computed exactly), so that refinement improves it.
     pub fn is_measured(&self) -> bool {
-        let is_made = self.depth_from == DepthFrom::Networks;
+        let is_made = matches!(self.depth_from, DepthFrom::Networks | DepthFrom::Plate);
         self.depth.is_some() && !is_made && (self.rig.is_none() || REFINES_STEREO)
     }
 }

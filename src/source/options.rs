@@ -140,12 +140,14 @@ pub enum DepthChoice {
     Device(String),
     /// Networks, from the pictures alone.
     Networks(ChosenNetworks),
+    /// A picture of what is behind, in this file, or one that is taken at the start.
+    Plate(Option<PathBuf>),
 }
 
 impl DepthChoice {
     /// Whether it names depth that is not the source's own.
     pub fn is_elsewhere(&self) -> bool {
-        matches!(self, Self::Folder(_) | Self::Device(_) | Self::Networks(_))
+        matches!(self, Self::Folder(_) | Self::Device(_) | Self::Networks(_) | Self::Plate(_))
     }
 }
 
@@ -157,13 +159,18 @@ impl FromStr for DepthChoice {
             "recorded" => Self::Recorded,
             "stereo" => Self::Stereo,
             "none" => Self::None,
+            "plate" => Self::Plate(None),
             "" => {
                 return Err(
-                    "use auto, recorded, stereo, none, matte, mono, a folder with a recording, or a depth camera"
+                    "use auto, recorded, stereo, none, matte, mono, plate, a folder with a recording, or a depth camera"
                         .to_string(),
                 );
             }
             text if let Some(chosen) = ChosenNetworks::parse(text) => Self::Networks(chosen?),
+            text if let Some(file) = text.strip_prefix("plate:") => match file {
+                "" => return Err(format!("{text}: name a picture after the colon, or leave it out")),
+                file => Self::Plate(Some(file.into())),
+            },
             folder if Path::new(folder).is_dir() => Self::Folder(folder.into()),
             device => Self::Device(device.to_owned()),
         })

@@ -2,6 +2,7 @@
 
 #[path = "../common/onnx.rs"]
 mod onnx;
+mod plate;
 mod real;
 
 use std::fs;
@@ -28,7 +29,7 @@ fn camera(file: &Path, runtime: Runtime) -> SingleCamera {
     SingleCamera::open(Some(file), None, &Hints::default(), runtime).unwrap()
 }
 
-fn read(camera: &mut SingleCamera, color: &ColorImage, frame: u64) -> DepthMap {
+fn read(camera: &mut dyn DepthSource, color: &ColorImage, frame: u64) -> DepthMap {
     let mut map = DepthMap::default();
     let stamp = Stamp { index: frame as usize, time_ns: frame * 33_000_000, captured_ns: None };
     camera.read(Seen { stamp, color, right: None }, &mut map).unwrap();

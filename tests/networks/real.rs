@@ -11,7 +11,7 @@ use bokehcam::recording::{Options, Recording, Scratch};
 use super::read;
 
 /// Pixels of a real sequence that a sensor knows to be of a person, and of the wall, three pixels away from all else.
-fn sure(depth: &DepthMap) -> (Vec<bool>, Vec<bool>) {
+pub fn sure(depth: &DepthMap) -> (Vec<bool>, Vec<bool>) {
     let (width, height) = (depth.width as usize, depth.height as usize);
     let within = |range: std::ops::Range<f32>| {
         let all = |x: usize, y: usize| {
@@ -27,33 +27,56 @@ fn sure(depth: &DepthMap) -> (Vec<bool>, Vec<bool>) {
     (within(0.4..1.5), within(2.0..4.0))
 }
 
+fn data() -> PathBuf {
+    PathBuf::from(std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data"))
+}
+
+/// The file of the best known network for a task.
+pub fn model(task: Task) -> PathBuf {
+    let known = KNOWN.iter().find(|known| known.task == task).unwrap();
+    let files = fs::read_dir(data().join("models")).unwrap().flatten().map(|entry| entry.path());
+    files
+        .into_iter()
+        .find(|file| Known::of(&fs::read(file).unwrap()).is_some_and(|found| found.name == known.name))
+        .unwrap()
+}
+
+/// A person who turns, as colours and depth.
+pub struct Sequence(Recording);
+
+impl Sequence {
+    pub fn open() -> Self {
+        let options = Options { depth_scale: 1000.0, ..Options::default() };
+        Self(Recording::open(&data().join("rgbd/person_turning"), &options).unwrap())
+    }
+
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub fn frame(&self, index: usize) -> (ColorImage, DepthMap) {
+        let (mut scratch, mut color, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
+        self.0.read_color(index, &mut scratch, &mut color).unwrap();
+        self.0.read_depth(index, &mut scratch, &mut depth).unwrap();
+        (color, depth)
+    }
+}
+
 #[test]
 #[ignore = "needs BOKEHCAM_DATA, a folder with models and rgbd/person_turning"]
 fn a_real_person_is_found_and_what_rests_rests() {
-    let data = PathBuf::from(std::env::var_os("BOKEHCAM_DATA").expect("BOKEHCAM_DATA names the folder of the data"));
-    let model = |task| {
-        let known = KNOWN.iter().find(|known| known.task == task).unwrap();
-        let files = fs::read_dir(data.join("models")).unwrap().flatten().map(|entry| entry.path());
-        files
-            .into_iter()
-            .find(|file| Known::of(&fs::read(file).unwrap()).is_some_and(|found| found.name == known.name))
-            .unwrap()
-    };
     let (matte, mono) = (model(Task::Matte), model(Task::Mono));
     let open = |matte: Option<&Path>, mono: Option<&Path>| {
         SingleCamera::open(matte, mono, &Hints::default(), Runtime::Auto).unwrap()
     };
-    let options = Options { depth_scale: 1000.0, ..Options::default() };
-    let recording = Recording::open(&data.join("rgbd/person_turning"), &options).unwrap();
-    let (mut scratch, mut color, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
+    let sequence = Sequence::open();
     let mut both = open(Some(&matte), Some(&mono));
     let mut relief = open(None, Some(&mono));
     let mut last: Option<(Vec<f32>, Vec<bool>, Vec<bool>)> = None;
     let (mut joint, mut any, mut rest, mut resting) = (0u64, 0u64, [0.0f64; 2], [0u64; 2]);
     let (mut ordered, mut pairs) = (0u64, 0u64);
-    for index in 0..recording.len() {
-        recording.read_color(index, &mut scratch, &mut color).unwrap();
-        recording.read_depth(index, &mut scratch, &mut depth).unwrap();
+    for index in 0..sequence.len() {
+        let (color, depth) = sequence.frame(index);
         let (person, wall) = sure(&depth);
         let map = read(&mut both, &color, index as u64);
         let mut shares: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= 1.0))).collect();

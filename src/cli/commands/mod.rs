@@ -7,6 +7,7 @@ mod devices;
 mod doctor;
 #[cfg(feature = "networks")]
 mod models;
+mod plate;
 #[cfg(feature = "window")]
 mod preview;
 mod record;
@@ -49,6 +50,7 @@ pub enum Command {
     Render(Box<render::RenderCommand>),
     Depth(Box<depth::DepthCommand>),
     Record(Box<record::RecordCommand>),
+    Plate(Box<plate::PlateCommand>),
     Aperture(aperture::ApertureCommand),
     Bench(Box<bench::BenchCommand>),
     Devices(devices::DevicesCommand),
@@ -107,6 +109,7 @@ pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Lay
         Command::Render(command) => render::run(&command, &cli.global, &layers.given(matches)),
         Command::Depth(command) => depth::run(&command, &cli.global),
         Command::Record(command) => record::run(&command, &cli.global, &layers.given(matches)),
+        Command::Plate(command) => plate::run(&command, &cli.global, &layers.given(matches)),
         Command::Aperture(command) => aperture::run(&command, &cli.global),
         Command::Bench(command) => bench::run(&command, &layers.given(matches)),
         Command::Devices(command) => devices::run(&command),

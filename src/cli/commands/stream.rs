@@ -127,6 +127,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     if parts.blur.takes_whatever_depth() && !source.has_depth() {
         unused::warn_of_no_depth(unused::From::Source(command.source.kind()));
     }
+    let guidance = terminal::Guidance::new(source.guide, global);
     let bar = terminal::Progress::new(info.frames, global);
     let ended = pipeline::run(Run {
         camera: source.camera,
@@ -146,7 +147,10 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         view: None,
         clock: Clock::system(),
         stop: &stop,
-        progress: &|progress| bar.delivered(progress.delivered),
+        progress: &|progress| {
+            bar.delivered(progress.delivered);
+            guidance.tell();
+        },
     });
     drop(bar);
     let (report, ended) = match ended {

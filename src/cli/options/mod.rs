@@ -63,8 +63,9 @@ pub struct Blur {
     pub preset: Option<String>,
     /// Where depth comes from: auto (the source's, when the effect needs it: recorded, else from its two eyes), recorded
     /// (the source's), stereo (from its two eyes), none, a folder with a recording whose depth is played in a loop, a depth
-    /// camera (/dev/videoN, N, or part of its name), or networks that need one camera alone: matte[:FILE.onnx] (where a
-    /// person is), mono[:FILE.onnx] (how near all is), or matte,mono; without FILE, the best that is installed
+    /// camera (/dev/videoN, N, or part of its name), networks that need one camera alone: matte[:FILE.onnx] (where a
+    /// person is), mono[:FILE.onnx] (how near all is), or matte,mono; without FILE, the best that is installed; or
+    /// plate[:FILE.png], a picture of what is behind you, taken at the start if there is no FILE (the camera stands still)
     #[arg(long, value_name = "FROM", default_value = "auto")]
     pub depth: DepthChoice,
     /// The look, but for its quality.

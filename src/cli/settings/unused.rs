@@ -50,6 +50,7 @@ const NEEDS: [(&[&str], Why); 14] = [
         DepthFrom::Nothing => Some(NO_DEPTH),
         DepthFrom::Metres | DepthFrom::Eyes => Some("this depth is in metres already"),
         DepthFrom::Networks => Some("networks give no depth pictures"),
+        DepthFrom::Plate => Some("a plate gives no depth pictures"),
         DepthFrom::Units if run.uses_depth => None,
         DepthFrom::Units => Some(DEPTH_UNUSED),
     }),

@@ -3,6 +3,7 @@
 
 mod address;
 pub mod error;
+pub mod hold;
 pub mod knobs;
 mod low_rate;
 pub mod negotiate;

@@ -216,9 +216,14 @@ fn sources(command: &RenderCommand) -> Vec<PathBuf> {
         Some(ApertureName::Image(file)) => Some(file),
         _ => None,
     };
+    let plate = match &command.blur.depth {
+        DepthChoice::Plate(Some(file)) => Some(file),
+        _ => None,
+    };
     [&command.image, &command.depth_map, &command.mask]
         .into_iter()
         .flatten()
+        .chain(plate)
         .chain(aperture)
         .cloned()
         .chain(of_snapshot)
@@ -255,8 +260,8 @@ fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Opt
 fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
     let is_given = command.depth_map.is_some() || command.mask.is_some();
     match (&command.mask, &command.blur.depth) {
-        (_, DepthChoice::Networks(_)) if is_given => {
-            let what = "--depth matte and mono make the depth: leave --depth-map and --mask out";
+        (_, DepthChoice::Networks(_) | DepthChoice::Plate(_)) if is_given => {
+            let what = "--depth matte, mono and plate make the depth: leave --depth-map and --mask out";
             Err(CliError::Usage(what.to_string()))
         }
         (Some(file), _) => {
@@ -270,6 +275,14 @@ fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Resul
             let map = source::depth_by_networks(chosen, &options, look, color)?;
             // Around a subject it has its matte already; else its outlines are soft, and are fitted to the picture.
             Ok(Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }))
+        }
+        (None, DepthChoice::Plate(Some(file))) => {
+            source::refuse_metres(look, "a plate tells")?;
+            Ok(Some(Depth::Final(source::plate::depth_of_picture(file, color)?)))
+        }
+        (None, DepthChoice::Plate(None)) => {
+            let what = "--depth plate: name the picture of what is behind: --depth plate:FILE.png";
+            Err(CliError::Usage(what.to_string()))
         }
         _ => Ok(None),
     }

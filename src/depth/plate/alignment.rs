@@ -1,0 +1,197 @@
+//! How the picture of now differs from the plate though nothing stands before it: exposure and white balance, a gain per
+//! channel; the camera, a shift.
+
+use super::reduced::MOST;
+
+/// Pixels darker or brighter than these tell no gain.
+const DARK: f32 = 24.0;
+const BRIGHT: f32 = MOST - 8.0;
+/// Bins of the histogram of ratios, and how many there are to a factor of two.
+const BINS: usize = 512;
+const PER_OCTAVE: f32 = 128.0;
+/// So much of the pixels, at least, show the background, or there is nothing to learn from.
+const LEAST: usize = 12;
+/// A gain moves by this share towards that of a frame, and at once if it is further away than [`JUMP`].
+const EASE: f32 = 0.25;
+const JUMP: f32 = 0.03;
+/// Differences are no guide to a shift beyond this.
+const FOREIGN: f32 = 24.0;
+/// A step of the shift, and what is not worth one, in reduced pixels.
+const MOST_STEP: f32 = 1.0;
+const LEAST_STEP: f32 = 0.02;
+/// Less texture than this, on average, tells no shift.
+const LEAST_TEXTURE: f32 = 0.05;
+
+/// How the plate has to be changed to be as the picture is now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alignment {
+    /// What values are multiplied by, per channel.
+    pub gain: [f32; 3],
+    /// Where a point of the plate is now, less where it was, in reduced pixels: to the right, and down.
+    pub shift: [f32; 2],
+}
+
+impl Default for Alignment {
+    fn default() -> Self {
+        Self { gain: [1.0; 3], shift: [0.0; 2] }
+    }
+}
+
+/// Finds alignments; owns the memory for it.
+#[derive(Debug, Default)]
+pub struct Aligner {
+    bins: Vec<u32>,
+    /// The plate, shifted.
+    shifted: Vec<[f32; 3]>,
+    shifted_by: Option<[f32; 2]>,
+}
+
+impl Aligner {
+    /// The plate, shifted as `alignment` has it.
+    pub fn shifted(&self) -> &[[f32; 3]] {
+        &self.shifted
+    }
+
+    /// The plate has changed.
+    pub fn forget(&mut self) {
+        self.shifted_by = None;
+    }
+
+    /// Shifts the plate.
+    pub fn shift(&mut self, plate: &[[f32; 3]], (width, height): (usize, usize), shift: [f32; 2]) {
+        if self.shifted_by == Some(shift) && self.shifted.len() == plate.len() {
+            return;
+        }
+        self.shifted_by = Some(shift);
+        self.shifted.clear();
+        if shift == [0.0; 2] {
+            self.shifted.extend_from_slice(plate);
+            return;
+        }
+        let axis = |at: usize, by: f32, count: usize| {
+            let place = (at as f32 - by).clamp(0.0, (count - 1) as f32);
+            (place as usize, (place as usize + 1).min(count - 1), place.fract())
+        };
+        for y in 0..height {
+            let (above, below, down) = axis(y, shift[1], height);
+            let (above, below) = (&plate[above * width..][..width], &plate[below * width..][..width]);
+            for x in 0..width {
+                let (left, right, along) = axis(x, shift[0], width);
+                self.shifted.push(std::array::from_fn(|p| {
+                    let first = above[left][p] + (above[right][p] - above[left][p]) * along;
+                    let second = below[left][p] + (below[right][p] - below[left][p]) * along;
+                    first + (second - first) * down
+                }));
+            }
+        }
+    }
+
+    /// One step towards the alignment of `now`, from the pixels that are not `foreign`. Whether it moved.
+    pub fn step(
+        &mut self,
+        now: &[[f32; 3]],
+        foreign: &[bool],
+        size: (usize, usize),
+        alignment: &mut Alignment,
+    ) -> bool {
+        for p in 0..3 {
+            if let Some(gain) = self.gain(now, foreign, p) {
+                let off = gain / alignment.gain[p] - 1.0;
+                alignment.gain[p] *= 1.0 + if off.abs() > JUMP { off } else { EASE * off };
+            }
+        }
+        let Some([across, down]) = self.shift_of(now, foreign, size, alignment.gain) else { return false };
+        if across.hypot(down) < LEAST_STEP {
+            return false;
+        }
+        alignment.shift[0] += across.clamp(-MOST_STEP, MOST_STEP);
+        alignment.shift[1] += down.clamp(-MOST_STEP, MOST_STEP);
+        true
+    }
+
+    /// The median ratio of a channel: what stands before the plate is outvoted.
+    fn gain(&mut self, now: &[[f32; 3]], foreign: &[bool], p: usize) -> Option<f32> {
+        self.bins.clear();
+        self.bins.resize(BINS, 0);
+        let mut count = 0;
+        for ((now, plate), _) in now.iter().zip(&self.shifted).zip(foreign).filter(|(_, foreign)| !**foreign) {
+            if now[p].min(plate[p]) > DARK && now[p].max(plate[p]) < BRIGHT {
+                let bin = (now[p] / plate[p]).log2() * PER_OCTAVE + BINS as f32 / 2.0;
+                self.bins[(bin as usize).min(BINS - 1)] += 1;
+                count += 1;
+            }
+        }
+        if count < foreign.len() / LEAST {
+            return None;
+        }
+        let mut below = 0;
+        let half = count as f32 / 2.0;
+        self.bins.iter().zip(0..).find_map(|(&inside, bin)| {
+            below += inside;
+            let is_median = below as f32 >= half;
+            let within = 1.0 - (below as f32 - half) / (inside.max(1)) as f32;
+            is_median.then(|| ((bin as f32 + within - BINS as f32 / 2.0) / PER_OCTAVE).exp2())
+        })
+    }
+
+    /// The shift that explains most of the differences that are left (Lucas and Kanade 1981), in the middle channel.
+    fn shift_of(
+        &self,
+        now: &[[f32; 3]],
+        foreign: &[bool],
+        (width, height): (usize, usize),
+        gain: [f32; 3],
+    ) -> Option<[f32; 2]> {
+        let (mut sums, mut count) = ([0.0f32; 5], 0);
+        for y in 1..height.max(1) - 1 {
+            for x in 1..width.max(1) - 1 {
+                let at = y * width + x;
+                let value = |at: usize| gain[1] * self.shifted[at][1];
+                let rest = now[at][1] - value(at);
+                if foreign[at] || rest.abs() > FOREIGN {
+                    continue;
+                }
+                let across = 0.5 * (value(at + 1) - value(at - 1));
+                let down = 0.5 * (value(at + width) - value(at - width));
+                let terms = [across * across, across * down, down * down, -across * rest, -down * rest];
+                (0..5).for_each(|k| sums[k] += terms[k]);
+                count += 1;
+            }
+        }
+        let [xx, xy, yy, x, y] = sums;
+        let determinant = xx * yy - xy * xy;
+        let least = LEAST_TEXTURE * count as f32;
+        (count > width * height / LEAST && determinant > least * least)
+            .then(|| [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (usize, usize) = (80, 60);
+
+    fn scene(shift: [f32; 2], gain: [f32; 3]) -> Vec<[f32; 3]> {
+        let wave = |x: f32, y: f32| 110.0 + 30.0 * (x * 0.31).sin() + 25.0 * (y * 0.23 + x * 0.05).cos();
+        let at = |k: usize| wave((k % SIZE.0) as f32 - shift[0], (k / SIZE.0) as f32 - shift[1]);
+        (0..SIZE.0 * SIZE.1).map(|k| gain.map(|gain| gain * at(k))).collect()
+    }
+
+    #[test]
+    fn a_nudge_and_another_exposure_are_found_beside_a_person() {
+        let (plate, [right, down]) = (scene([0.0; 2], [1.0; 3]), [1.4, -0.7]);
+        let mut now = scene([right, down], [0.9, 1.0, 1.1]);
+        let is_person = |k: usize| (20..50).contains(&(k % SIZE.0)) && k / SIZE.0 > 15;
+        (0..now.len()).filter(|&k| is_person(k)).for_each(|k| now[k] = [200.0, 40.0, 90.0]);
+        let (mut aligner, mut alignment) = (Aligner::default(), Alignment::default());
+        let foreign = vec![false; now.len()];
+        for _ in 0..12 {
+            aligner.shift(&plate, SIZE, alignment.shift);
+            aligner.step(&now, &foreign, SIZE, &mut alignment);
+        }
+        let Alignment { gain, shift } = alignment;
+        assert!((shift[0] - right).abs() < 0.08 && (shift[1] - down).abs() < 0.08, "{shift:?}");
+        assert!(gain.iter().zip([0.9, 1.0, 1.1]).all(|(a, b)| (a - b).abs() < 0.01), "{gain:?}");
+    }
+}

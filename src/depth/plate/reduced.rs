@@ -1,0 +1,116 @@
+//! A picture in few pixels, as the square root of its light: exposure and white balance are factors there, and noise is
+//! nearly the same everywhere.
+
+use crate::color::light_of_codes;
+use crate::frame::ColorImage;
+
+/// About so many columns a reduced picture has.
+const COLUMNS: u32 = 320;
+/// Values go from 0 to this.
+pub const MOST: f32 = 255.0;
+
+/// Reduces pictures.
+#[derive(Debug)]
+pub struct Reducer {
+    /// Per code; one more, so that there is always a next.
+    roots: Box<[f32; 257]>,
+    /// Sums of the codes of a row of blocks.
+    sums: Vec<u32>,
+}
+
+impl Default for Reducer {
+    fn default() -> Self {
+        let light = light_of_codes();
+        let roots = Box::new(std::array::from_fn(|code| MOST * light[code.min(255)].sqrt()));
+        Self { roots, sums: Vec::new() }
+    }
+}
+
+/// The side of a block of a picture so wide, in pixels: one pixel of the reduced picture.
+pub fn block_px(width: u32) -> usize {
+    ((width + COLUMNS / 2) / COLUMNS).max(1) as usize
+}
+
+/// Columns and rows of a reduced picture.
+pub fn reduced_size(color: &ColorImage) -> (usize, usize) {
+    let block_px = block_px(color.width);
+    ((color.width as usize).div_ceil(block_px), (color.height as usize).div_ceil(block_px))
+}
+
+impl Reducer {
+    /// The square root of the light of a value in codes, 0 to 255.
+    #[inline(always)]
+    pub fn root(&self, code: f32) -> f32 {
+        let first = code as usize;
+        let [a, b] = [self.roots[first], self.roots[first + 1]];
+        a + (b - a) * (code - first as f32)
+    }
+
+    /// The code of a value whose light's root is this.
+    #[inline(always)]
+    fn code(&self, root: f32) -> f32 {
+        let next = self.roots[1..256].partition_point(|&other| other <= root) + 1;
+        let [a, b] = [self.roots[next - 1], self.roots[next]];
+        if b > a { (next - 1) as f32 + ((root - a) / (b - a)).min(1.0) } else { 255.0 }
+    }
+
+    /// What a code was before it was multiplied by a gain.
+    #[inline(always)]
+    pub fn without_gain(&self, code: u8, gain: f32) -> u8 {
+        (self.code((self.root(f32::from(code)) / gain).min(MOST)) + 0.5) as u8
+    }
+
+    /// The means of the blocks of a picture.
+    pub fn reduce(&mut self, color: &ColorImage, reduced: &mut Vec<[f32; 3]>) {
+        let (block_px, (across, down)) = (block_px(color.width), reduced_size(color));
+        reduced.clear();
+        for row in 0..down {
+            self.reduce_row(color, (block_px, across), row, reduced);
+        }
+    }
+
+    fn reduce_row(
+        &mut self,
+        color: &ColorImage,
+        (block_px, across): (usize, usize),
+        row: usize,
+        reduced: &mut Vec<[f32; 3]>,
+    ) {
+        let (width, height) = (color.width as usize, color.height as usize);
+        let lines = row * block_px..((row + 1) * block_px).min(height);
+        self.sums.clear();
+        self.sums.resize(3 * width, 0);
+        for y in lines.clone() {
+            for (sum, &code) in self.sums.iter_mut().zip(&color.rgb[3 * y * width..]) {
+                *sum += u32::from(code);
+            }
+        }
+        for block in 0..across {
+            let columns = block * block_px..((block + 1) * block_px).min(width);
+            let share = 1.0 / (columns.len() * lines.len()) as f32;
+            let mut sums = [0; 3];
+            for pixel in self.sums[3 * columns.start..3 * columns.end].chunks_exact(3) {
+                (0..3).for_each(|p| sums[p] += pixel[p]);
+            }
+            reduced.push(sums.map(|sum| self.root(sum as f32 * share)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_of_one_colour_have_it_in_every_size() {
+        for (width, height) in [(7, 5), (320, 180), (641, 33), (1280, 720)] {
+            let mut picture = ColorImage::new(width, height);
+            picture.rgb.fill(100);
+            let (mut reducer, mut reduced) = (Reducer::default(), Vec::new());
+            reducer.reduce(&picture, &mut reduced);
+            let (across, down) = reduced_size(&picture);
+            assert_eq!(reduced.len(), across * down);
+            assert!(across <= 480 && reduced.iter().flatten().all(|&value| (value - reducer.root(100.0)).abs() < 1e-3));
+        }
+    }
+}

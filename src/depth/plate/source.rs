@@ -1,0 +1,194 @@
+//! A plate as a source of depth: taken with a countdown, then used.
+
+use std::any::Any;
+use std::fmt;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::Arc;
+
+use super::{Capture, Plate, Taken};
+use crate::depth::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
+use crate::depth::{DepthError, DepthSource, Seen};
+use crate::frame::{ColorImage, DepthMap};
+
+/// So long a person has to step out of the picture.
+const COUNTDOWN_NS: u64 = 3_000_000_000;
+/// A camera that has just been started finds its exposure in this time.
+const SETTLES_NS: u64 = 1_000_000_000;
+/// What moves for longer than this before a plate could be taken is the camera, or will not stop.
+const RESTLESS_NS: u64 = 10_000_000_000;
+
+/// What holds exposure, white balance and focus of a camera where they are until it is dropped.
+pub type Lock = Box<dyn FnMut() -> Option<Box<dyn Any + Send>> + Send>;
+
+/// How far a plate is, for the person who waits for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// They have so many seconds to step out of the picture.
+    StepOut(u32),
+    /// It is being taken; so much of it is, in percent.
+    Taking(u32),
+    /// Something moves.
+    Moves,
+    /// Something has moved for so long that no plate can be taken.
+    Restless,
+    /// There is one.
+    Ready,
+    /// There is one, and the picture is another: the camera was moved, or the light is.
+    Unlike,
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StepOut(seconds) => write!(f, "step out of the picture: {seconds}"),
+            Self::Taking(_) => f.write_str("stay out for a second: the plate is being taken"),
+            Self::Moves => f.write_str("something moves: stay out of the picture"),
+            Self::Restless => f.write_str(
+                "something keeps moving, so that no plate can be taken: let the camera stand on something firm, and leave the \
+                 picture",
+            ),
+            Self::Ready => f.write_str("the plate is taken: come back"),
+            Self::Unlike => f.write_str(
+                "the picture is not that of the plate, so all is blurred: the camera was moved or the light has changed; take \
+                 another plate",
+            ),
+        }
+    }
+}
+
+/// What those who wait for a plate share with it.
+#[derive(Debug, Default)]
+pub struct Guide {
+    /// The kind of step, times [`KINDS`], plus its number.
+    step: AtomicU32,
+    again: AtomicBool,
+}
+
+const KINDS: u32 = 1 << 16;
+
+impl Guide {
+    /// The step now.
+    pub fn step(&self) -> Step {
+        let step = self.step.load(Ordering::Relaxed);
+        let number = step % KINDS;
+        match step / KINDS {
+            0 => Step::StepOut(number),
+            1 => Step::Taking(number),
+            2 => Step::Moves,
+            3 => Step::Restless,
+            4 => Step::Ready,
+            _ => Step::Unlike,
+        }
+    }
+
+    /// Takes another plate.
+    pub fn take_again(&self) {
+        self.again.store(true, Ordering::Relaxed);
+    }
+
+    fn tell(&self, step: Step) {
+        let (kind, number) = match step {
+            Step::StepOut(seconds) => (0, seconds),
+            Step::Taking(percent) => (1, percent),
+            Step::Moves => (2, 0),
+            Step::Restless => (3, 0),
+            Step::Ready => (4, 0),
+            Step::Unlike => (5, 0),
+        };
+        self.step.store(kind * KINDS + number, Ordering::Relaxed);
+    }
+}
+
+#[derive(Debug)]
+enum State {
+    /// To be taken: since when, once there was a picture.
+    Waiting(Option<u64>),
+    Taking { capture: Box<Capture>, since_ns: u64 },
+    Using(Box<Plate>),
+}
+
+/// Depth with a matte from a plate: who stands before it is in focus, all else is far. While there is none, everything is
+/// blurred.
+pub struct PlateDepth {
+    state: State,
+    guide: Arc<Guide>,
+    lock: Option<Lock>,
+    /// While this lives, the camera is as it was when the plate was taken.
+    locked: Option<Box<dyn Any + Send>>,
+    matting: MaskMatting,
+    first_ns: Option<u64>,
+}
+
+impl PlateDepth {
+    /// A plate that is there, or one that is to be taken from the first pictures.
+    pub fn new(plate: Option<ColorImage>, lock: Option<Lock>) -> Self {
+        let state = plate.map_or(State::Waiting(None), |plate| State::Using(Box::new(Plate::new(plate))));
+        let guide = Arc::default();
+        Self { state, guide, lock, locked: None, matting: MaskMatting::default(), first_ns: None }
+    }
+
+    /// How far it is.
+    pub fn guide(&self) -> Arc<Guide> {
+        Arc::clone(&self.guide)
+    }
+
+    /// The plate, once there is one.
+    pub fn plate(&self) -> Option<&ColorImage> {
+        match &self.state {
+            State::Using(plate) => Some(plate.color()),
+            State::Waiting(_) | State::Taking { .. } => None,
+        }
+    }
+
+    /// Goes on from a picture towards a plate, or compares it with the one there is; tells how far that is.
+    fn look(&mut self, color: &ColorImage, now_ns: u64) -> Step {
+        if self.guide.again.swap(false, Ordering::Relaxed) {
+            self.state = State::Waiting(None);
+        }
+        let first_ns = *self.first_ns.get_or_insert(now_ns);
+        if self.locked.is_none() && now_ns >= first_ns + SETTLES_NS {
+            self.locked = self.lock.as_mut().and_then(|lock| lock());
+            // Once is enough, also where the camera has nothing to be held.
+            self.lock = None;
+        }
+        match &mut self.state {
+            State::Waiting(since_ns) => {
+                let since_ns = *since_ns.get_or_insert(now_ns);
+                let waited_ns = now_ns.saturating_sub(since_ns);
+                if waited_ns < COUNTDOWN_NS {
+                    return Step::StepOut((COUNTDOWN_NS - waited_ns).div_ceil(1_000_000_000) as u32);
+                }
+                self.state = State::Taking { capture: Box::default(), since_ns: now_ns };
+                Step::Taking(0)
+            }
+            State::Taking { capture, since_ns } => match capture.add(color, now_ns) {
+                Taken::More(share) => Step::Taking((100.0 * share) as u32),
+                Taken::Moved if now_ns > *since_ns + RESTLESS_NS => Step::Restless,
+                Taken::Moved => Step::Moves,
+                Taken::Whole(plate) => {
+                    self.state = State::Using(Box::new(Plate::new(plate)));
+                    Step::Ready
+                }
+            },
+            State::Using(plate) => match plate.size() == color.size() && plate.look(color, now_ns) {
+                true => Step::Ready,
+                false => Step::Unlike,
+            },
+        }
+    }
+}
+
+impl DepthSource for PlateDepth {
+    fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        let step = self.look(color, stamp.time_ns);
+        self.guide.tell(step);
+        map.resize(color.width, color.height);
+        map.matte.pixels.clear();
+        map.metres.fill(FAR_M);
+        map.subject_m = Some(SUBJECT_M);
+        if let (State::Using(plate), Step::Ready) = (&self.state, step) {
+            self.matting.find(plate.mask(), color, SUBJECT_M, map);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,222 @@
+//! What stands before the plate: pixels that differ from it, less the shadows they cast, joined to parts.
+
+use super::alignment::Alignment;
+use super::reduced::MOST;
+
+/// Differences from here on may be of something before the plate, and from the second on are, in a quiet picture.
+const WEAK: f32 = 6.0;
+const STRONG: f32 = 13.0;
+/// The same in a noisy one, in standard deviations.
+const WEAK_DEVIATIONS: f32 = 4.0;
+const STRONG_DEVIATIONS: f32 = 8.0;
+/// What was before the plate a frame ago is so from this share of the threshold on (hysteresis).
+const STAYS: f32 = 0.75;
+/// A shadow leaves this share of the light's root, at least, and the same colour but for a difference of so much.
+const DARKEST_SHADOW: f32 = 0.72;
+const SHADE: f32 = 4.0;
+/// From one pixel to the next, a shadow's depth changes by no more than this: outlines do.
+const SOFT: f32 = 0.035;
+/// Parts of less than this share of the picture are noise.
+const LEAST_PART: f32 = 0.002;
+/// Holes of less than this share of the picture are no background.
+const LEAST_HOLE: f32 = 0.001;
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Label {
+    Background,
+    /// As the background, but darker.
+    Shade,
+    /// Perhaps something before it.
+    Weak,
+    Strong,
+}
+
+/// A part of the picture that hangs together.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// Where its pixels begin in [`Subject::pixels`], and where they end.
+    pub first: usize,
+    pub end: usize,
+}
+
+/// Finds what stands before a plate; owns the memory for it.
+#[derive(Debug, Default)]
+pub struct Subject {
+    labels: Vec<Label>,
+    /// How bright a pixel is beside its plate.
+    ratios: Vec<f32>,
+    seen: Vec<bool>,
+    front: Vec<u32>,
+    sample: Vec<f32>,
+    /// Whether a pixel is of something before the plate.
+    pub foreign: Vec<bool>,
+    /// The pixels of all parts, part by part.
+    pub pixels: Vec<u32>,
+    pub parts: Vec<Part>,
+}
+
+impl Subject {
+    /// How much of the picture is before the plate, 0 to 1.
+    pub fn share(&self) -> f32 {
+        self.pixels.len() as f32 / self.foreign.len().max(1) as f32
+    }
+
+    /// Compares a picture with its plate; `foreign` is what it was in the frame before, and is what it is now, after.
+    pub fn find(&mut self, now: &[[f32; 3]], plate: &[[f32; 3]], size: (usize, usize), alignment: &Alignment) {
+        let deviation = self.deviation(now, plate, alignment);
+        let weak = WEAK.max(WEAK_DEVIATIONS * deviation);
+        let strong = STRONG.max(STRONG_DEVIATIONS * deviation);
+        self.label(now, plate, size, (alignment.gain, weak, strong));
+        self.grow_shadows(size);
+        self.join(size);
+        self.fill_holes(size);
+    }
+
+    /// The standard deviation of noise, from the median of what differs where nothing stood before the plate.
+    fn deviation(&mut self, now: &[[f32; 3]], plate: &[[f32; 3]], alignment: &Alignment) -> f32 {
+        /// The median of absolute values of a normal distribution is so much of its deviation.
+        const MEDIAN: f32 = 0.6745;
+        self.sample.clear();
+        let all = now.iter().zip(plate).zip(&self.foreign).filter(|(_, foreign)| !**foreign);
+        // Some are enough.
+        self.sample.extend(all.step_by(5).map(|((now, plate), _)| (now[1] - alignment.gain[1] * plate[1]).abs()));
+        let middle = self.sample.len() / 2;
+        match self.sample.is_empty() {
+            true => 0.0,
+            false => *self.sample.select_nth_unstable_by(middle, f32::total_cmp).1 / MEDIAN,
+        }
+    }
+
+    fn label(
+        &mut self,
+        now: &[[f32; 3]],
+        plate: &[[f32; 3]],
+        (width, height): (usize, usize),
+        (gain, weak, strong): ([f32; 3], f32, f32),
+    ) {
+        self.labels.clear();
+        self.ratios.clear();
+        self.foreign.resize(now.len(), false);
+        for y in 0..height {
+            let (above, below) = (y.saturating_sub(1) * width, (y + 1).min(height - 1) * width);
+            for x in 0..width {
+                let at = y * width + x;
+                let around = [y * width + x.saturating_sub(1), y * width + (x + 1).min(width - 1), above + x, below + x];
+                let (mut most, mut sums) = (0.0f32, [0.0f32; 2]);
+                for p in 0..3 {
+                    // Half a pixel of what is beside it is no difference: nothing stands that still.
+                    let (mut low, mut high) = (plate[at][p], plate[at][p]);
+                    for beside in around {
+                        let half = 0.5 * (plate[at][p] + plate[beside][p]);
+                        (low, high) = (low.min(half), high.max(half));
+                    }
+                    // What is cut off at white is at least as bright.
+                    let (low, high) = ((gain[p] * low).min(MOST), (gain[p] * high).min(MOST));
+                    let value = now[at][p];
+                    most = most.max((low - value).max(value - high));
+                    sums = [sums[0] + value, sums[1] + gain[p] * plate[at][p]];
+                }
+                let ratio = (sums[0] + 1.0) / (sums[1] + 1.0);
+                self.ratios.push(ratio);
+                let stays = if self.foreign[at] { STAYS } else { 1.0 };
+                let is_shade = || {
+                    let off = (0..3).map(|p| (now[at][p] - ratio * gain[p] * plate[at][p]).abs());
+                    (DARKEST_SHADOW..1.0).contains(&ratio) && off.fold(0.0, f32::max) < SHADE
+                };
+                self.labels.push(match most {
+                    most if most < stays * weak => Label::Background,
+                    _ if is_shade() => Label::Shade,
+                    most if most < stays * strong => Label::Weak,
+                    _ => Label::Strong,
+                });
+            }
+        }
+    }
+
+    /// Shade that the background goes over into without an outline is shadow.
+    fn grow_shadows(&mut self, (width, height): (usize, usize)) {
+        self.front.clear();
+        let is_background = |&at: &u32| self.labels[at as usize] == Label::Background;
+        self.front.extend((0..self.labels.len() as u32).filter(is_background));
+        while let Some(at) = self.front.pop() {
+            let (x, y) = (at as usize % width, at as usize / width);
+            let ratio = self.ratios[at as usize];
+            let sides = [
+                (x > 0).then(|| at as usize - 1),
+                (x + 1 < width).then(|| at as usize + 1),
+                (y > 0).then(|| at as usize - width),
+                (y + 1 < height).then(|| at as usize + width),
+            ];
+            for beside in sides.into_iter().flatten() {
+                if self.labels[beside] == Label::Shade && (self.ratios[beside] - ratio).abs() < SOFT {
+                    self.labels[beside] = Label::Background;
+                    self.front.push(beside as u32);
+                }
+            }
+        }
+        for label in &mut self.labels {
+            if *label == Label::Shade {
+                *label = Label::Strong;
+            }
+        }
+    }
+
+    /// Pixels that differ and hang together are a part, if enough of them differ much.
+    fn join(&mut self, size: (usize, usize)) {
+        let least = ((LEAST_PART * self.labels.len() as f32) as usize).max(4);
+        self.foreign.fill(false);
+        self.pixels.clear();
+        self.parts.clear();
+        self.seen.clear();
+        self.seen.extend(self.labels.iter().map(|&label| label == Label::Background));
+        for start in 0..self.labels.len() {
+            if self.labels[start] != Label::Strong || self.seen[start] {
+                continue;
+            }
+            let first = self.pixels.len();
+            flood(start, size, &mut self.seen, &mut self.pixels);
+            let strong = self.pixels[first..].iter().filter(|&&at| self.labels[at as usize] == Label::Strong).count();
+            if strong < least {
+                self.pixels.truncate(first);
+                continue;
+            }
+            self.pixels[first..].iter().for_each(|&at| self.foreign[at as usize] = true);
+            self.parts.push(Part { first, end: self.pixels.len() });
+        }
+    }
+
+    /// Small holes are a part's own: colours that happen to be those of the background behind.
+    fn fill_holes(&mut self, size: (usize, usize)) {
+        let most = (LEAST_HOLE * self.labels.len() as f32) as usize;
+        self.seen.clone_from(&self.foreign);
+        for start in 0..self.seen.len() {
+            if self.seen[start] {
+                continue;
+            }
+            self.front.clear();
+            flood(start, size, &mut self.seen, &mut self.front);
+            if self.front.len() <= most {
+                self.front.iter().for_each(|&at| self.foreign[at as usize] = true);
+            }
+        }
+    }
+}
+
+/// Adds to `pixels` all that hang together with `start` and were not seen, corners included.
+fn flood(start: usize, (width, height): (usize, usize), seen: &mut [bool], pixels: &mut Vec<u32>) {
+    let mut next = pixels.len();
+    seen[start] = true;
+    pixels.push(start as u32);
+    while let Some(&at) = pixels.get(next) {
+        next += 1;
+        let (x, y) = (at as usize % width, at as usize / width);
+        for y in y.saturating_sub(1)..(y + 2).min(height) {
+            for x in x.saturating_sub(1)..(x + 2).min(width) {
+                if !std::mem::replace(&mut seen[y * width + x], true) {
+                    pixels.push((y * width + x) as u32);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Who stands before a plate in a real sequence, beside what a depth sensor saw.
+
+use bokehcam::depth::plate::PlateDepth;
+use bokehcam::depth::single_camera::{Hints, SingleCamera};
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::network::{Runtime, Task};
+
+use super::read;
+use super::real::{Sequence, model, sure};
+
+/// Of a pixel, what it was in so many frames, if nobody was so near.
+const SAMPLES: usize = 15;
+const AWAY_PX: usize = 10;
+
+/// The background of a sequence, from the frames in which the person of the network is elsewhere, and where it is known.
+fn background(sequence: &Sequence) -> (ColorImage, Vec<bool>) {
+    let matte = model(Task::Matte);
+    let mut person = SingleCamera::open(Some(&matte), None, &Hints::default(), Runtime::Auto).unwrap();
+    let mut samples: Vec<Vec<[u8; 3]>> = Vec::new();
+    let mut size = (0, 0);
+    for index in 0..sequence.len() {
+        let (color, _) = sequence.frame(index);
+        size = (color.width as usize, color.height as usize);
+        let map = read(&mut person, &color, index as u64);
+        let covered: Vec<bool> = {
+            let mut rows = map.metres.iter().map(|&metres| metres <= 1.0).collect::<Vec<_>>();
+            for (count, step, line) in [(size.0, 1, size.1), (size.1, size.0, size.0)] {
+                let before = rows.clone();
+                for at in 0..line {
+                    let place = |k: usize| if step == 1 { at * size.0 + k } else { k * size.0 + at };
+                    for k in 0..count {
+                        let around = k.saturating_sub(AWAY_PX)..(k + AWAY_PX + 1).min(count);
+                        rows[place(k)] = around.into_iter().any(|k| before[place(k)]);
+                    }
+                }
+            }
+            rows
+        };
+        samples.resize(size.0 * size.1, Vec::new());
+        for (at, pixel) in color.rgb.chunks_exact(3).enumerate() {
+            if !covered[at] && samples[at].len() < SAMPLES {
+                samples[at].push([pixel[0], pixel[1], pixel[2]]);
+            }
+        }
+    }
+    let mut plate = ColorImage::new(size.0 as u32, size.1 as u32);
+    let known: Vec<bool> = samples.iter().map(|samples| samples.len() >= 3).collect();
+    let mut last = [128; 3];
+    for (at, samples) in samples.iter().enumerate() {
+        if known[at] {
+            last = [0, 1, 2].map(|p| {
+                let mut values: Vec<u8> = samples.iter().map(|sample| sample[p]).collect();
+                values.sort_unstable();
+                values[values.len() / 2]
+            });
+        }
+        // Where it is never seen, as beside it: nothing is counted there.
+        plate.rgb[3 * at..3 * at + 3].copy_from_slice(&last);
+    }
+    (plate, known)
+}
+
+#[test]
+#[ignore = "needs BOKEHCAM_DATA, a folder with models and rgbd/person_turning"]
+fn a_real_person_before_a_plate_is_found() {
+    let sequence = Sequence::open();
+    let (plate, known) = background(&sequence);
+    let mut source = PlateDepth::new(Some(plate), None);
+    let (mut found, mut persons, mut mistaken, mut walls) = (0u64, 0u64, 0u64, 0u64);
+    let (mut flicker, mut resting) = (0.0f64, 0u64);
+    let mut last: Option<(DepthMap, Vec<bool>)> = None;
+    for index in 0..sequence.len() {
+        let (color, depth) = sequence.frame(index);
+        let (person, wall) = sure(&depth);
+        let map = read(&mut source, &color, index as u64);
+        for at in (0..known.len()).filter(|&at| known[at]) {
+            let is_near = map.metres[at] <= 1.0;
+            found += u64::from(person[at] && is_near);
+            persons += u64::from(person[at]);
+            mistaken += u64::from(wall[at] && is_near);
+            walls += u64::from(wall[at]);
+        }
+        if let Some((before, wall_before)) = &last {
+            for at in (0..known.len()).filter(|&at| wall[at] && wall_before[at]) {
+                flicker += f64::from(u8::from((map.metres[at] <= 1.0) != (before.metres[at] <= 1.0)));
+                resting += 1;
+            }
+        }
+        last = Some((map, wall));
+    }
+    let (found, mistaken) = (found as f64 / persons as f64, mistaken as f64 / walls as f64);
+    let flicker = 1e3 * flicker / resting as f64;
+    eprintln!("person found {found:.4} of {persons}, wall mistaken {mistaken:.4}, flicker {flicker:.3}e-3");
+    assert!(found >= 0.99 && mistaken <= 0.01, "{found} {mistaken}");
+}
