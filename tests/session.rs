@@ -10,6 +10,9 @@ use std::time::{Duration, Instant};
 
 use bokehcam::bokeh::{self, Backend, Bokeh};
 use bokehcam::capture::synthetic::{Format, Synthetic};
+use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::depth::matting::mask::FAR_M;
+use bokehcam::depth::plate::{Guide, PlateDepth, Step};
 use bokehcam::frame::ColorImage;
 use bokehcam::knob::Knob;
 use bokehcam::link::Receiver;
@@ -51,6 +54,18 @@ impl Sink for Film {
     }
 }
 
+/// A camera that does not know its depth.
+struct Plain(Synthetic);
+
+impl Camera for Plain {
+    fn info(&self) -> SourceInfo {
+        SourceInfo { brings: Brings::Color, ..self.0.info() }
+    }
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+        self.0.next(shot)
+    }
+}
+
 impl Services for Small {
     fn sources(&mut self) -> Vec<Choice> {
         vec![Choice { name: "32".into(), label: "A scene".into() }]
@@ -58,14 +73,21 @@ impl Services for Small {
     fn virtual_cameras(&mut self) -> Vec<Choice> {
         Vec::new()
     }
-    fn open(&mut self, name: &str) -> Result<Opened, String> {
+    fn open(&mut self, name: &str, with_plate: bool) -> Result<Opened, String> {
         let width =
             name.split(' ').next().and_then(|width| width.parse().ok()).ok_or(format!("no such source: {name}"))?;
         let frames = name.ends_with("no more").then_some(2);
         let format = Format { size: (width, 18), fps: 60.0, frames, threads: 1, cycle: None };
-        let camera = Box::new(Synthetic::new(format).map_err(|error| error.to_string())?);
+        let scene = Synthetic::new(format).map_err(|error| error.to_string())?;
+        let camera: Box<dyn Camera> = if with_plate { Box::new(Plain(scene)) } else { Box::new(scene) };
         let (name, notes, controls) = (name.to_owned(), vec!["a note".to_owned()], Vec::new());
-        Ok(Opened { name, source: source::Source::of(camera, None), notes, controls })
+        let mut source = source::Source::of(camera, None);
+        if with_plate {
+            let plate = PlateDepth::new(None, None);
+            source.guide = Some(plate.guide());
+            source.depth = Some(Box::new(plate));
+        }
+        Ok(Opened { name, source, takes_plates: true, notes, controls })
     }
     fn turn(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
         Err("it has no controls".into())
@@ -96,6 +118,7 @@ impl Services for Small {
 struct Watched {
     session: Session,
     views: Option<Receiver<View>>,
+    guide: Option<Arc<Guide>>,
     told: Vec<Update>,
     copied: Option<String>,
     executors: Arc<AtomicUsize>,
@@ -126,14 +149,14 @@ impl Watched {
             wanted: Arc::default(),
         };
         let session = Session::begin(start, Arc::new(|| {})).unwrap();
-        Self { session, views: None, told: Vec::new(), copied: None, executors, written }
+        Self { session, views: None, guide: None, told: Vec::new(), copied: None, executors, written }
     }
 
     fn hear(&mut self) {
         while let Some(heard) = self.session.hear() {
             match heard {
                 SessionEvent::Update(told) => self.told.push(told),
-                SessionEvent::Views(views) => self.views = Some(views),
+                SessionEvent::Views(views, guide) => (self.views, self.guide) = (Some(views), guide),
                 SessionEvent::Copy(text) => self.copied = Some(text),
             }
         }
@@ -226,6 +249,31 @@ fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     watched.until("and ends", |told| *told == Update::Source(Source::Ended));
     let report = watched.session.close().report.unwrap();
     assert!(report.frames.balance() && report.frames.captured == 2, "{:?}", report.frames);
+}
+
+#[test]
+fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    assert!(watched.guide.is_none());
+    watched.session.order(Request::TakePlate);
+    watched.until("it runs again", |told| is_running(told, 32));
+    let guide = watched.guide.clone().expect("how far the plate is");
+    watched.frame("all is far until there is a plate", |view| {
+        view.depth.as_ref().is_some_and(|depth| depth.metres.iter().all(|&metres| metres == FAR_M))
+    });
+    assert!(matches!(guide.step(), Step::StepOut(1..=3)), "{:?}", guide.step());
+    watched.frame("the countdown is over", |_| !matches!(guide.step(), Step::StepOut(_)));
+    watched.session.order(Request::TakePlate);
+    watched.frame("the countdown has begun again", |_| matches!(guide.step(), Step::StepOut(_)));
+    assert!(!watched.told.iter().any(|told| is_running(told, 32)), "no new run");
+    // Another source has no plate, and neither has this one when it is opened afterwards.
+    for width in [48, 32] {
+        watched.session.order(Request::Open(width.to_string()));
+        watched.until("it runs", |told| is_running(told, width));
+        assert!(watched.guide.is_none());
+    }
+    assert!(watched.session.close().report.unwrap().frames.balance());
 }
 
 #[test]

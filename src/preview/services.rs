@@ -18,6 +18,8 @@ pub struct Opened {
     pub name: String,
     /// Its frames and their depth.
     pub source: Source,
+    /// Whether it is a camera that a plate can be taken with.
+    pub takes_plates: bool,
     /// Lines for the person: what was assumed, what is missing and where to get it.
     pub notes: Vec<String>,
     /// The camera's controls, such as exposure, if it has any.
@@ -32,11 +34,12 @@ pub trait Services: Send {
     /// The virtual cameras that can be written to now.
     fn virtual_cameras(&mut self) -> Vec<Choice>;
 
-    /// Opens a source; an empty name is the first camera there is, else the synthetic scene.
+    /// Opens a source; an empty name is the first camera there is, else the synthetic scene. With a plate, that is taken
+    /// at the start, and makes the depth.
     ///
     /// # Errors
     /// It cannot be opened.
-    fn open(&mut self, name: &str) -> Result<Opened, String>;
+    fn open(&mut self, name: &str, with_plate: bool) -> Result<Opened, String>;
 
     /// Sets a control of the camera that was opened last; gives back all of its controls.
     ///

@@ -12,7 +12,7 @@ use crate::knob::Knob;
 use crate::look::{Effect, Look, presets::Preset};
 use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
-use crate::source::{Kind, Options, Source, SourceName};
+use crate::source::{DepthChoice, DepthFrom, Kind, Options, Source, SourceName};
 
 /// Shown when there is no camera, and the synthetic scene takes its place.
 const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
@@ -43,6 +43,8 @@ pub struct System {
     turned: BTreeMap<String, i64>,
     /// The camera that was opened last, where it has knobs.
     camera: Option<String>,
+    /// Whether a plate was asked for in the window.
+    with_plate: bool,
 }
 
 impl System {
@@ -58,14 +60,18 @@ impl System {
             first: None,
             turned: BTreeMap::new(),
             camera: None,
+            with_plate: false,
         }
     }
 
     /// Opens a source to be played for as long as the window is open, with depth whether or not the look needs it.
-    fn open_source(&self, name: &str) -> Result<(Source, SourceName), String> {
+    fn open_source(&self, name: &str, with_plate: bool) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
         let mut options = self.options.clone();
         options.cycle = true;
+        if with_plate {
+            options.depth_choice = DepthChoice::Plate(None);
+        }
         // Only recordings repeat this way: the synthetic scene cycles.
         options.frames.repeat &= source_name.kind() == Kind::Recording;
         // The window may switch to an effect that needs depth later.
@@ -89,7 +95,7 @@ impl Services for System {
         devices::virtual_cameras()
     }
 
-    fn open(&mut self, name: &str) -> Result<Opened, String> {
+    fn open(&mut self, name: &str, with_plate: bool) -> Result<Opened, String> {
         let mut notes = Vec::new();
         let first_camera = devices::cameras().into_iter().next();
         let name = match name {
@@ -102,7 +108,7 @@ impl Services for System {
             ),
             name => name.to_owned(),
         };
-        let (source, source_name) = self.open_source(&name)?;
+        let (source, source_name) = self.open_source(&name, with_plate)?;
         notes.extend(source.networks.iter().map(|networks| format!("Depth by {networks}.")));
         if source_name.kind() == Kind::Camera && !source.has_depth() && cfg!(feature = "networks") {
             notes.push(NO_DEPTH.to_owned());
@@ -111,7 +117,10 @@ impl Services for System {
         self.first.get_or_insert_with(|| Choice { name: name.clone(), label: name.clone() });
         self.camera = devices::camera_of(&source_name);
         let controls = self.camera.as_deref().map(devices::knobs).unwrap_or_default();
-        Ok(Opened { name, source, notes, controls })
+        self.with_plate = with_plate;
+        let is_replaceable = matches!(source.depth_from, DepthFrom::Nothing | DepthFrom::Networks | DepthFrom::Plate);
+        let takes_plates = self.camera.is_some() && is_replaceable;
+        Ok(Opened { name, source, takes_plates, notes, controls })
     }
 
     fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
@@ -153,6 +162,9 @@ impl Services for System {
         if !self.turned.is_empty() {
             let controls: Vec<String> = self.turned.iter().map(|(name, value)| format!("{name}={value}")).collect();
             switches.push(("control".into(), controls.join(",")));
+        }
+        if self.with_plate {
+            switches.push(("depth".into(), "plate".into()));
         }
         self.settings.command(look, source, outputs, &switches)
     }

@@ -16,6 +16,7 @@ mod render;
 mod shape;
 mod targets;
 
+pub use portrait::Situation;
 pub use render::{LensPicture, LinearImage, ThinLens, View};
 pub use targets::PointLight;
 
@@ -40,12 +41,22 @@ impl Scene {
     /// A person at a table in a room in the evening: subject in focus at 1.2 m, a twig in front at half a metre,
     /// furniture, a shelf and a window on a lit street behind.
     pub fn portrait() -> Scene {
-        portrait::scene(true)
+        portrait::with_front()
     }
 
     /// The same without what stands in front of the person: as a webcam sees most people.
     pub fn sitter() -> Scene {
-        portrait::scene(false)
+        Self::of(Situation::Sits)
+    }
+
+    /// A person in a situation.
+    pub fn of(situation: Situation) -> Scene {
+        portrait::of(Some(situation), situation)
+    }
+
+    /// The same room without the person.
+    pub fn room_of(situation: Situation) -> Scene {
+        portrait::of(None, situation)
     }
 
     /// Length of the seamless loop, in seconds.

@@ -101,6 +101,8 @@ pub struct Part {
     pub motion: fn(f32) -> Pose,
     /// Roughly the part's form: what hides light from its own surfaces.
     pub form: Option<Arc<Grid>>,
+    /// Whether it belongs to the person of a portrait.
+    pub is_subject: bool,
     /// Balls (centre, radius in metres) that shade other parts.
     pub shades: Vec<(Vec3, f32)>,
 }
@@ -113,7 +115,15 @@ impl Part {
 
     /// A part without shapes that moves.
     pub fn moving(motion: fn(f32) -> Pose) -> Self {
-        Self { shapes: Vec::new(), materials: Vec::new(), tree: Bvh::default(), motion, form: None, shades: Vec::new() }
+        Self {
+            shapes: Vec::new(),
+            materials: Vec::new(),
+            tree: Bvh::default(),
+            motion,
+            form: None,
+            is_subject: false,
+            shades: Vec::new(),
+        }
     }
 
     pub fn add(&mut self, shape: Shape, material: Material) {

@@ -7,7 +7,7 @@ use glam::{DVec2, Vec2, Vec3};
 use super::ray::Ray;
 use super::{Moment, Scene};
 use crate::color::encode_srgb;
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, Mask};
 
 /// A camera: picture size, focal length, and which eye of a rectified pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,6 +151,29 @@ impl Scene {
                 *metres = depth_m;
             }
         });
+    }
+
+    /// How much of each pixel the person covers, 0 to 1, of as many rays as [`Self::render_pinhole`] takes.
+    pub fn render_coverage(&self, view: &View, time_s: f64, samples_per_pixel: u32, threads: usize) -> Mask {
+        let mut mask = Mask::default();
+        mask.resize(view.width, view.height);
+        if view.width == 0 || view.height == 0 {
+            return mask;
+        }
+        let moment = self.at(time_s);
+        let jitter: Vec<Vec2> = (0..samples_per_pixel.max(1)).map(pinhole_jitter).collect();
+        let rows = mask.share.chunks_exact_mut(view.width as usize).enumerate();
+        for_each_parallel(rows, threads, |(row, shares)| {
+            for (column, share) in shares.iter_mut().enumerate() {
+                let centre = Vec2::new(column as f32, row as f32);
+                let is_subject = |offset: &&Vec2| {
+                    let hit = moment.intersect(&view.pinhole_ray(centre + **offset));
+                    hit.is_some_and(|hit| self.parts[hit.part].is_subject)
+                };
+                *share = jitter.iter().filter(is_subject).count() as f32 / jitter.len() as f32;
+            }
+        });
+        mask
     }
 
     /// The picture through a thin lens, one ray per point of the aperture to each pixel, averaged in linear light

@@ -24,8 +24,8 @@ use crate::frame::{ColorImage, Mask};
 /// Steps of the alignment with the first picture; later ones need one.
 const FIRST_STEPS: usize = 8;
 /// A plate from which more of the picture differs is none of it, and fits again when less does.
-const MOST_SHARE: f32 = 0.7;
-const LESS_SHARE: f32 = 0.6;
+const MOST_SHARE: f32 = 0.6;
+const LESS_SHARE: f32 = 0.5;
 
 /// A plate at work.
 #[derive(Debug)]
@@ -83,6 +83,12 @@ impl Plate {
         let size = reduced_size(color);
         self.reducer.reduce(color, &mut self.now);
         self.subject.foreign.resize(self.now.len(), false);
+        if !self.fits {
+            // What was found of another picture is no way back to this one.
+            self.alignment = Alignment::default();
+            self.subject.foreign.fill(false);
+            self.begun = false;
+        }
         let Self { reduced, now, aligner, alignment, subject, .. } = self;
         for _ in 0..if self.begun { 1 } else { FIRST_STEPS } {
             aligner.shift(reduced, size, alignment.shift);

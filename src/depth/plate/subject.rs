@@ -9,6 +9,8 @@ const STRONG: f32 = 13.0;
 /// The same in a noisy one, in standard deviations.
 const WEAK_DEVIATIONS: f32 = 4.0;
 const STRONG_DEVIATIONS: f32 = 8.0;
+/// No camera is noisier than this, in what is left of it in a reduced pixel.
+const MOST_DEVIATION: f32 = 3.0;
 /// What was before the plate a frame ago is so from this share of the threshold on (hysteresis).
 const STAYS: f32 = 0.75;
 /// A shadow leaves this share of the light's root, at least, and the same colour but for a difference of so much.
@@ -84,7 +86,7 @@ impl Subject {
         let middle = self.sample.len() / 2;
         match self.sample.is_empty() {
             true => 0.0,
-            false => *self.sample.select_nth_unstable_by(middle, f32::total_cmp).1 / MEDIAN,
+            false => (*self.sample.select_nth_unstable_by(middle, f32::total_cmp).1 / MEDIAN).min(MOST_DEVIATION),
         }
     }
 

@@ -10,6 +10,7 @@ mod marks;
 mod notes;
 mod parts;
 mod place;
+mod plate;
 mod sections;
 mod sheet;
 #[cfg(test)]
@@ -89,6 +90,7 @@ impl Panel {
                 self.instruments.show(&ctx, state);
             }
         }
+        plate::show(&ctx, state, actions);
         self.notes.show(&ctx, state, actions);
         if state.help {
             help::show(&ctx, actions);

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use egui::{Align2, Area, Context, Id, Label, Order, RichText, Ui, vec2};
 
+use super::plate;
 use super::state::{Action, Source, State};
 use super::theme::{Colors, GAP, card, medium};
 
@@ -27,6 +28,7 @@ impl Ages {
     pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) {
         let mut bottom = GAP + banner(ctx, state, actions);
         bottom += trouble(ctx, state, bottom, actions);
+        bottom += plate::offer(ctx, state, bottom, actions);
         let now_s = ctx.input(|input| input.time);
         self.seen.retain(|(number, _)| state.notes.iter().any(|note| note.number == *number));
         for note in &state.notes {

@@ -20,6 +20,8 @@ pub(super) struct Host {
     services: Box<dyn Services>,
     look: Look,
     source: String,
+    /// Whether a plate makes its depth, by a wish of the window's.
+    with_plate: bool,
     outputs: Vec<Output>,
     keep_going: bool,
     budget_ns: Option<u64>,
@@ -54,6 +56,7 @@ impl Host {
             services,
             look,
             source,
+            with_plate: false,
             outputs,
             keep_going,
             budget_ns,
@@ -127,10 +130,20 @@ impl Host {
     fn carry_out(&mut self, request: Request) {
         match request {
             Request::Open(name) => {
+                // A plate is of one camera.
+                self.with_plate &= self.source == name;
                 self.source = name;
                 self.stop();
                 self.open();
             }
+            Request::TakePlate => match self.live.as_ref().and_then(|live| live.guide.as_ref()) {
+                Some(guide) => guide.take_again(),
+                None => {
+                    self.with_plate = true;
+                    self.stop();
+                    self.open();
+                }
+            },
             Request::Begin(output) => {
                 self.write_to(output);
                 self.tell_outputs();
@@ -185,7 +198,7 @@ impl Host {
     /// Opens the source and starts a run of it.
     fn open(&mut self) {
         self.news.tell(Update::Source(Source::Opening));
-        let opened = match self.services.open(&self.source) {
+        let opened = match self.services.open(&self.source, self.with_plate) {
             Ok(opened) => opened,
             Err(line) => return self.without_source(Source::Lost(line)),
         };

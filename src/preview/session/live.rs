@@ -11,6 +11,7 @@ use super::super::state::{Output, Running, Source};
 use super::{News, SessionEvent};
 use crate::bokeh;
 use crate::clock::Clock;
+use crate::depth::plate::Guide;
 use crate::link;
 use crate::look::Look;
 use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run, Wanted};
@@ -37,6 +38,8 @@ pub(super) struct Live {
     changes: mpsc::Sender<Change>,
     board: Switchboard,
     pub stop: Arc<AtomicBool>,
+    /// How far the plate is, where that makes the depth.
+    pub guide: Option<Arc<Guide>>,
     thread: JoinHandle<Option<Report>>,
 }
 
@@ -56,9 +59,9 @@ impl Live {
         wrote: impl Fn(Notice) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
-        let Opened { name, source, .. } = opened;
+        let Opened { name, source, takes_plates, .. } = opened;
         let (has_depth, measured) = (source.has_depth(), source.is_measured());
-        let crate::source::Source { camera, depth, .. } = source;
+        let crate::source::Source { camera, depth, guide, .. } = source;
         let info = camera.info();
         let look = settings.look.for_source(has_depth);
         let made_for = look.settings(info.size, ADAPTIVE);
@@ -71,7 +74,7 @@ impl Live {
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), settings.keep_going);
         let wanted = Arc::clone(&settings.wanted);
-        news.send(SessionEvent::Views(views));
+        news.send(SessionEvent::Views(views, guide.clone()));
         let run = move || {
             pipeline::run(Run {
                 camera,
@@ -110,11 +113,12 @@ impl Live {
             size: info.size,
             period_ns: info.period_ns,
             has_depth,
+            takes_plates,
             executor,
             budget_ns,
         });
         let live =
-            Self { size: info.size, period_ns: info.period_ns, has_depth, made_for, changes, board, stop, thread };
+            Self { size: info.size, period_ns: info.period_ns, has_depth, made_for, changes, board, stop, guide, thread };
         Ok((live, source))
     }
 

@@ -15,6 +15,7 @@ use host::Host;
 use super::services::{Services, Switch};
 use super::state::{Output, Request, Update};
 use crate::budget::Quality;
+use crate::depth::plate::Guide;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
 use crate::look::Look;
@@ -51,8 +52,8 @@ pub struct Start {
 /// What comes from a session.
 pub enum SessionEvent {
     Update(Update),
-    /// A new run started: its frames come from here.
-    Views(Receiver<View>),
+    /// A new run started: its frames come from here, and how far its plate is, if that makes its depth.
+    Views(Receiver<View>, Option<Arc<Guide>>),
     /// A text for the clipboard.
     Copy(String),
 }

@@ -57,6 +57,10 @@ pub enum Action {
     Retry,
     /// Sets a control of the camera.
     Control(String, i64),
+    /// Takes a plate: a picture of what is behind the person, who is told when to step aside.
+    TakePlate,
+    /// Takes no plate now.
+    DeclinePlate,
     /// Looks again which sources and virtual cameras there are.
     Refresh,
     /// Puts the equivalent command on the clipboard.
@@ -79,6 +83,8 @@ pub enum Request {
     End(Output),
     Open(String),
     Control(String, i64),
+    /// Take a plate, and use it.
+    TakePlate,
     /// Look which sources and virtual cameras there are.
     Refresh,
     /// Put the equivalent command on the clipboard.

@@ -8,6 +8,8 @@ pub const NO_DEPTH: &str =
     "This source has no depth. A second camera beside it, a depth camera or a recording with depth gives it.";
 /// Shown when depth is to be viewed while it is not computed.
 pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: choose Depth as the effect first.";
+/// Shown when a plate is to be taken of what is no camera.
+pub const NO_PLATE: &str = "A plate is a picture of what is behind you, taken with a camera that stands still: choose one first.";
 /// Shown when there is no virtual camera.
 pub const NO_VIRTUAL_CAMERA: &str = "There is no virtual camera yet: `bokehcam doctor` says how to make one.";
 
@@ -55,6 +57,12 @@ impl State {
             Action::Open(name) => return self.open(name),
             Action::Retry => return self.open(self.source_name.clone()),
             Action::Control(name, value) => return self.set_control(name, value),
+            Action::TakePlate if self.takes_plates()[0] => {
+                self.declined_plate = false;
+                return vec![Request::TakePlate];
+            }
+            Action::TakePlate => self.note(NO_PLATE),
+            Action::DeclinePlate => self.declined_plate = true,
             Action::Refresh => return vec![Request::Refresh],
             Action::CopyCommand => return vec![Request::CopyCommand],
             Action::Close => return vec![Request::Close],

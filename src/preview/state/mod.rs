@@ -14,13 +14,14 @@ mod tests;
 pub mod tweak;
 
 pub use action::{Action, Request, Update};
-pub use apply::{NO_DEPTH, NO_VIRTUAL_CAMERA};
+pub use apply::{NO_DEPTH, NO_PLATE, NO_VIRTUAL_CAMERA};
 pub use history::History;
 
 use super::meters::Meters;
 use super::views::Legend;
 pub use super::views::Shown;
 use crate::knob::Knob;
+use crate::depth::plate::Step;
 use crate::look::Look;
 use crate::look::presets::Preset;
 
@@ -52,6 +53,8 @@ pub struct Running {
     pub period_ns: u64,
     /// Whether its frames have depth.
     pub has_depth: bool,
+    /// Whether it is a camera that a plate can be taken with.
+    pub takes_plates: bool,
     pub executor: String,
     /// Time that a frame's blur may take.
     pub budget_ns: u64,
@@ -121,6 +124,10 @@ pub struct State {
     pub legend: Option<Legend>,
     /// Lines for the person, the newest last, and no more than a few.
     pub notes: Vec<Note>,
+    /// How far the plate is, where that makes the depth.
+    pub plate: Option<Step>,
+    /// Whether the person wants no plate.
+    pub declined_plate: bool,
     /// What went wrong with an output, until the person knows.
     pub trouble: Option<String>,
     /// How large text and controls are, in [`TEXT_SCALES`]; 1 is usual.
@@ -134,6 +141,8 @@ pub struct State {
     noted: u64,
 }
 
+/// Shown once a plate is taken.
+const PLATE_TAKEN: &str = "Come back: what is behind you is known now. Keep the camera where it is.";
 /// The most notes that are kept.
 const NOTES: usize = 6;
 
@@ -163,6 +172,8 @@ impl State {
             focus_m: None,
             legend: None,
             notes: Vec::new(),
+            plate: None,
+            declined_plate: false,
             trouble: None,
             text_scale: 1.0,
             meters: Meters::default(),
@@ -178,6 +189,23 @@ impl State {
         self.notes.push(Note { number: self.noted, text: text.into() });
         if self.notes.len() > NOTES {
             self.notes.remove(0);
+        }
+    }
+
+    /// Takes note of how far the plate is. Whether that is new.
+    pub fn guide(&mut self, step: Option<Step>) -> bool {
+        let before = std::mem::replace(&mut self.plate, step);
+        if step == Some(Step::Ready) && before.is_some_and(|before| before != Step::Ready) {
+            self.note(PLATE_TAKEN);
+        }
+        before != step
+    }
+
+    /// Whether a plate can be taken, and whether that is the way to a portrait.
+    pub fn takes_plates(&self) -> [bool; 2] {
+        match &self.source {
+            Source::Running(running) => [running.takes_plates, running.takes_plates && !running.has_depth],
+            Source::Opening | Source::Lost(_) | Source::Ended => [false; 2],
         }
     }
 

@@ -8,7 +8,10 @@ mod head;
 mod outside;
 mod paint;
 mod room;
+mod situation;
 mod torso;
+
+pub use situation::Situation;
 
 use std::f32::consts::TAU;
 
@@ -28,13 +31,22 @@ const NAPE: Vec3 = Vec3::new(0.0, -0.15, 0.04);
 /// About which the body sways, in its own frame.
 const HIP: Vec3 = Vec3::new(0.0, -0.75, 0.06);
 
-/// The whole scene, or without what stands in front of the person.
-pub fn scene(with_front: bool) -> Scene {
-    let front = if with_front { vec![front::desk(), front::twig()] } else { Vec::new() };
-    let parts = [head::part(nod), torso::part(sway), room::part(), outside::part()];
+/// A person with what stands in front of them.
+pub fn with_front() -> Scene {
+    let mut scene = of(Some(Situation::Sits), Situation::Sits);
+    scene.parts.extend([front::desk(), front::twig()].map(Part::built));
+    scene
+}
+
+/// A person in a situation, or the room of a situation without anybody.
+pub fn of(person: Option<Situation>, room: Situation) -> Scene {
+    let own = person.map(|person| [vec![head::part(nod), torso::part(sway)], person.own()].concat());
+    let own: Vec<Part> = own.unwrap_or_default().into_iter().map(|part| Part { is_subject: true, ..part }).collect();
+    let others = person.map(Situation::others).unwrap_or_default();
+    let fixed = [room.furniture(), vec![room::part(), outside::part()]].concat();
     Scene {
-        parts: parts.into_iter().chain(front).map(Part::built).collect(),
-        lights: lights(),
+        parts: [own, others, fixed].concat().into_iter().map(Part::built).collect(),
+        lights: [lights(), person.map(Situation::lights).unwrap_or_default()].concat(),
         ambient: Ambient { above: Vec3::new(0.155, 0.165, 0.20), below: Vec3::new(0.105, 0.080, 0.066) },
         background: Vec3::ZERO,
         focus_m: FOCUS_M,

@@ -18,6 +18,7 @@ use super::{Ended, Preview, WindowError};
 use crate::bokeh;
 use crate::clock::Clock;
 use crate::compute::device::Device;
+use crate::depth::plate::Guide;
 use crate::frame::ColorImage;
 use crate::link::Receiver;
 use crate::optics::CocField;
@@ -52,6 +53,8 @@ pub(super) struct App {
     /// Whether a wake-up is already on its way, so that a busy session does not fill the event queue.
     wake_pending: Arc<AtomicBool>,
     frames: Option<Receiver<View>>,
+    /// How far the plate is, where that makes the depth.
+    guide: Option<Arc<Guide>>,
     view: Option<View>,
     /// Whether `view` was not on the screen yet.
     view_is_new: bool,
@@ -108,6 +111,7 @@ impl App {
             session: Session::begin(session, wake)?,
             wake_pending,
             frames: None,
+            guide: None,
             view: None,
             view_is_new: false,
             false_colors: Views::default(),
@@ -154,7 +158,9 @@ impl App {
         let mut changed = false;
         while let Some(event) = self.session.hear() {
             match event {
-                SessionEvent::Views(frames) => {
+                SessionEvent::Views(frames, guide) => {
+                    self.guide = guide;
+                    changed |= self.state.guide(None);
                     self.heard_at = Instant::now();
                     // It was meant for the source before.
                     self.snapshot_due = false;
@@ -187,6 +193,10 @@ impl App {
         if newest.is_some() {
             self.heard_at = Instant::now();
             self.check_silence();
+            if self.state.guide(self.guide.as_ref().map(|guide| guide.step())) {
+                self.layout_at = Some(Instant::now());
+                changed = true;
+            }
         }
         // A frozen frame has to be in memory, to be saved: frames are replaced until one is.
         let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());

@@ -1,0 +1,263 @@
+//! Who stands before a plate: found whatever the light and the camera do, as far as that can be told.
+#![allow(missing_docs)]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use bokehcam::color::{linear_to_srgb, srgb_to_linear};
+use bokehcam::depth::plate::{PlateDepth, Step};
+use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::recording::still;
+
+const SIZE: (u32, u32) = (640, 360);
+const FRAME_NS: u64 = 33_333_333;
+
+/// A number from 0 to 1 for three whole ones.
+fn random(x: u32, y: u32, seed: u32) -> f32 {
+    let mut bits = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77) ^ seed.wrapping_mul(0xc2b2_ae3d);
+    for _ in 0..3 {
+        bits = (bits ^ bits >> 15).wrapping_mul(0x2c1b_3c6d);
+    }
+    (bits >> 8) as f32 / (1u32 << 24) as f32
+}
+
+/// What a camera before a room sees.
+#[derive(Clone, Copy)]
+struct Shown {
+    /// Columns and rows of the middle of a person, whose head it is.
+    person: Option<(f32, f32)>,
+    /// What the light of each channel is multiplied by.
+    light: [f32; 3],
+    /// How far the camera was nudged, in pixels.
+    nudge_px: (f32, f32),
+    /// How dark the shadow of the person is: 1 is none.
+    shadow: f32,
+    /// Something on the sideboard.
+    vase: bool,
+    /// Which noise.
+    frame: u32,
+}
+
+const ROOM: Shown =
+    Shown { person: None, light: [1.0; 3], nudge_px: (0.0, 0.0), shadow: 1.0, vase: false, frame: 0 };
+
+impl Shown {
+    /// Codes of the room: a wall with a pattern, a shelf, a bright window.
+    fn room(x: f32, y: f32) -> [f32; 3] {
+        let wave = (x * 0.045).sin() * (y * 0.06).cos() + 0.4 * (x * 0.21 + y * 0.13).sin();
+        let wall = [120.0 + 22.0 * wave, 105.0 + 20.0 * wave, 90.0 + 15.0 * wave];
+        match (x, y) {
+            (x, y) if (430.0..560.0).contains(&x) && (40.0..150.0).contains(&y) => [225.0, 232.0, 240.0],
+            (x, y) if y > 230.0 && y < 242.0 && x < 300.0 => [70.0, 45.0, 30.0],
+            _ => wall,
+        }
+    }
+
+    /// Whether the person, a head on shoulders, covers a point.
+    fn covers((head_x, head_y): (f32, f32), x: f32, y: f32) -> bool {
+        let head = ((x - head_x) / 48.0).hypot((y - head_y) / 62.0) < 1.0;
+        head || ((x - head_x) / 120.0).powi(2) + ((y - head_y - 190.0) / 130.0).powi(2) < 1.0
+    }
+
+    fn picture(&self) -> (ColorImage, Vec<bool>) {
+        let mut picture = ColorImage::new(SIZE.0, SIZE.1);
+        let mut covered = Vec::new();
+        for y in 0..SIZE.1 {
+            for x in 0..SIZE.0 {
+                let (fx, fy) = (x as f32, y as f32);
+                let is_person = self.person.is_some_and(|middle| Self::covers(middle, fx, fy));
+                let vase = self.vase && (90.0..130.0).contains(&fx) && (170.0..230.0).contains(&fy);
+                let mut codes = match () {
+                    () if is_person && fy < self.person.unwrap().1 + 70.0 => [190.0, 140.0, 115.0],
+                    () if is_person => [45.0, 60.0 + 10.0 * (fx * 0.3).sin(), 95.0],
+                    () if vase => [60.0, 120.0, 70.0],
+                    () => Self::room(fx - self.nudge_px.0, fy - self.nudge_px.1),
+                };
+                // A shadow on the wall beside the person, soft at its edge.
+                let beside = self.person.map_or(9.0, |(px, py)| ((fx - px - 110.0) / 90.0).hypot((fy - py - 60.0) / 120.0));
+                let depth = ((1.6 - beside) / 1.2).clamp(0.0, 1.0);
+                let shade = if is_person { 1.0 } else { 1.0 - (1.0 - self.shadow) * depth };
+                for (code, light) in codes.iter_mut().zip(self.light) {
+                    let linear = srgb_to_linear(*code / 255.0) * light * shade;
+                    let noise = 5.0 * (random(x, y, self.frame * 3 + 1) + random(x, y, self.frame * 3 + 2) - 1.0);
+                    *code = 255.0 * linear_to_srgb(linear.min(1.0)) + noise;
+                }
+                let at = 3 * (y * SIZE.0 + x) as usize;
+                picture.rgb[at..at + 3].copy_from_slice(&codes.map(|code| code.round().clamp(0.0, 255.0) as u8));
+                covered.push(is_person);
+            }
+        }
+        (picture, covered)
+    }
+}
+
+/// A plate source, and the time.
+struct Watched {
+    source: PlateDepth,
+    frame: u32,
+    map: DepthMap,
+}
+
+impl Watched {
+    fn new(plate: Option<ColorImage>) -> Self {
+        Self { source: PlateDepth::new(plate, None), frame: 0, map: DepthMap::default() }
+    }
+
+    /// A source with the plate of the room.
+    fn before_room() -> Self {
+        Self::new(Some(ROOM.picture().0))
+    }
+
+    /// Shows a picture; how far the plate is then, and the shares of the pixels that were found and of the others that
+    /// were mistaken for the person.
+    fn see(&mut self, shown: Shown) -> (Step, f32, f32) {
+        self.frame += 1;
+        let (color, covered) = Shown { frame: self.frame, ..shown }.picture();
+        let time_ns = u64::from(self.frame) * FRAME_NS;
+        let stamp = Stamp { index: self.frame as usize, time_ns, captured_ns: None };
+        self.source.read(Seen { stamp, color: &color, right: None }, &mut self.map).unwrap();
+        let share = |of: bool| {
+            let near = |at: &usize| self.map.metres[*at] <= 1.0;
+            let all: Vec<usize> = (0..covered.len()).filter(|&at| covered[at] == of).collect();
+            all.iter().filter(|at| near(at)).count() as f32 / all.len().max(1) as f32
+        };
+        (self.source.guide().step(), share(true), share(false))
+    }
+}
+
+const PERSON: Shown = Shown { person: Some((300.0, 150.0)), ..ROOM };
+
+#[test]
+fn a_person_is_found_and_nobody_is_not() {
+    let mut watched = Watched::before_room();
+    assert_eq!(watched.see(ROOM), (Step::Ready, 0.0, 0.0));
+    for step in 0..8 {
+        let (step, found, mistaken) = watched.see(Shown { person: Some((250.0 + 8.0 * step as f32, 150.0)), ..ROOM });
+        assert!(step == Step::Ready && found > 0.995 && mistaken < 0.002, "{step:?} {found} {mistaken}");
+    }
+}
+
+#[test]
+fn exposure_white_balance_a_nudge_and_shadows_are_no_persons() {
+    for (what, shown) in [
+        ("darker", Shown { light: [0.6, 0.6, 0.6], ..PERSON }),
+        ("brighter", Shown { light: [1.3, 1.3, 1.3], ..PERSON }),
+        ("warmer", Shown { light: [1.1, 1.0, 0.8], ..PERSON }),
+        ("nudged", Shown { nudge_px: (2.5, -1.5), ..PERSON }),
+        ("nudged more", Shown { nudge_px: (-5.0, 3.0), ..PERSON }),
+        ("in shadow", Shown { shadow: 0.7, ..PERSON }),
+    ] {
+        let mut watched = Watched::before_room();
+        (0..4).for_each(|_| { watched.see(shown); });
+        let (step, found, mistaken) = watched.see(shown);
+        eprintln!("{what}: {found:.4} found, {mistaken:.4} mistaken");
+        assert!(step == Step::Ready && found > 0.985 && mistaken < 0.01, "{what}: {step:?} {found} {mistaken}");
+    }
+}
+
+#[test]
+fn what_was_put_down_is_learned_and_who_sits_still_is_not() {
+    let mut watched = Watched::before_room();
+    let sits = Shown { vase: true, ..PERSON };
+    let (_, found, mistaken) = watched.see(sits);
+    assert!(found > 0.99 && mistaken > 0.005, "the vase is new: {found} {mistaken}");
+    (0..240).for_each(|_| { watched.see(sits); });
+    let (_, found, mistaken) = watched.see(sits);
+    assert!(found > 0.99 && mistaken < 0.002, "after 8 s: {found} {mistaken}");
+    // It is known for good, and so is the place where it stood, once it is seen.
+    assert!(watched.see(Shown { vase: true, ..ROOM }).2 < 0.001);
+}
+
+#[test]
+fn another_picture_is_said_and_all_is_blurred() {
+    let other = |nudge_px| Shown { nudge_px, light: [0.35, 0.6, 1.4], ..PERSON };
+    let mut watched = Watched::before_room();
+    let moved = Shown { nudge_px: (160.0, 75.0), ..other((160.0, 75.0)) };
+    let mut picture = moved.picture().0;
+    // Another room altogether.
+    picture.rgb.chunks_exact_mut(3).enumerate().for_each(|(at, pixel)| {
+        let code = (128.0 + 100.0 * (at as f32 * 0.013).sin()) as u8;
+        pixel.copy_from_slice(&[code, 255 - code, code / 2]);
+    });
+    let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
+    watched.source.read(Seen { stamp, color: &picture, right: None }, &mut watched.map).unwrap();
+    assert_eq!(watched.source.guide().step(), Step::Unlike);
+    assert!(watched.map.metres.iter().all(|&metres| metres > 100.0) && watched.map.matte.pixels.is_empty());
+    // It is the room again.
+    assert_eq!(watched.see(PERSON).0, Step::Ready);
+}
+
+#[test]
+fn a_plate_is_taken_once_the_person_has_gone() {
+    let mut watched = Watched::new(None);
+    let mut steps = Vec::new();
+    for frame in 0..240 {
+        // They dawdle: still in the picture after the countdown.
+        let person = (frame < 120).then(|| (300.0 + 4.0 * frame as f32, 150.0)).filter(|(x, _)| *x < 760.0);
+        let (step, ..) = watched.see(Shown { person, ..ROOM });
+        if steps.last() != Some(&step) {
+            steps.push(step);
+        }
+        if step == Step::Ready {
+            break;
+        }
+    }
+    let is_taking = |step: &Step| matches!(step, Step::Taking(_));
+    assert_eq!(steps[..3], [Step::StepOut(3), Step::StepOut(2), Step::StepOut(1)], "{steps:?}");
+    assert!(steps.contains(&Step::Moves) && steps.iter().any(is_taking), "{steps:?}");
+    assert_eq!(steps.last(), Some(&Step::Ready));
+    let (step, found, mistaken) = watched.see(PERSON);
+    assert!(step == Step::Ready && found > 0.99 && mistaken < 0.002, "{found} {mistaken}");
+    watched.source.guide().take_again();
+    assert_eq!(watched.see(PERSON).0, Step::StepOut(3));
+}
+
+fn bokehcam(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    command.args(arguments).current_dir(folder).env("XDG_CONFIG_HOME", "/nowhere").env("XDG_DATA_HOME", "/nowhere");
+    command.output().unwrap()
+}
+
+#[test]
+fn commands_take_plates_and_use_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let run = |arguments: &[&str]| {
+        let done = bokehcam(folder.path(), arguments);
+        (done.status.code(), String::from_utf8(done.stderr).unwrap())
+    };
+    let (color, covered) = PERSON.picture();
+    still::write_color(&at("me.png"), &color, false).unwrap();
+    still::write_color(&at("room.png"), &ROOM.picture().0, false).unwrap();
+    still::write_color(&at("small.png"), &ColorImage::new(64, 36), false).unwrap();
+    let options = ["--depth", "plate:room.png", "--coc-at-infinity", "12", "--out", "out.png"];
+    let (code, said) = run(&[&["render", "me.png"], &options[..]].concat());
+    assert_eq!(code, Some(0), "{said}");
+    let out = still::read_color(&at("out.png")).unwrap();
+    let change = |of: bool| {
+        let differ = |at: &usize| out.rgb[3 * at].abs_diff(color.rgb[3 * at]) as f32;
+        let all: Vec<f32> = (0..covered.len()).filter(|&at| covered[at] == of).map(|at| differ(&at)).collect();
+        all.iter().sum::<f32>() / all.len() as f32
+    };
+    assert!(change(true) < 0.5 && change(false) > 1.5, "{} {}", change(true), change(false));
+
+    for (arguments, code, part) in [
+        (&["render", "me.png", "--depth", "plate", "--out", "a.png"][..], 2, "name the picture"),
+        (&["render", "me.png", "--depth", "plate:small.png", "--out", "a.png"], 2, "64 x 36, and the pictures are 640 x 360"),
+        (&["render", "me.png", "--depth", "plate:none.png", "--out", "a.png"], 1, "none.png"),
+        (&["render", "me.png", "--depth", "plate:", "--out", "a.png"], 2, "name a picture after the colon"),
+        (&["render", "me.png", "--depth", "plate:room.png", "--focus", "1.2", "--out", "a.png"], 2, "--focus"),
+        (&["render", "me.png", "--depth", "plate:room.png", "--force", "--out", "room.png"], 2, "which is read"),
+        (&["stream", "synthetic", "--depth", "plate", "--to", "null"], 2, "leave --depth out"),
+        (&["plate", "synthetic", "--frames", "3", "--to", "room.png"], 1, "exists"),
+        (&["plate", "synthetic", "--frames", "3", "--to", "room.gif"], 1, "room.gif"),
+    ] {
+        let (came, said) = run(arguments);
+        assert!(came == Some(code) && said.contains(part) && !at("a.png").exists(), "{arguments:?}: {came:?} {said}");
+        assert_eq!(said.trim().lines().count(), 1, "{said}");
+    }
+    let (code, said) = run(&["plate", "synthetic", "--frames", "24", "--size", "160x120", "--to", "new/plate.png"]);
+    assert!(code == Some(0) && said.contains("--depth plate:new/plate.png"), "{code:?} {said}");
+    assert_eq!(still::read_color(&at("new/plate.png")).unwrap().size(), (160, 120));
+}
