@@ -98,9 +98,9 @@ fn averaged(k: u32, pixel: vec2<u32>) -> array<f32, 5> {
                 let place = first_mixed(at);
                 let near = near_surface(place);
                 // Where the nearer surface lies in front of the layer, behind it is the farther one.
-                let share = mixed[place].share * step_at(work.unhidden, near.w);
-                sum = plus(sum, taken(k, surface, weight * (1.0 - share)));
-                sum = plus(sum, taken(k, near, weight * share));
+                let before = step_at(work.unhidden, near.w);
+                sum = plus(sum, taken(k, surface, weight * (1.0 - (1.0 - mixed[place].behind) * before)));
+                sum = plus(sum, taken(k, near, weight * mixed[place].share * before));
             } else {
                 sum = plus(sum, taken(k, surface, weight));
             }

@@ -5,6 +5,7 @@ struct MixedPixel {
     near: u32,          // as uploaded, metres of the nearer and the farther surface; after unpack, the nearer one as a
     far: u32,           // pixel of the scene. The farther one is in the scene.
     share: f32,         // how much of the pixel the nearer surface covers
+    behind: f32,        // how much of it is known of the farther surface
     red: f32,           // colour of the nearer surface less that of the farther one
     green: f32,
     blue: f32,

@@ -138,7 +138,7 @@ fn what_cannot_have_a_matte_has_none() {
     let mut flat = depth(SIZE.0, SIZE.1, |x, _| 1.0 + 0.001 * x as f32);
     let mut stepped = three_depths(SIZE.0, SIZE.1);
     for (map, jump) in [(&mut small, JUMP), (&mut flat, JUMP), (&mut stepped, f32::INFINITY)] {
-        map.matte.pixels.push(MixedPixel { at: 3, near_m: 1.0, far_m: 2.0, share: 0.5, difference: [0.1; 3] });
+        map.matte.pixels.push(MixedPixel { at: 3, near_m: 1.0, far_m: 2.0, share: 0.5, behind: 0.5, difference: [0.1; 3] });
         Matting::default().find(map, &picture, jump);
         assert!(map.matte.pixels.is_empty());
     }
@@ -192,6 +192,36 @@ fn the_blurred_background_shows_through_a_soft_outline() {
     }
 }
 
+/// A light on the wall that a subject in focus hides: through a lens its disc is seen beside the subject, all the same.
+#[test]
+fn what_is_known_to_be_behind_a_subject_shows_beside_it() {
+    let wall = |x: u32, y: u32| light(if (36..42).contains(&x) && (34..46).contains(&y) { [250, 240, 210] } else { BLUE });
+    let is_near = |x: u32| x < 44;
+    let picture = color(SIZE.0, SIZE.1, |x, y| if is_near(x) { RED } else { codes(wall(x, y)) });
+    let field = coc(CocKind::Depth, SIZE.1);
+    let unknown = depth(SIZE.0, SIZE.1, |x, _| if is_near(x) { NEAR_M } else { FAR_M });
+    let mut map = unknown.clone();
+    let known = |at: u32| {
+        let (near, far) = (light(RED), wall(at % SIZE.0, at / SIZE.0));
+        let difference = std::array::from_fn(|p| near[p] - far[p]);
+        MixedPixel { at, near_m: NEAR_M, far_m: FAR_M, share: 1.0, behind: 1.0, difference }
+    };
+    map.matte.pixels = (0..SIZE.0 * SIZE.1).filter(|at| (20..44).contains(&(at % SIZE.0))).map(known).collect();
+    let only_wall = color(SIZE.0, SIZE.1, |x, y| codes(wall(x, y)));
+    for quality in Quality::ALL {
+        let behind = blur(&depth(SIZE.0, SIZE.1, |_, _| FAR_M), &only_wall, &field, quality);
+        let error = |out: &ColorImage, columns: std::ops::Range<u32>, truth: &ColorImage| {
+            let at = (30..50u32).flat_map(|y| columns.clone().map(move |x| 3 * (y * SIZE.0 + x) as usize));
+            at.map(|at| out.rgb[at].abs_diff(truth.rgb[at])).max().unwrap()
+        };
+        let (with, without) =
+            (blur(&map, &picture, &field, quality), blur(&unknown, &picture, &field, quality));
+        assert!(error(&with, 0..43, &picture) <= 3, "{quality}: the subject stays as it is");
+        let (known, filled) = (error(&with, 45..56, &behind), error(&without, 45..56, &behind));
+        assert!(known <= 6 && filled >= 3 * known.max(1), "{quality}: {known} codes off, {filled} where it is not known");
+    }
+}
+
 #[test]
 fn in_focus_a_mixed_pixel_is_the_pixel() {
     let picture = noise(SIZE.0, SIZE.1);
@@ -209,5 +239,5 @@ fn mixed(picture: &ColorImage, at: u32, numbers: &mut Numbers) -> MixedPixel {
     let share = 0.05 + 0.9 * numbers.next();
     let own = light(std::array::from_fn(|p| picture.rgb[3 * at as usize + p]));
     let difference = own.map(|own| (2.0 * numbers.next() - 1.0) * own.min(1.0 - own));
-    MixedPixel { at, near_m: 0.8, far_m: 3.0, share, difference }
+    MixedPixel { at, near_m: 0.8, far_m: 3.0, share, behind: 1.0 - share, difference }
 }

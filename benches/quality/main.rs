@@ -5,7 +5,7 @@
 //! | `scenes`, `texture` | scenes made by code |
 //! | `lens`, `truth` | the exact renderer, and its pictures kept between runs |
 //! | `damage` | depth maps as sensors give them |
-//! | `methods`, `rivals`, `masks` | what is compared |
+//! | `methods`, `rivals`, `masks`, `situations` | what is compared |
 //! | `metrics`, `flip`, `highlight` | how it is measured |
 //! | `report`, `markdown`, `sheet` | what comes out |
 //!
@@ -27,6 +27,8 @@ mod report;
 mod rivals;
 mod scenes;
 mod sheet;
+#[cfg(feature = "networks")]
+mod situations;
 mod texture;
 mod truth;
 
@@ -112,6 +114,17 @@ fn run(options: &Options) -> Outcome<()> {
     }
     if options.parts.contains(&Part::Highlight) {
         lone_light(options, &mut results)?;
+    }
+    #[cfg(feature = "networks")]
+    if options.parts.contains(&Part::Situations) {
+        say(options, situations::Outcome::HEAD.to_owned(), None::<&Record>)?;
+        let mut told = Ok(());
+        situations::measure(|outcome| {
+            let line = say(options, outcome.line(), Some(&outcome));
+            told = std::mem::replace(&mut told, Ok(())).and(line);
+            results.situations.push(outcome);
+        })?;
+        told?;
     }
     if options.markdown {
         print!("{}", markdown::markdown(&results));

@@ -25,6 +25,8 @@ pub fn markdown(results: &Results) -> String {
     // Writing to a string cannot fail.
     let _ = tables(results, &mut text);
     let _ = portraits(results, &mut text);
+    #[cfg(feature = "networks")]
+    let _ = situations(results, &mut text);
     for method in [BALANCED, BEST, Method::Refined] {
         let _ = verdict(results, method, &mut text);
     }
@@ -46,6 +48,21 @@ fn portraits(results: &Results, text: &mut String) -> std::fmt::Result {
     for portrait in &results.portraits {
         let Portrait { scene, method, share_error, share_flicker, psnr_db, edge_db } = portrait;
         writeln!(text, "| {scene} | {method} | {share_error:.1} | {share_flicker:.1} | {psnr_db:.2} | {edge_db:.2} |")?;
+    }
+    writeln!(text)
+}
+
+#[cfg(feature = "networks")]
+fn situations(results: &Results, text: &mut String) -> std::fmt::Result {
+    use super::situations::Outcome;
+    if results.situations.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "## What is hard for one camera\n")?;
+    writeln!(text, "| situation | source | missed % | mistaken % | PSNR dB | edge dB |\n|---|---|---|---|---|---|")?;
+    for outcome in &results.situations {
+        let Outcome { situation, source, missed, mistaken, psnr_db, edge_db } = outcome;
+        writeln!(text, "| {situation} | {source} | {missed:.2} | {mistaken:.2} | {psnr_db:.1} | {edge_db:.1} |")?;
     }
     writeln!(text)
 }

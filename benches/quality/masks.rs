@@ -2,17 +2,18 @@
 //! programs for video calls do with the same mask.
 //!
 //! The mask is the subject's true coverage, shrunk to a network's size, softened and hardened. What lies behind counts as
-//! being at one distance, for everybody. Rivals, after their own descriptions: `threshold` cuts the mask at one half and
+//! being at one distance, for everybody. `with plate` is given a picture of what is behind, too. Rivals, after their own descriptions: `threshold` cuts the mask at one half and
 //! feathers it (OBS plugins); `guided` filters it by the picture's luma (live-backgroundremoval-lite); both blend the
 //! picture with a Gaussian blur of all of it.
 
 use bokehcam::bokeh::BokehError;
 use bokehcam::budget::Quality;
-use bokehcam::depth::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
+use bokehcam::color::light_of_codes;
+use bokehcam::depth::matting::mask::{Backdrop, FAR_M, MaskMatting, SUBJECT_M};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, luma_of};
 use serde::Serialize;
 
-use super::lens::Scene;
+use super::lens::{Scene, Surface};
 use super::methods::{Blurrer, Method, Shot};
 use super::metrics;
 use super::picture::{Plane, Rgb, decode, encode};
@@ -55,8 +56,14 @@ impl Portrait {
     }
 }
 
-/// A way to get the share of every pixel from a mask.
-type Refine = fn(&Mask, &ColorImage) -> Plane<f32>;
+/// What all ways are given: the mask, and what is behind the subject, which only one makes use of.
+struct Given {
+    mask: Mask,
+    behind: ColorImage,
+}
+
+/// A way to get the share of every pixel.
+type Refine = fn(&Given, &ColorImage) -> Plane<f32>;
 
 /// Measures all ways on a scene.
 ///
@@ -64,20 +71,26 @@ type Refine = fn(&Mask, &ColorImage) -> Plane<f32>;
 /// This crate's executor failed.
 pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<Portrait>, BokehError> {
     let truth = coverage(scene);
-    let mask = as_network(&truth);
-    let band = band(&mask, &truth);
+    let given = Given { mask: as_network(&truth), behind: encode(&without_subject(scene).pinhole()) };
+    let band = band(&given, &truth);
     let edges = metrics::edge_band(&views.coc_px);
     let behind_px = behind_px(views, &truth);
-    let noisy: Vec<ColorImage> = (0..FRAMES).map(|frame| with_noise(&views.shot.image, frame)).collect();
-    let ways: [(&str, Refine); 4] =
-        [("upscaled", upscaled), ("threshold", threshold), ("guided", guided), ("bokehcam", ours)];
+    let noisy: Vec<ColorImage> = (0..FRAMES).map(|frame| with_noise(&views.shot.image, NOISE_CODES, frame)).collect();
+    let ways: [(&str, Refine); 5] = [
+        ("upscaled", upscaled),
+        ("threshold", threshold),
+        ("guided", guided),
+        ("bokehcam", |given, image| ours(given, None, image)),
+        ("with plate", |given, image| ours(given, Some(&given.behind), image)),
+    ];
     let mut measured = Vec::new();
     for (method, refine) in ways {
-        let share = refine(&mask, &views.shot.image);
-        let frames: Vec<Plane<f32>> = noisy.iter().map(|image| refine(&mask, image)).collect();
+        let share = refine(&given, &views.shot.image);
+        let frames: Vec<Plane<f32>> = noisy.iter().map(|image| refine(&given, image)).collect();
         let flicker: f64 = frames.windows(2).map(|pair| error(&pair[0], &pair[1], &band)).sum();
         let picture = match method {
-            "bokehcam" => portrait(&mask, &views.shot, behind_px)?,
+            "bokehcam" => portrait(&given, None, &views.shot, behind_px)?,
+            "with plate" => portrait(&given, Some(&given.behind), &views.shot, behind_px)?,
             _ => encode(&blended(&decode(&views.shot.image), &share, behind_px)),
         };
         measured.push(Portrait {
@@ -92,11 +105,22 @@ pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<P
     Ok(measured)
 }
 
+/// Whether a surface is in focus.
+fn is_subject(surface: &Surface) -> bool {
+    surface.coc_px == 0.0 && surface.slope == glam::Vec2::ZERO
+}
+
+fn without_subject(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    scene.surfaces.retain(|surface| !is_subject(surface));
+    scene
+}
+
 /// How much of each pixel what is in focus covers.
 fn coverage(scene: &Scene) -> Plane<f32> {
     let mut scene = scene.clone();
     for surface in &mut scene.surfaces {
-        let is_subject = surface.coc_px == 0.0 && surface.slope == glam::Vec2::ZERO;
+        let is_subject = is_subject(surface);
         surface.texture = surface.texture.map(|[_, _, _, alpha]| {
             let light = if is_subject { alpha } else { 0.0 };
             [light, light, light, alpha]
@@ -122,8 +146,8 @@ fn as_network(truth: &Plane<f32>) -> Mask {
 }
 
 /// Where the mask is undecided, or the truth is.
-fn band(mask: &Mask, truth: &Plane<f32>) -> Plane<bool> {
-    let wide = upscaled(mask, &ColorImage::new(truth.width as u32, truth.height as u32));
+fn band(given: &Given, truth: &Plane<f32>) -> Plane<bool> {
+    let wide = upscaled(given, &ColorImage::new(truth.width as u32, truth.height as u32));
     let undecided = |share: f32| share > 0.02 && share < 0.98;
     Plane::from_fn(truth.width, truth.height, |x, y| {
         (-2..=2).any(|dy| {
@@ -151,14 +175,15 @@ fn behind_px(views: &Views, truth: &Plane<f32>) -> f32 {
     behind.iter().sum::<f32>() / behind.len() as f32
 }
 
-fn with_noise(image: &ColorImage, seed: u64) -> ColorImage {
+/// The picture of a camera whose noise has this standard deviation.
+pub fn with_noise(image: &ColorImage, codes: f32, seed: u64) -> ColorImage {
     let mut dice = Dice::new(seed + 1);
-    let noisy = |code: &u8| (f32::from(*code) + NOISE_CODES * dice.normal()).round().clamp(0.0, 255.0) as u8;
+    let noisy = |code: &u8| (f32::from(*code) + codes * dice.normal()).round().clamp(0.0, 255.0) as u8;
     ColorImage { rgb: image.rgb.iter().map(noisy).collect(), ..*image }
 }
 
-fn upscaled(mask: &Mask, image: &ColorImage) -> Plane<f32> {
-    let small = Plane { width: SIZE.0, height: SIZE.1, data: mask.share.clone() };
+fn upscaled(given: &Given, image: &ColorImage) -> Plane<f32> {
+    let small = Plane { width: SIZE.0, height: SIZE.1, data: given.mask.share.clone() };
     let (width, height) = (image.width as usize, image.height as usize);
     Plane::from_fn(width, height, |x, y| {
         let place = |at: usize, of: usize, from: usize| (at as f32 + 0.5) * from as f32 / of as f32 - 0.5;
@@ -169,17 +194,17 @@ fn upscaled(mask: &Mask, image: &ColorImage) -> Plane<f32> {
     })
 }
 
-fn threshold(mask: &Mask, image: &ColorImage) -> Plane<f32> {
-    let cut = upscaled(mask, image).map(|share| [f32::from(u8::from(share > 0.5)); 3]);
+fn threshold(given: &Given, image: &ColorImage) -> Plane<f32> {
+    let cut = upscaled(given, image).map(|share| [f32::from(u8::from(share > 0.5)); 3]);
     smoothed(&cut, 2.0).map(|[share, _, _]| share)
 }
 
-fn guided(mask: &Mask, image: &ColorImage) -> Plane<f32> {
+fn guided(given: &Given, image: &ColorImage) -> Plane<f32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let mut luma = vec![0; width * height];
     luma_of(&image.rgb, &mut luma);
     let luma = Plane { width, height, data: luma.iter().map(|&code| f32::from(code) / 255.0).collect() };
-    let share = upscaled(mask, image);
+    let share = upscaled(given, image);
     let mean = |of: &(dyn Fn(usize) -> f32 + Sync)| {
         let own = Plane::from_fn(width, height, |x, y| of(y * width + x));
         let line = |plane: &Plane<f32>, dx: i32, dy: i32| {
@@ -203,24 +228,32 @@ fn guided(mask: &Mask, image: &ColorImage) -> Plane<f32> {
     })
 }
 
-fn matte(mask: &Mask, image: &ColorImage) -> DepthMap {
+fn matte(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> DepthMap {
+    let light = light_of_codes();
+    let light = [*light; 3];
+    let backdrop = behind.map(|color| Backdrop { color, light: &light, shift_px: [0; 2] });
     let mut map = DepthMap::new(image.width, image.height);
     map.metres.fill(FAR_M);
-    MaskMatting::default().find(mask, image, SUBJECT_M, &mut map);
+    MaskMatting::default().find(&given.mask, image, backdrop.as_ref(), &mut map);
     map
 }
 
-fn ours(mask: &Mask, image: &ColorImage) -> Plane<f32> {
-    let map = matte(mask, image);
+fn ours(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> Plane<f32> {
+    let map = matte(given, behind, image);
     let mut share: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= SUBJECT_M))).collect();
     map.matte.pixels.iter().for_each(|pixel| share[pixel.at as usize] = pixel.share);
     Plane { width: image.width as usize, height: image.height as usize, data: share }
 }
 
 /// This crate's portrait, at the default quality.
-fn portrait(mask: &Mask, shot: &Shot, behind_px: f32) -> Result<ColorImage, BokehError> {
+fn portrait(
+    given: &Given,
+    behind: Option<&ColorImage>,
+    shot: &Shot,
+    behind_px: f32,
+) -> Result<ColorImage, BokehError> {
     let lens = Shot::lens(behind_px, SUBJECT_M, shot.image.height as usize);
-    let shot = Shot { depth: matte(mask, &shot.image), lens, ..shot.clone() };
+    let shot = Shot { depth: matte(given, behind, &shot.image), lens, ..shot.clone() };
     Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)
 }
 

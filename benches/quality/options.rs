@@ -21,6 +21,8 @@ pub enum Part {
     Flicker,
     /// Portraits from a coarse mask alone
     Masks,
+    /// What is hard for one camera, by a plate and by networks
+    Situations,
 }
 
 /// Quality of the blur against thin-lens truth, beside other methods
@@ -49,7 +51,7 @@ pub struct Options {
         value_name = "LIST",
         value_delimiter = ',',
         value_enum,
-        default_value = "exact,damaged,highlight,flicker,masks"
+        default_value = "exact,damaged,highlight,flicker,masks,situations"
     )]
     pub parts: Vec<Part>,
     /// Frames of the scenes that move

@@ -63,6 +63,9 @@ pub struct Results {
     pub flicker: Vec<Flicker>,
     /// Portraits from a coarse mask.
     pub portraits: Vec<Portrait>,
+    /// What was made of what is hard for one camera.
+    #[cfg(feature = "networks")]
+    pub situations: Vec<super::situations::Outcome>,
 }
 
 impl Record {

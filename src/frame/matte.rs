@@ -19,6 +19,9 @@ pub struct MixedPixel {
     pub far_m: f32,
     /// How much of the pixel the nearer surface covers, 0 to 1.
     pub share: f32,
+    /// How much of the pixel is known of the farther surface, 0 to 1: what is seen of it, or 1 where what is behind is known
+    /// from elsewhere.
+    pub behind: f32,
     /// Colour of the nearer surface less that of the farther one: linear light, red, green and blue.
     pub difference: [f32; 3],
 }

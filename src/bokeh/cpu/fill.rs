@@ -207,8 +207,10 @@ impl Behind<'_> {
         }
         if surfaces.mixed {
             // Behind the nearer surface of a pixel lies its farther one.
-            for (share, coc_px) in surfaces.share.0.iter_mut().zip(&surfaces.front.0[3]) {
-                *share *= self.unhidden.at(*coc_px);
+            let planes = surfaces.share.0.iter_mut().zip(&mut surfaces.behind.0);
+            for ((share, behind), coc_px) in planes.zip(&surfaces.front.0[3]) {
+                let before = self.unhidden.at(*coc_px);
+                (*share, *behind) = (*share * before, 1.0 - (1.0 - *behind) * before);
             }
         }
     }

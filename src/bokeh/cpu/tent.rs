@@ -65,8 +65,8 @@ impl<S: Simd> ShareAt<S> {
             return back;
         }
         let front = self.of_one(simd, &surfaces.front, x);
-        let share = load::<S>(&surfaces.share.0, x);
-        std::array::from_fn(|p| fma(simd, share, simd.sub_f32s(front[p], back[p]), back[p]))
+        let [share, behind] = [&surfaces.share, &surfaces.behind].map(|plane| load::<S>(&plane.0, x));
+        std::array::from_fn(|p| fma(simd, share, front[p], simd.mul_f32s(behind, back[p])))
     }
 
     /// The same, of pixels of one surface.

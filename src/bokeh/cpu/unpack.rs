@@ -63,6 +63,8 @@ pub struct Surfaces<const W: usize> {
     pub front: Piece<W>,
     /// How much of a pixel the nearer surface covers.
     pub share: Line<[f32; W]>,
+    /// How much of it is known of the farther one.
+    pub behind: Line<[f32; W]>,
     /// Whether any pixel here has two.
     pub mixed: bool,
 }
@@ -70,7 +72,8 @@ pub struct Surfaces<const W: usize> {
 impl<const W: usize> Surfaces<W> {
     /// Memory for them.
     pub fn new() -> Self {
-        Self { back: Line([[0.0; W]; 4]), front: Line([[0.0; W]; 4]), share: Line([0.0; W]), mixed: false }
+        let [back, front] = [Line([[0.0; W]; 4]); 2];
+        Self { back, front, share: Line([0.0; W]), behind: Line([1.0; W]), mixed: false }
     }
 
     /// A pixel with both its surfaces: linear r, g, b, and the CoC of the nearer one.
@@ -117,8 +120,8 @@ impl Source<'_> {
         }
         self.unmix(y * width + first..y * width + first + count, before, surfaces);
         if before > 0 || end < columns {
-            let Surfaces { back, front, share, mixed } = surfaces;
-            let twos = front.0.iter_mut().chain([&mut share.0]).filter(|_| *mixed);
+            let Surfaces { back, front, share, behind, mixed } = surfaces;
+            let twos = front.0.iter_mut().chain([&mut share.0, &mut behind.0]).filter(|_| *mixed);
             for plane in back.0.iter_mut().chain(twos) {
                 let (left, right) = (plane[before], plane[end - 1]);
                 plane[..before].fill(left);
@@ -133,11 +136,12 @@ impl Source<'_> {
         surfaces.mixed = false;
         let (CocField::Depth(lens), Some(matte)) = (self.coc, self.matte) else { return };
         let start = range.start;
-        let Surfaces { back, front, share, mixed } = surfaces;
+        let Surfaces { back, front, share, behind, mixed } = surfaces;
         for pixel in matte.within(range) {
             if !*mixed {
                 front.0.as_flattened_mut().fill(0.0);
                 share.0.fill(0.0);
+                behind.0.fill(1.0);
                 *mixed = true;
             }
             let x = at + pixel.at as usize - start;
@@ -146,7 +150,7 @@ impl Source<'_> {
                 true => compress(luminance(back.0[0][x], back.0[1][x], back.0[2][x]), self.expansion).recip(),
                 false => 1.0,
             };
-            share.0[x] = pixel.share;
+            (share.0[x], behind.0[x]) = (pixel.share, pixel.behind);
             for p in 0..3 {
                 let own = back.0[p][x];
                 // Depth may be that of another frame, with other colours: no light is below 0.

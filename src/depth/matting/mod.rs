@@ -109,6 +109,7 @@ impl Matting {
             let pure = if evidence.labels.is_near { share > NEARLY_PURE } else { share < 1.0 - NEARLY_PURE };
             let at = evidence.edge.y as usize * size.0 + evidence.edge.x as usize;
             (!pure).then(|| MixedPixel {
+                behind: 1.0 - share,
                 at: at as u32,
                 near_m: evidence.edge.near.recip(),
                 far_m: evidence.edge.far.recip(),

@@ -25,25 +25,40 @@ pub struct Contrast {
     offset: f32,
     /// The reciprocal variance of that share.
     precision: f32,
+    /// The covariance that both surfaces' colours vary by.
+    spread: Symmetric,
 }
 
 impl Contrast {
     /// Of the colours of the near and of the far surface.
     pub(super) fn of(surfaces: [Color; 2]) -> Self {
         let [near, far] = &surfaces;
-        let difference: [f32; 3] = std::array::from_fn(|p| near.mean[p] - far.mean[p]);
         let mut spread: Symmetric = std::array::from_fn(|k| near.covariance[k] + far.covariance[k]);
         let trace = spread[0] + spread[3] + spread[5];
         spread = spread.map(|value| (1.0 - SHRINKAGE) * value);
         for k in [0, 3, 5] {
             spread[k] += SHRINKAGE / 3.0 * trace + QUANTISATION;
         }
+        Self::across(surfaces, spread)
+    }
+
+    /// Of the same near surface, and of one behind whose light is known but for noise.
+    #[inline(always)]
+    pub(super) fn before(&self, light: [f32; 3]) -> Self {
+        let [near, far] = self.surfaces;
+        Self::across([near, Color { mean: light, ..far }], self.spread)
+    }
+
+    #[inline(always)]
+    fn across(surfaces: [Color; 2], spread: Symmetric) -> Self {
+        let [near, far] = &surfaces;
+        let difference: [f32; 3] = std::array::from_fn(|p| near.mean[p] - far.mean[p]);
         let direction = solve(&spread, difference);
         let contrast = dot(direction, difference).max(1e-9);
         // Both surfaces' variances are in it, of which a mixed pixel has half each. No finer than the steps.
         let precision = (2.0 * contrast).min(1000.0);
         let direction = direction.map(|value| value / contrast);
-        Self { surfaces, direction, offset: dot(direction, far.mean), precision }
+        Self { surfaces, direction, offset: dot(direction, far.mean), precision, spread }
     }
 
     /// The share of the near surface that a colour is, from below 0 to above 1.

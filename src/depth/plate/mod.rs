@@ -16,9 +16,10 @@ pub use source::{Guide, Lock, PlateDepth, Step};
 
 use alignment::{Aligner, Alignment};
 use learning::{Learning, Lesson};
-use reduced::{Reducer, reduced_size};
+use reduced::{MOST, Reducer, block_px, reduced_size};
 use subject::Subject;
 
+use crate::depth::matting::mask::Backdrop;
 use crate::frame::{ColorImage, Mask};
 
 /// Steps of the alignment with the first picture; later ones need one.
@@ -38,6 +39,8 @@ pub struct Plate {
     alignment: Alignment,
     subject: Subject,
     learning: Learning,
+    /// The light of each code of the plate, by channel, as the camera exposes now.
+    light: Box<[[f32; 256]; 3]>,
     mask: Mask,
     begun: bool,
     fits: bool,
@@ -57,6 +60,7 @@ impl Plate {
             alignment: Alignment::default(),
             subject: Subject::default(),
             learning: Learning::default(),
+            light: Box::new([[0.0; 256]; 3]),
             mask: Mask::default(),
             begun: false,
             fits: true,
@@ -66,6 +70,13 @@ impl Plate {
     /// What it shows now.
     pub fn color(&self) -> &ColorImage {
         &self.color
+    }
+
+    /// What it shows, as the camera sees it now.
+    pub fn backdrop(&self) -> Backdrop<'_> {
+        let block_px = block_px(self.color.width) as f32;
+        let shift_px = self.alignment.shift.map(|shift| (shift * block_px).round() as isize);
+        Backdrop { color: &self.color, light: &self.light, shift_px }
     }
 
     /// Columns and rows.
@@ -112,6 +123,11 @@ impl Plate {
             }
         }
         self.draw_mask(size);
+        for (light, gain) in self.light.iter_mut().zip(self.alignment.gain) {
+            // Values are roots of light.
+            let exposed = |code: usize| (gain * self.reducer.root(code as f32) / MOST).powi(2).min(1.0);
+            light.iter_mut().enumerate().for_each(|(code, light)| *light = exposed(code));
+        }
         self.fits
     }
 

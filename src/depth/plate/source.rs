@@ -187,7 +187,7 @@ impl DepthSource for PlateDepth {
         map.metres.fill(FAR_M);
         map.subject_m = Some(SUBJECT_M);
         if let (State::Using(plate), Step::Ready) = (&self.state, step) {
-            self.matting.find(plate.mask(), color, SUBJECT_M, map);
+            self.matting.find(plate.mask(), color, Some(&plate.backdrop()), map);
         }
         Ok(())
     }

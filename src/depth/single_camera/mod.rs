@@ -157,7 +157,7 @@ impl DepthSource for SingleCamera {
         map.subject_m = (self.has_subject || relief.is_none()).then_some(SUBJECT_M);
         if let Some(person) = &person {
             let mask = if relief.is_some() { held.mask() } else { person.mask() };
-            matting.find(mask, color, SUBJECT_M, map);
+            matting.find(mask, color, None, map);
         }
         Ok(())
     }

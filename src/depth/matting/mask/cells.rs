@@ -1,5 +1,6 @@
 //! The cells of a picture: what its mask says of each, and the colours of both surfaces around it.
 
+use super::Backdrop;
 use crate::depth::matting::clusters::{Color, Symmetric, outer};
 use crate::depth::matting::share::Contrast;
 use crate::depth::tap::Tap;
@@ -11,6 +12,9 @@ const SURE: f32 = 0.95;
 pub const REACH: usize = 5;
 /// Less weight of pixels than this, of either surface, tells no colour.
 const LEAST_WEIGHT: f32 = 0.5;
+
+/// Variance of the light of a picture of what is behind: noise, and half a pixel of shift.
+const NOISE: f32 = 2e-4;
 
 /// The weights of the cells around one, by row and column.
 pub type Kernel = [[f32; 2 * REACH + 1]; 2 * REACH + 1];
@@ -50,15 +54,20 @@ impl Sums {
         self.0.iter_mut().zip(&other.0).for_each(|(sum, value)| *sum += weight * value);
     }
 
-    /// The colours of both; `None` where there are too few pixels of one.
-    fn colors(&self) -> Option<[Color; 2]> {
+    /// The colours of both; `None` where there are too few pixels of one. What is `behind` anyway is known but for noise.
+    fn colors(&self, behind: bool) -> Option<[Color; 2]> {
+        let noise = Color { mean: [0.0; 3], covariance: [NOISE, 0.0, 0.0, NOISE, 0.0, NOISE] };
         let weights = [self.0[0], self.0[SURFACE]];
         let color = |k: usize| {
             let sums = &self.0[k * SURFACE + 1..];
             let squares: Symmetric = std::array::from_fn(|k| sums[3 + k]);
             Color::of_sums(weights[k], std::array::from_fn(|k| sums[k]), squares)
         };
-        weights.iter().all(|&weight| weight > LEAST_WEIGHT).then(|| [color(NEAR), color(FAR)])
+        match weights.map(|weight| weight > LEAST_WEIGHT) {
+            [true, _] if behind => Some([color(NEAR), noise]),
+            [true, true] => Some([color(NEAR), color(FAR)]),
+            _ => None,
+        }
     }
 }
 
@@ -67,6 +76,7 @@ pub struct View<'a> {
     pub mask: &'a Mask,
     pub color: &'a ColorImage,
     pub light: &'a [f32; 256],
+    pub backdrop: Option<&'a Backdrop<'a>>,
     /// Per column of the picture, those of the mask on both sides.
     pub columns: &'a [Tap],
     pub cell_px: usize,
@@ -176,7 +186,7 @@ impl View<'_> {
                 around.add_all(&sums[other_row * self.across + other], weights[other + REACH - column]);
             }
         }
-        around.colors().map(Contrast::of)
+        around.colors(self.backdrop.is_some()).map(Contrast::of)
     }
 
     /// The cells up to so many away from one, and itself.

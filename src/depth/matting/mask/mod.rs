@@ -5,12 +5,15 @@
 //! a share: 0 or 1 as likely as the mask says, or anything between (mixed pixels, as in Bayesian matting, Chuang et al.
 //! 2001).
 
+mod backdrop;
 mod cells;
 mod posterior;
 
+pub use backdrop::Backdrop;
+
 use crate::color::light_of_codes;
 use crate::depth::tap::Tap;
-use crate::frame::{ColorImage, DepthMap, Mask, MixedPixel};
+use crate::frame::{ColorImage, DepthMap, Mask, Matte, MixedPixel};
 
 use super::NEARLY_PURE;
 use super::share::Contrast;
@@ -21,6 +24,9 @@ use posterior::Posterior;
 pub const SUBJECT_M: f32 = 1.0;
 /// What is then as good as infinitely far, in metres.
 pub const FAR_M: f32 = 1e3;
+
+/// So far from an outline, as a share of the picture's height, blur may show what is behind a subject.
+const REVEALED: f32 = 0.035;
 
 /// Side of a cell in pixels of the mask, and the least in pixels of the picture.
 const CELL_OF_MASK: f32 = 1.6;
@@ -54,7 +60,7 @@ pub struct MaskMatting {
 pub fn depth_around(mask: &Mask, color: &ColorImage) -> DepthMap {
     let mut map = DepthMap { subject_m: Some(SUBJECT_M), ..DepthMap::new(color.width, color.height) };
     map.metres.fill(FAR_M);
-    MaskMatting::default().find(mask, color, SUBJECT_M, &mut map);
+    MaskMatting::default().find(mask, color, None, &mut map);
     map
 }
 
@@ -81,14 +87,16 @@ impl Default for MaskMatting {
 
 impl MaskMatting {
     /// Gives `map`, as large as its picture, which has the metres of what is behind everywhere, those of the nearer surface,
-    /// `near_m`, where `mask` and the colours say that it is; and the mixed pixels between the two.
-    pub fn find(&mut self, mask: &Mask, color: &ColorImage, near_m: f32, map: &mut DepthMap) {
+    /// [`SUBJECT_M`], where `mask` and the colours say that it is; and the mixed pixels between the two. Where it is known
+    /// what is behind, pixels near the outline are mixed ones, too, with all of that behind them.
+    pub fn find(&mut self, mask: &Mask, color: &ColorImage, backdrop: Option<&Backdrop>, map: &mut DepthMap) {
         map.matte.pixels.clear();
         let (width, height) = (color.width as usize, color.height as usize);
+        let backdrop = backdrop.filter(|backdrop| backdrop.color.size() == color.size());
         if map.size() != color.size() || mask.share.is_empty() || width * height == 0 {
             return;
         }
-        pulp::Arch::new().dispatch(Finding { matting: self, mask, color, near_m, map });
+        pulp::Arch::new().dispatch(Finding { matting: self, mask, color, backdrop, map });
     }
 }
 
@@ -97,7 +105,7 @@ struct Finding<'a> {
     matting: &'a mut MaskMatting,
     mask: &'a Mask,
     color: &'a ColorImage,
-    near_m: f32,
+    backdrop: Option<&'a Backdrop<'a>>,
     map: &'a mut DepthMap,
 }
 
@@ -106,14 +114,14 @@ impl pulp::WithSimd for Finding<'_> {
     // No vectors by hand: the call lets the compiler make them of these loops, as wide as the processor has them.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { matting, mask, color, near_m, map } = self;
+        let Self { matting, mask, color, backdrop, map } = self;
         let (width, height) = (color.width as usize, color.height as usize);
         let cell_px = ((CELL_OF_MASK * width as f32 / mask.width as f32).round() as usize).max(LEAST_CELL_PX);
         matting.columns.clear();
         matting.columns.extend((0..width).map(|x| Tap::new(x, width, mask.width as usize)));
         let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
         let MaskMatting { light, posterior, kernel, cells, wanted, sums, contrasts, shares, front, columns } = matting;
-        let view = View { mask, color, light, columns, cell_px, across, down };
+        let view = View { mask, color, light, backdrop, columns, cell_px, across, down };
         view.classify(cells);
         view.gather(cells, wanted, sums);
         contrasts.clear();
@@ -131,10 +139,19 @@ impl pulp::WithSimd for Finding<'_> {
         for cell in 0..across * down {
             match cells[cell] {
                 Cell::Far => {}
-                Cell::Near => {
-                    view.pixels_of(cell).for_each(|(x, y)| map.metres[y * width + x] = near_m);
+                Cell::Near => view.cover(cell, map),
+                Cell::Band => view.take_apart(contrasts[cell].as_ref(), cell, shares, map),
+            }
+        }
+        if let Some(backdrop) = backdrop {
+            let reach = (REVEALED * height as f32 / cell_px as f32).ceil() as usize;
+            for cell in (0..across * down).filter(|&cell| cells[cell] == Cell::Near) {
+                if view.around(cell, reach).any(|at| cells[at] == Cell::Band) {
+                    view.reveal(backdrop, cell, map);
                 }
-                Cell::Band => view.take_apart(contrasts[cell].as_ref(), cell, shares, near_m, map),
+            }
+            if map.matte.pixels.len() > Matte::most(width, height) {
+                map.matte.pixels.retain(|pixel| pixel.share < 1.0);
             }
         }
         map.matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
@@ -154,11 +171,20 @@ impl View<'_> {
     ) {
         let own = contrasts[cell].as_ref();
         let slice = own.map(|contrast| (contrast, posterior.slice(contrast.precision())));
+        let known = self.backdrop.zip(own);
         for (x, y) in self.pixels_of(cell) {
             let at = y * self.color.width as usize + x;
             let mask = self.share_at(x, y);
             let place = |contrast: &Contrast| self.place(contrasts, contrast, (x, y), self.light_at(at));
-            let share = slice.as_ref().map_or(mask, |(contrast, slice)| slice.share(mask, place(contrast)));
+            let share = match (&known, &slice) {
+                (Some((backdrop, own)), _) => {
+                    let behind = backdrop.light_at(x, y);
+                    let precision = own.before(behind).precision();
+                    posterior.slice(precision).share(mask, self.place_before(contrasts, own, (x, y), at, behind))
+                }
+                (None, Some((contrast, slice))) => slice.share(mask, place(contrast)),
+                (None, None) => mask,
+            };
             shares[at] = share;
             if mask > NEAR_FROM && share > NEAR_FROM {
                 shares[at] += FOUND;
@@ -186,7 +212,7 @@ impl View<'_> {
     }
 
     #[inline(always)]
-    fn take_apart(&self, contrast: Option<&Contrast>, cell: usize, shares: &[f32], near_m: f32, map: &mut DepthMap) {
+    fn take_apart(&self, contrast: Option<&Contrast>, cell: usize, shares: &[f32], map: &mut DepthMap) {
         for (x, y) in self.pixels_of(cell) {
             let at = y * self.color.width as usize + x;
             let share = match shares[at] {
@@ -196,20 +222,75 @@ impl View<'_> {
             };
             let far_m = map.metres[at];
             if share > 0.5 {
-                map.metres[at] = near_m;
+                map.metres[at] = SUBJECT_M;
             }
-            if (1.0 - NEARLY_PURE..=NEARLY_PURE).contains(&share) {
-                let own = self.light_at(at);
-                let difference = contrast.map_or([0.0; 3], |contrast| contrast.difference(own, share));
-                map.matte.pixels.push(MixedPixel { at: at as u32, near_m, far_m, share, difference });
+            let own = self.light_at(at);
+            let (behind, difference) = match (self.backdrop, contrast) {
+                (Some(backdrop), _) if share > NEARLY_PURE => {
+                    let light = backdrop.light_at(x, y);
+                    (1.0, std::array::from_fn(|p| (own[p] - light[p]) / share))
+                }
+                (backdrop, Some(contrast)) => match backdrop.map(|backdrop| backdrop.light_at(x, y)) {
+                    Some(light) => (1.0, contrast.before(light).difference(own, share)),
+                    None => (1.0 - share, contrast.difference(own, share)),
+                },
+                (_, None) => (1.0 - share, [0.0; 3]),
+            };
+            if (1.0 - NEARLY_PURE..=NEARLY_PURE).contains(&share) || behind == 1.0 && share > NEARLY_PURE {
+                let (at, near_m) = (at as u32, SUBJECT_M);
+                map.matte.pixels.push(MixedPixel { at, near_m, far_m, share, behind, difference });
             }
+        }
+    }
+
+    /// Every pixel of a cell is the nearer surface's.
+    fn cover(&self, cell: usize, map: &mut DepthMap) {
+        for (x, y) in self.pixels_of(cell) {
+            map.metres[y * self.color.width as usize + x] = SUBJECT_M;
+        }
+    }
+
+    /// The pixels of a cell that is covered, with what is known to be behind them.
+    fn reveal(&self, backdrop: &Backdrop, cell: usize, map: &mut DepthMap) {
+        for (x, y) in self.pixels_of(cell) {
+            let at = y * self.color.width as usize + x;
+            let (own, light) = (self.light_at(at), backdrop.light_at(x, y));
+            let difference = std::array::from_fn(|p| own[p] - light[p]);
+            let (at, near_m, far_m) = (at as u32, SUBJECT_M, FAR_M);
+            map.matte.pixels.push(MixedPixel { at, near_m, far_m, share: 1.0, behind: 1.0, difference });
         }
     }
 
     /// Where the colour of a pixel lies between those of the two surfaces, linear between the cells around it, so that cells
     /// are not seen; `own` is the contrast of its cell.
     #[inline(always)]
-    fn place(&self, contrasts: &[Option<Contrast>], own: &Contrast, (x, y): (usize, usize), light: [f32; 3]) -> f32 {
+    fn place(&self, contrasts: &[Option<Contrast>], own: &Contrast, pixel: (usize, usize), light: [f32; 3]) -> f32 {
+        self.between(contrasts, own, pixel, |contrast| contrast.share(light))
+    }
+
+    /// The same where `behind` is known to be behind it.
+    #[inline(always)]
+    fn place_before(
+        &self,
+        contrasts: &[Option<Contrast>],
+        own: &Contrast,
+        pixel: (usize, usize),
+        at: usize,
+        behind: [f32; 3],
+    ) -> f32 {
+        let light = self.light_at(at);
+        self.between(contrasts, own, pixel, |contrast| contrast.before(behind).share(light))
+    }
+
+    /// The share that the contrasts of the cells around a pixel give, linear between them.
+    #[inline(always)]
+    fn between(
+        &self,
+        contrasts: &[Option<Contrast>],
+        own: &Contrast,
+        (x, y): (usize, usize),
+        share: impl Fn(&Contrast) -> f32,
+    ) -> f32 {
         let half = 0.5 * self.cell_px as f32;
         let axis = |at: usize, count: usize| {
             let place = ((at as f32 + 0.5 - half) / self.cell_px as f32).clamp(0.0, (count - 1) as f32);
@@ -217,7 +298,7 @@ impl View<'_> {
         };
         let ((left, right, along), (above, below, down)) = (axis(x, self.across), axis(y, self.down));
         let at = |row: usize, column: usize| {
-            contrasts[row * self.across + column].as_ref().unwrap_or(own).share(light).clamp(-0.5, 1.5)
+            share(contrasts[row * self.across + column].as_ref().unwrap_or(own)).clamp(-0.5, 1.5)
         };
         let row = |row: usize| {
             let first = at(row, left);
