@@ -138,7 +138,14 @@ fn what_cannot_have_a_matte_has_none() {
     let mut flat = depth(SIZE.0, SIZE.1, |x, _| 1.0 + 0.001 * x as f32);
     let mut stepped = three_depths(SIZE.0, SIZE.1);
     for (map, jump) in [(&mut small, JUMP), (&mut flat, JUMP), (&mut stepped, f32::INFINITY)] {
-        map.matte.pixels.push(MixedPixel { at: 3, near_m: 1.0, far_m: 2.0, share: 0.5, behind: 0.5, difference: [0.1; 3] });
+        map.matte.pixels.push(MixedPixel {
+            at: 3,
+            near_m: 1.0,
+            far_m: 2.0,
+            share: 0.5,
+            behind: 0.5,
+            difference: [0.1; 3],
+        });
         Matting::default().find(map, &picture, jump);
         assert!(map.matte.pixels.is_empty());
     }
@@ -195,7 +202,8 @@ fn the_blurred_background_shows_through_a_soft_outline() {
 /// A light on the wall that a subject in focus hides: through a lens its disc is seen beside the subject, all the same.
 #[test]
 fn what_is_known_to_be_behind_a_subject_shows_beside_it() {
-    let wall = |x: u32, y: u32| light(if (36..42).contains(&x) && (34..46).contains(&y) { [250, 240, 210] } else { BLUE });
+    let wall =
+        |x: u32, y: u32| light(if (36..42).contains(&x) && (34..46).contains(&y) { [250, 240, 210] } else { BLUE });
     let is_near = |x: u32| x < 44;
     let picture = color(SIZE.0, SIZE.1, |x, y| if is_near(x) { RED } else { codes(wall(x, y)) });
     let field = coc(CocKind::Depth, SIZE.1);
@@ -214,11 +222,13 @@ fn what_is_known_to_be_behind_a_subject_shows_beside_it() {
             let at = (30..50u32).flat_map(|y| columns.clone().map(move |x| 3 * (y * SIZE.0 + x) as usize));
             at.map(|at| out.rgb[at].abs_diff(truth.rgb[at])).max().unwrap()
         };
-        let (with, without) =
-            (blur(&map, &picture, &field, quality), blur(&unknown, &picture, &field, quality));
+        let (with, without) = (blur(&map, &picture, &field, quality), blur(&unknown, &picture, &field, quality));
         assert!(error(&with, 0..43, &picture) <= 3, "{quality}: the subject stays as it is");
         let (known, filled) = (error(&with, 45..56, &behind), error(&without, 45..56, &behind));
-        assert!(known <= 6 && filled >= 3 * known.max(1), "{quality}: {known} codes off, {filled} where it is not known");
+        assert!(
+            known <= 6 && filled >= 3 * known.max(1),
+            "{quality}: {known} codes off, {filled} where it is not known"
+        );
     }
 }
 

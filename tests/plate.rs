@@ -39,8 +39,7 @@ struct Shown {
     frame: u32,
 }
 
-const ROOM: Shown =
-    Shown { person: None, light: [1.0; 3], nudge_px: (0.0, 0.0), shadow: 1.0, vase: false, frame: 0 };
+const ROOM: Shown = Shown { person: None, light: [1.0; 3], nudge_px: (0.0, 0.0), shadow: 1.0, vase: false, frame: 0 };
 
 impl Shown {
     /// Codes of the room: a wall with a pattern, a shelf, a bright window.
@@ -75,7 +74,8 @@ impl Shown {
                     () => Self::room(fx - self.nudge_px.0, fy - self.nudge_px.1),
                 };
                 // A shadow on the wall beside the person, soft at its edge.
-                let beside = self.person.map_or(9.0, |(px, py)| ((fx - px - 110.0) / 90.0).hypot((fy - py - 60.0) / 120.0));
+                let beside =
+                    self.person.map_or(9.0, |(px, py)| ((fx - px - 110.0) / 90.0).hypot((fy - py - 60.0) / 120.0));
                 let depth = ((1.6 - beside) / 1.2).clamp(0.0, 1.0);
                 let shade = if is_person { 1.0 } else { 1.0 - (1.0 - self.shadow) * depth };
                 for (code, light) in codes.iter_mut().zip(self.light) {
@@ -149,7 +149,9 @@ fn exposure_white_balance_a_nudge_and_shadows_are_no_persons() {
         ("in shadow", Shown { shadow: 0.7, ..PERSON }),
     ] {
         let mut watched = Watched::before_room();
-        (0..4).for_each(|_| { watched.see(shown); });
+        (0..4).for_each(|_| {
+            watched.see(shown);
+        });
         let (step, found, mistaken) = watched.see(shown);
         eprintln!("{what}: {found:.4} found, {mistaken:.4} mistaken");
         assert!(step == Step::Ready && found > 0.985 && mistaken < 0.01, "{what}: {step:?} {found} {mistaken}");
@@ -162,7 +164,9 @@ fn what_was_put_down_is_learned_and_who_sits_still_is_not() {
     let sits = Shown { vase: true, ..PERSON };
     let (_, found, mistaken) = watched.see(sits);
     assert!(found > 0.99 && mistaken > 0.005, "the vase is new: {found} {mistaken}");
-    (0..240).for_each(|_| { watched.see(sits); });
+    (0..240).for_each(|_| {
+        watched.see(sits);
+    });
     let (_, found, mistaken) = watched.see(sits);
     assert!(found > 0.99 && mistaken < 0.002, "after 8 s: {found} {mistaken}");
     // It is known for good, and so is the place where it stood, once it is seen.
@@ -244,12 +248,18 @@ fn commands_take_plates_and_use_them() {
 
     for (arguments, code, part) in [
         (&["render", "me.png", "--depth", "plate", "--out", "a.png"][..], 2, "name the picture"),
-        (&["render", "me.png", "--depth", "plate:small.png", "--out", "a.png"], 2, "64 x 36, and the pictures are 640 x 360"),
+        (
+            &["render", "me.png", "--depth", "plate:small.png", "--out", "a.png"],
+            2,
+            "64 x 36, and the pictures are 640 x 360",
+        ),
         (&["render", "me.png", "--depth", "plate:none.png", "--out", "a.png"], 1, "none.png"),
         (&["render", "me.png", "--depth", "plate:", "--out", "a.png"], 2, "name a picture after the colon"),
         (&["render", "me.png", "--depth", "plate:room.png", "--focus", "1.2", "--out", "a.png"], 2, "--focus"),
         (&["render", "me.png", "--depth", "plate:room.png", "--force", "--out", "room.png"], 2, "which is read"),
         (&["stream", "synthetic", "--depth", "plate", "--to", "null"], 2, "leave --depth out"),
+        (&["render", "me.png", "--depth", "defocus", "--out", "a.png"], 2, "equally sharp"),
+        (&["stream", "synthetic", "--depth", "defocus", "--to", "null"], 2, "leave --depth out"),
         (&["plate", "synthetic", "--frames", "3", "--to", "room.png"], 1, "exists"),
         (&["plate", "synthetic", "--frames", "3", "--to", "room.gif"], 1, "room.gif"),
     ] {

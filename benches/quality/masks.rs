@@ -246,12 +246,7 @@ fn ours(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> Plane
 }
 
 /// This crate's portrait, at the default quality.
-fn portrait(
-    given: &Given,
-    behind: Option<&ColorImage>,
-    shot: &Shot,
-    behind_px: f32,
-) -> Result<ColorImage, BokehError> {
+fn portrait(given: &Given, behind: Option<&ColorImage>, shot: &Shot, behind_px: f32) -> Result<ColorImage, BokehError> {
     let lens = Shot::lens(behind_px, SUBJECT_M, shot.image.height as usize);
     let shot = Shot { depth: matte(given, behind, &shot.image), lens, ..shot.clone() };
     Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)

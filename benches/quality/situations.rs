@@ -152,11 +152,12 @@ fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
 /// The plate as the program takes it.
 fn plate(staged: &Staged) -> ColorImage {
     let mut capture = Capture::default();
-    (0..).find_map(|frame| match capture.add_any(&with_noise(&staged.room, staged.noise, frame)) {
-        Taken::Whole(plate) => Some(plate),
-        Taken::More(_) | Taken::Moved => None,
-    })
-    .unwrap_or_default()
+    (0..)
+        .find_map(|frame| match capture.add_any(&with_noise(&staged.room, staged.noise, frame)) {
+            Taken::Whole(plate) => Some(plate),
+            Taken::More(_) | Taken::Moved => None,
+        })
+        .unwrap_or_default()
 }
 
 /// A known network for a task.

@@ -4,15 +4,16 @@
 
 pub mod agreement;
 pub mod beside;
+pub mod defocus;
 pub mod fill;
 pub mod focus;
 mod guided_fill;
 #[cfg(feature = "camera")]
 pub mod live;
 pub mod matting;
+pub mod plate;
 pub mod recorded;
 pub mod refine;
-pub mod plate;
 pub mod registration;
 #[cfg(feature = "networks")]
 pub mod single_camera;

@@ -18,8 +18,8 @@ use crate::source::{DepthChoice, DepthFrom, Kind, Options, Source, SourceName};
 const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
                          `bokehcam doctor` says what is missing.";
 /// Shown where a camera gives no depth, so that a portrait never comes.
-const NO_DEPTH: &str = "This camera has no depth, so a band of the picture stays sharp. `bokehcam models` says which free \
-                        network gives one camera a portrait.";
+const NO_DEPTH: &str = "This camera has no depth, so a band of the picture stays sharp. A plate gives it a portrait (T), and \
+                        so does a free network (`bokehcam models`).";
 /// The source that needs no camera.
 const SYNTHETIC: &str = "synthetic";
 
@@ -110,7 +110,7 @@ impl Services for System {
         };
         let (source, source_name) = self.open_source(&name, with_plate)?;
         notes.extend(source.networks.iter().map(|networks| format!("Depth by {networks}.")));
-        if source_name.kind() == Kind::Camera && !source.has_depth() && cfg!(feature = "networks") {
+        if source_name.kind() == Kind::Camera && !source.has_depth() {
             notes.push(NO_DEPTH.to_owned());
         }
         self.turned.clear();

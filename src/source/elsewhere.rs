@@ -48,6 +48,9 @@ pub(super) fn with_external_depth(
             about = Some(said);
             (depth, DepthFrom::Networks)
         }
+        DepthChoice::Defocus => {
+            return SourceError::usage("--depth defocus is for a photograph: bokehcam render PHOTO --depth defocus");
+        }
         DepthChoice::Plate(file) => {
             let depth = plate::open(file.as_deref(), &source, name, wanted)?;
             guide = Some(depth.guide());

@@ -142,12 +142,14 @@ pub enum DepthChoice {
     Networks(ChosenNetworks),
     /// A picture of what is behind, in this file, or one that is taken at the start.
     Plate(Option<PathBuf>),
+    /// The small defocus of a photograph itself.
+    Defocus,
 }
 
 impl DepthChoice {
     /// Whether it names depth that is not the source's own.
     pub fn is_elsewhere(&self) -> bool {
-        matches!(self, Self::Folder(_) | Self::Device(_) | Self::Networks(_) | Self::Plate(_))
+        matches!(self, Self::Folder(_) | Self::Device(_) | Self::Networks(_) | Self::Plate(_) | Self::Defocus)
     }
 }
 
@@ -160,6 +162,7 @@ impl FromStr for DepthChoice {
             "stereo" => Self::Stereo,
             "none" => Self::None,
             "plate" => Self::Plate(None),
+            "defocus" => Self::Defocus,
             "" => {
                 return Err(
                     "use auto, recorded, stereo, none, matte, mono, plate, a folder with a recording, or a depth camera"

@@ -70,7 +70,9 @@ pub(super) fn lock(name: &SourceName) -> Option<Lock> {
         return Some(Box::new(move || match Held::new(&camera) {
             Ok(held) => Some(Box::new(held)),
             Err(error) => {
-                tracing::warn!("{error}: its exposure may change, and the plate is corrected for that as well as can be");
+                tracing::warn!(
+                    "{error}: its exposure may change, and the plate is corrected for that as well as can be"
+                );
                 None
             }
         }));

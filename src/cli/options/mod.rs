@@ -65,7 +65,7 @@ pub struct Blur {
     /// (the source's), stereo (from its two eyes), none, a folder with a recording whose depth is played in a loop, a depth
     /// camera (/dev/videoN, N, or part of its name), networks that need one camera alone: matte[:FILE.onnx] (where a
     /// person is), mono[:FILE.onnx] (how near all is), or matte,mono; without FILE, the best that is installed; or
-    /// plate[:FILE.png], a picture of what is behind you, taken at the start if there is no FILE (the camera stands still)
+    /// plate[:FILE.png], a picture of what is behind you, taken at the start if there is no FILE (the camera stands still); of a photograph, defocus (its own, magnified)
     #[arg(long, value_name = "FROM", default_value = "auto")]
     pub depth: DepthChoice,
     /// The look, but for its quality.

@@ -163,8 +163,8 @@ pub fn warn_of_no_depth(source: From) {
     let fix = match source {
         From::Picture => "--depth-map FILE gives its depth",
         From::Source(Kind::Recording) => "--depth FOLDER takes another recording's",
-        From::Source(Kind::Camera) if cfg!(feature = "networks") => {
-            "`bokehcam models` says how one camera alone gives a portrait"
+        From::Source(Kind::Camera) => {
+            "one camera alone gives a portrait by --depth plate (step aside once), or by a network (`bokehcam models`)"
         }
         From::Source(_) | From::Bench => "--depth NAME takes a depth camera's",
     };

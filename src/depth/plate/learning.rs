@@ -46,7 +46,13 @@ pub struct Lesson<'a> {
 
 impl Learning {
     /// Learns from a picture. Whether the plate is another now.
-    pub fn learn(&mut self, lesson: Lesson, reducer: &Reducer, plate: &mut ColorImage, reduced: &mut [[f32; 3]]) -> bool {
+    pub fn learn(
+        &mut self,
+        lesson: Lesson,
+        reducer: &Reducer,
+        plate: &mut ColorImage,
+        reduced: &mut [[f32; 3]],
+    ) -> bool {
         let (across, down) = reduced_size(lesson.color);
         self.rounds.resize(across * down, 0);
         self.changed.resize(across * down, ([0.0; 3], 0));

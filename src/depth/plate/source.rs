@@ -2,8 +2,8 @@
 
 use std::any::Any;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use super::{Capture, Plate, Taken};
 use crate::depth::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
@@ -103,7 +103,10 @@ impl Guide {
 enum State {
     /// To be taken: since when, once there was a picture.
     Waiting(Option<u64>),
-    Taking { capture: Box<Capture>, since_ns: u64 },
+    Taking {
+        capture: Box<Capture>,
+        since_ns: u64,
+    },
     Using(Box<Plate>),
 }
 

@@ -104,7 +104,8 @@ impl Subject {
             let (above, below) = (y.saturating_sub(1) * width, (y + 1).min(height - 1) * width);
             for x in 0..width {
                 let at = y * width + x;
-                let around = [y * width + x.saturating_sub(1), y * width + (x + 1).min(width - 1), above + x, below + x];
+                let around =
+                    [y * width + x.saturating_sub(1), y * width + (x + 1).min(width - 1), above + x, below + x];
                 let (mut most, mut sums) = (0.0f32, [0.0f32; 2]);
                 for p in 0..3 {
                     // Half a pixel of what is beside it is no difference: nothing stands that still.

@@ -42,7 +42,9 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
         Step::StepOut(_) => ("Step out of the picture", ""),
         Step::Taking(_) => ("Stay out", "What is behind you is being learned."),
         Step::Moves => ("Something moves", "Stay out of the picture, and let the camera stand still."),
-        Step::Restless => ("No plate so far", "Something keeps moving: let the camera stand on something firm, and step out."),
+        Step::Restless => {
+            ("No plate so far", "Something keeps moving: let the camera stand on something firm, and step out.")
+        }
         _ => (
             "Another picture",
             "The camera was moved, or the light has changed: nobody can be told from what is behind, so all is blurred.",

@@ -117,8 +117,17 @@ impl Live {
             executor,
             budget_ns,
         });
-        let live =
-            Self { size: info.size, period_ns: info.period_ns, has_depth, made_for, changes, board, stop, guide, thread };
+        let live = Self {
+            size: info.size,
+            period_ns: info.period_ns,
+            has_depth,
+            made_for,
+            changes,
+            board,
+            stop,
+            guide,
+            thread,
+        };
         Ok((live, source))
     }
 

@@ -9,7 +9,8 @@ pub const NO_DEPTH: &str =
 /// Shown when depth is to be viewed while it is not computed.
 pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: choose Depth as the effect first.";
 /// Shown when a plate is to be taken of what is no camera.
-pub const NO_PLATE: &str = "A plate is a picture of what is behind you, taken with a camera that stands still: choose one first.";
+pub const NO_PLATE: &str =
+    "A plate is a picture of what is behind you, taken with a camera that stands still: choose one first.";
 /// Shown when there is no virtual camera.
 pub const NO_VIRTUAL_CAMERA: &str = "There is no virtual camera yet: `bokehcam doctor` says how to make one.";
 

@@ -20,8 +20,8 @@ pub use history::History;
 use super::meters::Meters;
 use super::views::Legend;
 pub use super::views::Shown;
-use crate::knob::Knob;
 use crate::depth::plate::Step;
+use crate::knob::Knob;
 use crate::look::Look;
 use crate::look::presets::Preset;
 

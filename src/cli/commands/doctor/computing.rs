@@ -33,7 +33,7 @@ fn check_networks() -> Vec<Finding> {
         false => Finding::note(
             NETWORKS,
             "none that finds persons, so one camera alone gives no portrait",
-            "`bokehcam models` says which is known and where to get it (450 kB)",
+            "`bokehcam models` says which is known and where to get it (450 kB); --depth plate needs none",
         ),
     };
     let of_runtime = match network::onnx_runtime_installed() {

@@ -20,6 +20,7 @@ use crate::cli::settings::unused::From;
 use crate::cli::terminal;
 use crate::compute::Backend;
 use crate::depth::agreement::Agreement;
+use crate::depth::defocus;
 use crate::depth::matting::mask;
 use crate::files::place;
 use crate::frame::{ColorImage, DepthMap, Mask};
@@ -260,8 +261,8 @@ fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Opt
 fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
     let is_given = command.depth_map.is_some() || command.mask.is_some();
     match (&command.mask, &command.blur.depth) {
-        (_, DepthChoice::Networks(_) | DepthChoice::Plate(_)) if is_given => {
-            let what = "--depth matte, mono and plate make the depth: leave --depth-map and --mask out";
+        (_, DepthChoice::Networks(_) | DepthChoice::Plate(_) | DepthChoice::Defocus) if is_given => {
+            let what = "--depth matte, mono, plate and defocus make the depth: leave --depth-map and --mask out";
             Err(CliError::Usage(what.to_string()))
         }
         (Some(file), _) => {
@@ -279,6 +280,14 @@ fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Resul
         (None, DepthChoice::Plate(Some(file))) => {
             source::refuse_metres(look, "a plate tells")?;
             Ok(Some(Depth::Final(source::plate::depth_of_picture(file, color)?)))
+        }
+        (None, DepthChoice::Defocus) => {
+            source::refuse_metres(look, "defocus tells")?;
+            defocus::depth(color).map(Depth::Final).map(Some).ok_or_else(|| {
+                let what = "--depth defocus: the picture is equally sharp all over, or has hardly any edges, so that nothing can be \
+                            told of its depth; --depth mono or --effect blur needs no such difference";
+                CliError::Usage(what.to_string())
+            })
         }
         (None, DepthChoice::Plate(None)) => {
             let what = "--depth plate: name the picture of what is behind: --depth plate:FILE.png";

@@ -50,7 +50,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     });
     if state.takes_plates()[0] {
         let text = if state.plate.is_some() { "Take another plate" } else { "Take a plate" };
-        let hint = "A picture of what is behind you gives a portrait without any network; the camera has to stand still (T)";
+        let hint =
+            "A picture of what is behind you gives a portrait without any network; the camera has to stand still (T)";
         if ui.button(text).on_hover_text(hint).clicked() {
             sheet.act(Action::TakePlate);
         }
