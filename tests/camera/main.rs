@@ -13,5 +13,6 @@ mod faults;
 mod formats;
 mod knobs;
 mod machine;
+mod plate;
 mod two_eyes;
 mod virtual_camera;

@@ -4,6 +4,7 @@ mod gestures;
 mod keyboard;
 mod looks;
 mod paint;
+mod plate;
 mod sizes;
 
 use egui::{Event, FullOutput, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2, pos2};

@@ -266,3 +266,27 @@ fn arrows_move_what_is_sharp() {
         assert!((tweak::turned(angle, by) - is).abs() < 1e-4, "{angle} by {by}");
     }
 }
+
+#[test]
+fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
+    let mut state = state();
+    assert_eq!(state.takes_plates(), [false; 2]);
+    assert_eq!((state.apply(Action::TakePlate), &state.notes.last().unwrap().text[..]), (vec![], NO_PLATE));
+    state.hear(Update::Source(running(false)));
+    assert_eq!(state.takes_plates(), [true; 2]);
+    state.apply(Action::DeclinePlate);
+    assert!(state.declined_plate);
+    assert_eq!(state.apply(Action::TakePlate), [Request::TakePlate]);
+    assert!(!state.declined_plate);
+    let notes = state.notes.len();
+    for (step, is_new) in
+        [(Step::StepOut(3), true), (Step::StepOut(3), false), (Step::Taking(50), true), (Step::Ready, true)]
+    {
+        assert_eq!(state.guide(Some(step)), is_new, "{step:?}");
+    }
+    assert_eq!(state.notes.len(), notes + 1);
+    assert!(!state.guide(Some(Step::Ready)) && state.guide(None));
+    // A plate that was there from the start is no news.
+    assert!(state.guide(Some(Step::Ready)));
+    assert_eq!(state.notes.len(), notes + 1);
+}
