@@ -101,7 +101,7 @@ struct Watched {
 
 impl Watched {
     fn new(plate: Option<ColorImage>) -> Self {
-        Self { source: PlateDepth::new(plate, None), frame: 0, map: DepthMap::default() }
+        Self { source: PlateDepth::new(plate, None, None), frame: 0, map: DepthMap::default() }
     }
 
     /// A source with the plate of the room.
@@ -254,7 +254,7 @@ fn commands_take_plates_and_use_them() {
             "64 x 36, and the pictures are 640 x 360",
         ),
         (&["render", "me.png", "--depth", "plate:none.png", "--out", "a.png"], 1, "none.png"),
-        (&["render", "me.png", "--depth", "plate:", "--out", "a.png"], 2, "name a picture after the colon"),
+        (&["render", "me.png", "--depth", "plate:", "--out", "a.png"], 2, "name a file after the colon"),
         (&["render", "me.png", "--depth", "plate:room.png", "--focus", "1.2", "--out", "a.png"], 2, "--focus"),
         (&["render", "me.png", "--depth", "plate:room.png", "--force", "--out", "room.png"], 2, "which is read"),
         (&["stream", "synthetic", "--depth", "plate", "--to", "null"], 2, "leave --depth out"),

@@ -83,7 +83,7 @@ impl Services for Small {
         let (name, notes, controls) = (name.to_owned(), vec!["a note".to_owned()], Vec::new());
         let mut source = source::Source::of(camera, None);
         if with_plate {
-            let plate = PlateDepth::new(None, None);
+            let plate = PlateDepth::new(None, None, None);
             source.guide = Some(plate.guide());
             source.depth = Some(Box::new(plate));
         }

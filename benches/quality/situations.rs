@@ -12,7 +12,7 @@ use bokehcam::bokeh::aperture::{Aperture, lens_points};
 use bokehcam::budget::Quality;
 use bokehcam::compute::thread_pool::cores;
 use bokehcam::depth::matting::mask::SUBJECT_M;
-use bokehcam::depth::plate::{Capture, PlateDepth, Taken};
+use bokehcam::depth::plate::{Capture, Companion, PlateDepth, Taken};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, Stamp};
@@ -118,19 +118,24 @@ fn stage(situation: Situation) -> Staged {
 fn depths(staged: &Staged) -> Vec<(&'static str, DepthMap)> {
     let [matte, mono] = [Task::Matte, Task::Mono].map(model);
     let networks = |matte: &Option<PathBuf>, mono: &Option<PathBuf>| {
-        let source = SingleCamera::open(matte.as_deref(), mono.as_deref(), &Hints::default(), Runtime::Auto);
-        source.ok().map(|source| Box::new(source) as Box<dyn DepthSource>)
+        SingleCamera::open(matte.as_deref(), mono.as_deref(), &Hints::default(), Runtime::Auto).ok()
     };
-    let plate: Box<dyn DepthSource> = Box::new(PlateDepth::new(Some(plate(staged)), None));
-    let mut sources = vec![("plate", Some(plate))];
+    let alone = |networks: Option<SingleCamera>| networks.map(|networks| Box::new(networks) as Box<dyn DepthSource>);
+    let with_plate = |companion: Option<SingleCamera>| -> Option<Box<dyn DepthSource>> {
+        let companion = companion.map(|networks| Box::new(networks) as Box<dyn Companion>);
+        Some(Box::new(PlateDepth::new(Some(plate(staged)), None, companion)))
+    };
+    let mut sources = vec![("plate", with_plate(None))];
     if matte.is_some() {
-        sources.push(("matte", networks(&matte, &None)));
+        sources.push(("matte", alone(networks(&matte, &None))));
+        sources.push(("plate,matte", with_plate(networks(&matte, &None))));
     }
     if mono.is_some() {
-        sources.push(("mono", networks(&None, &mono)));
+        sources.push(("mono", alone(networks(&None, &mono))));
     }
     if matte.is_some() && mono.is_some() {
-        sources.push(("matte,mono", networks(&matte, &mono)));
+        sources.push(("matte,mono", alone(networks(&matte, &mono))));
+        sources.push(("all three", with_plate(networks(&matte, &mono))));
     }
     let mut depths = vec![("exact depth", staged.depth.clone())];
     for (name, source) in sources {

@@ -12,7 +12,7 @@ use crate::knob::Knob;
 use crate::look::{Effect, Look, presets::Preset};
 use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
-use crate::source::{DepthChoice, DepthFrom, Kind, Options, Source, SourceName};
+use crate::source::{DepthChoice, DepthFrom, Kind, OneCamera, Options, Source, SourceName};
 
 /// Shown when there is no camera, and the synthetic scene takes its place.
 const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
@@ -70,7 +70,7 @@ impl System {
         let mut options = self.options.clone();
         options.cycle = true;
         if with_plate {
-            options.depth_choice = DepthChoice::Plate(None);
+            options.depth_choice = DepthChoice::OneCamera(OneCamera::plate());
         }
         // Only recordings repeat this way: the synthetic scene cycles.
         options.frames.repeat &= source_name.kind() == Kind::Recording;

@@ -1,7 +1,7 @@
 //! External depth for a source: from another recording, or from a depth camera.
 
 use super::opened::depth_of;
-use super::{DepthChoice, DepthFrom, Options, Source, SourceError, SourceName, Wanted, networks, options, plate};
+use super::{DepthChoice, DepthFrom, Options, Source, SourceError, SourceName, Wanted, one_camera, options};
 use crate::capture::Brings;
 use crate::clock::Clock;
 use crate::depth::DepthSource;
@@ -33,7 +33,7 @@ pub(super) fn with_external_depth(
     if source.camera.info().brings == Brings::Depth {
         return SourceError::usage("the source knows its depth: leave --depth out");
     }
-    let (mut first_depth, mut about, mut guide) = (None, None, None);
+    let mut first_depth = None;
     let (external, depth_from): (Box<dyn DepthSource>, _) = match choice {
         DepthChoice::Auto | DepthChoice::Recorded | DepthChoice::Stereo | DepthChoice::None => return Ok(source),
         DepthChoice::Folder(folder) => {
@@ -43,21 +43,12 @@ pub(super) fn with_external_depth(
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }
         DepthChoice::Device(name) => (open_depth_camera(name, depth, clock)?, DepthFrom::Units),
-        DepthChoice::Networks(chosen) => {
-            let (depth, said) = networks::open(chosen, wanted)?;
-            about = Some(said);
-            (depth, DepthFrom::Networks)
-        }
+        DepthChoice::OneCamera(chosen) => return one_camera::give(source, chosen, name, wanted),
         DepthChoice::Defocus => {
             return SourceError::usage("--depth defocus is for a photograph: bokehcam render PHOTO --depth defocus");
         }
-        DepthChoice::Plate(file) => {
-            let depth = plate::open(file.as_deref(), &source, name, wanted)?;
-            guide = Some(depth.guide());
-            (Box::new(depth), DepthFrom::Plate)
-        }
     };
-    Ok(Source { depth: Some(external), depth_from, networks: about, guide, first_depth, ..source })
+    Ok(Source { depth: Some(external), depth_from, first_depth, ..source })
 }
 
 /// Opens the depth camera `name` with the scale and registration that the options state.

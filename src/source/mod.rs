@@ -20,9 +20,9 @@ mod eyes;
 mod name;
 mod near;
 mod networks;
+pub mod one_camera;
 mod opened;
 pub mod options;
-pub mod plate;
 #[cfg(feature = "camera")]
 pub mod registration;
 
@@ -30,7 +30,7 @@ pub use error::SourceError;
 pub use name::{Kind, SourceName};
 pub use networks::refuse_metres;
 use opened::Opened;
-pub use options::{ChosenNetworks, DepthChoice, Frames, NetworkFile, Size};
+pub use options::{DepthChoice, Frames, NetworkFile, OneCamera, PlateFile, Size};
 
 use std::sync::Arc;
 
@@ -38,10 +38,10 @@ use crate::capture::side_by_side::SideBySide;
 use crate::capture::{Brings, Camera, CaptureError};
 use crate::clock::Clock;
 use crate::computing::Computing;
+use crate::depth::DepthSource;
 use crate::depth::focus::FocusRule;
 use crate::depth::plate::Guide;
-use crate::depth::{DepthSource, Seen};
-use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::frame::DepthMap;
 use crate::look::{Effect, Look, Strength};
 use crate::optics::StereoRig;
 use crate::recording::{Options as Reading, Recording, Scratch};
@@ -242,23 +242,6 @@ impl Wanted<'_> {
             _ => false,
         }
     }
-}
-
-/// The depth of one picture, made by the networks `chosen`.
-///
-/// # Errors
-/// One is not installed or cannot be used, it failed, or the look needs real distances.
-pub fn depth_by_networks(
-    chosen: &ChosenNetworks,
-    options: &Options,
-    look: &Look,
-    color: &ColorImage,
-) -> Result<DepthMap, SourceError> {
-    let (mut networks, _) = networks::open(chosen, &Wanted { options, look: Some(look) })?;
-    let stamp = Stamp { index: 0, time_ns: 0, captured_ns: None };
-    let mut map = DepthMap::default();
-    networks.read(Seen { stamp, color, right: None }, &mut map)?;
-    Ok(map)
 }
 
 /// The look adapted to a source with or without depth: without, depth of field becomes tilt-shift.

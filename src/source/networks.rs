@@ -1,14 +1,16 @@
 //! Depth from one camera by networks: those that the user names, or those that are installed.
 
-use super::{ChosenNetworks, Source, SourceError, SourceName, Wanted};
-use crate::depth::DepthSource;
+use super::{OneCamera, Source, SourceError, SourceName, Wanted};
+use crate::depth::plate::Companion;
 use crate::look::Look;
 
 #[cfg(feature = "networks")]
 use super::{DepthChoice, DepthFrom, Kind, NetworkFile};
+#[cfg(feature = "networks")]
+use crate::depth::DepthSource;
 
 /// Networks at work, and what they are in a few words.
-type Opened = (Box<dyn DepthSource>, String);
+type Opened = (Box<dyn Companion>, String);
 
 /// Refuses a look that needs real distances, for depth in which `who` knows only relative ones.
 ///
@@ -26,12 +28,11 @@ pub fn refuse_metres(look: &Look, who: &str) -> Result<(), SourceError> {
 /// Opens the networks `chosen`, for a look.
 ///
 /// # Errors
-/// One is not installed or cannot be used, or the look needs real distances.
+/// One is not installed or cannot be used.
 #[cfg(feature = "networks")]
-pub(super) fn open(chosen: &ChosenNetworks, wanted: &Wanted) -> Result<Opened, SourceError> {
+pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, SourceError> {
     use crate::depth::single_camera::{Hints, SingleCamera};
     use crate::network::{Task, best};
-    wanted.look.map_or(Ok(()), |look| refuse_metres(look, "networks know"))?;
     let file = |chosen: &Option<NetworkFile>, task: Task| {
         match chosen {
         None => Ok(None),
@@ -71,13 +72,14 @@ pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted
     let installed = installed();
     let best =
         |task| installed.iter().find(|(known, _)| known.task == task).map(|(_, file)| NetworkFile::At(file.clone()));
-    let chosen = ChosenNetworks { matte: best(Task::Matte), mono: best(Task::Mono) };
+    let chosen = OneCamera { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) };
     if chosen.matte.is_none() {
         return source;
     }
     match open(&chosen, wanted) {
         Ok((depth, about)) => {
-            Source { depth: Some(depth), depth_from: DepthFrom::Networks, networks: Some(about), ..source }
+            let depth: Option<Box<dyn DepthSource>> = Some(depth);
+            Source { depth, depth_from: DepthFrom::Networks, networks: Some(about), ..source }
         }
         // They were not asked for.
         Err(error) => {
@@ -88,7 +90,7 @@ pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted
 }
 
 #[cfg(not(feature = "networks"))]
-pub(super) fn open(_: &ChosenNetworks, _: &Wanted) -> Result<Opened, SourceError> {
+pub(super) fn open(_: &OneCamera, _: &Wanted) -> Result<Opened, SourceError> {
     SourceError::usage("--depth matte and mono: this build leaves networks out (feature `networks`)")
 }
 

@@ -3,7 +3,7 @@
 // What options say is shown as it is written, brackets included.
 #![allow(rustdoc::broken_intra_doc_links)]
 
-mod networks;
+mod one_camera;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -15,9 +15,9 @@ use crate::depth::stereo::Settings;
 use crate::look::number::{above_zero, within};
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
-pub use networks::{ChosenNetworks, NetworkFile, Networks};
+pub use one_camera::{NetworkFile, Networks, OneCamera, PlateFile};
 #[cfg(feature = "networks")]
-pub use networks::{Order, Range};
+pub use one_camera::{Order, Range};
 
 /// Units of a 16-bit depth picture per metre: the TUM convention.
 pub const DEPTH_SCALE: f32 = 5000.0;
@@ -138,10 +138,8 @@ pub enum DepthChoice {
     Folder(PathBuf),
     /// A depth camera, by its path or name.
     Device(String),
-    /// Networks, from the pictures alone.
-    Networks(ChosenNetworks),
-    /// A picture of what is behind, in this file, or one that is taken at the start.
-    Plate(Option<PathBuf>),
+    /// A plate and networks, from the pictures alone.
+    OneCamera(OneCamera),
     /// The small defocus of a photograph itself.
     Defocus,
 }
@@ -149,7 +147,7 @@ pub enum DepthChoice {
 impl DepthChoice {
     /// Whether it names depth that is not the source's own.
     pub fn is_elsewhere(&self) -> bool {
-        matches!(self, Self::Folder(_) | Self::Device(_) | Self::Networks(_) | Self::Plate(_) | Self::Defocus)
+        matches!(self, Self::Folder(_) | Self::Device(_) | Self::OneCamera(_) | Self::Defocus)
     }
 }
 
@@ -161,7 +159,6 @@ impl FromStr for DepthChoice {
             "recorded" => Self::Recorded,
             "stereo" => Self::Stereo,
             "none" => Self::None,
-            "plate" => Self::Plate(None),
             "defocus" => Self::Defocus,
             "" => {
                 return Err(
@@ -169,11 +166,7 @@ impl FromStr for DepthChoice {
                         .to_string(),
                 );
             }
-            text if let Some(chosen) = ChosenNetworks::parse(text) => Self::Networks(chosen?),
-            text if let Some(file) = text.strip_prefix("plate:") => match file {
-                "" => return Err(format!("{text}: name a picture after the colon, or leave it out")),
-                file => Self::Plate(Some(file.into())),
-            },
+            text if let Some(chosen) = OneCamera::parse(text) => Self::OneCamera(chosen?),
             folder if Path::new(folder).is_dir() => Self::Folder(folder.into()),
             device => Self::Device(device.to_owned()),
         })

@@ -65,7 +65,7 @@ fn background(sequence: &Sequence) -> (ColorImage, Vec<bool>) {
 fn a_real_person_before_a_plate_is_found() {
     let sequence = Sequence::open();
     let (plate, known) = background(&sequence);
-    let mut source = PlateDepth::new(Some(plate), None);
+    let mut source = PlateDepth::new(Some(plate), None, None);
     let (mut found, mut persons, mut mistaken, mut walls) = (0u64, 0u64, 0u64, 0u64);
     let (mut flicker, mut resting) = (0.0f64, 0u64);
     let mut last: Option<(DepthMap, Vec<bool>)> = None;

@@ -18,7 +18,7 @@ use crate::depth::{DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::look::Effect;
 use crate::recording::still;
-use crate::source::{DepthChoice, Options, Source, SourceName, plate};
+use crate::source::{DepthChoice, Options, Source, SourceName, one_camera};
 
 /// Take a plate: a picture of what is behind you, for --depth plate:FILE
 #[derive(Args, Debug)]
@@ -109,7 +109,7 @@ impl Frames {
 
 /// The plate of a camera, with a countdown for the person before it.
 fn taken(frames: &mut Frames, name: &SourceName, global: &options::Global) -> Result<ColorImage, CliError> {
-    let (mut source, guide) = plate::taking(name);
+    let (mut source, guide) = one_camera::taking(name);
     let guidance = Guidance::new(Some(guide), global);
     let mut map = DepthMap::default();
     while let Some(stamp) = frames.next()? {

@@ -1,13 +1,15 @@
 //! Taking a plate: the median of pictures in which nothing moves.
 
 use super::reduced::Reducer;
-use crate::frame::ColorImage;
+use crate::frame::{ColorImage, Mask};
 
 /// They are so far apart, at least.
 const APART_NS: u64 = 80_000_000;
 /// A picture in which more than this share of the pixels differ by more than so much from the first one is another.
 const MOVES_SHARE: f32 = 0.003;
 const MOVES: f32 = 12.0;
+/// Less of a picture than this is no person.
+const PERSONS_SHARE: f32 = 0.004;
 
 /// What became of a picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,9 +36,17 @@ impl Capture {
     /// Of so many pictures the median is taken.
     pub const PICTURES: usize = 11;
 
-    /// Adds a picture at this time; all have the same size.
-    pub fn add(&mut self, color: &ColorImage, time_ns: u64) -> Taken {
+    /// Adds a picture at this time; all have the same size. Where `persons` are known, none may be there.
+    pub fn add(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> Taken {
         self.reducer.reduce(color, &mut self.now);
+        let are_there = persons.is_some_and(|persons| {
+            let count = persons.share.iter().filter(|share| **share > 0.5).count();
+            count as f32 > PERSONS_SHARE * persons.share.len() as f32
+        });
+        if are_there {
+            self.forget();
+            return Taken::Moved;
+        }
         if self.first.len() == self.now.len() && differing(&self.first, &self.now) > MOVES_SHARE {
             self.forget();
             return Taken::Moved;
@@ -110,7 +120,7 @@ mod tests {
         let mut capture = Capture::default();
         let mut moved = 0;
         for step in 0..40 {
-            match capture.add(&picture(step, step < 6), u64::from(step) * 100_000_000) {
+            match capture.add(&picture(step, step < 6), u64::from(step) * 100_000_000, None) {
                 Taken::More(share) => assert!(share < 1.0),
                 Taken::Moved => moved += 1,
                 Taken::Whole(plate) => {

@@ -12,7 +12,7 @@ mod source;
 mod subject;
 
 pub use capture::{Capture, Taken};
-pub use source::{Guide, Lock, PlateDepth, Step};
+pub use source::{Companion, Guide, Lock, PlateDepth, Step};
 
 use alignment::{Aligner, Alignment};
 use learning::{Learning, Lesson};
@@ -89,8 +89,9 @@ impl Plate {
         &self.mask
     }
 
-    /// Compares a picture of the same size with the plate. Whether it is of the same place and light.
-    pub fn look(&mut self, color: &ColorImage, time_ns: u64) -> bool {
+    /// Compares a picture of the same size with the plate, where `persons` are known or not. Whether it is of the same
+    /// place and light.
+    pub fn look(&mut self, color: &ColorImage, time_ns: u64, persons: Option<&Mask>) -> bool {
         let size = reduced_size(color);
         self.reducer.reduce(color, &mut self.now);
         self.subject.foreign.resize(self.now.len(), false);
@@ -114,6 +115,9 @@ impl Plate {
         }
         aligner.shift(reduced, size, alignment.shift);
         subject.find(now, aligner.shifted(), size, alignment);
+        if let Some(persons) = persons {
+            subject.keep_persons(persons, size);
+        }
         self.begun = true;
         self.fits = subject.share() < if self.fits { MOST_SHARE } else { LESS_SHARE };
         if self.fits {

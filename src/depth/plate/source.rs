@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use super::{Capture, Plate, Taken};
 use crate::depth::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
 use crate::depth::{DepthError, DepthSource, Seen};
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, Mask};
 
 /// So long a person has to step out of the picture.
 const COUNTDOWN_NS: u64 = 3_000_000_000;
@@ -19,6 +19,15 @@ const RESTLESS_NS: u64 = 10_000_000_000;
 
 /// What holds exposure, white balance and focus of a camera where they are until it is dropped.
 pub type Lock = Box<dyn FnMut() -> Option<Box<dyn Any + Send>> + Send>;
+
+/// What else looks at the pictures, and knows more of them than a plate tells.
+pub trait Companion: DepthSource {
+    /// Where persons are in the picture `seen`, which is the next one; `None` where that is not known.
+    fn persons(&mut self, seen: Seen) -> Option<&Mask>;
+
+    /// Gives `map` the distances of all that is behind what `mask` has, in the same picture.
+    fn measure_behind(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap);
+}
 
 /// How far a plate is, for the person who waits for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,12 +119,13 @@ enum State {
     Using(Box<Plate>),
 }
 
-/// Depth with a matte from a plate: who stands before it is in focus, all else is far. While there is none, everything is
-/// blurred.
+/// Depth with a matte from a plate: who stands before it is in focus, all else is far, or as far as a companion says. While
+/// there is none, everything is blurred, or what the companion makes of it is.
 pub struct PlateDepth {
     state: State,
     guide: Arc<Guide>,
     lock: Option<Lock>,
+    companion: Option<Box<dyn Companion>>,
     /// While this lives, the camera is as it was when the plate was taken.
     locked: Option<Box<dyn Any + Send>>,
     matting: MaskMatting,
@@ -124,10 +134,10 @@ pub struct PlateDepth {
 
 impl PlateDepth {
     /// A plate that is there, or one that is to be taken from the first pictures.
-    pub fn new(plate: Option<ColorImage>, lock: Option<Lock>) -> Self {
+    pub fn new(plate: Option<ColorImage>, lock: Option<Lock>, companion: Option<Box<dyn Companion>>) -> Self {
         let state = plate.map_or(State::Waiting(None), |plate| State::Using(Box::new(Plate::new(plate))));
         let guide = Arc::default();
-        Self { state, guide, lock, locked: None, matting: MaskMatting::default(), first_ns: None }
+        Self { state, guide, lock, companion, locked: None, matting: MaskMatting::default(), first_ns: None }
     }
 
     /// How far it is.
@@ -144,7 +154,9 @@ impl PlateDepth {
     }
 
     /// Goes on from a picture towards a plate, or compares it with the one there is; tells how far that is.
-    fn look(&mut self, color: &ColorImage, now_ns: u64) -> Step {
+    fn look(&mut self, seen: Seen) -> Step {
+        let Seen { stamp, color, .. } = seen;
+        let now_ns = stamp.time_ns;
         if self.guide.again.swap(false, Ordering::Relaxed) {
             self.state = State::Waiting(None);
         }
@@ -154,6 +166,10 @@ impl PlateDepth {
             // Once is enough, also where the camera has nothing to be held.
             self.lock = None;
         }
+        let persons = match self.state {
+            State::Waiting(_) => None,
+            _ => self.companion.as_mut().and_then(|companion| companion.persons(seen)),
+        };
         match &mut self.state {
             State::Waiting(since_ns) => {
                 let since_ns = *since_ns.get_or_insert(now_ns);
@@ -164,7 +180,7 @@ impl PlateDepth {
                 self.state = State::Taking { capture: Box::default(), since_ns: now_ns };
                 Step::Taking(0)
             }
-            State::Taking { capture, since_ns } => match capture.add(color, now_ns) {
+            State::Taking { capture, since_ns } => match capture.add(color, now_ns, persons) {
                 Taken::More(share) => Step::Taking((100.0 * share) as u32),
                 Taken::Moved if now_ns > *since_ns + RESTLESS_NS => Step::Restless,
                 Taken::Moved => Step::Moves,
@@ -173,7 +189,7 @@ impl PlateDepth {
                     Step::Ready
                 }
             },
-            State::Using(plate) => match plate.size() == color.size() && plate.look(color, now_ns) {
+            State::Using(plate) => match plate.size() == color.size() && plate.look(color, now_ns, persons) {
                 true => Step::Ready,
                 false => Step::Unlike,
             },
@@ -182,16 +198,31 @@ impl PlateDepth {
 }
 
 impl DepthSource for PlateDepth {
-    fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
-        let step = self.look(color, stamp.time_ns);
+    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        let (step, color) = (self.look(seen), seen.color);
         self.guide.tell(step);
+        // Until there is a plate, and where it is of no use, others know better than nobody.
+        if let (Some(companion), true) = (&mut self.companion, step != Step::Ready) {
+            return companion.read(seen, map);
+        }
         map.resize(color.width, color.height);
         map.matte.pixels.clear();
         map.metres.fill(FAR_M);
         map.subject_m = Some(SUBJECT_M);
         if let (State::Using(plate), Step::Ready) = (&self.state, step) {
+            if let Some(companion) = &mut self.companion {
+                companion.measure_behind(color, plate.mask(), map);
+            }
             self.matting.find(plate.mask(), color, Some(&plate.backdrop()), map);
         }
         Ok(())
+    }
+
+    fn efforts(&self) -> &'static [f64] {
+        self.companion.as_ref().map_or(&[1.0], |companion| companion.efforts())
+    }
+
+    fn set_effort(&mut self, effort: usize) {
+        self.companion.iter_mut().for_each(|companion| companion.set_effort(effort));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::alignment::Alignment;
 use super::reduced::MOST;
+use crate::frame::Mask;
 
 /// Differences from here on may be of something before the plate, and from the second on are, in a quiet picture.
 const WEAK: f32 = 6.0;
@@ -23,6 +24,12 @@ const LEAST_PART: f32 = 0.002;
 /// Holes of less than this share of the picture are no background.
 const LEAST_HOLE: f32 = 0.001;
 
+/// A mask of persons says so from here on; a part is theirs if so much of it is; what is as close to them as this, as a
+/// share of the picture's width, may be held.
+const PERSON: f32 = 0.5;
+const THEIRS: f32 = 0.35;
+const CLOSE: f32 = 0.02;
+
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Label {
@@ -42,6 +49,25 @@ pub struct Part {
     pub end: usize,
 }
 
+/// Whether any of the flags up to so many columns or rows away is set.
+fn dilate(flags: &[bool], (width, height): (usize, usize), reach: usize, wide: &mut Vec<bool>) {
+    wide.clear();
+    wide.resize(flags.len(), false);
+    for (at, _) in flags.iter().enumerate().filter(|(_, flag)| **flag) {
+        let (x, y) = (at % width, at / width);
+        // Inner pixels add nothing to what their neighbours do.
+        let is_inner = x > 0 && x + 1 < width && y > 0 && y + 1 < height;
+        if is_inner && [at - 1, at + 1, at - width, at + width].iter().all(|&beside| flags[beside]) {
+            wide[at] = true;
+            continue;
+        }
+        let columns = x.saturating_sub(reach)..(x + reach + 1).min(width);
+        for y in y.saturating_sub(reach)..(y + reach + 1).min(height) {
+            wide[y * width..][columns.clone()].fill(true);
+        }
+    }
+}
+
 /// Finds what stands before a plate; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct Subject {
@@ -51,6 +77,8 @@ pub struct Subject {
     seen: Vec<bool>,
     front: Vec<u32>,
     sample: Vec<f32>,
+    /// Whether a pixel of a mask of persons is one, or close to one.
+    near: Vec<bool>,
     /// Whether a pixel is of something before the plate.
     pub foreign: Vec<bool>,
     /// The pixels of all parts, part by part.
@@ -187,6 +215,43 @@ impl Subject {
             self.pixels[first..].iter().for_each(|&at| self.foreign[at as usize] = true);
             self.parts.push(Part { first, end: self.pixels.len() });
         }
+    }
+
+    /// Parts that are mostly nobody's, as where a lamp was switched on, are background but for where `persons` are, and
+    /// what is close to them.
+    pub fn keep_persons(&mut self, persons: &Mask, size: (usize, usize)) {
+        let of_mask = (persons.width as usize, persons.height as usize);
+        if persons.share.is_empty() {
+            return;
+        }
+        self.seen.clear();
+        self.seen.extend(persons.share.iter().map(|share| *share > PERSON));
+        let mut near = std::mem::take(&mut self.near);
+        dilate(&self.seen, of_mask, (CLOSE * of_mask.0 as f32).ceil() as usize, &mut near);
+        let place = |at: u32| {
+            let (x, y) = (at as usize % size.0, at as usize / size.0);
+            y * of_mask.1 / size.1 * of_mask.0 + x * of_mask.0 / size.0
+        };
+        let mut kept = 0;
+        for part in &mut self.parts {
+            let range = part.first..part.end;
+            let of_persons = self.pixels[range.clone()].iter().filter(|&&at| self.seen[place(at)]).count();
+            let is_theirs = of_persons as f32 >= THEIRS * range.len() as f32;
+            let first = kept;
+            for k in range {
+                let at = self.pixels[k];
+                if is_theirs || near[place(at)] {
+                    self.pixels[kept] = at;
+                    kept += 1;
+                } else {
+                    self.foreign[at as usize] = false;
+                }
+            }
+            *part = Part { first, end: kept };
+        }
+        self.pixels.truncate(kept);
+        self.parts.retain(|part| part.first < part.end);
+        self.near = near;
     }
 
     /// Small holes are a part's own: colours that happen to be those of the background behind.

@@ -19,9 +19,10 @@ use person::Person;
 use relief::Relief;
 
 use super::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
+use super::plate::Companion;
 use super::tap::Tap;
 use super::{DepthError, DepthSource, Seen};
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::network::{self, Runtime, Task};
 
 /// Nothing is less near, so that distances are numbers.
@@ -44,6 +45,7 @@ pub struct SingleCamera {
     effort: usize,
     frames: u64,
     last_ns: Option<u64>,
+    turn: Turn,
     /// Whether persons are to be found.
     has_subject: bool,
 }
@@ -85,6 +87,7 @@ impl SingleCamera {
             effort: EVERY.len() - 1,
             frames: 0,
             last_ns: None,
+            turn: Turn::default(),
             has_subject,
         };
         networks.try_out()?;
@@ -106,29 +109,45 @@ impl SingleCamera {
         relief.as_mut().map_or(Ok(()), |relief| relief.look(&grey, None)).map_err(failed)
     }
 
-    /// Lets the networks look at a picture, if it is their turn or the first of a scene; one that fails is turned off.
-    fn look(&mut self, color: &ColorImage, is_first: bool) {
-        let is_turn = |every: u64| is_first || self.frames.is_multiple_of(every);
+    /// Takes note of the next picture, taken at this time: whose turn it is.
+    fn begin(&mut self, time_ns: u64) {
+        let apart = self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) > APART_NS);
+        self.last_ns = Some(time_ns);
+        if apart {
+            self.person.iter_mut().for_each(Person::forget);
+        }
+        let is_turn = |every: u64| apart || self.frames.is_multiple_of(every);
         let (for_persons, for_all) = match EVERY[self.effort] {
             // Alone, it is what outlines come from.
-            (persons, _) if self.person.is_none() => (persons, persons),
+            (persons, _) if !self.has_subject => (persons, persons),
             every => every,
         };
-        let (for_persons, for_all) = (is_turn(for_persons), is_turn(for_all));
-        let Self { name, person, relief, held, .. } = self;
-        if let Some(Err(why)) = person.as_mut().filter(|_| for_persons).map(|person| person.look(color)) {
-            tracing::error!("{name}: the person's network is turned off, and all is blurred: {why}");
-            *person = None;
-        }
-        let mask = person.as_ref().map(Person::mask);
-        if let Some(Err(why)) = relief.as_mut().filter(|_| for_all).map(|relief| relief.look(color, mask)) {
-            tracing::error!("{name}: the network for depth is turned off: {why}");
-            *relief = None;
-        }
-        if let (Some(mask), Some(relief)) = (mask, relief) {
-            held.join(mask, relief);
+        self.turn = Turn { persons: is_turn(for_persons), all: is_turn(for_all) };
+        self.frames += 1;
+    }
+
+    /// Lets the network for persons look, if it is its turn; one that fails is turned off.
+    fn look_for_persons(&mut self, color: &ColorImage) {
+        if let Some(Err(why)) = self.person.as_mut().filter(|_| self.turn.persons).map(|person| person.look(color)) {
+            tracing::error!("{}: the person's network is turned off, and all is blurred: {why}", self.name);
+            self.person = None;
         }
     }
+}
+
+/// Lets the network for depth look, if it is its turn, around what `mask` has; one that fails is turned off.
+fn look_at_all(relief: &mut Option<Relief>, (name, is_turn): (&str, bool), color: &ColorImage, mask: Option<&Mask>) {
+    if let Some(Err(why)) = relief.as_mut().filter(|_| is_turn).map(|relief| relief.look(color, mask)) {
+        tracing::error!("{name}: the network for depth is turned off: {why}");
+        *relief = None;
+    }
+}
+
+/// Whether it is the turn of a network.
+#[derive(Clone, Copy, Debug, Default)]
+struct Turn {
+    persons: bool,
+    all: bool,
 }
 
 /// The pixel of a plane of other sizes that pixel `at` of one of `size` falls on.
@@ -138,14 +157,14 @@ fn nearest(at: usize, size: (usize, usize), (width, height): (usize, usize)) -> 
 
 impl DepthSource for SingleCamera {
     fn read(&mut self, Seen { stamp, color, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
-        let apart = self.last_ns.is_none_or(|last_ns| stamp.time_ns.abs_diff(last_ns) > APART_NS);
-        self.last_ns = Some(stamp.time_ns);
-        if apart {
-            self.person.iter_mut().for_each(Person::forget);
+        self.begin(stamp.time_ns);
+        self.look_for_persons(color);
+        let Self { name, person, relief, held, spread, matting, turn, .. } = self;
+        let mask = person.as_ref().map(Person::mask);
+        look_at_all(relief, (name, turn.all), color, mask);
+        if let (Some(mask), Some(relief)) = (mask, &relief) {
+            held.join(mask, relief);
         }
-        self.look(color, apart);
-        self.frames += 1;
-        let Self { person, relief, held, spread, matting, .. } = self;
         map.resize(color.width, color.height);
         map.matte.pixels.clear();
         match &relief {
@@ -168,6 +187,21 @@ impl DepthSource for SingleCamera {
 
     fn set_effort(&mut self, effort: usize) {
         self.effort = effort.min(EVERY.len() - 1);
+    }
+}
+
+impl Companion for SingleCamera {
+    fn persons(&mut self, Seen { stamp, color, .. }: Seen) -> Option<&Mask> {
+        self.begin(stamp.time_ns);
+        self.look_for_persons(color);
+        self.person.as_ref().map(Person::mask)
+    }
+
+    fn measure_behind(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap) {
+        look_at_all(&mut self.relief, (&self.name, self.turn.all), color, Some(mask));
+        if let Some(relief) = &self.relief {
+            self.spread.over(relief.behind(), relief.size(), map);
+        }
     }
 }
 

@@ -33,7 +33,7 @@ use crate::pipeline::{
 };
 use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::recording::{Extras, snapshot};
-use crate::source::{self, DepthChoice, DepthFrom};
+use crate::source::{self, DepthChoice, DepthFrom, OneCamera, PlateFile};
 
 names::named! {
     /// What the numbers of a depth map are.
@@ -218,7 +218,7 @@ fn sources(command: &RenderCommand) -> Vec<PathBuf> {
         _ => None,
     };
     let plate = match &command.blur.depth {
-        DepthChoice::Plate(Some(file)) => Some(file),
+        DepthChoice::OneCamera(OneCamera { plate: Some(PlateFile::At(file)), .. }) => Some(file),
         _ => None,
     };
     [&command.image, &command.depth_map, &command.mask]
@@ -261,7 +261,7 @@ fn read(command: &RenderCommand, look: &Look) -> Result<(ColorImage, Extras, Opt
 fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Result<Option<Depth>, CliError> {
     let is_given = command.depth_map.is_some() || command.mask.is_some();
     match (&command.mask, &command.blur.depth) {
-        (_, DepthChoice::Networks(_) | DepthChoice::Plate(_) | DepthChoice::Defocus) if is_given => {
+        (_, DepthChoice::OneCamera(_) | DepthChoice::Defocus) if is_given => {
             let what = "--depth matte, mono, plate and defocus make the depth: leave --depth-map and --mask out";
             Err(CliError::Usage(what.to_string()))
         }
@@ -271,15 +271,11 @@ fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Resul
             still::check_depth_size(file, (width, height), color.size())?;
             Ok(Some(Depth::Final(mask::depth_around(&Mask { width, height, share }, color))))
         }
-        (None, DepthChoice::Networks(chosen)) => {
+        (None, DepthChoice::OneCamera(chosen)) => {
             let options = source::Options { networks: command.networks.clone(), ..source::Options::default() };
-            let map = source::depth_by_networks(chosen, &options, look, color)?;
+            let map = source::one_camera::depth_of_picture(chosen, &options, look, color)?;
             // Around a subject it has its matte already; else its outlines are soft, and are fitted to the picture.
             Ok(Some(if map.subject_m.is_some() { Depth::Final(map) } else { Depth::Measured(map) }))
-        }
-        (None, DepthChoice::Plate(Some(file))) => {
-            source::refuse_metres(look, "a plate tells")?;
-            Ok(Some(Depth::Final(source::plate::depth_of_picture(file, color)?)))
         }
         (None, DepthChoice::Defocus) => {
             source::refuse_metres(look, "defocus tells")?;
@@ -288,10 +284,6 @@ fn made_depth(command: &RenderCommand, look: &Look, color: &ColorImage) -> Resul
                             told of its depth; --depth mono or --effect blur needs no such difference";
                 CliError::Usage(what.to_string())
             })
-        }
-        (None, DepthChoice::Plate(None)) => {
-            let what = "--depth plate: name the picture of what is behind: --depth plate:FILE.png";
-            Err(CliError::Usage(what.to_string()))
         }
         _ => Ok(None),
     }

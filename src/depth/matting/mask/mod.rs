@@ -136,23 +136,23 @@ impl pulp::WithSimd for Finding<'_> {
             view.weigh(posterior, contrasts, cell, shares, front);
         }
         view.connect(cells, shares, front);
+        let reach = (REVEALED * height as f32 / cell_px as f32).ceil() as usize;
         for cell in 0..across * down {
             match cells[cell] {
                 Cell::Far => {}
-                Cell::Near => view.cover(cell, map),
+                Cell::Near => {
+                    if let Some(backdrop) =
+                        backdrop.filter(|_| view.around(cell, reach).any(|at| cells[at] == Cell::Band))
+                    {
+                        view.reveal(backdrop, cell, map);
+                    }
+                    view.cover(cell, map);
+                }
                 Cell::Band => view.take_apart(contrasts[cell].as_ref(), cell, shares, map),
             }
         }
-        if let Some(backdrop) = backdrop {
-            let reach = (REVEALED * height as f32 / cell_px as f32).ceil() as usize;
-            for cell in (0..across * down).filter(|&cell| cells[cell] == Cell::Near) {
-                if view.around(cell, reach).any(|at| cells[at] == Cell::Band) {
-                    view.reveal(backdrop, cell, map);
-                }
-            }
-            if map.matte.pixels.len() > Matte::most(width, height) {
-                map.matte.pixels.retain(|pixel| pixel.share < 1.0);
-            }
+        if map.matte.pixels.len() > Matte::most(width, height) {
+            map.matte.pixels.retain(|pixel| pixel.share < 1.0);
         }
         map.matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
     }
@@ -256,7 +256,7 @@ impl View<'_> {
             let at = y * self.color.width as usize + x;
             let (own, light) = (self.light_at(at), backdrop.light_at(x, y));
             let difference = std::array::from_fn(|p| own[p] - light[p]);
-            let (at, near_m, far_m) = (at as u32, SUBJECT_M, FAR_M);
+            let (at, near_m, far_m) = (at as u32, SUBJECT_M, map.metres[at]);
             map.matte.pixels.push(MixedPixel { at, near_m, far_m, share: 1.0, behind: 1.0, difference });
         }
     }

@@ -1,4 +1,4 @@
-//! Which networks make depth, and how they are run.
+//! What makes depth from the pictures of one camera: a plate, networks, and how these are run.
 
 // What options say is shown as it is written, brackets included.
 #![allow(rustdoc::broken_intra_doc_links)]
@@ -79,41 +79,69 @@ pub enum NetworkFile {
     At(PathBuf),
 }
 
-/// The networks that depth is made by: one of them at least.
+/// A plate: taken at the start, or a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PlateFile {
+    /// To be taken from the first pictures.
+    Taken,
+    /// A picture of what is behind.
+    At(PathBuf),
+}
+
+/// What makes depth from the pictures of one camera: one of these at least.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ChosenNetworks {
+pub struct OneCamera {
+    /// What is behind.
+    pub plate: Option<PlateFile>,
     /// Where a person is.
     pub matte: Option<NetworkFile>,
     /// How near everything is.
     pub mono: Option<NetworkFile>,
 }
 
-impl ChosenNetworks {
-    /// Parses `matte[:FILE]`, `mono[:FILE]`, or both with a comma between; `None` if the text means something else.
+impl OneCamera {
+    /// A plate that is taken at the start, and nothing else.
+    pub fn plate() -> Self {
+        Self { plate: Some(PlateFile::Taken), ..Self::default() }
+    }
+
+    /// Whether there is any network.
+    pub fn has_networks(&self) -> bool {
+        self.matte.is_some() || self.mono.is_some()
+    }
+
+    /// Parses `plate[:FILE]`, `matte[:FILE]` and `mono[:FILE]`, with commas between; `None` if the text means something else.
     pub(super) fn parse(text: &str) -> Option<Result<Self, String>> {
-        let is_task = |text: &str| ["matte", "mono"].contains(&text.split(':').next().unwrap_or_default());
-        // A comma divides only where a task follows: files may have commas in their names.
-        let parts = match text.match_indices(',').find(|(at, _)| is_task(&text[at + 1..])) {
-            Some((at, _)) => vec![&text[..at], &text[at + 1..]],
-            None => vec![text],
+        let is_kind = |text: &str| {
+            let kind = text.split([':', ',']).next().unwrap_or_default();
+            ["plate", "matte", "mono"].contains(&kind)
         };
-        if !is_task(parts[0]) {
+        if !is_kind(text) {
             return None;
         }
         let mut chosen = Self::default();
-        for part in parts {
-            let (task, file) = part.split_once(':').map_or((part, None), |(task, file)| (task, Some(file)));
-            let place = match task {
-                "matte" => &mut chosen.matte,
-                _ => &mut chosen.mono,
+        let mut rest = Some(text);
+        while let Some(text) = rest {
+            // A comma divides only where another kind follows: files may have commas in their names.
+            let comma = text.match_indices(',').map(|(at, _)| at).find(|at| is_kind(&text[at + 1..]));
+            let part = &text[..comma.unwrap_or(text.len())];
+            rest = comma.map(|at| &text[at + 1..]);
+            let (kind, file) = part.split_once(':').map_or((part, None), |(kind, file)| (kind, Some(file)));
+            if file == Some("") {
+                return Some(Err(format!("{part}: name a file after the colon, or leave it out")));
+            }
+            let network = || file.map_or(NetworkFile::Installed, |file| NetworkFile::At(file.into()));
+            let is_twice = match kind {
+                "plate" => {
+                    let plate = file.map_or(PlateFile::Taken, |file| PlateFile::At(file.into()));
+                    chosen.plate.replace(plate).is_some()
+                }
+                "matte" => chosen.matte.replace(network()).is_some(),
+                "mono" => chosen.mono.replace(network()).is_some(),
+                other => return Some(Err(format!("{other}: use plate, matte or mono, with commas between"))),
             };
-            let file = match file {
-                None => NetworkFile::Installed,
-                Some("") => return Some(Err(format!("{part}: name an ONNX file after the colon, or leave it out"))),
-                Some(file) => NetworkFile::At(file.into()),
-            };
-            if place.replace(file).is_some() {
-                return Some(Err(format!("{task} is named twice")));
+            if is_twice {
+                return Some(Err(format!("{kind} is named twice")));
             }
         }
         Some(Ok(chosen))
@@ -129,12 +157,21 @@ mod tests {
     fn networks_are_told_from_folders_and_cameras() {
         let depth = |text: &str| text.parse::<DepthChoice>();
         let at = |file: &str| Some(NetworkFile::At(file.into()));
-        let networks = |matte, mono| Ok(DepthChoice::Networks(ChosenNetworks { matte, mono }));
+        let networks = |matte, mono| Ok(DepthChoice::OneCamera(OneCamera { plate: None, matte, mono }));
         assert_eq!(depth("matte"), networks(Some(NetworkFile::Installed), None));
         assert_eq!(depth("mono:a,b.onnx"), networks(None, at("a,b.onnx")));
         assert_eq!(depth("matte:x:1.onnx,mono"), networks(at("x:1.onnx"), Some(NetworkFile::Installed)));
         assert_eq!(depth("mono:n.onnx,matte:m.onnx"), networks(at("m.onnx"), at("n.onnx")));
         assert_eq!(depth("matterhorn"), Ok(DepthChoice::Device("matterhorn".to_owned())));
-        assert!(depth("matte:").unwrap_err().contains("ONNX") && depth("mono,mono").unwrap_err().contains("twice"));
+        let plate = |plate| OneCamera { plate: Some(plate), ..OneCamera::default() };
+        assert_eq!(depth("plate"), Ok(DepthChoice::OneCamera(OneCamera::plate())));
+        let room = plate(PlateFile::At("room,1.png".into()));
+        assert_eq!(depth("plate:room,1.png"), Ok(DepthChoice::OneCamera(room.clone())));
+        let all = OneCamera { matte: Some(NetworkFile::Installed), mono: at("n.onnx"), ..room };
+        assert_eq!(depth("matte,plate:room,1.png,mono:n.onnx"), Ok(DepthChoice::OneCamera(all)));
+        assert!(depth("matte,plateau").unwrap_err().contains("use plate, matte or mono"));
+        assert!(
+            depth("matte:").unwrap_err().contains("name a file") && depth("mono,mono").unwrap_err().contains("twice")
+        );
     }
 }

@@ -1,0 +1,122 @@
+//! Depth from the pictures of one camera: networks, and who stands before a picture of what is behind them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::{
+    DepthFrom, OneCamera, Options, PlateFile, Source, SourceError, SourceName, Wanted, networks, refuse_metres,
+};
+use crate::depth::plate::{Guide, Lock, PlateDepth, Step};
+use crate::depth::{DepthError, DepthSource, Seen};
+use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::look::Look;
+use crate::recording::still;
+
+/// Gives `source` the depth that `chosen` makes of its pictures.
+///
+/// # Errors
+/// A file cannot be read or is of another size, the source cannot be asked to step aside, a network cannot be used, or the
+/// look needs real distances.
+pub(super) fn give(
+    source: Source,
+    chosen: &OneCamera,
+    name: &SourceName,
+    wanted: &Wanted,
+) -> Result<Source, SourceError> {
+    wanted.look.map_or(Ok(()), |look| refuse_metres(look, "one camera knows"))?;
+    let info = source.camera.info();
+    let networks = chosen.has_networks().then(|| networks::open(chosen, wanted)).transpose()?;
+    let (companion, about) = networks.unzip();
+    let plate = match &chosen.plate {
+        None => {
+            let depth = companion.map(|networks| networks as Box<dyn DepthSource>);
+            return Ok(Source { depth, depth_from: DepthFrom::Networks, networks: about, ..source });
+        }
+        Some(PlateFile::At(file)) => Some(read(file, info.size)?),
+        Some(PlateFile::Taken) if info.live => None,
+        Some(PlateFile::Taken) => {
+            return SourceError::usage(format!(
+                "--depth plate: nobody in {name} can be asked to step aside; name a picture of what is behind them: --depth \
+                 plate:FILE.png (`bokehcam plate` makes one)"
+            ));
+        }
+    };
+    let depth = PlateDepth::new(plate, lock(name), companion);
+    let guide = Some(depth.guide());
+    let depth: Option<Box<dyn DepthSource>> = Some(Box::new(depth));
+    let depth_from = if about.is_some() { DepthFrom::Networks } else { DepthFrom::Plate };
+    Ok(Source { depth, depth_from, networks: about, guide, ..source })
+}
+
+/// The depth of one picture, as `chosen`.
+///
+/// # Errors
+/// As for a source; or what was chosen fails, or the plate is none of this picture.
+pub fn depth_of_picture(
+    chosen: &OneCamera,
+    options: &Options,
+    look: &Look,
+    color: &ColorImage,
+) -> Result<DepthMap, SourceError> {
+    refuse_metres(look, "one picture tells")?;
+    let wanted = Wanted { options, look: Some(look) };
+    let seen = Seen { stamp: Stamp { index: 0, time_ns: 0, captured_ns: None }, color, right: None };
+    let networks =
+        chosen.has_networks().then(|| networks::open(chosen, &wanted)).transpose()?.map(|(networks, _)| networks);
+    let mut map = DepthMap::default();
+    match (&chosen.plate, networks) {
+        (None, Some(mut networks)) => networks.read(seen, &mut map)?,
+        (Some(PlateFile::At(file)), networks) => {
+            let mut source = PlateDepth::new(Some(read(file, color.size())?), None, networks);
+            source.read(seen, &mut map)?;
+            let step = source.guide().step();
+            if step != Step::Ready {
+                let (name, why) = (file.display().to_string(), step.to_string());
+                return Err(DepthError::Plate { name, why }.into());
+            }
+        }
+        (Some(PlateFile::Taken) | None, _) => {
+            return SourceError::usage("--depth plate: name the picture of what is behind: --depth plate:FILE.png");
+        }
+    }
+    Ok(map)
+}
+
+fn read(file: &Path, (width, height): (u32, u32)) -> Result<ColorImage, SourceError> {
+    let plate = still::read_color(file)?;
+    if plate.size() == (width, height) {
+        return Ok(plate);
+    }
+    SourceError::usage(format!(
+        "--depth plate: {} is {} x {}, and the pictures are {width} x {height}: take a plate of that size (`bokehcam plate`)",
+        file.display(),
+        plate.width,
+        plate.height
+    ))
+}
+
+/// What holds the camera's exposure, white balance and focus while a plate is used.
+fn lock(name: &SourceName) -> Option<Lock> {
+    #[cfg(feature = "camera")]
+    if let Some(camera) = super::devices::camera_of(name) {
+        use crate::v4l2::live::hold::Held;
+        return Some(Box::new(move || match Held::new(&camera) {
+            Ok(held) => Some(Box::new(held)),
+            Err(error) => {
+                tracing::warn!(
+                    "{error}: its exposure may change, and the plate is corrected for that as well as can be"
+                );
+                None
+            }
+        }));
+    }
+    let _ = name;
+    None
+}
+
+/// A plate source for the pictures of a camera, and how far it is: for a program that takes a plate and no more.
+pub fn taking(name: &SourceName) -> (PlateDepth, Arc<Guide>) {
+    let source = PlateDepth::new(None, lock(name), None);
+    let guide = source.guide();
+    (source, guide)
+}
