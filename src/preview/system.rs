@@ -12,7 +12,7 @@ use crate::knob::Knob;
 use crate::look::{Effect, Look, presets::Preset};
 use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
-use crate::source::{DepthChoice, DepthFrom, Kind, OneCamera, Options, Source, SourceName};
+use crate::source::{self, DepthChoice, DepthFrom, Kind, OneCamera, Options, PlateFile, Source, SourceName};
 
 /// Shown when there is no camera, and the synthetic scene takes its place.
 const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
@@ -70,7 +70,7 @@ impl System {
         let mut options = self.options.clone();
         options.cycle = true;
         if with_plate {
-            options.depth_choice = DepthChoice::OneCamera(OneCamera::plate());
+            options.depth_choice = DepthChoice::OneCamera(plate());
         }
         // Only recordings repeat this way: the synthetic scene cycles.
         options.frames.repeat &= source_name.kind() == Kind::Recording;
@@ -79,6 +79,11 @@ impl System {
         let source = Source::open(&source_name, &options, Some(&look)).map_err(|error| error.to_string())?;
         Ok((source, source_name))
     }
+}
+
+/// A plate that is taken at the start, and the networks that are installed.
+fn plate() -> OneCamera {
+    OneCamera { plate: Some(PlateFile::Taken), ..source::installed_networks() }
 }
 
 impl Services for System {
@@ -164,7 +169,7 @@ impl Services for System {
             switches.push(("control".into(), controls.join(",")));
         }
         if self.with_plate {
-            switches.push(("depth".into(), "plate".into()));
+            switches.push(("depth".into(), plate().kinds()));
         }
         self.settings.command(look, source, outputs, &switches)
     }

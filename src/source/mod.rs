@@ -28,7 +28,7 @@ pub mod registration;
 
 pub use error::SourceError;
 pub use name::{Kind, SourceName};
-pub use networks::refuse_metres;
+pub use networks::{installed as installed_networks, refuse_metres};
 use opened::Opened;
 pub use options::{DepthChoice, Frames, NetworkFile, OneCamera, PlateFile, Size};
 

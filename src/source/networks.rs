@@ -58,10 +58,25 @@ pub(super) fn open(chosen: &OneCamera, wanted: &Wanted) -> Result<Opened, Source
     Ok((Box::new(networks), about))
 }
 
+/// The best networks that are installed, if there are any.
+#[cfg(feature = "networks")]
+pub fn installed() -> OneCamera {
+    use crate::network::{self, Task};
+    let installed = network::installed();
+    let best =
+        |task| installed.iter().find(|(known, _)| known.task == task).map(|(_, file)| NetworkFile::At(file.clone()));
+    OneCamera { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) }
+}
+
+/// The best networks that are installed: this build has none.
+#[cfg(not(feature = "networks"))]
+pub fn installed() -> OneCamera {
+    OneCamera::default()
+}
+
 /// Gives a camera that has no depth that of the installed networks, if there are any and nothing else is asked for.
 #[cfg(feature = "networks")]
 pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted) -> Source {
-    use crate::network::{Task, installed};
     let is_lone =
         name.kind() == Kind::Camera && !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
     let needs_metres = wanted.look.is_some_and(|look| look.needs_metres().is_some());
@@ -69,10 +84,7 @@ pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted
     if !is_lone || needs_metres || !wanted.look.is_some_and(|look| look.effect.follows_depth()) {
         return source;
     }
-    let installed = installed();
-    let best =
-        |task| installed.iter().find(|(known, _)| known.task == task).map(|(_, file)| NetworkFile::At(file.clone()));
-    let chosen = OneCamera { plate: None, matte: best(Task::Matte), mono: best(Task::Mono) };
+    let chosen = installed();
     if chosen.matte.is_none() {
         return source;
     }

@@ -100,9 +100,10 @@ pub struct OneCamera {
 }
 
 impl OneCamera {
-    /// A plate that is taken at the start, and nothing else.
-    pub fn plate() -> Self {
-        Self { plate: Some(PlateFile::Taken), ..Self::default() }
+    /// As `--depth` takes it, whatever the files.
+    pub fn kinds(&self) -> String {
+        let kinds = [("plate", self.plate.is_some()), ("matte", self.matte.is_some()), ("mono", self.mono.is_some())];
+        kinds.into_iter().filter(|(_, is_there)| *is_there).map(|(kind, _)| kind).collect::<Vec<_>>().join(",")
     }
 
     /// Whether there is any network.
@@ -164,7 +165,8 @@ mod tests {
         assert_eq!(depth("mono:n.onnx,matte:m.onnx"), networks(at("m.onnx"), at("n.onnx")));
         assert_eq!(depth("matterhorn"), Ok(DepthChoice::Device("matterhorn".to_owned())));
         let plate = |plate| OneCamera { plate: Some(plate), ..OneCamera::default() };
-        assert_eq!(depth("plate"), Ok(DepthChoice::OneCamera(OneCamera::plate())));
+        assert_eq!(depth("plate"), Ok(DepthChoice::OneCamera(plate(PlateFile::Taken))));
+        assert_eq!(plate(PlateFile::Taken).kinds(), "plate");
         let room = plate(PlateFile::At("room,1.png".into()));
         assert_eq!(depth("plate:room,1.png"), Ok(DepthChoice::OneCamera(room.clone())));
         let all = OneCamera { matte: Some(NetworkFile::Installed), mono: at("n.onnx"), ..room };
