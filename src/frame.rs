@@ -145,6 +145,16 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
+    /// The distance of what is nearest, or of a subject, where distances are only relative, in metres.
+    pub const SUBJECT_M: f32 = 1.0;
+    /// What is then as good as infinitely far, in metres.
+    pub const FAR_M: f32 = 1e3;
+    /// The distance of something of relative inverse depth, 1 where it is nearest and 0 where it is farthest; unknown where
+    /// that is no number.
+    pub fn relative_m(nearness: f32) -> f32 {
+        if nearness.is_finite() { Self::SUBJECT_M / nearness.max(Self::SUBJECT_M / Self::FAR_M) } else { 0.0 }
+    }
+
     /// The least depth: no scene is nearer, and its reciprocal, squared, still is a number.
     pub const LEAST_M: f32 = 1e-6;
     /// The largest depth: what is infinitely far in files that have to write a number is nearer than this.

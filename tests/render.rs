@@ -123,3 +123,40 @@ fn relative_inverse_depth_has_white_near_or_far() {
     let (code, said) = run(dir.path(), &["in.png", "--depth-map", "near.png", "--out", "no.png"]);
     assert_eq!(code, Some(1), "8 bits are too few for metres: {said}");
 }
+
+#[test]
+fn a_recording_may_have_relative_inverse_depth() {
+    let dir = TempDir::new().unwrap();
+    let picture = halves(dir.path());
+    let at = |name: &str| dir.path().join(name);
+    std::fs::create_dir_all(at("rec/rgb")).unwrap();
+    std::fs::rename(at("in.png"), at("rec/rgb/0.png")).unwrap();
+    std::fs::create_dir(at("rec/depth")).unwrap();
+    // As networks' pictures are: 8 bits, here of colours that are grey.
+    let near_left = image::RgbImage::from_fn(160, 96, |x, _| [if x < 80 { 250 } else { 20 }; 3].into());
+    near_left.save(at("rec/depth/0.png")).unwrap();
+    std::fs::write(at("rec/rgb.txt"), "0 rgb/0.png\n").unwrap();
+    std::fs::write(at("rec/depth.txt"), "0 depth/0.png\n").unwrap();
+    let stream = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+        command.env_clear().env("XDG_CONFIG_HOME", dir.path()).current_dir(dir.path()).stdin(Stdio::null());
+        let output = command.args(["stream", "rec", "--to", "out/", "--force", "--backend", "cpu"]).args(more).output();
+        let output = output.unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (code, said) = stream(&["--depth-unit", "inverse", "--focus", "0.2,0.5", "--coc-at-infinity", "8"]);
+    assert_eq!(code, Some(0), "{said}");
+    let mut written = std::fs::read_dir(at("out")).unwrap().map(|entry| entry.unwrap().path());
+    let first = written.find(|path| path.extension().is_some_and(|extension| extension == "png"));
+    let blurred = read_photo(&first.unwrap()).unwrap().0;
+    assert!(difference(&picture, &blurred, 0..66) < 0.1 && difference(&picture, &blurred, 94..160) > 5.0);
+    for (arguments, code, part) in [
+        (&["--depth-unit", "inverse", "--focus", "1.2"][..], 2, "inverse depth without a scale"),
+        (&["--depth-unit", "inverse", "--depth-scale", "1000", "--quiet"], 0, ""),
+        (&["--depth-unit", "inverse", "--depth-scale", "1000"], 0, "relative depth has no scale"),
+        (&["--depth-invert"], 1, "depth.txt:1"),
+    ] {
+        let (came, said) = stream(arguments);
+        assert!(came == Some(code) && said.contains(part), "{arguments:?}: {came:?} {said}");
+    }
+}

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
-use bokehcam::recording::{Options, Recording, Scratch, still};
+use bokehcam::recording::{DepthUnit, Options, Recording, Scratch, still};
 
 use super::input::{assert_one_line, files, place, put};
 
@@ -39,6 +39,11 @@ pub fn recording(data: &[u8]) {
         keep_going: flags & 1 != 0,
         pair_tolerance_ns: if flags & 2 != 0 { u64::MAX } else { 20_000_000 },
         depth_scale: if flags & 4 != 0 { 1e-38 } else { 5000.0 },
+        depth_unit: match flags & 48 {
+            16 => DepthUnit::Inverse { white_is_far: false },
+            48 => DepthUnit::Inverse { white_is_far: true },
+            _ => DepthUnit::Metres,
+        },
         depth_invalid: (flags & 8 != 0).then_some(65535),
     };
     match Recording::open(&place(folder), &options) {

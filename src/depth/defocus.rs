@@ -7,7 +7,7 @@
 //! edge-aware image and video processing", 2011). A picture alone does not tell on which side of the focus something is:
 //! all that is soft counts as behind.
 
-use super::matting::mask::{FAR_M, SUBJECT_M};
+use super::matting::mask::SUBJECT_M;
 use crate::frame::{ColorImage, DepthMap, luma_of};
 
 /// Standard deviation of the Gaussian that the picture is blurred with once more, in pixels of a picture of
@@ -51,7 +51,7 @@ pub fn depth(color: &ColorImage) -> Option<DepthMap> {
     let mut map = DepthMap { subject_m: Some(SUBJECT_M), ..DepthMap::new(color.width, color.height) };
     for (metres, soft) in map.metres.iter_mut().zip(soft) {
         let nearness = 1.0 - ((soft - sharp_px) / (soft_px - sharp_px)).clamp(0.0, 1.0);
-        *metres = SUBJECT_M / nearness.max(SUBJECT_M / FAR_M);
+        *metres = DepthMap::relative_m(nearness);
     }
     Some(map)
 }

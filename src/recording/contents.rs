@@ -45,6 +45,10 @@ pub(super) struct Listed {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum DepthForm {
     Units(DepthUnits),
+    /// Relative inverse depth in grey pictures: black and white are the farthest and the nearest, or the other way round.
+    Inverse {
+        white_is_far: bool,
+    },
     /// Disparities in a PFM; the rig is that of the colour pictures at their size.
     Disparity(StereoRig),
 }

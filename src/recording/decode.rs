@@ -144,14 +144,42 @@ pub(super) fn depth(
     Ok(())
 }
 
+/// Decodes relative inverse depth, 8 or 16 bits, grey or of colours that are grey, to metres in units of the nearest. A map
+/// that does not cover a colour picture of `color` pixels is refused.
+pub(super) fn inverse_depth(
+    path: &Path,
+    white_is_far: bool,
+    color: (u32, u32),
+    scratch: &mut Scratch,
+    into: &mut DepthMap,
+) -> Result<(), PictureFault> {
+    let coded = Coded::open(path, &mut scratch.file)?;
+    let found = coded.size();
+    if !depth_covers(found, color) {
+        return Err(PictureFault::DepthSize { found, color });
+    }
+    into.resize(found.0, found.1);
+    grey_of(coded, &mut scratch.pixels, &mut into.metres)?;
+    for value in &mut into.metres {
+        *value = DepthMap::relative_m(if white_is_far { 1.0 - *value } else { *value });
+    }
+    Ok(())
+}
+
 /// Decodes to columns, rows and grey values, 0 to 1 as stored (not linearised): luma for a colour picture, multiplied
 /// by the alpha if there is one.
 pub(super) fn grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
     let mut scratch = Scratch::default();
     let coded = Coded::open(path, &mut scratch.file)?;
-    let ((width, height), samples) = (coded.size(), coded.samples());
+    let (width, height) = coded.size();
     let mut grey = vec![0.0; width as usize * height as usize];
-    coded.runs(&mut scratch.pixels, |run, row| {
+    grey_of(coded, &mut scratch.pixels, &mut grey)?;
+    Ok((width, height, grey))
+}
+
+fn grey_of(coded: Coded, pixels: &mut Vec<u8>, grey: &mut [f32]) -> Result<(), PictureFault> {
+    let samples = coded.samples();
+    coded.runs(pixels, |run, row| {
         let pixels = grey[run.first..].iter_mut().step_by(run.step);
         for (grey, pixel) in pixels.zip(row.chunks_exact(samples.bytes_per_pixel())) {
             let sample = |channel: usize| match samples.are_wide {
@@ -165,5 +193,5 @@ pub(super) fn grey(path: &Path) -> Result<(u32, u32, Vec<f32>), PictureFault> {
             *grey = if samples.has_alpha() { luma * sample(samples.channels - 1) } else { luma };
         }
     })?;
-    Ok((width, height, grey))
+    Ok(())
 }

@@ -47,11 +47,26 @@ const LAYOUTS: [Layout; 4] = [tum::LAYOUT, euroc::LAYOUT, kitti::LAYOUT, middleb
 /// takes at most four times the 192 MiB of its RGB.
 const MAX_SIDE_PX: u32 = 8192;
 
+/// What the numbers of depth pictures are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DepthUnit {
+    /// Distances, in 16 bits.
+    #[default]
+    Metres,
+    /// Relative inverse depth, in grey pictures of any kind, from 0 to the largest number they can have.
+    Inverse {
+        /// Whether white is the farthest instead of the nearest.
+        white_is_far: bool,
+    },
+}
+
 /// How to read a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// Units of the depth pictures per metre, > 0.
     pub depth_scale: f32,
+    /// What the numbers of depth pictures are.
+    pub depth_unit: DepthUnit,
     /// A depth value that means unknown; 0 always does.
     pub depth_invalid: Option<u16>,
     /// Largest difference in time between a colour picture and its depth map or right picture, in nanoseconds.
@@ -64,7 +79,13 @@ pub struct Options {
 impl Default for Options {
     /// As in the TUM benchmark: 5000 units per metre, pairs within 20 ms. Faulty lists are refused.
     fn default() -> Self {
-        Self { depth_scale: tum::DEPTH_SCALE, depth_invalid: None, pair_tolerance_ns: 20_000_000, keep_going: false }
+        Self {
+            depth_scale: tum::DEPTH_SCALE,
+            depth_unit: DepthUnit::Metres,
+            depth_invalid: None,
+            pair_tolerance_ns: 20_000_000,
+            keep_going: false,
+        }
     }
 }
 
@@ -185,6 +206,11 @@ impl Recording {
         self.period_ns
     }
 
+    /// Whether its depth is only relative.
+    pub fn has_relative_depth(&self) -> bool {
+        matches!(self.depth, Some(DepthForm::Inverse { .. }))
+    }
+
     /// Whether its depth is in units that [`Options::depth_scale`] states.
     pub fn has_depth_in_units(&self) -> bool {
         matches!(self.depth, Some(DepthForm::Units(_)))
@@ -237,6 +263,9 @@ impl Recording {
         let path = self.folder.locate(source)?;
         let read = match form {
             DepthForm::Units(units) => decode::depth(&path, *units, Some(self.size), scratch, into),
+            DepthForm::Inverse { white_is_far } => {
+                decode::inverse_depth(&path, *white_is_far, self.size, scratch, into)
+            }
             DepthForm::Disparity(rig) => pfm::read_disparity_as_depth(&path, rig, self.size, scratch, into),
         };
         read.map_err(|fault| source.error(&self.folder.dir, fault))

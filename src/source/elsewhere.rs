@@ -39,6 +39,7 @@ pub(super) fn with_external_depth(
         DepthChoice::Folder(folder) => {
             let recording = Recording::open(folder, &wanted.reading())?;
             let depth_from = depth_of(&recording);
+            wanted.check_relative(depth_from)?;
             first_depth = wanted.first_depth(&recording);
             (Box::new(Beside::new(recording, &folder.display().to_string())?), depth_from)
         }

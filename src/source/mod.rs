@@ -55,6 +55,8 @@ pub enum DepthFrom {
     Units,
     /// Metres, or disparities that become metres.
     Metres,
+    /// Grey pictures of relative inverse depth.
+    Relative,
     /// Two eyes.
     Eyes,
     /// Networks: relative distances.
@@ -108,6 +110,9 @@ struct Wanted<'a> {
     /// The look that the depth is for; `None` where depth is wanted for its own sake, as for recording it.
     look: Option<&'a Look>,
 }
+
+/// What refuses metres for relative inverse depth.
+pub const INVERSE_TELLS: &str = "inverse depth without a scale tells";
 
 /// Whether depth from two eyes is refined by default: refinement does not model the errors of stereo matching, but
 /// makes its depth steadier.
@@ -204,6 +209,7 @@ impl Wanted<'_> {
         let Options { depth, keep_going, .. } = self.options;
         Reading {
             depth_scale: depth.file_scale(),
+            depth_unit: depth.file_unit(),
             depth_invalid: Some(depth.depth_invalid),
             keep_going: *keep_going,
             ..Reading::default()
@@ -223,6 +229,12 @@ impl Wanted<'_> {
         let is_compared = has_distance && recording.has_depth();
         let read = is_compared.then(|| recording.read_depth(0, &mut Scratch::default(), &mut map))?;
         read.ok().map(|()| map)
+    }
+
+    /// Refuses a look that needs real distances for relative ones.
+    fn check_relative(&self, depth_from: DepthFrom) -> Result<(), SourceError> {
+        let is_used = depth_from == DepthFrom::Relative && self.uses_depth();
+        self.look.filter(|_| is_used).map_or(Ok(()), |look| refuse_metres(look, INVERSE_TELLS))
     }
 
     fn check_effect(&self) -> Result<(), SourceError> {

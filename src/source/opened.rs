@@ -82,6 +82,7 @@ impl Opened {
                 }
                 let disparities = recording.disparities();
                 let depth_from = depth_of(&recording);
+                wanted.check_relative(depth_from)?;
                 let first_depth = wanted.first_depth(&recording);
                 let depth = match recording.has_depth() {
                     true => Some(Box::new(Recorded::new(recording, &name)?) as Box<dyn DepthSource>),
@@ -115,6 +116,7 @@ impl Opened {
 pub(super) fn depth_of(recording: &Recording) -> DepthFrom {
     match recording.has_depth() {
         false => DepthFrom::Nothing,
+        true if recording.has_relative_depth() => DepthFrom::Relative,
         true if recording.has_depth_in_units() => DepthFrom::Units,
         true => DepthFrom::Metres,
     }

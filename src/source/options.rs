@@ -13,6 +13,7 @@ use clap::builder::{BoolishValueParser, RangedI64ValueParser};
 
 use crate::depth::stereo::Settings;
 use crate::look::number::{above_zero, within};
+use crate::names;
 #[cfg(feature = "camera")]
 use crate::v4l2::{FourCc, live::Setting};
 pub use one_camera::{NetworkFile, Networks, OneCamera, PlateFile};
@@ -69,6 +70,15 @@ pub struct Depth {
     /// Value of a depth picture that means unknown
     #[arg(long, value_name = "VALUE", default_value = "0")]
     pub depth_invalid: u16,
+    /// What the numbers of depth pictures are: metres (as --depth-scale has them), or inverse (relative inverse depth, as
+    /// networks and phones give it: 8 or 16 bits, PNG or JPEG, white is near)
+    #[arg(long, value_name = "UNIT", value_parser = names::parse::<DepthUnit>, default_value = "metres")]
+    pub depth_unit: DepthUnit,
+    /// White is far in pictures of inverse depth
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub depth_invert: bool,
     /// How a depth camera stands beside the colour camera: TOML with the tables [depth] and [color] (width, height, fx,
     /// fy, cx, cy, in pixels) and [depth-to-color] (rotation: 9 numbers row by row; translation_m: 3 numbers)
     /// [default: both see the same]
@@ -76,7 +86,26 @@ pub struct Depth {
     pub depth_calibration: Option<PathBuf>,
 }
 
+names::named! {
+    /// What the numbers of a depth picture are.
+    pub enum DepthUnit default Metres {
+        /// Distances
+        Metres = "metres",
+        /// Relative inverse depth
+        Inverse = "inverse",
+    }
+}
+
 impl Depth {
+    /// What the numbers of depth pictures in files are.
+    pub fn file_unit(&self) -> crate::recording::DepthUnit {
+        use crate::recording::DepthUnit as Unit;
+        match self.depth_unit {
+            DepthUnit::Metres => Unit::Metres,
+            DepthUnit::Inverse => Unit::Inverse { white_is_far: self.depth_invert },
+        }
+    }
+
     /// Units per metre of depth pictures in files.
     pub fn file_scale(&self) -> f32 {
         self.depth_scale.unwrap_or(DEPTH_SCALE)

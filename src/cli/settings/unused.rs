@@ -43,16 +43,25 @@ pub enum From {
 type Why = fn(&Run) -> Option<&'static str>;
 
 /// What settings need to have an effect. The first two rows depend on the source alone: `warn_by_source` takes these.
-const NEEDS: [(&[&str], Why); 14] = [
+const NEEDS: [(&[&str], Why); 16] = [
     (&["size", "fps"], |run| (run.source == From::Source(Kind::Recording)).then_some("a recording has its own")),
     (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
     (&["depth-scale", "depth-invalid"], |run| match run.depth {
         DepthFrom::Nothing => Some(NO_DEPTH),
         DepthFrom::Metres | DepthFrom::Eyes => Some("this depth is in metres already"),
+        DepthFrom::Relative => Some("relative depth has no scale"),
         DepthFrom::Networks => Some("networks give no depth pictures"),
         DepthFrom::Plate => Some("a plate gives no depth pictures"),
         DepthFrom::Units if run.uses_depth => None,
         DepthFrom::Units => Some(DEPTH_UNUSED),
+    }),
+    (&["depth-unit"], |run| match run.depth {
+        DepthFrom::Units | DepthFrom::Relative | DepthFrom::Metres => None,
+        DepthFrom::Nothing => Some(NO_DEPTH),
+        _ => Some("depth comes from no pictures of it"),
+    }),
+    (&["depth-invert"], |run| {
+        (run.depth != DepthFrom::Relative).then_some("only inverse depth is inverted: add --depth-unit inverse")
     }),
     (&["max-disparity", "rectified", "calib", "focal-px", "baseline-m", "doffs-px"], |run| {
         (run.depth != DepthFrom::Eyes).then_some("depth is not taken from two eyes")
@@ -199,7 +208,7 @@ mod tests {
         let all = all_settings();
         let is_camera = |name: &&str| ["format", "control"].contains(name);
         let is_setting = |name: &&str| all.get_arguments().any(|arg| arg.get_long() == Some(name));
-        let window = |name: &&str| cfg!(feature = "window") || !NEEDS[13].0.contains(name);
+        let window = |name: &&str| cfg!(feature = "window") || !NEEDS[15].0.contains(name);
         assert!(names.iter().all(|name| is_setting(name) || is_camera(name) || !window(name)), "{names:?}");
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]));

@@ -24,11 +24,11 @@ const LEAST_PART: f32 = 0.002;
 /// Holes of less than this share of the picture are no background.
 const LEAST_HOLE: f32 = 0.001;
 
-/// A mask of persons says so from here on; a part is theirs if so much of it is; what is as close to them as this, as a
-/// share of the picture's width, may be held.
+/// A mask of persons says so from here on. What is as close to them as this, as a share of the picture's width, is theirs;
+/// and so is what else is joined to them, as what they hold, unless it is larger than this share of them.
 const PERSON: f32 = 0.5;
-const THEIRS: f32 = 0.35;
 const CLOSE: f32 = 0.02;
+const HELD: f32 = 0.3;
 
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -217,8 +217,8 @@ impl Subject {
         }
     }
 
-    /// Parts that are mostly nobody's, as where a lamp was switched on, are background but for where `persons` are, and
-    /// what is close to them.
+    /// What is nobody's, as where a lamp was switched on, is background: what is neither close to `persons` nor joined to them
+    /// and small enough to be held.
     pub fn keep_persons(&mut self, persons: &Mask, size: (usize, usize)) {
         let of_mask = (persons.width as usize, persons.height as usize);
         if persons.share.is_empty() {
@@ -236,7 +236,8 @@ impl Subject {
         for part in &mut self.parts {
             let range = part.first..part.end;
             let of_persons = self.pixels[range.clone()].iter().filter(|&&at| self.seen[place(at)]).count();
-            let is_theirs = of_persons as f32 >= THEIRS * range.len() as f32;
+            let away = self.pixels[range.clone()].iter().filter(|&&at| !near[place(at)]).count();
+            let is_theirs = away as f32 <= HELD * of_persons as f32;
             let first = kept;
             for k in range {
                 let at = self.pixels[k];

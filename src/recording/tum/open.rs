@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::{ASSOCIATIONS, COLOR_LIST, DEPTH_LIST, list};
+use crate::recording::DepthUnit;
 use crate::recording::contents::{Contents, DepthForm, Folder, Listed, Source};
 use crate::recording::decode::{self, DepthUnits, Kind};
 use crate::recording::error::RecordingError;
@@ -61,8 +62,12 @@ fn to_frame(color: Entry, depth: Option<Source>) -> Listed {
 
 /// `depth_options` are given if the frames have depth.
 fn to_contents(frames: Vec<Listed>, depth_options: Option<&Options>, unpaired: Unpaired) -> Contents {
-    let units = |options: &Options| DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid };
-    let depth = depth_options.map(|options| DepthForm::Units(units(options)));
+    let depth = depth_options.map(|options| match options.depth_unit {
+        DepthUnit::Metres => {
+            DepthForm::Units(DepthUnits { scale: options.depth_scale, invalid: options.depth_invalid })
+        }
+        DepthUnit::Inverse { white_is_far } => DepthForm::Inverse { white_is_far },
+    });
     Contents { frames, depth, pair: None, disparities: None, unpaired }
 }
 

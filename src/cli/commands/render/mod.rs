@@ -25,7 +25,6 @@ use crate::depth::matting::mask;
 use crate::files::place;
 use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::look::{ApertureName, Look, Refine, Strength};
-use crate::names;
 use crate::optics::StereoRig;
 use crate::pipeline::{
     self,
@@ -33,17 +32,8 @@ use crate::pipeline::{
 };
 use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::recording::{Extras, snapshot};
+use crate::source::options::DepthUnit;
 use crate::source::{self, DepthChoice, DepthFrom, OneCamera, PlateFile};
-
-names::named! {
-    /// What the numbers of a depth map are.
-    pub enum DepthUnit default Metres {
-        /// Distances
-        Metres = "metres",
-        /// Relative inverse depth
-        Inverse = "inverse",
-    }
-}
 
 /// Blur one still picture
 #[derive(Args, Debug)]
@@ -66,14 +56,6 @@ pub struct RenderCommand {
     /// Its depth: 16-bit grey PNG, or PFM in metres; or disparity that `depth` wrote
     #[arg(long, value_name = "FILE")]
     depth_map: Option<PathBuf>,
-    /// What the numbers of the depth map are: metres (as --depth-scale has them), or inverse (relative inverse depth, as
-    /// networks and phones give it: 8 or 16 bits, PNG, JPEG or PFM, white is near)
-    #[arg(long, value_name = "UNIT", value_parser = options::named::<DepthUnit>(), default_value = "metres",
-          requires = "depth_map")]
-    depth_unit: DepthUnit,
-    /// White is far in a depth map of inverse depth
-    #[arg(long, requires = "depth_map")]
-    depth_invert: bool,
     /// A mask of the subject, PNG or JPEG, of any size: white is the subject, which stays sharp
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_map", "like"])]
     mask: Option<PathBuf>,
@@ -151,6 +133,7 @@ impl RenderCommand {
     fn warn(&self, look: &Look, color: &ColorImage, depth: Option<&Depth>, given: &Given) {
         let in_units = |file: &PathBuf| still::map_format(file).is_ok_and(|format| format == MapFormat::Png);
         let in_units = self.depth_map.as_ref().is_some_and(in_units);
+        let is_inverse = self.depth_map.is_some() && self.depth.depth_unit == DepthUnit::Inverse;
         let uses_depth = look.effect.follows_depth();
         unused::warn(
             &given.settings,
@@ -158,6 +141,7 @@ impl RenderCommand {
                 source: From::Picture,
                 depth: match depth {
                     None => DepthFrom::Nothing,
+                    Some(Depth::Measured(_)) if is_inverse => DepthFrom::Relative,
                     Some(Depth::Measured(_)) if in_units => DepthFrom::Units,
                     Some(_) => DepthFrom::Metres,
                 },
@@ -303,8 +287,7 @@ fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
     let scale = 1.0 / (high - low).max(f32::MIN_POSITIVE);
     for value in &mut nearness {
         let near = (*value - low) * scale;
-        let near = if invert { 1.0 - near } else { near };
-        *value = if near.is_finite() { mask::SUBJECT_M / near.max(mask::SUBJECT_M / mask::FAR_M) } else { 0.0 };
+        *value = DepthMap::relative_m(if invert { 1.0 - near } else { near });
     }
     Ok(DepthMap { width, height, metres: nearness, ..DepthMap::default() })
 }
@@ -313,9 +296,9 @@ fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
 /// scale, which is an error where the look needs real metres.
 fn read_depth(file: &Path, command: &RenderCommand, look: &Look) -> Result<DepthMap, CliError> {
     let name = file.display();
-    if command.depth_unit == DepthUnit::Inverse {
-        source::refuse_metres(look, "inverse depth without a scale tells")?;
-        return read_inverse_depth(file, command.depth_invert);
+    if command.depth.depth_unit == DepthUnit::Inverse {
+        source::refuse_metres(look, source::INVERSE_TELLS)?;
+        return read_inverse_depth(file, command.depth.depth_invert);
     }
     let options::Depth { depth_scale, depth_invalid, .. } = command.depth;
     let (map, rig) = match still::read_map(file, depth_scale, Some(depth_invalid))? {

@@ -20,10 +20,10 @@ use super::share::Contrast;
 use cells::{Cell, Kernel, REACH, Sums, View};
 use posterior::Posterior;
 
-/// Distance that a subject is given where distances are only relative, in metres.
-pub const SUBJECT_M: f32 = 1.0;
-/// What is then as good as infinitely far, in metres.
-pub const FAR_M: f32 = 1e3;
+/// See [`DepthMap::SUBJECT_M`].
+pub const SUBJECT_M: f32 = DepthMap::SUBJECT_M;
+/// See [`DepthMap::FAR_M`].
+pub const FAR_M: f32 = DepthMap::FAR_M;
 
 /// So far from an outline, as a share of the picture's height, blur may show what is behind a subject.
 const REVEALED: f32 = 0.035;
