@@ -198,7 +198,7 @@ fn a_plate_is_taken_once_the_person_has_gone() {
     let mut steps = Vec::new();
     for frame in 0..240 {
         // They dawdle: still in the picture after the countdown.
-        let person = (frame < 120).then(|| (300.0 + 4.0 * frame as f32, 150.0)).filter(|(x, _)| *x < 760.0);
+        let person = (frame < 120).then_some((300.0 + 4.0 * frame as f32, 150.0)).filter(|(x, _)| *x < 760.0);
         let (step, ..) = watched.see(Shown { person, ..ROOM });
         if steps.last() != Some(&step) {
             steps.push(step);

@@ -188,11 +188,12 @@ mod tests {
         let (width, height) = (240usize, 160usize);
         let mut picture = ColorImage::new(width as u32, height as u32);
         for (half, [dark, bright]) in [[30.0, 130.0], [130.0, 230.0]].into_iter().enumerate() {
-            let hard = |at: usize| if at % width / 20 % 2 == 0 { dark } else { bright };
+            let hard = |at: usize| if (at % width / 20).is_multiple_of(2) { dark } else { bright };
             let soft =
                 gaussian(&(0..width * height).map(hard).collect::<Vec<f32>>(), (width, height), deviation_px(half));
-            for at in half * height / 2 * width..(half + 1) * height / 2 * width {
-                picture.rgb[3 * at..][..3].fill(soft[at].round() as u8);
+            let rows = half * height / 2 * width..(half + 1) * height / 2 * width;
+            for (pixel, soft) in picture.rgb.as_chunks_mut::<3>().0[rows.clone()].iter_mut().zip(&soft[rows]) {
+                pixel.fill(soft.round() as u8);
             }
         }
         picture

@@ -37,8 +37,6 @@ const STOP_POLL: Duration = Duration::from_millis(250);
 /// After this long without a frame, and this many periods of the source, the person is told.
 const SILENCE: Duration = Duration::from_secs(2);
 const SILENT_PERIODS: u32 = 10;
-/// The picture's size until the source tells it.
-const USUAL_SIZE: (u32, u32) = (1280, 720);
 
 pub(super) struct App {
     state: State,
@@ -246,16 +244,6 @@ impl App {
         };
     }
 
-    fn ask_for_redraw(&self) {
-        if let Some(gfx) = self.gfx.as_ref().filter(|_| !self.is_hidden()) {
-            gfx.window.request_redraw();
-        }
-    }
-
-    fn is_hidden(&self) -> bool {
-        self.covered || self.empty
-    }
-
     fn on_input(&mut self) {
         let now = Instant::now();
         if !self.is_hidden() {
@@ -263,14 +251,6 @@ impl App {
         }
         self.layout_at = Some(now);
         self.ask_for_redraw();
-    }
-
-    fn picture_size(&self) -> (u32, u32) {
-        match (&self.view, &self.state.source) {
-            (Some(view), _) => view.picture.size(),
-            (None, Source::Running(running)) => running.size,
-            (None, _) => USUAL_SIZE,
-        }
     }
 }
 

@@ -18,7 +18,28 @@ const NO_PICTURE: &str = "There is no picture to save.";
 /// Shown when another presenter took over.
 const GPU_FAILED: &str = "The GPU failed: the CPU takes over, more slowly.";
 
+/// The picture's size until the source tells it.
+const USUAL_SIZE: (u32, u32) = (1280, 720);
+
 impl App {
+    pub(super) fn ask_for_redraw(&self) {
+        if let Some(gfx) = self.gfx.as_ref().filter(|_| !self.is_hidden()) {
+            gfx.window.request_redraw();
+        }
+    }
+
+    pub(super) fn is_hidden(&self) -> bool {
+        self.covered || self.empty
+    }
+
+    pub(super) fn picture_size(&self) -> (u32, u32) {
+        match (&self.view, &self.state.source) {
+            (Some(view), _) => view.picture.size(),
+            (None, Source::Running(running)) => running.size,
+            (None, _) => USUAL_SIZE,
+        }
+    }
+
     /// Lays out the controls and carries out what the person did with them.
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
