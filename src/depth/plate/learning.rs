@@ -133,11 +133,11 @@ impl Brush<'_> {
         let (width, height) = (self.plate.width as usize, self.plate.height as usize);
         let Alignment { gain, shift } = *self.lesson.alignment;
         let block_px = block_px(self.plate.width);
-        // A plate that is off is learned only once it is whole pixels that it is off by.
+        // Where a point of the plate is now, to the nearest pixel.
         let off = shift.map(|shift| (shift * block_px as f32).round() as isize);
         let mut sums = [0.0f32; 3];
-        let (lines, columns) = (row * block_px..((row + 1) * block_px).min(height), column * block_px..width);
-        let columns = columns.start..columns.start.saturating_add(block_px).min(width);
+        let lines = row * block_px..((row + 1) * block_px).min(height);
+        let columns = column * block_px..((column + 1) * block_px).min(width);
         for y in lines.clone() {
             for x in columns.clone() {
                 let (Some(from_x), Some(from_y)) = (x.checked_add_signed(off[0]), y.checked_add_signed(off[1])) else {

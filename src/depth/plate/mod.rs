@@ -1,7 +1,7 @@
 //! Who stands before a plate: a picture of what is behind, taken once from a camera that stands still. No network is
 //! needed, and what a person holds is theirs.
 //!
-//! Each picture is compared with the plate in few pixels, after its exposure, white balance and shift ([`Alignment`]) are
+//! Each picture is compared with the plate in few pixels, after its exposure, white balance and shift are
 //! taken out of it; shadows are background. The plate goes on learning where nobody is.
 
 mod alignment;
