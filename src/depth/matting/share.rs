@@ -25,8 +25,8 @@ pub struct Contrast {
     offset: f32,
     /// The reciprocal variance of that share.
     precision: f32,
-    /// The covariance that both surfaces' colours vary by.
-    spread: Symmetric,
+    /// The inverse of the covariance that both surfaces' colours vary by.
+    inverse: Symmetric,
 }
 
 impl Contrast {
@@ -39,26 +39,26 @@ impl Contrast {
         for k in [0, 3, 5] {
             spread[k] += SHRINKAGE / 3.0 * trace + QUANTISATION;
         }
-        Self::across(surfaces, spread)
+        Self::across(surfaces, inverse(&spread))
     }
 
     /// Of the same near surface, and of one behind whose light is known but for noise.
     #[inline(always)]
     pub(super) fn before(&self, light: [f32; 3]) -> Self {
         let [near, far] = self.surfaces;
-        Self::across([near, Color { mean: light, ..far }], self.spread)
+        Self::across([near, Color { mean: light, ..far }], self.inverse)
     }
 
     #[inline(always)]
-    fn across(surfaces: [Color; 2], spread: Symmetric) -> Self {
+    fn across(surfaces: [Color; 2], inverse: Symmetric) -> Self {
         let [near, far] = &surfaces;
         let difference: [f32; 3] = std::array::from_fn(|p| near.mean[p] - far.mean[p]);
-        let direction = solve(&spread, difference);
+        let direction = times(&inverse, difference);
         let contrast = dot(direction, difference).max(1e-9);
         // Both surfaces' variances are in it, of which a mixed pixel has half each. No finer than the steps.
         let precision = (2.0 * contrast).min(1000.0);
         let direction = direction.map(|value| value / contrast);
-        Self { surfaces, direction, offset: dot(direction, far.mean), precision, spread }
+        Self { surfaces, direction, offset: dot(direction, far.mean), precision, inverse }
     }
 
     /// The share of the near surface that a colour is, from below 0 to above 1.
@@ -84,7 +84,7 @@ impl Contrast {
             spread[k] += floor;
         }
         let residual = std::array::from_fn(|p| own[p] - share * near.mean[p] - rest * far.mean[p]);
-        let step = solve(&spread, residual);
+        let step = times(&inverse(&spread), residual);
         let (of_near, of_far) = (times(&near.covariance, step), times(&far.covariance, step));
         let (up, down) = (rest.max(1e-3), share.max(1e-3));
         std::array::from_fn(|p| {
@@ -230,11 +230,11 @@ fn times(&[xx, xy, xz, yy, yz, zz]: &Symmetric, vector: [f32; 3]) -> [f32; 3] {
     [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| dot(row, vector))
 }
 
-/// The solution x of `matrix` x = `right`, by the adjugate.
-fn solve(&[xx, xy, xz, yy, yz, zz]: &Symmetric, right: [f32; 3]) -> [f32; 3] {
+/// The inverse, by the adjugate; of a matrix that has none, zeros.
+fn inverse(&[xx, xy, xz, yy, yz, zz]: &Symmetric) -> Symmetric {
     let (a, b, c) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
     let (d, e, f) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
     let determinant = xx * a + xy * b + xz * c;
     let scale = if determinant > 0.0 { 1.0 / determinant } else { 0.0 };
-    [[a, b, c], [b, d, e], [c, e, f]].map(|row| scale * dot(row, right))
+    [a, b, c, d, e, f].map(|value| scale * value)
 }

@@ -185,7 +185,9 @@ impl PlateDepth {
                 Taken::Moved if now_ns > *since_ns + RESTLESS_NS => Step::Restless,
                 Taken::Moved => Step::Moves,
                 Taken::Whole(plate) => {
-                    self.state = State::Using(Box::new(Plate::new(plate)));
+                    let mut plate = Box::new(Plate::new(plate));
+                    plate.look(color, now_ns, persons);
+                    self.state = State::Using(plate);
                     Step::Ready
                 }
             },

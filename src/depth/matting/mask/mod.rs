@@ -170,21 +170,16 @@ impl View<'_> {
         front: &mut Vec<u32>,
     ) {
         let own = contrasts[cell].as_ref();
-        let slice = own.map(|contrast| (contrast, posterior.slice(contrast.precision())));
-        let known = self.backdrop.zip(own);
         for (x, y) in self.pixels_of(cell) {
             let at = y * self.color.width as usize + x;
-            let mask = self.share_at(x, y);
-            let place = |contrast: &Contrast| self.place(contrasts, contrast, (x, y), self.light_at(at));
-            let share = match (&known, &slice) {
-                (Some((backdrop, own)), _) => {
-                    let behind = backdrop.light_at(x, y);
-                    let precision = own.before(behind).precision();
-                    posterior.slice(precision).share(mask, self.place_before(contrasts, own, (x, y), at, behind))
-                }
-                (None, Some((contrast, slice))) => slice.share(mask, place(contrast)),
-                (None, None) => mask,
-            };
+            let (mask, light) = (self.share_at(x, y), self.light_at(at));
+            let behind = self.backdrop.map(|backdrop| backdrop.light_at(x, y));
+            // Where it is known what is behind, the surfaces differ in another way at every pixel.
+            let here = |contrast: &Contrast| behind.map_or(*contrast, |behind| contrast.before(behind));
+            let share = own.map_or(mask, |own| {
+                let place = self.between(contrasts, own, (x, y), |contrast| here(contrast).share(light));
+                posterior.slice(here(own).precision()).share(mask, place)
+            });
             shares[at] = share;
             if mask > NEAR_FROM && share > NEAR_FROM {
                 shares[at] += FOUND;
@@ -225,15 +220,10 @@ impl View<'_> {
                 map.metres[at] = SUBJECT_M;
             }
             let own = self.light_at(at);
-            let (behind, difference) = match (self.backdrop, contrast) {
-                (Some(backdrop), _) if share > NEARLY_PURE => {
-                    let light = backdrop.light_at(x, y);
-                    (1.0, std::array::from_fn(|p| (own[p] - light[p]) / share))
-                }
-                (backdrop, Some(contrast)) => match backdrop.map(|backdrop| backdrop.light_at(x, y)) {
-                    Some(light) => (1.0, contrast.before(light).difference(own, share)),
-                    None => (1.0 - share, contrast.difference(own, share)),
-                },
+            let (behind, difference) = match (self.backdrop.map(|backdrop| backdrop.light_at(x, y)), contrast) {
+                (Some(light), _) if share > NEARLY_PURE => (1.0, std::array::from_fn(|p| (own[p] - light[p]) / share)),
+                (Some(light), Some(contrast)) => (1.0, contrast.before(light).difference(own, share)),
+                (None, Some(contrast)) => (1.0 - share, contrast.difference(own, share)),
                 (_, None) => (1.0 - share, [0.0; 3]),
             };
             if (1.0 - NEARLY_PURE..=NEARLY_PURE).contains(&share) || behind == 1.0 && share > NEARLY_PURE {
@@ -261,28 +251,8 @@ impl View<'_> {
         }
     }
 
-    /// Where the colour of a pixel lies between those of the two surfaces, linear between the cells around it, so that cells
-    /// are not seen; `own` is the contrast of its cell.
-    #[inline(always)]
-    fn place(&self, contrasts: &[Option<Contrast>], own: &Contrast, pixel: (usize, usize), light: [f32; 3]) -> f32 {
-        self.between(contrasts, own, pixel, |contrast| contrast.share(light))
-    }
-
-    /// The same where `behind` is known to be behind it.
-    #[inline(always)]
-    fn place_before(
-        &self,
-        contrasts: &[Option<Contrast>],
-        own: &Contrast,
-        pixel: (usize, usize),
-        at: usize,
-        behind: [f32; 3],
-    ) -> f32 {
-        let light = self.light_at(at);
-        self.between(contrasts, own, pixel, |contrast| contrast.before(behind).share(light))
-    }
-
-    /// The share that the contrasts of the cells around a pixel give, linear between them.
+    /// The share that the contrasts of the cells around a pixel give, linear between them, so that cells are not seen; `own` is
+    /// the contrast of its cell.
     #[inline(always)]
     fn between(
         &self,
