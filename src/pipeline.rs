@@ -12,6 +12,7 @@ mod coc;
 mod deliver;
 mod depth;
 mod error;
+mod held;
 mod pacer;
 mod places;
 mod playout;

@@ -138,8 +138,11 @@ impl Stage<'_> {
         }
         if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
             let mut map = brought.unwrap_or_else(|| self.depths.take());
-            rate.copy_held(&mut map);
-            coc.find_matte(&mut map, color, &field);
+            rate.give_held(&mut map, color);
+            // A map that was made around a subject has brought its matte.
+            if map.subject_m.is_none() {
+                coc.find_matte(&mut map, color, &field);
+            }
             *self.held += 1;
             return Ok((map, field));
         }
@@ -156,7 +159,7 @@ impl Stage<'_> {
         let now_ns = self.clock.now_ns();
         self.times.add(now_ns - began_ns);
         if let Some(rate) = &mut self.rate {
-            rate.made((&map, field), now_ns - began_ns, now_ns);
+            rate.made((&map, field), color, now_ns - began_ns, now_ns);
         }
         Ok((map, field))
     }

@@ -1,7 +1,8 @@
 //! With how much effort depth is made, and how many frames share a map: the ladder of the depth stage.
 
+use super::held::Held;
 use crate::budget::{Governor, Sample};
-use crate::frame::DepthMap;
+use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
 /// Picks what there is time for: where time is short, depth is first made with less effort, if its source has a choice,
@@ -16,7 +17,7 @@ pub(super) struct Rate {
     /// The CoC of the last depth, while later frames may share both.
     last: Option<CocField>,
     /// The depth that goes with it.
-    map: DepthMap,
+    held: Held,
 }
 
 #[derive(Clone, Copy)]
@@ -35,7 +36,7 @@ impl Rate {
         let unshared = efforts.iter().enumerate().map(|(effort, &cost)| (Rung { frames: 1, effort }, cost));
         let (rungs, costs): (Vec<Rung>, Vec<f64>) = shared.into_iter().chain(unshared).unzip();
         let governor = Governor::new(&costs, costs.len() - 1);
-        Self { rungs, governor, budget_ns, age: 0, last: None, map: DepthMap::default() }
+        Self { rungs, governor, budget_ns, age: 0, last: None, held: Held::new() }
     }
 
     /// The effort for the next depth.
@@ -61,29 +62,23 @@ impl Rate {
         self.last = None;
     }
 
-    /// The depth that is held.
-    pub(super) fn copy_held(&self, into: &mut DepthMap) {
-        copy(&self.map, into);
+    /// Gives a picture the depth that is held.
+    pub(super) fn give_held(&self, map: &mut DepthMap, color: &ColorImage) {
+        self.held.give(map, color);
     }
 
-    /// Depth was made in `took_ns`, until `at_ns`: tells the governor, and keeps it if later frames may share it.
-    pub(super) fn made(&mut self, (map, field): (&DepthMap, CocField), took_ns: u64, at_ns: u64) {
+    /// Depth of a picture was made in `took_ns`, until `at_ns`: tells the governor, and keeps it if later frames may share it.
+    pub(super) fn made(&mut self, (map, field): (&DepthMap, CocField), color: &ColorImage, took_ns: u64, at_ns: u64) {
         self.age = 1;
         // Its share for each of the frames.
         let took_ns = took_ns / self.rung().frames as u64;
         self.governor.note(Sample { rung: self.governor.rung(), took_ns, at_ns }, self.budget_ns);
         // The first one in any case: then the memory is allocated, and not during a later frame.
-        if self.rung().frames > 1 || self.map.metres.is_empty() {
-            copy(map, &mut self.map);
+        if self.rung().frames > 1 || self.held.is_empty() {
+            self.held.keep(map, color);
             self.last = Some(field);
         }
     }
-}
-
-fn copy(from: &DepthMap, to: &mut DepthMap) {
-    to.resize(from.width, from.height);
-    to.metres.copy_from_slice(&from.metres);
-    to.subject_m = from.subject_m;
 }
 
 #[cfg(test)]
@@ -101,7 +96,7 @@ mod tests {
                 return true;
             }
             let took_ns = (took_ns as f64 * efforts[rate.effort()]) as u64;
-            rate.made((&map, CocField::Uniform { radius_px: 1.0 }), took_ns, now_ns);
+            rate.made((&map, CocField::Uniform { radius_px: 1.0 }), &ColorImage::new(2, 2), took_ns, now_ns);
             false
         };
         let held = (1..=200).map(|frame| frame * 33_000_000).map(frame).collect();
