@@ -119,19 +119,15 @@ const ENOTTY: i32 = 25;
 /// After so many failures the whole device is taken to fail.
 const MAX_FAULTS: u32 = 64;
 
-/// The former or later name of a control that was renamed.
-pub fn renamed(name: &str) -> Option<&'static str> {
-    RENAMED.iter().find_map(|(old, new)| match name {
+/// The control of this name, also under its former or later name.
+pub fn find<'a>(controls: &'a [Control], name: &str) -> Option<&'a Control> {
+    let renamed = RENAMED.iter().find_map(|(old, new)| match name {
         _ if name == *old => Some(*new),
         _ if name == *new => Some(*old),
         _ => None,
-    })
-}
-
-/// The control of this name, also under its former or later name.
-pub fn find<'a>(controls: &'a [Control], name: &str) -> Option<&'a Control> {
+    });
     let called = |wanted: &str| controls.iter().find(|control| control.name == wanted);
-    called(name).or_else(|| called(renamed(name)?))
+    called(name).or_else(|| called(renamed?))
 }
 
 /// What a control is set to.

@@ -1,9 +1,8 @@
 //! Holding what a camera otherwise changes by itself: exposure, white balance, gain and focus.
 
 use super::OpenError;
-use super::knobs::{list, turn};
-use crate::knob::Knob;
-use crate::v4l2::controls;
+use super::knobs::{open, turn};
+use crate::v4l2::controls::{self, Control, Value};
 
 /// What switches a camera's own decisions off: the switch, whether it is off at 1 rather than at 0, and the value that it
 /// decides on, which is kept.
@@ -29,17 +28,23 @@ impl Held {
     /// # Errors
     /// There is no such camera, or it cannot be opened.
     pub fn new(camera: &str) -> Result<Self, OpenError> {
-        let knobs = list(camera)?;
+        let device = open(camera)?;
+        let listed = controls::list(&device);
+        let all = listed.map_err(|error| OpenError::at(device.path(), "its controls cannot be listed", error))?;
         let mut held = Self { camera: camera.to_owned(), before: Vec::new() };
+        let number = |name: &str| match controls::find(&all, name) {
+            Some(Control { name, value: Some(Value::Number(value)), .. }) => Some((name.as_str(), *value)),
+            _ => None,
+        };
         for (switch, off, value) in AUTOMATIC {
-            let Some(switch) = find(&knobs, switch).filter(|switch| switch.value != off) else { continue };
+            let Some((switch, before)) = number(switch).filter(|(_, value)| *value != off) else { continue };
             // One that refuses is left alone.
-            if turn(camera, &switch.name, off).is_err() {
+            if controls::set(&device, switch, &off.to_string()).is_err() {
                 continue;
             }
-            held.before.push((switch.name.clone(), switch.value));
-            if let Some(value) = find(&knobs, value) {
-                let _ = turn(camera, &value.name, value.value);
+            held.before.push((switch.to_owned(), before));
+            if let Some((name, value)) = number(value) {
+                let _ = controls::set(&device, name, &value.to_string());
             }
         }
         Ok(held)
@@ -54,10 +59,4 @@ impl Drop for Held {
             }
         }
     }
-}
-
-/// The knob of this name, also under its former one.
-fn find<'a>(knobs: &'a [Knob], name: &str) -> Option<&'a Knob> {
-    let other = controls::renamed(name);
-    knobs.iter().find(|knob| knob.name == name || Some(knob.name.as_str()) == other)
 }

@@ -31,7 +31,8 @@ pub fn turn(name: &str, knob: &str, value: i64) -> Result<Vec<Knob>, OpenError> 
     knobs(&device)
 }
 
-fn open(name: &str) -> Result<Device, OpenError> {
+/// A second opening of the camera that is meant by `name`.
+pub(super) fn open(name: &str) -> Result<Device, OpenError> {
     let path: &Path = &node::resolve(name)?;
     Device::open(path).map_err(|error| OpenError::at(path, "it cannot be opened", error))
 }
