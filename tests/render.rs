@@ -10,12 +10,17 @@ use bokehcam::recording::still::{read_photo, write_photo};
 use image::{ImageBuffer, Rgba};
 use tempfile::TempDir;
 
-/// Runs `render` with these arguments in `dir`; gives the exit code, and what was said.
-fn run(dir: &Path, arguments: &[&str]) -> (Option<i32>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-    command.env_clear().env("XDG_CONFIG_HOME", dir).current_dir(dir).stdin(Stdio::null());
-    let output = command.arg("render").args(arguments).args(["--backend", "cpu"]).output().unwrap();
+/// Runs a command with these arguments in `dir`; gives the exit code, and what was said.
+fn bokehcam(dir: &Path, command: &[&str], arguments: &[&str]) -> (Option<i32>, String) {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    program.env_clear().env("XDG_CONFIG_HOME", dir).current_dir(dir).stdin(Stdio::null());
+    let output = program.args(command).args(arguments).args(["--backend", "cpu"]).output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+/// Runs `render`.
+fn run(dir: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+    bokehcam(dir, &["render"], arguments)
 }
 
 /// Blurs `image` in `dir`; gives what was said.
@@ -137,13 +142,7 @@ fn a_recording_may_have_relative_inverse_depth() {
     near_left.save(at("rec/depth/0.png")).unwrap();
     std::fs::write(at("rec/rgb.txt"), "0 rgb/0.png\n").unwrap();
     std::fs::write(at("rec/depth.txt"), "0 depth/0.png\n").unwrap();
-    let stream = |more: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        command.env_clear().env("XDG_CONFIG_HOME", dir.path()).current_dir(dir.path()).stdin(Stdio::null());
-        let output = command.args(["stream", "rec", "--to", "out/", "--force", "--backend", "cpu"]).args(more).output();
-        let output = output.unwrap();
-        (output.status.code(), String::from_utf8(output.stderr).unwrap())
-    };
+    let stream = |more: &[&str]| bokehcam(dir.path(), &["stream", "rec", "--to", "out/", "--force"], more);
     let (code, said) = stream(&["--depth-unit", "inverse", "--focus", "0.2,0.5", "--coc-at-infinity", "8"]);
     assert_eq!(code, Some(0), "{said}");
     let mut written = std::fs::read_dir(at("out")).unwrap().map(|entry| entry.unwrap().path());

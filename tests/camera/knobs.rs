@@ -6,7 +6,7 @@ use std::thread;
 use bokehcam::knob::Knob;
 use bokehcam::v4l2::live::knobs;
 
-use super::machine::{CAMERA, Machine, frame, open, sh, until, wish};
+use super::machine::{CAMERA, Ends, Machine, frame, open, sh, until, wish};
 
 fn knob<'a>(knobs: &'a [Knob], name: &str) -> &'a Knob {
     knobs.iter().find(|knob| knob.name == name).unwrap_or_else(|| panic!("no {name} in {knobs:?}"))
@@ -67,13 +67,4 @@ fn knobs_are_listed_turned_and_read_back_while_the_camera_streams() {
         let streamed = count.load(Ordering::SeqCst);
         wait("more pictures", &mut || count.load(Ordering::SeqCst) > streamed + 2);
     });
-}
-
-/// Ends the other thread, also when the test fails.
-struct Ends<'a>(&'a AtomicBool);
-
-impl Drop for Ends<'_> {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::SeqCst);
-    }
 }

@@ -15,7 +15,7 @@ use bokehcam::sink::{Ending, Options, Target};
 use bokehcam::v4l2::live::hold::Held;
 use bokehcam::v4l2::node::nodes;
 
-use super::machine::{CAMERA, Machine, VIRTUAL, bokehcam, sh, until};
+use super::machine::{CAMERA, Ends, Machine, VIRTUAL, bokehcam, sh, until};
 
 #[test]
 #[ignore = "needs the camera VM (tests/vm/run)"]
@@ -112,13 +112,4 @@ fn a_stream_tells_a_person_to_step_out_and_makes_a_portrait() {
         };
         assert!(change(true) <= 4 && change(false) >= 15, "person {} codes off, wall {}", change(true), change(false));
     });
-}
-
-/// Ends the camera with the test, also where that fails.
-struct Ends<'a>(&'a AtomicBool);
-
-impl Drop for Ends<'_> {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::SeqCst);
-    }
 }

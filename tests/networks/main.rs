@@ -4,6 +4,8 @@
 mod onnx;
 mod plate;
 mod real;
+#[cfg(feature = "window")]
+mod window;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -314,94 +316,4 @@ fn the_known_networks_run_and_are_installed() {
         files().find(|file| Known::of(&fs::read(file).unwrap()).is_some_and(|known| known.name == KNOWN[0].name));
     let ran = bokehcam(&["models", "add", best.unwrap().to_str().unwrap()], home.path());
     assert_eq!((ran.status.code(), fs::read_to_string(&foreign).unwrap().as_str()), (Some(1), "mine"));
-}
-
-/// What the window asks of a settings file.
-#[cfg(feature = "window")]
-struct NoStore;
-
-#[cfg(feature = "window")]
-impl bokehcam::preview::services::SettingsStore for NoStore {
-    fn presets(&mut self) -> Vec<bokehcam::look::presets::Preset> {
-        Vec::new()
-    }
-    fn save_preset(&mut self, _: &str, _: &bokehcam::look::Look) -> Result<(), String> {
-        Err("no file".into())
-    }
-    fn command(&self, _: &bokehcam::look::Look, _: &str, _: &[String], _: &[(String, String)]) -> String {
-        String::new()
-    }
-}
-
-#[cfg(feature = "window")]
-#[test]
-fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {
-    use bokehcam::look::Look;
-    use bokehcam::preview::{services::Services, system::System};
-    use bokehcam::source::{DepthChoice, Options};
-    let folder = TempDir::new().unwrap();
-    let good = matte(32, 24, WEIGHTS, 0.0);
-    let huge = folder.path().join("huge.onnx");
-    fs::File::create(&huge).unwrap().set_len(1 << 40).unwrap();
-    let line = [port("in", &[Side::Is(7)])];
-    let shapeless = model(&line, &[], &[node("Relu", &["in"], "out", &[])], &[port("out", &[Side::Is(7)])]);
-    let files = [
-        folder.path().join("missing.onnx"),
-        written(&folder, "cut.onnx", &good[..good.len() / 2]),
-        written(&folder, "shapeless.onnx", &shapeless),
-        huge,
-        written(&folder, "good.onnx", &good),
-    ];
-    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait");
-    for file in files {
-        let depth_choice: DepthChoice = format!("matte:{}", file.display()).parse().unwrap();
-        let options = Options { depth_choice, ..Options::default() };
-        let mut system = System::new(options, Look::default(), Box::new(NoStore));
-        match system.open(recording, false) {
-            Ok(opened) => assert!(file.ends_with("good.onnx") && opened.source.has_depth(), "{}", file.display()),
-            Err(line) => {
-                let name = file.file_name().unwrap().to_str().unwrap();
-                assert!(line.contains(name) && !line.contains('\n') && name != "good.onnx", "{line}");
-            }
-        }
-    }
-}
-
-/// A plate beside networks: none is taken with a person in the picture, however still they sit; and what changes without
-/// being theirs, as a wall in the light of a lamp, is background.
-#[test]
-fn a_plate_and_networks_know_more_together() {
-    use bokehcam::depth::plate::{PlateDepth, Step};
-    let folder = TempDir::new().unwrap();
-    let file = written(&folder, "m.onnx", &matte(64, 36, WEIGHTS, 0.0));
-    let networks = SingleCamera::open(Some(&file), Some(&file), &Hints::default(), Runtime::BuiltIn)
-        .expect("the test's own network");
-    let mut source = PlateDepth::new(None, None, Some(Box::new(networks)));
-    let guide = source.guide();
-    let (person, shares) = disc(320, 180, (160.0, 90.0), 40.0);
-    let (room, _) = disc(320, 180, (-500.0, 90.0), 40.0);
-    let near = |map: &DepthMap, x: usize, y: usize| map.metres[y * 320 + x] <= 1.0;
-    // Frames are 33 ms apart.
-    for frame in 0..150 {
-        let map = read(&mut source, &person, frame);
-        assert!(near(&map, 160, 90) && !near(&map, 20, 20), "frame {frame}: the networks know");
-        assert!(matches!(guide.step(), Step::StepOut(_) | Step::Taking(0) | Step::Moves), "{:?}", guide.step());
-    }
-    let taken = (150..300).find(|&frame| {
-        read(&mut source, &room, frame);
-        guide.step() == Step::Ready
-    });
-    let taken = taken.expect("a plate of the room");
-    let mut lit = person.clone();
-    for at in (0..320 * 180).filter(|at| at % 320 < 110) {
-        // Green: neither the person's nor the wall's.
-        lit.rgb[3 * at + 1] = 200;
-    }
-    for (picture, what) in [(&person, "as it was"), (&lit, "in another light")] {
-        let mut map = DepthMap::default();
-        (0..6).for_each(|k| map = read(&mut source, picture, taken + 1 + k));
-        assert_eq!(guide.step(), Step::Ready);
-        let wrong = (0..320 * 180).filter(|&at| (map.metres[at] <= 1.0) != (shares[at] > 0.5)).count();
-        assert!(wrong < 320 * 180 / 100, "{what}: {wrong} pixels");
-    }
 }

@@ -1,12 +1,15 @@
-//! Who stands before a plate in a real sequence, beside what a depth sensor saw.
+//! Who stands before a plate: with networks beside it, and in a real sequence beside what a depth sensor saw.
 
-use bokehcam::depth::plate::PlateDepth;
+use bokehcam::depth::plate::{PlateDepth, Step};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::network::{Runtime, Task};
 
-use super::read;
+use tempfile::TempDir;
+
+use super::onnx::matte;
 use super::real::{Sequence, model, sure};
+use super::{WEIGHTS, disc, read, written};
 
 /// Of a pixel, what it was in so many frames, if nobody was so near.
 const SAMPLES: usize = 15;
@@ -92,4 +95,42 @@ fn a_real_person_before_a_plate_is_found() {
     let flicker = 1e3 * flicker / resting as f64;
     eprintln!("person found {found:.4} of {persons}, wall mistaken {mistaken:.4}, flicker {flicker:.3}e-3");
     assert!(found >= 0.99 && mistaken <= 0.01, "{found} {mistaken}");
+}
+
+/// A plate beside networks: none is taken with a person in the picture, however still they sit; and what changes without
+/// being theirs, as a wall in the light of a lamp, is background.
+#[test]
+fn a_plate_and_networks_know_more_together() {
+    let folder = TempDir::new().unwrap();
+    let file = written(&folder, "m.onnx", &matte(64, 36, WEIGHTS, 0.0));
+    let networks = SingleCamera::open(Some(&file), Some(&file), &Hints::default(), Runtime::BuiltIn)
+        .expect("the test's own network");
+    let mut source = PlateDepth::new(None, None, Some(Box::new(networks)));
+    let guide = source.guide();
+    let (person, shares) = disc(320, 180, (160.0, 90.0), 40.0);
+    let (room, _) = disc(320, 180, (-500.0, 90.0), 40.0);
+    let near = |map: &DepthMap, x: usize, y: usize| map.metres[y * 320 + x] <= 1.0;
+    // Frames are 33 ms apart.
+    for frame in 0..150 {
+        let map = read(&mut source, &person, frame);
+        assert!(near(&map, 160, 90) && !near(&map, 20, 20), "frame {frame}: the networks know");
+        assert!(matches!(guide.step(), Step::StepOut(_) | Step::Taking(0) | Step::Moves), "{:?}", guide.step());
+    }
+    let taken = (150..300).find(|&frame| {
+        read(&mut source, &room, frame);
+        guide.step() == Step::Ready
+    });
+    let taken = taken.expect("a plate of the room");
+    let mut lit = person.clone();
+    for at in (0..320 * 180).filter(|at| at % 320 < 110) {
+        // Green: neither the person's nor the wall's.
+        lit.rgb[3 * at + 1] = 200;
+    }
+    for (picture, what) in [(&person, "as it was"), (&lit, "in another light")] {
+        let mut map = DepthMap::default();
+        (0..6).for_each(|k| map = read(&mut source, picture, taken + 1 + k));
+        assert_eq!(guide.step(), Step::Ready);
+        let wrong = (0..320 * 180).filter(|&at| (map.metres[at] <= 1.0) != (shares[at] > 0.5)).count();
+        assert!(wrong < 320 * 180 / 100, "{what}: {wrong} pixels");
+    }
 }

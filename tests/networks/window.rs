@@ -1,0 +1,57 @@
+//! Networks that the window is given.
+
+use std::fs;
+
+use bokehcam::look::{Look, presets::Preset};
+use bokehcam::preview::services::{Services, SettingsStore};
+use bokehcam::preview::system::System;
+use bokehcam::source::{DepthChoice, Options};
+use tempfile::TempDir;
+
+use super::onnx::{Side, matte, model, node, port};
+use super::{WEIGHTS, written};
+
+/// What the window asks of a settings file.
+struct NoStore;
+
+impl SettingsStore for NoStore {
+    fn presets(&mut self) -> Vec<Preset> {
+        Vec::new()
+    }
+    fn save_preset(&mut self, _: &str, _: &Look) -> Result<(), String> {
+        Err("no file".into())
+    }
+    fn command(&self, _: &Look, _: &str, _: &[String], _: &[(String, String)]) -> String {
+        String::new()
+    }
+}
+
+#[test]
+fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {
+    let folder = TempDir::new().unwrap();
+    let good = matte(32, 24, WEIGHTS, 0.0);
+    let huge = folder.path().join("huge.onnx");
+    fs::File::create(&huge).unwrap().set_len(1 << 40).unwrap();
+    let line = [port("in", &[Side::Is(7)])];
+    let shapeless = model(&line, &[], &[node("Relu", &["in"], "out", &[])], &[port("out", &[Side::Is(7)])]);
+    let files = [
+        folder.path().join("missing.onnx"),
+        written(&folder, "cut.onnx", &good[..good.len() / 2]),
+        written(&folder, "shapeless.onnx", &shapeless),
+        huge,
+        written(&folder, "good.onnx", &good),
+    ];
+    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait");
+    for file in files {
+        let depth_choice: DepthChoice = format!("matte:{}", file.display()).parse().unwrap();
+        let options = Options { depth_choice, ..Options::default() };
+        let mut system = System::new(options, Look::default(), Box::new(NoStore));
+        match system.open(recording, false) {
+            Ok(opened) => assert!(file.ends_with("good.onnx") && opened.source.has_depth(), "{}", file.display()),
+            Err(line) => {
+                let name = file.file_name().unwrap().to_str().unwrap();
+                assert!(line.contains(name) && !line.contains('\n') && name != "good.onnx", "{line}");
+            }
+        }
+    }
+}
