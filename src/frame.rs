@@ -149,10 +149,12 @@ impl DepthMap {
     pub const SUBJECT_M: f32 = 1.0;
     /// What is then as good as infinitely far, in metres.
     pub const FAR_M: f32 = 1e3;
-    /// The distance of something of relative inverse depth, 1 where it is nearest and 0 where it is farthest; unknown where
-    /// that is no number.
+    /// The distance of something of relative inverse depth, 1 where it is nearest and 0 where it is farthest, and what is no
+    /// number.
+    #[inline(always)]
     pub fn relative_m(nearness: f32) -> f32 {
-        if nearness.is_finite() { Self::SUBJECT_M / nearness.max(Self::SUBJECT_M / Self::FAR_M) } else { 0.0 }
+        const LEAST: f32 = DepthMap::SUBJECT_M / DepthMap::FAR_M;
+        Self::SUBJECT_M / if nearness > LEAST { nearness } else { LEAST }
     }
 
     /// The least depth: no scene is nearer, and its reciprocal, squared, still is a number.

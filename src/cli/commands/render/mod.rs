@@ -287,7 +287,8 @@ fn read_inverse_depth(file: &Path, invert: bool) -> Result<DepthMap, CliError> {
     let scale = 1.0 / (high - low).max(f32::MIN_POSITIVE);
     for value in &mut nearness {
         let near = (*value - low) * scale;
-        *value = DepthMap::relative_m(if invert { 1.0 - near } else { near });
+        let near = if invert { 1.0 - near } else { near };
+        *value = if near.is_finite() { DepthMap::relative_m(near) } else { 0.0 };
     }
     Ok(DepthMap { width, height, metres: nearness, ..DepthMap::default() })
 }
