@@ -2,6 +2,7 @@
 //! channel; the camera, a shift.
 
 use super::reduced::MOST;
+use crate::depth::tap::Tap;
 
 /// Pixels darker or brighter than these tell no gain.
 const DARK: f32 = 24.0;
@@ -68,15 +69,11 @@ impl Aligner {
             self.shifted.extend_from_slice(plate);
             return;
         }
-        let axis = |at: usize, by: f32, count: usize| {
-            let place = (at as f32 - by).clamp(0.0, (count - 1) as f32);
-            (place as usize, (place as usize + 1).min(count - 1), place.fract())
-        };
         for y in 0..height {
-            let (above, below, down) = axis(y, shift[1], height);
-            let (above, below) = (&plate[above * width..][..width], &plate[below * width..][..width]);
+            let Tap { first, second, share: down } = Tap::at(y as f32 - shift[1], height);
+            let (above, below) = (&plate[first * width..][..width], &plate[second * width..][..width]);
             for x in 0..width {
-                let (left, right, along) = axis(x, shift[0], width);
+                let Tap { first: left, second: right, share: along } = Tap::at(x as f32 - shift[0], width);
                 self.shifted.push(std::array::from_fn(|p| {
                     let first = above[left][p] + (above[right][p] - above[left][p]) * along;
                     let second = below[left][p] + (below[right][p] - below[left][p]) * along;
@@ -86,27 +83,19 @@ impl Aligner {
         }
     }
 
-    /// One step towards the alignment of `now`, from the pixels that are not `foreign`. Whether it moved.
-    pub fn step(
-        &mut self,
-        now: &[[f32; 3]],
-        foreign: &[bool],
-        size: (usize, usize),
-        alignment: &mut Alignment,
-    ) -> bool {
+    /// One step towards the alignment of `now`, from the pixels that are not `foreign`.
+    pub fn step(&mut self, now: &[[f32; 3]], foreign: &[bool], size: (usize, usize), alignment: &mut Alignment) {
         for p in 0..3 {
             if let Some(gain) = self.gain(now, foreign, p) {
                 let off = gain / alignment.gain[p] - 1.0;
                 alignment.gain[p] *= 1.0 + if off.abs() > JUMP { off } else { EASE * off };
             }
         }
-        let Some([across, down]) = self.shift_of(now, foreign, size, alignment.gain) else { return false };
-        if across.hypot(down) < LEAST_STEP {
-            return false;
+        let step = self.shift_of(now, foreign, size, alignment.gain);
+        if let Some([across, down]) = step.filter(|[across, down]| across.hypot(*down) >= LEAST_STEP) {
+            alignment.shift[0] += across.clamp(-MOST_STEP, MOST_STEP);
+            alignment.shift[1] += down.clamp(-MOST_STEP, MOST_STEP);
         }
-        alignment.shift[0] += across.clamp(-MOST_STEP, MOST_STEP);
-        alignment.shift[1] += down.clamp(-MOST_STEP, MOST_STEP);
-        true
     }
 
     /// The median ratio of a channel: what stands before the plate is outvoted.

@@ -104,17 +104,10 @@ impl Plate {
         let Self { reduced, now, aligner, alignment, subject, .. } = self;
         for _ in 0..if self.begun { 1 } else { FIRST_STEPS } {
             aligner.shift(reduced, size, alignment.shift);
-            let moved = aligner.step(now, &subject.foreign, size, alignment);
-            if !self.begun {
-                aligner.shift(reduced, size, alignment.shift);
-                subject.find(now, aligner.shifted(), size, alignment);
-            }
-            if !moved && self.begun {
-                break;
-            }
+            aligner.step(now, &subject.foreign, size, alignment);
+            aligner.shift(reduced, size, alignment.shift);
+            subject.find(now, aligner.shifted(), size, alignment);
         }
-        aligner.shift(reduced, size, alignment.shift);
-        subject.find(now, aligner.shifted(), size, alignment);
         if let Some(persons) = persons {
             subject.keep_persons(persons, size);
         }

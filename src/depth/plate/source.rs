@@ -18,7 +18,7 @@ const SETTLES_NS: u64 = 1_000_000_000;
 const RESTLESS_NS: u64 = 10_000_000_000;
 
 /// What holds exposure, white balance and focus of a camera where they are until it is dropped.
-pub type Lock = Box<dyn FnMut() -> Option<Box<dyn Any + Send>> + Send>;
+pub type Lock = Box<dyn FnOnce() -> Option<Box<dyn Any + Send>> + Send>;
 
 /// What else looks at the pictures, and knows more of them than a plate tells.
 pub trait Companion: DepthSource {
@@ -161,10 +161,10 @@ impl PlateDepth {
             self.state = State::Waiting(None);
         }
         let first_ns = *self.first_ns.get_or_insert(now_ns);
-        if self.locked.is_none() && now_ns >= first_ns + SETTLES_NS {
-            self.locked = self.lock.as_mut().and_then(|lock| lock());
-            // Once is enough, also where the camera has nothing to be held.
-            self.lock = None;
+        if now_ns >= first_ns + SETTLES_NS
+            && let Some(lock) = self.lock.take()
+        {
+            self.locked = lock();
         }
         let persons = match self.state {
             State::Waiting(_) => None,

@@ -2,6 +2,7 @@
 
 use super::alignment::Alignment;
 use super::reduced::MOST;
+use crate::depth::tap::nearest;
 use crate::frame::Mask;
 
 /// Differences from here on may be of something before the plate, and from the second on are, in a quiet picture.
@@ -228,10 +229,7 @@ impl Subject {
         self.seen.extend(persons.share.iter().map(|share| *share > PERSON));
         let mut near = std::mem::take(&mut self.near);
         dilate(&self.seen, of_mask, (CLOSE * of_mask.0 as f32).ceil() as usize, &mut near);
-        let place = |at: u32| {
-            let (x, y) = (at as usize % size.0, at as usize / size.0);
-            y * of_mask.1 / size.1 * of_mask.0 + x * of_mask.0 / size.0
-        };
+        let place = |at: u32| nearest(at as usize, size, of_mask);
         let mut kept = 0;
         for part in &mut self.parts {
             let range = part.first..part.end;

@@ -1,8 +1,8 @@
 //! What belongs to a subject: what is as near and joined to it, such as a mug that is held; and what does not: others, who
 //! are further away.
 
-use super::nearest;
 use super::relief::Relief;
+use crate::depth::tap::nearest;
 use crate::frame::Mask;
 
 /// From here on, what is no person is as near as the subject.

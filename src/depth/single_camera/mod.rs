@@ -25,8 +25,6 @@ use super::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::network::{self, Runtime, Task};
 
-/// Nothing is less near, so that distances are numbers.
-const LEAST: f32 = SUBJECT_M / FAR_M;
 /// Of so many frames, persons are looked for in one, and all else is looked at in one, by effort: a room hardly moves.
 const EVERY: [(u64, u64); 3] = [(2, 8), (1, 4), (1, 2)];
 /// Between two frames further apart than this, the first is no guide to the second.
@@ -109,8 +107,12 @@ impl SingleCamera {
         relief.as_mut().map_or(Ok(()), |relief| relief.look(&grey, None)).map_err(failed)
     }
 
-    /// Takes note of the next picture, taken at this time: whose turn it is.
+    /// Takes note of a picture, taken at this time: whose turn it is. One that was begun already goes on: nobody looks at it
+    /// twice.
     fn begin(&mut self, time_ns: u64) {
+        if self.last_ns == Some(time_ns) {
+            return;
+        }
         let apart = self.last_ns.is_none_or(|last_ns| time_ns.abs_diff(last_ns) > APART_NS);
         self.last_ns = Some(time_ns);
         if apart {
@@ -128,7 +130,8 @@ impl SingleCamera {
 
     /// Lets the network for persons look, if it is its turn; one that fails is turned off.
     fn look_for_persons(&mut self, color: &ColorImage) {
-        if let Some(Err(why)) = self.person.as_mut().filter(|_| self.turn.persons).map(|person| person.look(color)) {
+        let is_turn = std::mem::take(&mut self.turn.persons);
+        if let Some(Err(why)) = self.person.as_mut().filter(|_| is_turn).map(|person| person.look(color)) {
             tracing::error!("{}: the person's network is turned off, and all is blurred: {why}", self.name);
             self.person = None;
         }
@@ -148,11 +151,6 @@ fn look_at_all(relief: &mut Option<Relief>, (name, is_turn): (&str, bool), color
 struct Turn {
     persons: bool,
     all: bool,
-}
-
-/// The pixel of a plane of other sizes that pixel `at` of one of `size` falls on.
-fn nearest(at: usize, size: (usize, usize), (width, height): (usize, usize)) -> usize {
-    at / size.0 * height / size.1 * width + at % size.0 * width / size.0
 }
 
 impl DepthSource for SingleCamera {
@@ -226,7 +224,7 @@ impl Spread {
             for (metres, tap) in row.iter_mut().zip(&self.columns) {
                 let (left, right) = (self.row[tap.first], self.row[tap.second]);
                 let nearness = left + (right - left) * tap.share;
-                *metres = SUBJECT_M / if nearness > LEAST { nearness } else { LEAST };
+                *metres = DepthMap::relative_m(nearness);
             }
         }
     }

@@ -4,7 +4,7 @@
 //! itself do away with both: the subject, and what is farthest.
 
 use super::feed::Feed;
-use super::nearest;
+use crate::depth::tap::nearest;
 use crate::frame::{ColorImage, Mask};
 
 /// Of all numbers, sorted, this share is farther than what counts as the farthest, or nearer than the nearest.

@@ -169,17 +169,22 @@ impl View<'_> {
         shares: &mut [f32],
         front: &mut Vec<u32>,
     ) {
-        let own = contrasts[cell].as_ref();
+        let own = contrasts[cell].as_ref().map(|own| (own, posterior.slice(own.precision())));
         for (x, y) in self.pixels_of(cell) {
             let at = y * self.color.width as usize + x;
             let (mask, light) = (self.share_at(x, y), self.light_at(at));
             let behind = self.backdrop.map(|backdrop| backdrop.light_at(x, y));
-            // Where it is known what is behind, the surfaces differ in another way at every pixel.
-            let here = |contrast: &Contrast| behind.map_or(*contrast, |behind| contrast.before(behind));
-            let share = own.map_or(mask, |own| {
-                let place = self.between(contrasts, own, (x, y), |contrast| here(contrast).share(light));
-                posterior.slice(here(own).precision()).share(mask, place)
-            });
+            let share = match (&own, behind) {
+                (None, _) => mask,
+                (Some((own, slice)), None) => {
+                    slice.share(mask, self.between(contrasts, own, (x, y), |contrast| contrast.share(light)))
+                }
+                // Where it is known what is behind, the surfaces differ in another way at every pixel.
+                (Some((own, _)), Some(behind)) => {
+                    let place = self.between(contrasts, own, (x, y), |contrast| contrast.before(behind).share(light));
+                    posterior.slice(own.before(behind).precision()).share(mask, place)
+                }
+            };
             shares[at] = share;
             if mask > NEAR_FROM && share > NEAR_FROM {
                 shares[at] += FOUND;
@@ -262,19 +267,16 @@ impl View<'_> {
         share: impl Fn(&Contrast) -> f32,
     ) -> f32 {
         let half = 0.5 * self.cell_px as f32;
-        let axis = |at: usize, count: usize| {
-            let place = ((at as f32 + 0.5 - half) / self.cell_px as f32).clamp(0.0, (count - 1) as f32);
-            (place as usize, (place as usize + 1).min(count - 1), place.fract())
-        };
-        let ((left, right, along), (above, below, down)) = (axis(x, self.across), axis(y, self.down));
+        let axis = |at: usize, count: usize| Tap::at((at as f32 + 0.5 - half) / self.cell_px as f32, count);
+        let (across, down) = (axis(x, self.across), axis(y, self.down));
         let at = |row: usize, column: usize| {
             share(contrasts[row * self.across + column].as_ref().unwrap_or(own)).clamp(-0.5, 1.5)
         };
         let row = |row: usize| {
-            let first = at(row, left);
-            first + (at(row, right) - first) * along
+            let first = at(row, across.first);
+            first + (at(row, across.second) - first) * across.share
         };
-        let first = row(above);
-        first + (row(below) - first) * down
+        let first = row(down.first);
+        first + (row(down.second) - first) * down.share
     }
 }
