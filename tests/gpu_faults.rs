@@ -122,6 +122,15 @@ fn a_destroyed_device_is_followed_by_the_cpu() {
     }
 }
 
+/// As often as somebody who tries apertures for an hour needs it.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn executors_come_and_go() {
+    for _ in 0..40 {
+        bokeh::create_on(&settings(CocKind::Uniform), SIZE, Arc::new(device()), Some(1)).unwrap();
+    }
+}
+
 /// Under the layer, the faults are its.
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
