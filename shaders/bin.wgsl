@@ -14,50 +14,33 @@
 
 const HUGE: f32 = 3.0e38;
 
-// Of each pixel of the tile: its value, and coverage times |CoC|.
-var<workgroup> values: array<vec4<f32>, TILE * TILE>;
-var<workgroup> cocs: array<f32, TILE * TILE>;
-// Whether any pixel that the tile is made of has a share.
-var<workgroup> some: atomic<u32>;
+// What some pixels hold: their coverage and that times |CoC|, their lowest and highest colour.
+struct Cell {
+    sums: vec2<f32>,
+    low: vec3<f32>,
+    high: vec3<f32>,
+}
+
+var<workgroup> pixels: array<Pixel, TILE * TILE>;
+// The rows of the tile's cells.
+var<workgroup> rows: array<Cell, TILE * TILE / CELL>;
+
+// How many threads a side share a pixel.
+fn sharing(k: u32) -> u32 {
+    return select(1u, 2u, bins[k].scale >= SHARED_FROM);
+}
 
 fn extent_of(k: u32) -> vec2<u32> {
-    return CELL * bins[k].cells;
+    return CELL * bins[k].cells * sharing(k);
 }
 
-fn tent(k: u32, scale: u32) -> f32 {
-    let s = f32(scale);
-    return select((1.0 - abs((f32(k) + 0.5) / s - 1.0)) / s, 1.0, scale == 1u);
-}
-
-// The cell at `first` within the tile.
-fn measure(k: u32, cell: vec2<u32>, first: vec2<u32>) {
-    var sums = vec2(0.0);
-    var low = vec3(HUGE);
-    var high = vec3(-HUGE);
-    for (var j = 0u; j < CELL * CELL; j++) {
-        let at = (first.y + j / CELL) * TILE + first.x + j % CELL;
-        let value = values[at];
-        sums += vec2(value.a, cocs[at]);
-        if value.a > COVERAGE_FLOOR {
-            let own = value.rgb * (1.0 / value.a);
-            low = min(low, own);
-            high = max(high, own);
-        }
-    }
-    if all(cell < bins[k].cells) {
-        let index = 2u * (bins[k].cells_at + cell.y * bins[k].cells.x + cell.x);
-        grid[index] = vec4(sums, low.rg);
-        grid[index + 1u] = vec4(low.b, high);
-    }
-}
-
-// Looks at the tiles of the picture that a tile of the bin is made of, one a thread.
-fn look(k: u32, tile: vec2<u32>, thread: u32) {
+// Looks at the tiles of the picture that `side` pixels of the bin, each way, are made of, one a thread.
+fn look(k: u32, first_pixel: vec2<u32>, side: u32, thread: u32) {
     let across = (frame.size + TILE - 1u) / TILE;
     let scale = bins[k].scale;
-    let start = tile * TILE * scale;
+    let start = first_pixel * scale;
     let first = (start - min(start, vec2(scale / 2u))) / TILE;
-    let last = min((start + TILE * scale + scale / 2u - 1u) / TILE, across - 1u);
+    let last = min((start + side * scale + scale / 2u - 1u) / TILE, across - 1u);
     let count = last - first + 1u;
     let at = first + vec2(thread % count.x, thread / count.x);
     if at.y <= last.y {
@@ -69,72 +52,78 @@ fn look(k: u32, tile: vec2<u32>, thread: u32) {
     }
 }
 
-// A bin's share of a surface: premultiplied colour and coverage, and coverage times |CoC|.
-fn taken(k: u32, surface: vec4<f32>, weight: f32) -> array<f32, 5> {
-    let share = weight * select(share_at(bins[k].front, bins[k].behind, surface.w), 1.0, bins[k].whole == 1u);
-    return array(share * surface.r, share * surface.g, share * surface.b, share, share * abs(surface.w));
-}
-
-fn plus(a: array<f32, 5>, b: array<f32, 5>) -> array<f32, 5> {
-    return array(a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4]);
-}
-
-// A pixel of the bin, and coverage times |CoC|.
-fn averaged(k: u32, pixel: vec2<u32>) -> array<f32, 5> {
-    // A tent of twice the scale, so that reducing a picture keeps its centroid.
-    let scale = bins[k].scale;
-    let taps = select(2u * scale, 1u, scale == 1u);
-    let before = select(scale / 2u, 0u, scale == 1u);
-    var sum = array<f32, 5>();
-    for (var j = 0u; j < taps; j++) {
-        let y = clamp(i32(pixel.y * scale + j) - i32(before), 0, i32(frame.size.y) - 1);
-        for (var i = 0u; i < taps; i++) {
-            let x = clamp(i32(pixel.x * scale + i) - i32(before), 0, i32(frame.size.x) - 1);
-            let at = u32(y) * frame.size.x + u32(x);
-            let value = scene[at];
-            let surface = scene_unpacked(value, frame.most_px);
-            let weight = tent(i, scale) * tent(j, scale);
-            if is_mixed(value) {
-                let place = first_mixed(at);
-                let near = near_surface(place);
-                // Where the nearer surface lies in front of the layer, behind it is the farther one.
-                let before = step_at(work.unhidden, near.w);
-                sum = plus(sum, taken(k, surface, weight * (1.0 - (1.0 - mixed[place].behind) * before)));
-                sum = plus(sum, taken(k, near, weight * mixed[place].share * before));
-            } else {
-                sum = plus(sum, taken(k, surface, weight));
-            }
-        }
-    }
-    return sum;
+fn write_cell(k: u32, cell: vec2<u32>, all: Cell) {
+    let index = 2u * (bins[k].cells_at + cell.y * bins[k].cells.x + cell.x);
+    grid[index] = vec4(all.sums, all.low.rg);
+    grid[index + 1u] = vec4(all.low.b, all.high);
 }
 
 @compute @workgroup_size(TILE, TILE)
 fn bin(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
-       @builtin(local_invocation_id) local: vec3<u32>) {
+       @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let place = place_of(workgroup, workgroups, vec2(TILE));
+    if !place.some {
+        return;
+    }
     let k = place.bin;
-    let pixel = place.tile * TILE + local.xy;
-    let at = local.y * TILE + local.x;
-    if place.some {
-        look(k, place.tile, at);
+    let step = sharing(k);
+    let side = TILE / step;
+    let corner = place.tile * side;
+    begin(thread);
+    look(k, corner, side, thread);
+    let cells = side / CELL;
+    let cell = corner / CELL + vec2(thread % cells, thread / cells);
+    let writes = thread < cells * cells && all(cell < bins[k].cells);
+    let nothing = Cell(vec2(0.0), vec3(HUGE), vec3(-HUGE));
+    if workgroupUniformLoad(&some) == 0u {
+        if writes {
+            write_cell(k, cell, nothing);
+        }
+        return;
+    }
+    let averaging = corner + local.xy / step;
+    var own = Pixel(vec4(0.0), 0.0);
+    if all(averaging < bins[k].size) {
+        own = averaged(k, averaging, local.xy % step, step);
+    }
+    if step > 1u {
+        pixels[thread] = own;
+        workgroupBarrier();
+        let first = (thread / side * TILE + thread % side) * step % (TILE * TILE);
+        own = plus(plus(pixels[first], pixels[first + 1u]), plus(pixels[first + TILE], pixels[first + TILE + 1u]));
+        workgroupBarrier();
+    }
+    let pixel = corner + vec2(thread % side, thread / side);
+    if thread < side * side {
+        let value = packed(own.value);
+        pixels[thread] = Pixel(unpacked(value), own.coc);
+        if all(pixel < bins[k].size) {
+            source[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x] = value;
+        }
     }
     workgroupBarrier();
-    var sum = vec4(0.0);
-    var coc_sum = 0.0;
-    if atomicLoad(&some) == 1u && all(pixel < bins[k].size) {
-        let average = averaged(k, pixel);
-        let value = packed(vec4(average[0], average[1], average[2], average[3]));
-        source[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x] = value;
-        sum = unpacked(value);
-        coc_sum = average[4];
+    if thread < cells * cells * CELL {
+        // A row of a cell. Neighbouring threads begin with other pixels, as memory has banks.
+        let first = (thread / (cells * CELL) * CELL + thread % CELL) * side + thread / CELL % cells * CELL;
+        var row = nothing;
+        for (var j = 0u; j < CELL; j++) {
+            let at = pixels[first + (j + thread) % CELL];
+            row.sums += vec2(at.value.a, at.coc);
+            if bins[k].has_lobes == 1u && at.value.a > COVERAGE_FLOOR {
+                let own = at.value.rgb * (1.0 / at.value.a);
+                row.low = min(row.low, own);
+                row.high = max(row.high, own);
+            }
+        }
+        rows[thread] = row;
     }
-    values[at] = sum;
-    cocs[at] = coc_sum;
     workgroupBarrier();
-    let cells = TILE / CELL;
-    if place.some && at < cells * cells {
-        let cell = vec2(at % cells, at / cells);
-        measure(k, place.tile * cells + cell, cell * CELL);
+    if writes {
+        var all = nothing;
+        for (var j = 0u; j < CELL; j++) {
+            let row = rows[thread * CELL + j];
+            all = Cell(all.sums + row.sums, min(all.low, row.low), max(all.high, row.high));
+        }
+        write_cell(k, cell, all);
     }
 }

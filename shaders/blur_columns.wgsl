@@ -1,23 +1,27 @@
 // Pass blur_columns: the vertical low-rank filters, terms summed; truncation leaves lobes, so the result is kept in
-// the range of the colours in reach. Writes premultiplied colour and coverage where there is any, and per tile whether.
+// the range of the colours in reach. Writes premultiplied colour and coverage where there is any, per tile whether, and per tile
+// of the picture which bins it shows.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> bank: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read> node_reach: array<u32>;
-@group(0) @binding(5) var<storage, read> edges: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> scene: array<vec2<u32>>;
-@group(0) @binding(7) var<storage, read> rows: array<vec2<u32>>;
-@group(0) @binding(8) var<storage, read> filtered: array<u32>;
-@group(0) @binding(9) var<storage, read_write> blurred: array<vec2<u32>>;
-@group(0) @binding(10) var<storage, read_write> active_tiles: array<u32>;
+@group(0) @binding(4) var<storage, read> edges: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read> scene: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read> rows: array<vec2<u32>>;
+@group(0) @binding(7) var<storage, read> filtered: array<u32>;
+@group(0) @binding(8) var<storage, read_write> blurred: array<vec2<u32>>;
+@group(0) @binding(9) var<storage, read_write> active_tiles: array<u32>;
+@group(0) @binding(10) var<storage, read_write> shown: array<atomic<u32>>;
 
-// Rows that are held at a time, of one term; most filters need no more for a whole tile.
-const CHUNK = 64u;
+// Rows that are held at a time, of four terms; most filters need no more for a whole tile.
+const CHUNK = 62u;
 
-var<workgroup> values: array<vec2<u32>, CHUNK * RESULT_TILE_X>;
-var<workgroup> some: atomic<u32>;
+// Of a term, the pixels of all rows.
+var<workgroup> values: array<vec2<u32>, 4 * CHUNK * RESULT_TILE_X>;
+// Of the first tiles of rows that a tile's taps reach: whether anything is there. Most filters reach no more.
+const NOTED = 24u;
+var<workgroup> noted: array<bool, NOTED>;
 
 fn extent_of(k: u32) -> vec2<u32> {
     return bins[k].size;
@@ -27,10 +31,32 @@ fn is_filtered(k: u32, pixel: vec2<u32>) -> bool {
     return filtered[bins[k].filtered_at + tile_of(pixel, bins[k].size.x, rows_tile())] == 1u;
 }
 
+// The same for the column of such tiles that a tile's taps reach from tile `first` on.
+fn is_noted(k: u32, pixel: vec2<u32>, first: u32) -> bool {
+    let tile = pixel.y / ROWS_TILE_Y - first;
+    if tile < NOTED {
+        return noted[tile];
+    }
+    return is_filtered(k, pixel);
+}
+
+// The pixels at `a` and at `b`, each once, times the taps of their term: summed over all terms.
+fn both(weights: vec4<f32>, a: u32, b: u32) -> vec4<f32> {
+    let apart = CHUNK * RESULT_TILE_X;
+    var sum = weights.x * (unpacked(values[a]) + unpacked(values[b]));
+    if work.terms > 1u { sum += weights.y * (unpacked(values[a + apart]) + unpacked(values[b + apart])); }
+    if work.terms > 2u { sum += weights.z * (unpacked(values[a + 2u * apart]) + unpacked(values[b + 2u * apart])); }
+    if work.terms > 3u { sum += weights.w * (unpacked(values[a + 3u * apart]) + unpacked(values[b + 3u * apart])); }
+    return sum;
+}
+
 @compute @workgroup_size(RESULT_TILE_X, RESULT_TILE_Y)
 fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
                 @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let place = place_of(workgroup, workgroups, result_tile());
+    if !place.some {
+        return;
+    }
     let k = place.bin;
     let size = bins[k].size;
     let corner_pixel = place.tile * result_tile();
@@ -38,47 +64,68 @@ fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgr
     let reach = i32(bins[k].reach);
     let first = i32(corner_pixel.y) - reach;
     let length = i32(RESULT_TILE_Y) + 2 * reach;
-    let across = i32(RESULT_TILE_X);
-    let threads = i32(RESULT_TILE_X * RESULT_TILE_Y);
-    let tile_rows = i32(ROWS_TILE_Y);
-    for (var y = max(first, 0) / tile_rows + i32(thread); y * tile_rows < min(first + length, i32(size.y)); y += threads) {
-        if place.some && is_filtered(k, vec2(corner_pixel.x, u32(y * tile_rows))) {
+    let threads = RESULT_TILE_X * RESULT_TILE_Y;
+    begin(thread);
+    let first_tile = u32(max(first, 0)) / ROWS_TILE_Y;
+    for (var n = thread; (first_tile + n) * ROWS_TILE_Y < u32(min(first + length, i32(size.y))); n += threads) {
+        let filled = is_filtered(k, vec2(corner_pixel.x, (first_tile + n) * ROWS_TILE_Y));
+        if filled {
             atomicStore(&some, 1u);
         }
+        if n < NOTED {
+            noted[n] = filled;
+        }
     }
-    workgroupBarrier();
-    let here = atomicLoad(&some) == 1u;
-    let inside = here && all(pixel < size);
-    if place.some && thread == 0u {
-        active_tiles[bins[k].active_at + tile_of(pixel, size.x, result_tile())] = u32(here);
+    let here = workgroupUniformLoad(&some);
+    if thread == 0u {
+        active_tiles[bins[k].active_at + tile_of(corner_pixel, size.x, result_tile())] = here;
     }
+    if here == 0u {
+        return;
+    }
+    if work.last == 1u {
+        show(k, place.tile, thread);
+    }
+    let inside = all(pixel < size);
     var corner: Corner;
     var taps: Taps;
     if inside {
         corner = corner_of(k, pixel);
         taps = taps_at(k, pixel, corner);
     }
+    let mirrored = is_mirrored(length, CHUNK);
     var sum = vec4(0.0);
-    for (var term = 0u; term < work.terms; term++) {
-        for (var at = 0; at < length; at += i32(CHUNK)) {
-            for (var n = i32(thread); here && n < across * min(i32(CHUNK), length - at); n += threads) {
-                let x = min(corner_pixel.x + u32(n % across), size.x - 1u);
-                let y = u32(clamp(first + at + n / across, 0, i32(size.y) - 1));
+    for (var at = 0; at < length; at += i32(CHUNK)) {
+        let held = RESULT_TILE_X * u32(min(i32(CHUNK), length - at));
+        for (var n = thread; n < held; n += threads) {
+            let x = min(corner_pixel.x + n % RESULT_TILE_X, size.x - 1u);
+            let y = u32(clamp(first + at + i32(n / RESULT_TILE_X), 0, i32(size.y) - 1));
+            let filled = is_noted(k, vec2(x, y), first_tile);
+            for (var term = 0u; term < work.terms; term++) {
                 var value = vec2(0u);
-                if is_filtered(k, vec2(x, y)) {
+                if filled {
                     value = rows[bins[k].rows_at + term * bins[k].rows_apart + y * size.x + x];
                 }
-                values[n] = value;
+                values[term * CHUNK * RESULT_TILE_X + n] = value;
             }
-            workgroupBarrier();
-            // The pixel itself is in row `own`; taps that lie in other chunks have their turn then.
-            let own = i32(pixel.y) - first - at;
+        }
+        workgroupBarrier();
+        // The pixel itself is in row `own`; taps that lie in other chunks have their turn then.
+        let own = i32(pixel.y) - first - at;
+        let line = own * i32(RESULT_TILE_X) + i32(local.x);
+        let apart = i32(RESULT_TILE_X);
+        if mirrored {
+            sum += 0.5 * both(tap_at(taps, corner.along, 0), u32(line), u32(line));
+            for (var j = 1; j <= taps.reach; j++) {
+                sum += both(tap_at(taps, corner.along, j), u32(line + j * apart), u32(line - j * apart));
+            }
+        } else {
             let last = select(-1 - own, min(taps.reach, i32(CHUNK) - 1 - own), inside);
             for (var j = max(-taps.reach, -own); j <= last; j++) {
-                sum += tap_at(taps, corner.along, j)[term] * unpacked(values[across * (own + j) + i32(local.x)]);
+                sum += 0.5 * both(tap_at(taps, corner.along, j), u32(line + j * apart), u32(line + j * apart));
             }
-            workgroupBarrier();
         }
+        workgroupBarrier();
     }
     if !inside {
         return;

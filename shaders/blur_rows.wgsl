@@ -5,19 +5,20 @@
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> bank: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read> node_reach: array<u32>;
-@group(0) @binding(5) var<storage, read> edges: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> scene: array<vec2<u32>>;
-@group(0) @binding(7) var<storage, read> grid: array<vec4<f32>>;
-@group(0) @binding(8) var<storage, read> source: array<vec2<u32>>;
-@group(0) @binding(9) var<storage, read_write> rows: array<vec2<u32>>;
-@group(0) @binding(10) var<storage, read_write> filtered: array<u32>;
+@group(0) @binding(4) var<storage, read> edges: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read> scene: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read> grid: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read> source: array<vec2<u32>>;
+@group(0) @binding(8) var<storage, read_write> rows: array<vec2<u32>>;
+@group(0) @binding(9) var<storage, read_write> filtered: array<u32>;
 
 // Columns that are held at a time; most filters need no more for a whole tile.
 const CHUNK = 128u;
 
 var<workgroup> values: array<vec2<u32>, CHUNK * ROWS_TILE_Y>;
-var<workgroup> some: atomic<u32>;
+// Of the first cells that a tile's taps reach: whether anything is there. Most filters reach no more.
+const NOTED = 24u;
+var<workgroup> noted: array<bool, NOTED>;
 
 fn extent_of(k: u32) -> vec2<u32> {
     return bins[k].size;
@@ -28,10 +29,35 @@ fn is_covered(k: u32, pixel: vec2<u32>) -> bool {
     return grid[2u * (bins[k].cells_at + cell.y * bins[k].cells.x + cell.x)].x > 0.0;
 }
 
+// The same for the row of cells of a tile, whose taps reach from cell `first` on.
+fn is_noted(k: u32, pixel: vec2<u32>, first: u32) -> bool {
+    let cell = pixel.x / CELL - first;
+    if cell < NOTED {
+        return noted[cell];
+    }
+    return is_covered(k, pixel);
+}
+
+// The sums of a pixel, one for each of four terms.
+struct Sums {
+    a: vec4<f32>,
+    b: vec4<f32>,
+    c: vec4<f32>,
+    d: vec4<f32>,
+}
+
+fn plus(sums: Sums, weights: vec4<f32>, value: vec4<f32>) -> Sums {
+    return Sums(sums.a + weights.x * value, sums.b + weights.y * value, sums.c + weights.z * value,
+                sums.d + weights.w * value);
+}
+
 @compute @workgroup_size(ROWS_TILE_X, ROWS_TILE_Y)
 fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
              @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let place = place_of(workgroup, workgroups, rows_tile());
+    if !place.some {
+        return;
+    }
     let k = place.bin;
     let size = bins[k].size;
     let corner_pixel = place.tile * rows_tile();
@@ -41,33 +67,39 @@ fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroup
     let length = i32(ROWS_TILE_X) + 2 * reach;
     let threads = i32(ROWS_TILE_X * ROWS_TILE_Y);
     // Where no cell within reach is covered, nothing comes of it.
-    for (var x = max(first, 0) / i32(CELL) + i32(thread); x * i32(CELL) < min(first + length, i32(size.x)); x += threads) {
-        if place.some && is_covered(k, vec2(u32(x) * CELL, corner_pixel.y)) {
+    begin(thread);
+    let first_cell = u32(max(first, 0)) / CELL;
+    for (var n = thread; (first_cell + n) * CELL < u32(min(first + length, i32(size.x))); n += u32(threads)) {
+        let covered = is_covered(k, vec2((first_cell + n) * CELL, corner_pixel.y));
+        if covered {
             atomicStore(&some, 1u);
         }
+        if n < NOTED {
+            noted[n] = covered;
+        }
     }
-    workgroupBarrier();
-    let here = atomicLoad(&some) == 1u;
-    let inside = here && all(pixel < size);
-    if place.some && thread == 0u {
-        filtered[bins[k].filtered_at + tile_of(pixel, size.x, rows_tile())] = u32(here);
+    let here = workgroupUniformLoad(&some);
+    if thread == 0u {
+        filtered[bins[k].filtered_at + tile_of(corner_pixel, size.x, rows_tile())] = here;
     }
+    if here == 0u {
+        return;
+    }
+    let inside = all(pixel < size);
     var corner: Corner;
     var taps: Taps;
     if inside {
         corner = corner_of(k, pixel);
         taps = taps_at(k, pixel, corner);
     }
-    var sum0 = vec4(0.0);
-    var sum1 = vec4(0.0);
-    var sum2 = vec4(0.0);
-    var sum3 = vec4(0.0);
+    let mirrored = is_mirrored(length, CHUNK);
+    var sums = Sums(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     for (var at = 0; at < length; at += i32(CHUNK)) {
-        for (var n = i32(thread); here && n < i32(CHUNK * ROWS_TILE_Y); n += threads) {
+        for (var n = i32(thread); n < i32(CHUNK * ROWS_TILE_Y); n += threads) {
             let x = u32(clamp(first + at + n % i32(CHUNK), 0, i32(size.x) - 1));
             let y = min(corner_pixel.y + u32(n / i32(CHUNK)), size.y - 1u);
             var value = vec2(0u);
-            if at + n % i32(CHUNK) < length && is_covered(k, vec2(x, y)) {
+            if at + n % i32(CHUNK) < length && is_noted(k, vec2(x, y), first_cell) {
                 value = source[bins[k].pixels_at + y * size.x + x];
             }
             values[n] = value;
@@ -76,22 +108,25 @@ fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroup
         // The pixel itself is value `own`; taps that lie in other chunks have their turn then.
         let own = i32(pixel.x) - first - at;
         let line = i32(local.y * CHUNK) + own;
-        let last = select(-1 - own, min(taps.reach, i32(CHUNK) - 1 - own), inside);
-        for (var j = max(-taps.reach, -own); j <= last; j++) {
-            let weight = tap_at(taps, corner.along, j);
-            let value = unpacked(values[line + j]);
-            sum0 += weight.x * value;
-            sum1 += weight.y * value;
-            sum2 += weight.z * value;
-            sum3 += weight.w * value;
+        if mirrored {
+            sums = plus(sums, tap_at(taps, corner.along, 0), unpacked(values[line]));
+            for (var j = 1; j <= taps.reach; j++) {
+                let both = unpacked(values[line + j]) + unpacked(values[line - j]);
+                sums = plus(sums, tap_at(taps, corner.along, j), both);
+            }
+        } else {
+            let last = select(-1 - own, min(taps.reach, i32(CHUNK) - 1 - own), inside);
+            for (var j = max(-taps.reach, -own); j <= last; j++) {
+                sums = plus(sums, tap_at(taps, corner.along, j), unpacked(values[line + j]));
+            }
         }
         workgroupBarrier();
     }
     if inside {
         let at = bins[k].rows_at + pixel.y * size.x + pixel.x;
-        rows[at] = packed(sum0);
-        if work.terms > 1u { rows[at + bins[k].rows_apart] = packed(sum1); }
-        if work.terms > 2u { rows[at + 2u * bins[k].rows_apart] = packed(sum2); }
-        if work.terms > 3u { rows[at + 3u * bins[k].rows_apart] = packed(sum3); }
+        rows[at] = packed(sums.a);
+        if work.terms > 1u { rows[at + bins[k].rows_apart] = packed(sums.b); }
+        if work.terms > 2u { rows[at + 2u * bins[k].rows_apart] = packed(sums.c); }
+        if work.terms > 3u { rows[at + 3u * bins[k].rows_apart] = packed(sums.d); }
     }
 }

@@ -20,6 +20,7 @@ override ROWS_TILE_X: u32;
 override ROWS_TILE_Y: u32;
 override RESULT_TILE_X: u32;
 override RESULT_TILE_Y: u32;
+override SHARED_FROM: u32;          // scale of a bin from which on four threads of bin share a pixel
 
 const MAX_BINS = 13;
 const MIXED = 0x8000u;      // of a pixel of the scene: see scene_packed
@@ -41,9 +42,9 @@ struct Frame {
     expansion: f32,             // 0: highlights stay as they are
     steps_per_px: f32,          // nodes of the bank per pixel of radius, below OCTAVES_FROM_PX
     mixed: u32,                 // pixels that show two surfaces
-    unused_a: u32,
-    unused_b: u32,
-    unused_c: u32,
+    even: u32,                  // 1: taps at -j and j are equal
+    extent: f32,                // of the aperture: the outermost point, in radii
+    unused: u32,
 }
 
 // What a dispatch does: some bins, of one layer where it goes over the picture.

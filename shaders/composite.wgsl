@@ -6,6 +6,9 @@
 @group(0) @binding(3) var<storage, read> scene: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> result: array<u32>;
 @group(0) @binding(5) var<storage, read> active_tiles: array<u32>;
+@group(0) @binding(6) var<storage, read> shown: array<u32>;
+
+var<workgroup> codes: array<u32, LINE>;
 
 // A pixel of a bin; nothing was written where nothing is.
 fn bin_at(k: u32, pixel: vec2<u32>) -> vec4<f32> {
@@ -21,7 +24,7 @@ fn sample_bin(k: u32, pixel: vec2<u32>) -> vec4<f32> {
         return bin_at(k, pixel);
     }
     let limit = bins[k].size - 1u;
-    let along = (vec2<f32>(pixel) + 0.5) / f32(bins[k].scale) - 0.5;
+    let along = (vec2<f32>(pixel) + 0.5) * (1.0 / f32(bins[k].scale)) - 0.5;
     let at = clamp(along, vec2(0.0), vec2<f32>(limit));
     let first = vec2<u32>(at);
     let second = min(first + 1u, limit);
@@ -55,11 +58,14 @@ fn closed(stack: Stack) -> vec3<f32> {
 fn layers(pixel: vec2<u32>) -> vec3<f32> {
     var front = Stack(vec3(0.0), 1.0, vec3(0.0), 0.0);
     var back = front;
-    for (var k = 0u; k < frame.near_bins; k++) {
-        front = add(front, sample_bin(k, pixel));
-    }
-    for (var k = frame.near_bins; k < frame.bins; k++) {
-        back = add(back, sample_bin(k, pixel));
+    for (var rest = shown[tile_of(pixel, frame.size.x, vec2(TILE))]; rest != 0u; rest &= rest - 1u) {
+        let k = firstTrailingBit(rest);
+        let layer = sample_bin(k, pixel);
+        if k < frame.near_bins {
+            front = add(front, layer);
+        } else {
+            back = add(back, layer);
+        }
     }
     if back.known > 1.0e-4 || front.known <= 0.0 {
         return front.color + front.open * closed(back);
@@ -87,7 +93,8 @@ fn code_of(light: f32) -> u32 {
     return u32(code * 255.0 + 0.5);
 }
 
-fn color_of(index: u32) -> vec3<u32> {
+// Red in the lowest byte, then green and blue.
+fn codes_of(index: u32) -> u32 {
     let pixel = vec2(index % frame.size.x, index / frame.size.x);
     var color: vec3<f32>;
     if frame.compositing == 0u {
@@ -100,23 +107,24 @@ fn color_of(index: u32) -> vec3<u32> {
     if frame.expansion > 0.0 {
         color *= frame.expansion / (frame.expansion + luminance(color));
     }
-    return vec3(code_of(color.r), code_of(color.g), code_of(color.b));
+    return code_of(color.r) | (code_of(color.g) << 8u) | (code_of(color.b) << 16u);
 }
 
-// Four pixels, three words.
+// A pixel each; four of them are three words.
 @compute @workgroup_size(LINE)
-fn composite(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let quad = id.y * groups.x * LINE + id.x;
+fn composite(@builtin(workgroup_id) line: vec3<u32>, @builtin(num_workgroups) lines: vec3<u32>,
+             @builtin(local_invocation_index) thread: u32) {
+    let first = (line.y * lines.x + line.x) * LINE;
     let pixels = frame.size.x * frame.size.y;
-    if 4u * quad >= pixels {
-        return;
+    if first + thread < pixels {
+        codes[thread] = codes_of(first + thread);
     }
-    let last = pixels - 1u;
-    let a = color_of(4u * quad);
-    let b = color_of(min(4u * quad + 1u, last));
-    let c = color_of(min(4u * quad + 2u, last));
-    let d = color_of(min(4u * quad + 3u, last));
-    result[3u * quad] = a.r | (a.g << 8u) | (a.b << 16u) | (b.r << 24u);
-    result[3u * quad + 1u] = b.g | (b.b << 8u) | (c.r << 16u) | (c.g << 24u);
-    result[3u * quad + 2u] = c.b | (d.r << 8u) | (d.g << 16u) | (d.b << 24u);
+    workgroupBarrier();
+    // A word has the last bytes of a pixel, `word % 3` done, and the first ones of the next.
+    let word = 3u * first / 4u + thread;
+    let pixel = 4u * (thread / 3u) + thread % 3u;
+    if 4u * thread < 3u * LINE && word < (pixels + 3u) / 4u * 3u {
+        let part = thread % 3u;
+        result[word] = (codes[pixel] >> (8u * part)) | (codes[pixel + 1u] << (24u - 8u * part));
+    }
 }

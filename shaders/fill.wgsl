@@ -1,5 +1,6 @@
 // Pass fill, the inpainting of disocclusions: the scene as a layer sees it, where what lies in front of the layer has become
-// what lies behind that. Reads the scene; writes that of the layer, and its ranges of CoC.
+// what lies behind that. Reads the scene, and pushes the pyramid down to it; writes the scene of the layer, and its ranges of
+// CoC.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> frame: Frame;
@@ -9,45 +10,106 @@
 @group(0) @binding(5) var<storage, read> ranges: array<vec2<f32>>;
 @group(0) @binding(6) var<storage, read_write> behind: array<vec2<u32>>;
 @group(0) @binding(7) var<storage, read_write> ranges_behind: array<vec2<f32>>;
+@group(0) @binding(8) var<storage, read> nearest_px: array<f32>;
+
+// Pixels a side of a level's patch that reaches all that a tile needs of it, its neighbours included.
+const PATCH = 6u;
+
+// The patches of a level, which the finer one is pushed from, and of that: they take turns.
+var<workgroup> patches: array<Known, 2u * PATCH * PATCH>;
 
 // How far what is filled in behind a pixel is another surface, told by their CoC: what comes nearer, such as the ground, hides
 // its own continuation, which looks like it.
-fn other_surface(own_px: f32, behind_px: f32) -> f32 {
-    let step = (own_px - behind_px) / min(own_px, -1.0e-3);
+fn other_surface(own_px: f32, hidden: f32) -> f32 {
+    let step = (own_px - hidden) / min(own_px, -1.0e-3);
     return clamp((step - OTHER_FROM) / (OTHER_TO - OTHER_FROM), 0.0, 1.0);
 }
 
-@compute @workgroup_size(TILE, TILE)
+// The first pixel of a tile's patch of a level; of level 0, of the tile.
+fn corner_of(tile: vec2<u32>, level: u32) -> vec2<u32> {
+    var corner = tile * SMALL_TILE;
+    for (var k = 0u; k < level; k++) {
+        corner = corner / 2u - min(corner / 2u, vec2(1u));
+    }
+    return corner;
+}
+
+// A pixel of a level, with what it does not know from the patch of the coarser one.
+fn completed(number: u32, own: Known, pixel: vec2<u32>, tile: vec2<u32>) -> Known {
+    if own.known >= 1.0 {
+        return own;
+    }
+    let b = between(pixel, level_of(number + 1u).size) - corner_of(tile, number + 1u).xxyy;
+    let at = (number + 1u) % 2u * PATCH * PATCH + vec4(b.xy, b.xy) + PATCH * vec4(b.zz, b.ww);
+    let near = plus(times(patches[at.x], 0.75), times(patches[at.y], 0.25));
+    let far = plus(times(patches[at.z], 0.75), times(patches[at.w], 0.25));
+    return pushed(own, plus(times(near, 0.75), times(far, 0.25)));
+}
+
+// A pixel of the scene with what is known behind it.
+fn filled(value: vec2<u32>, behind: Known) -> vec2<u32> {
+    let own = scene_unpacked(value, frame.most_px);
+    let unhidden = step_at(work.unhidden, own.w);
+    // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it. Where something near
+    // touches every pixel nothing is known, and nothing lies behind.
+    if unhidden == 1.0 || behind.known <= 0.5 {
+        return value;
+    }
+    let hidden = (1.0 - unhidden) * other_surface(own.w, behind.value.w);
+    if hidden == 0.0 {
+        return value;
+    }
+    let mixture = mix(own, vec4(behind.value.rgb, max(behind.value.w, work.nearest_px)), hidden);
+    return scene_packed(mixture.rgb, mixture.w, frame.most_px) | vec2(0u, value.y & MIXED);
+}
+
+// Four pixels a thread.
+@compute @workgroup_size(SMALL_TILE, SMALL_TILE)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
-        @builtin(workgroup_id) tile: vec3<u32>, @builtin(num_workgroups) tiles: vec3<u32>) {
-    let index = tile.y * tiles.x + tile.x;
-    if thread == 0u {
-        atomicStore(&lowest, key_of(ranges[index].x));
-        atomicStore(&highest, key_of(ranges[index].y));
-    }
-    workgroupBarrier();
-    if all(id.xy < frame.size) {
-        let pixel = id.y * frame.size.x + id.x;
-        var value = scene[pixel];
-        let own = scene_unpacked(value, frame.most_px);
-        let half = id.y / 2u * ((frame.size.x + 1u) / 2u) + id.x / 2u;
-        let unhidden = step_at(work.unhidden, own.w);
-        // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it. Where something near
-        // touches every pixel nothing is known, and nothing lies behind.
-        if unhidden < 1.0 && known[half] > 0.5 {
-            let found = pyramid[half];
-            let hidden = (1.0 - unhidden) * other_surface(own.w, found.w);
-            if hidden > 0.0 {
-                let mixture = mix(own, vec4(found.rgb, max(found.w, work.nearest_px)), hidden);
-                let result = scene_packed(mixture.rgb, mixture.w, frame.most_px);
-                range_add(scene_unpacked(result, frame.most_px).w);
-                value = vec2(result.x, result.y | (value.y & MIXED));
-            }
+        @builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
+    let tile = workgroup.xy;
+    let index = tile.y * workgroups.x + tile.x;
+    let is_hiding = step_at(work.unhidden, ranges[index].x) < 1.0;
+    var hidden = Known(vec4(0.0), 0.0);
+    if is_hiding {
+        var coarsest = 0u;
+        for (var size = finest(); coarsest < BY_TILES && !is_coarsest(size); size = (size + 1u) / 2u) {
+            coarsest++;
         }
-        behind[pixel] = value;
+        for (var number = coarsest; number > 0u; number--) {
+            if thread < PATCH * PATCH {
+                let level = level_of(number);
+                let pixel = min(corner_of(tile, number) + vec2(thread % PATCH, thread / PATCH), level.size - 1u);
+                let index = index_of(level, pixel);
+                var own = Known(pyramid[index], known[index]);
+                if number < coarsest {
+                    own = completed(number, own, pixel, tile);
+                }
+                patches[number % 2u * PATCH * PATCH + thread] = own;
+            }
+            workgroupBarrier();
+        }
+        let half = min(id.xy, finest() - 1u);
+        hidden = base(half);
+        if coarsest > 0u {
+            hidden = completed(0u, hidden, half, tile);
+        }
     }
-    workgroupBarrier();
+    var range = ranges[index];
+    for (var sub = 0u; sub < 4u; sub++) {
+        let at = 2u * id.xy + vec2(sub % 2u, sub / 2u);
+        if all(at < frame.size) {
+            let pixel = at.y * frame.size.x + at.x;
+            let value = filled(scene[pixel], hidden);
+            behind[pixel] = value;
+            // What was there counts, too: the nearer surface of a mixed pixel stays where it is.
+            range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
+        }
+    }
+    if is_hiding {
+        range = range_of_tile(thread, SMALL_TILE * SMALL_TILE, range);
+    }
     if thread == 0u {
-        ranges_behind[index] = vec2(value_of(atomicLoad(&lowest)), value_of(atomicLoad(&highest)));
+        ranges_behind[index] = range;
     }
 }

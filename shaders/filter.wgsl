@@ -29,6 +29,16 @@ fn edge_at(corner: Corner, index: u32) -> vec4<f32> {
     return mix(edges[corner.above + index], edges[corner.below + index], corner.down);
 }
 
+// The outermost tap of a node.
+fn reach_of(node: u32) -> i32 {
+    let first = u32(OCTAVES_FROM_PX * frame.steps_per_px);
+    var radius_px = f32(node) / frame.steps_per_px;
+    if node > first {
+        radius_px = bitcast<f32>(bitcast<u32>(OCTAVES_FROM_PX) + ((node - first) << OCTAVE_SHIFT));
+    }
+    return i32(ceil(max(radius_px * frame.extent - 0.5, 0.0)));
+}
+
 fn taps_at(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     var radii = vec2(edge_at(corner, 0u).x, edge_at(corner, 2u).x);
     var turned = bins[k].turned == 1u;
@@ -42,10 +52,15 @@ fn taps_at(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     let right = node_at(radii.y, frame.steps_per_px, frame.nodes);
     let origin = (vec2(left, right) * (2u * frame.reach + 1u) + frame.reach) * frame.groups + work.group;
     let step = select(i32(frame.groups), -i32(frame.groups), turned);
-    return Taps(i32(origin.x), i32(origin.y), step, i32(node_reach[max(left, right)]));
+    return Taps(i32(origin.x), i32(origin.y), step, reach_of(max(left, right)));
 }
 
 // Tap `j`, four terms.
 fn tap_at(taps: Taps, along: f32, j: i32) -> vec4<f32> {
     return mix(bank[u32(taps.left + j * taps.step)], bank[u32(taps.right + j * taps.step)], along);
+}
+
+// Whether taps at -j and j, which are equal, can be taken together: where all of a line's `length` pixels are at hand.
+fn is_mirrored(length: i32, held: u32) -> bool {
+    return frame.even == 1u && length <= i32(held);
 }

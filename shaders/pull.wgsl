@@ -1,22 +1,49 @@
-// Pass pull, of push-pull inpainting: one level of the pyramid to the next coarser one, known pixels only.
+// Pass pull, of push-pull inpainting: those levels of the pyramid that a tile of level 0 can make.
 
-@compute @workgroup_size(SMALL_TILE, SMALL_TILE)
-fn pull(@builtin(global_invocation_id) id: vec3<u32>) {
-    if any(id.xy >= level.coarse) {
-        return;
-    }
-    var sum = vec4(0.0);
-    var knows = 0.0;
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(1) var<uniform> frame: Frame;
+@group(0) @binding(2) var<storage, read> scene: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> nearest_px: array<f32>;
+@group(0) @binding(4) var<storage, read_write> pyramid: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> known: array<f32>;
+
+// The tile's pixels of the level that was made last, a multiple of TILE apart by rows.
+var<workgroup> tile: array<Known, TILE * TILE>;
+
+fn lay(level: Level, pixel: vec2<u32>, own: Known) {
+    let index = index_of(level, pixel);
+    pyramid[index] = own.value;
+    known[index] = own.known;
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn pull(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>,
+        @builtin(local_invocation_index) thread: u32) {
+    // Four pixels of level 0 a thread.
+    var pixel = workgroup.xy * TILE + local.xy;
+    var sum = Known(vec4(0.0), 0.0);
     for (var sub = 0u; sub < 4u; sub++) {
-        let at = 2u * id.xy + vec2(sub % 2u, sub / 2u);
-        if all(at < level.fine) {
-            let index = level.fine_offset + at.y * level.fine.x + at.x;
-            sum += pyramid[index];
-            knows += known[index];
+        let at = 2u * pixel + vec2(sub % 2u, sub / 2u);
+        if all(at < finest()) {
+            sum = plus(sum, base(at));
         }
     }
-    let scale = 1.0 / max(knows, 1.0);
-    let index = level.coarse_offset + id.y * level.coarse.x + id.x;
-    pyramid[index] = sum * scale;
-    known[index] = knows * scale;
+    var level = level_of(1u);
+    var more = !is_coarsest(finest());
+    var side = TILE;
+    for (var k = 1u; k <= BY_TILES; k++) {
+        let own = pulled(sum);
+        if more && all(local.xy < vec2(side)) && all(pixel < level.size) {
+            lay(level, pixel, own);
+        }
+        more = more && !is_coarsest(level.size);
+        level = coarser(level);
+        workgroupBarrier();
+        tile[thread] = own;
+        workgroupBarrier();
+        side /= 2u;
+        pixel = workgroup.xy * side + local.xy;
+        let first = (2u * local.y * TILE + 2u * local.x) % (TILE * TILE - TILE);
+        sum = plus(plus(tile[first], tile[first + 1u]), plus(tile[first + TILE], tile[first + TILE + 1u]));
+    }
 }

@@ -1,20 +1,29 @@
 // Shared by the passes that note the range of CoC of every tile of the picture, so that later ones can leave out what
 // is not there.
 
-var<workgroup> lowest: atomic<i32>;
-var<workgroup> highest: atomic<i32>;
+const HUGE: f32 = 3.0e38;
+const NOTHING = vec2(HUGE, -HUGE);
 
-// Integers in the order of the floats, and back.
-fn key_of(value: f32) -> i32 {
-    let bits = bitcast<i32>(value);
-    return bits ^ ((bits >> 31u) & 0x7fffffff);
+var<workgroup> seen: array<vec2<f32>, TILE * TILE>;
+
+fn union_of(a: vec2<f32>, b: vec2<f32>) -> vec2<f32> {
+    return vec2(min(a.x, b.x), max(a.y, b.y));
 }
 
-fn value_of(key: i32) -> f32 {
-    return bitcast<f32>(key ^ ((key >> 31u) & 0x7fffffff));
-}
-
-fn range_add(coc_px: f32) {
-    atomicMin(&lowest, key_of(coc_px));
-    atomicMax(&highest, key_of(coc_px));
+// In thread 0, the lowest and highest value of a tile, of which each of some threads has seen `own`. In two steps: atomics on
+// one word would be done one thread at a time.
+fn range_of_tile(thread: u32, threads: u32, own: vec2<f32>) -> vec2<f32> {
+    seen[thread] = own;
+    workgroupBarrier();
+    var range = NOTHING;
+    for (var k = thread; thread < TILE && k < threads; k += TILE) {
+        range = union_of(range, seen[k]);
+    }
+    workgroupBarrier();
+    seen[thread] = range;
+    workgroupBarrier();
+    for (var k = 1u; thread == 0u && k < TILE; k++) {
+        range = union_of(range, seen[k]);
+    }
+    return range;
 }

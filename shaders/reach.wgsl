@@ -8,6 +8,9 @@
 
 const HUGE: f32 = 3.0e38;
 
+// What is around the cells on both sides of each edge.
+var<workgroup> sides: array<Around, TILE * SMALL_TILE>;
+
 struct Around {
     radius_px: f32,
     low: vec3<f32>,
@@ -15,7 +18,7 @@ struct Around {
 }
 
 fn extent_of(k: u32) -> vec2<u32> {
-    return vec2(bins[k].edges, bins[k].cells.y);
+    return vec2(2u * bins[k].edges, bins[k].cells.y);
 }
 
 fn nearness(k: u32, distance: u32) -> f32 {
@@ -44,10 +47,12 @@ fn around(k: u32, cell: vec2<u32>) -> Around {
         for (var x = first.x; x <= last.x; x++) {
             let index = 2u * (bins[k].cells_at + y * bins[k].cells.x + x);
             let a = grid[index];
-            let b = grid[index + 1u];
             sums += a.xy * weight_y * nearness(k, max(x, cell.x) - min(x, cell.x));
-            low = min(low, vec3(a.zw, b.x));
-            high = max(high, b.yzw);
+            if bins[k].has_lobes == 1u {
+                let b = grid[index + 1u];
+                low = min(low, vec3(a.zw, b.x));
+                high = max(high, b.yzw);
+            }
         }
     }
     let coc_px = select(0.0, sums.y / sums.x, sums.x > 0.0);
@@ -59,19 +64,29 @@ fn around(k: u32, cell: vec2<u32>) -> Around {
     return Around(bin_radius_px(k, coc_px), select(vec3(0.0), low, some), select(vec3(0.0), high, some));
 }
 
-@compute @workgroup_size(SMALL_TILE, SMALL_TILE)
+// Two threads an edge: one for the cell on its left, and one for that on its right.
+@compute @workgroup_size(TILE, SMALL_TILE)
 fn reach(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
-         @builtin(local_invocation_id) local: vec3<u32>) {
-    let place = place_of(workgroup, workgroups, vec2(SMALL_TILE));
-    let k = place.bin;
-    let edge = place.tile * SMALL_TILE + local.xy;
-    if !place.some || any(edge >= extent_of(k)) {
+         @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let place = place_of(workgroup, workgroups, vec2(TILE, SMALL_TILE));
+    if !place.some {
         return;
     }
-    let right = edge.x * SEGMENT / CELL;
-    let a = around(k, vec2(right - min(right, 1u), edge.y));
-    let b = around(k, vec2(min(right, bins[k].cells.x - 1u), edge.y));
-    let index = 2u * (bins[k].edges_at + edge.y * bins[k].edges + edge.x);
-    edges[index] = 0.5 * (vec4(a.radius_px, a.low) + vec4(b.radius_px, b.low));
-    edges[index + 1u] = 0.5 * (vec4(a.high, 0.0) + vec4(b.high, 0.0));
+    let k = place.bin;
+    let at = place.tile * vec2(TILE, SMALL_TILE) + local.xy;
+    let inside = all(at < extent_of(k));
+    let edge = at.x / 2u;
+    let right = edge * SEGMENT / CELL;
+    if inside {
+        let cell = select(right - min(right, 1u), min(right, bins[k].cells.x - 1u), at.x % 2u == 1u);
+        sides[thread] = around(k, vec2(cell, at.y));
+    }
+    workgroupBarrier();
+    if inside && at.x % 2u == 0u {
+        let a = sides[thread];
+        let b = sides[thread + 1u];
+        let index = 2u * (bins[k].edges_at + at.y * bins[k].edges + edge);
+        edges[index] = 0.5 * (vec4(a.radius_px, a.low) + vec4(b.radius_px, b.low));
+        edges[index + 1u] = 0.5 * (vec4(a.high, 0.0) + vec4(b.high, 0.0));
+    }
 }

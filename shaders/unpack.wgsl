@@ -1,5 +1,6 @@
 // Pass unpack: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC; mixed pixels to two surfaces.
-// Reads packed RGB bytes and metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile.
+// Reads packed RGB bytes and metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile, which
+// shows no bins yet.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> color: array<u32>;
@@ -7,13 +8,25 @@
 @group(0) @binding(3) var<storage, read_write> scene: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> ranges: array<vec2<f32>>;
 @group(0) @binding(5) var<storage, read_write> mixed: array<MixedPixel>;
+@group(0) @binding(6) var<storage, read_write> shown: array<u32>;
+
+const ACROSS = 4u;          // pixels of a row that a thread does: three whole words
 
 // Of each pixel of the tile: its place among the mixed ones, plus one.
 var<workgroup> places: array<u32, TILE * TILE>;
 
-fn light_of(index: u32) -> f32 {
-    let code = f32((color[index / 4u] >> (8u * (index % 4u))) & 255u) / 255.0;
-    return select(pow((code + 0.055) / 1.055, 2.4), code / 12.92, code <= 0.04045);
+fn light_of(code: u32) -> f32 {
+    let value = f32(code) * (1.0 / 255.0);
+    return select(pow(value * (1.0 / 1.055) + 0.055 / 1.055, 2.4), value * (1.0 / 12.92), value <= 0.04045);
+}
+
+// Bytes of three, from byte `at` on.
+fn codes_at(at: u32) -> vec3<u32> {
+    let shift = 8u * (at % 4u);
+    // What a word lacks is in the next one; the last pixel of the picture may end with the last word.
+    let words = vec2(color[at / 4u], color[min(at / 4u + 1u, arrayLength(&color) - 1u)]);
+    let bytes = (words.x >> shift) | select(words.y << (32u - shift), 0u, shift == 0u);
+    return vec3(bytes, bytes >> 8u, bytes >> 16u) & vec3(255u);
 }
 
 fn coc_of(x: u32, y: u32) -> f32 {
@@ -23,6 +36,9 @@ fn coc_of(x: u32, y: u32) -> f32 {
     if frame.coc_kind == 1u {
         let distance_px = abs(frame.coc.x * f32(x) + frame.coc.y * f32(y) - frame.coc.z) - frame.coc.w;
         return min(max(distance_px, 0.0) * frame.ramp.x, frame.ramp.y);
+    }
+    if all(frame.depth_size == frame.size) {
+        return coc_of_depth(depth[y * frame.size.x + x]);
     }
     let column = min((2u * x + 1u) * frame.depth_size.x / (2u * frame.size.x), frame.depth_size.x - 1u);
     let row = min((2u * y + 1u) * frame.depth_size.y / (2u * frame.size.y), frame.depth_size.y - 1u);
@@ -65,37 +81,46 @@ fn take_apart(k: u32, light: vec3<f32>) -> vec2<u32> {
     let far = scene_packed(far_light, coc_of_depth(bitcast<f32>(own.far)), frame.most_px);
     mixed[k].near = near.x;
     mixed[k].far = near.y;
-    range_add(scene_unpacked(near, frame.most_px).w);
     return vec2(far.x, far.y | MIXED);
 }
 
-@compute @workgroup_size(TILE, TILE)
-fn unpack(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32,
+@compute @workgroup_size(TILE / ACROSS, TILE)
+fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32,
           @builtin(workgroup_id) tile: vec3<u32>, @builtin(num_workgroups) tiles: vec3<u32>) {
-    if thread == 0u {
-        atomicStore(&lowest, 0x7fffffff);
-        atomicStore(&highest, -0x7fffffff);
+    let first = tile.xy * TILE + vec2(ACROSS * local.x, local.y);
+    if frame.mixed > 0u {
+        for (var n = 0u; n < ACROSS; n++) {
+            places[ACROSS * thread + n] = 0u;
+        }
+        workgroupBarrier();
+        if local.x == 0u && first.y < frame.size.y {
+            find_mixed(tile.xy * TILE, local.y);
+        }
+        workgroupBarrier();
     }
-    if frame.mixed > 0u && thread % TILE == 0u && id.y < frame.size.y {
-        find_mixed(tile.xy * TILE, thread / TILE);
-    }
-    workgroupBarrier();
-    if all(id.xy < frame.size) {
-        let pixel = id.y * frame.size.x + id.x;
-        var light = vec3(light_of(3u * pixel), light_of(3u * pixel + 1u), light_of(3u * pixel + 2u));
+    var range = NOTHING;
+    for (var n = 0u; n < ACROSS && first.x + n < frame.size.x && first.y < frame.size.y; n++) {
+        let pixel = first.y * frame.size.x + first.x + n;
+        let codes = codes_at(3u * pixel);
+        var light = vec3(light_of(codes.x), light_of(codes.y), light_of(codes.z));
         if frame.expansion > 0.0 {
             light *= frame.expansion / (frame.expansion - luminance(light));
         }
-        var value = scene_packed(light, coc_of(id.x, id.y), frame.most_px);
-        if places[thread] > 0u {
-            value = take_apart(places[thread] - 1u, light);
+        var value = scene_packed(light, coc_of(first.x + n, first.y), frame.most_px);
+        if frame.mixed > 0u {
+            let place = places[ACROSS * thread + n];
+            if place > 0u {
+                value = take_apart(place - 1u, light);
+                range = union_of(range, vec2(near_surface(place - 1u).w));
+            }
         }
         scene[pixel] = value;
         // What the others read, rounding included.
-        range_add(scene_unpacked(value, frame.most_px).w);
+        range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
     }
-    workgroupBarrier();
+    range = range_of_tile(thread, TILE * TILE / ACROSS, range);
     if thread == 0u {
-        ranges[tile.y * tiles.x + tile.x] = vec2(value_of(atomicLoad(&lowest)), value_of(atomicLoad(&highest)));
+        ranges[tile.y * tiles.x + tile.x] = range;
+        shown[tile.y * tiles.x + tile.x] = 0u;
     }
 }

@@ -18,3 +18,14 @@ fn place_of(workgroup: vec3<u32>, workgroups: vec3<u32>, tile: vec2<u32>) -> Pla
     }
     return Place(0u, vec2(0u), false);
 }
+
+// Whether a workgroup has anything to do: threads that find something store 1.
+var<workgroup> some: atomic<u32>;
+
+// Before that: nothing is found yet.
+fn begin(thread: u32) {
+    if thread == 0u {
+        atomicStore(&some, 0u);
+    }
+    workgroupBarrier();
+}

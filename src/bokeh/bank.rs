@@ -34,6 +34,8 @@ pub struct Bank {
     pub nodes: usize,
     /// Whether every profile is even, so that taps at `-j` and `j` are equal.
     pub even: bool,
+    /// Outermost point of the aperture, in radii.
+    pub extent: f64,
     /// Outermost tap of each node.
     pub node_reach: Vec<u32>,
     /// Horizontal taps, `[node][reach + j][term]`, as they are for content behind the focal plane.
@@ -81,6 +83,7 @@ impl Bank {
             reach,
             nodes,
             even: symmetry == (true, true),
+            extent: mask.extent,
             node_reach: (0..nodes).map(|k| reach_at(k) as u32).collect(),
             horizontal: Vec::with_capacity(nodes * (2 * reach + 1) * terms),
             vertical: Vec::with_capacity(nodes * (2 * reach + 1) * terms),

@@ -1,7 +1,7 @@
 //! What lives on the device: allocated once per picture size.
 
 use super::layout::Capacity;
-use super::shaders::{Bin, Frame, Level};
+use super::shaders::{Bin, Frame};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::occlusion::MOST_LAYERS;
@@ -20,10 +20,6 @@ pub struct Buffers {
     pub bins: wgpu::Buffer,
     /// Uniform `Work`, one every [`WORK_STRIDE`] bytes.
     pub work: wgpu::Buffer,
-    /// Uniform `Level`, one for each step of the pyramid.
-    pub levels: Vec<wgpu::Buffer>,
-    /// Sizes of those steps: fine, coarse.
-    pub level_sizes: Vec<([u32; 2], [u32; 2])>,
     pub color: wgpu::Buffer,
     /// Linear light and CoC.
     pub scene: wgpu::Buffer,
@@ -47,6 +43,8 @@ pub struct Buffers {
     pub filtered: wgpu::Buffer,
     /// Per tile of blurred bins, whether anything is there.
     pub active: wgpu::Buffer,
+    /// Per tile of the picture, the bins that it shows, a bit each.
+    pub shown: wgpu::Buffer,
     pub result: wgpu::Buffer,
     /// CoC of the nearest surface, at half size.
     pub nearest_px: wgpu::Buffer,
@@ -110,7 +108,7 @@ impl Buffers {
         let storage = |label: &str, words: usize| buffer(label, words * 4, Usage::STORAGE | Usage::COPY_SRC);
         let (width, height) = (plan.width, plan.height);
         let layered = plan.compositing == Compositing::Layers;
-        let (levels, pyramid_pixels) = if layered { pyramid_steps(width, height) } else { (Vec::new(), 1) };
+        let pyramid_pixels = if layered { pyramid_pixels(width, height) } else { 1 };
         let (behind, tiles) = (if layered { width * height } else { 1 }, width.div_ceil(16) * height.div_ceil(16));
         let mixed = if layered { Matte::most(width, height).max(1) } else { 1 };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
@@ -119,8 +117,6 @@ impl Buffers {
             frame: buffer("frame", size_of::<Frame>(), Usage::UNIFORM),
             bins: buffer("bins", MAX_BINS * size_of::<Bin>(), Usage::UNIFORM),
             work: buffer("work", work_bytes, Usage::UNIFORM),
-            level_sizes: levels.iter().map(|level| (level.fine, level.coarse)).collect(),
-            levels: levels.iter().map(|level| with_data("level", bytemuck::bytes_of(level), Usage::UNIFORM)).collect(),
             color: storage("color", picture_bytes(plan) as usize / 4),
             scene: storage("scene", width * height * 2),
             mixed: storage("mixed", mixed * size_of::<MixedPixel>() / 4),
@@ -134,6 +130,7 @@ impl Buffers {
             blurred: storage("blurred", capacity.pixels * 2),
             filtered: storage("filtered", capacity.filtered),
             active: storage("active", capacity.active),
+            shown: storage("shown", tiles),
             result: storage("result", picture_bytes(plan) as usize / 4),
             nearest_px: storage("nearest", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),
             pyramid: storage("pyramid", pyramid_pixels * 4),
@@ -178,22 +175,12 @@ fn pad_to_fours(taps: &[f32], terms: usize) -> Vec<[f32; 4]> {
     taps.chunks(terms).flat_map(|tap| tap.chunks(4).map(padded)).collect()
 }
 
-/// The steps from one level of the pyramid to the next, finest first, and the pixels of all levels.
-fn pyramid_steps(width: usize, height: usize) -> (Vec<Level>, usize) {
-    let (mut fine, mut offset, mut steps) = ([width.div_ceil(2), height.div_ceil(2)], 0, Vec::new());
-    while fine != [1, 1] {
-        let coarse = [fine[0].div_ceil(2), fine[1].div_ceil(2)];
-        let next = offset + fine[0] * fine[1];
-        steps.push(Level {
-            fine: fine.map(|v| v as u32),
-            coarse: coarse.map(|v| v as u32),
-            fine_offset: offset as u32,
-            coarse_offset: next as u32,
-            unused: [0; 2],
-        });
-        (fine, offset) = (coarse, next);
-    }
-    (steps, offset + 1)
+/// The pixels of all levels of the pyramid that are kept, from a quarter of the size of a picture to one pixel.
+fn pyramid_pixels(width: usize, height: usize) -> usize {
+    let halved = |size: &[usize; 2]| size.map(|side| side.div_ceil(2));
+    let finest = [width, height].map(|side| side.div_ceil(4));
+    let levels = std::iter::successors(Some(finest), |level| (*level != [1, 1]).then(|| halved(level)));
+    levels.map(|[across, down]| across * down).sum()
 }
 
 /// Every node's kernel, one after the other, and where each starts.

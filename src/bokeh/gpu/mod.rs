@@ -1,5 +1,5 @@
 //! The GPU executor: wgpu compute passes, one WGSL file each under `shaders/`, with the names of the passes in
-//! [`super::plan`]; where one is several dispatches (`fill`: hide, know, pull, push), each has a file.
+//! [`super::plan`]; where one is several dispatches (`fill`: hide, pull, coarse, fill), each has a file.
 
 mod buffers;
 mod layout;
@@ -138,6 +138,8 @@ impl GpuBokeh {
             most_px: most_px.max(1e-3),
             coc,
             ramp,
+            even: u32::from(plan.bank.even),
+            extent: plan.bank.extent as f32,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),

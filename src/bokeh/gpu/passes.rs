@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::buffers::{Buffers, Filters, WORK_STRIDE, work_count};
 use super::layout::{Layout, tiles};
 use super::readback::MAX_QUERIES;
-use super::shaders::{self, Bin, LINE, RESULT_TILE, ROWS_TILE, SMALL_TILE, TILE, Work};
+use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, SHARED_FROM, TILE, Work};
 use crate::bokeh::occlusion::MOST_LAYERS;
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
 use crate::compute::device::{Device, Shader, workgroups_2d};
@@ -21,7 +21,7 @@ struct Step {
     bindings: wgpu::BindGroup,
 }
 
-/// A pass over the picture or a level of the pyramid: always as many workgroups.
+/// A pass over the picture or the pyramid: always as many workgroups.
 struct Fixed {
     step: Step,
     workgroups: [u32; 2],
@@ -29,8 +29,9 @@ struct Fixed {
 
 /// The passes of a layer.
 struct Layer {
-    /// What is known behind those in front of it, and the scene with that filled in; the foremost has the scene as it is.
-    fill: Option<[Fixed; 2]>,
+    /// What is known behind those in front of it, up and down a pyramid, and the scene with that filled in; the foremost
+    /// has the scene as it is.
+    fill: Option<[Fixed; 3]>,
     bin: Step,
 }
 
@@ -40,8 +41,6 @@ pub struct Passes {
     /// What may hide others.
     hide: Fixed,
     layers: Vec<Layer>,
-    /// From the finest level of the pyramid to the coarsest, and back.
-    pull_push: Vec<Fixed>,
     gather: Option<Fixed>,
     reach: Step,
     /// For each bank, rows and columns of each batch of bins and group of terms.
@@ -100,6 +99,11 @@ impl<'a> Maker<'a> {
     }
 }
 
+/// What `unpack` has: the depth among it, whose buffer may become another.
+fn unpack_buffers<'a>(b: &'a Buffers, depth: &'a wgpu::Buffer) -> [&'a wgpu::Buffer; 7] {
+    [&b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed, &b.shown]
+}
+
 /// A pass over `size` invocations in workgroups of `tile` x `tile`.
 fn over(step: Step, size: [u32; 2], tile: u32) -> Fixed {
     Fixed { step, workgroups: size.map(|size| size.div_ceil(tile)) }
@@ -114,23 +118,17 @@ impl Passes {
 
         let hide = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
         let hide = over(maker.step("fill", shaders::HIDE, &[], &hide), half, TILE);
-        let mut level = |shader, level: &wgpu::Buffer, size: &[u32; 2]| {
-            over(maker.step("fill", shader, &[], &[level, &b.pyramid, &b.known]), *size, SMALL_TILE)
-        };
-        let mut pull_push = Vec::new();
-        for (uniform, (_, coarse)) in b.levels.iter().zip(&b.level_sizes) {
-            pull_push.push(level(shaders::PULL, uniform, coarse));
-        }
-        for (uniform, (fine, _)) in b.levels.iter().zip(&b.level_sizes).rev() {
-            pull_push.push(level(shaders::PUSH, uniform, fine));
-        }
         let layers = (0..MOST_LAYERS).map(|index| {
             let fill = (index > 0).then(|| {
-                let known = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known];
-                let filled = [&b.frame, &b.pyramid, &b.known, &b.scene, &b.ranges, &b.behind, &b.ranges_behind];
+                let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known];
+                let coarse = [&b.frame, &b.pyramid, &b.known];
+                let (known, behind) = ([&b.pyramid, &b.known], [&b.behind, &b.ranges_behind]);
+                let filled = [&b.frame, known[0], known[1], &b.scene, &b.ranges, behind[0], behind[1], &b.nearest_px];
                 let work = [maker.work(index)];
                 [
-                    over(maker.step("fill", shaders::KNOW, &work, &known), half, TILE),
+                    // A thread takes four pixels of half the size, or of the picture.
+                    over(maker.step("fill", shaders::PULL, &work, &pulled), half, 2 * TILE),
+                    over(maker.step("fill", shaders::COARSE, &[], &coarse), [1, 1], 1),
                     over(maker.step("fill", shaders::FILL, &work, &filled), picture, TILE),
                 ]
             });
@@ -140,9 +138,10 @@ impl Passes {
         });
         let layers = layers.collect();
         let filters = |maker: &mut Maker, bank: &Filters, k: usize| {
-            let ([horizontal, vertical], reach) = (&bank.taps, &bank.node_reach);
-            let rows = [&b.frame, horizontal, reach, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered];
-            let columns = [&b.frame, vertical, reach, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active];
+            let [horizontal, vertical] = &bank.taps;
+            let rows = [&b.frame, horizontal, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered];
+            let columns =
+                [&b.frame, vertical, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active, &b.shown];
             [
                 maker.over_bins("blur_rows", shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
                 maker.over_bins("blur_columns", shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
@@ -159,19 +158,16 @@ impl Passes {
             let buffers = [&b.frame, starts, kernels, &b.scene, &b.banks[plan.bank_index].node_reach, &b.blurred];
             over(maker.step("gather", shaders::GATHER, &[], &buffers), picture, TILE)
         });
-        // Each invocation makes four pixels: three whole words.
-        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active];
-        let pixels_in_fours = (plan.width * plan.height).div_ceil(4) as u32;
+        let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active, &b.shown];
         let composite = Fixed {
             step: maker.step("composite", shaders::COMPOSITE, &[], &composite),
-            workgroups: workgroups_2d(pixels_in_fours.div_ceil(LINE)),
+            workgroups: workgroups_2d((plan.width * plan.height).div_ceil(LINE as usize) as u32),
         };
-        let unpack = [&b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed];
+        let unpack = unpack_buffers(b, depth);
         Self {
             unpack: over(maker.step("unpack", shaders::UNPACK, &[], &unpack), picture, TILE),
             hide,
             layers,
-            pull_push,
             gather,
             reach: maker.over_bins("reach", shaders::REACH, ALL, &[&b.grid, &b.edges]),
             blur,
@@ -182,8 +178,7 @@ impl Passes {
 
     /// Binds another depth buffer.
     pub fn set_depth(&mut self, device: &Device, b: &Buffers, depth: &wgpu::Buffer) {
-        let buffers =
-            [&b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed].map(|buffer| buffer.as_entire_buffer_binding());
+        let buffers = unpack_buffers(b, depth).map(wgpu::Buffer::as_entire_buffer_binding);
         self.unpack.step.bindings = device.bindings(&self.unpack.step.pipeline, buffers.into_iter());
     }
 
@@ -247,7 +242,10 @@ impl Passes {
         let workgroups = |bins: &[Bin], tile: [usize; 2], extent: fn(&Bin) -> [u32; 2]| {
             workgroups_2d(bins.iter().map(|bin| tiles(extent(bin).map(|size| size as usize), tile) as u32).sum())
         };
-        let cells = |bin: &Bin| bin.cells.map(|cells| cells * CELL as u32);
+        let threads = |bin: &Bin| {
+            let side = CELL as u32 * if bin.scale >= SHARED_FROM { 2 } else { 1 };
+            bin.cells.map(|cells| cells * side)
+        };
         run(&self.unpack.step, self.unpack.workgroups);
         if let Some(gather) = &self.gather {
             run(&gather.step, gather.workgroups);
@@ -256,13 +254,10 @@ impl Passes {
                 if index == 1 {
                     run(&self.hide.step, self.hide.workgroups);
                 }
-                if let Some([know, fill]) = &layer.fill {
-                    let steps = std::iter::once(know).chain(&self.pull_push).chain([fill]);
-                    steps.for_each(|fixed| run(&fixed.step, fixed.workgroups));
-                }
-                run(&layer.bin, workgroups(&layout.bins[bins], [TILE as usize; 2], cells));
+                layer.fill.iter().flatten().for_each(|fixed| run(&fixed.step, fixed.workgroups));
+                run(&layer.bin, workgroups(&layout.bins[bins], [TILE as usize; 2], threads));
             }
-            run(&self.reach, workgroups(&layout.bins, [SMALL_TILE as usize; 2], |bin| [bin.edges, bin.cells[1]]));
+            run(&self.reach, workgroups(&layout.bins, EDGES_TILE, |bin| [2 * bin.edges, bin.cells[1]]));
             let groups = plan.bank.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];

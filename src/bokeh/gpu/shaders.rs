@@ -23,38 +23,44 @@ macro_rules! shader {
 /// 8-bit sRGB and depth to linear light and CoC.
 pub const UNPACK: Shader = shader!("unpack", "range", "mixed");
 /// A bin's share of each pixel, and the coarse grid over it.
-pub const BIN: Shader = shader!("bin", "work", "mixed");
+pub const BIN: Shader = shader!("bin", "work", "mixed", "tent");
 /// Local radius and range of colours.
 pub const REACH: Shader = shader!("reach", "work");
 pub const BLUR_ROWS: Shader = shader!("blur_rows", "work", "filter");
-pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "work", "filter");
+pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "work", "filter", "show");
 /// The exact two-dimensional gather.
 pub const GATHER: Shader = shader!("gather");
 /// The nearest surface.
 pub const HIDE: Shader = shader!("hide", "mixed");
-/// What is known behind a layer.
-pub const KNOW: Shader = shader!("know");
-/// To the coarser level.
-pub const PULL: Shader = shader!("pull", "level");
-/// Back to the finer level.
-pub const PUSH: Shader = shader!("push", "level");
-pub const FILL: Shader = shader!("fill", "range");
+/// What is known behind a layer, at half size and over ever larger areas.
+pub const PULL: Shader = shader!("pull", "pyramid", "base");
+/// The largest areas, and back.
+pub const COARSE: Shader = shader!("coarse", "pyramid");
+/// Back to the picture.
+pub const FILL: Shader = shader!("fill", "pyramid", "base", "range");
 pub const COMPOSITE: Shader = shader!("composite");
 
-pub const ALL: [Shader; 12] =
-    [UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, KNOW, PULL, PUSH, FILL, COMPOSITE];
+pub const ALL: [Shader; 11] =
+    [UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, PULL, COARSE, FILL, COMPOSITE];
 
 /// Invocations of a workgroup in x and in y, for pictures and bins, and for what is smaller.
 pub const TILE: u32 = 16;
 pub const SMALL_TILE: u32 = 8;
+// `fill` makes a tile of the picture from a small one of half its size.
+const _: () = assert!(TILE == 2 * SMALL_TILE);
 /// Invocations of a workgroup that goes along lines.
-pub const LINE: u32 = 64;
+pub const LINE: u32 = 256;
+/// Sides of edges that a workgroup does in `reach`, two an edge.
+pub const EDGES_TILE: [usize; 2] = [TILE as usize, SMALL_TILE as usize];
 /// Pixels of a bin that a workgroup makes in `blur_rows` and in `blur_columns`.
 pub const ROWS_TILE: [usize; 2] = [64, 4];
 pub const RESULT_TILE: [usize; 2] = [8, 32];
 
+/// The scale of a bin from which on a pixel of it has so many taps that four threads share them, two each way.
+pub const SHARED_FROM: u32 = 4;
+
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 17] = [
+pub const CONSTANTS: [(&str, f64); 18] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("ANY_COLOR", ANY_COLOR as f64),
@@ -72,6 +78,7 @@ pub const CONSTANTS: [(&str, f64); 17] = [
     ("ROWS_TILE_Y", ROWS_TILE[1] as f64),
     ("RESULT_TILE_X", RESULT_TILE[0] as f64),
     ("RESULT_TILE_Y", RESULT_TILE[1] as f64),
+    ("SHARED_FROM", SHARED_FROM as f64),
 ];
 
 /// `Frame` of `common.wgsl`, where each field is explained.
@@ -94,9 +101,9 @@ pub struct Frame {
     pub expansion: f32,
     pub steps_per_px: f32,
     pub mixed: u32,
-    pub unused_a: u32,
-    pub unused_b: u32,
-    pub unused_c: u32,
+    pub even: u32,
+    pub extent: f32,
+    pub unused: u32,
 }
 
 /// `Bin` of `common.wgsl`.
@@ -138,16 +145,4 @@ pub struct Work {
     pub last: u32,
     pub nearest_px: f32,
     pub unhidden: [f32; 2],
-}
-
-/// `Level` of `level.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[allow(missing_docs)]
-pub struct Level {
-    pub fine: [u32; 2],
-    pub coarse: [u32; 2],
-    pub fine_offset: u32,
-    pub coarse_offset: u32,
-    pub unused: [u32; 2],
 }

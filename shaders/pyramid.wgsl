@@ -1,0 +1,70 @@
+// Shared by the passes of push-pull inpainting, over a pyramid from half the size of the picture (level 0) to one pixel. Of
+// each pixel it has light and CoC times how far they are known, and that. Level 0 is not kept: it is soon made anew.
+
+// So many levels above level 0 are done tile by tile, and all others by one workgroup.
+const BY_TILES = 5u;
+
+struct Level {
+    size: vec2<u32>,
+    at: u32,            // of its pixels among those of all levels
+}
+
+struct Known {
+    value: vec4<f32>,
+    known: f32,
+}
+
+// Size of level 0.
+fn finest() -> vec2<u32> {
+    return (frame.size + 1u) / 2u;
+}
+
+fn coarser(level: Level) -> Level {
+    return Level((level.size + 1u) / 2u, level.at + level.size.x * level.size.y);
+}
+
+// A level from 1 on.
+fn level_of(number: u32) -> Level {
+    var level = Level((finest() + 1u) / 2u, 0u);
+    for (var k = 1u; k < number; k++) {
+        level = coarser(level);
+    }
+    return level;
+}
+
+fn is_coarsest(size: vec2<u32>) -> bool {
+    return all(size == vec2(1u));
+}
+
+fn index_of(level: Level, pixel: vec2<u32>) -> u32 {
+    return level.at + pixel.y * level.size.x + pixel.x;
+}
+
+fn plus(a: Known, b: Known) -> Known {
+    return Known(a.value + b.value, a.known + b.known);
+}
+
+fn times(a: Known, factor: f32) -> Known {
+    return Known(a.value * factor, a.known * factor);
+}
+
+// The sum of four pixels as one of the coarser level: their mean where more than one is known.
+fn pulled(sum: Known) -> Known {
+    return times(sum, 1.0 / max(sum.known, 1.0));
+}
+
+// What a pixel does not know, from those of the coarser level around it.
+fn pushed(own: Known, around: Known) -> Known {
+    return plus(own, times(around, (1.0 - own.known) / max(around.known, 1.0e-6)));
+}
+
+// The other coarse pixel that a fine one lies between, along one axis.
+fn neighbour(at: u32, limit: u32) -> u32 {
+    let half = at / 2u;
+    return select(min(half + 1u, limit - 1u), half - min(half, 1u), at % 2u == 0u);
+}
+
+// The four coarse pixels that a fine one lies between: columns of the nearer and the farther, rows likewise.
+fn between(pixel: vec2<u32>, coarse: vec2<u32>) -> vec4<u32> {
+    return vec4(pixel.x / 2u, neighbour(pixel.x, coarse.x), pixel.y / 2u, neighbour(pixel.y, coarse.y));
+}

@@ -1,0 +1,53 @@
+// Shared by what brings the scene to the scale of a bin. Such a pass has `work`, `bins`, `frame`, `scene` and `mixed`.
+
+// A value, and coverage times |CoC|.
+struct Pixel {
+    value: vec4<f32>,
+    coc: f32,
+}
+
+// A bin's share of a surface.
+fn taken(k: u32, surface: vec4<f32>, weight: f32) -> Pixel {
+    let share = weight * select(share_at(bins[k].front, bins[k].behind, surface.w), 1.0, bins[k].whole == 1u);
+    return Pixel(share * vec4(surface.rgb, 1.0), share * abs(surface.w));
+}
+
+fn plus(a: Pixel, b: Pixel) -> Pixel {
+    return Pixel(a.value + b.value, a.coc + b.coc);
+}
+
+// A bin's share of a pixel of the scene.
+fn taken_at(k: u32, at: u32, weight: f32) -> Pixel {
+    let value = scene[at];
+    let surface = scene_unpacked(value, frame.most_px);
+    if !is_mixed(value) {
+        return taken(k, surface, weight);
+    }
+    let place = first_mixed(at);
+    let near = near_surface(place);
+    // Where the nearer surface lies in front of the layer, behind it is the farther one.
+    let before = step_at(work.unhidden, near.w);
+    return plus(taken(k, surface, weight * (1.0 - (1.0 - mixed[place].behind) * before)),
+                taken(k, near, weight * mixed[place].share * before));
+}
+
+// Every `step`th tap of a pixel of the bin, each way, from `first` on.
+fn averaged(k: u32, pixel: vec2<u32>, first: vec2<u32>, step: u32) -> Pixel {
+    let scale = bins[k].scale;
+    if scale == 1u {
+        return taken_at(k, pixel.y * frame.size.x + pixel.x, 1.0);
+    }
+    // A tent of twice the scale, so that reducing a picture keeps its centroid.
+    let inverse = 1.0 / f32(scale);
+    var sum = Pixel(vec4(0.0), 0.0);
+    for (var j = first.y; j < 2u * scale; j += step) {
+        let y = u32(clamp(i32(pixel.y * scale + j) - i32(scale / 2u), 0, i32(frame.size.y) - 1));
+        let weight_y = (1.0 - abs((f32(j) + 0.5) * inverse - 1.0)) * inverse;
+        for (var i = first.x; i < 2u * scale; i += step) {
+            let x = u32(clamp(i32(pixel.x * scale + i) - i32(scale / 2u), 0, i32(frame.size.x) - 1));
+            let weight_x = (1.0 - abs((f32(i) + 0.5) * inverse - 1.0)) * inverse;
+            sum = plus(sum, taken_at(k, y * frame.size.x + x, weight_x * weight_y));
+        }
+    }
+    return sum;
+}
