@@ -9,8 +9,9 @@
 @group(0) @binding(3) var<storage, read> scene: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> source: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read_write> grid: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> ranges: array<vec2<f32>>;
-@group(0) @binding(7) var<storage, read> mixed: array<MixedPixel>;
+@group(0) @binding(6) var<storage, read> mixed: array<MixedPixel>;
+@group(0) @binding(7) var<storage, read> todo: array<u32>;
+@group(0) @binding(8) var<storage, read_write> next: array<atomic<u32>>;
 
 const HUGE: f32 = 3.0e38;
 
@@ -25,30 +26,18 @@ var<workgroup> pixels: array<Pixel, TILE * TILE>;
 // The rows of the tile's cells.
 var<workgroup> rows: array<Cell, TILE * TILE / CELL>;
 
-// How many threads a side share a pixel.
-fn sharing(k: u32) -> u32 {
-    return select(1u, 2u, bins[k].scale >= SHARED_FROM);
+fn list_at(k: u32) -> u32 {
+    return bins[k].binned_at;
 }
 
-fn extent_of(k: u32) -> vec2<u32> {
-    return CELL * bins[k].cells * sharing(k);
-}
-
-// Looks at the tiles of the picture that `side` pixels of the bin, each way, are made of, one a thread.
-fn look(k: u32, first_pixel: vec2<u32>, side: u32, thread: u32) {
-    let across = (frame.size + TILE - 1u) / TILE;
-    let scale = bins[k].scale;
-    let start = first_pixel * scale;
-    let first = (start - min(start, vec2(scale / 2u))) / TILE;
-    let last = min((start + side * scale + scale / 2u - 1u) / TILE, across - 1u);
-    let count = last - first + 1u;
-    let at = first + vec2(thread % count.x, thread / count.x);
-    if at.y <= last.y {
-        let range = ranges[at.y * across.x + at.x];
-        let meets = step_at(bins[k].front, range.y) > 0.0 && step_at(bins[k].behind, range.x) < 1.0;
-        if meets || bins[k].whole == 1u {
-            atomicStore(&some, 1u);
-        }
+// Lists the tiles of rows that some columns of the bin, and rows of it, reach.
+fn put_filtered(k: u32, corner: vec2<u32>, side: u32, thread: u32) {
+    let first = vec2(corner.x - min(corner.x, bins[k].reach), corner.y) / rows_tile();
+    let end = min(corner + side - 1u + vec2(bins[k].reach, 0u), bins[k].size - 1u) / rows_tile();
+    let count = end - first + 1u;
+    for (var n = thread; n < count.x * count.y; n += TILE * TILE) {
+        let tile = first + vec2(n % count.x, n / count.x);
+        put(k, bins[k].filtered_at, tile.y * filtered_across(k) + tile.x);
     }
 }
 
@@ -58,33 +47,19 @@ fn write_cell(k: u32, cell: vec2<u32>, all: Cell) {
     grid[index + 1u] = vec4(all.low.b, all.high);
 }
 
-@compute @workgroup_size(TILE, TILE)
-fn bin(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
-       @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let place = place_of(workgroup, workgroups, vec2(TILE));
-    if !place.some {
-        return;
-    }
-    let k = place.bin;
+fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     let step = sharing(k);
     let side = TILE / step;
-    let corner = place.tile * side;
-    begin(thread);
-    look(k, corner, side, thread);
+    let across = binned_across(k);
+    let corner = vec2(tile % across, tile / across) * side;
+    put_filtered(k, corner, side, thread);
     let cells = side / CELL;
     let cell = corner / CELL + vec2(thread % cells, thread / cells);
-    let writes = thread < cells * cells && all(cell < bins[k].cells);
     let nothing = Cell(vec2(0.0), vec3(HUGE), vec3(-HUGE));
-    if workgroupUniformLoad(&some) == 0u {
-        if writes {
-            write_cell(k, cell, nothing);
-        }
-        return;
-    }
-    let averaging = corner + local.xy / step;
+    let averaging = corner + local / step;
     var own = Pixel(vec4(0.0), 0.0);
     if all(averaging < bins[k].size) {
-        own = averaged(k, averaging, local.xy % step, step);
+        own = averaged(k, averaging, local % step, step);
     }
     if step > 1u {
         pixels[thread] = own;
@@ -118,12 +93,25 @@ fn bin(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wor
         rows[thread] = row;
     }
     workgroupBarrier();
-    if writes {
+    if thread < cells * cells && all(cell < bins[k].cells) {
         var all = nothing;
         for (var j = 0u; j < CELL; j++) {
             let row = rows[thread * CELL + j];
             all = Cell(all.sums + row.sums, min(all.low, row.low), max(all.high, row.high));
         }
         write_cell(k, cell, all);
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn bin(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+       @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    for (var n = workgroup.x;; n += workgroups.x) {
+        let place = place_of(n);
+        if !place.some {
+            break;
+        }
+        bin_tile(place.bin, place.tile, local.xy, thread);
+        workgroupBarrier();
     }
 }

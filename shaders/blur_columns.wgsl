@@ -1,6 +1,6 @@
 // Pass blur_columns: the vertical low-rank filters, terms summed; truncation leaves lobes, so the result is kept in
-// the range of the colours in reach. Writes premultiplied colour and coverage where there is any, per tile whether, and per tile
-// of the picture which bins it shows.
+// the range of the colours in reach. Writes premultiplied colour and coverage where there is any, and per tile of the
+// picture which bins it shows.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -11,7 +11,7 @@
 @group(0) @binding(6) var<storage, read> rows: array<vec2<u32>>;
 @group(0) @binding(7) var<storage, read> filtered: array<u32>;
 @group(0) @binding(8) var<storage, read_write> blurred: array<vec2<u32>>;
-@group(0) @binding(9) var<storage, read_write> active_tiles: array<u32>;
+@group(0) @binding(9) var<storage, read> todo: array<u32>;
 @group(0) @binding(10) var<storage, read_write> shown: array<atomic<u32>>;
 
 // Rows that are held at a time, of four terms; most filters need no more for a whole tile.
@@ -23,12 +23,12 @@ var<workgroup> values: array<vec2<u32>, 4 * CHUNK * RESULT_TILE_X>;
 const NOTED = 24u;
 var<workgroup> noted: array<bool, NOTED>;
 
-fn extent_of(k: u32) -> vec2<u32> {
-    return bins[k].size;
+fn list_at(k: u32) -> u32 {
+    return bins[k].active_at;
 }
 
 fn is_filtered(k: u32, pixel: vec2<u32>) -> bool {
-    return filtered[bins[k].filtered_at + tile_of(pixel, bins[k].size.x, rows_tile())] == 1u;
+    return filtered[HEAD + bins[k].filtered_at + tile_of(pixel, bins[k].size.x, rows_tile())] == 1u;
 }
 
 // The same for the column of such tiles that a tile's taps reach from tile `first` on.
@@ -50,42 +50,40 @@ fn both(weights: vec4<f32>, a: u32, b: u32) -> vec4<f32> {
     return sum;
 }
 
-@compute @workgroup_size(RESULT_TILE_X, RESULT_TILE_Y)
-fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
-                @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let place = place_of(workgroup, workgroups, result_tile());
-    if !place.some {
-        return;
+// The result of a pixel, once all terms are there.
+fn finish(k: u32, pixel: vec2<u32>, corner: Corner, own: vec4<f32>) {
+    var sum = own;
+    let at = bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x;
+    if work.group > 0u {
+        sum += unpacked(blurred[at]);
     }
-    let k = place.bin;
+    if work.last == 1u && frame.compositing != 2u {
+        let low = mix(edge_at(corner, 0u), edge_at(corner, 2u), corner.along).yzw;
+        let high = mix(edge_at(corner, 1u), edge_at(corner, 3u), corner.along).xyz;
+        sum.a = clamp(sum.a, 0.0, 1.0);
+        sum = vec4(min(max(sum.rgb, low * sum.a), high * sum.a), sum.a);
+    }
+    blurred[at] = packed(sum);
+}
+
+fn filter_columns(k: u32, number: u32, local: vec2<u32>, thread: u32) {
     let size = bins[k].size;
-    let corner_pixel = place.tile * result_tile();
-    let pixel = corner_pixel + local.xy;
+    let across = active_across(k);
+    let tile = vec2(number % across, number / across);
+    if work.last == 1u {
+        show(k, tile, thread);
+    }
+    let corner_pixel = tile * result_tile();
+    let pixel = corner_pixel + local;
     let reach = i32(bins[k].reach);
     let first = i32(corner_pixel.y) - reach;
     let length = i32(RESULT_TILE_Y) + 2 * reach;
     let threads = RESULT_TILE_X * RESULT_TILE_Y;
-    begin(thread);
     let first_tile = u32(max(first, 0)) / ROWS_TILE_Y;
-    for (var n = thread; (first_tile + n) * ROWS_TILE_Y < u32(min(first + length, i32(size.y))); n += threads) {
-        let filled = is_filtered(k, vec2(corner_pixel.x, (first_tile + n) * ROWS_TILE_Y));
-        if filled {
-            atomicStore(&some, 1u);
-        }
-        if n < NOTED {
-            noted[n] = filled;
-        }
+    for (var n = thread; n < NOTED && (first_tile + n) * ROWS_TILE_Y < u32(min(first + length, i32(size.y))); n += threads) {
+        noted[n] = is_filtered(k, vec2(corner_pixel.x, (first_tile + n) * ROWS_TILE_Y));
     }
-    let here = workgroupUniformLoad(&some);
-    if thread == 0u {
-        active_tiles[bins[k].active_at + tile_of(corner_pixel, size.x, result_tile())] = here;
-    }
-    if here == 0u {
-        return;
-    }
-    if work.last == 1u {
-        show(k, place.tile, thread);
-    }
+    workgroupBarrier();
     let inside = all(pixel < size);
     var corner: Corner;
     var taps: Taps;
@@ -104,7 +102,7 @@ fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgr
             for (var term = 0u; term < work.terms; term++) {
                 var value = vec2(0u);
                 if filled {
-                    value = rows[bins[k].rows_at + term * bins[k].rows_apart + y * size.x + x];
+                    value = rows[bins[k].rows_at + term * frame.rows_apart + y * size.x + x];
                 }
                 values[term * CHUNK * RESULT_TILE_X + n] = value;
             }
@@ -127,18 +125,19 @@ fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgr
         }
         workgroupBarrier();
     }
-    if !inside {
-        return;
+    if inside {
+        finish(k, pixel, corner, sum);
     }
-    let at = bins[k].pixels_at + pixel.y * size.x + pixel.x;
-    if work.group > 0u {
-        sum += unpacked(blurred[at]);
+}
+
+@compute @workgroup_size(RESULT_TILE_X, RESULT_TILE_Y)
+fn blur_columns(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+                @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    for (var n = workgroup.x;; n += workgroups.x) {
+        let place = place_of(n);
+        if !place.some {
+            break;
+        }
+        filter_columns(place.bin, place.tile, local.xy, thread);
     }
-    if work.last == 1u && frame.compositing != 2u {
-        let low = mix(edge_at(corner, 0u), edge_at(corner, 2u), corner.along).yzw;
-        let high = mix(edge_at(corner, 1u), edge_at(corner, 3u), corner.along).xyz;
-        sum.a = clamp(sum.a, 0.0, 1.0);
-        sum = vec4(min(max(sum.rgb, low * sum.a), high * sum.a), sum.a);
-    }
-    blurred[at] = packed(sum);
 }

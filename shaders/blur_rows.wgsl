@@ -10,7 +10,8 @@
 @group(0) @binding(6) var<storage, read> grid: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read> source: array<vec2<u32>>;
 @group(0) @binding(8) var<storage, read_write> rows: array<vec2<u32>>;
-@group(0) @binding(9) var<storage, read_write> filtered: array<u32>;
+@group(0) @binding(9) var<storage, read> todo: array<u32>;
+@group(0) @binding(10) var<storage, read_write> next: array<atomic<u32>>;
 
 // Columns that are held at a time; most filters need no more for a whole tile.
 const CHUNK = 128u;
@@ -20,8 +21,19 @@ var<workgroup> values: array<vec2<u32>, CHUNK * ROWS_TILE_Y>;
 const NOTED = 24u;
 var<workgroup> noted: array<bool, NOTED>;
 
-fn extent_of(k: u32) -> vec2<u32> {
-    return bins[k].size;
+fn list_at(k: u32) -> u32 {
+    return bins[k].filtered_at;
+}
+
+// Lists the tiles of the result that a tile of rows reaches.
+fn put_active(k: u32, corner: vec2<u32>, thread: u32) {
+    let first = vec2(corner.x, corner.y - min(corner.y, bins[k].reach)) / result_tile();
+    let end = min(corner + rows_tile() - 1u + vec2(0u, bins[k].reach), bins[k].size - 1u) / result_tile();
+    let count = end - first + 1u;
+    for (var n = thread; n < count.x * count.y; n += ROWS_TILE_X * ROWS_TILE_Y) {
+        let tile = first + vec2(n % count.x, n / count.x);
+        put(k, bins[k].active_at, tile.y * active_across(k) + tile.x);
+    }
 }
 
 fn is_covered(k: u32, pixel: vec2<u32>) -> bool {
@@ -51,40 +63,21 @@ fn plus(sums: Sums, weights: vec4<f32>, value: vec4<f32>) -> Sums {
                 sums.d + weights.w * value);
 }
 
-@compute @workgroup_size(ROWS_TILE_X, ROWS_TILE_Y)
-fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
-             @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let place = place_of(workgroup, workgroups, rows_tile());
-    if !place.some {
-        return;
-    }
-    let k = place.bin;
+fn filter_rows(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     let size = bins[k].size;
-    let corner_pixel = place.tile * rows_tile();
-    let pixel = corner_pixel + local.xy;
+    let across = filtered_across(k);
+    let corner_pixel = vec2(tile % across, tile / across) * rows_tile();
+    put_active(k, corner_pixel, thread);
+    let pixel = corner_pixel + local;
     let reach = i32(bins[k].reach);
     let first = i32(corner_pixel.x) - reach;
     let length = i32(ROWS_TILE_X) + 2 * reach;
     let threads = i32(ROWS_TILE_X * ROWS_TILE_Y);
-    // Where no cell within reach is covered, nothing comes of it.
-    begin(thread);
     let first_cell = u32(max(first, 0)) / CELL;
-    for (var n = thread; (first_cell + n) * CELL < u32(min(first + length, i32(size.x))); n += u32(threads)) {
-        let covered = is_covered(k, vec2((first_cell + n) * CELL, corner_pixel.y));
-        if covered {
-            atomicStore(&some, 1u);
-        }
-        if n < NOTED {
-            noted[n] = covered;
-        }
+    for (var n = thread; n < NOTED && (first_cell + n) * CELL < u32(min(first + length, i32(size.x))); n += u32(threads)) {
+        noted[n] = is_covered(k, vec2((first_cell + n) * CELL, corner_pixel.y));
     }
-    let here = workgroupUniformLoad(&some);
-    if thread == 0u {
-        filtered[bins[k].filtered_at + tile_of(corner_pixel, size.x, rows_tile())] = here;
-    }
-    if here == 0u {
-        return;
-    }
+    workgroupBarrier();
     let inside = all(pixel < size);
     var corner: Corner;
     var taps: Taps;
@@ -125,8 +118,20 @@ fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroup
     if inside {
         let at = bins[k].rows_at + pixel.y * size.x + pixel.x;
         rows[at] = packed(sums.a);
-        if work.terms > 1u { rows[at + bins[k].rows_apart] = packed(sums.b); }
-        if work.terms > 2u { rows[at + 2u * bins[k].rows_apart] = packed(sums.c); }
-        if work.terms > 3u { rows[at + 3u * bins[k].rows_apart] = packed(sums.d); }
+        if work.terms > 1u { rows[at + frame.rows_apart] = packed(sums.b); }
+        if work.terms > 2u { rows[at + 2u * frame.rows_apart] = packed(sums.c); }
+        if work.terms > 3u { rows[at + 3u * frame.rows_apart] = packed(sums.d); }
+    }
+}
+
+@compute @workgroup_size(ROWS_TILE_X, ROWS_TILE_Y)
+fn blur_rows(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+             @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    for (var n = workgroup.x;; n += workgroups.x) {
+        let place = place_of(n);
+        if !place.some {
+            break;
+        }
+        filter_rows(place.bin, place.tile, local.xy, thread);
     }
 }

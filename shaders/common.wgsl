@@ -44,7 +44,7 @@ struct Frame {
     mixed: u32,                 // pixels that show two surfaces
     even: u32,                  // 1: taps at -j and j are equal
     extent: f32,                // of the aperture: the outermost point, in radii
-    unused: u32,
+    rows_apart: u32,            // pixels filtered at once: from one term's rows to the next one's
 }
 
 // What a dispatch does: some bins, of one layer where it goes over the picture.
@@ -75,7 +75,7 @@ struct Bin {
     rows_at: u32,               // of its pixels among those filtered at once
     edges_at: u32,
     cells_at: u32,
-    rows_apart: u32,            // pixels filtered at once: from one term's rows to the next one's
+    binned_at: u32,             // of the flags of its tiles in bin
     reach: u32,                 // outermost tap of any pixel
     filtered_at: u32,           // of the flags of its tiles of rows
     active_at: u32,             // of the flags of its tiles of the result

@@ -12,7 +12,7 @@ var<workgroup> codes: array<u32, LINE>;
 
 // A pixel of a bin; nothing was written where nothing is.
 fn bin_at(k: u32, pixel: vec2<u32>) -> vec4<f32> {
-    if active_tiles[bins[k].active_at + tile_of(pixel, bins[k].size.x, result_tile())] == 0u {
+    if active_tiles[HEAD + bins[k].active_at + tile_of(pixel, bins[k].size.x, result_tile())] == 0u {
         return vec4(0.0);
     }
     return unpacked(blurred[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x]);

@@ -1,6 +1,6 @@
 // Pass fill, the inpainting of disocclusions: the scene as a layer sees it, where what lies in front of the layer has become
-// what lies behind that. Reads the scene, and pushes the pyramid down to it; writes the scene of the layer, and its ranges of
-// CoC.
+// what lies behind that. Reads the scene, and pushes the pyramid down to it; writes the scene of the layer, and lists the
+// tiles of its bins.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> frame: Frame;
@@ -9,8 +9,9 @@
 @group(0) @binding(4) var<storage, read> scene: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read> ranges: array<vec2<f32>>;
 @group(0) @binding(6) var<storage, read_write> behind: array<vec2<u32>>;
-@group(0) @binding(7) var<storage, read_write> ranges_behind: array<vec2<f32>>;
-@group(0) @binding(8) var<storage, read> nearest_px: array<f32>;
+@group(0) @binding(7) var<storage, read> nearest_px: array<f32>;
+@group(0) @binding(8) var<uniform> bins: array<Bin, MAX_BINS>;
+@group(0) @binding(9) var<storage, read_write> next: array<atomic<u32>>;
 
 // Pixels a side of a level's patch that reaches all that a tile needs of it, its neighbours included.
 const PATCH = 6u;
@@ -109,7 +110,5 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
     if is_hiding {
         range = range_of_tile(thread, SMALL_TILE * SMALL_TILE, range);
     }
-    if thread == 0u {
-        ranges_behind[index] = range;
-    }
+    put_binned(tile, range, thread);
 }

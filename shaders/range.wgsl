@@ -10,7 +10,7 @@ fn union_of(a: vec2<f32>, b: vec2<f32>) -> vec2<f32> {
     return vec2(min(a.x, b.x), max(a.y, b.y));
 }
 
-// In thread 0, the lowest and highest value of a tile, of which each of some threads has seen `own`. In two steps: atomics on
+// The lowest and highest value of a tile, of which each of some threads has seen `own`. In two steps: atomics on
 // one word would be done one thread at a time.
 fn range_of_tile(thread: u32, threads: u32, own: vec2<f32>) -> vec2<f32> {
     seen[thread] = own;
@@ -22,7 +22,8 @@ fn range_of_tile(thread: u32, threads: u32, own: vec2<f32>) -> vec2<f32> {
     workgroupBarrier();
     seen[thread] = range;
     workgroupBarrier();
-    for (var k = 1u; thread == 0u && k < TILE; k++) {
+    range = seen[0];
+    for (var k = 1u; k < TILE; k++) {
         range = union_of(range, seen[k]);
     }
     return range;

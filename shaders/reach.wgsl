@@ -48,7 +48,7 @@ fn around(k: u32, cell: vec2<u32>) -> Around {
             let index = 2u * (bins[k].cells_at + y * bins[k].cells.x + x);
             let a = grid[index];
             sums += a.xy * weight_y * nearness(k, max(x, cell.x) - min(x, cell.x));
-            if bins[k].has_lobes == 1u {
+            if bins[k].has_lobes == 1u && a.x > 0.0 {
                 let b = grid[index + 1u];
                 low = min(low, vec3(a.zw, b.x));
                 high = max(high, b.yzw);

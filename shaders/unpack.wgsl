@@ -1,14 +1,17 @@
 // Pass unpack: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC; mixed pixels to two surfaces.
 // Reads packed RGB bytes and metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile, which
-// shows no bins yet.
+// shows no bins yet; lists the tiles of the bins of the foremost layer.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> color: array<u32>;
-@group(0) @binding(2) var<storage, read> depth: array<f32>;
-@group(0) @binding(3) var<storage, read_write> scene: array<vec2<u32>>;
-@group(0) @binding(4) var<storage, read_write> ranges: array<vec2<f32>>;
-@group(0) @binding(5) var<storage, read_write> mixed: array<MixedPixel>;
-@group(0) @binding(6) var<storage, read_write> shown: array<u32>;
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
+@group(0) @binding(2) var<uniform> frame: Frame;
+@group(0) @binding(3) var<storage, read> color: array<u32>;
+@group(0) @binding(4) var<storage, read> depth: array<f32>;
+@group(0) @binding(5) var<storage, read_write> scene: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read_write> ranges: array<vec2<f32>>;
+@group(0) @binding(7) var<storage, read_write> mixed: array<MixedPixel>;
+@group(0) @binding(8) var<storage, read_write> shown: array<u32>;
+@group(0) @binding(9) var<storage, read_write> next: array<atomic<u32>>;
 
 const ACROSS = 4u;          // pixels of a row that a thread does: three whole words
 
@@ -119,6 +122,7 @@ fn unpack(@builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocat
         range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
     }
     range = range_of_tile(thread, TILE * TILE / ACROSS, range);
+    put_binned(tile.xy, range, thread);
     if thread == 0u {
         ranges[tile.y * tiles.x + tile.x] = range;
         shown[tile.y * tiles.x + tile.x] = 0u;

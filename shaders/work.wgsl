@@ -1,4 +1,4 @@
-// Shared by the passes that do several bins at once: which part of which bin a workgroup does. Such a pass has the
+// Shared by the passes that do all of several bins at once: which part of which bin a workgroup does. Such a pass has the
 // uniforms `work` and `bins`, and says in `extent_of` what of a bin is divided into tiles.
 
 struct Place {
@@ -17,15 +17,4 @@ fn place_of(workgroup: vec3<u32>, workgroups: vec3<u32>, tile: vec2<u32>) -> Pla
         left -= tiles.x * tiles.y;
     }
     return Place(0u, vec2(0u), false);
-}
-
-// Whether a workgroup has anything to do: threads that find something store 1.
-var<workgroup> some: atomic<u32>;
-
-// Before that: nothing is found yet.
-fn begin(thread: u32) {
-    if thread == 0u {
-        atomicStore(&some, 0u);
-    }
-    workgroupBarrier();
 }

@@ -1,7 +1,7 @@
 //! What lives on the device: allocated once per picture size.
 
 use super::layout::Capacity;
-use super::shaders::{Bin, Frame};
+use super::shaders::{Bin, Frame, LIST_HEAD};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::occlusion::MOST_LAYERS;
@@ -27,9 +27,8 @@ pub struct Buffers {
     pub mixed: wgpu::Buffer,
     /// Range of CoC of each tile of the picture.
     pub ranges: wgpu::Buffer,
-    /// The scene and its ranges as a layer sees them, behind others.
+    /// The scene as a layer sees it, behind others.
     pub behind: wgpu::Buffer,
-    pub ranges_behind: wgpu::Buffer,
     /// The pictures of all bins.
     pub source: wgpu::Buffer,
     /// Coarse grids of all bins.
@@ -39,9 +38,9 @@ pub struct Buffers {
     /// Results of the horizontal filters, of the bins that are filtered at once.
     pub rows: wgpu::Buffer,
     pub blurred: wgpu::Buffer,
-    /// Per tile of rows, whether anything is there.
+    /// Lists of what is there: tiles of the bins, of their rows, and of their results.
+    pub binned: wgpu::Buffer,
     pub filtered: wgpu::Buffer,
-    /// Per tile of blurred bins, whether anything is there.
     pub active: wgpu::Buffer,
     /// Per tile of the picture, the bins that it shows, a bit each.
     pub shown: wgpu::Buffer,
@@ -106,6 +105,8 @@ impl Buffers {
         };
         // In words of four bytes: a bin's pixel is four halves, a cell or an edge eight floats.
         let storage = |label: &str, words: usize| buffer(label, words * 4, Usage::STORAGE | Usage::COPY_SRC);
+        // A flag and a place for each tile.
+        let list = |label: &str, tiles: usize| storage(label, LIST_HEAD + 2 * tiles);
         let (width, height) = (plan.width, plan.height);
         let layered = plan.compositing == Compositing::Layers;
         let pyramid_pixels = if layered { pyramid_pixels(width, height) } else { 1 };
@@ -122,14 +123,14 @@ impl Buffers {
             mixed: storage("mixed", mixed * size_of::<MixedPixel>() / 4),
             ranges: storage("ranges", tiles * 2),
             behind: storage("behind", behind * 2),
-            ranges_behind: storage("ranges behind", tiles * 2),
             source: storage("source", capacity.pixels * 2),
             grid: storage("grid", capacity.cells * 8),
             edges: storage("edges", capacity.edges * 8),
             rows: storage("rows", capacity.rows * 2 * plan.ladder.most_terms().min(4)),
             blurred: storage("blurred", capacity.pixels * 2),
-            filtered: storage("filtered", capacity.filtered),
-            active: storage("active", capacity.active),
+            binned: list("binned", capacity.binned),
+            filtered: list("filtered", capacity.filtered),
+            active: list("active", capacity.active),
             shown: storage("shown", tiles),
             result: storage("result", picture_bytes(plan) as usize / 4),
             nearest_px: storage("nearest", if layered { width.div_ceil(2) * height.div_ceil(2) } else { 1 }),

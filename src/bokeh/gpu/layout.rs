@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::shaders::{Bin, RESULT_TILE, ROWS_TILE};
+use super::shaders::{Bin, RESULT_TILE, ROWS_TILE, SHARED_FROM, TILE};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{CELL, MAX_BINS, Plan, SEGMENT};
 
@@ -31,6 +31,8 @@ pub struct Capacity {
     pub cells: usize,
     /// Edges of all bins.
     pub edges: usize,
+    /// Tiles of all bins as they are made.
+    pub binned: usize,
     /// Tiles of rows of all bins.
     pub filtered: usize,
     /// Tiles of the results of all bins.
@@ -62,8 +64,10 @@ impl Capacity {
             capacity.rows = capacity.rows.max(width * height);
             capacity.cells += cells;
             capacity.edges += edges;
-            capacity.filtered += tiles([width, height], ROWS_TILE);
-            capacity.active += tiles([width, height], RESULT_TILE);
+            let size = [width as u32, height as u32];
+            capacity.binned += binned_tiles(size, scale as u32);
+            capacity.filtered += tiles(size, ROWS_TILE);
+            capacity.active += tiles(size, RESULT_TILE);
         }
         capacity
     }
@@ -75,6 +79,7 @@ impl Capacity {
             rows: self.rows.max(other.rows),
             cells: self.cells.max(other.cells),
             edges: self.edges.max(other.edges),
+            binned: self.binned.max(other.binned),
             filtered: self.filtered.max(other.filtered),
             active: self.active.max(other.active),
         }
@@ -82,8 +87,14 @@ impl Capacity {
 }
 
 /// How many tiles cover a bin.
-pub fn tiles(size: [usize; 2], tile: [usize; 2]) -> usize {
-    size[0].div_ceil(tile[0]) * size[1].div_ceil(tile[1])
+pub fn tiles(size: [u32; 2], tile: [usize; 2]) -> usize {
+    (size[0] as usize).div_ceil(tile[0]) * (size[1] as usize).div_ceil(tile[1])
+}
+
+/// How many tiles pass `bin` makes a bin from.
+pub fn binned_tiles(size: [u32; 2], scale: u32) -> usize {
+    let sharing = if scale >= SHARED_FROM { 2 } else { 1 };
+    tiles(size.map(|side| side * sharing), [TILE as usize; 2])
 }
 
 /// Cells across and down a bin.
@@ -122,8 +133,9 @@ impl Layout {
                 (first, batch_pixels) = (k, 0);
             }
             let share = plan.share(k);
+            let size = [bin.width as u32, bin.height as u32];
             self.bins.push(Bin {
-                size: [bin.width as u32, bin.height as u32],
+                size,
                 cells: [cells_across as u32, down as u32],
                 scale: bin.scale as u32,
                 edges: edges as u32,
@@ -138,7 +150,7 @@ impl Layout {
                 rows_at: batch_pixels as u32,
                 edges_at: used.edges as u32,
                 cells_at: used.cells as u32,
-                rows_apart: capacity.rows as u32,
+                binned_at: used.binned as u32,
                 reach: match plan.compositing {
                     // Each pixel has its own radius, which no bin limits.
                     Compositing::Gather => plan.bank.reach as u32,
@@ -151,8 +163,9 @@ impl Layout {
             used.pixels += pixels;
             used.cells += cells_across * down;
             used.edges += edges * down;
-            used.filtered += tiles([bin.width, bin.height], ROWS_TILE);
-            used.active += tiles([bin.width, bin.height], RESULT_TILE);
+            used.binned += binned_tiles(size, bin.scale as u32);
+            used.filtered += tiles(size, ROWS_TILE);
+            used.active += tiles(size, RESULT_TILE);
             batch_pixels += pixels;
         }
         if !plan.bins.is_empty() {

@@ -140,6 +140,7 @@ impl GpuBokeh {
             ramp,
             even: u32::from(plan.bank.even),
             extent: plan.bank.extent as f32,
+            rows_apart: self.capacity.rows as u32,
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use super::buffers::{Buffers, Filters, WORK_STRIDE, work_count};
-use super::layout::{Layout, tiles};
+use super::layout::{self, Layout, tiles};
 use super::readback::MAX_QUERIES;
-use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, SHARED_FROM, TILE, Work};
+use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, TAKING_TURNS, TILE, Work};
 use crate::bokeh::occlusion::MOST_LAYERS;
-use crate::bokeh::plan::{CELL, MAX_BINS, Plan};
+use crate::bokeh::plan::{MAX_BINS, Plan};
 use crate::compute::device::{Device, Shader, workgroups_2d};
 
 /// Which uniform `Work` a dispatch has: that of its layer, of `reach`, or of a batch of the filters.
@@ -37,6 +37,7 @@ struct Layer {
 
 /// Everything that a frame runs.
 pub struct Passes {
+    clear: Fixed,
     unpack: Fixed,
     /// What may hide others.
     hide: Fixed,
@@ -83,25 +84,34 @@ impl<'a> Maker<'a> {
         Step { name, pipeline, bindings }
     }
 
-    /// Uniform `Work` number `index`.
-    fn work(&self, index: usize) -> wgpu::BufferBinding<'a> {
-        wgpu::BufferBinding {
-            buffer: &self.buffers.work,
-            offset: index as u64 * WORK_STRIDE,
-            size: wgpu::BufferSize::new(size_of::<Work>() as u64),
-        }
-    }
-
     /// A pass over several bins at once, which are in uniform `Work` number `work`; binds that and the bins first.
     fn over_bins(&mut self, name: &'static str, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Step {
-        let uniforms = [self.work(work), self.buffers.bins.as_entire_buffer_binding()];
+        let uniforms = [work_binding(self.buffers, work), self.buffers.bins.as_entire_buffer_binding()];
         self.step(name, shader, &uniforms, buffers)
     }
 }
 
-/// What `unpack` has: the depth among it, whose buffer may become another.
-fn unpack_buffers<'a>(b: &'a Buffers, depth: &'a wgpu::Buffer) -> [&'a wgpu::Buffer; 7] {
-    [&b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed, &b.shown]
+/// Uniform `Work` number `index`.
+fn work_binding(b: &Buffers, index: usize) -> wgpu::BufferBinding<'_> {
+    let size = wgpu::BufferSize::new(size_of::<Work>() as u64);
+    wgpu::BufferBinding { buffer: &b.work, offset: index as u64 * WORK_STRIDE, size }
+}
+
+/// The bind group of `unpack`: the depth is in it, whose buffer may become another.
+fn unpack_bindings(
+    device: &Device,
+    pipeline: &wgpu::ComputePipeline,
+    b: &Buffers,
+    depth: &wgpu::Buffer,
+) -> wgpu::BindGroup {
+    let buffers = [&b.bins, &b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned];
+    let buffers = buffers.map(wgpu::Buffer::as_entire_buffer_binding);
+    device.bindings(pipeline, std::iter::once(work_binding(b, 0)).chain(buffers))
+}
+
+/// Workgroups for so many pieces of work, which they take turns with.
+fn turns(pieces: usize) -> u32 {
+    pieces.clamp(1, TAKING_TURNS) as u32
 }
 
 /// A pass over `size` invocations in workgroups of `tile` x `tile`.
@@ -122,9 +132,10 @@ impl Passes {
             let fill = (index > 0).then(|| {
                 let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known];
                 let coarse = [&b.frame, &b.pyramid, &b.known];
-                let (known, behind) = ([&b.pyramid, &b.known], [&b.behind, &b.ranges_behind]);
-                let filled = [&b.frame, known[0], known[1], &b.scene, &b.ranges, behind[0], behind[1], &b.nearest_px];
-                let work = [maker.work(index)];
+                let known = [&b.pyramid, &b.known];
+                let (seen, nearest) = ([&b.scene, &b.ranges, &b.behind], &b.nearest_px);
+                let filled = [&b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, &b.binned];
+                let work = [work_binding(b, index)];
                 [
                     // A thread takes four pixels of half the size, or of the picture.
                     over(maker.step("fill", shaders::PULL, &work, &pulled), half, 2 * TILE),
@@ -132,14 +143,14 @@ impl Passes {
                     over(maker.step("fill", shaders::FILL, &work, &filled), picture, TILE),
                 ]
             });
-            let (scene, ranges) = if index > 0 { (&b.behind, &b.ranges_behind) } else { (&b.scene, &b.ranges) };
-            let bin = [&b.frame, scene, &b.source, &b.grid, ranges, &b.mixed];
+            let scene = if index > 0 { &b.behind } else { &b.scene };
+            let bin = [&b.frame, scene, &b.source, &b.grid, &b.mixed, &b.binned, &b.filtered];
             Layer { fill, bin: maker.over_bins("bin", shaders::BIN, index, &bin) }
         });
         let layers = layers.collect();
         let filters = |maker: &mut Maker, bank: &Filters, k: usize| {
             let [horizontal, vertical] = &bank.taps;
-            let rows = [&b.frame, horizontal, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered];
+            let rows = [&b.frame, horizontal, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered, &b.active];
             let columns =
                 [&b.frame, vertical, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active, &b.shown];
             [
@@ -163,9 +174,16 @@ impl Passes {
             step: maker.step("composite", shaders::COMPOSITE, &[], &composite),
             workgroups: workgroups_2d((plan.width * plan.height).div_ceil(LINE as usize) as u32),
         };
-        let unpack = unpack_buffers(b, depth);
+        let clear = [&b.binned, &b.filtered, &b.active, &b.grid];
+        let pipeline = maker.pipeline(shaders::UNPACK);
+        let bindings = unpack_bindings(device, &pipeline, b, depth);
+        let unpack = Step { name: "unpack", pipeline, bindings };
         Self {
-            unpack: over(maker.step("unpack", shaders::UNPACK, &[], &unpack), picture, TILE),
+            clear: Fixed {
+                step: maker.step("clear", shaders::CLEAR, &[], &clear),
+                workgroups: [turns(b.grid.size() as usize / (16 * LINE as usize)), 1],
+            },
+            unpack: over(unpack, picture, TILE),
             hide,
             layers,
             gather,
@@ -178,8 +196,7 @@ impl Passes {
 
     /// Binds another depth buffer.
     pub fn set_depth(&mut self, device: &Device, b: &Buffers, depth: &wgpu::Buffer) {
-        let buffers = unpack_buffers(b, depth).map(wgpu::Buffer::as_entire_buffer_binding);
-        self.unpack.step.bindings = device.bindings(&self.unpack.step.pipeline, buffers.into_iter());
+        self.unpack.step.bindings = unpack_bindings(device, &self.unpack.step.pipeline, b, depth);
     }
 
     /// Uploads which bins each pass of this frame does, with the terms of the plan's bank.
@@ -238,14 +255,9 @@ impl Passes {
                 names.push(step.name);
             }
         };
-        // Workgroups for all tiles of some bins.
-        let workgroups = |bins: &[Bin], tile: [usize; 2], extent: fn(&Bin) -> [u32; 2]| {
-            workgroups_2d(bins.iter().map(|bin| tiles(extent(bin).map(|size| size as usize), tile) as u32).sum())
-        };
-        let threads = |bin: &Bin| {
-            let side = CELL as u32 * if bin.scale >= SHARED_FROM { 2 } else { 1 };
-            bin.cells.map(|cells| cells * side)
-        };
+        // Workgroups that take turns with the tiles of some bins.
+        let workgroups = |bins: &[Bin], of: &dyn Fn(&Bin) -> usize| [turns(bins.iter().map(of).sum()), 1];
+        run(&self.clear.step, self.clear.workgroups);
         run(&self.unpack.step, self.unpack.workgroups);
         if let Some(gather) = &self.gather {
             run(&gather.step, gather.workgroups);
@@ -255,15 +267,16 @@ impl Passes {
                     run(&self.hide.step, self.hide.workgroups);
                 }
                 layer.fill.iter().flatten().for_each(|fixed| run(&fixed.step, fixed.workgroups));
-                run(&layer.bin, workgroups(&layout.bins[bins], [TILE as usize; 2], threads));
+                run(&layer.bin, workgroups(&layout.bins[bins], &|bin| layout::binned_tiles(bin.size, bin.scale)));
             }
-            run(&self.reach, workgroups(&layout.bins, EDGES_TILE, |bin| [2 * bin.edges, bin.cells[1]]));
+            let edges = layout.bins.iter().map(|bin| tiles([2 * bin.edges, bin.cells[1]], EDGES_TILE) as u32);
+            run(&self.reach, workgroups_2d(edges.sum()));
             let groups = plan.bank.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];
                 for [rows, columns] in steps {
-                    run(rows, workgroups(bins, ROWS_TILE, |bin| bin.size));
-                    run(columns, workgroups(bins, RESULT_TILE, |bin| bin.size));
+                    run(rows, workgroups(bins, &|bin| tiles(bin.size, ROWS_TILE)));
+                    run(columns, workgroups(bins, &|bin| tiles(bin.size, RESULT_TILE)));
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! What the passes leave behind, for comparing the executors pass by pass.
 
 use super::GpuBokeh;
-use super::shaders::RESULT_TILE;
+use super::shaders::{LIST_HEAD, RESULT_TILE};
 use crate::bokeh::plan::CELL;
 use crate::bokeh::{BokehError, Probe};
 use crate::compute::GpuError;
@@ -29,8 +29,11 @@ impl GpuBokeh {
             Probe::Blur(k) => {
                 let bin = &self.layout.bins[k];
                 let across = bin.size[0].div_ceil(RESULT_TILE[0] as u32);
-                let tiles =
-                    self.read(&b.active, bin.active_at, across * bin.size[1].div_ceil(RESULT_TILE[1] as u32))?;
+                let tiles = self.read(
+                    &b.active,
+                    LIST_HEAD as u32 + bin.active_at,
+                    across * bin.size[1].div_ceil(RESULT_TILE[1] as u32),
+                )?;
                 let active = |x: usize, y: usize| tiles[y / RESULT_TILE[1] * across as usize + x / RESULT_TILE[0]] != 0;
                 self.pixels(k, &b.blurred, active)
             }

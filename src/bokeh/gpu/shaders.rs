@@ -20,14 +20,16 @@ macro_rules! shader {
     };
 }
 
+/// Nothing is listed.
+pub const CLEAR: Shader = shader!("clear", "list");
 /// 8-bit sRGB and depth to linear light and CoC.
-pub const UNPACK: Shader = shader!("unpack", "range", "mixed");
+pub const UNPACK: Shader = shader!("unpack", "range", "mixed", "list", "tiles", "next", "meet");
 /// A bin's share of each pixel, and the coarse grid over it.
-pub const BIN: Shader = shader!("bin", "work", "mixed", "tent");
+pub const BIN: Shader = shader!("bin", "mixed", "tent", "list", "tiles", "todo", "next");
 /// Local radius and range of colours.
 pub const REACH: Shader = shader!("reach", "work");
-pub const BLUR_ROWS: Shader = shader!("blur_rows", "work", "filter");
-pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "work", "filter", "show");
+pub const BLUR_ROWS: Shader = shader!("blur_rows", "filter", "list", "tiles", "todo", "next");
+pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "filter", "show", "list", "tiles", "todo");
 /// The exact two-dimensional gather.
 pub const GATHER: Shader = shader!("gather");
 /// The nearest surface.
@@ -37,11 +39,11 @@ pub const PULL: Shader = shader!("pull", "pyramid", "base");
 /// The largest areas, and back.
 pub const COARSE: Shader = shader!("coarse", "pyramid");
 /// Back to the picture.
-pub const FILL: Shader = shader!("fill", "pyramid", "base", "range");
-pub const COMPOSITE: Shader = shader!("composite");
+pub const FILL: Shader = shader!("fill", "pyramid", "base", "range", "list", "tiles", "next", "meet");
+pub const COMPOSITE: Shader = shader!("composite", "list");
 
-pub const ALL: [Shader; 11] =
-    [UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, PULL, COARSE, FILL, COMPOSITE];
+pub const ALL: [Shader; 12] =
+    [CLEAR, UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, PULL, COARSE, FILL, COMPOSITE];
 
 /// Invocations of a workgroup in x and in y, for pictures and bins, and for what is smaller.
 pub const TILE: u32 = 16;
@@ -56,6 +58,10 @@ pub const EDGES_TILE: [usize; 2] = [TILE as usize, SMALL_TILE as usize];
 pub const ROWS_TILE: [usize; 2] = [64, 4];
 pub const RESULT_TILE: [usize; 2] = [8, 32];
 
+/// So many workgroups, at most, take turns with the tiles of a list: more than any device runs at once.
+pub const TAKING_TURNS: usize = 4096;
+/// Words of a list before its flags.
+pub const LIST_HEAD: usize = 16;
 /// The scale of a bin from which on a pixel of it has so many taps that four threads share them, two each way.
 pub const SHARED_FROM: u32 = 4;
 
@@ -103,7 +109,7 @@ pub struct Frame {
     pub mixed: u32,
     pub even: u32,
     pub extent: f32,
-    pub unused: u32,
+    pub rows_apart: u32,
 }
 
 /// `Bin` of `common.wgsl`.
@@ -126,7 +132,7 @@ pub struct Bin {
     pub rows_at: u32,
     pub edges_at: u32,
     pub cells_at: u32,
-    pub rows_apart: u32,
+    pub binned_at: u32,
     pub reach: u32,
     pub filtered_at: u32,
     pub active_at: u32,

@@ -1,0 +1,23 @@
+// Shared by the passes that know the range of CoC of a tile of the picture: they list the tiles of those bins of `work` that
+// are made of it, in `next`. Four threads a bin: a tile of the picture has a share in as many of a bin's, at most.
+
+fn put_binned(tile: vec2<u32>, range: vec2<f32>, thread: u32) {
+    let k = work.first + thread / 4u;
+    if k >= work.first + work.count {
+        return;
+    }
+    let meets = step_at(bins[k].front, range.y) > 0.0 && step_at(bins[k].behind, range.x) < 1.0;
+    if !meets && bins[k].whole == 0u {
+        return;
+    }
+    // Pixels of the bin whose taps reach the tile: see tent.wgsl.
+    let scale = bins[k].scale;
+    let corner = tile * TILE / scale;
+    let before = select(vec2(0u), min(corner, vec2(1u)), scale > 1u);
+    let end = (tile * TILE + TILE - 1u + scale / 2u) / scale;
+    let side = TILE / sharing(k);
+    let at = (corner - before) / side + vec2(thread % 2u, thread / 2u % 2u);
+    if all(at <= min(end, bins[k].size - 1u) / side) {
+        put(k, bins[k].binned_at, at.y * binned_across(k) + at.x);
+    }
+}
