@@ -7,11 +7,13 @@
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> scene: array<vec2<u32>>;
-@group(0) @binding(4) var<storage, read_write> source: array<vec2<u32>>;
-@group(0) @binding(5) var<storage, read_write> grid: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> mixed: array<MixedPixel>;
-@group(0) @binding(7) var<storage, read> todo: array<u32>;
-@group(0) @binding(8) var<storage, read_write> next: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read> behind: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read> ranges: array<vec2<f32>>;
+@group(0) @binding(6) var<storage, read_write> source: array<vec2<u32>>;
+@group(0) @binding(7) var<storage, read_write> grid: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read> mixed: array<MixedPixel>;
+@group(0) @binding(9) var<storage, read> todo: array<u32>;
+@group(0) @binding(10) var<storage, read_write> next: array<atomic<u32>>;
 
 const HUGE: f32 = 3.0e38;
 
@@ -25,6 +27,8 @@ struct Cell {
 var<workgroup> pixels: array<Pixel, TILE * TILE>;
 // The rows of the tile's cells.
 var<workgroup> rows: array<Cell, TILE * TILE / CELL>;
+// Whether any pixel has a share: the tile may meet the bin in its range of CoC alone.
+var<workgroup> some: atomic<u32>;
 
 fn list_at(k: u32) -> u32 {
     return bins[k].binned_at;
@@ -52,7 +56,10 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     let side = TILE / step;
     let across = binned_across(k);
     let corner = vec2(tile % across, tile / across) * side;
-    put_filtered(k, corner, side, thread);
+    if thread == 0u {
+        atomicStore(&some, 0u);
+    }
+    workgroupBarrier();
     let cells = side / CELL;
     let cell = corner / CELL + vec2(thread % cells, thread / cells);
     let nothing = Cell(vec2(0.0), vec3(HUGE), vec3(-HUGE));
@@ -64,19 +71,28 @@ fn bin_tile(k: u32, tile: u32, local: vec2<u32>, thread: u32) {
     if step > 1u {
         pixels[thread] = own;
         workgroupBarrier();
-        let first = (thread / side * TILE + thread % side) * step % (TILE * TILE);
-        own = plus(plus(pixels[first], pixels[first + 1u]), plus(pixels[first + TILE], pixels[first + TILE + 1u]));
+        if thread < side * side {
+            let first = (thread / side * TILE + thread % side) * step;
+            own = plus(plus(pixels[first], pixels[first + 1u]), plus(pixels[first + TILE], pixels[first + TILE + 1u]));
+        }
         workgroupBarrier();
     }
     let pixel = corner + vec2(thread % side, thread / side);
     if thread < side * side {
         let value = packed(own.value);
         pixels[thread] = Pixel(unpacked(value), own.coc);
+        if own.value.a > 0.0 {
+            atomicStore(&some, 1u);
+        }
         if all(pixel < bins[k].size) {
             source[bins[k].pixels_at + pixel.y * bins[k].size.x + pixel.x] = value;
         }
     }
-    workgroupBarrier();
+    // The cells of a tile that holds nothing stay as they were cleared.
+    if workgroupUniformLoad(&some) == 0u {
+        return;
+    }
+    put_filtered(k, corner, side, thread);
     if thread < cells * cells * CELL {
         // A row of a cell. Neighbouring threads begin with other pixels, as memory has banks.
         let first = (thread / (cells * CELL) * CELL + thread % CELL) * side + thread / CELL % cells * CELL;

@@ -1,6 +1,6 @@
 // Pass fill, the inpainting of disocclusions: the scene as a layer sees it, where what lies in front of the layer has become
-// what lies behind that. Reads the scene, and pushes the pyramid down to it; writes the scene of the layer, and lists the
-// tiles of its bins.
+// what lies behind that. Reads the scene, and pushes the pyramid down to it; writes the scene of the layer in those tiles
+// where something is hidden, and lists the tiles of its bins.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> frame: Frame;
@@ -70,32 +70,33 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
         @builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
     let tile = workgroup.xy;
     let index = tile.y * workgroups.x + tile.x;
-    let is_hiding = step_at(work.unhidden, ranges[index].x) < 1.0;
-    var hidden = Known(vec4(0.0), 0.0);
-    if is_hiding {
-        var coarsest = 0u;
-        for (var size = finest(); coarsest < BY_TILES && !is_coarsest(size); size = (size + 1u) / 2u) {
-            coarsest++;
-        }
-        for (var number = coarsest; number > 0u; number--) {
-            if thread < PATCH * PATCH {
-                let level = level_of(number);
-                let pixel = min(corner_of(tile, number) + vec2(thread % PATCH, thread / PATCH), level.size - 1u);
-                let index = index_of(level, pixel);
-                var own = Known(pyramid[index], known[index]);
-                if number < coarsest {
-                    own = completed(number, own, pixel, tile);
-                }
-                patches[number % 2u * PATCH * PATCH + thread] = own;
-            }
-            workgroupBarrier();
-        }
-        let half = min(id.xy, finest() - 1u);
-        hidden = base(half);
-        if coarsest > 0u {
-            hidden = completed(0u, hidden, half, tile);
-        }
+    if step_at(work.unhidden, ranges[index].x) == 1.0 {
+        put_binned(tile, ranges[index], thread);
+        return;
     }
+    var coarsest = 0u;
+    for (var size = finest(); coarsest < BY_TILES && !is_coarsest(size); size = (size + 1u) / 2u) {
+        coarsest++;
+    }
+    for (var number = coarsest; number > 0u; number--) {
+        if thread < PATCH * PATCH {
+            let level = level_of(number);
+            let pixel = min(corner_of(tile, number) + vec2(thread % PATCH, thread / PATCH), level.size - 1u);
+            let at = index_of(level, pixel);
+            var own = Known(pyramid[at], known[at]);
+            if number < coarsest {
+                own = completed(number, own, pixel, tile);
+            }
+            patches[number % 2u * PATCH * PATCH + thread] = own;
+        }
+        workgroupBarrier();
+    }
+    let half = min(id.xy, finest() - 1u);
+    var hidden = base(half);
+    if coarsest > 0u {
+        hidden = completed(0u, hidden, half, tile);
+    }
+    // What is there counts, too: the nearer surface of a mixed pixel stays where it is.
     var range = ranges[index];
     for (var sub = 0u; sub < 4u; sub++) {
         let at = 2u * id.xy + vec2(sub % 2u, sub / 2u);
@@ -103,12 +104,8 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
             let pixel = at.y * frame.size.x + at.x;
             let value = filled(scene[pixel], hidden);
             behind[pixel] = value;
-            // What was there counts, too: the nearer surface of a mixed pixel stays where it is.
             range = union_of(range, vec2(scene_unpacked(value, frame.most_px).w));
         }
     }
-    if is_hiding {
-        range = range_of_tile(thread, SMALL_TILE * SMALL_TILE, range);
-    }
-    put_binned(tile, range, thread);
+    put_binned(tile, range_of_tile(thread, SMALL_TILE * SMALL_TILE, range), thread);
 }

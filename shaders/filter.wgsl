@@ -52,7 +52,8 @@ fn taps_at(k: u32, pixel: vec2<u32>, corner: Corner) -> Taps {
     let right = node_at(radii.y, frame.steps_per_px, frame.nodes);
     let origin = (vec2(left, right) * (2u * frame.reach + 1u) + frame.reach) * frame.groups + work.group;
     let step = select(i32(frame.groups), -i32(frame.groups), turned);
-    return Taps(i32(origin.x), i32(origin.y), step, reach_of(max(left, right)));
+    // No tap of a bin lies farther out, however the device rounds.
+    return Taps(i32(origin.x), i32(origin.y), step, min(reach_of(max(left, right)), i32(bins[k].reach)));
 }
 
 // Tap `j`, four terms.

@@ -1,4 +1,5 @@
-// Shared by what brings the scene to the scale of a bin. Such a pass has `work`, `bins`, `frame`, `scene` and `mixed`.
+// Shared by what brings the scene to the scale of a bin. Such a pass has `work`, `bins`, `frame`,
+// `scene`, `behind`, `ranges` and `mixed`.
 
 // A value, and coverage times |CoC|.
 struct Pixel {
@@ -16,9 +17,19 @@ fn plus(a: Pixel, b: Pixel) -> Pixel {
     return Pixel(a.value + b.value, a.coc + b.coc);
 }
 
+// A pixel of the scene as the layer sees it. Only tiles that hide something from it were filled.
+fn seen(pixel: vec2<u32>, at: u32) -> vec2<u32> {
+    let nearest_px = ranges[tile_of(pixel, frame.size.x, vec2(TILE))].x;
+    if step_at(work.unhidden, nearest_px) < 1.0 {
+        return behind[at];
+    }
+    return scene[at];
+}
+
 // A bin's share of a pixel of the scene.
-fn taken_at(k: u32, at: u32, weight: f32) -> Pixel {
-    let value = scene[at];
+fn taken_at(k: u32, pixel: vec2<u32>, weight: f32) -> Pixel {
+    let at = pixel.y * frame.size.x + pixel.x;
+    let value = seen(pixel, at);
     let surface = scene_unpacked(value, frame.most_px);
     if !is_mixed(value) {
         return taken(k, surface, weight);
@@ -35,7 +46,7 @@ fn taken_at(k: u32, at: u32, weight: f32) -> Pixel {
 fn averaged(k: u32, pixel: vec2<u32>, first: vec2<u32>, step: u32) -> Pixel {
     let scale = bins[k].scale;
     if scale == 1u {
-        return taken_at(k, pixel.y * frame.size.x + pixel.x, 1.0);
+        return taken_at(k, pixel, 1.0);
     }
     // A tent of twice the scale, so that reducing a picture keeps its centroid.
     let inverse = 1.0 / f32(scale);
@@ -46,7 +57,7 @@ fn averaged(k: u32, pixel: vec2<u32>, first: vec2<u32>, step: u32) -> Pixel {
         for (var i = first.x; i < 2u * scale; i += step) {
             let x = u32(clamp(i32(pixel.x * scale + i) - i32(scale / 2u), 0, i32(frame.size.x) - 1));
             let weight_x = (1.0 - abs((f32(i) + 0.5) * inverse - 1.0)) * inverse;
-            sum = plus(sum, taken_at(k, y * frame.size.x + x, weight_x * weight_y));
+            sum = plus(sum, taken_at(k, vec2(x, y), weight_x * weight_y));
         }
     }
     return sum;

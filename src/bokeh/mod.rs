@@ -248,8 +248,8 @@ pub enum Probe {
 /// `adapter` is part of a GPU adapter's name; `threads` is for the CPU executor, all cores when `None`.
 ///
 /// # Errors
-/// The blur is too wide ([`Settings::check`]); a GPU was asked for and there is none that fits, or it failed. A GPU
-/// that fails later is no error: the CPU takes over.
+/// The blur is too wide ([`Settings::check`]); a GPU was asked for and there is none that fits, or it failed, or blurs
+/// otherwise than the CPU. A GPU that fails later is no error: the CPU takes over.
 pub fn create(
     settings: &Settings,
     size: (u32, u32),
@@ -261,8 +261,9 @@ pub fn create(
     let plan = plan::Plan::new(settings, size.0, size.1);
     #[cfg(feature = "gpu")]
     if backend != Backend::Cpu {
-        match gpu::GpuBokeh::new(&plan, backend == Backend::Auto, adapter) {
-            Ok(gpu) => return Ok(with_fallback(gpu, plan, threads)),
+        let open = || Ok(Arc::new(Device::open(backend == Backend::Auto, adapter)?));
+        match open().and_then(|device| gpu_with_fallback(&plan, device, threads)) {
+            Ok(bokeh) => return Ok(bokeh),
             Err(error) if backend == Backend::Gpu || adapter.is_some() => return Err(error),
             Err(error) => tracing::info!("blurring on the CPU: {error}"),
         }
@@ -277,7 +278,8 @@ pub fn create(
 /// The executor for pictures of `size` (width, height) on a device that is open already; `threads` as for [`create`].
 ///
 /// # Errors
-/// The blur is too wide ([`Settings::check`]), the device is too small for such pictures, or it failed.
+/// The blur is too wide ([`Settings::check`]), the device is too small for such pictures, failed, or blurs otherwise than
+/// the CPU.
 #[cfg(feature = "gpu")]
 pub fn create_on(
     settings: &Settings,
@@ -287,15 +289,22 @@ pub fn create_on(
 ) -> Result<Box<dyn Bokeh>, BokehError> {
     settings.check(size)?;
     let plan = plan::Plan::new(settings, size.0, size.1);
-    let gpu = gpu::GpuBokeh::on(&plan, device)?;
-    Ok(with_fallback(gpu, plan, threads))
+    gpu_with_fallback(&plan, device, threads)
 }
 
-/// The GPU executor with the CPU to take over: its buffers are allocated only when the GPU fails.
+/// The executor on a GPU that blurs as the CPU does, with the CPU to take over: its buffers are allocated only when the
+/// GPU fails.
 #[cfg(feature = "gpu")]
-fn with_fallback(gpu: gpu::GpuBokeh, plan: plan::Plan, threads: Option<usize>) -> Box<dyn Bokeh> {
+fn gpu_with_fallback(
+    plan: &plan::Plan,
+    device: Arc<Device>,
+    threads: Option<usize>,
+) -> Result<Box<dyn Bokeh>, BokehError> {
+    gpu::try_out(&device)?;
+    let gpu = gpu::GpuBokeh::on(plan, device)?;
+    let plan = plan.clone();
     let cpu = move || Box::new(cpu::CpuBokeh::new(plan, threads)) as Box<dyn Bokeh>;
-    Box::new(fallback::Fallback::new(Box::new(gpu), Box::new(cpu)))
+    Ok(Box::new(fallback::Fallback::new(Box::new(gpu), Box::new(cpu))))
 }
 
 /// An executor of the plan.

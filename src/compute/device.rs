@@ -1,5 +1,6 @@
 //! Which adapter, and the device on it.
 
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -41,6 +42,10 @@ pub struct Device {
     pub name: String,
     /// Whether passes can be timed.
     pub timestamps: bool,
+    /// What the trial of this device found wrong, once that is over.
+    pub trial: OnceLock<Option<String>>,
+    /// Those made so far, by the names of their shaders and the bits of their constants.
+    pipelines: Mutex<HashMap<(&'static str, Vec<u64>), wgpu::ComputePipeline>>,
     patience: Duration,
     /// The first thing that went wrong.
     fault: Arc<Mutex<Option<String>>>,
@@ -96,7 +101,8 @@ impl Device {
         // Dropping the device calls this, too; then nobody is left to read the fault.
         device.set_device_lost_callback(move |_, message| on_loss(format!("device lost: {message}")));
         let patience = if infos[best].device_type == wgpu::DeviceType::Cpu { PATIENCE_WITH_SOFTWARE } else { PATIENCE };
-        Ok(Self { instance, adapter, device, queue, name, timestamps, patience, fault })
+        let (trial, pipelines) = (OnceLock::new(), Mutex::default());
+        Ok(Self { instance, adapter, device, queue, name, timestamps, trial, pipelines, patience, fault })
     }
 
     /// The same device, which may take so long before it counts as hung.
@@ -105,17 +111,22 @@ impl Device {
         Self { patience, ..self }
     }
 
-    /// The pipeline of a shader with its `override` constants; its bind group layout follows from the source. Workgroup
-    /// memory is not zero when a shader begins.
-    pub fn pipeline(&self, Shader { name, source }: Shader, constants: &[(&str, f64)]) -> wgpu::ComputePipeline {
+    /// The pipeline of a shader with its `override` constants; the same again where that was made already. Its bind group
+    /// layout follows from the source. Workgroup memory is not zero when it begins.
+    pub fn pipeline(&self, shader: Shader, constants: &[(&str, f64)]) -> wgpu::ComputePipeline {
+        let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        let constant_bits = constants.iter().map(|(_, value)| value.to_bits()).collect();
+        pipelines.entry((shader.name, constant_bits)).or_insert_with(|| self.make_pipeline(shader, constants)).clone()
+    }
+
+    fn make_pipeline(&self, Shader { name, source }: Shader, constants: &[(&str, f64)]) -> wgpu::ComputePipeline {
         let descriptor =
             wgpu::ShaderModuleDescriptor { label: Some(name), source: wgpu::ShaderSource::Wgsl(source.into()) };
-        // Checks of indices and of the turns of loops would take a tenth of the time.
-        // SAFETY: a shader reaches no memory but the device's, which checks indices of buffers itself; loops end, and
-        // indices of workgroup memory are in bounds, in all shaders there are.
+        // Counting the turns of loops would take a twentieth of the time.
+        let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..Default::default() };
+        // SAFETY: all loops end, in all shaders there are.
         #[allow(unsafe_code)]
-        let module =
-            unsafe { self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) };
+        let module = unsafe { self.device.create_shader_module_trusted(descriptor, checks) };
         self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(name),
             layout: None,

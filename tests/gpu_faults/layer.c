@@ -4,6 +4,7 @@
  *   wait       the device is lost while its work is waited for
  *   hang       work is never done: waiting for it takes as long as was asked for
  *   memory     there is no more memory
+ *   idle       work is reported as done that was not done
  * Needs no header of Vulkan's: what is used of it is declared here, as its specification has it. */
 #include <stdint.h>
 #include <stdlib.h>
@@ -117,6 +118,12 @@ static Result our_allocate(void *device, const void *what, const void *allocator
     return strikes("memory") ? OUT_OF_DEVICE_MEMORY : allocate(device, what, allocator, memory);
 }
 
+static void (*dispatch)(void *, uint32_t, uint32_t, uint32_t);
+static void our_dispatch(void *commands, uint32_t x, uint32_t y, uint32_t z) {
+    if (!strikes("idle"))
+        dispatch(commands, x, y, z);
+}
+
 static Function of_device(void *device, const char *name) {
     const struct {
         const char *name;
@@ -133,6 +140,7 @@ static Function of_device(void *device, const char *name) {
         {"vkGetSemaphoreCounterValueKHR", &counter, (Function)our_counter},
         {"vkDeviceWaitIdle", &idle, (Function)our_idle},
         {"vkAllocateMemory", &allocate, (Function)our_allocate},
+        {"vkCmdDispatch", &dispatch, (Function)our_dispatch},
     };
     Function next = next_of_device(device, name);
     for (size_t k = 0; next && k < sizeof taken / sizeof *taken; k++)

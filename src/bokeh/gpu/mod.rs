@@ -7,9 +7,12 @@ mod passes;
 mod probe;
 mod readback;
 pub mod shaders;
+mod trial;
 
 use std::sync::Arc;
 use std::time::Instant;
+
+pub use trial::try_out;
 
 use buffers::Buffers;
 use layout::{Capacity, Layout};
@@ -144,7 +147,6 @@ impl GpuBokeh {
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),
-            ..shaders::Frame::default()
         }
     }
 }

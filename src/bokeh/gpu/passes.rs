@@ -51,28 +51,20 @@ pub struct Passes {
     work: Vec<u8>,
 }
 
-/// Makes the passes; compiles each shader once.
+/// Makes the passes.
 struct Maker<'a> {
     device: &'a Device,
     buffers: &'a Buffers,
-    /// Pipelines by the names of their shaders.
-    pipelines: Vec<(&'static str, wgpu::ComputePipeline)>,
 }
 
-impl<'a> Maker<'a> {
-    /// The pipeline of a shader, shared by all passes that run it.
-    fn pipeline(&mut self, shader: Shader) -> wgpu::ComputePipeline {
-        if let Some((_, pipeline)) = self.pipelines.iter().find(|(name, _)| *name == shader.name) {
-            return pipeline.clone();
-        }
-        let pipeline = self.device.pipeline(shader, &shaders::CONSTANTS);
-        self.pipelines.push((shader.name, pipeline.clone()));
-        pipeline
+impl Maker<'_> {
+    fn pipeline(&self, shader: Shader) -> wgpu::ComputePipeline {
+        self.device.pipeline(shader, &shaders::CONSTANTS)
     }
 
     /// A pass with these uniforms first and then `buffers`; its time counts for `name`.
     fn step(
-        &mut self,
+        &self,
         name: &'static str,
         shader: Shader,
         uniforms: &[wgpu::BufferBinding<'_>],
@@ -85,7 +77,7 @@ impl<'a> Maker<'a> {
     }
 
     /// A pass over several bins at once, which are in uniform `Work` number `work`; binds that and the bins first.
-    fn over_bins(&mut self, name: &'static str, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Step {
+    fn over_bins(&self, name: &'static str, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Step {
         let uniforms = [work_binding(self.buffers, work), self.buffers.bins.as_entire_buffer_binding()];
         self.step(name, shader, &uniforms, buffers)
     }
@@ -122,7 +114,7 @@ fn over(step: Step, size: [u32; 2], tile: u32) -> Fixed {
 impl Passes {
     /// The passes of a plan over its buffers.
     pub fn new(device: &Device, plan: &Plan, b: &Buffers, depth: &wgpu::Buffer) -> Self {
-        let mut maker = Maker { device, buffers: b, pipelines: Vec::new() };
+        let maker = Maker { device, buffers: b };
         let picture = [plan.width as u32, plan.height as u32];
         let half = picture.map(|v| v.div_ceil(2));
 
@@ -143,12 +135,12 @@ impl Passes {
                     over(maker.step("fill", shaders::FILL, &work, &filled), picture, TILE),
                 ]
             });
-            let scene = if index > 0 { &b.behind } else { &b.scene };
-            let bin = [&b.frame, scene, &b.source, &b.grid, &b.mixed, &b.binned, &b.filtered];
+            let (seen, lists) = ([&b.scene, &b.behind, &b.ranges], [&b.binned, &b.filtered]);
+            let bin = [&b.frame, seen[0], seen[1], seen[2], &b.source, &b.grid, &b.mixed, lists[0], lists[1]];
             Layer { fill, bin: maker.over_bins("bin", shaders::BIN, index, &bin) }
         });
         let layers = layers.collect();
-        let filters = |maker: &mut Maker, bank: &Filters, k: usize| {
+        let filters = |bank: &Filters, k: usize| {
             let [horizontal, vertical] = &bank.taps;
             let rows = [&b.frame, horizontal, &b.edges, &b.scene, &b.grid, &b.source, &b.rows, &b.filtered, &b.active];
             let columns =
@@ -161,7 +153,7 @@ impl Passes {
         // A batch has at least one bin, so there are no more batches than bins.
         let blur = b.banks.iter().map(|bank| {
             let steps = 0..MAX_BINS * bank.terms.div_ceil(4);
-            steps.map(|k| filters(&mut maker, bank, k)).collect()
+            steps.map(|k| filters(bank, k)).collect()
         });
         let blur = blur.collect();
         let gather = plan.exact.then(|| {

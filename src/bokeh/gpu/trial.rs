@@ -1,0 +1,85 @@
+//! Whether a device blurs as the CPU does: drivers have faults, and none is to be found out by whoever is looked at.
+
+use std::sync::Arc;
+
+use super::GpuBokeh;
+use crate::bokeh::aperture::Aperture;
+use crate::bokeh::cpu::CpuBokeh;
+use crate::bokeh::plan::Plan;
+use crate::bokeh::{Bokeh, BokehError, Job, Method, Settings};
+use crate::budget::Quality;
+use crate::compute::device::Device;
+use crate::compute::{GpuError, Place};
+use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pooled;
+use crate::optics::{CocField, CocKind, DepthCoc};
+
+const WIDTH: u32 = 96;
+const HEIGHT: u32 = 64;
+const VALUES: usize = (3 * WIDTH * HEIGHT) as usize;
+const RADIUS_PX: f32 = 12.0;
+/// A value that differs by more is wrong; one in a hundred may be, as roundings fall either way.
+const CODES: u8 = 4;
+
+/// Blurs a small picture of noise at three distances on `device` and on the CPU, once for each device.
+///
+/// # Errors
+/// The device failed, or makes another picture of it.
+pub fn try_out(device: &Arc<Device>) -> Result<(), BokehError> {
+    if device.trial.get().is_none() {
+        let wrong = differing(device)?;
+        let fault = (wrong > VALUES / 100).then(|| {
+            format!(
+                "{}: {wrong} of the {VALUES} values of a trial picture are wrong, so its driver may have a fault; use \
+                 --backend cpu",
+                device.name
+            )
+        });
+        let _ = device.trial.set(fault);
+    }
+    match device.trial.get() {
+        Some(Some(fault)) => Err(GpuError::Failed(fault.clone()).into()),
+        _ => Ok(()),
+    }
+}
+
+/// How many values of the picture differ.
+fn differing(device: &Arc<Device>) -> Result<usize, BokehError> {
+    let settings = Settings {
+        coc: CocKind::Depth,
+        method: Method::Layered,
+        aperture: Aperture::default(),
+        rim: 0.2,
+        rank: None,
+        highlights: 4.0,
+        quality: Quality::default(),
+        adaptive: false,
+        far_max_px: RADIUS_PX,
+        near_max_px: RADIUS_PX,
+    };
+    let coc =
+        CocField::Depth(DepthCoc { coc_at_infinity_px: RADIUS_PX, focus_m: 1.0, range_m: 0.0, max_coc_px: RADIUS_PX });
+    let mut color = ColorImage::new(WIDTH, HEIGHT);
+    for (k, value) in (0u32..).zip(&mut color.rgb) {
+        *value = (k.wrapping_mul(0x9e37_79b1) >> 24) as u8;
+    }
+    let metres = (0..WIDTH * HEIGHT).map(|k| [0.6, 1.0, 4.0][(k % WIDTH * 3 / WIDTH) as usize]).collect();
+    let depth = DepthMap { width: WIDTH, height: HEIGHT, metres, ..DepthMap::default() };
+
+    let plan = Plan::new(&settings, WIDTH, HEIGHT);
+    let mut expected = ColorImage::default();
+    CpuBokeh::new(plan.clone(), Some(1)).blur(&color, Some(&depth), &coc, &mut expected)?;
+    let mut gpu = GpuBokeh::on(&plan, Arc::clone(device))?;
+    gpu.submit(Job {
+        ticket: 0,
+        color: Pooled::detached(color),
+        depth: Some(Pooled::detached(depth)),
+        coc,
+        quality: Quality::default(),
+        place: Place::Memory,
+        out: Pooled::detached(ColorImage::default()),
+    })?;
+    let finished = gpu.collect(true)?.ok_or(BokehError::Lost)?;
+    let made = finished.picture.memory().ok_or(BokehError::Lost)?;
+    Ok(made.rgb.iter().zip(&expected.rgb).filter(|(a, b)| a.abs_diff(**b) > CODES).count())
+}
