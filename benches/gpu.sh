@@ -1,11 +1,9 @@
 #!/usr/bin/env bash
 # What the GPU executor does on this machine: first whether it agrees with the CPU's, then its time per pass.
 #
-# Prints one table: each pass's time by the device's own timestamps, the memory that it moves (as counted in
-# docs/performance.md for this scene, "GPU: what moves"), and how near that is to what the memory can do.
+# Prints one table a size: each pass's time by the device's own timestamps, their sum, and that of a whole frame.
 #
 #   benches/gpu.sh                                  builds, tests and measures
-#   MEM_GBPS=1008 benches/gpu.sh                    also the share of the memory's bandwidth, in GB/s
 #   BOKEHCAM=target/release/bokehcam benches/gpu.sh measures a binary as it is, without building or testing
 #   SIZES=1280x720 FRAMES=5 ADAPTER=llvmpipe benches/gpu.sh
 set -euo pipefail
@@ -33,30 +31,14 @@ for size in ${sizes//,/ }; do
         failed=1
         continue
     fi
-    awk -v size="$size" -v gbps="${MEM_GBPS:-0}" '
-        BEGIN {
-            # Bytes moved a pixel of the picture, synthetic scene, default quality.
-            split("unpack 15 bin 28 fill 35 reach 4 blur_rows 22 blur_columns 32 composite 9", pairs, " ")
-            for (k = 1; k in pairs; k += 2) { order[(k + 1) / 2] = pairs[k]; moved[pairs[k]] = pairs[k + 1] }
-            split(size, sides, "x")
-            pixels = sides[1] * sides[2]
-        }
-        function row(name, ms, bytes) {
-            floor_ms = gbps > 0 ? bytes / gbps / 1e6 : 0
-            share = gbps > 0 && ms > 0 ? sprintf("%9.3f %5.0f %%", floor_ms, 100 * floor_ms / ms) : "        -       -"
-            printf "%-14s %9.3f %9.1f %s\n", name, ms, bytes / 1e6, share
-        }
+    awk -v size="$size" '
         $1 == size { whole = $4; $1 = $2 = $3 = $4 = $5 = $6 = $7 = ""; sub(/^ +/, ""); executor = $0; next }
-        executor != "" { for (k = 1; k < NF; k += 2) ms[$k] = $(k + 1) }
+        executor != "" { for (k = 1; k < NF; k += 2) { names[++count] = $k; ms[count] = $(k + 1); sum += $(k + 1) } }
         END {
             if (executor == "") exit 1
-            printf "\n%s, %s\n%-14s %9s %9s %9s %7s\n", size, executor, "pass", "ms", "MB moved", "floor ms", "share"
-            for (k = 1; k in order; k++) if (order[k] in ms) {
-                row(order[k], ms[order[k]], moved[order[k]] * pixels)
-                sum += ms[order[k]]; all += moved[order[k]] * pixels; delete ms[order[k]]
-            }
-            for (name in ms) { row(name, ms[name], 0); sum += ms[name] }
-            row("all passes", sum, all)
+            printf "\n%s, %s\n%-14s %9s\n", size, executor, "pass", "ms"
+            for (k = 1; k <= count; k++) printf "%-14s %9.3f\n", names[k], ms[k]
+            printf "%-14s %9.3f\n", "all passes", sum
             printf "%-14s %9.3f   with upload, waiting and the way back\n", "whole frame", whole
         }' <<<"$lines" || { echo "$lines"; failed=1; }
 done
