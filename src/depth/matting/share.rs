@@ -20,13 +20,53 @@ const AT_CORNER: f32 = 0.3;
 pub struct Contrast {
     /// Of the near and of the far surface.
     surfaces: [Color; 2],
-    /// Fisher's linear discriminant: a colour's product with it, less `offset`, is the share.
-    direction: [f32; 3],
-    offset: f32,
-    /// The reciprocal variance of that share.
-    precision: f32,
+    discriminant: Discriminant,
     /// The inverse of the covariance that both surfaces' colours vary by.
     inverse: Symmetric,
+}
+
+/// Fisher's linear discriminant between the colours of two surfaces: a colour's product with `direction`, less `offset`, is the
+/// share of the near one, and `precision` the reciprocal variance of that over the pixels of one surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Discriminant {
+    direction: [f32; 3],
+    offset: f32,
+    pub precision: f32,
+}
+
+/// Numbers of [`Contrast::line`], and of [`Contrast::front`].
+pub(super) const LINE: usize = 4;
+pub(super) const FRONT: usize = 9;
+
+impl Discriminant {
+    #[inline(always)]
+    fn new(near: [f32; 3], inverse: &Symmetric, far: [f32; 3]) -> Self {
+        let difference: [f32; 3] = std::array::from_fn(|p| near[p] - far[p]);
+        let direction = times(inverse, difference);
+        let contrast = dot(direction, difference).max(1e-9);
+        let scale = 1.0 / contrast;
+        let direction = direction.map(|value| scale * value);
+        // Both surfaces' variances are in it, of which a mixed pixel has half each. No finer than the steps.
+        Self { direction, offset: dot(direction, far), precision: (2.0 * contrast).min(1000.0) }
+    }
+
+    /// Of a [`Contrast::line`].
+    #[inline(always)]
+    pub fn of([x, y, z, offset]: [f32; LINE], precision: f32) -> Self {
+        Self { direction: [x, y, z], offset, precision }
+    }
+
+    /// Of a [`Contrast::front`] before this light.
+    #[inline(always)]
+    pub fn before([x, y, z, a, b, c, d, e, f]: [f32; FRONT], light: [f32; 3]) -> Self {
+        Self::new([x, y, z], &[a, b, c, d, e, f], light)
+    }
+
+    /// The share of the near surface that a colour is, from below 0 to above 1.
+    #[inline(always)]
+    pub fn share(&self, color: [f32; 3]) -> f32 {
+        dot(self.direction, color) - self.offset
+    }
 }
 
 impl Contrast {
@@ -49,26 +89,34 @@ impl Contrast {
         Self::across([near, Color { mean: light, ..far }], self.inverse)
     }
 
-    #[inline(always)]
     fn across(surfaces: [Color; 2], inverse: Symmetric) -> Self {
         let [near, far] = &surfaces;
-        let difference: [f32; 3] = std::array::from_fn(|p| near.mean[p] - far.mean[p]);
-        let direction = times(&inverse, difference);
-        let contrast = dot(direction, difference).max(1e-9);
-        // Both surfaces' variances are in it, of which a mixed pixel has half each. No finer than the steps.
-        let precision = (2.0 * contrast).min(1000.0);
-        let direction = direction.map(|value| value / contrast);
-        Self { surfaces, direction, offset: dot(direction, far.mean), precision, inverse }
+        let discriminant = Discriminant::new(near.mean, &inverse, far.mean);
+        Self { surfaces, discriminant, inverse }
     }
 
-    /// The share of the near surface that a colour is, from below 0 to above 1.
+    /// What tells a colour's share, for [`Discriminant::of`]: sums of such are those of what lies between.
+    #[inline(always)]
+    pub(super) fn line(&self) -> [f32; LINE] {
+        let Discriminant { direction: [x, y, z], offset, .. } = self.discriminant;
+        [x, y, z, offset]
+    }
+
+    /// The same before light that is known, for [`Discriminant::before`].
+    #[inline(always)]
+    pub(super) fn front(&self) -> [f32; FRONT] {
+        let ([x, y, z], [a, b, c, d, e, f]) = (self.surfaces[0].mean, self.inverse);
+        [x, y, z, a, b, c, d, e, f]
+    }
+
+    /// See [`Discriminant::share`].
     pub(super) fn share(&self, color: [f32; 3]) -> f32 {
-        dot(self.direction, color) - self.offset
+        self.discriminant.share(color)
     }
 
-    /// The reciprocal variance of [`Self::share`] over the pixels of one surface.
+    /// See [`Discriminant`].
     pub(super) fn precision(&self) -> f32 {
-        self.precision
+        self.discriminant.precision
     }
 
     /// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
@@ -127,7 +175,7 @@ impl Evidence {
     pub(super) fn new(edge: &EdgePixel, labels: Labels, own: [f32; 3], (place, contrast): (u32, &Contrast)) -> Self {
         let Labels { is_near, is_thin, .. } = labels;
         let projected = contrast.share(own).clamp(-0.3, 1.3);
-        let likelihoods = gaussian(contrast.precision, projected);
+        let likelihoods = gaussian(contrast.precision(), projected);
         let (mut half, mut any) = ([0.0; 2], [0.0; 2]);
         let middle = STEPS / 2;
         for (step, &value) in likelihoods.iter().enumerate() {
@@ -141,7 +189,7 @@ impl Evidence {
         if is_thin {
             half = any;
         }
-        let pure = likelihoods[if is_near { STEPS - 1 } else { 0 }].max(OUTLIER / contrast.precision.sqrt());
+        let pure = likelihoods[if is_near { STEPS - 1 } else { 0 }].max(OUTLIER / contrast.precision().sqrt());
         Self { edge: *edge, labels, contrast: place, pure, half, any }
     }
 }

@@ -1,5 +1,7 @@
 //! The cells of a picture: what its mask says of each, and the colours of both surfaces around it.
 
+use std::ops::Range;
+
 use super::Backdrop;
 use crate::depth::matting::clusters::{Color, Symmetric, outer};
 use crate::depth::matting::share::Contrast;
@@ -85,13 +87,16 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// Columns and rows of the pixels of a cell.
+    /// Columns of the pixels of a column of cells.
     #[inline(always)]
-    pub fn pixels_of(&self, cell: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let (side, width, height) = (self.cell_px, self.color.width as usize, self.color.height as usize);
-        let (row, column) = (cell / self.across, cell % self.across);
-        let xs = column * side..((column + 1) * side).min(width);
-        (row * side..((row + 1) * side).min(height)).flat_map(move |y| xs.clone().map(move |x| (x, y)))
+    pub fn columns_of(&self, column: usize) -> Range<usize> {
+        column * self.cell_px..((column + 1) * self.cell_px).min(self.color.width as usize)
+    }
+
+    /// Rows of the pixels of a row of cells.
+    #[inline(always)]
+    pub fn rows_of(&self, row: usize) -> Range<usize> {
+        row * self.cell_px..((row + 1) * self.cell_px).min(self.color.height as usize)
     }
 
     /// The colour of a pixel in linear light.
@@ -100,19 +105,24 @@ impl View<'_> {
         [0, 1, 2].map(|p| self.light[usize::from(self.color.rgb[3 * at + p])])
     }
 
-    /// The mask at a pixel, linear between its own.
+    /// The mask in a row of pixels, linear between its own.
     #[inline(always)]
-    pub fn share_at(&self, x: usize, y: usize) -> f32 {
-        let (down, across) = (Tap::new(y, self.color.height as usize, self.mask.height as usize), &self.columns[x]);
-        let row = |row: usize| {
-            let row = &self.mask.share[row * self.mask.width as usize..];
-            row[across.first] + (row[across.second] - row[across.first]) * across.share
-        };
-        row(down.first) + (row(down.second) - row(down.first)) * down.share
+    pub fn shares_in(&self, y: usize) -> impl Fn(usize) -> f32 {
+        let width = self.mask.width as usize;
+        let Tap { first, second, share } = Tap::new(y, self.color.height as usize, self.mask.height as usize);
+        let row = |row: usize| &self.mask.share[row * width..][..width];
+        let (above, below, columns) = (row(first), row(second), self.columns);
+        move |x| {
+            let across = &columns[x];
+            let between = |row: &[f32]| row[across.first] + (row[across.second] - row[across.first]) * across.share;
+            let above = between(above);
+            above + (between(below) - above) * share
+        }
     }
 
-    /// What the mask says of every cell: it is sure of all of it, or not.
-    pub fn classify(&self, cells: &mut Vec<Cell>) {
+    /// What the mask says of every cell: it is sure of all of it, or not. `ends` is memory for that.
+    #[inline(always)]
+    pub fn classify(&self, cells: &mut Vec<Cell>, ends: &mut Vec<[f32; 2]>) {
         let (across, down, mask) = (self.across, self.down, self.mask);
         let range = |of: usize, count: usize, side: usize| {
             // The pixels of the mask around a cell, with those beside them: the band is a cell wider than it needs be.
@@ -120,23 +130,26 @@ impl View<'_> {
             let start = (of as f32 * scale - 1.0).max(0.0) as usize;
             start.min(side - 1)..(((of + 1) as f32 * scale + 1.0).ceil() as usize).min(side)
         };
+        let width = mask.width as usize;
         cells.clear();
         for row in 0..down {
-            let ys = range(row, down, mask.height as usize);
-            for column in 0..across {
-                let xs = range(column, across, mask.width as usize);
-                let (mut low, mut high) = (1.0f32, 0.0f32);
-                for y in ys.clone() {
-                    for &share in &mask.share[y * mask.width as usize..][xs.clone()] {
-                        (low, high) = (low.min(share), high.max(share));
-                    }
+            // Lowest and highest of each column of the mask first: neighbouring cells share them.
+            ends.clear();
+            ends.resize(width, [1.0, 0.0]);
+            for y in range(row, down, mask.height as usize) {
+                for ([low, high], &share) in ends.iter_mut().zip(&mask.share[y * width..][..width]) {
+                    (*low, *high) = (low.min(share), high.max(share));
                 }
-                cells.push(match () {
+            }
+            cells.extend((0..across).map(|column| {
+                let ends = &ends[range(column, across, width)];
+                let [low, high] = ends.iter().fold([1.0f32, 0.0f32], |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+                match () {
                     () if low > SURE => Cell::Near,
                     () if high < 1.0 - SURE => Cell::Far,
                     () => Cell::Band,
-                });
-            }
+                }
+            }));
         }
     }
 
@@ -156,19 +169,21 @@ impl View<'_> {
                 }
             }
         }
-        for at in (0..across * down).filter(|&at| wanted[at]) {
-            let sums = &mut sums[at];
-            for (x, y) in self.pixels_of(at).filter(|(x, y)| (x + y) % 2 == 0) {
-                let light = || self.light_at(y * self.color.width as usize + x);
-                match cells[at] {
-                    Cell::Near => sums.add(NEAR, light()),
-                    Cell::Far => sums.add(FAR, light()),
-                    Cell::Band => {
-                        let share = self.share_at(x, y);
-                        if share > SURE {
-                            sums.add(NEAR, light());
-                        } else if share < 1.0 - SURE {
-                            sums.add(FAR, light());
+        for row in 0..down {
+            for y in self.rows_of(row) {
+                let (share_at, first) = (self.shares_in(y), y * self.color.width as usize);
+                for column in (0..across).filter(|column| wanted[row * across + column]) {
+                    let (sums, cell) = (&mut sums[row * across + column], cells[row * across + column]);
+                    // Every other one is enough.
+                    for x in self.columns_of(column).filter(|x| (x + y) % 2 == 0) {
+                        match cell {
+                            Cell::Near => sums.add(NEAR, self.light_at(first + x)),
+                            Cell::Far => sums.add(FAR, self.light_at(first + x)),
+                            Cell::Band => match share_at(x) {
+                                share if share > SURE => sums.add(NEAR, self.light_at(first + x)),
+                                share if share < 1.0 - SURE => sums.add(FAR, self.light_at(first + x)),
+                                _ => {}
+                            },
                         }
                     }
                 }

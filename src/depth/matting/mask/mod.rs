@@ -9,6 +9,8 @@ mod backdrop;
 mod cells;
 mod posterior;
 
+use std::ops::Range;
+
 pub use backdrop::Backdrop;
 
 use crate::color::light_of_codes;
@@ -16,7 +18,7 @@ use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap, Mask, Matte, MixedPixel};
 
 use super::NEARLY_PURE;
-use super::share::Contrast;
+use super::share::{Contrast, Discriminant};
 use cells::{Cell, Kernel, REACH, Sums, View};
 use posterior::Posterior;
 
@@ -24,9 +26,6 @@ use posterior::Posterior;
 pub const SUBJECT_M: f32 = DepthMap::SUBJECT_M;
 /// See [`DepthMap::FAR_M`].
 pub const FAR_M: f32 = DepthMap::FAR_M;
-
-/// So far from an outline, as a share of the picture's height, blur may show what is behind a subject.
-const REVEALED: f32 = 0.035;
 
 /// Side of a cell in pixels of the mask, and the least in pixels of the picture.
 const CELL_OF_MASK: f32 = 1.6;
@@ -46,6 +45,8 @@ pub struct MaskMatting {
     posterior: Posterior,
     kernel: Kernel,
     cells: Vec<Cell>,
+    /// Lowest and highest share of columns of the mask.
+    ends: Vec<[f32; 2]>,
     /// Whether the colours of a cell are wanted.
     wanted: Vec<bool>,
     sums: Vec<Sums>,
@@ -75,6 +76,7 @@ impl Default for MaskMatting {
             posterior: Posterior::new(),
             kernel: std::array::from_fn(|row| std::array::from_fn(|column| weight(row, column))),
             cells: Vec::new(),
+            ends: Vec::new(),
             wanted: Vec::new(),
             sums: Vec::new(),
             contrasts: Vec::new(),
@@ -120,41 +122,45 @@ impl pulp::WithSimd for Finding<'_> {
         matting.columns.clear();
         matting.columns.extend((0..width).map(|x| Tap::new(x, width, mask.width as usize)));
         let (across, down) = (width.div_ceil(cell_px), height.div_ceil(cell_px));
-        let MaskMatting { light, posterior, kernel, cells, wanted, sums, contrasts, shares, front, columns } = matting;
+        let MaskMatting { light, posterior, kernel, cells, ends, wanted, sums, contrasts, shares, front, columns } =
+            matting;
         let view = View { mask, color, light, backdrop, columns, cell_px, across, down };
-        view.classify(cells);
+        view.classify(cells, ends);
         view.gather(cells, wanted, sums);
         contrasts.clear();
         for at in 0..across * down {
-            let is_beside = cells[at] == Cell::Band || view.around(at, 1).any(|at| cells[at] == Cell::Band);
-            let contrast = if is_beside { view.contrast(kernel, sums, (at / across, at % across)) } else { None };
-            contrasts.push(contrast);
+            let is_beside = || cells[at] == Cell::Band || view.around(at, 1).any(|at| cells[at] == Cell::Band);
+            let place = (at / across, at % across);
+            contrasts.push(if wanted[at] && is_beside() { view.contrast(kernel, sums, place) } else { None });
         }
         shares.resize(width * height, 0.0);
         front.clear();
         for cell in (0..across * down).filter(|&cell| cells[cell] == Cell::Band) {
-            view.weigh(posterior, contrasts, cell, shares, front);
+            view.weigh(posterior, contrasts, (cell / across, cell % across), shares, front);
         }
         view.connect(cells, shares, front);
-        let reach = (REVEALED * height as f32 / cell_px as f32).ceil() as usize;
-        for cell in 0..across * down {
-            match cells[cell] {
-                Cell::Far => {}
-                Cell::Near => {
-                    if let Some(backdrop) =
-                        backdrop.filter(|_| view.around(cell, reach).any(|at| cells[at] == Cell::Band))
-                    {
-                        view.reveal(backdrop, cell, map);
+        // Row by row, so that the pixels of the matte come in their order.
+        for row in 0..down {
+            for y in view.rows_of(row) {
+                for column in 0..across {
+                    let (cell, xs) = (row * across + column, view.columns_of(column));
+                    match cells[cell] {
+                        Cell::Far => {}
+                        Cell::Near => {
+                            // So far from the outline, blur may show what is behind.
+                            if let Some(backdrop) = backdrop.filter(|_| wanted[cell]) {
+                                view.reveal(backdrop, (xs.clone(), y), map);
+                            }
+                            map.metres[y * width..][xs].fill(SUBJECT_M);
+                        }
+                        Cell::Band => view.take_apart(contrasts[cell].as_ref(), (xs, y), shares, map),
                     }
-                    view.cover(cell, map);
                 }
-                Cell::Band => view.take_apart(contrasts[cell].as_ref(), cell, shares, map),
             }
         }
         if map.matte.pixels.len() > Matte::most(width, height) {
             map.matte.pixels.retain(|pixel| pixel.share < 1.0);
         }
-        map.matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
     }
 }
 
@@ -165,32 +171,62 @@ impl View<'_> {
         &self,
         posterior: &Posterior,
         contrasts: &[Option<Contrast>],
-        cell: usize,
+        (row, column): (usize, usize),
         shares: &mut [f32],
         front: &mut Vec<u32>,
     ) {
-        let own = contrasts[cell].as_ref().map(|own| (own, posterior.slice(own.precision())));
-        for (x, y) in self.pixels_of(cell) {
-            let at = y * self.color.width as usize + x;
-            let (mask, light) = (self.share_at(x, y), self.light_at(at));
-            let behind = self.backdrop.map(|backdrop| backdrop.light_at(x, y));
-            let share = match (&own, behind) {
-                (None, _) => mask,
-                (Some((own, slice)), None) => {
-                    slice.share(mask, self.between(contrasts, own, (x, y), |contrast| contrast.share(light)))
+        let own = contrasts[row * self.across + column].as_ref();
+        let slice = own.map(|own| posterior.slice(own.precision()));
+        let at = |row: usize, column: usize| contrasts[row * self.across + column].as_ref();
+        for y in self.rows_of(row) {
+            let (mask_at, down) = (self.shares_in(y), self.cells_around(y, self.down));
+            let xs = self.columns_of(column);
+            let middle = (xs.start + self.cell_px / 2).min(xs.end);
+            for xs in [xs.start..middle, middle..xs.end] {
+                // The same four cells are around all of them.
+                let Some(first) = xs.clone().next() else { continue };
+                let across = self.cells_around(first, self.across);
+                let corners = own.map(|own| {
+                    [
+                        (down.first, across.first),
+                        (down.second, across.first),
+                        (down.first, across.second),
+                        (down.second, across.second),
+                    ]
+                    .map(|(row, column)| at(row, column).unwrap_or(own))
+                });
+                let lines = corners.map(|corners| Sides::of(corners.map(Contrast::line), down.share));
+                let fronts = corners.map(|corners| Sides::of(corners.map(Contrast::front), down.share));
+                for x in xs {
+                    let place = y * self.color.width as usize + x;
+                    let (mask, light) = (mask_at(x), self.light_at(place));
+                    let along = self.cells_around(x, self.across).share;
+                    let share = match (self.backdrop, &lines, &fronts, &slice) {
+                        (None, Some(lines), _, Some(slice)) => {
+                            slice.share(mask, Discriminant::of(lines.between(along), 1.0).share(light))
+                        }
+                        // Where it is known what is behind, the surfaces differ in another way at every pixel.
+                        (Some(backdrop), _, Some(fronts), _) => {
+                            let own = Discriminant::before(fronts.between(along), backdrop.light_at(x, y));
+                            posterior.slice(own.precision).share(mask, own.share(light))
+                        }
+                        _ => mask,
+                    };
+                    shares[place] = share;
+                    if mask > NEAR_FROM && share > NEAR_FROM {
+                        shares[place] += FOUND;
+                        front.push(place as u32);
+                    }
                 }
-                // Where it is known what is behind, the surfaces differ in another way at every pixel.
-                (Some((own, _)), Some(behind)) => {
-                    let place = self.between(contrasts, own, (x, y), |contrast| contrast.before(behind).share(light));
-                    posterior.slice(own.before(behind).precision()).share(mask, place)
-                }
-            };
-            shares[at] = share;
-            if mask > NEAR_FROM && share > NEAR_FROM {
-                shares[at] += FOUND;
-                front.push(at as u32);
             }
         }
+    }
+
+    /// The cells, across or down, whose middles a pixel lies between: what is linear between them shows no cells.
+    #[inline(always)]
+    fn cells_around(&self, at: usize, count: usize) -> Tap {
+        let half = 0.5 * self.cell_px as f32;
+        Tap::at((at as f32 + 0.5 - half) / self.cell_px as f32, count)
     }
 
     /// Marks what is joined to the surest pixels: what only has the colours of the nearer surface is not.
@@ -211,9 +247,16 @@ impl View<'_> {
         }
     }
 
+    /// Gives the pixels of a row of a cell their surface, and the mixed ones both.
     #[inline(always)]
-    fn take_apart(&self, contrast: Option<&Contrast>, cell: usize, shares: &[f32], map: &mut DepthMap) {
-        for (x, y) in self.pixels_of(cell) {
+    fn take_apart(
+        &self,
+        contrast: Option<&Contrast>,
+        (xs, y): (Range<usize>, usize),
+        shares: &[f32],
+        map: &mut DepthMap,
+    ) {
+        for x in xs {
             let at = y * self.color.width as usize + x;
             let share = match shares[at] {
                 found if found >= FOUND => found - FOUND,
@@ -224,59 +267,53 @@ impl View<'_> {
             if share > 0.5 {
                 map.metres[at] = SUBJECT_M;
             }
+            let is_pure = share > NEARLY_PURE;
+            if share < 1.0 - NEARLY_PURE || is_pure && self.backdrop.is_none() {
+                continue;
+            }
             let own = self.light_at(at);
             let (behind, difference) = match (self.backdrop.map(|backdrop| backdrop.light_at(x, y)), contrast) {
-                (Some(light), _) if share > NEARLY_PURE => (1.0, std::array::from_fn(|p| (own[p] - light[p]) / share)),
+                (Some(light), _) if is_pure => (1.0, std::array::from_fn(|p| (own[p] - light[p]) / share)),
                 (Some(light), Some(contrast)) => (1.0, contrast.before(light).difference(own, share)),
                 (None, Some(contrast)) => (1.0 - share, contrast.difference(own, share)),
                 (_, None) => (1.0 - share, [0.0; 3]),
             };
-            if (1.0 - NEARLY_PURE..=NEARLY_PURE).contains(&share) || behind == 1.0 && share > NEARLY_PURE {
-                let (at, near_m) = (at as u32, SUBJECT_M);
-                map.matte.pixels.push(MixedPixel { at, near_m, far_m, share, behind, difference });
-            }
+            let (at, near_m) = (at as u32, SUBJECT_M);
+            map.matte.pixels.push(MixedPixel { at, near_m, far_m, share, behind, difference });
         }
     }
 
-    /// Every pixel of a cell is the nearer surface's.
-    fn cover(&self, cell: usize, map: &mut DepthMap) {
-        for (x, y) in self.pixels_of(cell) {
-            map.metres[y * self.color.width as usize + x] = SUBJECT_M;
-        }
-    }
-
-    /// The pixels of a cell that is covered, with what is known to be behind them.
-    fn reveal(&self, backdrop: &Backdrop, cell: usize, map: &mut DepthMap) {
-        for (x, y) in self.pixels_of(cell) {
-            let at = y * self.color.width as usize + x;
-            let (own, light) = (self.light_at(at), backdrop.light_at(x, y));
-            let difference = std::array::from_fn(|p| own[p] - light[p]);
-            let (at, near_m, far_m) = (at as u32, SUBJECT_M, map.metres[at]);
-            map.matte.pixels.push(MixedPixel { at, near_m, far_m, share: 1.0, behind: 1.0, difference });
-        }
-    }
-
-    /// The share that the contrasts of the cells around a pixel give, linear between them, so that cells are not seen; `own` is
-    /// the contrast of its cell.
+    /// Gives pixels that are covered what is known to be behind them.
     #[inline(always)]
-    fn between(
-        &self,
-        contrasts: &[Option<Contrast>],
-        own: &Contrast,
-        (x, y): (usize, usize),
-        share: impl Fn(&Contrast) -> f32,
-    ) -> f32 {
-        let half = 0.5 * self.cell_px as f32;
-        let axis = |at: usize, count: usize| Tap::at((at as f32 + 0.5 - half) / self.cell_px as f32, count);
-        let (across, down) = (axis(x, self.across), axis(y, self.down));
-        let at = |row: usize, column: usize| {
-            share(contrasts[row * self.across + column].as_ref().unwrap_or(own)).clamp(-0.5, 1.5)
-        };
-        let row = |row: usize| {
-            let first = at(row, across.first);
-            first + (at(row, across.second) - first) * across.share
-        };
-        let first = row(down.first);
-        first + (row(down.second) - first) * down.share
+    fn reveal(&self, backdrop: &Backdrop, (xs, y): (Range<usize>, usize), map: &mut DepthMap) {
+        let row = y * self.color.width as usize;
+        let metres = &map.metres[row..];
+        map.matte.pixels.extend(xs.map(|x| {
+            let (own, light) = (self.light_at(row + x), backdrop.light_at(x, y));
+            let difference = std::array::from_fn(|p| own[p] - light[p]);
+            let (at, near_m, far_m) = ((row + x) as u32, SUBJECT_M, metres[x]);
+            MixedPixel { at, near_m, far_m, share: 1.0, behind: 1.0, difference }
+        }));
     }
+}
+
+/// Numbers on the left and on the right of some pixels.
+struct Sides<const N: usize>([[f32; N]; 2]);
+
+impl<const N: usize> Sides<N> {
+    /// Between those on the left above and below, and those on the right.
+    #[inline(always)]
+    fn of([left, below_left, right, below_right]: [[f32; N]; 4], down: f32) -> Self {
+        Self([mixed(&left, &below_left, down), mixed(&right, &below_right, down)])
+    }
+
+    #[inline(always)]
+    fn between(&self, along: f32) -> [f32; N] {
+        mixed(&self.0[0], &self.0[1], along)
+    }
+}
+
+#[inline(always)]
+fn mixed<const N: usize>(a: &[f32; N], b: &[f32; N], share: f32) -> [f32; N] {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
 }

@@ -38,7 +38,9 @@ impl Posterior {
 
     /// The shares at this precision, the reciprocal variance of the place of a colour.
     pub fn slice(&self, precision: f32) -> Slice<'_> {
-        let k = (precision.max(1.0).log2().round() as usize).min(PRECISIONS - 1);
+        // The exponent of a float is its binary logarithm, rounded down.
+        let exponent = (std::f32::consts::SQRT_2 * precision.max(1.0)).to_bits() >> (f32::MANTISSA_DIGITS - 1);
+        let k = (exponent as usize - 127).min(PRECISIONS - 1);
         Slice(&self.0[k * MASKS * PLACES..][..MASKS * PLACES])
     }
 }

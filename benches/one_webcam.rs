@@ -1,0 +1,178 @@
+//! `cargo bench --bench one_webcam -- [OPTIONS]`: what depth and matte of one webcam cost a frame: processor time of all
+//! threads, without decoding and without blur.
+//!
+//! The pictures are a real sequence, `rgbd/person_turning` in the folder BOKEHCAM_DATA, enlarged; networks come from its
+//! folder `models`. Sources take turns, so that what else the machine does strikes all alike.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use bokehcam::depth::plate::{Companion, PlateDepth};
+use bokehcam::depth::single_camera::{Hints, SingleCamera};
+use bokehcam::depth::{DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::network::{KNOWN, Known, Runtime, Task};
+use bokehcam::recording::{self, Recording, Scratch};
+use clap::Parser;
+use image::imageops::{FilterType, resize};
+
+/// Frames of the sequence that are shown, forth and back.
+const FRAMES: usize = 24;
+/// The kernel counts processor time in these.
+const TICK_MS: f64 = 10.0;
+
+#[derive(Parser)]
+struct Options {
+    /// Rounds of frames each, forth and back
+    #[arg(long, default_value_t = 4)]
+    rounds: u32,
+    /// What runs networks
+    #[arg(long, default_value = "auto")]
+    network_runtime: Runtime,
+    /// Only sources whose names begin so
+    #[arg(long, default_value = "")]
+    only: String,
+    /// Columns and rows
+    #[arg(long, num_args = 2, default_values_t = [1280, 720])]
+    size: Vec<u32>,
+    /// Passed by cargo
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+fn main() -> ExitCode {
+    let options = match common::options::<Options>() {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
+    match std::env::var_os("BOKEHCAM_DATA").map(PathBuf::from) {
+        Some(data) => measure(&options, &data).map_or_else(
+            |error| {
+                eprintln!("error: {error}");
+                ExitCode::FAILURE
+            },
+            |()| ExitCode::SUCCESS,
+        ),
+        None => {
+            eprintln!("error: BOKEHCAM_DATA is not set: it names the folder with rgbd/person_turning and models");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// A source at work, and what it has taken so far.
+struct Case {
+    name: &'static str,
+    source: Box<dyn DepthSource>,
+    frames: u32,
+    wall_ms: f64,
+    processor_ms: f64,
+}
+
+fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let (pictures, plate) = pictures(data, (options.size[0], options.size[1]))?;
+    let (matte, mono) = (model(data, Task::Matte)?, model(data, Task::Mono)?);
+    let networks = |matte: Option<&Path>, mono: Option<&Path>| {
+        SingleCamera::open(matte, mono, &Hints::default(), options.network_runtime)
+    };
+    let mut cases = Vec::new();
+    for name in ["matte", "mono", "matte,mono", "plate", "plate,matte", "plate,matte,mono"] {
+        if !name.starts_with(&options.only) {
+            continue;
+        }
+        let has = |task: &str| name.split(',').any(|part| part == task);
+        let files = (has("matte").then_some(matte.as_path()), has("mono").then_some(mono.as_path()));
+        let loaded = if files == (None, None) { None } else { Some(networks(files.0, files.1)?) };
+        let source: Box<dyn DepthSource> = match (has("plate"), loaded) {
+            (false, Some(networks)) => Box::new(networks),
+            (_, networks) => {
+                let companion = networks.map(|networks| Box::new(networks) as Box<dyn Companion>);
+                Box::new(PlateDepth::new(Some(plate.clone()), None, companion))
+            }
+        };
+        cases.push(Case { name, source, frames: 0, wall_ms: 0.0, processor_ms: 0.0 });
+    }
+    let mut map = DepthMap::default();
+    // The first round finds its memory.
+    for round in 0..=options.rounds {
+        for case in &mut cases {
+            let (began, before_ms) = (Instant::now(), processor_ms()?);
+            for (k, color) in pictures.iter().chain(pictures.iter().rev()).enumerate() {
+                let index = round as usize * 2 * pictures.len() + k;
+                let stamp = Stamp { index, time_ns: index as u64 * 33_333_333, captured_ns: None };
+                case.source.read(Seen { stamp, color, right: None }, &mut map)?;
+            }
+            if round > 0 {
+                case.frames += 2 * pictures.len() as u32;
+                case.wall_ms += began.elapsed().as_secs_f64() * 1e3;
+                case.processor_ms += processor_ms()? - before_ms;
+            }
+        }
+    }
+    println!("{} x {}, {} frames each", options.size[0], options.size[1], options.rounds as usize * 2 * pictures.len());
+    println!("{:<18} {:>15} {:>10}", "source", "processor ms", "wall ms");
+    for case in &cases {
+        let frames = f64::from(case.frames.max(1));
+        println!("{:<18} {:>15.2} {:>10.2}", case.name, case.processor_ms / frames, case.wall_ms / frames);
+    }
+    Ok(())
+}
+
+/// Pictures of the sequence in this size, and what is behind the person: of each pixel, the farthest that was seen.
+fn pictures(data: &Path, size: (u32, u32)) -> Result<(Vec<ColorImage>, ColorImage), Box<dyn std::error::Error>> {
+    let options = recording::Options { depth_scale: 1000.0, ..recording::Options::default() };
+    let recording = Recording::open(&data.join("rgbd/person_turning"), &options)?;
+    let (mut scratch, mut color, mut depth) = (Scratch::default(), ColorImage::default(), DepthMap::default());
+    let (mut plate, mut farthest_m, mut pictures) = (ColorImage::default(), Vec::new(), Vec::new());
+    for index in 0..recording.len().min(FRAMES) {
+        recording.read_color(index, &mut scratch, &mut color)?;
+        recording.read_depth(index, &mut scratch, &mut depth)?;
+        if index == 0 {
+            plate = color.clone();
+            farthest_m = depth.metres.clone();
+        }
+        for (at, (farthest_m, &metres)) in farthest_m.iter_mut().zip(&depth.metres).enumerate() {
+            if metres > *farthest_m {
+                *farthest_m = metres;
+                plate.rgb[3 * at..3 * at + 3].copy_from_slice(&color.rgb[3 * at..3 * at + 3]);
+            }
+        }
+        pictures.push(enlarged(&color, size));
+    }
+    Ok((pictures, enlarged(&plate, size)))
+}
+
+/// The middle of a picture, in another size.
+fn enlarged(color: &ColorImage, (width, height): (u32, u32)) -> ColorImage {
+    let rows = (color.width * height / width).min(color.height);
+    let first = ((color.height - rows) / 2 * color.width * 3) as usize;
+    let middle = color.rgb[first..][..(rows * color.width * 3) as usize].to_vec();
+    let picture = image::RgbImage::from_raw(color.width, rows, middle).expect("as many bytes as that");
+    ColorImage { width, height, rgb: resize(&picture, width, height, FilterType::CatmullRom).into_raw() }
+}
+
+/// The file of the first known network for a task that is there.
+fn model(data: &Path, task: Task) -> Result<PathBuf, Box<dyn std::error::Error>> {
+    let folder = data.join("models");
+    let mut files: Vec<_> = fs::read_dir(&folder)?.flatten().map(|entry| entry.path()).collect();
+    files.sort();
+    let known = |file: &PathBuf| fs::read(file).ok().and_then(|bytes| Known::of(&bytes)).map(|known| known.name);
+    let wanted = KNOWN.iter().filter(|known| known.task == task);
+    let mut found = wanted.filter_map(|wanted| files.iter().find(|file| known(file) == Some(wanted.name)));
+    Ok(found
+        .next()
+        .ok_or_else(|| format!("{}: no known network for --depth {}", folder.display(), task.name()))?
+        .clone())
+}
+
+/// Processor time of all threads so far.
+fn processor_ms() -> Result<f64, Box<dyn std::error::Error>> {
+    let line = fs::read_to_string("/proc/self/stat")?;
+    // Behind the name in brackets, which may hold anything: fields 14 and 15 are user and system time.
+    let fields = line.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().skip(11).take(2);
+    Ok(fields.map(|field| field.parse::<f64>().unwrap_or(0.0)).sum::<f64>() * TICK_MS)
+}
