@@ -22,6 +22,8 @@ use image::imageops::{FilterType, resize};
 
 /// Frames of the sequence that are shown, forth and back.
 const FRAMES: usize = 24;
+/// What is behind the person of the sequence is farther than this.
+const BEHIND_M: f32 = 1.8;
 /// The kernel counts processor time in these.
 const TICK_MS: f64 = 10.0;
 
@@ -33,7 +35,7 @@ struct Options {
     /// What runs networks
     #[arg(long, default_value = "auto")]
     network_runtime: Runtime,
-    /// Only sources whose names begin so
+    /// Only this source
     #[arg(long, default_value = "")]
     only: String,
     /// Columns and rows
@@ -81,7 +83,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
     };
     let mut cases = Vec::new();
     for name in ["matte", "mono", "matte,mono", "plate", "plate,matte", "plate,matte,mono"] {
-        if !name.starts_with(&options.only) {
+        if !options.only.is_empty() && name != options.only {
             continue;
         }
         let has = |task: &str| name.split(',').any(|part| part == task);
@@ -142,6 +144,10 @@ fn pictures(data: &Path, size: (u32, u32)) -> Result<(Vec<ColorImage>, ColorImag
             }
         }
         pictures.push(enlarged(&color, size));
+    }
+    // What nobody ever saw is as beside it.
+    for at in (1..farthest_m.len()).filter(|&at| farthest_m[at] < BEHIND_M) {
+        plate.rgb.copy_within(3 * (at - 1)..3 * at, 3 * at);
     }
     Ok((pictures, enlarged(&plate, size)))
 }

@@ -79,18 +79,7 @@ impl Contrast {
         for k in [0, 3, 5] {
             spread[k] += SHRINKAGE / 3.0 * trace + QUANTISATION;
         }
-        Self::across(surfaces, inverse(&spread))
-    }
-
-    /// Of the same near surface, and of one behind whose light is known but for noise.
-    #[inline(always)]
-    pub(super) fn before(&self, light: [f32; 3]) -> Self {
-        let [near, far] = self.surfaces;
-        Self::across([near, Color { mean: light, ..far }], self.inverse)
-    }
-
-    fn across(surfaces: [Color; 2], inverse: Symmetric) -> Self {
-        let [near, far] = &surfaces;
+        let inverse = inverse(&spread);
         let discriminant = Discriminant::new(near.mean, &inverse, far.mean);
         Self { surfaces, discriminant, inverse }
     }
@@ -124,24 +113,34 @@ impl Contrast {
     /// darker than black, or brighter than white.
     pub(super) fn difference(&self, own: [f32; 3], share: f32) -> [f32; 3] {
         let [near, far] = &self.surfaces;
-        let rest = 1.0 - share;
-        let mut spread: Symmetric =
-            std::array::from_fn(|k| share * share * near.covariance[k] + rest * rest * far.covariance[k]);
-        let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
-        for k in [0, 3, 5] {
-            spread[k] += floor;
-        }
-        let residual = std::array::from_fn(|p| own[p] - share * near.mean[p] - rest * far.mean[p]);
-        let step = times(&inverse(&spread), residual);
-        let (of_near, of_far) = (times(&near.covariance, step), times(&far.covariance, step));
-        let (up, down) = (rest.max(1e-3), share.max(1e-3));
-        std::array::from_fn(|p| {
-            let difference = near.mean[p] + share * of_near[p] - far.mean[p] - rest * of_far[p];
-            let most = ((1.0 - own[p]) / up).min(own[p] / down);
-            let least = -(own[p] / up).min((1.0 - own[p]) / down);
-            difference.clamp(least.min(0.0), most.max(0.0))
-        })
+        difference(near, far, own, share)
     }
+
+    /// The same where the light behind is known but for noise.
+    pub(super) fn difference_before(&self, light: [f32; 3], own: [f32; 3], share: f32) -> [f32; 3] {
+        let [near, far] = &self.surfaces;
+        difference(near, &Color { mean: light, ..*far }, own, share)
+    }
+}
+
+fn difference(near: &Color, far: &Color, own: [f32; 3], share: f32) -> [f32; 3] {
+    let rest = 1.0 - share;
+    let mut spread: Symmetric =
+        std::array::from_fn(|k| share * share * near.covariance[k] + rest * rest * far.covariance[k]);
+    let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
+    for k in [0, 3, 5] {
+        spread[k] += floor;
+    }
+    let residual = std::array::from_fn(|p| own[p] - share * near.mean[p] - rest * far.mean[p]);
+    let step = times(&inverse(&spread), residual);
+    let (of_near, of_far) = (times(&near.covariance, step), times(&far.covariance, step));
+    let (up, down) = (rest.max(1e-3), share.max(1e-3));
+    std::array::from_fn(|p| {
+        let difference = near.mean[p] + share * of_near[p] - far.mean[p] - rest * of_far[p];
+        let most = ((1.0 - own[p]) / up).min(own[p] / down);
+        let least = -(own[p] / up).min((1.0 - own[p]) / down);
+        difference.clamp(least.min(0.0), most.max(0.0))
+    })
 }
 
 /// What the depth map says of a pixel at an edge.

@@ -10,6 +10,8 @@ const BRIGHT: f32 = MOST - 8.0;
 /// Bins of the histogram of ratios, and how many there are to a factor of two.
 const BINS: usize = 512;
 const PER_OCTAVE: f32 = 128.0;
+/// One pixel in so many tells enough of a gain.
+const SAMPLED: usize = 3;
 /// So much of the pixels, at least, show the background, or there is nothing to learn from.
 const LEAST: usize = 12;
 /// A gain moves by this share towards that of a frame, and at once if it is further away than [`JUMP`].
@@ -103,14 +105,15 @@ impl Aligner {
         self.bins.clear();
         self.bins.resize(BINS, 0);
         let mut count = 0;
-        for ((now, plate), _) in now.iter().zip(&self.shifted).zip(foreign).filter(|(_, foreign)| !**foreign) {
+        let all = now.iter().zip(&self.shifted).zip(foreign).step_by(SAMPLED);
+        for ((now, plate), _) in all.filter(|(_, foreign)| !**foreign) {
             if now[p].min(plate[p]) > DARK && now[p].max(plate[p]) < BRIGHT {
                 let bin = (now[p] / plate[p]).log2() * PER_OCTAVE + BINS as f32 / 2.0;
                 self.bins[(bin as usize).min(BINS - 1)] += 1;
                 count += 1;
             }
         }
-        if count < foreign.len() / LEAST {
+        if count < foreign.len() / SAMPLED / LEAST {
             return None;
         }
         let mut below = 0;

@@ -50,6 +50,29 @@ pub struct Part {
     pub end: usize,
 }
 
+/// How far values of a row, three a pixel, are from those of the plate: half a pixel of what is `beside` it (above and below;
+/// left and right are in `own`) is no difference, as nothing stands that still. Values of the plate times `gain`.
+fn differences(now: &[f32], own: &[f32], beside: [&[f32]; 2], gain: &[f32], off: &mut [f32]) {
+    let count = off.len();
+    let off_at = |value: f32, own: f32, around: [f32; 4], gain: f32| {
+        let halves = around.map(|beside| 0.5 * (own + beside));
+        let low = halves.into_iter().fold(own, f32::min);
+        let high = halves.into_iter().fold(own, f32::max);
+        // What is cut off at white is at least as bright.
+        ((gain * low).min(MOST) - value).max(value - (gain * high).min(MOST))
+    };
+    let [above, below] = beside.map(|row| &row[..count]);
+    let (now, own, gain) = (&now[..count], &own[..count], &gain[..count]);
+    for k in 3..count.max(6) - 3 {
+        off[k] = off_at(now[k], own[k], [own[k - 3], own[k + 3], above[k], below[k]], gain[k]);
+    }
+    // At both ends there is nothing on one side.
+    for k in (0..count.min(3)).chain(count.saturating_sub(3).max(3)..count) {
+        let (left, right) = (own[if k < 3 { k } else { k - 3 }], own[if k + 3 < count { k + 3 } else { k }]);
+        off[k] = off_at(now[k], own[k], [left, right, above[k], below[k]], gain[k]);
+    }
+}
+
 /// Whether any of the flags up to so many columns or rows away is set.
 fn dilate(flags: &[bool], (width, height): (usize, usize), reach: usize, wide: &mut Vec<bool>) {
     wide.clear();
@@ -73,6 +96,9 @@ fn dilate(flags: &[bool], (width, height): (usize, usize), reach: usize, wide: &
 #[derive(Debug, Default)]
 pub struct Subject {
     labels: Vec<Label>,
+    /// Of a row, three values a pixel: the gain, and how far each is from the plate's.
+    line: Vec<f32>,
+    off: Vec<f32>,
     /// How bright a pixel is beside its plate.
     ratios: Vec<f32>,
     seen: Vec<bool>,
@@ -129,31 +155,26 @@ impl Subject {
         self.labels.clear();
         self.ratios.clear();
         self.foreign.resize(now.len(), false);
+        let (now, plate) = (now.as_flattened(), plate.as_flattened());
+        let line = 3 * width;
+        self.line.clear();
+        self.line.extend((0..width).flat_map(|_| gain));
+        self.off.resize(line, 0.0);
         for y in 0..height {
-            let (above, below) = (y.saturating_sub(1) * width, (y + 1).min(height - 1) * width);
+            let row = |y: usize| &plate[y * line..][..line];
+            let (own, values) = (row(y), &now[y * line..][..line]);
+            let beside = [row(y.saturating_sub(1)), row((y + 1).min(height - 1))];
+            differences(values, own, beside, &self.line, &mut self.off);
             for x in 0..width {
-                let at = y * width + x;
-                let around =
-                    [y * width + x.saturating_sub(1), y * width + (x + 1).min(width - 1), above + x, below + x];
-                let (mut most, mut sums) = (0.0f32, [0.0f32; 2]);
-                for p in 0..3 {
-                    // Half a pixel of what is beside it is no difference: nothing stands that still.
-                    let (mut low, mut high) = (plate[at][p], plate[at][p]);
-                    for beside in around {
-                        let half = 0.5 * (plate[at][p] + plate[beside][p]);
-                        (low, high) = (low.min(half), high.max(half));
-                    }
-                    // What is cut off at white is at least as bright.
-                    let (low, high) = ((gain[p] * low).min(MOST), (gain[p] * high).min(MOST));
-                    let value = now[at][p];
-                    most = most.max((low - value).max(value - high));
-                    sums = [sums[0] + value, sums[1] + gain[p] * plate[at][p]];
-                }
-                let ratio = (sums[0] + 1.0) / (sums[1] + 1.0);
+                let (at, of) = (y * width + x, 3 * x..3 * x + 3);
+                let (values, off) = (&values[of.clone()], &self.off[of.clone()]);
+                let exposed: [f32; 3] = std::array::from_fn(|p| gain[p] * own[3 * x + p]);
+                let ratio = (values.iter().sum::<f32>() + 1.0) / (exposed.iter().sum::<f32>() + 1.0);
                 self.ratios.push(ratio);
+                let most = off[0].max(off[1]).max(off[2]).max(0.0);
                 let stays = if self.foreign[at] { STAYS } else { 1.0 };
                 let is_shade = || {
-                    let off = (0..3).map(|p| (now[at][p] - ratio * gain[p] * plate[at][p]).abs());
+                    let off = values.iter().zip(exposed).map(|(value, exposed)| (value - ratio * exposed).abs());
                     (DARKEST_SHADOW..1.0).contains(&ratio) && off.fold(0.0, f32::max) < SHADE
                 };
                 self.labels.push(match most {

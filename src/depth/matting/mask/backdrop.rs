@@ -14,12 +14,16 @@ pub struct Backdrop<'a> {
 }
 
 impl Backdrop<'_> {
-    /// The light behind a pixel; beyond its edges, it is as there.
+    /// The light behind the pixels of a row; beyond the picture's edges, it is as there.
     #[inline(always)]
-    pub fn light_at(&self, x: usize, y: usize) -> [f32; 3] {
-        let place = |at: usize, shift: isize, count: u32| at.saturating_add_signed(-shift).min(count as usize - 1);
-        let (x, y) = (place(x, self.shift_px[0], self.color.width), place(y, self.shift_px[1], self.color.height));
-        let at = 3 * (y * self.color.width as usize + x);
-        [0, 1, 2].map(|p| self.light[p][usize::from(self.color.rgb[at + p])])
+    pub fn row(&self, y: usize) -> impl Fn(usize) -> [f32; 3] {
+        let place = |at: usize, shift: isize, count: usize| at.saturating_add_signed(-shift).min(count - 1);
+        let (width, height) = (self.color.width as usize, self.color.height as usize);
+        let row = &self.color.rgb[3 * width * place(y, self.shift_px[1], height)..][..3 * width];
+        let (light, shift) = (self.light, self.shift_px[0]);
+        move |x| {
+            let at = 3 * place(x, shift, width);
+            [0, 1, 2].map(|p| light[p][usize::from(row[at + p])])
+        }
     }
 }

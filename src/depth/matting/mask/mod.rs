@@ -180,6 +180,7 @@ impl View<'_> {
         let at = |row: usize, column: usize| contrasts[row * self.across + column].as_ref();
         for y in self.rows_of(row) {
             let (mask_at, down) = (self.shares_in(y), self.cells_around(y, self.down));
+            let behind = self.backdrop.map(|backdrop| backdrop.row(y));
             let xs = self.columns_of(column);
             let middle = (xs.start + self.cell_px / 2).min(xs.end);
             for xs in [xs.start..middle, middle..xs.end] {
@@ -201,13 +202,13 @@ impl View<'_> {
                     let place = y * self.color.width as usize + x;
                     let (mask, light) = (mask_at(x), self.light_at(place));
                     let along = self.cells_around(x, self.across).share;
-                    let share = match (self.backdrop, &lines, &fronts, &slice) {
+                    let share = match (&behind, &lines, &fronts, &slice) {
                         (None, Some(lines), _, Some(slice)) => {
                             slice.share(mask, Discriminant::of(lines.between(along), 1.0).share(light))
                         }
                         // Where it is known what is behind, the surfaces differ in another way at every pixel.
-                        (Some(backdrop), _, Some(fronts), _) => {
-                            let own = Discriminant::before(fronts.between(along), backdrop.light_at(x, y));
+                        (Some(behind), _, Some(fronts), _) => {
+                            let own = Discriminant::before(fronts.between(along), behind(x));
                             posterior.slice(own.precision).share(mask, own.share(light))
                         }
                         _ => mask,
@@ -256,6 +257,7 @@ impl View<'_> {
         shares: &[f32],
         map: &mut DepthMap,
     ) {
+        let backdrop = self.backdrop.map(|backdrop| backdrop.row(y));
         for x in xs {
             let at = y * self.color.width as usize + x;
             let share = match shares[at] {
@@ -272,9 +274,9 @@ impl View<'_> {
                 continue;
             }
             let own = self.light_at(at);
-            let (behind, difference) = match (self.backdrop.map(|backdrop| backdrop.light_at(x, y)), contrast) {
+            let (behind, difference) = match (backdrop.as_ref().map(|behind| behind(x)), contrast) {
                 (Some(light), _) if is_pure => (1.0, std::array::from_fn(|p| (own[p] - light[p]) / share)),
-                (Some(light), Some(contrast)) => (1.0, contrast.before(light).difference(own, share)),
+                (Some(light), Some(contrast)) => (1.0, contrast.difference_before(light, own, share)),
                 (None, Some(contrast)) => (1.0 - share, contrast.difference(own, share)),
                 (_, None) => (1.0 - share, [0.0; 3]),
             };
@@ -286,10 +288,10 @@ impl View<'_> {
     /// Gives pixels that are covered what is known to be behind them.
     #[inline(always)]
     fn reveal(&self, backdrop: &Backdrop, (xs, y): (Range<usize>, usize), map: &mut DepthMap) {
-        let row = y * self.color.width as usize;
+        let (row, behind) = (y * self.color.width as usize, backdrop.row(y));
         let metres = &map.metres[row..];
         map.matte.pixels.extend(xs.map(|x| {
-            let (own, light) = (self.light_at(row + x), backdrop.light_at(x, y));
+            let (own, light) = (self.light_at(row + x), behind(x));
             let difference = std::array::from_fn(|p| own[p] - light[p]);
             let (at, near_m, far_m) = ((row + x) as u32, SUBJECT_M, metres[x]);
             MixedPixel { at, near_m, far_m, share: 1.0, behind: 1.0, difference }
