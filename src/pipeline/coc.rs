@@ -111,6 +111,7 @@ impl CocMaker {
                 Finisher::Refine { refiner, .. } => {
                     refiner.set_focus(focus_m);
                     refiner.refine(map, color, time_ns);
+                    map.is_smooth = false;
                 }
             }
             self.find_matte(map, color, &field);
@@ -120,7 +121,8 @@ impl CocMaker {
 
     /// Gives a map the matte of a picture. A map that several frames share needs that of each.
     pub fn find_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
-        if let CocField::Depth(lens) = field {
+        map.matte.pixels.clear();
+        if let (CocField::Depth(lens), false) = (field, map.is_smooth) {
             self.matting.find(map, color, lens.inverse_depth_of_px(matting::FROM_PX));
         }
     }

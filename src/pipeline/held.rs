@@ -66,7 +66,7 @@ fn own(light: &[f32; 256], color: &ColorImage, pixel: &MixedPixel) -> [f32; 3] {
 fn copy(from: &DepthMap, to: &mut DepthMap) {
     to.resize(from.width, from.height);
     to.metres.copy_from_slice(&from.metres);
-    to.subject_m = from.subject_m;
+    (to.subject_m, to.is_smooth) = (from.subject_m, from.is_smooth);
 }
 
 #[cfg(test)]

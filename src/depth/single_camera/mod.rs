@@ -172,6 +172,7 @@ impl DepthSource for SingleCamera {
         }
         // Without a mask there is a subject only where there was to be one, and then nothing is in focus.
         map.subject_m = (self.has_subject || relief.is_none()).then_some(SUBJECT_M);
+        map.is_smooth = map.subject_m.is_none();
         if let Some(person) = &person {
             let mask = if relief.is_some() { held.mask() } else { person.mask() };
             matting.find(mask, color, None, map);
