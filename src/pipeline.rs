@@ -23,7 +23,7 @@ pub mod still;
 mod view;
 mod wanted;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread::{self, Scope, ScopedJoinHandle};
 
@@ -216,6 +216,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         clock: &clock,
         times: decode,
     };
+    let blur_ns = AtomicU64::new(0);
     let depth = depth::Stage {
         // Without a blur nobody asks for depth.
         look: if executor.is_some() { run.look } else { Look::plain(Effect::None) },
@@ -223,7 +224,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         measured: run.measured,
         adaptive: run.adaptive,
         changes: run.changes,
-        rate: live_ns.map(|_| rate::Rate::new(run.budget_ns / 2, source.as_ref().map_or(&[1.0], |s| s.efforts()))),
+        rate: live_ns
+            .map(|_| rate::Rate::new(run.budget_ns, &blur_ns, source.as_ref().map_or(&[1.0], |s| s.efforts()))),
         source,
         source_name: &info.name,
         keep_going: run.keep_going,
@@ -237,6 +239,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let blur = blur::Stage {
         executor,
         late: live_ns.map(quality::LateRule::new),
+        usual_ns: &blur_ns,
         picker: quality::Picker::new(quality, finest, run.budget_ns, live_ns),
         rule: quality,
         about: &mut about,

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::depth::Ready;
 use super::quality::{LateRule, Picker};
@@ -36,6 +37,8 @@ pub(super) struct Stage<'a> {
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     pub picker: Picker,
+    /// Told how long frames usually take.
+    pub usual_ns: &'a AtomicU64,
     /// At which rung the executor blurs.
     pub rule: QualityRule,
     /// Told when the executor goes over to another backend.
@@ -218,6 +221,7 @@ impl Stage<'_> {
         // Where frames overlap, wall time says nothing of a single one.
         let took_ns = if capacity > 1 { in_passes_ns } else { blur_ns };
         self.picker.note(done.quality, took_ns, now_ns);
+        self.usual_ns.store(self.picker.usual_ns().unwrap_or(0), Ordering::Relaxed);
         blur_ns
     }
 }

@@ -46,7 +46,7 @@ pub(super) struct Stage<'a> {
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     /// How well and how often depth is made; `None` makes it as well as can be, for every frame.
-    pub rate: Option<Rate>,
+    pub rate: Option<Rate<'a>>,
     pub times: &'a mut Histogram,
     /// Notices depth that is not registered to the colours.
     pub check: RegistrationCheck,

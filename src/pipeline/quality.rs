@@ -11,6 +11,14 @@ const DEADLINE_TENTHS: u64 = 8;
 /// Frames whose ages are remembered: three seconds at 30 fps.
 const AGES: usize = 90;
 
+/// The first frames are old, as all that makes them is made then.
+const WARMING_UP: usize = 8;
+
+/// So long after its capture, the blur of a frame is to be done.
+pub(super) fn deadline_ns(period_ns: u64) -> u64 {
+    DEADLINE_PERIODS * period_ns * DEADLINE_TENTHS / 10
+}
+
 /// Picks the quality of each frame by the time there is.
 pub(super) struct Picker {
     /// The rungs to pick from, cheapest first.
@@ -18,6 +26,8 @@ pub(super) struct Picker {
     governor: Governor,
     budget_ns: u64,
     deadline_ns: Option<u64>,
+    /// Frames that were begun, up to [`WARMING_UP`].
+    begun: usize,
     /// Ages of the last frames when their blur began.
     ages: Window<AGES>,
 }
@@ -27,15 +37,15 @@ impl Picker {
     /// blurred more finely than `finest` unless that was asked for.
     pub(super) fn new(rule: QualityRule, finest: Quality, budget_ns: u64, period_ns: Option<u64>) -> Self {
         let (rungs, governor) = Self::rungs_and_governor(rule, finest);
-        let deadline_ns = period_ns.map(|period_ns| DEADLINE_PERIODS * period_ns * DEADLINE_TENTHS / 10);
-        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default() }
+        let deadline_ns = period_ns.map(deadline_ns);
+        Self { rungs, governor, budget_ns, deadline_ns, begun: 0, ages: Window::default() }
     }
 
     /// The same under another rule, for another executor. What was learnt of the time that rungs take holds no more.
     pub(super) fn with(&self, rule: QualityRule, finest: Quality) -> Self {
         let (rungs, governor) = Self::rungs_and_governor(rule, finest);
         let &Self { budget_ns, deadline_ns, .. } = self;
-        Self { rungs, governor, budget_ns, deadline_ns, ages: Window::default() }
+        Self { rungs, governor, budget_ns, deadline_ns, begun: 0, ages: Window::default() }
     }
 
     /// The qualities that `rule` allows, cheapest first, and a governor that climbs them.
@@ -59,9 +69,21 @@ impl Picker {
         self.governor.expected_ns().unwrap_or(0)
     }
 
+    /// How long a frame of the default quality is likely to take, or of the finest one below it that there is; `None` before
+    /// anything is known.
+    pub(super) fn usual_ns(&self) -> Option<u64> {
+        let usual = self.rungs.iter().rposition(|&rung| rung <= Quality::default()).unwrap_or(0);
+        let costs = self.governor.costs();
+        let ns = self.governor.expected_ns()? as f64 * costs[usual] / costs[self.governor.rung()];
+        Some(ns as u64)
+    }
+
     /// The blur of a frame of this age begins.
     pub(super) fn begin(&mut self, age_ns: u64) {
-        self.ages.push(age_ns as f64);
+        self.begun = (self.begun + 1).min(WARMING_UP);
+        if self.begun == WARMING_UP {
+            self.ages.push(age_ns as f64);
+        }
     }
 
     /// A frame of this quality took so long, and was done at `at_ns`.

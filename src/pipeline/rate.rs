@@ -1,17 +1,25 @@
 //! With how much effort depth is made, and how many frames share a map: the ladder of the depth stage.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use super::held::Held;
+use super::quality::deadline_ns;
 use crate::budget::{Governor, Sample};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
 /// Picks what there is time for: where time is short, depth is first made with less effort, if its source has a choice,
 /// then for every second or third frame only, and the others take it over.
-pub(super) struct Rate {
+///
+/// Depth comes before a finer blur than usual, and after the usual one: it may take what that leaves of the time until a
+/// frame is due, half of its period at least.
+pub(super) struct Rate<'a> {
     /// Cheapest first.
     rungs: Vec<Rung>,
     governor: Governor,
-    budget_ns: u64,
+    period_ns: u64,
+    /// How long the blur usually takes; 0 before that is known.
+    blur_ns: &'a AtomicU64,
     /// Frames since depth was made, that one included.
     age: usize,
     /// The CoC of the last depth, while later frames may share both.
@@ -27,16 +35,31 @@ struct Rung {
     effort: usize,
 }
 
-impl Rate {
-    /// Depth may take `budget_ns` of a frame's time, on average. `efforts` are the costs of its source's efforts, the
-    /// finest, 1, at the end.
-    pub(super) fn new(budget_ns: u64, efforts: &[f64]) -> Self {
+/// This part of a period goes by before depth is begun, and between the stages.
+const LOST: u64 = 4;
+
+impl<'a> Rate<'a> {
+    /// A frame has `period_ns`, of which its blur will usually take `blur_ns`. `efforts` are the costs of the source's
+    /// efforts, the finest, 1, at the end.
+    pub(super) fn new(period_ns: u64, blur_ns: &'a AtomicU64, efforts: &[f64]) -> Self {
         let cheapest = efforts.first().copied().unwrap_or(1.0);
         let shared = [3, 2].map(|frames| (Rung { frames, effort: 0 }, cheapest / frames as f64));
         let unshared = efforts.iter().enumerate().map(|(effort, &cost)| (Rung { frames: 1, effort }, cost));
         let (rungs, costs): (Vec<Rung>, Vec<f64>) = shared.into_iter().chain(unshared).unzip();
         let governor = Governor::new(&costs, costs.len() - 1);
-        Self { rungs, governor, budget_ns, age: 0, last: None, held: Held::new() }
+        Self { rungs, governor, period_ns, blur_ns, age: 0, last: None, held: Held::new() }
+    }
+
+    /// What depth may take of a frame's time, on average.
+    fn allowed_ns(&self) -> u64 {
+        let half_ns = self.period_ns / 2;
+        match self.blur_ns.load(Ordering::Relaxed) {
+            0 => half_ns,
+            // One thread makes depth: it never has more than the period.
+            blur_ns => (deadline_ns(self.period_ns) - self.period_ns / LOST)
+                .saturating_sub(blur_ns)
+                .clamp(half_ns, self.period_ns * 9 / 10),
+        }
     }
 
     /// The effort for the next depth.
@@ -72,7 +95,10 @@ impl Rate {
         self.age = 1;
         // Its share for each of the frames.
         let took_ns = took_ns / self.rung().frames as u64;
-        self.governor.note(Sample { rung: self.governor.rung(), took_ns, at_ns }, self.budget_ns);
+        // The first one takes longer than any other: its memory is allocated then.
+        if !self.held.is_empty() {
+            self.governor.note(Sample { rung: self.governor.rung(), took_ns, at_ns }, self.allowed_ns());
+        }
         // The first one in any case: then the memory is allocated, and not during a later frame.
         if self.rung().frames > 1 || self.held.is_empty() {
             self.held.keep(map, color);
@@ -89,7 +115,13 @@ mod tests {
 
     /// Which frames of 200 are given the depth of the one before, where making it takes so long, and the last effort.
     fn run(took_ns: u64, efforts: &[f64]) -> (Vec<bool>, usize) {
-        let mut rate = Rate::new(16_000_000, efforts);
+        run_beside(0, took_ns, efforts)
+    }
+
+    /// The same beside a blur that usually takes so long.
+    fn run_beside(blur_ns: u64, took_ns: u64, efforts: &[f64]) -> (Vec<bool>, usize) {
+        let blur_ns = AtomicU64::new(blur_ns);
+        let mut rate = Rate::new(32_000_000, &blur_ns, efforts);
         let map = DepthMap::new(2, 2);
         let frame = |now_ns| {
             if rate.holds().is_some() {
@@ -111,6 +143,17 @@ mod tests {
             let made: Vec<usize> = (20..200).filter(|&frame| !held[frame]).collect();
             assert!(made.windows(2).all(|pair| pair[1] - pair[0] == every), "{took_ms} ms: {made:?}");
             assert_eq!(effort, 0);
+        }
+    }
+
+    #[test]
+    fn depth_has_what_the_blur_leaves() {
+        let ms = 1_000_000;
+        for (blur_ms, took_ms, all) in
+            [(10, 26, true), (10, 40, false), (30, 26, false), (100, 14, true), (100, 20, false)]
+        {
+            let (held, _) = run_beside(blur_ms * ms, took_ms * ms, &[1.0]);
+            assert_eq!(held[20..].iter().all(|held| !held), all, "{took_ms} ms beside {blur_ms} ms");
         }
     }
 
