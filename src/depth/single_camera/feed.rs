@@ -137,12 +137,20 @@ impl Feed {
         }
     }
 
-    /// Shows it a picture.
+    /// Shows it a picture, and runs it.
+    ///
+    /// # Errors
+    /// As for [`Self::answer`].
+    pub fn see(&mut self, color: &ColorImage) -> Result<Answer<'_>, String> {
+        self.show(color);
+        self.answer()
+    }
+
+    /// Runs it on the picture that it was shown.
     ///
     /// # Errors
     /// What the runtime says, or the answer is no picture of finite numbers.
-    pub fn see(&mut self, color: &ColorImage) -> Result<Answer<'_>, String> {
-        self.shrink(color);
+    pub fn answer(&mut self) -> Result<Answer<'_>, String> {
         self.network.run(&self.inputs, &mut self.outputs)?;
         for &(input, output) in &self.memory {
             std::mem::swap(&mut self.inputs[input], &mut self.outputs[output]);
@@ -155,7 +163,8 @@ impl Feed {
         }
     }
 
-    fn shrink(&mut self, color: &ColorImage) {
+    /// Shows it a picture, for [`Self::answer`].
+    pub fn show(&mut self, color: &ColorImage) {
         let (width, height) = self.size;
         self.scale.adapt((color.width as usize, color.height as usize), self.size);
         self.small.resize(3 * width, 0);

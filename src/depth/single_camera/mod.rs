@@ -4,6 +4,7 @@
 //! A person is one surface, in focus by default. What is as near and joined to them, as what they hold, is theirs; other
 //! people, further away, are not. With a mask alone, all else is infinitely far.
 
+mod aside;
 mod feed;
 mod held;
 mod person;
@@ -22,6 +23,7 @@ use super::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
 use super::plate::Companion;
 use super::tap::Tap;
 use super::{DepthError, DepthSource, Seen};
+use crate::compute::thread_pool::cores;
 use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::network::{self, Runtime, Task};
 
@@ -41,6 +43,8 @@ pub struct SingleCamera {
     matting: MaskMatting,
     /// As its place in [`EVERY`].
     effort: usize,
+    /// Whether pictures come in their own time: else what was seen of each does not depend on how fast this machine is.
+    is_live: bool,
     frames: u64,
     last_ns: Option<u64>,
     turn: Turn,
@@ -83,6 +87,7 @@ impl SingleCamera {
             spread: Spread::default(),
             matting: MaskMatting::default(),
             effort: EVERY.len() - 1,
+            is_live: false,
             frames: 0,
             last_ns: None,
             turn: Turn::default(),
@@ -124,7 +129,9 @@ impl SingleCamera {
             (persons, _) if !self.has_subject => (persons, persons),
             every => every,
         };
-        self.turn = Turn { persons: is_turn(for_persons), all: is_turn(for_all) };
+        // A room hardly moves; a picture after a break is another one. Outlines are those of their frame.
+        let aside = self.is_live && self.has_subject && !apart && cores() > 1;
+        self.turn = Turn { persons: is_turn(for_persons), all: is_turn(for_all), aside };
         self.frames += 1;
     }
 
@@ -138,9 +145,14 @@ impl SingleCamera {
     }
 }
 
-/// Lets the network for depth look, if it is its turn, around what `mask` has; one that fails is turned off.
-fn look_at_all(relief: &mut Option<Relief>, (name, is_turn): (&str, bool), color: &ColorImage, mask: Option<&Mask>) {
-    if let Some(Err(why)) = relief.as_mut().filter(|_| is_turn).map(|relief| relief.look(color, mask)) {
+/// Lets the network for depth look around what `mask` has, if it is its turn; one that fails is turned off.
+fn look_at_all(relief: &mut Option<Relief>, (name, turn): (&str, Turn), color: &ColorImage, mask: Option<&Mask>) {
+    let looked = relief.as_mut().map(|relief| match turn {
+        Turn { all: false, .. } => relief.take_in(false),
+        Turn { aside: true, .. } => relief.look_aside(color, mask),
+        Turn { aside: false, .. } => relief.look(color, mask),
+    });
+    if let Some(Err(why)) = looked {
         tracing::error!("{name}: the network for depth is turned off: {why}");
         *relief = None;
     }
@@ -151,6 +163,8 @@ fn look_at_all(relief: &mut Option<Relief>, (name, is_turn): (&str, bool), color
 struct Turn {
     persons: bool,
     all: bool,
+    /// Whether what it sees may be told some frames later.
+    aside: bool,
 }
 
 impl DepthSource for SingleCamera {
@@ -159,7 +173,7 @@ impl DepthSource for SingleCamera {
         self.look_for_persons(color);
         let Self { name, person, relief, held, spread, matting, turn, .. } = self;
         let mask = person.as_ref().map(Person::mask);
-        look_at_all(relief, (name, turn.all), color, mask);
+        look_at_all(relief, (name, *turn), color, mask);
         if let (Some(mask), Some(relief)) = (mask, &relief) {
             held.join(mask, relief);
         }
@@ -186,6 +200,8 @@ impl DepthSource for SingleCamera {
 
     fn set_effort(&mut self, effort: usize) {
         self.effort = effort.min(EVERY.len() - 1);
+        // Nobody saves effort but where time is short.
+        self.is_live = true;
     }
 }
 
@@ -197,7 +213,7 @@ impl Companion for SingleCamera {
     }
 
     fn measure_behind(&mut self, color: &ColorImage, mask: &Mask, map: &mut DepthMap) {
-        look_at_all(&mut self.relief, (&self.name, self.turn.all), color, Some(mask));
+        look_at_all(&mut self.relief, (&self.name, self.turn), color, Some(mask));
         if let Some(relief) = &self.relief {
             self.spread.over(relief.behind(), relief.size(), map);
         }

@@ -3,6 +3,7 @@
 //! Its numbers grow with nearness, in a scale and from a zero that wander from frame to frame. Two anchors of the picture
 //! itself do away with both: the subject, and what is farthest.
 
+use super::aside::Aside;
 use super::feed::Feed;
 use crate::depth::tap::nearest;
 use crate::frame::{ColorImage, Mask};
@@ -18,14 +19,33 @@ const NEAREST_BEHIND: f32 = 0.9;
 
 /// Nearness from frame to frame.
 pub struct Relief {
-    feed: Feed,
+    /// What was found last.
+    found: Found,
+    /// Away while the thread has it.
+    finder: Option<Box<Finder>>,
+    aside: Option<Aside<Box<Finder>>>,
+}
+
+/// How near everything in a picture is.
+#[derive(Default)]
+struct Found {
+    /// Columns and rows.
     size: (usize, usize),
     /// Relative inverse depth: 1 at the subject, 0 at what is farthest.
     nearness: Vec<f32>,
-    /// How far each is the subject's.
-    subject: Vec<f32>,
     /// The same of what is behind the subject.
     behind: Vec<f32>,
+}
+
+/// Finds it.
+struct Finder {
+    feed: Feed,
+    found: Found,
+    outcome: Result<(), String>,
+    /// The mask of the subject in the picture that was shown; nobody's where it is empty.
+    mask: Mask,
+    /// How far each is the subject's.
+    subject: Vec<f32>,
     known: Vec<f32>,
     spread: Vec<f32>,
     sorted: Vec<f32>,
@@ -34,32 +54,33 @@ pub struct Relief {
 
 impl Relief {
     pub fn new(feed: Feed) -> Self {
-        Self {
+        let finder = Finder {
             feed,
-            size: (0, 0),
-            nearness: Vec::new(),
+            found: Found::default(),
+            outcome: Ok(()),
+            mask: Mask::default(),
             subject: Vec::new(),
-            behind: Vec::new(),
             known: Vec::new(),
             spread: Vec::new(),
             sorted: Vec::new(),
             line: Vec::new(),
-        }
+        };
+        Self { found: Found::default(), finder: Some(Box::new(finder)), aside: None }
     }
 
     /// Columns and rows.
     pub fn size(&self) -> (usize, usize) {
-        self.size
+        self.found.size
     }
 
-    /// Relative inverse depth of the last picture, 1 at the subject and 0 at what is farthest.
+    /// Relative inverse depth of the picture that was seen last, 1 at the subject and 0 at what is farthest.
     pub fn nearness(&self) -> &[f32] {
-        &self.nearness
+        &self.found.nearness
     }
 
     /// The same, with the subject away: below 1.
     pub fn behind(&self) -> &[f32] {
-        &self.behind
+        &self.found.behind
     }
 
     /// Finds the nearness of all that a picture shows, the subject being what `mask` has, or else what is nearest.
@@ -67,24 +88,92 @@ impl Relief {
     /// # Errors
     /// As for [`Feed::see`].
     pub fn look(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
-        let answer = self.feed.see(color)?;
-        self.size = answer.size;
-        let pixels = answer.size.0 * answer.size.1;
-        self.nearness.clear();
-        self.nearness.extend((0..pixels).map(|pixel| answer.at(pixel, 0)));
-        self.subject.clear();
-        let subject = |at: usize| {
-            mask.map_or(0.0, |mask| mask.share[nearest(at, answer.size, (mask.width as usize, mask.height as usize))])
+        self.take_in(true)?;
+        let Some(mut finder) = self.finder.take() else { return Ok(()) };
+        finder.show(color, mask);
+        finder.find();
+        self.take_back(finder)
+    }
+
+    /// The same in a thread of its own, once anything was found: [`Self::take_in`] has it later. Nothing is begun while
+    /// another picture is under way.
+    ///
+    /// # Errors
+    /// As for [`Feed::see`].
+    pub fn look_aside(&mut self, color: &ColorImage, mask: Option<&Mask>) -> Result<(), String> {
+        if self.found.nearness.is_empty() {
+            return self.look(color, mask);
+        }
+        self.take_in(false)?;
+        let Some(mut finder) = self.finder.take() else { return Ok(()) };
+        finder.show(color, mask);
+        if self.aside.is_none() {
+            self.aside = Aside::new("inference", |finder: &mut Box<Finder>| finder.find());
+        }
+        let given = match &self.aside {
+            Some(aside) => aside.give(finder),
+            None => Err(finder),
         };
-        self.subject.extend((0..pixels).map(subject));
+        given.or_else(|mut finder| {
+            finder.find();
+            self.take_back(finder)
+        })
+    }
+
+    /// Takes in what the thread has found, or will have with `wait`.
+    ///
+    /// # Errors
+    /// As for [`Feed::see`].
+    pub fn take_in(&mut self, wait: bool) -> Result<(), String> {
+        match self.aside.as_ref().filter(|_| self.finder.is_none()).map(|aside| aside.take(wait)).transpose()? {
+            Some(Some(finder)) => self.take_back(finder),
+            _ => Ok(()),
+        }
+    }
+
+    fn take_back(&mut self, mut finder: Box<Finder>) -> Result<(), String> {
+        let outcome = std::mem::replace(&mut finder.outcome, Ok(()));
+        if outcome.is_ok() {
+            std::mem::swap(&mut self.found, &mut finder.found);
+        }
+        self.finder = Some(finder);
+        outcome
+    }
+}
+
+impl Finder {
+    fn show(&mut self, color: &ColorImage, mask: Option<&Mask>) {
+        self.feed.show(color);
+        match mask {
+            Some(mask) => self.mask.clone_from(mask),
+            None => self.mask.resize(0, 0),
+        }
+    }
+
+    fn find(&mut self) {
+        let Self { feed, found: Found { size, nearness, .. }, mask, subject, outcome, .. } = self;
+        let answer = match feed.answer() {
+            Ok(answer) => answer,
+            Err(why) => {
+                *outcome = Err(why);
+                return;
+            }
+        };
+        *size = answer.size;
+        let pixels = answer.size.0 * answer.size.1;
+        nearness.clear();
+        nearness.extend((0..pixels).map(|pixel| answer.at(pixel, 0)));
+        subject.clear();
+        let of_mask = (mask.width as usize, mask.height as usize);
+        let share = |at: usize| if of_mask.0 == 0 { 0.0 } else { mask.share[nearest(at, answer.size, of_mask)] };
+        subject.extend((0..pixels).map(share));
         self.measure();
         self.look_behind();
-        Ok(())
     }
 
     /// Scales the network's numbers by the two anchors.
     fn measure(&mut self) {
-        let Self { nearness, subject: shares, sorted, .. } = self;
+        let Self { found: Found { nearness, .. }, subject: shares, sorted, .. } = self;
         let mut anchor = |share: f32, counts: &dyn Fn(usize) -> bool| {
             sorted.clear();
             sorted.extend(nearness.iter().enumerate().filter(|(at, _)| counts(*at)).map(|(_, &value)| value));
@@ -96,13 +185,13 @@ impl Relief {
         let subject = anchor(0.5, &person).or_else(|| anchor(1.0 - OUTLIERS, &|_| true));
         let (Some(farthest), Some(subject)) = (farthest, subject) else { return };
         let scale = 1.0 / (subject - farthest).max(1e-6);
-        self.nearness.iter_mut().for_each(|value| *value = (*value - farthest) * scale);
+        nearness.iter_mut().for_each(|value| *value = (*value - farthest) * scale);
     }
 
     /// What is around the subject, carried on behind it.
     fn look_behind(&mut self) {
-        let size = self.size;
-        let Self { nearness, subject, behind, known, spread, line, .. } = self;
+        let Self { found: Found { size, nearness, behind }, subject, known, spread, line, .. } = self;
+        let size = *size;
         behind.clone_from(nearness);
         if subject.iter().all(|&share| share < 0.5) {
             return;
