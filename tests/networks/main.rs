@@ -10,6 +10,7 @@ mod window;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::Duration;
 
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, Seen};
@@ -93,6 +94,28 @@ fn a_coarse_mask_becomes_the_share_of_every_pixel() {
         let red = pixel.difference[0];
         assert!((0.7..1.0).contains(&red), "{pixel:?}");
     }
+}
+
+/// Live, a network for depth may take longer than a frame: what it saw is told some frames later, and is the same.
+#[test]
+fn what_is_seen_aside_is_what_is_seen_at_once() {
+    let folder = TempDir::new().unwrap();
+    let person = written(&folder, "matte.onnx", &matte(32, 24, WEIGHTS, 0.0));
+    // Blue is nearer than red.
+    let depth = written(&folder, "mono.onnx", &matte(32, 24, [-1.0, 0.0, 1.0], 0.0));
+    let open = || SingleCamera::open(Some(&person), Some(&depth), &Hints::default(), Runtime::BuiltIn).unwrap();
+    let [(first, _), (second, _)] = [100.0, 220.0].map(|x| disc(320, 240, (x, 118.0), 60.0));
+    let (mut at_once, mut live) = (open(), open());
+    let finest = live.efforts().len() - 1;
+    live.set_effort(finest);
+    assert!(read(&mut live, &first, 0) == read(&mut at_once, &first, 0), "the first one has its own depth");
+    // By then undecided pixels have settled.
+    let expected = (1..200).map(|frame| read(&mut at_once, &second, frame)).last();
+    let is_there = (1..2000).any(|frame| {
+        std::thread::sleep(Duration::from_millis(1));
+        Some(read(&mut live, &second, frame)) == expected
+    });
+    assert!(is_there, "the thread never told");
 }
 
 #[test]
