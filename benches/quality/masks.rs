@@ -11,6 +11,7 @@ use bokehcam::budget::Quality;
 use bokehcam::color::light_of_codes;
 use bokehcam::depth::matting::mask::{Backdrop, FAR_M, MaskMatting, SUBJECT_M};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, luma_of};
+use bokehcam::optics::DepthCoc;
 use serde::Serialize;
 
 use super::lens::{Scene, Surface};
@@ -19,7 +20,7 @@ use super::metrics;
 use super::picture::{Plane, Rgb, decode, encode};
 use super::rivals::smoothed;
 use super::texture::Dice;
-use super::truth::Views;
+use super::truth::{Views, depth};
 
 /// Columns and rows of the mask.
 const SIZE: (usize, usize) = (256, 144);
@@ -60,6 +61,8 @@ impl Portrait {
 struct Given {
     mask: Mask,
     behind: ColorImage,
+    /// Depth of what is behind, the subject's being [`SUBJECT_M`].
+    behind_m: Vec<f32>,
 }
 
 /// A way to get the share of every pixel.
@@ -71,17 +74,26 @@ type Refine = fn(&Given, &ColorImage) -> Plane<f32>;
 /// This crate's executor failed.
 pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<Portrait>, BokehError> {
     let truth = coverage(scene);
-    let given = Given { mask: as_network(&truth), behind: encode(&without_subject(scene).pinhole()) };
+    let background = without_subject(scene);
+    let DepthCoc { coc_at_infinity_px, focus_m, .. } = views.shot.lens;
+    let behind_m = depth(&background.coc(), coc_at_infinity_px).metres;
+    let given = Given {
+        mask: as_network(&truth),
+        behind: encode(&background.pinhole()),
+        behind_m: behind_m.iter().map(|metres| metres * SUBJECT_M / focus_m).collect(),
+    };
     let band = band(&given, &truth);
     let edges = metrics::edge_band(&views.coc_px);
     let behind_px = behind_px(views, &truth);
     let noisy: Vec<ColorImage> = (0..FRAMES).map(|frame| with_noise(&views.shot.image, NOISE_CODES, frame)).collect();
-    let ways: [(&str, Refine); 5] = [
+    let ways: [(&str, Refine); 7] = [
         ("upscaled", upscaled),
         ("threshold", threshold),
         ("guided", guided),
         ("bokehcam", |given, image| ours(given, None, image)),
         ("with plate", |given, image| ours(given, Some(&given.behind), image)),
+        ("room's depth", |given, image| ours(given, None, image)),
+        ("exact depth", upscaled),
     ];
     let mut measured = Vec::new();
     for (method, refine) in ways {
@@ -91,6 +103,17 @@ pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<P
         let picture = match method {
             "bokehcam" => portrait(&given, None, &views.shot, behind_px)?,
             "with plate" => portrait(&given, Some(&given.behind), &views.shot, behind_px)?,
+            // As from a network for depth beside the mask, which knows the room exactly.
+            "room's depth" => {
+                let lens = Shot::lens(coc_at_infinity_px, SUBJECT_M, views.shot.image.height as usize);
+                let mut depth = DepthMap::new(views.shot.image.width, views.shot.image.height);
+                depth.metres.clone_from(&given.behind_m);
+                MaskMatting::default().find(&given.mask, &views.shot.image, None, &mut depth);
+                let shot = Shot { depth, lens, ..views.shot.clone() };
+                Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)?
+            }
+            // Of everything, without a matte; the share is not its own.
+            "exact depth" => Blurrer::new(Method::Layered(Quality::default()), &views.shot)?.blur_as_is(&views.shot)?,
             _ => encode(&blended(&decode(&views.shot.image), &share, behind_px)),
         };
         measured.push(Portrait {
