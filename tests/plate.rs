@@ -33,13 +33,16 @@ struct Shown {
     nudge_px: (f32, f32),
     /// How dark the shadow of the person is: 1 is none.
     shadow: f32,
+    /// How much brighter than the room a lamp is, which is warm and lights the wall on the left.
+    lamp: f32,
     /// Something on the sideboard.
     vase: bool,
     /// Which noise.
     frame: u32,
 }
 
-const ROOM: Shown = Shown { person: None, light: [1.0; 3], nudge_px: (0.0, 0.0), shadow: 1.0, vase: false, frame: 0 };
+const ROOM: Shown =
+    Shown { person: None, light: [1.0; 3], nudge_px: (0.0, 0.0), shadow: 1.0, lamp: 0.0, vase: false, frame: 0 };
 
 impl Shown {
     /// Codes of the room: a wall with a pattern, a shelf, a bright window.
@@ -78,8 +81,10 @@ impl Shown {
                     self.person.map_or(9.0, |(px, py)| ((fx - px - 110.0) / 90.0).hypot((fy - py - 60.0) / 120.0));
                 let depth = ((1.6 - beside) / 1.2).clamp(0.0, 1.0);
                 let shade = if is_person { 1.0 } else { 1.0 - (1.0 - self.shadow) * depth };
-                for (code, light) in codes.iter_mut().zip(self.light) {
-                    let linear = srgb_to_linear(*code / 255.0) * light * shade;
+                let lit =
+                    if is_person { 0.0 } else { self.lamp / (1.0 + ((fx - 90.0).hypot(fy - 60.0) / 110.0).powi(2)) };
+                for ((code, light), warm) in codes.iter_mut().zip(self.light).zip([1.0, 0.8, 0.6]) {
+                    let linear = srgb_to_linear(*code / 255.0) * (light * shade + warm * lit);
                     let noise = 5.0 * (random(x, y, self.frame * 3 + 1) + random(x, y, self.frame * 3 + 2) - 1.0);
                     *code = 255.0 * linear_to_srgb(linear.min(1.0)) + noise;
                 }
@@ -139,7 +144,7 @@ fn a_person_is_found_and_nobody_is_not() {
 }
 
 #[test]
-fn exposure_white_balance_a_nudge_and_shadows_are_no_persons() {
+fn exposure_white_balance_a_nudge_shadows_and_lamps_are_no_persons() {
     for (what, shown) in [
         ("darker", Shown { light: [0.6, 0.6, 0.6], ..PERSON }),
         ("brighter", Shown { light: [1.3, 1.3, 1.3], ..PERSON }),
@@ -147,6 +152,7 @@ fn exposure_white_balance_a_nudge_and_shadows_are_no_persons() {
         ("nudged", Shown { nudge_px: (2.5, -1.5), ..PERSON }),
         ("nudged more", Shown { nudge_px: (-5.0, 3.0), ..PERSON }),
         ("in shadow", Shown { shadow: 0.7, ..PERSON }),
+        ("a lamp on", Shown { lamp: 0.9, ..PERSON }),
     ] {
         let mut watched = Watched::before_room();
         (0..4).for_each(|_| {

@@ -1,4 +1,4 @@
-//! What stands before the plate: pixels that differ from it, less the shadows they cast, joined to parts.
+//! What stands before the plate: pixels that differ from it, less what is only lit otherwise, joined to parts.
 
 use super::alignment::Alignment;
 use super::reduced::MOST;
@@ -18,7 +18,12 @@ const STAYS: f32 = 0.75;
 /// A shadow leaves this share of the light's root, at least, and the same colour but for a difference of so much.
 const DARKEST_SHADOW: f32 = 0.72;
 const SHADE: f32 = 4.0;
-/// From one pixel to the next, a shadow's depth changes by no more than this: outlines do.
+/// A lamp that is switched on makes the root of no channel less, or so many times what it was; and of one no more than so many
+/// times what it makes of another.
+const UNLIT: f32 = 0.98;
+const BRIGHTEST: f32 = 1.8;
+const TINT: f32 = 1.25;
+/// From one pixel to the next, light changes by no more than this: outlines do.
 const SOFT: f32 = 0.035;
 /// Parts of less than this share of the picture are noise.
 const LEAST_PART: f32 = 0.002;
@@ -35,8 +40,8 @@ const HELD: f32 = 0.3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Label {
     Background,
-    /// As the background, but darker.
-    Shade,
+    /// As the background, but in shadow or in another light.
+    Relit,
     /// Perhaps something before it.
     Weak,
     Strong,
@@ -125,7 +130,7 @@ impl Subject {
         let weak = WEAK.max(WEAK_DEVIATIONS * deviation);
         let strong = STRONG.max(STRONG_DEVIATIONS * deviation);
         self.label(now, plate, size, (alignment.gain, weak, strong));
-        self.grow_shadows(size);
+        self.grow_light(size);
         self.join(size);
         self.fill_holes(size);
     }
@@ -173,13 +178,18 @@ impl Subject {
                 self.ratios.push(ratio);
                 let most = off[0].max(off[1]).max(off[2]).max(0.0);
                 let stays = if self.foreign[at] { STAYS } else { 1.0 };
-                let is_shade = || {
+                let in_shadow = || {
                     let off = values.iter().zip(exposed).map(|(value, exposed)| (value - ratio * exposed).abs());
                     (DARKEST_SHADOW..1.0).contains(&ratio) && off.fold(0.0, f32::max) < SHADE
                 };
+                let is_lit = || {
+                    let ratios = values.iter().zip(exposed).map(|(value, exposed)| (value + 1.0) / (exposed + 1.0));
+                    let (least, most) = ratios.fold((f32::MAX, 0.0f32), |ends, one| (ends.0.min(one), ends.1.max(one)));
+                    least > UNLIT && most < BRIGHTEST && most < TINT * least
+                };
                 self.labels.push(match most {
                     most if most < stays * weak => Label::Background,
-                    _ if is_shade() => Label::Shade,
+                    _ if in_shadow() || is_lit() => Label::Relit,
                     most if most < stays * strong => Label::Weak,
                     _ => Label::Strong,
                 });
@@ -187,8 +197,8 @@ impl Subject {
         }
     }
 
-    /// Shade that the background goes over into without an outline is shadow.
-    fn grow_shadows(&mut self, (width, height): (usize, usize)) {
+    /// What the background goes over into without an outline is the background in another light.
+    fn grow_light(&mut self, (width, height): (usize, usize)) {
         self.front.clear();
         let is_background = |&at: &u32| self.labels[at as usize] == Label::Background;
         self.front.extend((0..self.labels.len() as u32).filter(is_background));
@@ -202,14 +212,14 @@ impl Subject {
                 (y + 1 < height).then(|| at as usize + width),
             ];
             for beside in sides.into_iter().flatten() {
-                if self.labels[beside] == Label::Shade && (self.ratios[beside] - ratio).abs() < SOFT {
+                if self.labels[beside] == Label::Relit && (self.ratios[beside] - ratio).abs() < SOFT {
                     self.labels[beside] = Label::Background;
                     self.front.push(beside as u32);
                 }
             }
         }
         for label in &mut self.labels {
-            if *label == Label::Shade {
+            if *label == Label::Relit {
                 *label = Label::Strong;
             }
         }
