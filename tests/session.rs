@@ -11,9 +11,8 @@ use std::time::{Duration, Instant};
 use bokehcam::bokeh::{self, Backend, Bokeh};
 use bokehcam::capture::synthetic::{Format, Synthetic};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
-use bokehcam::depth::matting::mask::FAR_M;
 use bokehcam::depth::plate::{Guide, PlateDepth, Step};
-use bokehcam::frame::ColorImage;
+use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::knob::Knob;
 use bokehcam::link::Receiver;
 use bokehcam::look::presets::Preset;
@@ -260,7 +259,7 @@ fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
     watched.until("it runs again", |told| is_running(told, 32));
     let guide = watched.guide.clone().expect("how far the plate is");
     watched.frame("all is far until there is a plate", |view| {
-        view.depth.as_ref().is_some_and(|depth| depth.metres.iter().all(|&metres| metres == FAR_M))
+        view.depth.as_ref().is_some_and(|depth| depth.metres.iter().all(|&metres| metres == DepthMap::FAR_M))
     });
     assert!(matches!(guide.step(), Step::StepOut(1..=3)), "{:?}", guide.step());
     watched.frame("the countdown is over", |_| !matches!(guide.step(), Step::StepOut(_)));

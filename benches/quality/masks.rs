@@ -9,7 +9,7 @@
 use bokehcam::bokeh::BokehError;
 use bokehcam::budget::Quality;
 use bokehcam::color::light_of_codes;
-use bokehcam::depth::matting::mask::{Backdrop, FAR_M, MaskMatting, SUBJECT_M};
+use bokehcam::depth::matting::mask::{Backdrop, MaskMatting};
 use bokehcam::frame::{ColorImage, DepthMap, Mask, luma_of};
 use bokehcam::optics::DepthCoc;
 use serde::Serialize;
@@ -61,7 +61,7 @@ impl Portrait {
 struct Given {
     mask: Mask,
     behind: ColorImage,
-    /// Depth of what is behind, the subject's being [`SUBJECT_M`].
+    /// Depth of what is behind, the subject's being [`DepthMap::SUBJECT_M`].
     behind_m: Vec<f32>,
 }
 
@@ -80,7 +80,7 @@ pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<P
     let given = Given {
         mask: as_network(&truth),
         behind: encode(&background.pinhole()),
-        behind_m: behind_m.iter().map(|metres| metres * SUBJECT_M / focus_m).collect(),
+        behind_m: behind_m.iter().map(|metres| metres * DepthMap::SUBJECT_M / focus_m).collect(),
     };
     let band = band(&given, &truth);
     let edges = metrics::edge_band(&views.coc_px);
@@ -105,7 +105,7 @@ pub fn measure(name: &'static str, scene: &Scene, views: &Views) -> Result<Vec<P
             "with plate" => portrait(&given, Some(&given.behind), &views.shot, behind_px)?,
             // As from a network for depth beside the mask, which knows the room exactly.
             "room's depth" => {
-                let lens = Shot::lens(coc_at_infinity_px, SUBJECT_M, views.shot.image.height as usize);
+                let lens = Shot::lens(coc_at_infinity_px, DepthMap::SUBJECT_M, views.shot.image.height as usize);
                 let mut depth = DepthMap::new(views.shot.image.width, views.shot.image.height);
                 depth.metres.clone_from(&given.behind_m);
                 MaskMatting::default().find(&given.mask, &views.shot.image, None, &mut depth);
@@ -256,21 +256,22 @@ fn matte(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> Dept
     let light = [*light; 3];
     let backdrop = behind.map(|color| Backdrop { color, light: &light, shift_px: [0; 2] });
     let mut map = DepthMap::new(image.width, image.height);
-    map.metres.fill(FAR_M);
+    map.metres.fill(DepthMap::FAR_M);
     MaskMatting::default().find(&given.mask, image, backdrop.as_ref(), &mut map);
     map
 }
 
 fn ours(given: &Given, behind: Option<&ColorImage>, image: &ColorImage) -> Plane<f32> {
     let map = matte(given, behind, image);
-    let mut share: Vec<f32> = map.metres.iter().map(|&metres| f32::from(u8::from(metres <= SUBJECT_M))).collect();
+    let mut share: Vec<f32> =
+        map.metres.iter().map(|&metres| f32::from(u8::from(metres <= DepthMap::SUBJECT_M))).collect();
     map.matte.pixels.iter().for_each(|pixel| share[pixel.at as usize] = pixel.share);
     Plane { width: image.width as usize, height: image.height as usize, data: share }
 }
 
 /// This crate's portrait, at the default quality.
 fn portrait(given: &Given, behind: Option<&ColorImage>, shot: &Shot, behind_px: f32) -> Result<ColorImage, BokehError> {
-    let lens = Shot::lens(behind_px, SUBJECT_M, shot.image.height as usize);
+    let lens = Shot::lens(behind_px, DepthMap::SUBJECT_M, shot.image.height as usize);
     let shot = Shot { depth: matte(given, behind, &shot.image), lens, ..shot.clone() };
     Blurrer::new(Method::Layered(Quality::default()), &shot)?.blur_as_is(&shot)
 }

@@ -11,7 +11,6 @@ use bokehcam::bokeh::BokehError;
 use bokehcam::bokeh::aperture::{Aperture, lens_points};
 use bokehcam::budget::Quality;
 use bokehcam::compute::thread_pool::cores;
-use bokehcam::depth::matting::mask::SUBJECT_M;
 use bokehcam::depth::plate::{Capture, Companion, PlateDepth, Taken};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, Seen};
@@ -182,7 +181,7 @@ fn outcome(staged: &Staged, source: &'static str, depth: DepthMap) -> Result<Out
     let lens = match depth.subject_m {
         _ if source == "exact depth" => real,
         // Alone, the nearest of what a network for depth sees is the subject.
-        _ => Shot::lens(COC_AT_INFINITY_PX, SUBJECT_M, height),
+        _ => Shot::lens(COC_AT_INFINITY_PX, DepthMap::SUBJECT_M, height),
     };
     let (mut counts, mut wrong) = ([0.0; 2], [0.0; 2]);
     for ((metres, true_m), share) in depth.metres.iter().zip(&staged.depth.metres).zip(&staged.coverage.share) {

@@ -265,7 +265,8 @@ pub fn create(
         match open().and_then(|device| gpu_with_fallback(&plan, device, threads)) {
             Ok(bokeh) => return Ok(bokeh),
             Err(error) if backend == Backend::Gpu || adapter.is_some() => return Err(error),
-            Err(error) => tracing::info!("blurring on the CPU: {error}"),
+            Err(error @ BokehError::Gpu(GpuError::NoAdapter { .. })) => tracing::info!("blurring on the CPU: {error}"),
+            Err(error) => tracing::warn!("blurring on the CPU: {error}"),
         }
     }
     #[cfg(not(feature = "gpu"))]

@@ -7,7 +7,6 @@
 //! edge-aware image and video processing", 2011). A picture alone does not tell on which side of the focus something is:
 //! all that is soft counts as behind.
 
-use super::matting::mask::SUBJECT_M;
 use crate::frame::{ColorImage, DepthMap, luma_of};
 
 /// Standard deviation of the Gaussian that the picture is blurred with once more, in pixels of a picture of
@@ -34,8 +33,8 @@ const SOFTEST: f32 = 0.9;
 /// up to a pixel by themselves.
 const LEAST_RANGE_PX: f32 = 1.2;
 
-/// The relative depth of a photograph, as large as it: its sharpest things are the subject, [`SUBJECT_M`] away, its softest
-/// ones are as good as infinitely far. `None` where it has hardly any edge, or is equally sharp everywhere.
+/// The relative depth of a photograph, as large as it: its sharpest things are the subject, [`DepthMap::SUBJECT_M`] away, its
+/// softest ones are as good as infinitely far. `None` where it has hardly any edge, or is equally sharp everywhere.
 pub fn depth(color: &ColorImage) -> Option<DepthMap> {
     let by = (color.width as usize / WIDTH).max(1);
     let small = reduced(color, by);
@@ -48,7 +47,7 @@ pub fn depth(color: &ColorImage) -> Option<DepthMap> {
         return None;
     }
     let soft = spread(color, &edges, (size, by));
-    let mut map = DepthMap { subject_m: Some(SUBJECT_M), ..DepthMap::new(color.width, color.height) };
+    let mut map = DepthMap { subject_m: Some(DepthMap::SUBJECT_M), ..DepthMap::new(color.width, color.height) };
     for (metres, soft) in map.metres.iter_mut().zip(soft) {
         let nearness = 1.0 - ((soft - sharp_px) / (soft_px - sharp_px)).clamp(0.0, 1.0);
         *metres = DepthMap::relative_m(nearness);
@@ -216,7 +215,12 @@ mod tests {
     fn what_is_soft_is_far_and_what_is_all_sharp_has_no_depth() {
         let map = depth(&stripes(|half| if half == 0 { 0.5 } else { 2.0 })).unwrap();
         let at = |x: usize, y: usize| map.metres[y * 240 + x];
-        assert!(at(120, 20) < 1.2 * SUBJECT_M && at(120, 140) > 4.0 * SUBJECT_M, "{} {}", at(120, 20), at(120, 140));
+        assert!(
+            at(120, 20) < 1.2 * DepthMap::SUBJECT_M && at(120, 140) > 4.0 * DepthMap::SUBJECT_M,
+            "{} {}",
+            at(120, 20),
+            at(120, 140)
+        );
         assert!(depth(&stripes(|_| 0.5)).is_none() && depth(&ColorImage::new(64, 48)).is_none());
     }
 }

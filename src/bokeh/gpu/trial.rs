@@ -30,8 +30,8 @@ pub fn try_out(device: &Arc<Device>) -> Result<(), BokehError> {
         let wrong = differing(device)?;
         let fault = (wrong > VALUES / 100).then(|| {
             format!(
-                "{}: {wrong} of the {VALUES} values of a trial picture are wrong, so its driver may have a fault; use \
-                 --backend cpu",
+                "{}: {wrong} of the {VALUES} values of a trial picture are wrong: its driver may have a fault \
+                 (--backend cpu does without it)",
                 device.name
             )
         });

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use super::{Capture, Plate, Taken};
-use crate::depth::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
+use crate::depth::matting::mask::MaskMatting;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, Mask};
 
@@ -209,8 +209,8 @@ impl DepthSource for PlateDepth {
         }
         map.resize(color.width, color.height);
         map.matte.pixels.clear();
-        map.metres.fill(FAR_M);
-        map.subject_m = Some(SUBJECT_M);
+        map.metres.fill(DepthMap::FAR_M);
+        map.subject_m = Some(DepthMap::SUBJECT_M);
         if let (State::Using(plate), Step::Ready) = (&self.state, step) {
             if let Some(companion) = &mut self.companion {
                 companion.measure_behind(color, plate.mask(), map);

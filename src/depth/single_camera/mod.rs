@@ -19,7 +19,7 @@ use held::Held;
 use person::Person;
 use relief::Relief;
 
-use super::matting::mask::{FAR_M, MaskMatting, SUBJECT_M};
+use super::matting::mask::MaskMatting;
 use super::plate::Companion;
 use super::tap::Tap;
 use super::{DepthError, DepthSource, Seen};
@@ -182,10 +182,10 @@ impl DepthSource for SingleCamera {
         match &relief {
             Some(relief) if person.is_some() => spread.over(relief.behind(), relief.size(), map),
             Some(relief) if !self.has_subject => spread.over(relief.nearness(), relief.size(), map),
-            _ => map.metres.fill(FAR_M),
+            _ => map.metres.fill(DepthMap::FAR_M),
         }
         // Without a mask there is a subject only where there was to be one, and then nothing is in focus.
-        map.subject_m = (self.has_subject || relief.is_none()).then_some(SUBJECT_M);
+        map.subject_m = (self.has_subject || relief.is_none()).then_some(DepthMap::SUBJECT_M);
         map.is_smooth = map.subject_m.is_none();
         if let Some(person) = &person {
             let mask = if relief.is_some() { held.mask() } else { person.mask() };

@@ -56,7 +56,7 @@ fn check_blur() -> Finding {
             let name = bokeh.describe();
             if bokeh.backend() == Backend::Cpu && cfg!(feature = "gpu") {
                 let fix = "install a Vulkan driver if there is a GPU; `bokehcam bench` tells how fast the CPU is";
-                Finding::note(BLUR, format!("no hardware GPU: {name}"), fix)
+                Finding::note(BLUR, format!("no hardware GPU that can be used: {name}"), fix)
             } else {
                 Finding::good(BLUR, name)
             }

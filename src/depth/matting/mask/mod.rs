@@ -22,11 +22,6 @@ use super::share::{Contrast, Discriminant};
 use cells::{Cell, Kernel, REACH, Sums, View};
 use posterior::Posterior;
 
-/// See [`DepthMap::SUBJECT_M`].
-pub const SUBJECT_M: f32 = DepthMap::SUBJECT_M;
-/// See [`DepthMap::FAR_M`].
-pub const FAR_M: f32 = DepthMap::FAR_M;
-
 /// Side of a cell in pixels of the mask, and the least in pixels of the picture.
 const CELL_OF_MASK: f32 = 1.6;
 const LEAST_CELL_PX: usize = 4;
@@ -59,8 +54,8 @@ pub struct MaskMatting {
 
 /// The depth of a picture in which `mask` has the subject, all else being far.
 pub fn depth_around(mask: &Mask, color: &ColorImage) -> DepthMap {
-    let mut map = DepthMap { subject_m: Some(SUBJECT_M), ..DepthMap::new(color.width, color.height) };
-    map.metres.fill(FAR_M);
+    let mut map = DepthMap { subject_m: Some(DepthMap::SUBJECT_M), ..DepthMap::new(color.width, color.height) };
+    map.metres.fill(DepthMap::FAR_M);
     MaskMatting::default().find(mask, color, None, &mut map);
     map
 }
@@ -89,8 +84,8 @@ impl Default for MaskMatting {
 
 impl MaskMatting {
     /// Gives `map`, as large as its picture, which has the metres of what is behind everywhere, those of the nearer surface,
-    /// [`SUBJECT_M`], where `mask` and the colours say that it is; and the mixed pixels between the two. Where it is known
-    /// what is behind, pixels near the outline are mixed ones, too, with all of that behind them.
+    /// [`DepthMap::SUBJECT_M`], where `mask` and the colours say that it is; and the mixed pixels between the two. Where it is
+    /// known what is behind, pixels near the outline are mixed ones, too, with all of that behind them.
     pub fn find(&mut self, mask: &Mask, color: &ColorImage, backdrop: Option<&Backdrop>, map: &mut DepthMap) {
         map.matte.pixels.clear();
         let (width, height) = (color.width as usize, color.height as usize);
@@ -151,7 +146,7 @@ impl pulp::WithSimd for Finding<'_> {
                             if let Some(backdrop) = backdrop.filter(|_| wanted[cell]) {
                                 view.reveal(backdrop, (xs.clone(), y), map);
                             }
-                            map.metres[y * width..][xs].fill(SUBJECT_M);
+                            map.metres[y * width..][xs].fill(DepthMap::SUBJECT_M);
                         }
                         Cell::Band => view.take_apart(contrasts[cell].as_ref(), (xs, y), shares, map),
                     }
@@ -267,7 +262,7 @@ impl View<'_> {
             };
             let far_m = map.metres[at];
             if share > 0.5 {
-                map.metres[at] = SUBJECT_M;
+                map.metres[at] = DepthMap::SUBJECT_M;
             }
             let is_pure = share > NEARLY_PURE;
             if share < 1.0 - NEARLY_PURE || is_pure && self.backdrop.is_none() {
@@ -280,7 +275,7 @@ impl View<'_> {
                 (None, Some(contrast)) => (1.0 - share, contrast.difference(own, share)),
                 (_, None) => (1.0 - share, [0.0; 3]),
             };
-            let (at, near_m) = (at as u32, SUBJECT_M);
+            let (at, near_m) = (at as u32, DepthMap::SUBJECT_M);
             map.matte.pixels.push(MixedPixel { at, near_m, far_m, share, behind, difference });
         }
     }
@@ -293,7 +288,7 @@ impl View<'_> {
         map.matte.pixels.extend(xs.map(|x| {
             let (own, light) = (self.light_at(row + x), behind(x));
             let difference = std::array::from_fn(|p| own[p] - light[p]);
-            let (at, near_m, far_m) = ((row + x) as u32, SUBJECT_M, metres[x]);
+            let (at, near_m, far_m) = ((row + x) as u32, DepthMap::SUBJECT_M, metres[x]);
             MixedPixel { at, near_m, far_m, share: 1.0, behind: 1.0, difference }
         }));
     }
