@@ -50,12 +50,6 @@ impl Discriminant {
         Self { direction, offset: dot(direction, far), precision: (2.0 * contrast).min(1000.0) }
     }
 
-    /// Of a [`Contrast::line`].
-    #[inline(always)]
-    pub fn of([x, y, z, offset]: [f32; LINE], precision: f32) -> Self {
-        Self { direction: [x, y, z], offset, precision }
-    }
-
     /// Of a [`Contrast::front`] before this light.
     #[inline(always)]
     pub fn before([x, y, z, a, b, c, d, e, f]: [f32; FRONT], light: [f32; 3]) -> Self {
@@ -67,6 +61,12 @@ impl Discriminant {
     pub fn share(&self, color: [f32; 3]) -> f32 {
         dot(self.direction, color) - self.offset
     }
+}
+
+/// As [`Discriminant::share`], by a [`Contrast::line`].
+#[inline(always)]
+pub(super) fn share_by([x, y, z, offset]: [f32; LINE], color: [f32; 3]) -> f32 {
+    dot([x, y, z], color) - offset
 }
 
 impl Contrast {
@@ -84,7 +84,7 @@ impl Contrast {
         Self { surfaces, discriminant, inverse }
     }
 
-    /// What tells a colour's share, for [`Discriminant::of`]: sums of such are those of what lies between.
+    /// What tells a colour's share, for [`share_by`]; what lies between two of them does so between their surfaces.
     #[inline(always)]
     pub(super) fn line(&self) -> [f32; LINE] {
         let Discriminant { direction: [x, y, z], offset, .. } = self.discriminant;

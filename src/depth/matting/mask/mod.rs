@@ -18,7 +18,7 @@ use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap, Mask, Matte, MixedPixel};
 
 use super::NEARLY_PURE;
-use super::share::{Contrast, Discriminant};
+use super::share::{Contrast, Discriminant, share_by};
 use cells::{Cell, Kernel, REACH, Sums, View};
 use posterior::Posterior;
 
@@ -198,9 +198,7 @@ impl View<'_> {
                     let (mask, light) = (mask_at(x), self.light_at(place));
                     let along = self.cells_around(x, self.across).share;
                     let share = match (&behind, &lines, &fronts, &slice) {
-                        (None, Some(lines), _, Some(slice)) => {
-                            slice.share(mask, Discriminant::of(lines.between(along), 1.0).share(light))
-                        }
+                        (None, Some(lines), _, Some(slice)) => slice.share(mask, share_by(lines.between(along), light)),
                         // Where it is known what is behind, the surfaces differ in another way at every pixel.
                         (Some(behind), _, Some(fronts), _) => {
                             let own = Discriminant::before(fronts.between(along), behind(x));
