@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
+use bokehcam::clock::cpu_ns;
 use bokehcam::depth::plate::{Companion, PlateDepth};
 use bokehcam::depth::single_camera::{Hints, SingleCamera};
 use bokehcam::depth::{DepthSource, Seen};
@@ -24,8 +25,6 @@ use image::imageops::{FilterType, resize};
 const FRAMES: usize = 24;
 /// What is behind the person of the sequence is farther than this.
 const BEHIND_M: f32 = 1.8;
-/// The kernel counts processor time in these.
-const TICK_MS: f64 = 10.0;
 
 #[derive(Parser)]
 struct Options {
@@ -102,7 +101,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
     // The first round finds its memory.
     for round in 0..=options.rounds {
         for case in &mut cases {
-            let (began, before_ms) = (Instant::now(), processor_ms()?);
+            let (began, before_ns) = (Instant::now(), cpu_ns());
             for (k, color) in pictures.iter().chain(pictures.iter().rev()).enumerate() {
                 let index = round as usize * 2 * pictures.len() + k;
                 let stamp = Stamp { index, time_ns: index as u64 * 33_333_333, captured_ns: None };
@@ -111,7 +110,7 @@ fn measure(options: &Options, data: &Path) -> Result<(), Box<dyn std::error::Err
             if round > 0 {
                 case.frames += 2 * pictures.len() as u32;
                 case.wall_ms += began.elapsed().as_secs_f64() * 1e3;
-                case.processor_ms += processor_ms()? - before_ms;
+                case.processor_ms += (cpu_ns() - before_ns) as f64 / 1e6;
             }
         }
     }
@@ -173,12 +172,4 @@ fn model(data: &Path, task: Task) -> Result<PathBuf, Box<dyn std::error::Error>>
         .next()
         .ok_or_else(|| format!("{}: no known network for --depth {}", folder.display(), task.name()))?
         .clone())
-}
-
-/// Processor time of all threads so far.
-fn processor_ms() -> Result<f64, Box<dyn std::error::Error>> {
-    let line = fs::read_to_string("/proc/self/stat")?;
-    // Behind the name in brackets, which may hold anything: fields 14 and 15 are user and system time.
-    let fields = line.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().skip(11).take(2);
-    Ok(fields.map(|field| field.parse::<f64>().unwrap_or(0.0)).sum::<f64>() * TICK_MS)
 }

@@ -210,7 +210,7 @@ impl DepthSource for PlateDepth {
         map.resize(color.width, color.height);
         map.matte.pixels.clear();
         map.metres.fill(DepthMap::FAR_M);
-        map.subject_m = Some(DepthMap::SUBJECT_M);
+        (map.subject_m, map.is_smooth) = (Some(DepthMap::SUBJECT_M), false);
         if let (State::Using(plate), Step::Ready) = (&self.state, step) {
             if let Some(companion) = &mut self.companion {
                 companion.measure_behind(color, plate.mask(), map);

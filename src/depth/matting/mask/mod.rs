@@ -191,8 +191,10 @@ impl View<'_> {
                     ]
                     .map(|(row, column)| at(row, column).unwrap_or(own))
                 });
-                let lines = corners.map(|corners| Sides::of(corners.map(Contrast::line), down.share));
-                let fronts = corners.map(|corners| Sides::of(corners.map(Contrast::front), down.share));
+                // One or the other, as it is known what is behind.
+                let (unknown, known) = (corners.filter(|_| behind.is_none()), corners.filter(|_| behind.is_some()));
+                let lines = unknown.map(|corners| Sides::of(corners.map(Contrast::line), down.share));
+                let fronts = known.map(|corners| Sides::of(corners.map(Contrast::front), down.share));
                 for x in xs {
                     let place = y * self.color.width as usize + x;
                     let (mask, light) = (mask_at(x), self.light_at(place));
