@@ -8,6 +8,7 @@ override COVERAGE_FLOOR: f32;       // less coverage than this has no colour of 
 override FAR_WEIGHT: f32;           // weight of far cells in the local radius
 override OTHER_FROM: f32;           // what comes nearer is one surface with what is behind it up to this step of the CoC
 override OTHER_TO: f32;             // and another one from here on
+override HIDING_SHARE: f32;         // a bin with this share of a nearer surface shows nothing of what that hides
 override HINDMOST_COVERAGE: f32;    // a bin counts wholly from here on when the hindmost is looked for
 override OCTAVES_FROM_PX: f32;      // from this radius on, nodes of the bank lie evenly in each octave
 override OCTAVE_SHIFT: u32;         // bits of a float below those that tell the node within its octave

@@ -38,8 +38,12 @@ fn taken_at(k: u32, pixel: vec2<u32>, weight: f32) -> Pixel {
     let near = near_surface(place);
     // Where the nearer surface lies in front of the layer, behind it is the farther one.
     let before = step_at(work.unhidden, near.w);
-    return plus(taken(k, surface, weight * (1.0 - (1.0 - mixed[place].behind) * before)),
-                taken(k, near, weight * mixed[place].share * before));
+    let share = mixed[place].share * before;
+    let known = 1.0 - (1.0 - mixed[place].behind) * before;
+    let front = taken(k, near, 1.0);
+    // What is known of the farther surface without being seen is shown by bins that take none of the nearer one.
+    let behind = known - (known + share - 1.0) * min(front.value.a / HIDING_SHARE, 1.0);
+    return plus(taken(k, surface, weight * behind), Pixel(weight * share * front.value, weight * share * front.coc));
 }
 
 // Every `step`th tap of a pixel of the bin, each way, from `first` on.

@@ -232,6 +232,28 @@ fn what_is_known_to_be_behind_a_subject_shows_beside_it() {
     }
 }
 
+/// However close behind: bins that take both surfaces of a pixel show the nearer one.
+#[test]
+fn what_is_hidden_everywhere_is_never_seen() {
+    let picture = color(SIZE.0, SIZE.1, |_, _| RED);
+    let field = coc(CocKind::Depth, SIZE.1);
+    let (own, far) = (light(RED), light([240, 250, 20]));
+    let hiding = (0..SIZE.0 * SIZE.1).filter(|at| (40..60).contains(&(at % SIZE.0)));
+    for near_m in [0.45, 0.8, 1.0, 1.2] {
+        for factor in [1.03, 1.1, 1.3, 4.0] {
+            let mut map = depth(SIZE.0, SIZE.1, |_, _| near_m);
+            let difference = std::array::from_fn(|p| own[p] - far[p]);
+            let pixel = |at| MixedPixel { at, near_m, far_m: factor * near_m, share: 1.0, behind: 1.0, difference };
+            map.matte.pixels = hiding.clone().map(pixel).collect();
+            for quality in Quality::ALL {
+                let out = blur(&map, &picture, &field, quality);
+                let off = out.rgb.iter().zip(&picture.rgb).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+                assert!(off <= 2, "{quality}, {near_m} m before {} m: {off} codes", factor * near_m);
+            }
+        }
+    }
+}
+
 #[test]
 fn in_focus_a_mixed_pixel_is_the_pixel() {
     let picture = noise(SIZE.0, SIZE.1);

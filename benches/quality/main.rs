@@ -37,6 +37,7 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
+use bokehcam::budget::Quality;
 use bokehcam::frame::{ColorImage, DepthMap};
 
 use damage::Damage;
@@ -53,6 +54,10 @@ const MASKED: [&str; 3] = ["slant", "hair", "pentagon"];
 /// The scene that is looked at for flicker, and for how many frames.
 const STATIC: &str = "depths";
 const STATIC_FRAMES: u64 = 8;
+/// What moves is watched for so many frames; then every so many count, of so many in all.
+const PLAYED: usize = 60;
+const PLAYED_STEP: usize = 10;
+const PLAYED_FRAMES: usize = 6;
 /// Seed of all damage.
 const SEED: u64 = 1;
 /// Where truths are kept.
@@ -91,6 +96,9 @@ fn run(options: &Options) -> Outcome<()> {
         let shots =
             (0..frames).map(|frame| views(&(kind.at)(frame), &format!("{}-{frame}", kind.name), Path::new(CACHE)));
         let shots = shots.collect::<Result<Vec<_>, _>>()?;
+        if options.parts.contains(&Part::Moving) && kind.moves {
+            moving(options, kind, &mut results)?;
+        }
         if options.parts.contains(&Part::Exact) {
             scene(options, kind, None, &shots, &mut results)?;
         }
@@ -159,15 +167,7 @@ fn scene(
         for (views, band) in frames.iter().zip(&bands) {
             let picture = blurrer.blur(&views.shot)?;
             let truth = &views.truth;
-            records.push(Record {
-                scene: kind.name,
-                damage: damage.map(Damage::name),
-                method,
-                psnr_db: metrics::psnr(&picture, truth, None),
-                edge_db: Some(metrics::psnr(&picture, truth, Some(band))).filter(|db| !db.is_nan()),
-                ssim: metrics::ssim(&picture, truth),
-                flip: flip::flip(&picture, truth),
-            });
+            records.push(Record::of((kind.name, damage.map(Damage::name)), method, &picture, truth, band));
             pictures.push((method, picture));
         }
         if let Some(record) = Record::mean(&records.iter().collect::<Vec<_>>()) {
@@ -180,6 +180,45 @@ fn scene(
     let folder = case.1.map_or(kind.name.to_owned(), |damage| format!("{}-{damage}", kind.name));
     let rival = results.best_rival(case).map_or(Method::None, |rival| rival.method);
     show(options, rival, &out.join(folder), frames, &pictures)
+}
+
+/// Measures what memory is worth where something moves: of a sequence, some later frames count.
+fn moving(options: &Options, kind: &Kind, results: &mut Results) -> Outcome<()> {
+    let counts = |frame: usize| frame >= PLAYED && (frame - PLAYED).is_multiple_of(PLAYED_STEP);
+    let methods = [Method::Layered(Quality::default()), Method::Remembered];
+    let mut records = methods.map(|_| Vec::new());
+    let mut blurrers: Vec<Blurrer> = Vec::new();
+    for frame in 0..=PLAYED + PLAYED_STEP * (PLAYED_FRAMES - 1) {
+        let scene = (kind.at)(frame);
+        let views = match counts(frame) {
+            true => views(&scene, &format!("{}-{frame}", kind.name), Path::new(CACHE))?,
+            false => truth::without_truth(&scene),
+        };
+        let band = metrics::edge_band(&views.coc_px);
+        for (k, method) in methods.into_iter().enumerate() {
+            if blurrers.len() == k {
+                blurrers.push(Blurrer::new(method, &views.shot)?);
+            }
+            if !counts(frame) {
+                blurrers[k].watch(&views.shot);
+                continue;
+            }
+            let picture = blurrers[k].blur(&views.shot)?;
+            if let Some(out) = &options.out {
+                fs::create_dir_all(out)?;
+                sheet::write(&out.join(format!("{}-{frame}-{method}.png", kind.name)), &picture)?;
+                sheet::write(&out.join(format!("{}-{frame}-truth.png", kind.name)), &views.truth)?;
+            }
+            records[k].push(Record::of((kind.name, Some("moving")), method, &picture, &views.truth, &band));
+        }
+    }
+    for records in &records {
+        if let Some(record) = Record::mean(&records.iter().collect::<Vec<_>>()) {
+            say(options, record.line(), Some(&record))?;
+            results.moving.push(record);
+        }
+    }
+    Ok(())
 }
 
 /// Writes a scene's first frame, and the crops of every frame.
@@ -215,11 +254,23 @@ fn damaged(views: &Views, damage: Damage, seed: u64) -> Views {
 }
 
 fn flicker(options: &Options, views: &Views, results: &mut Results) -> Outcome<()> {
+    let band = metrics::edge_band(&views.coc_px);
     for method in options.methods() {
         let mut blurrer = Blurrer::new(method, &views.shot)?;
         let frame = |seed| blurrer.blur(&damaged(views, Damage::Noise, SEED + seed).shot);
         let frames = (0..STATIC_FRAMES).map(frame).collect::<Result<Vec<_>, _>>()?;
-        let flicker = Flicker { method: method.name(), flicker_codes: metrics::flicker(&frames, &views.coc_px) };
+        // The outline is in the picture as in the map: a camera's has noise.
+        let mut blurrer = Blurrer::new(method, &views.shot)?;
+        let noisy = |seed| {
+            let shot = damaged(views, Damage::Noise, SEED + seed).shot;
+            blurrer.blur(&Shot { image: masks::with_noise(&shot.image, masks::NOISE_CODES, seed), ..shot })
+        };
+        let noisy = (0..STATIC_FRAMES).map(noisy).collect::<Result<Vec<_>, _>>()?;
+        let flicker = Flicker {
+            method: method.name(),
+            flicker_codes: metrics::flicker(&frames, |at| metrics::is_blurred(&views.coc_px, at)),
+            outline_codes: metrics::flicker(&noisy, |at| band.data[at]),
+        };
         say(options, flicker.line(), Some(&flicker))?;
         results.flicker.push(flicker);
     }

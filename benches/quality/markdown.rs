@@ -6,7 +6,7 @@ use bokehcam::budget::Quality;
 
 use super::masks::Portrait;
 use super::methods::Method;
-use super::report::{Case, Record, Results};
+use super::report::{Case, Flicker, Record, Results};
 
 /// Where the error is one code value (RMS): what is better than that counts as this in the verdict, as nobody sees it.
 const ONE_CODE_DB: f64 = 48.13;
@@ -105,10 +105,18 @@ fn tables(results: &Results, text: &mut String) -> std::fmt::Result {
         }
         writeln!(text)?;
     }
+    if !results.moving.is_empty() {
+        writeln!(text, "## What moves\n\n| scene | method | PSNR / edge / SSIM / FLIP |\n|---|---|---|")?;
+        for record in &results.moving {
+            writeln!(text, "| {} | {} | {} |", record.scene, record.method, cell(Some(record)))?;
+        }
+        writeln!(text)?;
+    }
     if !results.flicker.is_empty() {
-        writeln!(text, "## Flicker\n\n| method | code values |\n|---|---|")?;
+        writeln!(text, "## Flicker\n\n| method | code values | outlines of a noisy picture |\n|---|---|---|")?;
         for flicker in &results.flicker {
-            writeln!(text, "| {} | {:.3} |", flicker.method, flicker.flicker_codes)?;
+            let Flicker { method, flicker_codes, outline_codes } = flicker;
+            writeln!(text, "| {method} | {flicker_codes:.3} | {outline_codes:.3} |")?;
         }
         writeln!(text)?;
     }

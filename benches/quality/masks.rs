@@ -31,7 +31,7 @@ const HARD: f32 = 8.0;
 const GUIDED_PX: i32 = 8;
 const GUIDED: f32 = 1e-4;
 /// Noise of the camera for the flicker, in codes, and frames.
-const NOISE_CODES: f32 = 2.0;
+pub const NOISE_CODES: f32 = 2.0;
 const FRAMES: u64 = 6;
 
 /// What was measured of a scene and a way to make a portrait from a mask.

@@ -6,6 +6,7 @@ use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Job, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
+use bokehcam::depth::background::Background;
 use bokehcam::depth::fill::Filler;
 use bokehcam::depth::matting::{self, Matting};
 use bokehcam::depth::refine::Refiner;
@@ -45,6 +46,8 @@ pub enum Method {
     Layered(Quality),
     /// This crate's layers at the default quality, on depth that was refined first: what a recording gets.
     Refined,
+    /// The same on depth as it is, with what was seen before behind what moved: what a stream gets.
+    Remembered,
 }
 
 impl Method {
@@ -52,7 +55,11 @@ impl Method {
     pub fn all() -> Vec<Method> {
         use Method::{Blended, Gather, Gather3, Gaussian, GoldenAngle, NearFocusFar, None, Scatter};
         let others = [None, Gaussian, Blended, Gather3, Gather, NearFocusFar, GoldenAngle, Scatter];
-        others.into_iter().chain(Quality::ALL.map(Method::Layered)).chain([Method::Refined]).collect()
+        others
+            .into_iter()
+            .chain(Quality::ALL.map(Method::Layered))
+            .chain([Method::Refined, Method::Remembered])
+            .collect()
     }
 
     /// As on the command line.
@@ -68,12 +75,13 @@ impl Method {
             Method::Blended => "blended",
             Method::Layered(quality) => quality.name(),
             Method::Refined => "refined",
+            Method::Remembered => "remembered",
         }
     }
 
     /// Whether it competes with the layers.
     pub fn is_rival(self) -> bool {
-        !matches!(self, Method::None | Method::Layered(_) | Method::Refined)
+        !matches!(self, Method::None | Method::Layered(_) | Method::Refined | Method::Remembered)
     }
 }
 
@@ -118,6 +126,7 @@ pub struct Blurrer {
     filler: Filler,
     refiner: Refiner,
     matting: Matting,
+    background: Background,
     time_ns: u64,
 }
 
@@ -134,7 +143,7 @@ impl Blurrer {
             Method::Gather => (bokeh::Method::Gather, Some(Rank::Full), 0.0, Quality::Best),
             Method::Gather3 => (bokeh::Method::Gather, Some(Rank::Terms(3)), 0.0, Quality::Best),
             Method::Layered(quality) => (bokeh::Method::Layered, None, RIM, quality),
-            Method::Refined => (bokeh::Method::Layered, None, RIM, Quality::default()),
+            Method::Refined | Method::Remembered => (bokeh::Method::Layered, None, RIM, Quality::default()),
             _ => return Ok(Self::of(method, None)),
         };
         let settings = Settings {
@@ -154,7 +163,9 @@ impl Blurrer {
     }
 
     fn of(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
-        Self { method, bokeh, filler: Filler::new(), refiner: Refiner::new(), matting: Matting::default(), time_ns: 0 }
+        let (filler, refiner) = (Filler::new(), Refiner::new());
+        let (matting, background) = (Matting::default(), Background::default());
+        Self { method, bokeh, filler, refiner, matting, background, time_ns: 0 }
     }
 
     /// The blurred picture.
@@ -182,6 +193,10 @@ impl Blurrer {
                 self.filler.fill_guided(&mut depth, &shot.image);
                 self.layered(shot, depth)
             }
+            Method::Remembered => {
+                let depth = self.remember(shot);
+                self.run(shot, depth)
+            }
             Method::Refined => {
                 let mut depth = shot.depth.clone();
                 self.refiner.refine(&mut depth, &shot.image, self.time_ns);
@@ -195,6 +210,30 @@ impl Blurrer {
     fn layered(&mut self, shot: &Shot, mut depth: DepthMap) -> Result<ColorImage, BokehError> {
         self.matting.find(&mut depth, &shot.image, shot.lens.inverse_depth_of_px(matting::FROM_PX));
         self.run(shot, depth)
+    }
+
+    /// Sees a frame whose picture nobody needs.
+    pub fn watch(&mut self, shot: &Shot) {
+        if self.method == Method::Remembered {
+            self.remember(shot);
+        }
+    }
+
+    /// The depth of a frame with its matte and what lies behind, as far as it was seen in this frame and those before.
+    fn remember(&mut self, shot: &Shot) -> DepthMap {
+        let mut depth = shot.depth.clone();
+        self.filler.fill_guided(&mut depth, &shot.image);
+        let jump = shot.lens.inverse_depth_of_px(matting::FROM_PX);
+        let Self { background, matting, .. } = self;
+        match background.knows(&shot.image) {
+            true => matting
+                .find_before(&mut depth, &shot.image, jump, |at, near| background.light_behind(at, near, &shot.lens)),
+            false => matting.find(&mut depth, &shot.image, jump),
+        }
+        self.background.learn(&depth, &shot.image, &shot.lens, self.time_ns);
+        self.background.reveal(&mut depth, &shot.image, &shot.lens);
+        self.time_ns += PERIOD_NS;
+        depth
     }
 
     /// The blurred picture, with the depth and matte that the shot has.

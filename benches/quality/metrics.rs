@@ -76,12 +76,17 @@ pub fn edge_band(coc_px: &Plane<f32>) -> Plane<bool> {
     grown(&grown(&edges, 1, 0), 0, 1)
 }
 
-/// Mean difference of consecutive frames in code values, where the picture is blurred.
-pub fn flicker(frames: &[ColorImage], coc_px: &Plane<f32>) -> f64 {
+/// Whether a pixel is blurred.
+pub fn is_blurred(coc_px: &Plane<f32>, at: usize) -> bool {
+    coc_px.data[at].abs() > BLURRED_PX
+}
+
+/// Mean difference of consecutive frames in code values, over the pixels that count.
+pub fn flicker(frames: &[ColorImage], counts: impl Fn(usize) -> bool) -> f64 {
     let (mut sum, mut values) = (0.0, 0.0);
     for pair in frames.windows(2) {
         for (k, (a, b)) in pair[0].rgb.iter().zip(&pair[1].rgb).enumerate() {
-            if coc_px.data[k / 3].abs() > BLURRED_PX {
+            if counts(k / 3) {
                 sum += f64::from(a.abs_diff(*b));
                 values += 1.0;
             }

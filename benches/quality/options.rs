@@ -15,6 +15,8 @@ pub enum Part {
     Exact,
     /// Some of them with damaged depth
     Damaged,
+    /// What moves, with and without memory of what lies behind
+    Moving,
     /// One light on a plain wall
     Highlight,
     /// A static scene with noisy depth
@@ -51,7 +53,7 @@ pub struct Options {
         value_name = "LIST",
         value_delimiter = ',',
         value_enum,
-        default_value = "exact,damaged,highlight,flicker,masks,situations"
+        default_value = "exact,damaged,moving,highlight,flicker,masks,situations"
     )]
     pub parts: Vec<Part>,
     /// Frames of the scenes that move

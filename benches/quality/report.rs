@@ -1,10 +1,13 @@
 //! What was measured: lines of a table, JSON, and what follows from it.
 
+use bokehcam::frame::ColorImage;
 use serde::Serialize;
 
 use super::highlight::Profile;
 use super::masks::Portrait;
 use super::methods::Method;
+use super::picture::Plane;
+use super::{flip, metrics};
 
 /// Name of a scene, and what was done to its depth map, if anything.
 pub type Case<'a> = (&'a str, Option<&'a str>);
@@ -50,6 +53,8 @@ pub struct Flicker {
     pub method: &'static str,
     /// Mean difference of consecutive frames in code values, where the picture is blurred.
     pub flicker_codes: f64,
+    /// The same within 12 px of depth edges, where the picture has a camera's noise, too.
+    pub outline_codes: f64,
 }
 
 /// Everything that was measured.
@@ -57,6 +62,8 @@ pub struct Flicker {
 pub struct Results {
     /// Methods on scenes.
     pub records: Vec<Record>,
+    /// Methods on what moves.
+    pub moving: Vec<Record>,
     /// The lone light.
     pub highlights: Vec<Highlight>,
     /// The static scene.
@@ -84,6 +91,25 @@ impl Record {
             self.ssim,
             self.flip
         )
+    }
+
+    /// Of a method's picture of a scene with its damage, whose truth has edges in `band`.
+    pub fn of(
+        (scene, damage): Case<'static>,
+        method: Method,
+        picture: &ColorImage,
+        truth: &ColorImage,
+        band: &Plane<bool>,
+    ) -> Record {
+        Record {
+            scene,
+            damage,
+            method,
+            psnr_db: metrics::psnr(picture, truth, None),
+            edge_db: Some(metrics::psnr(picture, truth, Some(band))).filter(|db| !db.is_nan()),
+            ssim: metrics::ssim(picture, truth),
+            flip: flip::flip(picture, truth),
+        }
     }
 
     /// The mean of records of one method, under the first one's names.
@@ -117,7 +143,8 @@ impl Highlight {
 impl Flicker {
     /// A line of the table.
     pub fn line(&self) -> String {
-        format!("flicker   {:16} {:6.3} codes", self.method, self.flicker_codes)
+        let Self { method, flicker_codes, outline_codes } = self;
+        format!("flicker   {method:16} {flicker_codes:6.3} codes, outlines of a noisy picture {outline_codes:6.3}")
     }
 }
 

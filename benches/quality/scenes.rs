@@ -29,7 +29,7 @@ pub struct Kind {
 }
 
 /// Every scene.
-pub const KINDS: [Kind; 16] = [
+pub const KINDS: [Kind; 17] = [
     still("wall", "a flat wall, 12 px", |_| Stage::new(14.0).wall(12.0, Pattern::Checks(24.0), 1).scene),
     still("slant", "a slanted wall, 2 to 17 px, behind a subject", |_| slant()),
     still("ground", "a ground plane through focus, -11 to 11 px", |_| ground()),
@@ -48,6 +48,12 @@ pub const KINDS: [Kind; 16] = [
     still("bars", "thin bars at eleven depths, -13 to 15 px", |_| bars()),
     still("street", "a ground plane through focus with things on it, and a wall", |_| street()),
     Kind { name: "pan", what: "the fence and the subject in motion", moves: true, at: fence },
+    Kind {
+        name: "sway",
+        what: "a head with strands of hair that moves to and fro before a wall",
+        moves: true,
+        at: sway,
+    },
 ];
 
 const fn still(name: &'static str, what: &'static str, at: fn(usize) -> Scene) -> Kind {
@@ -93,7 +99,13 @@ impl Stage {
 
     /// A head and shoulders in focus.
     fn bust(self, x: f32, seed: u32) -> Self {
-        self.cutout(0.0, |p| bust(p, x), |p| if p.y < 255.0 { face(p, seed) } else { coat(p, seed) })
+        self.moved_bust(x, 0.0, seed)
+    }
+
+    /// The same, moved to the right.
+    fn moved_bust(self, x: f32, by: f32, seed: u32) -> Self {
+        let own = move |p: Vec2| p - Vec2::new(by, 0.0);
+        self.cutout(0.0, |p| bust(own(p), x), |p| if p.y < 255.0 { face(own(p), seed) } else { coat(own(p), seed) })
     }
 }
 
@@ -158,6 +170,15 @@ fn lights(shape: Shape, seed: u64, brightest: f32, radius_px: (f32, f32)) -> Sce
 }
 
 fn hair() -> Scene {
+    moved_hair(0.0)
+}
+
+/// To and fro in two seconds.
+fn sway(frame: usize) -> Scene {
+    moved_hair(24.0 * (frame as f32 * std::f32::consts::TAU / 60.0).sin())
+}
+
+fn moved_hair(by: f32) -> Scene {
     let mut dice = Dice::new(6);
     let strands: Vec<[Vec2; 3]> = (0..70)
         .map(|_| {
@@ -169,14 +190,16 @@ fn hair() -> Scene {
             [root, middle, middle + length * 0.6 * bend]
         })
         .collect();
+    let own = move |p: Vec2| p - Vec2::new(by, 0.0);
     let strand = |p: Vec2| {
+        let p = own(p);
         let near = strands.iter().map(|s| stroke(p, s[0], s[1], 1.4).min(stroke(p, s[1], s[2], 0.9)));
         near.fold(f32::INFINITY, f32::min)
     };
     Stage::new(14.0)
         .wall(12.0, Pattern::Checks(16.0), 5)
-        .bust(320.0, 7)
-        .cutout(0.0, strand, |p| paint(p, [0.3, 0.2, 0.12], Pattern::Noise, 8))
+        .moved_bust(320.0, by, 7)
+        .cutout(0.0, strand, move |p| paint(own(p), [0.3, 0.2, 0.12], Pattern::Noise, 8))
         .scene
 }
 

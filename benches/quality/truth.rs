@@ -32,11 +32,8 @@ pub struct Views {
 /// # Errors
 /// The cache cannot be written.
 pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
-    let image = encode(&scene.pinhole());
-    let coc_px = scene.coc();
-    let lens = Shot::lens(scene.coc_at_infinity_px, FOCUS_M, scene.height);
-    let depth = depth(&coc_px, scene.coc_at_infinity_px);
-    let most_px = coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
+    let views = without_truth(scene);
+    let most_px = views.coc_px.data.iter().fold(0f32, |most, c| most.max(c.abs()));
     let rays = (RAYS.1 * most_px * most_px).clamp(RAYS.0, RAYS.2) as usize;
     let file = cache.join(format!("{name}-{:016x}.png", key(scene, rays)));
     let truth = match sheet::read(&file) {
@@ -47,7 +44,19 @@ pub fn views(scene: &Scene, name: &str, cache: &Path) -> io::Result<Views> {
             truth
         }
     };
-    Ok(Views { shot: Shot { image, depth, lens, aperture: scene.aperture.clone() }, coc_px, truth })
+    Ok(Views { truth, ..views })
+}
+
+/// What the methods are given of a scene; what the lens sees is left out.
+pub fn without_truth(scene: &Scene) -> Views {
+    let coc_px = scene.coc();
+    let shot = Shot {
+        image: encode(&scene.pinhole()),
+        depth: depth(&coc_px, scene.coc_at_infinity_px),
+        lens: Shot::lens(scene.coc_at_infinity_px, FOCUS_M, scene.height),
+        aperture: scene.aperture.clone(),
+    };
+    Views { shot, coc_px, truth: ColorImage::default() }
 }
 
 /// The depth map whose CoC is `coc_px`.

@@ -32,6 +32,9 @@ pub const MAX_BINS: usize = 13;
 /// A bin pixel with less coverage than this has no colour of its own.
 pub const COVERAGE_FLOOR: f32 = 1e-3;
 
+/// A bin that takes this share of a nearer surface, or more, shows nothing of what that hides.
+pub const HIDING_SHARE: f32 = 0.25;
+
 /// From this coverage on, a bin counts fully when the colour of the hindmost is worked out.
 pub const HINDMOST_COVERAGE: f32 = 0.8;
 

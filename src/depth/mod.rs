@@ -3,6 +3,8 @@
 //! before that is measured, too ([`agreement`]).
 
 pub mod agreement;
+mod alignment;
+pub mod background;
 pub mod beside;
 pub mod defocus;
 pub mod fill;
@@ -13,6 +15,7 @@ pub mod live;
 pub mod matting;
 pub mod plate;
 pub mod recorded;
+mod reduced;
 pub mod refine;
 pub mod registration;
 #[cfg(feature = "networks")]
@@ -48,6 +51,11 @@ pub trait DepthSource: Send {
     /// Changes the effort, as its place in [`DepthSource::efforts`], from the next map on. It begins with the finest.
     fn set_effort(&mut self, effort: usize) {
         let _ = effort;
+    }
+
+    /// Whether its maps have all that is behind the nearer surface, so that nothing need be remembered.
+    fn knows_background(&self) -> bool {
+        false
     }
 
     /// No frame came for a while: lets go of the device, if there is one, until [`DepthSource::read`] is called again.

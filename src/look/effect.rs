@@ -36,3 +36,13 @@ named! {
         Off = "off",
     }
 }
+
+named! {
+    /// Whether a stream remembers what lies behind things.
+    pub enum BackgroundMemory default On {
+        /// What was seen before, as far as it was; what never was is filled in from around it
+        On = "on",
+        /// All is filled in from around it, in every frame anew
+        Off = "off",
+    }
+}

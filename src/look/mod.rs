@@ -15,7 +15,7 @@ mod tilt;
 
 pub use aperture::ApertureName;
 pub use coc::{CocAtInfinity, CocRule};
-pub use effect::{Effect, Refine};
+pub use effect::{BackgroundMemory, Effect, Refine};
 pub use patch::{LookError, Value};
 pub use settings::{Patch, SETTINGS};
 pub use strength::Strength;
@@ -60,6 +60,8 @@ pub struct Look {
     pub max_coc_px: Option<f32>,
     /// Whether depth is refined.
     pub refine: Refine,
+    /// Whether a stream remembers what lies behind things.
+    pub background_memory: BackgroundMemory,
     /// The band of the effect `tilt-shift`.
     pub tilt: Tilt,
     /// The lens opening.
@@ -84,6 +86,7 @@ impl Default for Look {
             strength: Strength::Default,
             max_coc_px: None,
             refine: Refine::Auto,
+            background_memory: BackgroundMemory::On,
             tilt: Tilt { center_y: 0.55, band: 0.15, angle_deg: 0.0 },
             aperture: Aperture::default(),
             // Rank 3 is then as good as rank 7 of a hard disc.

@@ -39,6 +39,7 @@ impl Patch {
             sensor_width_mm: lens.map(|lens| lens.sensor_width_mm),
             max_coc_px: Some(look.max_coc_px.into()),
             refine: Some(look.refine),
+            background_memory: Some(look.background_memory),
             tilt: Some(look.tilt),
             aperture: ApertureName::of(&look.aperture.shape),
             intensity: Some(look.aperture.intensity),
@@ -96,7 +97,7 @@ impl Patch {
         macro_rules! take {
             ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
         }
-        take!(effect, method, focus, focus_range_m, refine, tilt, rim, highlights);
+        take!(effect, method, focus, focus_range_m, refine, background_memory, tilt, rim, highlights);
         look.strength = self.strength(base.strength)?;
         if let Some(max_coc_px) = self.max_coc_px {
             look.max_coc_px = max_coc_px.chosen();

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use super::number::{OrAuto, above_zero, not_negative, within};
-use super::{ApertureName, Effect, Look, MOST_RADIUS_PX, Refine, Strength, Tilt};
+use super::{ApertureName, BackgroundMemory, Effect, Look, MOST_RADIUS_PX, Refine, Strength, Tilt};
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
@@ -112,6 +112,8 @@ settings! {
     max_coc_px: OrAuto<f32> = "max-coc" "PX" Blur OrAuto::parser(within(0.0..=MOST_RADIUS_PX)), is computed;
     /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker
     refine: Refine = "refine" "WHEN" Blur Refine::from_str, one of names_of::<Refine>();
+    /// What a stream shows of what things hide, where blur lets it through
+    background_memory: BackgroundMemory = "background-memory" "WHETHER" Blur BackgroundMemory::from_str, one of names_of::<BackgroundMemory>();
     /// Sharp band of tilt-shift: CENTER_Y[:BAND[:ANGLE_DEG]], the first two as fractions of the height
     tilt: Tilt = "tilt" "BAND" Blur Tilt::from_str;
     /// disc, ring:INNER, polygon:N[:ROTATION_DEG[:CURVATURE]], heart, star:N or image:FILE

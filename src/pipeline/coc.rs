@@ -1,5 +1,6 @@
 //! From a frame's depth to its circle of confusion (CoC): the one step that every blur by depth goes through.
 
+use crate::depth::background::Background;
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
 use crate::depth::matting::{self, Matting};
@@ -35,6 +36,7 @@ pub struct CocMaker {
     focus: Focus,
     finisher: Finisher,
     matting: Matting,
+    background: Option<Background>,
 }
 
 enum Finisher {
@@ -69,7 +71,15 @@ impl CocMaker {
             CocRule::Fixed(_) => FocusRule::Auto,
             CocRule::Depth { focus, .. } => focus,
         };
-        Self { rule, focus: Focus::new(focus), finisher: Finisher::new(finish), matting: Matting::default() }
+        let (focus, finisher, matting) = (Focus::new(focus), Finisher::new(finish), Matting::default());
+        Self { rule, focus, finisher, matting, background: None }
+    }
+
+    /// Remembers from now on, or no more, what lies behind things.
+    pub fn remember(&mut self, remembers: bool) {
+        if self.background.is_some() != remembers {
+            self.background = remembers.then(Background::default);
+        }
     }
 
     /// Follows another rule, from where the lens stands now.
@@ -82,7 +92,7 @@ impl CocMaker {
                 }
                 self.rule = rule;
             }
-            _ => *self = Self::new(rule, finish),
+            _ => *self = Self { background: self.background.take(), ..Self::new(rule, finish) },
         }
     }
 
@@ -116,14 +126,35 @@ impl CocMaker {
             }
             self.find_matte(map, color, &field);
         }
+        if let (CocField::Depth(lens), Some(background), false) = (&field, &mut self.background, map.is_smooth) {
+            background.learn(map, color, lens, time_ns);
+            background.reveal(map, color, lens);
+        }
         field
     }
 
-    /// Gives a map the matte of a picture. A map that several frames share needs that of each.
-    pub fn find_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
+    /// Gives a picture the map of one before it, which several share. Where it was not made around a subject, and has
+    /// brought its matte, it needs one of its own.
+    pub fn share(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
+        if map.subject_m.is_some() {
+            return;
+        }
+        self.find_matte(map, color, field);
+        if let (CocField::Depth(lens), Some(background), false) = (field, &mut self.background, map.is_smooth) {
+            background.reveal(map, color, lens);
+        }
+    }
+
+    fn find_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
         map.matte.pixels.clear();
         if let (CocField::Depth(lens), false) = (field, map.is_smooth) {
-            self.matting.find(map, color, lens.inverse_depth_of_px(matting::FROM_PX));
+            let jump = lens.inverse_depth_of_px(matting::FROM_PX);
+            match &self.background {
+                Some(background) if background.knows(color) => {
+                    self.matting.find_before(map, color, jump, |at, near| background.light_behind(at, near, lens));
+                }
+                _ => self.matting.find(map, color, jump),
+            }
         }
     }
 }

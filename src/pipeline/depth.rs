@@ -14,7 +14,7 @@ use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Received, Receiver, Sender};
-use crate::look::Look;
+use crate::look::{BackgroundMemory, Look};
 use crate::optics::CocField;
 use crate::stats::{Cause, Histogram, Tally};
 
@@ -58,6 +58,7 @@ impl Stage<'_> {
     /// Runs until the frames end or nobody takes the results. Changes of the blur take effect between frames.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
         let mut coc = CocMaker::new(self.look.coc_rule(self.size), self.finish(&self.look));
+        coc.remember(self.remembers(&self.look));
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
         let (mut change, mut between) = (0, false);
@@ -75,6 +76,7 @@ impl Stage<'_> {
                 };
             for Change { number, look, bokeh } in self.changes.iter().flat_map(mpsc::Receiver::try_iter) {
                 coc.follow(look.coc_rule(self.size), self.finish(&look));
+                coc.remember(self.remembers(&look));
                 (change, between) = (number, matches!(bokeh, Executor::Meanwhile));
                 self.rate.iter_mut().for_each(Rate::forget);
                 if let Executor::To(executor) = bokeh {
@@ -124,6 +126,11 @@ impl Stage<'_> {
         Finish::measured(look.refines(self.measured))
     }
 
+    fn remembers(&self, look: &Look) -> bool {
+        let is_known = self.source.as_ref().is_some_and(|source| source.knows_background());
+        look.background_memory == BackgroundMemory::On && !is_known
+    }
+
     /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more.
     fn depth_and_coc(
         &mut self,
@@ -139,10 +146,7 @@ impl Stage<'_> {
         if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
             let mut map = brought.unwrap_or_else(|| self.depths.take());
             rate.give_held(&mut map, color);
-            // A map that was made around a subject has brought its matte.
-            if map.subject_m.is_none() {
-                coc.find_matte(&mut map, color, &field);
-            }
+            coc.share(&mut map, color, &field);
             *self.held += 1;
             return Ok((map, field));
         }

@@ -5,7 +5,7 @@ use pulp::Simd;
 
 use super::tiles::BLOCK;
 use super::unpack::{Piece, Surfaces};
-use crate::bokeh::plan::Share;
+use crate::bokeh::plan::{HIDING_SHARE, Share};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, store};
 
@@ -66,6 +66,11 @@ impl<S: Simd> ShareAt<S> {
         }
         let front = self.of_one(simd, &surfaces.front, x);
         let [share, behind] = [&surfaces.share, &surfaces.behind].map(|plane| load::<S>(&plane.0, x));
+        // What is known of the farther surface without being seen, and the bins that take none of the nearer one.
+        let one = simd.splat_f32s(1.0);
+        let unseen = simd.sub_f32s(simd.add_f32s(behind, share), one);
+        let hidden = simd.min_f32s(simd.mul_f32s(simd.splat_f32s(1.0 / HIDING_SHARE), front[3]), one);
+        let behind = simd.sub_f32s(behind, simd.mul_f32s(unseen, hidden));
         std::array::from_fn(|p| fma(simd, share, front[p], simd.mul_f32s(behind, back[p])))
     }
 

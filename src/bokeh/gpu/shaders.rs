@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
 use crate::bokeh::occlusion::{OTHER_FROM, OTHER_TO};
-use crate::bokeh::plan::{ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HINDMOST_COVERAGE, SEGMENT};
+use crate::bokeh::plan::{ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HIDING_SHARE, HINDMOST_COVERAGE, SEGMENT};
 use crate::compute::device::Shader;
 
 macro_rules! shader {
@@ -66,7 +66,7 @@ pub const LIST_HEAD: usize = 16;
 pub const SHARED_FROM: u32 = 4;
 
 /// The `override` constants of `common.wgsl`.
-pub const CONSTANTS: [(&str, f64); 18] = [
+pub const CONSTANTS: [(&str, f64); 19] = [
     ("CELL", CELL as f64),
     ("SEGMENT", SEGMENT as f64),
     ("ANY_COLOR", ANY_COLOR as f64),
@@ -74,6 +74,7 @@ pub const CONSTANTS: [(&str, f64); 18] = [
     ("FAR_WEIGHT", FAR_WEIGHT as f64),
     ("OTHER_FROM", OTHER_FROM as f64),
     ("OTHER_TO", OTHER_TO as f64),
+    ("HIDING_SHARE", HIDING_SHARE as f64),
     ("HINDMOST_COVERAGE", HINDMOST_COVERAGE as f64),
     ("OCTAVES_FROM_PX", OCTAVES_FROM_PX as f64),
     ("OCTAVE_SHIFT", OCTAVE_SHIFT as f64),

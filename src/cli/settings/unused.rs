@@ -43,7 +43,7 @@ pub enum From {
 type Why = fn(&Run) -> Option<&'static str>;
 
 /// What settings need to have an effect. The first two rows depend on the source alone: `warn_by_source` takes these.
-const NEEDS: [(&[&str], Why); 16] = [
+const NEEDS: [(&[&str], Why); 17] = [
     (&["size", "fps"], |run| (run.source == From::Source(Kind::Recording)).then_some("a recording has its own")),
     (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
     (&["depth-scale", "depth-invalid"], |run| match run.depth {
@@ -72,6 +72,11 @@ const NEEDS: [(&[&str], Why); 16] = [
     (&["focus"], |run| if run.lens { None } else { dof(run) }),
     (&["focus-range", "method"], dof),
     (&["refine"], |run| if run.source == From::Bench { Some("the scene's depth is exact") } else { dof(run) }),
+    (&["background-memory"], |run| match (run.source, run.depth) {
+        (From::Picture | From::Bench, _) => Some("a picture on its own has nothing to remember"),
+        (_, DepthFrom::Plate) => Some("the plate has what lies behind"),
+        _ => dof(run),
+    }),
     (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
     (&["coc-at-infinity", "f-number", "focal-length", "sensor-width"], |run| {
         if run.source == From::Bench { Some("`bench` takes --coc") } else { blur(run) }

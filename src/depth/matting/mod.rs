@@ -79,6 +79,17 @@ impl Matting {
     /// Finds the mixed pixels of a map as large as its picture, beside jumps of inverse depth of more than `jump`, in 1/m.
     /// Of another size, or where `jump` is not finite, or with more edges than [`Matte::most`], it has none.
     pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, jump: f32) {
+        self.find_before(map, color, jump, |_, _| None);
+    }
+
+    /// The same where `behind` may know the light behind a pixel, by its place and the inverse depth of its nearer surface.
+    pub fn find_before(
+        &mut self,
+        map: &mut DepthMap,
+        color: &ColorImage,
+        jump: f32,
+        behind: impl Fn(usize, f32) -> Option<[f32; 3]>,
+    ) {
         map.matte.pixels.clear();
         if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
             return;
@@ -97,24 +108,28 @@ impl Matting {
         evidence.extend(edges.iter().filter_map(|edge| {
             let place = clusters.around(&view, edge)?;
             let at = edge.y as usize * size.0 + edge.x as usize;
-            Some(Evidence::new(edge, labels(&view, edge, at), view.light(at), (place, clusters.at(place))))
+            let contrast = clusters.at(place);
+            // What is remembered of a surface that looks otherwise here is not of that surface.
+            let behind = behind(at, edge.near).filter(|light| contrast.is_like_far(*light));
+            Some(Evidence::new(edge, labels(&view, edge, at), (view.light(at), behind), (place, contrast)))
         }));
         let prior = Prior::of(&self.evidence);
         let on_edges = self.evidence.len();
-        self.trace((size, most), jump, &prior, &color.rgb);
+        self.trace((size, most), jump, &prior, (&color.rgb, &behind));
         let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
         let view = View { size, inverse, jump, at_edge, rgb: &color.rgb, light };
         map.matte.pixels.extend(evidence.iter().filter_map(|evidence| {
             let share = prior.share(evidence);
             let pure = if evidence.labels.is_near { share > NEARLY_PURE } else { share < 1.0 - NEARLY_PURE };
             let at = evidence.edge.y as usize * size.0 + evidence.edge.x as usize;
-            (!pure).then(|| MixedPixel {
-                behind: 1.0 - share,
-                at: at as u32,
-                near_m: evidence.edge.near.recip(),
-                far_m: evidence.edge.far.recip(),
-                share,
-                difference: clusters.at(evidence.contrast).difference(view.light(at), share),
+            (!pure).then(|| {
+                let (contrast, own) = (clusters.at(evidence.contrast), view.light(at));
+                let (behind, difference) = match evidence.behind {
+                    Some(light) => (1.0, contrast.difference_before(light, own, share)),
+                    None => (1.0 - share, contrast.difference(own, share)),
+                };
+                let (near_m, far_m) = (evidence.edge.near.recip(), evidence.edge.far.recip());
+                MixedPixel { at: at as u32, near_m, far_m, share, behind, difference }
             })
         }));
         if self.evidence.len() > on_edges {
@@ -125,7 +140,13 @@ impl Matting {
     /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near
     /// though the map has none there, to neighbours that do so, too (hysteresis, as edges are traced); no further where there
     /// are `most` pixels already.
-    fn trace(&mut self, (size, most): ((usize, usize), usize), jump: f32, prior: &Prior, rgb: &[u8]) {
+    fn trace(
+        &mut self,
+        (size, most): ((usize, usize), usize),
+        jump: f32,
+        prior: &Prior,
+        (rgb, behind): (&[u8], &impl Fn(usize, f32) -> Option<[f32; 3]>),
+    ) {
         let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
         let (mut from, mut steps) = (0, 0);
         while from < evidence.len() && evidence.len() < most && steps < MOST_STEPS {
@@ -144,8 +165,9 @@ impl Matting {
                     }
                     let view = View { size, inverse, jump, at_edge, rgb, light };
                     if let Some(place) = clusters.around(&view, &next) {
-                        let contrast = (place, clusters.at(place));
-                        evidence.push(Evidence::new(&next, TRACED, view.light(at), contrast));
+                        let contrast = clusters.at(place);
+                        let behind = behind(at, next.near).filter(|light| contrast.is_like_far(*light));
+                        evidence.push(Evidence::new(&next, TRACED, (view.light(at), behind), (place, contrast)));
                     }
                 }
             }

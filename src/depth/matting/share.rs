@@ -12,6 +12,8 @@ const SHRINKAGE: f32 = 0.01;
 const QUANTISATION: f32 = 5e-6;
 /// Surfaces have spots that no pixel around is like: so likely a pure pixel is one, times what evens out densities.
 const OUTLIER: f32 = 0.02;
+/// Light that is off a surface's by more than so many standard deviations is not of it.
+const MOST_DEVIATION: f32 = 3.0;
 /// Of two pixels in a row at an edge, one borders the other surface only at a corner: it is mixed so much more rarely.
 const AT_CORNER: f32 = 0.3;
 
@@ -108,6 +110,26 @@ impl Contrast {
         self.discriminant.precision
     }
 
+    /// Whether the far surface may have this light here.
+    pub(super) fn is_like_far(&self, light: [f32; 3]) -> bool {
+        let Color { mean, covariance: mut spread } = self.surfaces[1];
+        let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
+        for k in [0, 3, 5] {
+            spread[k] += floor;
+        }
+        let off = std::array::from_fn(|p| light[p] - mean[p]);
+        dot(off, times(&inverse(&spread), off)) < MOST_DEVIATION * MOST_DEVIATION
+    }
+
+    /// How likely it is that a colour which is a `share` of the near surface before this light is off the line between both by
+    /// as much as it is; at most 1.
+    fn off_line(&self, light: [f32; 3], own: [f32; 3], share: f32) -> f32 {
+        let near = &self.surfaces[0].mean;
+        let share = share.clamp(0.0, 1.0);
+        let off = std::array::from_fn(|p| own[p] - light[p] - share * (near[p] - light[p]));
+        (-dot(off, times(&self.inverse, off))).exp().max(1e-6)
+    }
+
     /// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
     /// ones of those that add up to the pixel's `own` (Chuang et al. 2001, equation 9, with the pixel as exact). None is
     /// darker than black, or brighter than white.
@@ -161,6 +183,8 @@ pub struct Evidence {
     pub labels: Labels,
     /// The place of the contrast that it was compared with.
     pub contrast: u32,
+    /// The light behind it, where that is known.
+    pub behind: Option<[f32; 3]>,
     /// Likelihood of the pixel's colour if it is pure, as the map says.
     pure: f32,
     /// The mean over shares of the map's side of one half (of all where it is thin), and of the same times the share.
@@ -170,11 +194,23 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Compares a pixel's colour `own` with those of both surfaces.
-    pub(super) fn new(edge: &EdgePixel, labels: Labels, own: [f32; 3], (place, contrast): (u32, &Contrast)) -> Self {
+    /// Compares a pixel's colour `own` with those of both surfaces, the farther one's being `behind` where that is known.
+    pub(super) fn new(
+        edge: &EdgePixel,
+        labels: Labels,
+        (own, behind): ([f32; 3], Option<[f32; 3]>),
+        (place, contrast): (u32, &Contrast),
+    ) -> Self {
         let Labels { is_near, is_thin, .. } = labels;
-        let projected = contrast.share(own).clamp(-0.3, 1.3);
-        let likelihoods = gaussian(contrast.precision(), projected);
+        let discriminant = behind.map_or(contrast.discriminant, |light| Discriminant::before(contrast.front(), light));
+        let precision = discriminant.precision;
+        let share = discriminant.share(own);
+        let mut likelihoods = gaussian(precision, share.clamp(-0.3, 1.3));
+        if let Some(light) = behind {
+            // What is no mixture of both has a colour of its own, as lone hair beside a face.
+            let unlike = contrast.off_line(light, own, share);
+            likelihoods = likelihoods.map(|value| value * unlike);
+        }
         let (mut half, mut any) = ([0.0; 2], [0.0; 2]);
         let middle = STEPS / 2;
         for (step, &value) in likelihoods.iter().enumerate() {
@@ -188,8 +224,10 @@ impl Evidence {
         if is_thin {
             half = any;
         }
-        let pure = likelihoods[if is_near { STEPS - 1 } else { 0 }].max(OUTLIER / contrast.precision().sqrt());
-        Self { edge: *edge, labels, contrast: place, pure, half, any }
+        // No pixel of a surface whose light is known is like none of it.
+        let outlier = if is_near || behind.is_none() { OUTLIER / precision.sqrt() } else { 0.0 };
+        let pure = likelihoods[if is_near { STEPS - 1 } else { 0 }].max(outlier);
+        Self { edge: *edge, labels, contrast: place, behind, pure, half, any }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Taking a plate: the median of pictures in which nothing moves.
 
-use super::reduced::Reducer;
+use crate::depth::reduced::Reducer;
 use crate::frame::{ColorImage, Mask};
 
 /// They are so far apart, at least.

@@ -1,9 +1,9 @@
 //! A plate that stays true: what is surely background is learned again and again, and so is what was put down. Who stands
 //! before it never is.
 
-use super::alignment::Alignment;
-use super::reduced::{Reducer, block_px, reduced_size};
 use super::subject::{Part, Subject};
+use crate::depth::alignment::Alignment;
+use crate::depth::reduced::{Reducer, block_px, reduced_size};
 use crate::frame::ColorImage;
 
 /// The whole picture is learned from once in this time.

@@ -4,22 +4,20 @@
 //! Each picture is compared with the plate in few pixels, after its exposure, white balance and shift are
 //! taken out of it; shadows are background. The plate goes on learning where nobody is.
 
-mod alignment;
 mod capture;
 mod learning;
-mod reduced;
 mod source;
 mod subject;
 
 pub use capture::{Capture, Taken};
 pub use source::{Companion, Guide, Lock, PlateDepth, Step};
 
-use alignment::{Aligner, Alignment};
 use learning::{Learning, Lesson};
-use reduced::{MOST, Reducer, block_px, reduced_size};
 use subject::Subject;
 
+use crate::depth::alignment::{Aligner, Alignment};
 use crate::depth::matting::mask::Backdrop;
+use crate::depth::reduced::{Reducer, block_px, reduced_size};
 use crate::frame::{ColorImage, Mask};
 
 /// Steps of the alignment with the first picture; later ones need one.
@@ -120,11 +118,7 @@ impl Plate {
             }
         }
         self.draw_mask(size);
-        for (light, gain) in self.light.iter_mut().zip(self.alignment.gain) {
-            // Values are roots of light.
-            let exposed = |code: usize| (gain * self.reducer.root(code as f32) / MOST).powi(2).min(1.0);
-            light.iter_mut().enumerate().for_each(|(code, light)| *light = exposed(code));
-        }
+        self.reducer.expose(self.alignment.gain, &mut self.light);
         self.fits
     }
 

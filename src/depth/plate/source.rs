@@ -220,6 +220,10 @@ impl DepthSource for PlateDepth {
         Ok(())
     }
 
+    fn knows_background(&self) -> bool {
+        true
+    }
+
     fn efforts(&self) -> &'static [f64] {
         self.companion.as_ref().map_or(&[1.0], |companion| companion.efforts())
     }

@@ -1,7 +1,7 @@
 //! What stands before the plate: pixels that differ from it, less what is only lit otherwise, joined to parts.
 
-use super::alignment::Alignment;
-use super::reduced::MOST;
+use crate::depth::alignment::Alignment;
+use crate::depth::reduced::MOST;
 use crate::depth::tap::nearest;
 use crate::frame::Mask;
 

@@ -5,7 +5,7 @@ use egui::{ComboBox, Ui};
 use super::Sheet;
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
-use crate::look::Refine;
+use crate::look::{BackgroundMemory, Refine};
 use crate::preview::panel::parts::choose;
 use crate::preview::state::tweak::rank_label;
 
@@ -56,6 +56,12 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         if let Some(index) = choose(ui, "Refine depth", &refines, chosen, |_| true) {
             sheet.look.refine = REFINES[index];
             sheet.changed(true, "refine");
+        }
+        let mut remembers = sheet.look.background_memory == BackgroundMemory::On;
+        let hover = "What was seen before of what things hide now is shown where blur lets it through";
+        if ui.checkbox(&mut remembers, "Remember the background").on_hover_text(hover).changed() {
+            sheet.look.background_memory = if remembers { BackgroundMemory::On } else { BackgroundMemory::Off };
+            sheet.changed(true, "background-memory");
         }
     }
 }

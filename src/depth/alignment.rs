@@ -1,8 +1,8 @@
-//! How the picture of now differs from the plate though nothing stands before it: exposure and white balance, a gain per
-//! channel; the camera, a shift.
+//! How the picture of now differs from an earlier one of the same place, such as a plate, though nothing stands before it:
+//! exposure and white balance, a gain per channel; the camera, a shift.
 
 use super::reduced::MOST;
-use crate::depth::tap::Tap;
+use super::tap::Tap;
 
 /// Pixels darker or brighter than these tell no gain.
 const DARK: f32 = 24.0;

@@ -60,6 +60,15 @@ impl Reducer {
         (self.code((self.root(f32::from(code)) / gain).min(MOST)) + 0.5) as u8
     }
 
+    /// The light of each code, by channel, once values are multiplied by a gain per channel.
+    pub fn expose(&self, gain: [f32; 3], light: &mut [[f32; 256]; 3]) {
+        for (light, gain) in light.iter_mut().zip(gain) {
+            // Values are roots of light.
+            let exposed = |code: usize| (gain * self.root(code as f32) / MOST).powi(2).min(1.0);
+            light.iter_mut().enumerate().for_each(|(code, light)| *light = exposed(code));
+        }
+    }
+
     /// The means of the blocks of a picture.
     pub fn reduce(&mut self, color: &ColorImage, reduced: &mut Vec<[f32; 3]>) {
         let (block_px, (across, down)) = (block_px(color.width), reduced_size(color));

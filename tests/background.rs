@@ -1,0 +1,152 @@
+//! What lies behind things is remembered where it was seen, and forgotten where it is not what it was.
+#![allow(missing_docs)]
+
+mod common;
+
+use std::sync::LazyLock;
+
+use bokehcam::color::srgb_to_linear;
+use bokehcam::depth::background::Background;
+use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::optics::DepthCoc;
+use common::{color, depth, noise};
+
+const SIZE: (u32, u32) = (160, 96);
+const PERIOD_NS: u64 = 33_333_333;
+const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 };
+const PERSON: [u8; 3] = [200, 90, 60];
+/// The person's columns, and where they stand after a step to the right.
+const WIDE: u32 = 50;
+const STEP: u32 = 20;
+
+/// A person before a wall that is `brightness` times as bright as at first, both `shift` columns further right.
+struct Shot {
+    person: u32,
+    shift: u32,
+    brightness: f32,
+}
+
+impl Shot {
+    fn wall(&self, x: u32, y: u32) -> [u8; 3] {
+        static GRAIN: LazyLock<ColorImage> = LazyLock::new(|| noise(SIZE.0, SIZE.1));
+        let (x, y) = ((x + SIZE.0 - self.shift) % SIZE.0 / 4 * 4, y / 4 * 4);
+        let code = GRAIN.rgb[3 * (y * SIZE.0 + x) as usize];
+        // Exposure is a factor of the light: of the root of it here, nearly that of the codes.
+        [60 + code / 3, 80 + code / 4, 100 + code / 5].map(|code| (f32::from(code) * self.brightness) as u8)
+    }
+
+    fn is_person(&self, x: u32, y: u32) -> bool {
+        y >= 20 && (self.person..self.person + WIDE).contains(&x)
+    }
+
+    fn taken(&self) -> (ColorImage, DepthMap) {
+        let wall: Vec<[u8; 3]> = (0..SIZE.0 * SIZE.1).map(|at| self.wall(at % SIZE.0, at / SIZE.0)).collect();
+        let person = PERSON.map(|code| (f32::from(code) * self.brightness) as u8);
+        let of = |x: u32, y: u32| if self.is_person(x, y) { person } else { wall[(y * SIZE.0 + x) as usize] };
+        (color(SIZE.0, SIZE.1, of), depth(SIZE.0, SIZE.1, |x, y| if self.is_person(x, y) { 1.0 } else { 4.0 }))
+    }
+}
+
+const BEFORE: Shot = Shot { person: 40, shift: 0, brightness: 1.0 };
+
+struct Seer {
+    background: Background,
+    time_ns: u64,
+}
+
+impl Seer {
+    fn new() -> Self {
+        Self { background: Background::default(), time_ns: 0 }
+    }
+
+    /// Sees a shot for some frames; the last one's map, with what is behind.
+    fn see(&mut self, shot: &Shot, frames: usize) -> DepthMap {
+        let (picture, map) = shot.taken();
+        let mut last = map.clone();
+        for _ in 0..frames {
+            self.background.learn(&map, &picture, &LENS, self.time_ns);
+            last.clone_from(&map);
+            self.background.reveal(&mut last, &picture, &LENS);
+            self.time_ns += PERIOD_NS;
+        }
+        last
+    }
+}
+
+/// How far the light behind is off that of a shot's wall, over the mean pixel of those that have one; and how many do.
+fn off(map: &DepthMap, shot: &Shot) -> (f32, usize) {
+    let (picture, _) = shot.taken();
+    let (mut sum, count) = (0.0, map.matte.pixels.len());
+    for pixel in &map.matte.pixels {
+        assert_eq!((pixel.near_m, pixel.share, pixel.behind), (1.0, 1.0, 1.0));
+        assert!((pixel.far_m - 4.0).abs() < 1e-3, "{pixel:?}");
+        let (x, y) = (pixel.at % SIZE.0, pixel.at / SIZE.0);
+        assert!(shot.is_person(x, y));
+        let wall = shot.wall(x, y);
+        for (p, code) in wall.into_iter().enumerate() {
+            let own = srgb_to_linear(f32::from(picture.rgb[3 * pixel.at as usize + p]) / 255.0);
+            sum += (own - pixel.difference[p] - srgb_to_linear(f32::from(code) / 255.0)).abs();
+        }
+    }
+    (sum / (3 * count).max(1) as f32, count)
+}
+
+#[test]
+fn what_a_step_covers_is_known_and_nothing_else_is() {
+    let mut seer = Seer::new();
+    assert!(seer.see(&BEFORE, 40).matte.pixels.is_empty(), "nothing was seen of what is hidden");
+    let after = Shot { person: BEFORE.person + STEP, ..BEFORE };
+    let (off, count) = off(&seer.see(&after, 1), &after);
+    assert!(off < 0.004, "{off}");
+    // All that was the wall, but for what is close to the outline of then.
+    let covered = (STEP * (SIZE.1 - 20)) as usize;
+    assert!(count <= covered && count * 5 >= covered * 4, "{count} of {covered}");
+}
+
+#[test]
+fn another_exposure_makes_what_is_hidden_another_one_too() {
+    let mut seer = Seer::new();
+    seer.see(&BEFORE, 40);
+    let after = Shot { person: BEFORE.person + STEP, brightness: 0.85, ..BEFORE };
+    let (off, count) = off(&seer.see(&after, 20), &after);
+    assert!(off < 0.015 && count > 1000, "{off}, {count}");
+}
+
+#[test]
+fn a_camera_that_moves_remembers_nothing() {
+    let mut seer = Seer::new();
+    seer.see(&BEFORE, 40);
+    let after = Shot { person: BEFORE.person + STEP, shift: 4, ..BEFORE };
+    assert!(seer.see(&after, 4).matte.pixels.is_empty());
+    // It stands again, and what it sees now is learned.
+    seer.see(&after, 60);
+    let back = Shot { person: after.person + STEP, ..after };
+    let (off, count) = off(&seer.see(&back, 1), &back);
+    assert!(off < 0.004 && count > 1000, "{off}, {count}");
+}
+
+#[test]
+fn what_was_seen_shortly_and_is_hidden_for_long_fades() {
+    let mut seer = Seer::new();
+    seer.see(&BEFORE, 40);
+    let after = Shot { person: BEFORE.person + STEP, ..BEFORE };
+    assert!(seer.see(&after, 240).matte.pixels.is_empty(), "it was seen for a second, and hidden for eight");
+}
+
+#[test]
+fn another_place_or_size_is_begun_anew() {
+    let mut seer = Seer::new();
+    seer.see(&BEFORE, 40);
+    // A cut in a recording: time goes back.
+    seer.time_ns = 0;
+    let after = Shot { person: BEFORE.person + STEP, ..BEFORE };
+    assert!(seer.see(&after, 2).matte.pixels.is_empty());
+    let (picture, mut map) = (noise(32, 24), depth(32, 24, |_, _| 1.0));
+    seer.background.learn(&map, &picture, &LENS, seer.time_ns);
+    seer.background.reveal(&mut map, &picture, &LENS);
+    assert!(map.matte.pixels.is_empty());
+    let small = depth(16, 12, |_, _| 1.0);
+    seer.background.learn(&small, &picture, &LENS, seer.time_ns);
+    seer.background.reveal(&mut map, &picture, &LENS);
+    assert!(map.matte.pixels.is_empty(), "a map of another size");
+}
