@@ -12,13 +12,13 @@ mod coc;
 mod deliver;
 mod depth;
 mod error;
+mod fit_check;
 mod held;
 mod pacer;
 mod places;
 mod playout;
 mod quality;
 mod rate;
-mod registration_check;
 pub mod still;
 mod view;
 mod wanted;
@@ -233,7 +233,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         tally: &tally,
         clock: &clock,
         times: depth_times,
-        check: registration_check::RegistrationCheck::default(),
+        check: fit_check::FitCheck::default(),
         held,
     };
     let blur = blur::Stage {

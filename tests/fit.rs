@@ -158,7 +158,7 @@ fn render_says_what_it_does_about_it() {
 }
 
 #[test]
-fn a_stream_says_once_that_its_depth_is_of_another_camera() {
+fn a_stream_says_once_how_its_depth_does_not_fit_and_mends_it() {
     let dir = TempDir::new().unwrap();
     let (color, map) = portrait();
     let record = |name: &str, map: &DepthMap| {
@@ -177,10 +177,28 @@ fn a_stream_says_once_that_its_depth_is_of_another_camera() {
     };
     record("fits", &map);
     record("other", &mirrored(&map));
+    record("fat", &fat(&map, 6));
     let stream =
         |name: &str| bokehcam(dir.path(), &["stream", name, "--to", "null", "--backend", "cpu", "--quality", "draft"]);
     let about =
         |said: &str| said.lines().filter(|line| line.contains("nowhere do the outlines of its depth meet")).count();
     assert_eq!(about(&stream("fits")), 0);
     assert_eq!(about(&stream("other")), 1);
+    let pictures = |name: &str| {
+        let out = format!("{name}-out");
+        let to = ["stream", name, "--to", &out, "--backend", "cpu", "--quality", "draft"];
+        let said = bokehcam(dir.path(), &to);
+        let of = |frame: &str| read_color(&dir.path().join(&out).join(frame)).unwrap();
+        (said, [of("000000.png"), of("000024.png")])
+    };
+    let ((_, fitting), (said, mended)) = (pictures("fits"), pictures("fat"));
+    let about =
+        said.lines().filter(|line| line.contains("depth is brought to the pictures, as its outlines lie about"));
+    assert_eq!(about.count(), 1, "{said}");
+    // The first frames are not judged yet.
+    let off = |k: usize| {
+        let values = fitting[k].rgb.iter().zip(&mended[k].rgb);
+        values.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum::<f64>()
+    };
+    assert!(off(1) < 0.8 * off(0), "{} before, {} after", off(0), off(1));
 }

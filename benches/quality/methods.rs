@@ -9,7 +9,8 @@ use bokehcam::compute::Place;
 use bokehcam::depth::background::Background;
 use bokehcam::depth::fill::Filler;
 use bokehcam::depth::matting::{self, Matting};
-use bokehcam::depth::refine::Refiner;
+use bokehcam::depth::misfit::Misfit;
+use bokehcam::depth::refine::{Mending, Refiner};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
@@ -125,6 +126,7 @@ pub struct Blurrer {
     bokeh: Option<Box<dyn Bokeh>>,
     filler: Filler,
     refiner: Refiner,
+    mending: Mending,
     matting: Matting,
     background: Background,
     time_ns: u64,
@@ -165,7 +167,8 @@ impl Blurrer {
     fn of(method: Method, bokeh: Option<Box<dyn Bokeh>>) -> Self {
         let (filler, refiner) = (Filler::new(), Refiner::new());
         let (matting, background) = (Matting::default(), Background::default());
-        Self { method, bokeh, filler, refiner, matting, background, time_ns: 0 }
+        let mending = Mending::default();
+        Self { method, bokeh, filler, refiner, mending, matting, background, time_ns: 0 }
     }
 
     /// The blurred picture.
@@ -199,6 +202,11 @@ impl Blurrer {
             }
             Method::Refined => {
                 let mut depth = shot.depth.clone();
+                let mending = Misfit::of(&depth, &shot.image).and_then(|misfit| misfit.mending(&depth, &shot.image));
+                let mending = mending.unwrap_or_default();
+                if self.mending != mending {
+                    (self.mending, self.refiner) = (mending, Refiner::mending(mending));
+                }
                 self.refiner.refine(&mut depth, &shot.image, self.time_ns);
                 self.time_ns += PERIOD_NS;
                 self.layered(shot, depth)

@@ -13,6 +13,7 @@ mod guided_fill;
 #[cfg(feature = "camera")]
 pub mod live;
 pub mod matting;
+pub mod misfit;
 pub mod plate;
 pub mod recorded;
 mod reduced;

@@ -4,7 +4,7 @@ use crate::depth::background::Background;
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
 use crate::depth::matting::{self, Matting};
-use crate::depth::refine::Refiner;
+use crate::depth::refine::{Mending, Refiner};
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::CocRule;
 use crate::optics::CocField;
@@ -17,16 +17,13 @@ pub enum Finish {
     /// Holes are filled.
     Fill,
     /// It is fitted to the picture and steadied, and holes are filled.
-    Refine {
-        /// As [`Refiner::from_coarse`] has it; 1 for frames of a stream.
-        coarsest: u32,
-    },
+    Refine,
 }
 
 impl Finish {
     /// Of depth as it was measured.
     pub fn measured(refine: bool) -> Self {
-        if refine { Self::Refine { coarsest: 1 } } else { Self::Fill }
+        if refine { Self::Refine } else { Self::Fill }
     }
 }
 
@@ -35,6 +32,7 @@ pub struct CocMaker {
     rule: CocRule,
     focus: Focus,
     finisher: Finisher,
+    mending: Mending,
     matting: Matting,
     background: Option<Background>,
 }
@@ -42,15 +40,15 @@ pub struct CocMaker {
 enum Finisher {
     Keep,
     Fill(Filler),
-    Refine { coarsest: u32, refiner: Box<Refiner> },
+    Refine(Box<Refiner>),
 }
 
 impl Finisher {
-    fn new(finish: Finish) -> Self {
+    fn new(finish: Finish, mending: Mending) -> Self {
         match finish {
             Finish::Keep => Self::Keep,
             Finish::Fill => Self::Fill(Filler::new()),
-            Finish::Refine { coarsest } => Self::Refine { coarsest, refiner: Box::new(Refiner::from_coarse(coarsest)) },
+            Finish::Refine => Self::Refine(Box::new(Refiner::mending(mending))),
         }
     }
 
@@ -59,7 +57,7 @@ impl Finisher {
             == match self {
                 Self::Keep => Finish::Keep,
                 Self::Fill(_) => Finish::Fill,
-                Self::Refine { coarsest, .. } => Finish::Refine { coarsest: *coarsest },
+                Self::Refine(_) => Finish::Refine,
             }
     }
 }
@@ -71,8 +69,19 @@ impl CocMaker {
             CocRule::Fixed(_) => FocusRule::Auto,
             CocRule::Depth { focus, .. } => focus,
         };
-        let (focus, finisher, matting) = (Focus::new(focus), Finisher::new(finish), Matting::default());
-        Self { rule, focus, finisher, matting, background: None }
+        let mending = Mending::default();
+        let (focus, finisher, matting) = (Focus::new(focus), Finisher::new(finish, mending), Matting::default());
+        Self { rule, focus, finisher, mending, matting, background: None }
+    }
+
+    /// Mends every map from now on, where it is refined; whether it is.
+    pub fn mend(&mut self, mending: Mending) -> bool {
+        let refines = matches!(self.finisher, Finisher::Refine(_));
+        if self.mending != mending && refines {
+            self.finisher = Finisher::new(Finish::Refine, mending);
+        }
+        self.mending = mending;
+        refines
     }
 
     /// Remembers from now on, or no more, what lies behind things.
@@ -88,11 +97,15 @@ impl CocMaker {
             (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
                 self.focus.follow(focus);
                 if !self.finisher.is(finish) {
-                    self.finisher = Finisher::new(finish);
+                    self.finisher = Finisher::new(finish, self.mending);
                 }
                 self.rule = rule;
             }
-            _ => *self = Self { background: self.background.take(), ..Self::new(rule, finish) },
+            _ => {
+                let new = Self { background: self.background.take(), ..Self::new(rule, finish) };
+                let mending = std::mem::replace(self, new).mending;
+                self.mend(mending);
+            }
         }
     }
 
@@ -118,7 +131,7 @@ impl CocMaker {
             match &mut self.finisher {
                 Finisher::Keep => {}
                 Finisher::Fill(filler) => filler.fill_guided(map, color),
-                Finisher::Refine { refiner, .. } => {
+                Finisher::Refine(refiner) => {
                     refiner.set_focus(focus_m);
                     refiner.refine(map, color, time_ns);
                     map.is_smooth = false;
@@ -172,7 +185,7 @@ mod tests {
         let mut refiner_after = |refine| {
             coc.follow(rule, Finish::measured(refine));
             match &coc.finisher {
-                Finisher::Refine { refiner, .. } => Some(std::ptr::from_ref(&**refiner)),
+                Finisher::Refine(refiner) => Some(std::ptr::from_ref(&**refiner)),
                 Finisher::Fill(_) | Finisher::Keep => None,
             }
         };

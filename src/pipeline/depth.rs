@@ -6,8 +6,8 @@ use std::time::Duration;
 use super::capture::Shot;
 use super::change::{Change, Executor, Swap};
 use super::coc::{CocMaker, Finish};
+use super::fit_check::{FitCheck, Verdict};
 use super::rate::Rate;
-use super::registration_check::RegistrationCheck;
 use super::{Ended, Fault, Frame, hand_on};
 use crate::clock::Clock;
 use crate::depth::{DepthError, DepthSource, Seen};
@@ -48,8 +48,8 @@ pub(super) struct Stage<'a> {
     /// How well and how often depth is made; `None` makes it as well as can be, for every frame.
     pub rate: Option<Rate<'a>>,
     pub times: &'a mut Histogram,
-    /// Notices depth that is not registered to the colours.
-    pub check: RegistrationCheck,
+    /// Notices depth that does not fit the pictures.
+    pub check: FitCheck,
     /// Counts frames that took over the depth of the one before.
     pub held: &'a mut u64,
 }
@@ -152,12 +152,21 @@ impl Stage<'_> {
         }
         let seen = Seen { stamp, color, right: right.as_deref() };
         let mut map = brought.map_or_else(|| self.read(seen), Ok)?;
-        if self.check.fails(&map, color) {
-            tracing::warn!(
+        match self.check.look(&map, color) {
+            None => {}
+            Some(Verdict::Unrelated) => tracing::warn!(
                 "{}: nowhere do the outlines of its depth meet those of its pictures: the depth may be of another camera, not \
                  registered to the colours (--depth-calibration), or of another time",
                 self.source_name
-            );
+            ),
+            Some(Verdict::Mend(misfit, mending)) => {
+                if coc.mend(mending) {
+                    tracing::warn!(
+                        "{}: depth is brought to the pictures, as {misfit}; --refine off takes it as it is",
+                        self.source_name
+                    );
+                }
+            }
         }
         let field = coc.make(&mut map, color, stamp.time_ns);
         let now_ns = self.clock.now_ns();

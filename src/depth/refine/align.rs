@@ -37,6 +37,8 @@ pub struct Aligner {
     nearby: Weights,
     /// Pixels to ask, in order: first those at an edge, then the neighbours of those that changed.
     front: Vec<u32>,
+    /// All that were asked in the first round.
+    asked: Vec<u32>,
     /// Pixels that changed in the last round.
     moved: Vec<u32>,
 }
@@ -51,6 +53,7 @@ impl Default for Aligner {
             confidence: Vec::new(),
             nearby: votes::weights_by_distance(),
             front: Vec::new(),
+            asked: Vec::new(),
             moved: Vec::new(),
         }
     }
@@ -62,8 +65,9 @@ impl Aligner {
     pub fn align(&mut self, arch: Arch, inverse: &mut [f32], unknown: &[bool], rgb: &[u8], width: usize, jump: f32) {
         let height = inverse.len().checked_div(width).unwrap_or(0);
         self.moved.clear();
+        self.asked.clear();
         for round in 0..ROUNDS {
-            let Self { planes, edge, band, scratch, confidence, nearby, front, moved } = self;
+            let Self { planes, edge, band, scratch, confidence, nearby, front, asked, moved } = self;
             confidence.resize(inverse.len(), 0.0);
             arch.dispatch(FindBand { inverse, width, jump, edge, band, scratch });
             // Only what moved in the round before can move its neighbours now.
@@ -74,7 +78,7 @@ impl Aligner {
                 front.extend(moved.iter().filter(|&&k| band[k as usize]));
             }
             if front.is_empty() {
-                return;
+                break;
             }
             if round == 0 {
                 planes.set_colors(rgb, width, height, REACH_LANES);
@@ -91,6 +95,30 @@ impl Aligner {
             arch.dispatch(SetDepths { planes, inverse, confidence });
             moved.clear();
             arch.dispatch(Vote { planes, band, nearby, inverse, jump, front, moved });
+            if round == 0 {
+                std::mem::swap(front, asked);
+            }
+        }
+        decide(&self.asked, inverse, rgb, width, jump);
+    }
+}
+
+/// Gives those pixels that are left between two surfaces, as where a ramp was an edge, the one of both whose colour beside them
+/// is more like theirs.
+fn decide(asked: &[u32], inverse: &mut [f32], rgb: &[u8], width: usize, jump: f32) {
+    let color = |k: usize| [0, 1, 2].map(|p| i32::from(rgb[3 * k + p]));
+    let height = inverse.len() / width;
+    for k in asked.iter().map(|&k| k as usize) {
+        let (x, y, here) = (k % width, k / width, inverse[k]);
+        let pairs = [(x > 0 && x + 1 < width, 1), (y > 0 && y + 1 < height, width)];
+        let ends = pairs.into_iter().filter(|(inside, _)| *inside).map(|(_, step)| (k - step, k + step));
+        let is_between = |&(a, b): &(usize, usize)| {
+            let (low, high) = (inverse[a].min(inverse[b]), inverse[a].max(inverse[b]));
+            here - low > jump_at(jump, here) && high - here > jump_at(jump, high)
+        };
+        if let Some((a, b)) = ends.filter(is_between).last() {
+            let apart = |of: usize| color(of).into_iter().zip(color(k)).map(|(a, b)| (a - b).pow(2)).sum::<i32>();
+            inverse[k] = inverse[if apart(a) <= apart(b) { a } else { b }];
         }
     }
 }

@@ -16,7 +16,7 @@ mod votes;
 
 use pulp::Arch;
 
-pub use self::outlines::move_outlines;
+pub use self::outlines::Outlines;
 
 use self::align::Aligner;
 use self::smooth::Smoother;
@@ -35,6 +35,24 @@ const JUMP_SIGMAS: f32 = 4.0;
 const LEAST_CHANGE: f32 = 0.01;
 const CHANGE_SIGMAS: f32 = 4.0;
 
+/// What a map needs that is so far off its picture that colours alone do not find the outlines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mending {
+    /// How far all outlines are moved first, in pixels of the picture: outwards, seen from the nearer surface, or inwards where
+    /// that is negative.
+    pub distance_px: i32,
+    /// The scale at which refinement begins: one pixel for so many of the picture, each way. It is halved until it is that of
+    /// the picture. At each scale an edge moves by a few pixels, so that edges are found that are so many times as far off.
+    pub coarsest: u32,
+}
+
+impl Default for Mending {
+    /// Of a map that fits.
+    fn default() -> Self {
+        Self { distance_px: 0, coarsest: 1 }
+    }
+}
+
 /// Refines the depth of frame after frame; owns the memory for it, and remembers the last frame.
 #[derive(Debug, Default)]
 pub struct Refiner {
@@ -49,8 +67,8 @@ pub struct Refiner {
     aligner: Aligner,
     temporal: TemporalFilter,
     focus: Focus,
-    /// The scale at which refinement begins: one pixel for so many of the picture, each way. Up to 1 it is the picture's.
-    coarsest: u32,
+    mending: Mending,
+    outlines: Outlines,
     /// The picture, reduced.
     reduced: ColorImage,
     fit: Fit,
@@ -72,11 +90,10 @@ impl Refiner {
         Self::default()
     }
 
-    /// Refines from a scale on at which `coarsest` pixels of the picture, each way, are one, and halves it until it is that of
-    /// the picture. At each scale an edge moves by a few pixels, so that edges are found that are `coarsest` times as far
-    /// off. For pictures on their own: frames are only compared with earlier ones where this is 1.
-    pub fn from_coarse(coarsest: u32) -> Self {
-        Self { coarsest: coarsest.clamp(1, 1 << 5).next_power_of_two(), ..Self::default() }
+    /// The same for maps that need to be mended.
+    pub fn mending(mending: Mending) -> Self {
+        let coarsest = mending.coarsest.clamp(1, 1 << 5).next_power_of_two();
+        Self { mending: Mending { coarsest, ..mending }, ..Self::default() }
     }
 
     /// What is in focus from the next frame on, in metres: for a street, a step of depth counts less than for a desk. A
@@ -92,21 +109,24 @@ impl Refiner {
     /// A frame that does not follow the one before (another size, a seek, a gap) starts anew. Where no depth was ever
     /// known, the map stays unknown (0) everywhere.
     pub fn refine(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
-        let mut scale = self.coarsest;
+        let Mending { mut distance_px, coarsest: mut scale } = self.mending;
         while scale > 1 {
             let size = |side: u32| side.div_ceil(scale);
             let mut reduced = std::mem::take(&mut self.reduced);
             reduced.resize(size(color.width), size(color.height));
             self.fit.fit(color, &mut reduced);
-            self.refine_at(map, &reduced, time_ns);
+            let of_scale = distance_px as f32 / scale as f32;
+            self.refine_at(map, &reduced, of_scale.round() as i32, None);
+            distance_px = 0;
             self.reduced = reduced;
             scale /= 2;
         }
-        self.refine_at(map, color, time_ns);
+        self.refine_at(map, color, distance_px, Some(time_ns));
     }
 
-    /// Refines `map` at the size of `color`.
-    fn refine_at(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
+    /// Refines `map` at the size of `color`, its outlines moved first, and steadies it where it is that of a frame at `time_ns`:
+    /// only at the picture's scale a frame is compared with earlier ones.
+    fn refine_at(&mut self, map: &mut DepthMap, color: &ColorImage, distance_px: i32, time_ns: Option<u64>) {
         self.upsampler.resize(map, color.size());
         self.unknown.clear();
         self.unknown.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
@@ -115,7 +135,7 @@ impl Refiner {
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
             return self.temporal.forget();
         }
-        let Self { arch, unknown, inverse, smoother, aligner, temporal, focus: Focus(focus_m), .. } = self;
+        let Self { arch, unknown, inverse, smoother, outlines, aligner, temporal, focus: Focus(focus_m), .. } = self;
         let focus_m = *focus_m;
         let (arch, width) = (*arch, map.width as usize);
         inverse.clear();
@@ -124,9 +144,12 @@ impl Refiner {
         smoother.smooth(arch, inverse, width, measured_noise);
         let noise = smoother.noise(inverse, unknown, width);
         let jump = JUMP.max(JUMP_SIGMAS * noise);
+        outlines.shift(inverse, unknown, width, distance_px, jump);
         aligner.align(arch, inverse, unknown, &color.rgb, width, jump);
-        let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
-        temporal.steady(arch, inverse, &color.rgb, width, time_ns, limits);
+        if let Some(time_ns) = time_ns {
+            let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
+            temporal.steady(arch, inverse, &color.rgb, width, time_ns, limits);
+        }
         for (z_m, &v) in map.metres.iter_mut().zip(&*inverse) {
             *z_m = focus_m / v;
         }

@@ -1,40 +1,57 @@
-//! Morphology of a depth map: near things grow or shrink all around, holes stay as they are.
+//! Morphology of a depth map: near things grow or shrink all around.
 
-use crate::frame::DepthMap;
-
-/// Moves all outlines by `distance_px` pixels of the map: outwards, seen from the nearer surface, or inwards where that is
-/// negative. A square dilation or erosion of nearness, one axis after the other.
-pub fn move_outlines(map: &mut DepthMap, distance_px: i32) {
-    let (width, height, reach) = (map.width as usize, map.height as usize, distance_px.unsigned_abs() as usize);
-    let mut line = Line { reach, outwards: distance_px > 0, known: Vec::new(), scratch: Vec::new() };
-    for y in 0..height {
-        line.run(&mut map.metres, y * width, 1, width);
-    }
-    for x in 0..width {
-        line.run(&mut map.metres, x, width, height);
-    }
-}
-
-struct Line {
-    reach: usize,
-    outwards: bool,
-    known: Vec<f32>,
+/// Moves outlines; owns the memory for it.
+#[derive(Debug, Default)]
+pub struct Outlines {
+    before: Vec<f32>,
+    line: Vec<f32>,
     scratch: Vec<f32>,
 }
 
-impl Line {
-    /// Replaces each known depth of `len`, `step` apart, by the least (outwards) or largest one within reach.
-    fn run(&mut self, metres: &mut [f32], first: usize, step: usize, len: usize) {
-        let at = |k: usize| first + k * step;
-        let nothing = if self.outwards { f32::INFINITY } else { f32::NEG_INFINITY };
-        let pick = |a: f32, b: f32| if self.outwards { a.min(b) } else { a.max(b) };
-        let values = &mut self.known;
+impl Outlines {
+    /// Moves all outlines of a map of inverse depth by `distance_px` of its pixels: outwards, seen from the nearer surface, or
+    /// inwards where that is negative. A square dilation or erosion of nearness, one axis after the other, of steps above
+    /// `jump`: what differs less is one surface, and noise. What is `unknown` stays as it is, and moves nothing.
+    pub fn shift(&mut self, inverse: &mut [f32], unknown: &[bool], width: usize, distance_px: i32, jump: f32) {
+        if distance_px == 0 || width == 0 {
+            return;
+        }
+        let height = inverse.len() / width;
+        self.before.clear();
+        self.before.extend_from_slice(inverse);
+        for y in 0..height {
+            self.run(inverse, unknown, (y * width, 1, width), distance_px);
+        }
+        for x in 0..width {
+            self.run(inverse, unknown, (x, width, height), distance_px);
+        }
+        for (value, &before) in inverse.iter_mut().zip(&self.before) {
+            if (*value - before).abs() <= jump {
+                *value = before;
+            }
+        }
+    }
+
+    /// Replaces each known value of `len`, `step` apart, by the largest (outwards) or least one within reach.
+    fn run(
+        &mut self,
+        inverse: &mut [f32],
+        unknown: &[bool],
+        (first, step, len): (usize, usize, usize),
+        distance_px: i32,
+    ) {
+        let (reach, outwards) = (distance_px.unsigned_abs() as usize, distance_px > 0);
+        let nothing = if outwards { f32::NEG_INFINITY } else { f32::INFINITY };
+        let pick = |a: f32, b: f32| if outwards { a.max(b) } else { a.min(b) };
+        let values = &mut self.line;
         values.clear();
-        values.resize(self.reach, nothing);
-        values.extend((0..len).map(|k| if DepthMap::is_known(metres[at(k)]) { metres[at(k)] } else { nothing }));
-        values.resize(len + 2 * self.reach, nothing);
+        values.resize(reach, nothing);
+        let unknown = || unknown[first..].iter().step_by(step);
+        let known = |(&value, &unknown): (&f32, &bool)| if unknown { nothing } else { value };
+        values.extend(inverse[first..].iter().step_by(step).zip(unknown()).take(len).map(known));
+        values.resize(len + 2 * reach, nothing);
         // Windows of twice the size, until they are as large as two of them that overlap have to be.
-        let (window, mut size) = (2 * self.reach + 1, 1);
+        let (window, mut size) = (2 * reach + 1, 1);
         while 2 * size <= window {
             self.scratch.clone_from(values);
             for (k, value) in values.iter_mut().enumerate() {
@@ -42,9 +59,9 @@ impl Line {
             }
             size *= 2;
         }
-        for k in 0..len {
-            if DepthMap::is_known(metres[at(k)]) {
-                metres[at(k)] = pick(values[k], values[k + window - size]);
+        for (k, (value, unknown)) in inverse[first..].iter_mut().step_by(step).zip(unknown()).take(len).enumerate() {
+            if !unknown {
+                *value = pick(values[k], values[k + window - size]);
             }
         }
     }
@@ -55,23 +72,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_things_grow_and_shrink_and_holes_stay() {
-        let row = |text: &str| DepthMap {
-            width: text.len() as u32,
-            height: 1,
-            metres: text.bytes().map(|b| f32::from(b - b'0')).collect(),
-            ..DepthMap::default()
-        };
+    fn near_things_grow_and_shrink_and_holes_and_small_steps_stay() {
+        let row = |text: &str| text.bytes().map(|b| f32::from(b - b'0')).collect::<Vec<f32>>();
         for (distance_px, from, to) in [
-            (1, "9992299990999", "9922229990999"),
-            (-1, "9922229990999", "9992299990999"),
-            (2, "9999991999990", "9999111119990"),
-            (-2, "9999111119990", "9999991999990"),
-            (3, "1999999999992", "1111999992222"),
-            (0, "1992990", "1992990"),
+            (1, "1118811101111", "1188881101111"),
+            (-1, "1188881101111", "1118811101111"),
+            (2, "1111118111110", "1111888881110"),
+            (-2, "1111888881110", "1111118111110"),
+            (3, "8111111111117", "8888111117777"),
+            (2, "1112111811111", "1112188888111"),
+            (0, "8118110", "8118110"),
         ] {
             let mut map = row(from);
-            move_outlines(&mut map, distance_px);
+            let unknown: Vec<bool> = map.iter().map(|&value| value == 0.0).collect();
+            Outlines::default().shift(&mut map, &unknown, from.len(), distance_px, 1.5);
             assert_eq!(map, row(to), "{distance_px} of {from}");
         }
     }

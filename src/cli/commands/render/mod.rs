@@ -22,14 +22,12 @@ use crate::compute::Backend;
 use crate::depth::agreement::Agreement;
 use crate::depth::defocus;
 use crate::depth::matting::mask;
+use crate::depth::misfit::Misfit;
 use crate::files::place;
 use crate::frame::{ColorImage, DepthMap, Mask};
 use crate::look::{ApertureName, Look, Refine, Strength};
 use crate::optics::StereoRig;
-use crate::pipeline::{
-    self,
-    still::{Depth, Misfit},
-};
+use crate::pipeline::{self, still::Depth};
 use crate::recording::still::{self, MapFormat, PhotoFormat};
 use crate::recording::{Extras, snapshot};
 use crate::source::options::DepthUnit;
@@ -169,25 +167,14 @@ impl RenderCommand {
 
 /// Says how a depth map does not fit its picture, and what is done about it.
 fn say_of_misfit(file: &dyn Display, look: &Look, map: &DepthMap, color: &ColorImage) {
-    let Some(Misfit { smaller, outlines }) = Misfit::of(map, color) else { return };
-    let smaller = smaller.map(|(width, height)| format!("it has {width} x {height} pixels"));
-    let outlines = match outlines {
-        Agreement::Unrelated => {
-            return log::warn(&format!(
-                "{file}: nowhere do its outlines meet those of the picture: it may be the depth of another one, or of a \
-                 camera beside it that is not registered to the colours"
-            ));
-        }
-        Agreement::Beside { distance_px } => {
-            let side = if distance_px < 0 { "outside" } else { "inside" };
-            Some(format!("its outlines lie about {} px {side} those of the picture", distance_px.abs()))
-        }
-        Agreement::Soft { width_px } => Some(format!("its outlines are about {width_px} px wide")),
-        Agreement::Meets | Agreement::Unknown => None,
-    };
-    if look.refine == Refine::Auto {
-        let reasons: Vec<String> = smaller.into_iter().chain(outlines).collect();
-        log::note(&format!("{file}: refined, as {}; --refine off takes it as it is", reasons.join(" and ")));
+    let Some(misfit) = Misfit::of(map, color) else { return };
+    if misfit.outlines == Agreement::Unrelated {
+        log::warn(&format!(
+            "{file}: nowhere do its outlines meet those of the picture: it may be the depth of another one, or of a camera beside \
+             it that is not registered to the colours"
+        ));
+    } else if look.refine == Refine::Auto {
+        log::note(&format!("{file}: refined, as {misfit}; --refine off takes it as it is"));
     }
 }
 

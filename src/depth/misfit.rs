@@ -1,0 +1,75 @@
+//! How a depth map does not fit its picture, and what brings it so close that colours can do the rest.
+
+use std::fmt;
+
+use super::agreement::Agreement;
+use super::refine::{Mending, Outlines};
+use crate::frame::{ColorImage, DepthMap};
+
+/// Why a depth map does not fit its picture as it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misfit {
+    /// Its columns and rows, where it has fewer than the picture.
+    pub smaller: Option<(u32, u32)>,
+    /// How its outlines and those of the picture lie.
+    pub outlines: Agreement,
+}
+
+impl Misfit {
+    /// Of the measured depth `map` and its picture, if there is any.
+    pub fn of(map: &DepthMap, color: &ColorImage) -> Option<Self> {
+        Self::with(Agreement::of(map, color), map, color)
+    }
+
+    /// The same where it is known how the outlines lie.
+    pub fn with(outlines: Agreement, map: &DepthMap, color: &ColorImage) -> Option<Self> {
+        let smaller = (map.width < color.width).then(|| map.size());
+        let fits = smaller.is_none() && matches!(outlines, Agreement::Meets | Agreement::Unknown);
+        (!fits).then_some(Self { smaller, outlines })
+    }
+
+    /// What mends it; `None`: colours do not know where the outlines are.
+    pub fn mending(self, map: &DepthMap, color: &ColorImage) -> Option<Mending> {
+        let (mut outlines, mut distance_px) = (self.outlines, 0);
+        if let Agreement::Beside { distance_px: of_picture_px } = outlines {
+            // Colours find the last pixel, and bring nothing back that is too thin.
+            distance_px = of_picture_px - of_picture_px.signum();
+            let mut moved = map.clone();
+            let unknown: Vec<bool> = map.metres.iter().map(|&metres| !DepthMap::is_known(metres)).collect();
+            let of_map_px = distance_px * map.width as i32 / color.width as i32;
+            // Inverted, and back: what is not known is 0.
+            let invert = |metres: &mut f32| *metres = if DepthMap::is_known(*metres) { 1.0 / *metres } else { 0.0 };
+            moved.metres.iter_mut().for_each(invert);
+            Outlines::default().shift(&mut moved.metres, &unknown, map.width as usize, of_map_px, 0.0);
+            moved.metres.iter_mut().for_each(invert);
+            outlines = Agreement::of(&moved, color);
+        }
+        // At each scale, edges move by some three pixels.
+        let of_size = self.smaller.map_or(1, |(width, _)| color.width.div_ceil(width.max(1)));
+        let coarsest = match outlines {
+            Agreement::Unrelated => return None,
+            Agreement::Soft { width_px } => width_px.div_ceil(3).max(of_size),
+            Agreement::Meets | Agreement::Unknown | Agreement::Beside { .. } if distance_px == 0 => of_size,
+            Agreement::Meets | Agreement::Unknown | Agreement::Beside { .. } => of_size.max(2),
+        };
+        Some(Mending { distance_px, coarsest })
+    }
+}
+
+impl fmt::Display for Misfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some((width, height)) = self.smaller {
+            write!(f, "it has {width} x {height} pixels")?;
+        }
+        let and = if self.smaller.is_some() { " and " } else { "" };
+        match self.outlines {
+            Agreement::Beside { distance_px } => {
+                let side = if distance_px < 0 { "outside" } else { "inside" };
+                write!(f, "{and}its outlines lie about {} px {side} those of the picture", distance_px.abs())
+            }
+            Agreement::Soft { width_px } => write!(f, "{and}its outlines are about {width_px} px wide"),
+            Agreement::Unrelated => write!(f, "{and}nowhere do its outlines meet those of the picture"),
+            Agreement::Meets | Agreement::Unknown => Ok(()),
+        }
+    }
+}
