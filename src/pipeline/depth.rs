@@ -160,7 +160,8 @@ impl Stage<'_> {
                 self.source_name
             ),
             Some(Verdict::Mend(misfit, mending)) => {
-                if coc.mend(mending) {
+                let is_refined = coc.mend(mending);
+                if is_refined {
                     tracing::warn!(
                         "{}: depth is brought to the pictures, as {misfit}; --refine off takes it as it is",
                         self.source_name

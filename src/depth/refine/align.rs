@@ -116,7 +116,7 @@ fn decide(asked: &[u32], inverse: &mut [f32], rgb: &[u8], width: usize, jump: f3
             let (low, high) = (inverse[a].min(inverse[b]), inverse[a].max(inverse[b]));
             here - low > jump_at(jump, here) && high - here > jump_at(jump, high)
         };
-        if let Some((a, b)) = ends.filter(is_between).last() {
+        if let Some((a, b)) = ends.filter(is_between).next_back() {
             let apart = |of: usize| color(of).into_iter().zip(color(k)).map(|(a, b)| (a - b).pow(2)).sum::<i32>();
             inverse[k] = inverse[if apart(a) <= apart(b) { a } else { b }];
         }
