@@ -111,12 +111,12 @@ fn decide(asked: &[u32], inverse: &mut [f32], rgb: &[u8], width: usize, jump: f3
     for k in asked.iter().map(|&k| k as usize) {
         let (x, y, here) = (k % width, k / width, inverse[k]);
         let pairs = [(x > 0 && x + 1 < width, 1), (y > 0 && y + 1 < height, width)];
-        let ends = pairs.into_iter().filter(|(inside, _)| *inside).map(|(_, step)| (k - step, k + step));
+        let mut ends = pairs.into_iter().filter(|(inside, _)| *inside).map(|(_, step)| (k - step, k + step));
         let is_between = |&(a, b): &(usize, usize)| {
             let (low, high) = (inverse[a].min(inverse[b]), inverse[a].max(inverse[b]));
             here - low > jump_at(jump, here) && high - here > jump_at(jump, high)
         };
-        if let Some((a, b)) = ends.filter(is_between).next_back() {
+        if let Some((a, b)) = ends.rfind(is_between) {
             let apart = |of: usize| color(of).into_iter().zip(color(k)).map(|(a, b)| (a - b).pow(2)).sum::<i32>();
             inverse[k] = inverse[if apart(a) <= apart(b) { a } else { b }];
         }
