@@ -55,6 +55,7 @@ fn a_rectified_pair_is_one() {
     assert!(found.matches > 60, "{found:?}");
     assert!(found.vertical_px.abs() < 0.05 && found.vertical_spread_px < 0.2, "{found:?}");
     assert_eq!((found.negative_share, found.verdict()), (0.0, Verdict::Rectified), "{found:?}");
+    assert!((found.largest_px - 20.0).abs() < 0.5, "{found:?}");
 }
 
 #[test]

@@ -206,6 +206,25 @@ fn what_does_not_fit_two_eyes_costs_one_line_and_exit_code_2() {
     }
 }
 
+/// The leaves before the portrait have disparities of up to 84 pixels, and a tenth of the width is 64.
+#[test]
+fn near_things_beyond_the_range_are_found_or_said() {
+    let out = tempfile::tempdir().unwrap();
+    let stream = |name: &str, more: &[&str]| {
+        let (source, to) = (concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/stereo"), out.path().join(name));
+        let all = ["stream", source, "--depth", "stereo", "--frames", "2", "--backend", "cpu", "--to", path(&to)];
+        let ran = bokehcam(&[&all, more].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        (fs::read(to.join("000001.png")).unwrap(), ran.stderr)
+    };
+    let (found, said) = stream("default", &[]);
+    let (wide, _) = stream("wide", &["--max-disparity", "96"]);
+    assert!(found == wide && !said.contains("disparit"), "{said}");
+    let (narrow, said) = stream("narrow", &["--max-disparity", "64"]);
+    assert!(narrow != wide && said.contains("more than the 64 that are tried"), "{said}");
+    assert!(said.contains("--max-disparity 96 finds them"), "{said}");
+}
+
 #[test]
 fn a_calibration_that_cannot_be_read_is_named() {
     let wide = side_by_side(0);

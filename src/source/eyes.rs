@@ -110,6 +110,8 @@ pub fn open(
     computing: &Computing,
 ) -> Result<StereoDepth, SourceError> {
     let stated = options.resolve_pair(pair, &info.name, info.size)?;
+    // What nobody knows is found out.
+    let is_known = options.max_disparity.is_some() || disparities.is_some();
     let disparities = options.max_disparity.unwrap_or_else(|| default_disparities(disparities, info.size.0));
     let matcher = computing.matcher(disparities, Effort::Full, info.size)?;
     let (depth, how) = match stated {
@@ -126,7 +128,11 @@ pub fn open(
         info.name,
         depth.describe()
     );
-    Ok(depth)
+    let (computing, size) = (computing.clone(), info.size);
+    Ok(match is_known {
+        true => depth,
+        false => depth.widening(move |disparities| computing.matcher(disparities, Effort::Full, size)),
+    })
 }
 
 /// Refuses a look that needs metres where the geometry of the eyes is only assumed.

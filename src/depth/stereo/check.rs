@@ -23,6 +23,9 @@ const MOST_OFF_PX: f32 = 0.75;
 const MOST_SPREAD_PX: f32 = 1.0;
 /// Disparities of what is far are around 0; those beyond this count as negative.
 const NEGATIVE_PX: f32 = -1.0;
+/// A disparity has so many points, and so large a share of all, at it or above.
+const SOME_POINTS: usize = 4;
+const SOME_SHARE: f32 = 0.015;
 /// With more negative disparities than this share, the eyes are exchanged.
 const MOST_NEGATIVE: f32 = 0.7;
 
@@ -37,6 +40,8 @@ pub struct PairCheck {
     pub vertical_spread_px: f32,
     /// Share of points with a negative disparity: further to the right in the right picture.
     pub negative_share: f32,
+    /// The largest disparity that some points have, in pixels; 0 where there are none.
+    pub largest_px: f32,
 }
 
 /// What a pair is.
@@ -61,7 +66,7 @@ pub enum Verdict {
 impl PairCheck {
     /// What this makes the pair.
     pub fn verdict(&self) -> Verdict {
-        let Self { matches, vertical_px, vertical_spread_px, negative_share } = *self;
+        let Self { matches, vertical_px, vertical_spread_px, negative_share, .. } = *self;
         if matches < LEAST_MATCHES {
             Verdict::Unclear { matches }
         } else if vertical_px.abs() > MOST_OFF_PX || vertical_spread_px > MOST_SPREAD_PX {
@@ -131,7 +136,11 @@ fn summary(moved_px: &[(f32, f32)]) -> PairCheck {
     down_px.iter_mut().for_each(|down_px| *down_px = (*down_px - vertical_px).abs());
     // A disparity is a move to the left: the negated move across.
     let negative = moved_px.iter().filter(|&&(across_px, _)| -across_px < NEGATIVE_PX).count();
+    let mut disparities_px: Vec<f32> = moved_px.iter().map(|&(across_px, _)| -across_px).collect();
+    disparities_px.sort_unstable_by(|a, b| b.total_cmp(a));
+    let some = SOME_POINTS.max((SOME_SHARE * moved_px.len() as f32) as usize);
     PairCheck {
+        largest_px: disparities_px.get(some - 1).map_or(0.0, |largest_px| largest_px.max(0.0)),
         matches: moved_px.len() as u32,
         vertical_px,
         vertical_spread_px: quantile(&mut down_px, 0.6),

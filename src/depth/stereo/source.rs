@@ -6,7 +6,7 @@
 //! ([`StereoRig::assumed`]) blurs as well as a measured one; only distances in metres mean nothing then.
 
 use super::check::{Verdict, check};
-use super::{Effort, MatchError, Matcher, Pair};
+use super::{Effort, Matcher, Pair, Settings};
 use crate::calibration::rectifier::Rectifier;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, DisparityMap, GrayImage};
@@ -23,6 +23,11 @@ const MOST_CHECKS: u32 = 5;
 /// depend on them.
 const EFFORTS: [f64; 2] = [0.33, 1.0];
 
+/// What comes nearer later has so many pixels more.
+const NEARER_PX: u32 = 8;
+
+type Widen = Box<dyn Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send>;
+
 /// Depth from the frames of a camera that brings a right eye.
 pub struct StereoDepth {
     source_name: String,
@@ -35,6 +40,8 @@ pub struct StereoDepth {
     right: GrayImage,
     disparity: DisparityMap,
     disparities: u32,
+    /// Makes a matcher that tries more.
+    widen: Option<Widen>,
     /// Pairs that may still be checked for whether they are rectified.
     checks_left: u32,
 }
@@ -53,6 +60,7 @@ impl StereoDepth {
             right: GrayImage::default(),
             disparity: DisparityMap::default(),
             disparities,
+            widen: None,
             checks_left: MOST_CHECKS,
         }
     }
@@ -61,6 +69,42 @@ impl StereoDepth {
     pub fn of_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         let rig = rectifier.rig();
         Self { rectifier: Some(rectifier), ..Self::of_rectified(source_name, rig, matcher, disparities) }
+    }
+
+    /// Lets a matcher that `widen` makes take over where the first pairs have larger disparities than were expected; where
+    /// they are as large as was asked for, that is said.
+    pub fn widening(self, widen: impl Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send + 'static) -> Self {
+        Self { widen: Some(Box::new(widen)), ..self }
+    }
+
+    /// Checks a pair, where none has told yet, and its range of disparities.
+    fn check(&mut self, right: Option<&GrayImage>) -> Result<(), DepthError> {
+        if self.checks_left == 0 {
+            return Ok(());
+        }
+        let right = right.unwrap_or(&self.right);
+        let (source_name, calibrated) = (&self.source_name, self.rectifier.is_some());
+        // Twice as far: nearer things than expected are seen, too.
+        let found = check(&self.left, right, (2 * self.disparities).min(Settings::MOST_DISPARITIES))?;
+        let clear = log_check((source_name, calibrated), found.verdict());
+        self.checks_left = if clear { 0 } else { self.checks_left - 1 };
+        let needed = (found.largest_px.ceil() as u32 + NEARER_PX).next_multiple_of(16).min(Settings::MOST_DISPARITIES);
+        if found.verdict() != Verdict::Rectified || found.largest_px < self.disparities as f32 {
+            return Ok(());
+        }
+        let largest_px = found.largest_px;
+        match &self.widen {
+            Some(widen) => {
+                (self.matcher, self.disparities) = (widen(needed)?, needed);
+                tracing::info!("{source_name}: near things have disparities of {largest_px:.0} px: {needed} are tried");
+            }
+            None => tracing::warn!(
+                "{source_name}: near things have disparities of {largest_px:.0} px, more than the {} that are tried, and are \
+                 taken for far ones; --max-disparity {needed} finds them",
+                self.disparities
+            ),
+        }
+        Ok(())
     }
 
     /// What takes the pictures, once they are rectified.
@@ -74,15 +118,9 @@ impl StereoDepth {
     }
 }
 
-/// Checks whether a pair is rectified, as was claimed or as its calibration (`calibrated`) should have made it, and
-/// logs the verdict. Returns false where the pair cannot tell.
-fn log_check(
-    (source_name, calibrated): (&str, bool),
-    left: &GrayImage,
-    right: &GrayImage,
-    disparities: u32,
-) -> Result<bool, MatchError> {
-    let verdict = check(left, right, disparities)?.verdict();
+/// Logs the verdict on a pair that is rectified, as was claimed or as its calibration (`calibrated`) should have made it.
+/// Returns false where the pair cannot tell.
+fn log_check((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool {
     match verdict {
         Verdict::Rectified => tracing::info!("{source_name}: {verdict}"),
         Verdict::RowsOff { .. } if calibrated => tracing::warn!(
@@ -95,10 +133,10 @@ fn log_check(
         Verdict::Swapped => tracing::warn!("{source_name}: {verdict}"),
         Verdict::Unclear { .. } => {
             tracing::debug!("{source_name}: {verdict}");
-            return Ok(false);
+            return false;
         }
     }
-    Ok(true)
+    true
 }
 
 impl DepthSource for StereoDepth {
@@ -114,18 +152,15 @@ impl DepthSource for StereoDepth {
             return Err(DepthError::OneEye { source_name: self.source_name.clone() });
         };
         self.left.set_luma_of(seen.color);
-        let right = match &self.rectifier {
+        let rectified = match &self.rectifier {
             Some(rectifier) => {
                 rectifier.right(right, &mut self.right);
-                &self.right
+                None
             }
-            None => right,
+            None => Some(right),
         };
-        if self.checks_left > 0 {
-            let clear = log_check((&self.source_name, self.rectifier.is_some()), &self.left, right, self.disparities)?;
-            self.checks_left = if clear { 0 } else { self.checks_left - 1 };
-        }
-        let pair = Pair { left: &self.left, color: Some(seen.color), right };
+        self.check(rectified)?;
+        let pair = Pair { left: &self.left, color: Some(seen.color), right: rectified.unwrap_or(&self.right) };
         self.matcher.disparity(pair, &mut self.disparity)?;
         metres(&self.disparity, &self.rig, map);
         Ok(())
