@@ -38,8 +38,8 @@ pub struct Group {
 /// What is known when a key is pressed, besides the state.
 #[derive(Clone, Copy, Debug)]
 pub struct Context {
-    /// Rows of the picture; some blur is a share of them.
-    pub height_px: u32,
+    /// Columns and rows of the picture; some blur is a share of them.
+    pub size: (u32, u32),
     /// Index of the pressed chord in [`Binding::chords`].
     pub chord: usize,
 }
@@ -131,7 +131,7 @@ pub const GROUPS: [Group; 5] = [
             ),
             held(&[key(Key::OpenBracket), key(Key::CloseBracket)], "[  ]", "less blur, more blur", |state, context| {
                 let factor = THIRD_STOP.powf(way(context));
-                look(state, "key blur", |look| tweak::blur_by(look, factor, context.height_px))
+                look(state, "key blur", |look| tweak::blur_by(look, factor, context.size.1))
             }),
             held(
                 &[key(Key::Semicolon), key(Key::Quote)],
@@ -139,7 +139,9 @@ pub const GROUPS: [Group; 5] = [
                 "smaller f-number, larger f-number",
                 |state, context| {
                     let factor = THIRD_STOP.powf(way(context));
-                    look(state, "key f-number", |look| tweak::f_number_by(look, factor))
+                    look(state, "key f-number", |look| {
+                        tweak::f_number_by(look, factor, state.distance_m(), context.size)
+                    })
                 },
             ),
             held(&[key(Key::Comma), key(Key::Period)], ",  .", "less in focus, more in focus", |state, context| {
@@ -255,7 +257,7 @@ impl Chord {
 }
 
 /// The action that is bound to the key in `event`, if any. While a control is `focused`, it keeps some keys to itself.
-pub fn action(event: &Event, state: &State, height_px: u32, focused: bool) -> Option<Action> {
+pub fn action(event: &Event, state: &State, size: (u32, u32), focused: bool) -> Option<Action> {
     let Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { return None };
     let bindings = GROUPS.iter().flat_map(|group| group.bindings);
     let found = bindings.filter(|binding| binding.repeats || !repeat).find_map(|binding| {
@@ -266,7 +268,7 @@ pub fn action(event: &Event, state: &State, height_px: u32, focused: bool) -> Op
     if focused && is_for_controls(binding.chords[chord]) {
         return None;
     }
-    (binding.make)(state, Context { height_px, chord })
+    (binding.make)(state, Context { size, chord })
 }
 
 #[cfg(test)]

@@ -73,8 +73,8 @@ impl Panel {
             ctx.set_zoom_factor(state.text_scale);
         }
         let first = actions.len();
-        let height_px = if canvas.size.1 > 0 { canvas.size.1 } else { 720 };
-        self.read_keys(ui, state, height_px, actions);
+        let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };
+        self.read_keys(ui, state, size, actions);
         let awake = self.is_awake(ui);
         if let Some(place) = Place::new(canvas, ctx.pixels_per_point(), state.mirror) {
             self.gestures.show(ui, state, place, actions);
@@ -82,7 +82,7 @@ impl Panel {
         if !state.bare {
             legend::show(ui, state);
             let shown = state.panel && (awake || self.sheet.is_in_use(&ctx));
-            self.sheet.show(&ctx, state, shown, height_px, actions);
+            self.sheet.show(&ctx, state, shown, size, actions);
             if !shown {
                 badges::show(&ctx, state);
             }
@@ -100,7 +100,7 @@ impl Panel {
     }
 
     /// Adds the actions of the keys that were pressed, unless text is being typed.
-    fn read_keys(&mut self, ui: &Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
+    fn read_keys(&mut self, ui: &Ui, state: &State, size: (u32, u32), actions: &mut Vec<Action>) {
         let ctx = ui.ctx();
         if ctx.text_edit_focused() {
             return;
@@ -109,7 +109,7 @@ impl Panel {
         let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape)) && self.was_in_hand;
         let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped;
         ui.input(|input| {
-            actions.extend(input.events.iter().filter_map(|event| keys::action(event, state, height_px, focused)));
+            actions.extend(input.events.iter().filter_map(|event| keys::action(event, state, size, focused)));
         });
     }
 

@@ -42,7 +42,11 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
                 let mut typed = *value;
                 let drag = DragValue::new(&mut typed).range(range.clone()).clamp_existing_to_range(false);
                 let drag = drag.speed(per_point).max_decimals(digits).min_decimals(digits).prefix(before).suffix(after);
-                if ui.add(drag).labelled_by(name.id).on_hover_text(hint).changed() {
+                // Many write 1,5.
+                let drag = drag.custom_parser(|text| text.trim().replace(',', ".").parse().ok());
+                let is_other = ui.add(drag).labelled_by(name.id).on_hover_text(hint).changed();
+                // The keyboard's way through the panel leaves behind the number as it is shown, rounded.
+                if is_other && (typed - *value).abs() > 0.501 * 0.1f32.powi(digits as i32) {
                     (*value, changed) = (typed, true);
                 }
             });

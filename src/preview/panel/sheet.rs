@@ -37,7 +37,7 @@ impl Memory {
     }
 
     /// Draws the panel, sliding in or out from the right; what does not fit is scrolled.
-    pub fn show(&mut self, ctx: &Context, state: &State, shown: bool, height_px: u32, actions: &mut Vec<Action>) {
+    pub fn show(&mut self, ctx: &Context, state: &State, shown: bool, size: (u32, u32), actions: &mut Vec<Action>) {
         let openness = ctx.animate_bool_with_time(id().with("open"), shown, 0.16);
         if openness == 0.0 {
             self.rect = None;
@@ -58,7 +58,7 @@ impl Memory {
                 status(ui, state);
                 let height = most_height - 2.0 * PAD - ui.min_rect().height() - ui.spacing().item_spacing.y;
                 let scroll = ScrollArea::vertical().max_height(height.max(20.0)).auto_shrink([false, true]);
-                scroll.show(ui, |ui| self.body(ui, state, height_px, actions));
+                scroll.show(ui, |ui| self.body(ui, state, size, actions));
             });
         });
         if shown && matches!(state.source, Source::Running(_)) {
@@ -81,11 +81,11 @@ impl Memory {
     }
 
     /// Draws the sections, and turns what they changed of the look into an action.
-    fn body(&mut self, ui: &mut Ui, state: &State, height_px: u32, actions: &mut Vec<Action>) {
+    fn body(&mut self, ui: &mut Ui, state: &State, size: (u32, u32), actions: &mut Vec<Action>) {
         // Room for the scroll bar, which floats over the right edge.
         ui.set_width(ui.available_width() - 4.0);
         ui.spacing_mut().combo_width = ui.available_width();
-        let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, height_px, actions };
+        let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, size, actions };
         sections::show(ui, &mut sheet, &mut self.saving, &mut self.thumbs);
         self.follow_focus(ui);
         let Sheet { look, stroke, .. } = sheet;

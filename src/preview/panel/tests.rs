@@ -84,6 +84,17 @@ impl Window {
         actions
     }
 
+    /// The middle of a text that is drawn.
+    fn place_of(&mut self, text: &str) -> Option<Pos2> {
+        let (_, output) = self.pass_with_output(Vec::new());
+        let found = output.shapes.iter().find_map(|clipped| match &clipped.shape {
+            egui::Shape::Text(shape) if shape.galley.text() == text => Some(shape.visual_bounding_rect().center()),
+            _ => None,
+        });
+        output.drop_without_applying_deltas();
+        found
+    }
+
     fn press(&mut self, key: Key, modifiers: Modifiers) -> Vec<Action> {
         let mut actions = self.pass(vec![pressed(key, modifiers, true)]);
         actions.extend(self.pass(vec![pressed(key, modifiers, false)]));

@@ -217,6 +217,11 @@ impl State {
         }
     }
 
+    /// Distance of the focal plane in the last frame, in metres; one where there is none to start from.
+    pub fn distance_m(&self) -> f32 {
+        self.focus_m.filter(|metres| metres.is_finite()).unwrap_or(1.0)
+    }
+
     /// The recording that is being written, if any.
     pub fn recording(&self) -> Option<&Output> {
         self.outputs.iter().find(|output| !output.is_camera)

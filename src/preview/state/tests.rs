@@ -238,11 +238,29 @@ fn the_wheel_gets_away_from_no_blur_and_back() {
         tweak::blur_by(&mut look, 1.25, 720);
     }
     assert_eq!(look.strength, Strength::Percent(crate::look::MAX_COC_PER_HEIGHT * 100.0));
-    tweak::f_number_by(&mut look, 1.0);
+    look.strength = Strength::Lens(tweak::LENS);
     for (factor, f_number) in [(1.0, 1.8), (1e3, 0.7), (1e-6, 22.0)] {
         tweak::blur_by(&mut look, factor, 720);
         let Strength::Lens(lens) = look.strength else { panic!("{:?}", look.strength) };
         assert!((lens.f_number - f_number).abs() < 1e-5, "{factor}: {lens:?}");
+    }
+}
+
+#[test]
+fn amount_and_lens_are_converted_and_the_f_number_goes_the_way_it_says() {
+    for (size, percent, focus_m) in [((1280, 720), 2.2, 1.2), ((640, 480), 1.0, 2.5), ((1080, 1920), 3.0, 4.0)] {
+        let look = Look { strength: Strength::Percent(percent), ..look() };
+        let lens = tweak::lens_of(&look, focus_m, size);
+        let back = 100.0 * tweak::amount_of(lens, focus_m, size);
+        assert!((back - percent).abs() < 1e-4, "{size:?}: {percent} % is {lens:?}, which is {back} %");
+        for factor in [1.122, 1.0 / 1.122] {
+            let mut look = look.clone();
+            tweak::f_number_by(&mut look, factor, focus_m, size);
+            let Strength::Lens(turned) = look.strength else { panic!("{:?}", look.strength) };
+            let turned = tweak::amount_of(turned, focus_m, size);
+            // Beyond what lenses have, it stays where it is.
+            assert!(if factor > 1.0 { turned < percent / 100.0 } else { turned * 100.0 >= percent - 1e-4 });
+        }
     }
 }
 

@@ -35,21 +35,44 @@ pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
             let most = amount(look, height_px).unwrap_or_default().max(MAX_COC_PER_HEIGHT);
             look.strength = Strength::Percent(share.min(most) * 100.0);
         }
-        None => f_number_by(look, 1.0 / factor),
+        // The lens is there: no distance matters.
+        None => f_number_by(look, 1.0 / factor, 1.0, (1, 1)),
     }
 }
 
-/// Makes the f-number `factor` times as large; a look without a lens gets [`LENS`] instead. Does nothing unless the
-/// blur follows depth: a lens needs distances.
-pub fn f_number_by(look: &mut Look, factor: f32) {
+/// The f-number at which [`LENS`], focused at `focus_m`, blurs by a share of the height of pictures of this size; infinite
+/// where that is none.
+pub fn f_number_of(share: f32, focus_m: f32, (width, height): (u32, u32)) -> f32 {
+    let wide_open = Lens { f_number: 1.0, ..LENS };
+    wide_open.coc_at_infinity_px(focus_m, width) / (share * height.max(1) as f32)
+}
+
+/// The share of the height by which a lens, focused at `focus_m`, blurs pictures of this size.
+pub fn amount_of(lens: Lens, focus_m: f32, (width, height): (u32, u32)) -> f32 {
+    lens.coc_at_infinity_px(focus_m, width) / height.max(1) as f32
+}
+
+/// The lens of a look, or the one that blurs as much while focused at `focus_m`, as far as there is one.
+pub fn lens_of(look: &Look, focus_m: f32, size: (u32, u32)) -> Lens {
+    match (look.strength, amount(look, size.1)) {
+        (Strength::Lens(lens), _) => lens,
+        (_, share) => {
+            let f_number = f_number_of(share.unwrap_or(COC_AT_INFINITY_PER_HEIGHT), focus_m, size);
+            // It may be one that no lens has: nothing is lost on the way back.
+            Lens { f_number: f_number.clamp(0.01, 10_000.0), ..LENS }
+        }
+    }
+}
+
+/// Makes the f-number `factor` times as large, from that of [`lens_of`]. Does nothing unless the blur follows depth: a lens
+/// needs distances.
+pub fn f_number_by(look: &mut Look, factor: f32, focus_m: f32, size: (u32, u32)) {
     if !look.effect.follows_depth() {
         return;
     }
-    let lens = match look.strength {
-        Strength::Lens(lens) => Lens { f_number: lens.f_number * factor, ..lens },
-        Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => LENS,
-    };
-    let f_number = lens.f_number.clamp(*F_NUMBERS.start(), *F_NUMBERS.end());
+    let lens = lens_of(look, focus_m, size);
+    let (least, most) = (F_NUMBERS.start().min(lens.f_number), F_NUMBERS.end().max(lens.f_number));
+    let f_number = (lens.f_number * factor).clamp(least, most);
     look.strength = Strength::Lens(Lens { f_number, ..lens });
 }
 

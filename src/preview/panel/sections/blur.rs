@@ -6,7 +6,7 @@ use super::Sheet;
 use crate::look::{Look, MAX_COC_PER_HEIGHT, Strength};
 use crate::optics::Lens;
 use crate::preview::panel::parts::{Number, choose, number, remark, switch};
-use crate::preview::state::tweak::{F_NUMBERS, LENS, amount};
+use crate::preview::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of};
 
 const WAYS: [(&str, &str); 2] = [
     ("Amount", "Blur as a share of the picture, the same at every distance of focus"),
@@ -20,8 +20,14 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         let follows_depth = sheet.follows_depth();
         let chosen = choose(ui, "Blur by", &WAYS, usize::from(by_lens), |index| index == 0 || follows_depth);
         match chosen {
-            Some(1) if !by_lens => sheet.look.strength = Strength::Lens(LENS),
-            Some(0) if by_lens => sheet.look.strength = Strength::Default,
+            Some(1) if !by_lens => {
+                sheet.look.strength = Strength::Lens(lens_of(&sheet.look, sheet.state.distance_m(), sheet.size));
+            }
+            Some(0) if by_lens => {
+                let lens = lens_of(&sheet.look, 1.0, sheet.size);
+                let share = amount_of(lens, sheet.state.distance_m(), sheet.size);
+                sheet.look.strength = Strength::Percent(100.0 * share.min(MAX_COC_PER_HEIGHT));
+            }
             _ => {}
         }
         sheet.changed(chosen.is_some(), "blur by");
@@ -35,7 +41,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
 
 /// The strength as a radius, with a lens to compare it with.
 fn by_amount(ui: &mut Ui, sheet: &mut Sheet) {
-    let Some(share) = amount(&sheet.look, sheet.height_px) else { return };
+    let Some(share) = amount(&sheet.look, sheet.size.1) else { return };
     let mut percent = share * 100.0;
     let how = Number {
         label: "Amount of blur",
@@ -56,13 +62,8 @@ fn by_amount(ui: &mut Ui, sheet: &mut Sheet) {
 
 /// Says at which f-number [`LENS`] would blur as much, focused as the last frame was.
 fn like_lens(sheet: &Sheet) -> String {
-    let share = amount(&sheet.look, sheet.height_px).unwrap_or_default();
-    let focus_mm = sheet.state.focus_m.unwrap_or(1.0) * 1000.0;
-    // The share is of the height: the sensor's, with the common aspect ratio of 16:9.
-    let radius_mm = share * LENS.sensor_width_mm * 9.0 / 16.0;
-    let focal_mm = LENS.focal_length_mm;
-    // The thin lens: the CoC at infinity has a diameter of f^2 / (N (s - f)) for f-number N and focus distance s.
-    let f_number = focal_mm * focal_mm / (2.0 * radius_mm * (focus_mm - focal_mm).max(1.0));
+    let share = amount(&sheet.look, sheet.size.1).unwrap_or_default();
+    let (f_number, focal_mm) = (f_number_of(share, sheet.state.distance_m(), sheet.size), LENS.focal_length_mm);
     if f_number.is_finite() && f_number < 64.0 {
         format!("Like {focal_mm:.0} mm at f/{f_number:.1} on full frame")
     } else {
@@ -89,7 +90,7 @@ fn lens_numbers(ui: &mut Ui, sheet: &mut Sheet, mut lens: Lens) {
 
 /// The largest radius, where the person sets one: without any, near objects would blur without bound.
 fn limit(ui: &mut Ui, sheet: &mut Sheet) {
-    let height_px = sheet.height_px as f32;
+    let height_px = sheet.size.1 as f32;
     let has_limit = sheet.look.max_coc_px.is_some();
     if switch(ui, "Own limit", "Largest blur of anything, near or far; otherwise 6 % of the height", has_limit) {
         let Look { max_coc_px, .. } = &mut sheet.look;

@@ -21,7 +21,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         FocusRule::Metres(_) => 2,
     };
     // Without depth in the frame yet, something to start from.
-    let now_m = sheet.state.focus_m.filter(|metres| metres.is_finite()).unwrap_or(1.0);
+    let now_m = sheet.state.distance_m();
     if let Some(index) = choose(ui, "Focus on", &RULES, chosen, |_| true).filter(|&index| index != chosen) {
         sheet.look.focus = match index {
             0 => FocusRule::Auto,

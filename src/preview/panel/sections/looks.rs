@@ -20,6 +20,7 @@ pub struct Saving {
 
 /// The presets, and a way to save one.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving) {
+    let mut asked = false;
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 6.0);
         ui.horizontal_wrapped(|ui| {
@@ -33,10 +34,13 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving) {
             }
             if saving.name.is_none() && ui.button("Save as…").on_hover_text("Save this look under a name").clicked() {
                 *saving = Saving { name: Some(String::new()), ask_focus: true };
+                // In the pass of the click it has the focus itself.
+                ui.ctx().request_repaint();
+                asked = true;
             }
         });
     });
-    if let Some(name) = &mut saving.name {
+    if let Some(name) = saving.name.as_mut().filter(|_| !asked) {
         let mut done = false;
         ui.horizontal(|ui| {
             let edit = TextEdit::singleline(name).hint_text("name").desired_width(150.0).char_limit(40);

@@ -27,8 +27,8 @@ pub struct Sheet<'a> {
     pub look: Look,
     /// The control that changed it, if any.
     pub stroke: Option<&'static str>,
-    /// Rows of the picture.
-    pub height_px: u32,
+    /// Columns and rows of the picture.
+    pub size: (u32, u32),
     /// What the person did other than change the look.
     pub actions: &'a mut Vec<Action>,
 }

@@ -5,6 +5,8 @@ use std::collections::HashSet;
 use egui::{Event, Key, Modifiers, pos2};
 
 use super::{Action, Window, on_panel, pressed};
+use crate::look::Strength;
+use crate::optics::Lens;
 use crate::preview::keys::GROUPS;
 use crate::preview::state::Source;
 
@@ -65,6 +67,62 @@ fn a_control_in_focus_is_worked_by_the_keyboard() {
     }
     assert!(done.iter().any(|action| matches!(action, Action::Preset(_))), "{done:?}");
     assert!(done.iter().any(|action| matches!(action, Action::Look { .. })), "{done:?}");
+}
+
+#[test]
+fn tab_alone_changes_nothing() {
+    let mut window = Window::new();
+    window.state.focus_m = Some(1.2345);
+    // Numbers that are shown rounded.
+    let look = &mut window.state.look;
+    (look.strength, look.focus_range_m) = (Strength::Percent(2.2468), 0.1234);
+    (look.aperture.intensity, look.rim, look.highlights) = (0.1234, 0.1234, 3.4567);
+    look.max_coc_px = Some(33.33);
+    let before = look.clone();
+    let mut focused = HashSet::new();
+    for _ in 0..2 * stops(&mut window) {
+        window.press(Key::Tab, Modifiers::NONE);
+        window.wait(0.1);
+        focused.extend(window.ctx.memory(|memory| memory.focused()));
+        assert_eq!(window.state.look, before);
+    }
+    assert!(focused.len() > 40);
+    window.state.look.strength =
+        Strength::Lens(Lens { f_number: 2.3456, focal_length_mm: 35.6, sensor_width_mm: 23.456 });
+    let before = window.state.look.clone();
+    for _ in 0..60 {
+        window.press(Key::Tab, Modifiers::NONE);
+        assert_eq!(window.state.look, before);
+    }
+}
+
+/// Whatever way the name is asked for.
+#[test]
+fn a_name_is_typed_after_a_click() {
+    let mut window = Window::new();
+    let at = window.place_of("Save as…").expect("a button");
+    window.click(at);
+    window.wait(0.1);
+    let mut actions = Vec::new();
+    for (key, letter) in [(Key::Q, "q"), (Key::U, "u"), (Key::I, "i"), (Key::E, "e"), (Key::T, "t")] {
+        actions.extend(window.pass(vec![pressed(key, Modifiers::NONE, true), Event::Text(letter.into())]));
+    }
+    actions.extend(window.press(Key::Enter, Modifiers::NONE));
+    actions.extend(window.wait(0.2));
+    let done: Vec<&Action> = actions.iter().filter(|action| **action != Action::Settle).collect();
+    assert_eq!(done, [&Action::SavePreset("quiet".into())]);
+}
+
+#[test]
+fn a_decimal_comma_is_one() {
+    let mut window = Window::new();
+    let at = window.place_of("0.00").expect("the focal range");
+    window.click(at);
+    window.pass(vec![pressed(Key::A, Modifiers::CTRL | Modifiers::COMMAND, true)]);
+    window.pass(vec![Event::Text("0,75".into())]);
+    window.press(Key::Enter, Modifiers::NONE);
+    window.wait(0.1);
+    assert_eq!(window.state.look.focus_range_m, 1.5);
 }
 
 #[test]
