@@ -1,6 +1,8 @@
-//! Badges while the panel is hidden: that something is being written, or that the picture is frozen.
+//! Badges: that something is being written, and for how long, or that the picture is frozen. Always to be seen.
 
-use egui::{Align2, Color32, Context, CornerRadius, FontId, Id, LayerId, Order, vec2};
+use std::time::Duration;
+
+use egui::{Align2, Color32, Context, CornerRadius, FontId, Id, LayerId, Order, Rect, vec2};
 
 use super::state::State;
 use super::theme::{GAP, ON_PICTURE, medium};
@@ -9,21 +11,46 @@ const HEIGHT: f32 = 24.0;
 /// Red enough for a dot on a dark badge.
 const LIVE: Color32 = Color32::from_rgb(255, 90, 80);
 
-/// Draws the badges at the top right.
-pub fn show(ctx: &Context, state: &State) {
-    let all = [
-        (state.recording().is_some(), "Recording", LIVE),
-        (state.virtual_camera().is_some(), "Virtual camera", LIVE),
-        (state.frozen, "Frozen", ON_PICTURE),
-    ];
-    let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("badges")));
-    let mut corner = ctx.content_rect().right_top() + vec2(-GAP, GAP);
-    for (_, text, color) in all.into_iter().filter(|(on, ..)| *on) {
-        let galley = painter.layout_no_wrap(text.to_owned(), FontId::new(12.5, medium()), ON_PICTURE);
-        let rect = Align2::RIGHT_TOP.anchor_size(corner, vec2(galley.size().x + 34.0, HEIGHT));
-        painter.rect_filled(rect, CornerRadius::same(12), Color32::from_black_alpha(190));
-        painter.circle_filled(rect.left_center() + vec2(13.0, 0.0), 4.5, color);
-        painter.galley(rect.left_center() + vec2(23.0, -galley.size().y / 2.0), galley, ON_PICTURE);
-        corner.y += HEIGHT + 6.0;
+/// When what is written now was begun, in egui's seconds.
+#[derive(Debug, Default)]
+pub struct Badges {
+    recording_s: Option<f64>,
+    camera_s: Option<f64>,
+}
+
+impl Badges {
+    /// Draws them at the top right, or to the left of the panel.
+    pub fn show(&mut self, ctx: &Context, state: &State, panel: Option<Rect>) {
+        let now_s = ctx.input(|input| input.time);
+        let text = |name: &str, is_on: bool, since_s: &mut Option<f64>| {
+            *since_s = is_on.then(|| since_s.unwrap_or(now_s));
+            since_s.map(|since_s| format!("{name} {}", elapsed(now_s - since_s)))
+        };
+        let all = [
+            (text("Recording", state.recording().is_some(), &mut self.recording_s), LIVE),
+            (text("Virtual camera", state.virtual_camera().is_some(), &mut self.camera_s), LIVE),
+            (state.frozen.then(|| "Frozen".to_owned()), ON_PICTURE),
+        ];
+        if self.recording_s.or(self.camera_s).is_some() {
+            ctx.request_repaint_after(Duration::from_secs(1));
+        }
+        let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("badges")));
+        let right = panel.map_or(ctx.content_rect().right(), |panel| panel.left());
+        let mut corner = egui::pos2(right, ctx.content_rect().top()) + vec2(-GAP, GAP);
+        for (text, color) in all.into_iter().filter_map(|(text, color)| Some((text?, color))) {
+            let galley = painter.layout_no_wrap(text, FontId::new(12.5, medium()), ON_PICTURE);
+            let rect = Align2::RIGHT_TOP.anchor_size(corner, vec2(galley.size().x + 34.0, HEIGHT));
+            painter.rect_filled(rect, CornerRadius::same(12), Color32::from_black_alpha(190));
+            painter.circle_filled(rect.left_center() + vec2(13.0, 0.0), 4.5, color);
+            painter.galley(rect.left_center() + vec2(23.0, -galley.size().y / 2.0), galley, ON_PICTURE);
+            corner.y += HEIGHT + 6.0;
+        }
     }
+}
+
+/// Minutes and seconds, after an hour with hours.
+fn elapsed(seconds: f64) -> String {
+    let seconds = seconds.max(0.0) as u64;
+    let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    if hours > 0 { format!("{hours}:{minutes:02}:{seconds:02}") } else { format!("{minutes}:{seconds:02}") }
 }

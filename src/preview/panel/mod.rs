@@ -47,6 +47,7 @@ pub struct Panel {
     sheet: sheet::Memory,
     instruments: instruments::Cache,
     notes: notes::Ages,
+    badges: badges::Badges,
     /// Whether a control had the focus or a list was open at the end of the last pass.
     was_in_hand: bool,
 }
@@ -83,13 +84,12 @@ impl Panel {
             legend::show(ui, state);
             let shown = state.panel && (awake || self.sheet.is_in_use(&ctx));
             self.sheet.show(&ctx, state, shown, size, actions);
-            if !shown {
-                badges::show(&ctx, state);
-            }
             if state.instruments {
                 self.instruments.show(&ctx, state);
             }
         }
+        let panel = self.sheet.rect().filter(|_| !state.bare);
+        self.badges.show(&ctx, state, panel);
         plate::show(&ctx, state, actions);
         self.notes.show(&ctx, state, actions);
         if state.help {

@@ -31,7 +31,6 @@ impl Memory {
     }
 
     /// Where it was drawn last, if it is open.
-    #[cfg(test)]
     pub fn rect(&self) -> Option<Rect> {
         self.rect
     }

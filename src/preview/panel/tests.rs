@@ -84,15 +84,24 @@ impl Window {
         actions
     }
 
-    /// The middle of a text that is drawn.
-    fn place_of(&mut self, text: &str) -> Option<Pos2> {
+    /// All texts that are drawn, and their middles.
+    fn places(&mut self) -> Vec<(String, Pos2)> {
         let (_, output) = self.pass_with_output(Vec::new());
-        let found = output.shapes.iter().find_map(|clipped| match &clipped.shape {
-            egui::Shape::Text(shape) if shape.galley.text() == text => Some(shape.visual_bounding_rect().center()),
+        let texts = output.shapes.iter().filter_map(|clipped| match &clipped.shape {
+            egui::Shape::Text(shape) => Some((shape.galley.text().to_owned(), shape.visual_bounding_rect().center())),
             _ => None,
         });
+        let texts = texts.collect();
         output.drop_without_applying_deltas();
-        found
+        texts
+    }
+
+    fn texts(&mut self) -> Vec<String> {
+        self.places().into_iter().map(|(text, _)| text).collect()
+    }
+
+    fn place_of(&mut self, text: &str) -> Option<Pos2> {
+        self.places().into_iter().find_map(|(shown, at)| (shown == text).then_some(at))
     }
 
     fn press(&mut self, key: Key, modifiers: Modifiers) -> Vec<Action> {

@@ -8,7 +8,7 @@ use super::{Action, Window, on_panel, pressed};
 use crate::look::Strength;
 use crate::optics::Lens;
 use crate::preview::keys::GROUPS;
-use crate::preview::state::Source;
+use crate::preview::state::{Output, Source};
 
 #[test]
 fn every_key_reaches_the_window() {
@@ -111,6 +111,30 @@ fn a_name_is_typed_after_a_click() {
     actions.extend(window.wait(0.2));
     let done: Vec<&Action> = actions.iter().filter(|action| **action != Action::Settle).collect();
     assert_eq!(done, [&Action::SavePreset("quiet".into())]);
+}
+
+#[test]
+fn what_is_written_is_always_seen_with_its_time() {
+    let mut window = Window::new();
+    window.state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
+    window.pass(Vec::new());
+    for bare in [false, true] {
+        window.state.bare = bare;
+        for _ in 0..2 {
+            window.wait(30.5);
+            assert!(window.texts().iter().any(|text| text.starts_with("Recording ")), "{:?}", window.texts());
+            window.pass(vec![Event::PointerMoved(pos2(300.0, 300.0))]);
+        }
+    }
+    assert!(window.texts().contains(&"Recording 2:02".to_owned()), "{:?}", window.texts());
+    (window.state.bare, window.state.panel) = (false, true);
+    window.pass(vec![Event::PointerMoved(pos2(310.0, 300.0))]);
+    window.wait(0.5);
+    let (panel, badge) = (window.panel.sheet.rect().unwrap(), window.place_of("Recording 2:02").unwrap());
+    assert!(badge.x < panel.left(), "{badge} is under {panel}");
+    window.state.outputs.clear();
+    window.wait(0.1);
+    assert!(!window.texts().iter().any(|text| text.starts_with("Recording ")));
 }
 
 #[test]
