@@ -61,7 +61,7 @@ impl Gestures {
             look.focus = FocusRule::Auto;
             self.ring = None;
         } else {
-            look.focus = FocusRule::Point { x, y };
+            look.focus = tweak::point(x, y);
             self.ring = Some(([x, y], response.ctx.input(|input| input.time)));
         }
         push_look(actions, state, look, "picture click");

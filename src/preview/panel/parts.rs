@@ -62,7 +62,9 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
             ui.add(slider.logarithmic(ratios).smallest_positive(least)).labelled_by(name.inner.id).on_hover_text(hint);
         focus_ring(ui, &slider, slider.rect.shrink2(Vec2::new(0.0, 1.0)));
         if slider.changed() {
-            (*value, changed) = (slid, true);
+            // A digit more than is shown.
+            let steps = 10f32.powi(digits as i32 + 1);
+            (*value, changed) = ((slid * steps).round() / steps, true);
         }
     });
     changed

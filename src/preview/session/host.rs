@@ -270,12 +270,19 @@ impl Host {
     /// A path for a recording that does not exist yet.
     fn free_name(&self) -> PathBuf {
         let name = |number: u32| self.folder.join(format!("{RECORDING}{number}{VIDEO}"));
-        (1..u32::MAX).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
+        // What is being written gets its name at the end.
+        let is_taken = |path: &PathBuf| self.outputs.iter().any(|output| path.as_os_str() == output.name.as_str());
+        (1..u32::MAX).map(name).find(|path| !path.exists() && !is_taken(path)).unwrap_or_else(|| name(0))
     }
 
     /// Puts the command line that does the same on the clipboard.
     fn copy(&self, switches: &[Switch]) {
-        let outputs: Vec<String> = self.outputs.iter().map(|output| output.name.clone()).collect();
+        // What is recorded now is there already: the command makes another one.
+        let again = |output: &Output| match output.is_camera {
+            true => output.name.clone(),
+            false => self.free_name().display().to_string(),
+        };
+        let outputs: Vec<String> = self.outputs.iter().map(again).collect();
         let look = self.live.as_ref().map_or_else(|| self.look.clone(), |live| live.effective(&self.look));
         let command = self.services.command(&look, &self.source, &outputs, switches);
         self.news.note(format!("Copied: {command}"));

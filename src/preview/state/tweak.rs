@@ -33,7 +33,7 @@ pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
             let share = if share < least && factor < 1.0 { 0.0 } else { share.max(least / 2.0) * factor };
             // A radius beyond the usual limit may stay.
             let most = amount(look, height_px).unwrap_or_default().max(MAX_COC_PER_HEIGHT);
-            look.strength = Strength::Percent(share.min(most) * 100.0);
+            look.strength = Strength::Percent(short(share.min(most) * 100.0));
         }
         // The lens is there: no distance matters.
         None => f_number_by(look, 1.0 / factor, 1.0, (1, 1)),
@@ -59,7 +59,7 @@ pub fn lens_of(look: &Look, focus_m: f32, size: (u32, u32)) -> Lens {
         (_, share) => {
             let f_number = f_number_of(share.unwrap_or(COC_AT_INFINITY_PER_HEIGHT), focus_m, size);
             // It may be one that no lens has: nothing is lost on the way back.
-            Lens { f_number: f_number.clamp(0.01, 10_000.0), ..LENS }
+            Lens { f_number: short(f_number.clamp(0.01, 10_000.0)), ..LENS }
         }
     }
 }
@@ -73,7 +73,7 @@ pub fn f_number_by(look: &mut Look, factor: f32, focus_m: f32, size: (u32, u32))
     let lens = lens_of(look, focus_m, size);
     let (least, most) = (F_NUMBERS.start().min(lens.f_number), F_NUMBERS.end().max(lens.f_number));
     let f_number = (lens.f_number * factor).clamp(least, most);
-    look.strength = Strength::Lens(Lens { f_number, ..lens });
+    look.strength = Strength::Lens(Lens { f_number: short(f_number), ..lens });
 }
 
 /// Widens the focal range by some metres, in steps of a centimetre.
@@ -95,11 +95,21 @@ pub fn move_focus(look: &mut Look, dx: f32, dy: f32) {
         FocusRule::Metres(metres) => {
             // The same step is a share of the distance: 4 %.
             let metres = metres * (1.0 + 2.0 * (dx - dy));
-            FocusRule::Metres(metres.clamp(*DISTANCES_M.start(), *DISTANCES_M.end()))
+            FocusRule::Metres(short(metres.clamp(*DISTANCES_M.start(), *DISTANCES_M.end())))
         }
-        FocusRule::Auto => FocusRule::Point { x: (0.5 + dx).clamp(0.0, 1.0), y: (0.5 + dy).clamp(0.0, 1.0) },
-        FocusRule::Point { x, y } => FocusRule::Point { x: (x + dx).clamp(0.0, 1.0), y: (y + dy).clamp(0.0, 1.0) },
+        FocusRule::Auto => point(0.5 + dx, 0.5 + dy),
+        FocusRule::Point { x, y } => point(x + dx, y + dy),
     };
+}
+
+/// The focus at a place of the picture, or the nearest one in it.
+pub fn point(x: f32, y: f32) -> FocusRule {
+    FocusRule::Point { x: short(x.clamp(0.0, 1.0)), y: short(y.clamp(0.0, 1.0)) }
+}
+
+/// A number with four digits that count, as one would write it: finer nobody sees, and commands stay short.
+pub fn short(value: f32) -> f32 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 /// An angle plus `by_deg`, wrapped to -90 to 90 degrees: a band turned by 180 degrees is the same.

@@ -6,7 +6,7 @@ use super::Sheet;
 use crate::look::{Look, MAX_COC_PER_HEIGHT, Strength};
 use crate::optics::Lens;
 use crate::preview::panel::parts::{Number, choose, number, remark, switch};
-use crate::preview::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of};
+use crate::preview::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of, short};
 
 const WAYS: [(&str, &str); 2] = [
     ("Amount", "Blur as a share of the picture, the same at every distance of focus"),
@@ -26,7 +26,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             Some(0) if by_lens => {
                 let lens = lens_of(&sheet.look, 1.0, sheet.size);
                 let share = amount_of(lens, sheet.state.distance_m(), sheet.size);
-                sheet.look.strength = Strength::Percent(100.0 * share.min(MAX_COC_PER_HEIGHT));
+                sheet.look.strength = Strength::Percent(short(100.0 * share.min(MAX_COC_PER_HEIGHT)));
             }
             _ => {}
         }
