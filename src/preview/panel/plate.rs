@@ -11,7 +11,7 @@ const WIDTH: f32 = 420.0;
 /// Draws the offer to take a plate, `bottom` points above the window's edge, where that is the way to a portrait. Its
 /// height.
 pub fn offer(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) -> f32 {
-    if !state.takes_plates()[1] || state.declined_plate || state.bare {
+    if !state.takes_plates()[1] || state.declined_plate || state.plate.is_some() || state.bare {
         return 0.0;
     }
     let area = Area::new(Id::unique("plate offer")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom));

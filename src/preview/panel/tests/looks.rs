@@ -6,6 +6,7 @@ use egui::{Event, Theme, pos2};
 
 use super::paint::{Painter, over};
 use super::{Window, button};
+use crate::depth::plate::Step;
 use crate::frame::ColorImage;
 use crate::look::Effect;
 use crate::preview::panel::theme::{Colors, rung};
@@ -98,6 +99,12 @@ fn pictures() {
         state.apply(crate::preview::state::Action::Record(true));
         state.apply(crate::preview::state::Action::VirtualCamera(Some("/dev/video9".into())));
     });
+    // From the offer to the portrait.
+    for (name, step) in [("offer", None), ("step-out", Some(Step::StepOut(3))), ("taking", Some(Step::Taking(60)))] {
+        shot(&format!("plate-{name}"), Theme::Dark, &|state| {
+            (state.source, state.plate, state.panel) = (sample::running(false), step, false);
+        });
+    }
     shot("large", Theme::Dark, &|state| {
         state.text_scale = 1.8;
         state.look.strength = crate::look::Strength::Lens(crate::preview::state::tweak::LENS);
