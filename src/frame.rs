@@ -189,4 +189,10 @@ impl DepthMap {
         let (is_beyond_least, is_below_most) = (metres >= Self::LEAST_M, metres <= Self::MOST_M);
         is_beyond_least & is_below_most
     }
+
+    /// Inverse depth of a stored value, in 1/m; 0 where it is unknown.
+    #[inline(always)]
+    pub fn inverse_of(metres: f32) -> f32 {
+        if Self::is_known(metres) { 1.0 / metres } else { 0.0 }
+    }
 }

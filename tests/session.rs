@@ -290,9 +290,8 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     watched.until("the command", |told| matches!(told, Update::Note(line) if line.starts_with("Copied: show 32")));
     watched.hear();
     // The film is there already: the command makes another one.
-    let copied = watched.copied.clone().expect("a command");
-    let (begin, end) = ("show 32 [\"", "bokehcam-1.mp4\", \"camera\"] [(\"split\", \"0.5\")]");
-    assert!(copied.starts_with(begin) && copied.ends_with(end), "{copied}");
+    let (copied, end) = (watched.copied.clone().unwrap(), r#"bokehcam-1.mp4", "camera"] [("split", "0.5")]"#);
+    assert!(copied.starts_with("show 32 [\"") && copied.ends_with(end), "{copied}");
     let has = |watched: &Watched, line: &str| watched.written.lock().unwrap().iter().any(|written| written == line);
     let began = Instant::now();
     while !has(&watched, "film 32") || !has(&watched, "camera 32") {

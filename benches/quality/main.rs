@@ -194,15 +194,15 @@ fn moving(options: &Options, kind: &Kind, results: &mut Results) -> Outcome<()> 
             true => views(&scene, &format!("{}-{frame}", kind.name), Path::new(CACHE))?,
             false => truth::without_truth(&scene),
         };
+        if blurrers.is_empty() {
+            blurrers = methods.map(|method| Blurrer::new(method, &views.shot)).into_iter().collect::<Result<_, _>>()?;
+        }
+        if !counts(frame) {
+            blurrers.iter_mut().for_each(|blurrer| blurrer.watch(&views.shot));
+            continue;
+        }
         let band = metrics::edge_band(&views.coc_px);
         for (k, method) in methods.into_iter().enumerate() {
-            if blurrers.len() == k {
-                blurrers.push(Blurrer::new(method, &views.shot)?);
-            }
-            if !counts(frame) {
-                blurrers[k].watch(&views.shot);
-                continue;
-            }
             let picture = blurrers[k].blur(&views.shot)?;
             if let Some(out) = &options.out {
                 fs::create_dir_all(out)?;

@@ -231,13 +231,7 @@ impl Blurrer {
     fn remember(&mut self, shot: &Shot) -> DepthMap {
         let mut depth = shot.depth.clone();
         self.filler.fill_guided(&mut depth, &shot.image);
-        let jump = shot.lens.inverse_depth_of_px(matting::FROM_PX);
-        let Self { background, matting, .. } = self;
-        match background.knows(&shot.image) {
-            true => matting
-                .find_before(&mut depth, &shot.image, jump, |at, near| background.light_behind(at, near, &shot.lens)),
-            false => matting.find(&mut depth, &shot.image, jump),
-        }
+        self.background.find_matte(&mut self.matting, &mut depth, &shot.image, &shot.lens);
         self.background.learn(&depth, &shot.image, &shot.lens, self.time_ns);
         self.background.reveal(&mut depth, &shot.image, &shot.lens);
         self.time_ns += PERIOD_NS;

@@ -142,8 +142,7 @@ impl Lines {
         }
         let known = reduced.metres.iter().map(|&z_m| DepthMap::is_known(z_m)).collect();
         Filler::new().fill(&mut reduced);
-        let inverse_of = |&z_m: &f32| if DepthMap::is_known(z_m) { z_m.recip() } else { 0.0 };
-        let inverse = reduced.metres.iter().map(inverse_of).collect();
+        let inverse = reduced.metres.iter().map(|&z_m| DepthMap::inverse_of(z_m)).collect();
         Self { width, height, luma, inverse, known }
     }
 

@@ -37,11 +37,10 @@ impl Misfit {
             let mut moved = map.clone();
             let unknown: Vec<bool> = map.metres.iter().map(|&metres| !DepthMap::is_known(metres)).collect();
             let of_map_px = distance_px * map.width as i32 / color.width as i32;
-            // Inverted, and back: what is not known is 0.
-            let invert = |metres: &mut f32| *metres = if DepthMap::is_known(*metres) { 1.0 / *metres } else { 0.0 };
-            moved.metres.iter_mut().for_each(invert);
+            moved.metres.iter_mut().for_each(|metres| *metres = DepthMap::inverse_of(*metres));
             Outlines::default().shift(&mut moved.metres, &unknown, map.width as usize, of_map_px, 0.0);
-            moved.metres.iter_mut().for_each(invert);
+            // And back: 0 is unknown either way.
+            moved.metres.iter_mut().filter(|value| **value > 0.0).for_each(|value| *value = value.recip());
             outlines = Agreement::of(&moved, color);
         }
         // At each scale, edges move by some three pixels.

@@ -62,15 +62,18 @@ impl Finisher {
     }
 }
 
+fn focus_of(rule: CocRule) -> FocusRule {
+    match rule {
+        CocRule::Fixed(_) => FocusRule::Auto,
+        CocRule::Depth { focus, .. } => focus,
+    }
+}
+
 impl CocMaker {
     /// Nothing was seen yet.
     pub fn new(rule: CocRule, finish: Finish) -> Self {
-        let focus = match rule {
-            CocRule::Fixed(_) => FocusRule::Auto,
-            CocRule::Depth { focus, .. } => focus,
-        };
-        let mending = Mending::default();
-        let (focus, finisher, matting) = (Focus::new(focus), Finisher::new(finish, mending), Matting::default());
+        let (focus, mending) = (Focus::new(focus_of(rule)), Mending::default());
+        let (finisher, matting) = (Finisher::new(finish, mending), Matting::default());
         Self { rule, focus, finisher, mending, matting, background: None }
     }
 
@@ -99,14 +102,13 @@ impl CocMaker {
                 if !self.finisher.is(finish) {
                     self.finisher = Finisher::new(finish, self.mending);
                 }
-                self.rule = rule;
             }
             _ => {
-                let new = Self { background: self.background.take(), ..Self::new(rule, finish) };
-                let mending = std::mem::replace(self, new).mending;
-                self.mend(mending);
+                self.focus = Focus::new(focus_of(rule));
+                self.finisher = Finisher::new(finish, self.mending);
             }
         }
+        self.rule = rule;
     }
 
     /// The CoC of every frame, where that needs no depth.
@@ -139,10 +141,7 @@ impl CocMaker {
             }
             self.find_matte(map, color, &field);
         }
-        if let (CocField::Depth(lens), Some(background), false) = (&field, &mut self.background, map.is_smooth) {
-            background.learn(map, color, lens, time_ns);
-            background.reveal(map, color, lens);
-        }
+        self.reveal(map, color, &field, Some(time_ns));
         field
     }
 
@@ -153,21 +152,26 @@ impl CocMaker {
             return;
         }
         self.find_matte(map, color, field);
-        if let (CocField::Depth(lens), Some(background), false) = (field, &mut self.background, map.is_smooth) {
-            background.reveal(map, color, lens);
-        }
+        self.reveal(map, color, field, None);
     }
 
     fn find_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
         map.matte.pixels.clear();
         if let (CocField::Depth(lens), false) = (field, map.is_smooth) {
-            let jump = lens.inverse_depth_of_px(matting::FROM_PX);
             match &self.background {
-                Some(background) if background.knows(color) => {
-                    self.matting.find_before(map, color, jump, |at, near| background.light_behind(at, near, lens));
-                }
-                _ => self.matting.find(map, color, jump),
+                Some(background) => background.find_matte(&mut self.matting, map, color, lens),
+                None => self.matting.find(map, color, lens.inverse_depth_of_px(matting::FROM_PX)),
             }
+        }
+    }
+
+    /// Gives a map what is remembered to lie behind, having learned from it first where it is that of a picture `taken_ns`.
+    fn reveal(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField, taken_ns: Option<u64>) {
+        if let (CocField::Depth(lens), Some(background), false) = (field, &mut self.background, map.is_smooth) {
+            if let Some(taken_ns) = taken_ns {
+                background.learn(map, color, lens, taken_ns);
+            }
+            background.reveal(map, color, lens);
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use crate::optics::DepthCoc;
 
 use super::alignment::{Aligner, Alignment};
-use super::matting::FROM_PX;
+use super::matting::{FROM_PX, Matting};
 use super::reduced::{MOST, Reducer, block_px, reduced_size};
 use cells::Cells;
 
@@ -112,7 +112,7 @@ impl Background {
             self.size = (0, 0);
             return;
         }
-        let follows = (self.time_ns..=self.time_ns + LONGEST_GAP_NS).contains(&time_ns);
+        let follows = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
         if self.size != size || !follows {
             self.forget(size);
             self.resumes_ns = time_ns;
@@ -125,7 +125,7 @@ impl Background {
         let other = lens.inverse_depth_of_px(OTHER_PX);
         if !self.align(map, color, other) {
             self.forget(size);
-            self.resumes_ns = time_ns + REST_NS;
+            self.resumes_ns = time_ns.saturating_add(REST_NS);
             return;
         }
         for y in (self.frame / LESSONS % ROWS..size.1).step_by(ROWS) {
@@ -142,7 +142,7 @@ impl Background {
         let other = lens.inverse_depth_of_px(OTHER_PX);
         let Self { cells, rounds, inverse, .. } = self;
         let nearest = cells.survey(size, |at| {
-            let own = inverse_of(map.metres[at]);
+            let own = DepthMap::inverse_of(map.metres[at]);
             (rounds[at] >= KNOWN).then(|| (own, own - inverse[at] > other))
         });
         cells.spread(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
@@ -161,7 +161,7 @@ impl Background {
                 }
                 for at in first..end {
                     let mixed = before.next_if(|pixel| pixel.at as usize == at);
-                    pixels.extend(mixed.copied().or_else(|| self.behind(at, map.metres[at], &color.rgb, lens)));
+                    pixels.extend(mixed.copied().or_else(|| self.behind(at, map.metres[at], &color.rgb, other)));
                 }
             }
         }
@@ -172,15 +172,24 @@ impl Background {
         self.pixels = pixels;
     }
 
+    /// Finds the matte of a picture by `matting`, before what is known to lie behind.
+    pub fn find_matte(&self, matting: &mut Matting, map: &mut DepthMap, color: &ColorImage, lens: &DepthCoc) {
+        let (jump, other) = [FROM_PX, OTHER_PX].map(|px| lens.inverse_depth_of_px(px)).into();
+        match self.knows(color) {
+            true => matting.find_before(map, color, jump, |at, near| self.light_behind(at, near, other)),
+            false => matting.find(map, color, jump),
+        }
+    }
+
     /// Whether anything is known of pictures like this one.
-    pub fn knows(&self, color: &ColorImage) -> bool {
+    fn knows(&self, color: &ColorImage) -> bool {
         self.size == (color.width as usize, color.height as usize) && self.time_ns >= self.resumes_ns
     }
 
     /// The light behind pixel `at`, as the camera exposes now, whose nearer surface has inverse depth `near`, in 1/m; `None`
-    /// where that is not known.
-    pub fn light_behind(&self, at: usize, near: f32, lens: &DepthCoc) -> Option<[f32; 3]> {
-        let is_known = self.rounds[at] >= KNOWN && near - self.inverse[at] > lens.inverse_depth_of_px(OTHER_PX);
+    /// where that is not known. Surfaces are another beyond a step `other` of it.
+    fn light_behind(&self, at: usize, near: f32, other: f32) -> Option<[f32; 3]> {
+        let is_known = self.rounds[at] >= KNOWN && near - self.inverse[at] > other;
         is_known.then(|| [0, 1, 2].map(|p| self.light[p][usize::from(self.rgb[3 * at + p])]))
     }
 
@@ -215,7 +224,7 @@ impl Background {
                 let (at, place) =
                     (row * size.0 + column, middle(row, self.size.1) * self.size.0 + middle(column, self.size.0));
                 let is_known = rounds[place] >= KNOWN;
-                let is_seen = is_known && (inverse_of(map.metres[place]) - inverse[place]).abs() <= other;
+                let is_seen = is_known && (DepthMap::inverse_of(map.metres[place]) - inverse[place]).abs() <= other;
                 hidden[at] = !(is_seen && has[at]);
                 if is_seen && !has[at] {
                     // What was learned is as the camera exposed at first.
@@ -248,7 +257,7 @@ impl Background {
         let ys = [y.saturating_sub(CLEAR_PX), y, (y + CLEAR_PX).min(height - 1)];
         for (out, y) in self.rows.iter_mut().zip(ys) {
             out.clear();
-            out.extend(map.metres[y * width..][..width].iter().map(|&metres| inverse_of(metres)));
+            out.extend(map.metres[y * width..][..width].iter().map(|&metres| DepthMap::inverse_of(metres)));
         }
         self.mixed.clear();
         self.mixed.resize(width, false);
@@ -293,16 +302,10 @@ impl Background {
     }
 
     /// A pixel at `metres` and what it hides, if that is remembered.
-    fn behind(&self, at: usize, metres: f32, rgb: &[u8], lens: &DepthCoc) -> Option<MixedPixel> {
-        let light = self.light_behind(at, inverse_of(metres), lens)?;
+    fn behind(&self, at: usize, metres: f32, rgb: &[u8], other: f32) -> Option<MixedPixel> {
+        let light = self.light_behind(at, DepthMap::inverse_of(metres), other)?;
         let difference = std::array::from_fn(|p| self.own_light[usize::from(rgb[3 * at + p])] - light[p]);
         let far_m = self.inverse[at].recip();
         Some(MixedPixel { at: at as u32, near_m: metres, far_m, share: 1.0, behind: 1.0, difference })
     }
-}
-
-/// The inverse of a distance, in 1/m; 0 of one that is not known.
-#[inline(always)]
-fn inverse_of(metres: f32) -> f32 {
-    if DepthMap::is_known(metres) { 1.0 / metres } else { 0.0 }
 }

@@ -108,10 +108,8 @@ impl Matting {
         evidence.extend(edges.iter().filter_map(|edge| {
             let place = clusters.around(&view, edge)?;
             let at = edge.y as usize * size.0 + edge.x as usize;
-            let contrast = clusters.at(place);
-            // What is remembered of a surface that looks otherwise here is not of that surface.
-            let behind = behind(at, edge.near).filter(|light| contrast.is_like_far(*light));
-            Some(Evidence::new(edge, labels(&view, edge, at), (view.light(at), behind), (place, contrast)))
+            let lights = (view.light(at), behind(at, edge.near));
+            Some(Evidence::new(edge, labels(&view, edge, at), lights, (place, clusters.at(place))))
         }));
         let prior = Prior::of(&self.evidence);
         let on_edges = self.evidence.len();
@@ -165,9 +163,8 @@ impl Matting {
                     }
                     let view = View { size, inverse, jump, at_edge, rgb, light };
                     if let Some(place) = clusters.around(&view, &next) {
-                        let contrast = clusters.at(place);
-                        let behind = behind(at, next.near).filter(|light| contrast.is_like_far(*light));
-                        evidence.push(Evidence::new(&next, TRACED, (view.light(at), behind), (place, contrast)));
+                        let lights = (view.light(at), behind(at, next.near));
+                        evidence.push(Evidence::new(&next, TRACED, lights, (place, clusters.at(place))));
                     }
                 }
             }
@@ -214,7 +211,7 @@ impl pulp::WithSimd for Survey<'_> {
         let (width, height) = (map.width as usize, map.height as usize);
         inverse.resize(width * height, 0.0);
         for (inverse, &metres) in inverse.iter_mut().zip(&map.metres) {
-            *inverse = if DepthMap::is_known(metres) { 1.0 / metres } else { 0.0 };
+            *inverse = DepthMap::inverse_of(metres);
         }
         at_edge.resize(width * height, false);
         edges.clear();

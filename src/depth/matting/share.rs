@@ -112,13 +112,9 @@ impl Contrast {
 
     /// Whether the far surface may have this light here.
     pub(super) fn is_like_far(&self, light: [f32; 3]) -> bool {
-        let Color { mean, covariance: mut spread } = self.surfaces[1];
-        let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
-        for k in [0, 3, 5] {
-            spread[k] += floor;
-        }
+        let Color { mean, covariance } = self.surfaces[1];
         let off = std::array::from_fn(|p| light[p] - mean[p]);
-        dot(off, times(&inverse(&spread), off)) < MOST_DEVIATION * MOST_DEVIATION
+        dot(off, times(&inverse(&widened(covariance)), off)) < MOST_DEVIATION * MOST_DEVIATION
     }
 
     /// How likely it is that a colour which is a `share` of the near surface before this light is off the line between both by
@@ -147,12 +143,8 @@ impl Contrast {
 
 fn difference(near: &Color, far: &Color, own: [f32; 3], share: f32) -> [f32; 3] {
     let rest = 1.0 - share;
-    let mut spread: Symmetric =
-        std::array::from_fn(|k| share * share * near.covariance[k] + rest * rest * far.covariance[k]);
-    let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
-    for k in [0, 3, 5] {
-        spread[k] += floor;
-    }
+    let spread = std::array::from_fn(|k| share * share * near.covariance[k] + rest * rest * far.covariance[k]);
+    let spread = widened(spread);
     let residual = std::array::from_fn(|p| own[p] - share * near.mean[p] - rest * far.mean[p]);
     let step = times(&inverse(&spread), residual);
     let (of_near, of_far) = (times(&near.covariance, step), times(&far.covariance, step));
@@ -194,7 +186,8 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Compares a pixel's colour `own` with those of both surfaces, the farther one's being `behind` where that is known.
+    /// Compares a pixel's colour `own` with those of both surfaces, the farther one's being `behind` where that is known and
+    /// like that surface.
     pub(super) fn new(
         edge: &EdgePixel,
         labels: Labels,
@@ -202,6 +195,8 @@ impl Evidence {
         (place, contrast): (u32, &Contrast),
     ) -> Self {
         let Labels { is_near, is_thin, .. } = labels;
+        // What is remembered of a surface that looks otherwise here is not of that surface.
+        let behind = behind.filter(|light| contrast.is_like_far(*light));
         let discriminant = behind.map_or(contrast.discriminant, |light| Discriminant::before(contrast.front(), light));
         let precision = discriminant.precision;
         let share = discriminant.share(own);
@@ -313,6 +308,15 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 /// `matrix` times `vector`.
 fn times(&[xx, xy, xz, yy, yz, zz]: &Symmetric, vector: [f32; 3]) -> [f32; 3] {
     [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| dot(row, vector))
+}
+
+/// A covariance of few pixels with what goes evenly into all directions.
+fn widened(mut spread: Symmetric) -> Symmetric {
+    let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
+    for k in [0, 3, 5] {
+        spread[k] += floor;
+    }
+    spread
 }
 
 /// The inverse, by the adjugate; of a matrix that has none, zeros.

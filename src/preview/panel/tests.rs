@@ -86,12 +86,18 @@ impl Window {
 
     /// All texts that are drawn, and their middles.
     fn places(&mut self) -> Vec<(String, Pos2)> {
+        fn add(shape: &egui::Shape, to: &mut Vec<(String, Pos2)>) {
+            match shape {
+                egui::Shape::Text(text) => {
+                    to.push((text.galley.text().to_owned(), text.visual_bounding_rect().center()));
+                }
+                egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| add(shape, to)),
+                _ => {}
+            }
+        }
         let (_, output) = self.pass_with_output(Vec::new());
-        let texts = output.shapes.iter().filter_map(|clipped| match &clipped.shape {
-            egui::Shape::Text(shape) => Some((shape.galley.text().to_owned(), shape.visual_bounding_rect().center())),
-            _ => None,
-        });
-        let texts = texts.collect();
+        let mut texts = Vec::new();
+        output.shapes.iter().for_each(|clipped| add(&clipped.shape, &mut texts));
         output.drop_without_applying_deltas();
         texts
     }

@@ -28,15 +28,17 @@ pub fn amount(look: &Look, height_px: u32) -> Option<f32> {
 pub fn blur_by(look: &mut Look, factor: f32, height_px: u32) {
     // As a share of the height: below that no blur is visible, so a step down ends at 0, and one up starts from half.
     let least = 0.002;
-    match amount(look, height_px) {
-        Some(share) => {
+    match (look.strength, amount(look, height_px)) {
+        (_, Some(share)) => {
             let share = if share < least && factor < 1.0 { 0.0 } else { share.max(least / 2.0) * factor };
             // A radius beyond the usual limit may stay.
             let most = amount(look, height_px).unwrap_or_default().max(MAX_COC_PER_HEIGHT);
             look.strength = Strength::Percent(short(share.min(most) * 100.0));
         }
-        // The lens is there: no distance matters.
-        None => f_number_by(look, 1.0 / factor, 1.0, (1, 1)),
+        (Strength::Lens(lens), None) if look.effect.follows_depth() => {
+            look.strength = Strength::Lens(stopped(lens, 1.0 / factor));
+        }
+        _ => {}
     }
 }
 
@@ -57,7 +59,7 @@ pub fn lens_of(look: &Look, focus_m: f32, size: (u32, u32)) -> Lens {
     match (look.strength, amount(look, size.1)) {
         (Strength::Lens(lens), _) => lens,
         (_, share) => {
-            let f_number = f_number_of(share.unwrap_or(COC_AT_INFINITY_PER_HEIGHT), focus_m, size);
+            let f_number = f_number_of(share.unwrap_or_default(), focus_m, size);
             // It may be one that no lens has: nothing is lost on the way back.
             Lens { f_number: short(f_number.clamp(0.01, 10_000.0)), ..LENS }
         }
@@ -70,10 +72,14 @@ pub fn f_number_by(look: &mut Look, factor: f32, focus_m: f32, size: (u32, u32))
     if !look.effect.follows_depth() {
         return;
     }
-    let lens = lens_of(look, focus_m, size);
+    look.strength = Strength::Lens(stopped(lens_of(look, focus_m, size), factor));
+}
+
+/// A lens whose f-number is `factor` times as large, within what can be chosen.
+fn stopped(lens: Lens, factor: f32) -> Lens {
     let (least, most) = (F_NUMBERS.start().min(lens.f_number), F_NUMBERS.end().max(lens.f_number));
     let f_number = (lens.f_number * factor).clamp(least, most);
-    look.strength = Strength::Lens(Lens { f_number: short(f_number), ..lens });
+    Lens { f_number: short(f_number), ..lens }
 }
 
 /// Widens the focal range by some metres, in steps of a centimetre.

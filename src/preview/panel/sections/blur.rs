@@ -19,13 +19,11 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     if sheet.follows_depth() || by_lens {
         let follows_depth = sheet.follows_depth();
         let chosen = choose(ui, "Blur by", &WAYS, usize::from(by_lens), |index| index == 0 || follows_depth);
-        match chosen {
-            Some(1) if !by_lens => {
-                sheet.look.strength = Strength::Lens(lens_of(&sheet.look, sheet.state.distance_m(), sheet.size));
-            }
-            Some(0) if by_lens => {
-                let lens = lens_of(&sheet.look, 1.0, sheet.size);
-                let share = amount_of(lens, sheet.state.distance_m(), sheet.size);
+        let focus_m = sheet.state.distance_m();
+        match (chosen, sheet.look.strength) {
+            (Some(1), _) => sheet.look.strength = Strength::Lens(lens_of(&sheet.look, focus_m, sheet.size)),
+            (Some(0), Strength::Lens(lens)) => {
+                let share = amount_of(lens, focus_m, sheet.size);
                 sheet.look.strength = Strength::Percent(short(100.0 * share.min(MAX_COC_PER_HEIGHT)));
             }
             _ => {}

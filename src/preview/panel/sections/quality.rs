@@ -6,7 +6,7 @@ use super::Sheet;
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::look::{BackgroundMemory, Refine};
-use crate::preview::panel::parts::choose;
+use crate::preview::panel::parts::{choose, switch};
 use crate::preview::state::tweak::rank_label;
 
 /// Quality, terms, method and refining.
@@ -57,10 +57,10 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             sheet.look.refine = REFINES[index];
             sheet.changed(true, "refine");
         }
-        let mut remembers = sheet.look.background_memory == BackgroundMemory::On;
-        let hover = "What was seen before of what things hide now is shown where blur lets it through";
-        if ui.checkbox(&mut remembers, "Remember the background").on_hover_text(hover).changed() {
-            sheet.look.background_memory = if remembers { BackgroundMemory::On } else { BackgroundMemory::Off };
+        let remembers = sheet.look.background_memory == BackgroundMemory::On;
+        let hint = "What was seen before of what things hide now is shown where blur lets it through";
+        if switch(ui, "Remember the background", hint, remembers) {
+            sheet.look.background_memory = if remembers { BackgroundMemory::Off } else { BackgroundMemory::On };
             sheet.changed(true, "background-memory");
         }
     }

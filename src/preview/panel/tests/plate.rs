@@ -1,7 +1,5 @@
 //! The plate: offered where it is the way to a portrait, and what to do while it is taken.
 
-use egui::FullOutput;
-
 use super::super::super::state::{State, sample};
 use super::Window;
 use crate::depth::plate::Step;
@@ -12,10 +10,7 @@ fn a_lone_camera_is_offered_a_plate_and_what_to_do_for_it_is_shown() {
     let mut texts = |change: &dyn Fn(&mut State)| {
         change(&mut window.state);
         window.pass(Vec::new());
-        let (_, output) = window.pass_with_output(Vec::new());
-        let found = written(&output);
-        output.drop_without_applying_deltas();
-        found
+        window.texts().join("\n")
     };
     assert!(!texts(&|_| {}).contains("Take a plate"));
     let offer = texts(&|state| state.source = sample::running(false));
@@ -26,21 +21,4 @@ fn a_lone_camera_is_offered_a_plate_and_what_to_do_for_it_is_shown() {
     let unlike = texts(&|state| state.plate = Some(Step::Unlike));
     assert!(unlike.contains("Take another plate"), "{unlike}");
     assert!(!texts(&|state| state.plate = Some(Step::Ready)).contains("Step out"));
-}
-
-/// All text that is drawn.
-fn written(output: &FullOutput) -> String {
-    fn add(shape: &egui::Shape, text: &mut String) {
-        match shape {
-            egui::Shape::Text(shape) => {
-                text.push_str(shape.galley.text());
-                text.push('\n');
-            }
-            egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| add(shape, text)),
-            _ => {}
-        }
-    }
-    let mut text = String::new();
-    output.shapes.iter().for_each(|clipped| add(&clipped.shape, &mut text));
-    text
 }
