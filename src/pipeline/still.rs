@@ -1,7 +1,8 @@
 //! One picture on its own: the same blur as in a stream, without one.
 
 use super::{CocMaker, Finish};
-use crate::bokeh::{BokehError, Job};
+use crate::bokeh::{Bokeh, BokehError, Job};
+use crate::budget::Quality;
 use crate::compute::Place;
 use crate::computing::Computing;
 use crate::depth::misfit::Misfit;
@@ -61,16 +62,30 @@ pub fn blur(
     let Some(settings) = look.settings(size, false) else { return Ok((color, "not blurred".to_string())) };
     let (coc, depth) = coc_and_depth(look, &color, depth)?;
     let mut bokeh = computing.blur(&settings, size)?;
+    Ok((blur_with(&mut *bokeh, settings.quality, color, depth, coc)?, bokeh.describe()))
+}
+
+/// Blurs the picture `color` with an executor that has nothing else in hand, by what [`coc_and_depth`] gave.
+///
+/// # Errors
+/// The executor failed.
+pub fn blur_with(
+    bokeh: &mut dyn Bokeh,
+    quality: Quality,
+    color: ColorImage,
+    depth: Option<DepthMap>,
+    coc: CocField,
+) -> Result<ColorImage, BokehError> {
     bokeh.submit(Job {
         ticket: 0,
         color: Pooled::detached(color),
         depth: depth.map(Pooled::detached),
         coc,
-        quality: settings.quality,
+        quality,
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
     })?;
     let mut finished = bokeh.collect(true)?.ok_or(BokehError::Lost)?;
     let picture = finished.picture.memory_mut().ok_or(BokehError::Lost)?;
-    Ok((std::mem::take(picture), bokeh.describe()))
+    Ok(std::mem::take(picture))
 }

@@ -1,16 +1,18 @@
 //! The session's own thread.
 
+mod looks;
+
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 
 use super::live::{self, Live};
-use super::{Closed, News, Order, SessionEvent, Start, Still};
-use crate::look::{Look, Patch};
+use super::{Closed, News, Order, SessionEvent, Start, held};
+use crate::link::demand::{Demand, Watch};
+use crate::look::Look;
 use crate::pipeline::{PipelineError, Wanted};
 use crate::preview::services::{Services, Switch};
 use crate::preview::state::{Output, Request, Source, Update};
-use crate::recording::snapshot::{self, Snapshot};
 use crate::sink;
 use crate::sink::switch::{Fate, Notice};
 use crate::stats::Report;
@@ -27,6 +29,9 @@ pub(super) struct Host {
     budget_ns: Option<u64>,
     folder: PathBuf,
     wanted: Arc<Wanted>,
+    demand: Demand,
+    /// Held while something is written: then the source does not rest.
+    watch: Option<Watch>,
     news: News,
     orders: mpsc::Sender<Order>,
     live: Option<Live>,
@@ -39,19 +44,18 @@ pub(super) struct Host {
     began: bool,
     /// The last looks of the present run, each with the number of its change, oldest first.
     looks: VecDeque<(u64, Look)>,
+    /// The frame that stays on the screen.
+    held: Option<held::HeldBlur>,
 }
 
 /// A recording without a name of its own is called this, around a number.
 const RECORDING: &str = "bokehcam-";
 const VIDEO: &str = ".mp4";
 
-/// Looks that are kept for snapshots: frames that come are of one of the last few.
-const KEPT_LOOKS: usize = 512;
-
 impl Host {
     /// A session that has not started yet; `orders` sends orders to itself.
     pub fn new(start: Start, news: News, orders: mpsc::Sender<Order>) -> Self {
-        let Start { services, look, source, outputs, keep_going, budget_ns, folder, wanted } = start;
+        let Start { services, look, source, outputs, keep_going, budget_ns, folder, wanted, demand } = start;
         Self {
             services,
             look,
@@ -62,6 +66,8 @@ impl Host {
             budget_ns,
             folder,
             wanted,
+            demand,
+            watch: None,
             news,
             orders,
             live: None,
@@ -70,6 +76,7 @@ impl Host {
             failed: None,
             began: false,
             looks: VecDeque::new(),
+            held: None,
         }
     }
 
@@ -97,6 +104,7 @@ impl Host {
                     }
                     Order::Do(request) => self.carry_out(request),
                     Order::Save(still) => self.save(&still),
+                    Order::Hold(held) => self.hold(held.map(|held| *held)),
                     Order::Copy(switches) => self.copy(&switches),
                     Order::Wrote(run, notice) => self.on_output(run, &notice),
                     Order::Ended(run, ended) => self.on_run_end(run, *ended),
@@ -179,8 +187,9 @@ impl Host {
         self.news.tell(Update::Presets(self.services.presets()));
     }
 
-    fn tell_outputs(&self) {
+    fn tell_outputs(&mut self) {
         self.wanted.need(!self.outputs.is_empty());
+        self.watch = (!self.outputs.is_empty()).then(|| self.demand.watch());
         self.news.tell(Update::Outputs(self.outputs.clone()));
     }
 
@@ -220,6 +229,7 @@ impl Host {
             keep_going: self.keep_going,
             budget_ns: self.budget_ns,
             wanted: Arc::clone(&self.wanted),
+            demand: self.demand.clone(),
         };
         match Live::begin(opened, &settings, &mut *self.services, &self.news, wrote, ended) {
             Ok((live, source)) => {
@@ -233,21 +243,6 @@ impl Host {
                 self.tell_outputs();
             }
             Err(line) => self.without_source(Source::Lost(line)),
-        }
-    }
-
-    /// Blurs with another look from now on, and remembers it by its number for snapshots.
-    fn adopt(&mut self, look: Look) {
-        self.look = look;
-        if let Some(live) = &mut self.live {
-            let number = self.looks.back().map_or(0, |(last, _)| last + 1);
-            self.looks.push_back((number, live.effective(&self.look)));
-            if self.looks.len() > KEPT_LOOKS {
-                self.looks.pop_front();
-            }
-            if let Err(line) = live.adopt(&self.look, number, &mut *self.services) {
-                self.news.note(line);
-            }
         }
     }
 
@@ -332,19 +327,6 @@ impl Host {
             && let Some(report) = live.stop()
         {
             self.report = Some(report);
-        }
-    }
-
-    /// Saves a snapshot with the settings that repeat it: those of the look that its frame was blurred with.
-    fn save(&self, still: &Still) {
-        let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
-        let look = its_look.map_or(&self.look, |(_, look)| look);
-        let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
-        let Still { picture, color, depth, .. } = still;
-        let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
-        match snapshot::save(&self.folder, "bokehcam", &snapshot) {
-            Ok(path) => self.news.note(format!("Saved {}", path.display())),
-            Err(error) => self.news.note(error.to_string()),
         }
     }
 }

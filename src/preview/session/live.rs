@@ -12,7 +12,7 @@ use super::{News, SessionEvent};
 use crate::bokeh;
 use crate::clock::Clock;
 use crate::depth::plate::Guide;
-use crate::link;
+use crate::link::{self, demand::Demand};
 use crate::look::Look;
 use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run, Wanted};
 use crate::sink::Sink;
@@ -26,6 +26,7 @@ pub(super) struct Settings<'a> {
     pub keep_going: bool,
     pub budget_ns: Option<u64>,
     pub wanted: Arc<Wanted>,
+    pub demand: Demand,
 }
 
 /// A run, and the channels into it.
@@ -73,7 +74,7 @@ impl Live {
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), settings.keep_going);
-        let wanted = Arc::clone(&settings.wanted);
+        let (wanted, demand) = (Arc::clone(&settings.wanted), settings.demand.clone());
         news.send(SessionEvent::Views(views, guide.clone()));
         let run = move || {
             pipeline::run(Run {
@@ -88,7 +89,7 @@ impl Live {
                 pace: Pace::Realtime,
                 budget_ns,
                 keep_going,
-                demand: None,
+                demand: Some(demand),
                 mirror: false,
                 wanted: Some(wanted),
                 view: Some(view),
@@ -113,6 +114,7 @@ impl Live {
             size: info.size,
             period_ns: info.period_ns,
             has_depth,
+            is_live: info.live,
             takes_plates,
             executor,
             budget_ns,

@@ -1,6 +1,7 @@
 //! What goes on behind the window: a thread of its own opens sources, runs the pipeline, makes executors for new looks,
 //! and begins and ends outputs. None of it holds up the window.
 
+mod held;
 mod host;
 mod live;
 
@@ -10,6 +11,7 @@ use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+pub use held::{Blurred, Held};
 use host::Host;
 
 use super::services::{Services, Switch};
@@ -18,6 +20,7 @@ use crate::budget::Quality;
 use crate::depth::plate::Guide;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
+use crate::link::demand::Demand;
 use crate::look::Look;
 use crate::optics::CocField;
 use crate::pipeline::{PipelineError, View, Wanted};
@@ -47,6 +50,8 @@ pub struct Start {
     pub folder: PathBuf,
     /// Where blurred pictures are wanted.
     pub wanted: Arc<Wanted>,
+    /// Whether anybody watches: sources rest while nobody does.
+    pub demand: Demand,
 }
 
 /// What comes from a session.
@@ -56,6 +61,8 @@ pub enum SessionEvent {
     Views(Receiver<View>, Option<Arc<Guide>>),
     /// A text for the clipboard.
     Copy(String),
+    /// The frame that stays, in another look.
+    Blurred(Box<Blurred>),
 }
 
 /// A frame to be saved.
@@ -87,6 +94,7 @@ pub struct Closed {
 enum Order {
     Do(Request),
     Save(Box<Still>),
+    Hold(Option<Box<Held>>),
     Copy(Vec<Switch>),
     /// What became of an output of the run of this number.
     Wrote(u64, Notice),
@@ -124,6 +132,11 @@ impl Session {
 
     pub fn save(&self, still: Still) {
         let _ = self.orders.send(Order::Save(Box::new(still)));
+    }
+
+    /// This frame stays: it is to be blurred anew with every look, until there is none.
+    pub fn hold(&self, held: Option<Held>) {
+        let _ = self.orders.send(Order::Hold(held.map(Box::new)));
     }
 
     /// Asks for the equivalent command, for the clipboard; `switches` are the window's options.

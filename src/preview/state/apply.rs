@@ -11,6 +11,9 @@ pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: ch
 /// Shown when a plate is to be taken of what is no camera.
 pub const NO_PLATE: &str =
     "A plate is a picture of what is behind you, taken with a camera that stands still: choose one first.";
+/// Shown when the picture is frozen while something is written.
+pub const GOES_ON: &str =
+    "Only this window is frozen. What is recorded or sent goes on live, and in every look that you choose here.";
 /// Shown when there is no virtual camera.
 pub const NO_VIRTUAL_CAMERA: &str = "There is no virtual camera yet: `bokehcam doctor` says how to make one.";
 
@@ -39,7 +42,7 @@ impl State {
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
             Action::Mirror(on) => self.mirror = on,
-            Action::Freeze(on) => self.frozen = on,
+            Action::Freeze(on) => self.freeze(on),
             Action::Panel(on) => self.panel = on,
             Action::Instruments(on) => self.instruments = on,
             Action::Bare(on) => self.bare = on,
@@ -70,6 +73,14 @@ impl State {
             Action::Dismiss => self.trouble = None,
         }
         Vec::new()
+    }
+
+    /// Keeps the picture, and says what goes out meanwhile.
+    fn freeze(&mut self, on: bool) {
+        if on && !self.frozen && !self.outputs.is_empty() {
+            self.note(GOES_ON);
+        }
+        self.frozen = on;
     }
 
     /// Changes the look as far as the source allows it; the one before can be undone.

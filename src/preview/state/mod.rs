@@ -53,6 +53,8 @@ pub struct Running {
     pub period_ns: u64,
     /// Whether its frames have depth.
     pub has_depth: bool,
+    /// Whether its frames come at their own pace, as a camera's do. Others can stand still.
+    pub is_live: bool,
     /// Whether it is a camera that a plate can be taken with.
     pub takes_plates: bool,
     pub executor: String,
@@ -207,6 +209,16 @@ impl State {
             Source::Running(running) => [running.takes_plates, running.takes_plates && !running.has_depth],
             Source::Opening | Source::Lost(_) | Source::Ended => [false; 2],
         }
+    }
+
+    /// Whether the picture that is shown stays: it was frozen, or no others come.
+    pub fn keeps_picture(&self) -> bool {
+        self.frozen || matches!(self.source, Source::Lost(_) | Source::Ended)
+    }
+
+    /// Whether the window needs no frames: it is frozen, and the source can stand still.
+    pub fn stands_still(&self) -> bool {
+        self.frozen && matches!(&self.source, Source::Running(running) if !running.is_live)
     }
 
     /// Whether frames have depth, as far as is known: without a running source they may.

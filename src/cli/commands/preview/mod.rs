@@ -17,6 +17,7 @@ use crate::cli::settings::look;
 use crate::cli::settings::unused;
 use crate::cli::sinks;
 use crate::cli::terminal;
+use crate::link::demand::Demand;
 use crate::look::{Effect, Look};
 use crate::pipeline::Pace;
 use crate::preview::session::Start;
@@ -122,6 +123,7 @@ pub fn show(
             keep_going: stream.keep_going,
             budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
             wanted: Arc::default(),
+            demand: Demand::default(),
             folder: window.save_to.clone().unwrap_or_else(pictures_folder),
         },
         device: device.clone(),

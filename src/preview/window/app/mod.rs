@@ -1,5 +1,6 @@
 //! The window's events.
 
+mod hold;
 mod show;
 
 use std::path::PathBuf;
@@ -21,7 +22,7 @@ use crate::compute::device::Device;
 use crate::depth::plate::Guide;
 use crate::frame::ColorImage;
 use crate::link::Receiver;
-use crate::optics::CocField;
+use crate::link::demand::{Demand, Watch};
 use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
 use crate::preview::panel::Panel;
@@ -34,9 +35,6 @@ use crate::stats::WindowUse;
 const INSTRUMENTS_PERIOD: Duration = Duration::from_millis(200);
 /// The stop flag is polled at least this often.
 const STOP_POLL: Duration = Duration::from_millis(250);
-/// After this long without a frame, and this many periods of the source, the person is told.
-const SILENCE: Duration = Duration::from_secs(2);
-const SILENT_PERIODS: u32 = 10;
 
 pub(super) struct App {
     state: State,
@@ -57,8 +55,14 @@ pub(super) struct App {
     /// Whether `view` was not on the screen yet.
     view_is_new: bool,
     false_colors: Views,
-    /// The view that `false_colors` drew last.
-    drawn: Shown,
+    /// The view that `false_colors` drew last, if the frame is still the same.
+    drawn: Option<Shown>,
+    /// The number of the frame that the session blurs anew, and of all of them so far.
+    held: Option<u64>,
+    holds: u64,
+    /// While it is held, the source does not rest.
+    watch: Option<Watch>,
+    demand: Demand,
     /// What frames are blurred with, once the present look has reached them.
     settings: Option<bokeh::Settings>,
     blank: ColorImage,
@@ -72,6 +76,8 @@ pub(super) struct App {
     input_at: Option<Instant>,
     /// Whether the window is hidden completely, and whether it has no pixels.
     covered: bool,
+    /// Since when nobody can see it.
+    hidden_at: Option<Instant>,
     empty: bool,
     /// Where the window's size is kept, and what was read from there or measured last.
     memory: Option<PathBuf>,
@@ -93,7 +99,7 @@ impl App {
                 let _ = proxy.send_event(());
             }
         });
-        let wanted = Arc::clone(&session.wanted);
+        let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
         let ctx = egui::Context::default();
@@ -113,7 +119,11 @@ impl App {
             view: None,
             view_is_new: false,
             false_colors: Views::default(),
-            drawn: Shown::default(),
+            drawn: None,
+            held: None,
+            holds: 0,
+            watch: Some(demand.watch()),
+            demand,
             settings: None,
             blank: ColorImage::new(16, 9),
             clock,
@@ -122,6 +132,7 @@ impl App {
             laid_out: Instant::now(),
             input_at: None,
             covered: false,
+            hidden_at: None,
             empty: false,
             memory,
             remembered,
@@ -165,6 +176,7 @@ impl App {
                     self.frames = Some(frames);
                     self.state.meters.restart();
                 }
+                SessionEvent::Blurred(blurred) => changed |= self.show_again(*blurred),
                 SessionEvent::Copy(text) => {
                     if let Some(gfx) = &mut self.gfx {
                         gfx.input.set_clipboard_text(text);
@@ -199,10 +211,7 @@ impl App {
         // A frozen frame has to be in memory, to be saved: frames are replaced until one is.
         let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
         if let Some(view) = newest.filter(|_| !frozen) {
-            self.state.focus_m = match view.coc {
-                CocField::Depth(coc) => Some(coc.focus_m),
-                _ => None,
-            };
+            self.state.focus_m = hold::focus_m(&view.coc);
             self.view = Some(view);
             self.view_is_new = true;
             changed = true;
@@ -210,23 +219,8 @@ impl App {
                 self.snapshot();
             }
         }
+        self.hold();
         if changed {
-            self.ask_for_redraw();
-        }
-    }
-
-    /// Updates how long a running source has been silent. A camera that is gone reports no error, as it may come back.
-    fn check_silence(&mut self) {
-        let silent = match &self.state.source {
-            Source::Running(running) => {
-                let patience = SILENCE.max(Duration::from_nanos(running.period_ns) * SILENT_PERIODS);
-                Some(self.heard_at.elapsed()).filter(|silent| *silent > patience)
-            }
-            _ => None,
-        };
-        let silent_s = silent.map(|silent| silent.as_secs());
-        if std::mem::replace(&mut self.state.silent_s, silent_s) != silent_s {
-            self.layout_at = Some(Instant::now());
             self.ask_for_redraw();
         }
     }
@@ -319,6 +313,7 @@ impl ApplicationHandler<()> for App {
         if self.stop.load(Ordering::Relaxed) {
             return events.exit();
         }
+        self.watch();
         self.check_silence();
         let now = Instant::now();
         if self.layout_at.is_some_and(|at| at <= now) {

@@ -84,6 +84,8 @@ impl App {
             }
         }
         self.update_wanted();
+        self.hold();
+        self.watch();
     }
 
     /// Tells the pipeline where pictures are needed from now on. They are read back from the GPU only where something
@@ -125,9 +127,9 @@ impl App {
         let hidden = self.is_hidden();
         let Some(gfx) = self.gfx.as_mut().filter(|_| !hidden) else { return };
         let shown = self.state.shown;
-        if let Some(view) = self.view.as_ref().filter(|_| self.view_is_new || self.drawn != shown) {
+        if let Some(view) = self.view.as_ref().filter(|_| self.view_is_new || self.drawn != Some(shown)) {
             self.false_colors.draw(shown, view, self.settings.as_ref());
-            self.drawn = shown;
+            self.drawn = Some(shown);
             self.state.legend = self.false_colors.legend();
         }
         let false_colors = self.state.legend.map(|_| self.false_colors.image());

@@ -1,0 +1,123 @@
+//! A frame that stays on the screen, and sources that stand still.
+
+use std::time::{Duration, Instant};
+
+use bokehcam::computing::Computing;
+use bokehcam::depth::focus::FocusRule;
+use bokehcam::look::{Effect, Look, Strength};
+use bokehcam::optics::CocField;
+use bokehcam::pipeline::View;
+use bokehcam::pipeline::still::{self, Depth};
+use bokehcam::preview::session::{Blurred, Held};
+use bokehcam::preview::state::{Output, Request, Update};
+
+use super::watched::{PATIENCE, Watched, is_running, look};
+
+/// A session whose first frame stays.
+fn holding(source: &str) -> (Watched, View) {
+    let mut watched = Watched::begin(source);
+    watched.until("it runs", |told| is_running(told, 32));
+    let view = watched.frame("a frame", |_| true);
+    watched.session.hold(Some(Held {
+        number: 7,
+        color: view.color.as_deref().unwrap().clone(),
+        depth: view.depth.as_deref().cloned(),
+        coc: view.coc,
+        is_behind: false,
+    }));
+    (watched, view)
+}
+
+/// The frame in another look.
+fn in_look(watched: &mut Watched, look: &Look) -> Blurred {
+    watched.session.order(Request::Look(Box::new(look.clone())));
+    let began = Instant::now();
+    loop {
+        watched.hear();
+        if let Some(blurred) = watched.blurred.pop() {
+            return blurred;
+        }
+        assert!(began.elapsed() < PATIENCE, "never blurred anew: {:?}", watched.told);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn a_frame_that_stays_is_blurred_as_each_look_says() {
+    let (mut watched, view) = holding("32");
+    let CocField::Depth(coc) = view.coc else { panic!("{:?}", view.coc) };
+    let color = view.color.as_deref().unwrap();
+    let looks = [
+        Look { strength: Strength::AtInfinity(4.0), ..look() },
+        Look { strength: Strength::AtInfinity(4.0), focus: FocusRule::Metres(0.9), ..look() },
+        Look { effect: Effect::Blur, ..look() },
+    ];
+    let mut last = 0;
+    for wanted in &looks {
+        let blurred = in_look(&mut watched, wanted);
+        assert!(blurred.number == 7 && blurred.change > last, "{} after {last}", blurred.change);
+        last = blurred.change;
+        // What was in focus stays in focus, until another focus is chosen.
+        let focus = if wanted.focus == look().focus { FocusRule::Metres(coc.focus_m) } else { wanted.focus };
+        let depth = view.depth.as_deref().cloned().map(Depth::Final);
+        let same = Look { focus, ..wanted.clone() };
+        let (picture, _) = still::blur(&same, color.clone(), depth, &Computing::default()).unwrap();
+        assert_eq!(blurred.picture.rgb, picture.rgb, "{wanted:?}");
+        assert_ne!(blurred.picture.rgb, view.picture.memory().unwrap().rgb);
+    }
+    let plain = in_look(&mut watched, &Look { effect: Effect::None, ..look() });
+    assert_eq!((plain.picture.rgb, plain.quality), (color.rgb.clone(), None));
+    watched.session.hold(None);
+    watched.session.order(Request::Look(Box::new(look())));
+    watched.frame("the next frames come in the look", |view| matches!(view.coc, CocField::Depth(_)));
+    assert!(watched.blurred.is_empty());
+}
+
+#[test]
+fn a_frame_without_depth_says_so_when_depth_is_needed() {
+    let (mut watched, view) = holding("32");
+    let color = view.color.as_deref().unwrap().clone();
+    watched.session.hold(Some(Held { number: 8, color, depth: None, coc: view.coc, is_behind: false }));
+    watched.session.order(Request::Look(Box::new(Look { strength: Strength::AtInfinity(3.0), ..look() })));
+    watched.until("why not", |told| matches!(told, Update::Note(line) if line.contains("without depth")));
+    let even = in_look(&mut watched, &Look { effect: Effect::Blur, ..look() });
+    assert_eq!(even.number, 8);
+}
+
+#[test]
+fn the_last_frame_of_a_source_that_ended_follows_the_look() {
+    let (mut watched, _) = holding("32 no more");
+    watched.until("its end", |told| matches!(told, Update::Source(bokehcam::preview::state::Source::Ended)));
+    let blurred = in_look(&mut watched, &Look { strength: Strength::AtInfinity(4.0), ..look() });
+    assert!(blurred.depth.is_some());
+}
+
+#[test]
+fn nothing_is_captured_while_nobody_watches_unless_it_is_written() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    watched.frame("a frame", |_| true);
+    watched.watch = None;
+    // What is on its way still comes.
+    std::thread::sleep(Duration::from_millis(500));
+    let rests = |watched: &mut Watched| {
+        let mut last = watched.views.as_mut().and_then(|views| views.try_recv()).map(|view| view.stamp.time_ns);
+        let began = Instant::now();
+        let first = last;
+        while began.elapsed() < Duration::from_secs(1) {
+            last = watched.views.as_mut().and_then(|views| views.try_recv()).map(|view| view.stamp.time_ns).or(last);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        first == last
+    };
+    assert!(rests(&mut watched));
+    let film = Output { name: "film".into(), is_camera: false };
+    watched.session.order(Request::Begin(film.clone()));
+    watched.frame("frames come for the film", |_| true);
+    watched.session.order(Request::End(film));
+    watched.until("the film is complete", |told| matches!(told, Update::Note(line) if line.contains("complete")));
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(rests(&mut watched));
+    watched.watch = Some(watched.demand.watch());
+    watched.frame("frames come again", |_| true);
+}
