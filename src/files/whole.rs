@@ -157,6 +157,17 @@ pub fn keep_incomplete(part: &Path, path: &Path) -> io::Result<PathBuf> {
     Err(ErrorKind::AlreadyExists.into())
 }
 
+/// Bytes that this process has written of a file that will be at `path`; `None` where it writes none.
+pub fn bytes_so_far(path: &Path) -> Option<u64> {
+    let (folder, name) = split(path).ok()?;
+    let own = format!(".{}-", std::process::id());
+    let parts = fs::read_dir(folder).ok()?.flatten().filter(|entry| {
+        let part = entry.file_name();
+        name_of_part(&part) == Some(name) && part.to_string_lossy().contains(&own)
+    });
+    parts.filter_map(|part| part.metadata().ok()).map(|part| part.len()).max()
+}
+
 /// The parts of `path` whose process is gone. None is locked any more, so who calls this may remove or keep them.
 ///
 /// # Errors
@@ -244,7 +255,9 @@ mod tests {
         let part = Part::create(&path).unwrap();
         part.file().write_all(b"one").unwrap();
         assert!(!path.exists());
+        assert_eq!((bytes_so_far(&path), bytes_so_far(&dir.path().join("b.txt"))), (Some(3), None));
         drop(part);
+        assert_eq!(bytes_so_far(&path), None);
         assert_eq!(names(dir.path()), Vec::<String>::new());
 
         write(&path, b"one", false).unwrap();

@@ -87,7 +87,9 @@ fn way(context: Context) -> f32 {
 
 /// What Esc closes, one thing at a time.
 fn step_back(state: &State) -> Option<Action> {
-    if state.help {
+    if state.closing {
+        Some(Action::StayOpen)
+    } else if state.help {
         Some(Action::Help(false))
     } else if state.bare {
         Some(Action::Bare(false))
@@ -223,7 +225,7 @@ pub const GROUPS: [Group; 5] = [
                 &[ctrl(Key::Minus), ctrl(Key::Plus), ctrl(Key::Minus), ctrl(Key::Equals)],
                 "Ctrl+−  Ctrl++",
                 "smaller text, larger text",
-                |state, context| Some(Action::TextScale(state.text_scale * TEXT_STEP.powf(way(context)))),
+                |state, context| Some(Action::TextScale(state.habits.text_scale * TEXT_STEP.powf(way(context)))),
             ),
             once(&[ctrl(Key::Num0)], "Ctrl+0", "text as usual", |_, _| Some(Action::TextScale(1.0))),
             once(&[key(Key::F1), key(Key::Questionmark)], "F1, ?", "these keys", |state, _| {
@@ -241,6 +243,20 @@ pub const GROUPS: [Group; 5] = [
 fn is_for_controls(chord: Chord) -> bool {
     let keys = [Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown, Key::Space, Key::Escape];
     !chord.ctrl && keys.contains(&chord.key)
+}
+
+/// Whether an action may come of a key: under the help and the question, nothing is changed unseen.
+fn is_uncovered(action: &Action, state: &State) -> bool {
+    match action {
+        Action::Close | Action::StayOpen => true,
+        Action::Help(_) | Action::FullScreen(_) | Action::TextScale(_) => !state.closing,
+        _ => !state.help && !state.closing,
+    }
+}
+
+/// Whether the key is a letter, a digit or a sign on its own, which some programs for people who speak press by mistake.
+fn is_single(chord: Chord) -> bool {
+    !chord.ctrl && chord.key.symbol_or_name().len() == 1
 }
 
 /// Whether the key is a letter. Only then do Shift and Alt matter: other signs may need them on some keyboards.
@@ -265,10 +281,13 @@ pub fn action(event: &Event, state: &State, size: (u32, u32), focused: bool) -> 
         Some((binding, chord))
     });
     let (binding, chord) = found?;
+    if !state.habits.single_keys && is_single(binding.chords[chord]) {
+        return None;
+    }
     if focused && is_for_controls(binding.chords[chord]) {
         return None;
     }
-    (binding.make)(state, Context { size, chord })
+    (binding.make)(state, Context { size, chord }).filter(|action| is_uncovered(action, state))
 }
 
 #[cfg(test)]

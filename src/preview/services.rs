@@ -18,6 +18,8 @@ pub struct Opened {
     pub name: String,
     /// Its frames and their depth.
     pub source: Source,
+    /// Whether its depth is used: it has some, and that was not declined.
+    pub has_depth: bool,
     /// Whether it is a camera that a plate can be taken with.
     pub takes_plates: bool,
     /// Lines for the person: what was assumed, what is missing and where to get it.
@@ -70,14 +72,8 @@ pub trait Services: Send {
     /// `bokehcam stream ...` into `outputs`.
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String;
 
-    /// The presets, the person's own last.
-    fn presets(&mut self) -> Vec<Preset>;
-
-    /// Saves a look under a name of the person's.
-    ///
-    /// # Errors
-    /// The settings file cannot be written, or the name cannot be one.
-    fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String>;
+    /// The settings: presets are there.
+    fn settings(&mut self) -> &mut dyn SettingsStore;
 }
 
 /// The settings, wherever they are kept.
@@ -90,6 +86,18 @@ pub trait SettingsStore: Send {
     /// # Errors
     /// The settings file cannot be written, or the name cannot be one.
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String>;
+
+    /// Gives a preset of the person's another name.
+    ///
+    /// # Errors
+    /// As for saving; or there is none, or one of the new name.
+    fn rename_preset(&mut self, name: &str, new: &str) -> Result<(), String>;
+
+    /// Deletes a preset of the person's.
+    ///
+    /// # Errors
+    /// The settings file cannot be written, or has no such preset.
+    fn delete_preset(&mut self, name: &str) -> Result<(), String>;
 
     /// As [`Services::command`].
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String;

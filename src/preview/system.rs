@@ -9,7 +9,7 @@ use super::services::{Opened, Services, SettingsStore, Switch};
 use crate::bokeh::{self, Backend, Bokeh};
 use crate::compute::device::Device;
 use crate::knob::Knob;
-use crate::look::{Effect, Look, presets::Preset};
+use crate::look::{Effect, Look};
 use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
 use crate::source::{self, DepthChoice, DepthFrom, Kind, OneCamera, Options, PlateFile, Source, SourceName};
@@ -20,6 +20,8 @@ const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bo
 /// Shown where a camera gives no depth, so that a portrait never comes.
 const NO_DEPTH: &str = "This camera has no depth, so a band of the picture stays sharp. A plate gives it a portrait (T), and \
                         so does a free network (`bokehcam models`).";
+/// Shown where the command line declines the depth that there is.
+const DECLINED: &str = "This source has depth, and --depth none declines it: leave that out for blur by depth.";
 /// The source that needs no camera.
 const SYNTHETIC: &str = "synthetic";
 
@@ -118,6 +120,11 @@ impl Services for System {
         if source_name.kind() == Kind::Camera && !source.has_depth() {
             notes.push(NO_DEPTH.to_owned());
         }
+        let is_declined = self.options.depth_choice == DepthChoice::None && !with_plate;
+        if is_declined && source.has_depth() {
+            notes.push(DECLINED.to_owned());
+        }
+        let has_depth = source.has_depth() && !is_declined;
         self.turned.clear();
         self.first.get_or_insert_with(|| Choice { name: name.clone(), label: name.clone() });
         self.camera = devices::camera_of(&source_name);
@@ -125,7 +132,7 @@ impl Services for System {
         self.with_plate = with_plate;
         let is_replaceable = matches!(source.depth_from, DepthFrom::Nothing | DepthFrom::Networks | DepthFrom::Plate);
         let takes_plates = self.camera.is_some() && is_replaceable;
-        Ok(Opened { name, source, takes_plates, notes, controls })
+        Ok(Opened { name, source, has_depth, takes_plates, notes, controls })
     }
 
     fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
@@ -174,11 +181,7 @@ impl Services for System {
         self.settings.command(look, source, outputs, &switches)
     }
 
-    fn presets(&mut self) -> Vec<Preset> {
-        self.settings.presets()
-    }
-
-    fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
-        self.settings.save_preset(name, look)
+    fn settings(&mut self) -> &mut dyn SettingsStore {
+        &mut *self.settings
     }
 }

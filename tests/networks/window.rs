@@ -21,6 +21,12 @@ impl SettingsStore for NoStore {
     fn save_preset(&mut self, _: &str, _: &Look) -> Result<(), String> {
         Err("no file".into())
     }
+    fn rename_preset(&mut self, _: &str, _: &str) -> Result<(), String> {
+        Err("no file".into())
+    }
+    fn delete_preset(&mut self, _: &str) -> Result<(), String> {
+        Err("no file".into())
+    }
     fn command(&self, _: &Look, _: &str, _: &[String], _: &[(String, String)]) -> String {
         String::new()
     }

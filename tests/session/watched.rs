@@ -18,7 +18,7 @@ use bokehcam::look::presets::Preset;
 use bokehcam::look::{Look, Patch, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
-use bokehcam::preview::services::{Opened, Services, Switch};
+use bokehcam::preview::services::{Opened, Services, SettingsStore, Switch};
 use bokehcam::preview::session::{Blurred, Session, SessionEvent, Start};
 use bokehcam::preview::state::{Source, Update};
 use bokehcam::sink::{Ending, Sink, SinkError};
@@ -28,6 +28,7 @@ use bokehcam::source::{self, devices::Choice};
 struct Small {
     executors: Arc<AtomicUsize>,
     written: Arc<Mutex<Vec<String>>>,
+    settings: NoSettings,
 }
 
 struct Film(Arc<Mutex<Vec<String>>>, String);
@@ -85,7 +86,8 @@ impl Services for Small {
             source.guide = Some(plate.guide());
             source.depth = Some(Box::new(plate));
         }
-        Ok(Opened { name, source, takes_plates: true, notes, controls })
+        let has_depth = source.has_depth();
+        Ok(Opened { name, source, has_depth, takes_plates: true, notes, controls })
     }
     fn turn(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
         Err("it has no controls".into())
@@ -101,14 +103,32 @@ impl Services for Small {
             Ok(Box::new(Film(Arc::clone(&self.written), name.into())))
         }
     }
-    fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
-        format!("show {source} {outputs:?} {switches:?}")
+    fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        self.settings.command(look, source, outputs, switches)
     }
+    fn settings(&mut self) -> &mut dyn SettingsStore {
+        &mut self.settings
+    }
+}
+
+/// Settings that hold nothing: of presets there is one.
+struct NoSettings;
+
+impl SettingsStore for NoSettings {
     fn presets(&mut self) -> Vec<Preset> {
         vec![Preset { name: "same".into(), patch: Patch::default(), own: false }]
     }
     fn save_preset(&mut self, name: &str, _: &Look) -> Result<(), String> {
         if name.is_empty() { Err("no name".into()) } else { Ok(()) }
+    }
+    fn rename_preset(&mut self, _: &str, _: &str) -> Result<(), String> {
+        Err("none of that name".into())
+    }
+    fn delete_preset(&mut self, _: &str) -> Result<(), String> {
+        Err("none of that name".into())
+    }
+    fn command(&self, _: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
+        format!("show {source} {outputs:?} {switches:?}")
     }
 }
 
@@ -144,7 +164,11 @@ impl Watched {
         let demand = Demand::default();
         let watch = Some(demand.watch());
         let start = Start {
-            services: Box::new(Small { executors: Arc::clone(&executors), written: Arc::clone(&written) }),
+            services: Box::new(Small {
+                executors: Arc::clone(&executors),
+                written: Arc::clone(&written),
+                settings: NoSettings,
+            }),
             look: look(),
             source: source.into(),
             outputs: Vec::new(),

@@ -34,9 +34,18 @@ pub struct Window {
           default_missing_value = "true", value_parser = BoolishValueParser::new(),
           action = clap::ArgAction::Set, hide_possible_values = true)]
     pub panel: bool,
-    /// Size of text and controls, 1 as usual
-    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = within(TEXT_SCALES))]
-    pub text_scale: f32,
+    /// Size of text and controls, 1 as usual [default: as it was last]
+    #[arg(long, value_name = "TIMES", value_parser = within(TEXT_SCALES))]
+    pub text_scale: Option<f32>,
+    /// Let keys without Ctrl do something; --single-keys=false for who speaks to the computer [default: as it was last]
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+          value_parser = BoolishValueParser::new(), hide_possible_values = true)]
+    pub single_keys: Option<bool>,
+    /// Begin with nothing remembered: no look, no source, no sizes of the window before
+    #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
+          default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
+          hide_possible_values = true)]
+    pub fresh: bool,
     /// Where snapshots and recordings go [default: the pictures folder]
     #[arg(long, value_name = "DIR")]
     pub save_to: Option<PathBuf>,

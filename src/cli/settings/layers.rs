@@ -43,6 +43,15 @@ pub struct Given {
     pub settings: Vec<Setting>,
 }
 
+impl Given {
+    /// Whether flags or the environment say anything of the look.
+    #[cfg(feature = "window")]
+    pub fn has_look(&self) -> bool {
+        let of_look = |name: &str| name == "preset" || settings::setting(name).is_some();
+        self.settings.iter().any(|setting| of_look(&setting.name))
+    }
+}
+
 /// The settings of one command line that come from neither flags nor environment.
 #[derive(Debug, Default)]
 pub struct Layers {
@@ -93,7 +102,7 @@ impl Layers {
     /// What the command line gave, for putting together a command that does the same and for warnings.
     pub fn given(&self, matches: &ArgMatches) -> Given {
         /// Never repeated in a command: they are for one run only, or the window states them itself.
-        const NOT_REPEATED: [&str; 10] = [
+        const NOT_REPEATED: [&str; 12] = [
             "preset",
             "report",
             "force",
@@ -104,6 +113,8 @@ impl Layers {
             "instruments",
             "panel",
             "text-scale",
+            "single-keys",
+            "fresh",
         ];
         let is_given = |setting: &Setting| {
             let name = setting.name.as_str();

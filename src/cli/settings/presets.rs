@@ -20,6 +20,50 @@ pub fn save(path: &Path, name: &str, settings: &[Value]) -> Result<(), CliError>
     save::edit(path, |document| with_preset(document, name, settings))
 }
 
+/// Gives the user's preset `name` another name; its place, its settings and their comments stay as they were.
+///
+/// # Errors
+/// There is no such preset in the file, or one of the new name; or as for [`save`].
+pub fn rename(path: &Path, name: &str, new: &str) -> Result<(), CliError> {
+    check_name(new).map_err(CliError::Usage)?;
+    change_own(path, name, |presets| {
+        if presets.contains_key(new) {
+            return Err(CliError::Usage(format!("there is a preset '{new}' already: choose another name")));
+        }
+        presets.insert(new, presets.get(name).cloned().unwrap_or_default());
+        presets.remove(name);
+        Ok(())
+    })
+}
+
+/// Deletes the user's preset `name`.
+///
+/// # Errors
+/// There is no such preset in the file; or as for [`save`].
+pub fn delete(path: &Path, name: &str) -> Result<(), CliError> {
+    change_own(path, name, |presets| {
+        presets.remove(name);
+        Ok(())
+    })
+}
+
+/// Changes the table of presets of a file that has the preset `name`.
+fn change_own(
+    path: &Path,
+    name: &str,
+    change: impl FnOnce(&mut dyn TableLike) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    let mut changed = Ok(());
+    save::edit(path, |document| {
+        changed = match document.get_mut(PRESETS).and_then(Item::as_table_like_mut) {
+            Some(presets) if presets.contains_key(name) => change(presets),
+            _ => Err(CliError::Usage(format!("{}: there is no preset '{name}' in it", path.display()))),
+        };
+        Some(())
+    })
+    .and(changed)
+}
+
 /// Sets the preset `name` to exactly `settings`. `None` where `presets` or the preset exists and is no table.
 fn with_preset(document: &mut DocumentMut, name: &str, settings: &[Value]) -> Option<()> {
     let mut new_presets = Table::new();
@@ -117,6 +161,28 @@ mod tests {
         let settings = &parsed(&again).presets["old"];
         assert_eq!(settings.iter().map(|(k, v)| format!("{k}={v}")).collect::<Vec<_>>(), ["aperture=heart", "rim=0.5"]);
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1, "no leftovers");
+    }
+
+    #[test]
+    fn a_preset_is_renamed_or_deleted_and_all_else_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.toml");
+        let text = "# mine\nrim = 0.9\n\n[presets.old] # dear\n# soft\nrim = 0.8 # so\n\n[presets.z]\nrim = 0\n";
+        fs::write(&path, text).unwrap();
+        rename(&path, "old", "evening").unwrap();
+        let renamed = fs::read_to_string(&path).unwrap();
+        assert_eq!(renamed.matches("evening").count(), 1, "{renamed}");
+        assert!(renamed.contains("# soft\nrim = 0.8 # so\n") && !renamed.contains("old"), "{renamed}");
+        for (from, to, said) in
+            [("old", "new", "no preset 'old'"), ("z", "evening", "already"), ("z", "dreamy", "built in")]
+        {
+            let refused = rename(&path, from, to).unwrap_err().to_string();
+            assert!(refused.contains(said), "{refused}");
+        }
+        assert!(delete(&path, "dreamy").unwrap_err().to_string().contains("no preset 'dreamy'"));
+        assert_eq!(fs::read_to_string(&path).unwrap(), renamed);
+        delete(&path, "evening").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "# mine\nrim = 0.9\n\n[presets.z]\nrim = 0\n");
     }
 
     #[test]

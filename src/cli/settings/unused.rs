@@ -90,9 +90,10 @@ const NEEDS: [(&[&str], Why); 17] = [
         true => blur(run),
         false => Some("frames do not come in real time: add --pace realtime"),
     }),
-    (&["show", "split", "full-screen", "instruments", "panel", "text-scale", "save-to"], |run| {
-        (!run.window).then_some("there is no window")
-    }),
+    (
+        &["show", "split", "full-screen", "instruments", "panel", "text-scale", "single-keys", "fresh", "save-to"],
+        |run| (!run.window).then_some("there is no window"),
+    ),
 ];
 
 const NO_DEPTH: &str = "there is no depth";

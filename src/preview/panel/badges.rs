@@ -26,10 +26,15 @@ impl Badges {
             *since_s = is_on.then(|| since_s.unwrap_or(now_s));
             since_s.map(|since_s| format!("{name} {}", elapsed(now_s - since_s)))
         };
+        let recording = text("Recording", state.recording().is_some(), &mut self.recording_s);
+        let sized = |text| match state.recorded_bytes {
+            Some(bytes) => format!("{text}, {}", size(bytes)),
+            None => text,
+        };
         let all = [
-            (text("Recording", state.recording().is_some(), &mut self.recording_s), LIVE),
+            (recording.map(sized), LIVE),
             (text("Virtual camera", state.virtual_camera().is_some(), &mut self.camera_s), LIVE),
-            (state.frozen.then(|| "Frozen".to_owned()), ON_PICTURE),
+            (frozen(state).map(str::to_owned), ON_PICTURE),
         ];
         if self.recording_s.or(self.camera_s).is_some() {
             ctx.request_repaint_after(Duration::from_secs(1));
@@ -45,6 +50,23 @@ impl Badges {
             painter.galley(rect.left_center() + vec2(23.0, -galley.size().y / 2.0), galley, ON_PICTURE);
             corner.y += HEIGHT + 6.0;
         }
+    }
+}
+
+/// That the picture stays, and what does not.
+fn frozen(state: &State) -> Option<&'static str> {
+    state.frozen.then_some(if state.outputs.is_empty() { "Frozen" } else { "Frozen here, live outside" })
+}
+
+/// A size as one says it.
+fn size(bytes: u64) -> String {
+    let (kb, mb) = (bytes as f64 / 1e3, bytes as f64 / 1e6);
+    if mb >= 1e3 {
+        format!("{:.2} GB", mb / 1e3)
+    } else if mb >= 1.0 {
+        format!("{mb:.1} MB")
+    } else {
+        format!("{kb:.0} kB")
     }
 }
 

@@ -1,10 +1,11 @@
 //! The help on keys and gestures.
 
-use egui::{Align2, Area, Color32, Context, Grid, Id, Key, Label, Order, RichText, ScrollArea, Sense, Ui, vec2};
+use egui::{Context, Grid, Id, Key, Label, Modal, RichText, ScrollArea, Ui, vec2};
 
 use super::icons::{self, Icon};
-use super::keys::GROUPS;
-use super::state::Action;
+use super::keys::{GROUPS, Group};
+use super::parts::switch;
+use super::state::{Action, State};
 use super::theme::{Colors, GAP, PAD, card, medium};
 
 const GESTURES: [(&str, &str); 6] = [
@@ -16,55 +17,66 @@ const GESTURES: [(&str, &str); 6] = [
     ("Tab", "from control to control; Space and the arrow keys change it"),
 ];
 
-/// Draws the help over everything, in two columns where the window is wide. Enter or a click beside it closes it.
-pub fn show(ctx: &Context, actions: &mut Vec<Action>) {
+/// Points that an arrow key scrolls.
+const LINE: f32 = 40.0;
+
+/// Draws the help over everything, in two columns where the window is wide. Enter or a click beside it closes it; the arrow
+/// and page keys scroll it.
+pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     let window = ctx.content_rect();
-    let dim = ctx.layer_painter(egui::LayerId::new(Order::Middle, Id::unique("dim")));
-    dim.rect_filled(window, egui::CornerRadius::ZERO, Color32::from_black_alpha(120));
-    let area = Area::new(Id::unique("help")).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).order(Order::Foreground);
     let columns = if window.width() > 720.0 { 2 } else { 1 };
     let width = if columns == 2 { 660.0 } else { (window.width() - 2.0 * (GAP + PAD)).clamp(60.0, 340.0) };
-    let drawn = area.fade_in(false).sense(Sense::click()).show(ctx, |ui| {
-        let colors = Colors::here(ui);
-        ui.set_max_height((window.height() - 2.0 * GAP).max(1.0));
-        card(&colors).show(ui, |ui| {
-            ui.set_width(width);
-            ui.horizontal(|ui| {
-                ui.heading("Keys and gestures");
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    if icons::button(ui, Icon::Close, "Close (Esc)", true) {
-                        actions.push(Action::Help(false));
-                    }
-                });
-            });
-            let height = (window.height() - 2.0 * (GAP + PAD) - 40.0).max(20.0);
-            ScrollArea::vertical().max_height(height).show(ui, |ui| {
-                if columns == 2 {
-                    ui.columns_const(|[left, right]| {
-                        GROUPS[..3].iter().for_each(|group| {
-                            table(left, group.name, group.bindings.iter().map(|key| (key.keys, key.does)))
-                        });
-                        GROUPS[3..].iter().for_each(|group| {
-                            table(right, group.name, group.bindings.iter().map(|key| (key.keys, key.does)))
-                        });
-                        table(right, "On the picture", GESTURES.into_iter());
-                    });
-                } else {
-                    for group in &GROUPS {
-                        table(ui, group.name, group.bindings.iter().map(|key| (key.keys, key.does)));
-                    }
-                    table(ui, "On the picture", GESTURES.into_iter());
+    let frame = card(&Colors::of(ctx.theme()));
+    let drawn = Modal::new(Id::unique("help")).frame(frame).show(ctx, |ui| {
+        ui.set_width(width);
+        ui.horizontal(|ui| {
+            ui.heading("Keys and gestures");
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if icons::button(ui, Icon::Close, "Close (Esc)", true) {
+                    actions.push(Action::Help(false));
                 }
             });
         });
+        let hint = "Off, letters, digits and signs do nothing: for who speaks to the computer";
+        if switch(ui, "Single keys", hint, state.habits.single_keys) {
+            actions.push(Action::SingleKeys(!state.habits.single_keys));
+        }
+        let height = (window.height() - 2.0 * (GAP + PAD) - 70.0).max(20.0);
+        ScrollArea::vertical().max_height(height).show(ui, |ui| {
+            ui.scroll_with_delta(vec2(0.0, scrolled(ui, height)));
+            let gestures = |ui: &mut Ui| table(ui, "On the picture", GESTURES.into_iter());
+            if columns == 2 {
+                ui.columns_const(|[left, right]| {
+                    GROUPS[..3].iter().for_each(|group| keys(left, group));
+                    GROUPS[3..].iter().for_each(|group| keys(right, group));
+                    gestures(right);
+                });
+            } else {
+                GROUPS.iter().for_each(|group| keys(ui, group));
+                gestures(ui);
+            }
+        });
     });
-    let clicked_outside = ctx.input(|input| {
-        let at = input.pointer.interact_pos().filter(|_| input.pointer.primary_clicked());
-        at.is_some_and(|at| !drawn.response.rect.contains(at))
-    });
-    if clicked_outside || ctx.input(|input| input.key_pressed(Key::Enter)) {
+    if drawn.backdrop_response.clicked() || ctx.input(|input| input.key_pressed(Key::Enter)) {
         actions.push(Action::Help(false));
     }
+}
+
+/// How far the keys that were pressed scroll, in points: a page is `height`.
+fn scrolled(ui: &Ui, height: f32) -> f32 {
+    let steps = [
+        (Key::ArrowUp, LINE),
+        (Key::ArrowDown, -LINE),
+        (Key::PageUp, height),
+        (Key::PageDown, -height),
+        (Key::Home, f32::MAX),
+        (Key::End, f32::MIN),
+    ];
+    ui.input(|input| steps.iter().filter(|(key, _)| input.key_pressed(*key)).map(|(_, by)| by).sum())
+}
+
+fn keys(ui: &mut Ui, group: &Group) {
+    table(ui, group.name, group.bindings.iter().map(|binding| (binding.keys, binding.does)));
 }
 
 /// A titled table of keys or gestures and what they do.

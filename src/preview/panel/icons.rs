@@ -8,7 +8,6 @@ use egui::{
 use egui::{Role, vec2};
 
 use super::theme::Colors;
-use super::theme::focus_ring;
 
 /// Side of an icon button, in points.
 pub const SIDE: f32 = 26.0;
@@ -24,6 +23,8 @@ pub enum Icon {
     Reset,
     Help,
     Close,
+    /// Sliders.
+    Panel,
 }
 
 /// Draws an icon button. Whether it was clicked.
@@ -37,7 +38,6 @@ pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     }
     let color = if enabled { colors.text } else { colors.weak.gamma_multiply(0.45) };
     draw(ui.painter(), icon, rect.center(), color);
-    focus_ring(ui, &response, rect.shrink(2.0));
     response.on_hover_text(hint).clicked()
 }
 
@@ -57,6 +57,12 @@ fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
             let foot = at + vec2(0.0, 2.0);
             painter.add(Shape::line(vec![at + vec2(2.3, -0.8), at + vec2(0.2, 0.7), foot], stroke));
             painter.circle_filled(at + vec2(0.0, 5.6), 1.2, color);
+        }
+        Icon::Panel => {
+            for (y, knob) in [(-5.0, 2.5), (0.0, -3.0), (5.0, 1.0)] {
+                painter.line_segment([at + vec2(-7.0, y), at + vec2(7.0, y)], stroke);
+                painter.circle_filled(at + vec2(knob, y), 2.4, color);
+            }
         }
         Icon::Close => {
             for down in [-1.0, 1.0] {

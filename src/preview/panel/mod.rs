@@ -2,6 +2,7 @@
 
 mod badges;
 mod canvas;
+mod closing;
 mod help;
 mod icons;
 mod instruments;
@@ -21,7 +22,7 @@ pub use theme::install as dress;
 
 use std::time::Duration;
 
-use egui::{Event, Ui};
+use egui::{Context, Event, Id, Ui};
 
 use super::present::Area;
 use super::state::{Action, State};
@@ -48,6 +49,9 @@ pub struct Panel {
     instruments: instruments::Cache,
     notes: notes::Ages,
     badges: badges::Badges,
+    /// What had the focus before something covered the window, and whether something does.
+    focused: Option<Id>,
+    covered: bool,
     /// Whether a control had the focus or a list was open at the end of the last pass.
     was_in_hand: bool,
 }
@@ -70,20 +74,24 @@ impl Panel {
             self.active_s = ctx.input(|input| input.time);
         }
         // A new scale holds from the next pass on.
-        if (ctx.zoom_factor() - state.text_scale).abs() > 1e-3 {
-            ctx.set_zoom_factor(state.text_scale);
+        if (ctx.zoom_factor() - state.habits.text_scale).abs() > 1e-3 {
+            ctx.set_zoom_factor(state.habits.text_scale);
         }
         let first = actions.len();
         let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };
         self.read_keys(ui, state, size, actions);
-        let awake = self.is_awake(ui);
-        if let Some(place) = Place::new(canvas, ctx.pixels_per_point(), state.mirror) {
+        let place = Place::new(canvas, ctx.pixels_per_point(), state.mirror);
+        let awake = self.is_awake(ui, place.is_none());
+        if let Some(place) = place {
             self.gestures.show(ui, state, place, actions);
         }
         if !state.bare {
             legend::show(ui, state);
             let shown = state.panel && (awake || self.sheet.is_in_use(&ctx));
             self.sheet.show(&ctx, state, shown, size, actions);
+            if awake && !state.panel {
+                sheet::way_back(&ctx, actions);
+            }
             if state.instruments {
                 self.instruments.show(&ctx, state);
             }
@@ -92,11 +100,24 @@ impl Panel {
         self.badges.show(&ctx, state, panel);
         plate::show(&ctx, state, actions);
         self.notes.show(&ctx, state, actions);
+        closing::show(&ctx, state, actions);
         if state.help {
-            help::show(&ctx, actions);
+            help::show(&ctx, state, actions);
         }
+        self.give_back_focus(&ctx, state.help || state.closing);
+        theme::focus_ring(&ctx);
+        actions.extend(parts::take_said(&ctx).map(Action::Note));
         self.was_in_hand = ctx.memory(|memory| memory.focused().is_some()) || egui::Popup::is_any_open(&ctx);
         self.settle(ui, &actions[first..]).into_iter().for_each(|settle| actions.push(settle));
+    }
+
+    /// Gives the focus back to what had it, once nothing covers the window any more.
+    fn give_back_focus(&mut self, ctx: &Context, covered: bool) {
+        match (std::mem::replace(&mut self.covered, covered), covered) {
+            (true, false) => self.focused.into_iter().for_each(|id| ctx.memory_mut(|memory| memory.request_focus(id))),
+            (false, false) => self.focused = ctx.memory(|memory| memory.focused()),
+            (_, true) => {}
+        }
     }
 
     /// Adds the actions of the keys that were pressed, unless text is being typed.
@@ -113,8 +134,8 @@ impl Panel {
         });
     }
 
-    /// Whether pointer or keyboard were used a short while ago.
-    fn is_awake(&mut self, ui: &Ui) -> bool {
+    /// Whether pointer or keyboard were used a short while ago, or the person `waits` for the first picture.
+    fn is_awake(&mut self, ui: &Ui, waits: bool) -> bool {
         let (now_s, active) = ui.input(|input| {
             let is_use = |event: &Event| {
                 let is_other = matches!(event, Event::PointerGone | Event::WindowFocused(_) | Event::MouseMoved(_));
@@ -122,7 +143,8 @@ impl Panel {
             };
             (input.time, input.events.iter().any(is_use) || input.pointer.any_down())
         });
-        if active {
+        // Its first seconds count from the first picture.
+        if active || waits {
             self.active_s = now_s;
         }
         let left_s = self.active_s + HIDES_AFTER_S - now_s;

@@ -3,11 +3,11 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, CornerRadius, DragValue, FontId, Layout, Rect, RichText, Role, Sense, Slider, SliderClamping,
-    Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+    Align, Align2, Context, CornerRadius, DragValue, FontId, Id, Layout, Rect, RichText, Role, Sense, Slider,
+    SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
 };
 
-use super::theme::{Colors, ROW, focus_ring, medium};
+use super::theme::{Colors, ROW, medium};
 
 /// A control for a number.
 pub struct Number<'a> {
@@ -41,9 +41,23 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
                 // What was chosen elsewhere may lie outside; it stays until somebody moves it.
                 let mut typed = *value;
                 let drag = DragValue::new(&mut typed).range(range.clone()).clamp_existing_to_range(false);
-                let drag = drag.speed(per_point).max_decimals(digits).min_decimals(digits).prefix(before).suffix(after);
+                let drag = drag
+                    .speed(per_point)
+                    .update_while_editing(false)
+                    .max_decimals(digits)
+                    .min_decimals(digits)
+                    .prefix(before)
+                    .suffix(after);
                 // Many write 1,5.
-                let drag = drag.custom_parser(|text| text.trim().replace(',', ".").parse().ok());
+                let (ctx, shown) = (ui.ctx().clone(), f64::from(*value));
+                let drag = drag.custom_parser(|text| {
+                    let number: f64 = text.trim().replace(',', ".").parse().ok()?;
+                    // On its way through the panel, Tab leaves behind what was there.
+                    if (number - shown).abs() > 0.1f64.powi(digits as i32) {
+                        say_range(&ctx, (label, before, after), digits, &range, number);
+                    }
+                    Some(number)
+                });
                 let is_other = ui.add(drag).labelled_by(name.id).on_hover_text(hint).changed();
                 // The keyboard's way through the panel leaves behind the number as it is shown, rounded.
                 if is_other && (typed - *value).abs() > 0.501 * 0.1f32.powi(digits as i32) {
@@ -60,7 +74,6 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
         let slider = Slider::new(&mut slid, range).clamping(SliderClamping::Edits).show_value(false);
         let slider =
             ui.add(slider.logarithmic(ratios).smallest_positive(least)).labelled_by(name.inner.id).on_hover_text(hint);
-        focus_ring(ui, &slider, slider.rect.shrink2(Vec2::new(0.0, 1.0)));
         if slider.changed() {
             // A digit more than is shown.
             let steps = 10f32.powi(digits as i32 + 1);
@@ -68,6 +81,37 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
         }
     });
     changed
+}
+
+/// Where a line for the person waits for the end of the pass.
+fn said() -> Id {
+    Id::unique("said by a control")
+}
+
+/// Says what becomes of a number that was typed, if it cannot be.
+fn say_range(
+    ctx: &Context,
+    (label, before, after): (&str, &str, &str),
+    digits: usize,
+    range: &RangeInclusive<f32>,
+    number: f64,
+) {
+    // As it is shown: half a step beyond is the end itself.
+    let half = 0.5 * 0.1f64.powi(digits as i32);
+    let (least, most) = (f64::from(*range.start()), f64::from(*range.end()));
+    if number < least - half || number > most + half {
+        let taken = if number < least { least } else { most };
+        let line = format!(
+            "{label} goes from {before}{least:.digits$}{after} to {before}{most:.digits$}{after}: {before}{taken:.digits$}\
+             {after} was taken."
+        );
+        ctx.data_mut(|data| data.insert_temp(said(), line));
+    }
+}
+
+/// The line that a control had for the person in this pass.
+pub fn take_said(ctx: &Context) -> Option<String> {
+    ctx.data_mut(|data| data.remove_temp(said()))
 }
 
 /// Draws options side by side, each with a name and a hint; `can` says which may be chosen. The one that was clicked.
@@ -103,7 +147,6 @@ pub fn choose(
             }
             colors.text
         };
-        focus_ring(ui, &response, inner);
         let family = if is_chosen { medium() } else { egui::FontFamily::Proportional };
         let font = FontId::new(12.5, family);
         ui.painter().with_clip_rect(cell).text(inner.center(), Align2::CENTER_CENTER, name, font, text);
@@ -132,7 +175,6 @@ pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     painter.circle_filled(pos2(x, track.center().y), 6.5, if on { colors.on_accent } else { colors.weak });
     let font = TextStyle::Body.resolve(ui.style());
     painter.text(rect.left_center(), Align2::LEFT_CENTER, label, font, ui.visuals().text_color());
-    focus_ring(ui, &response, track);
     response.on_hover_text(hint).clicked()
 }
 
@@ -142,19 +184,25 @@ pub fn remark(ui: &mut Ui, text: &str) {
     ui.label(RichText::new(text).text_style(TextStyle::Small).color(colors.weak));
 }
 
-/// Draws a part of the panel that can be folded, `open` at first. What `body` gave, unless it is folded.
-pub fn section<R>(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui) -> R) -> Option<R> {
+/// A path, of which the end says which file it is: a long one is cut at its beginning.
+pub fn path(ui: &mut Ui, path: &str) {
+    const MOST: usize = 38;
+    let over = path.chars().count().saturating_sub(MOST);
+    let cut = path.chars().skip(over + 1).collect::<String>();
+    ui.scope(|ui| remark(ui, &if over == 0 { path.to_owned() } else { format!("…{cut}") }))
+        .response
+        .on_hover_text(path);
+}
+
+/// Draws a part of the panel, unless it is folded. Whether its title was clicked.
+pub fn section(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui)) -> bool {
     let colors = Colors::here(ui);
     ui.add_space(4.0);
     let title = RichText::new(name).family(medium()).size(13.5).color(colors.text);
-    let folded = egui::CollapsingHeader::new(title)
-        .id_salt(name)
-        .default_open(open)
-        .icon(super::icons::chevron)
-        .show_unindented(ui, |ui| {
-            ui.add_space(2.0);
-            body(ui)
-        });
-    focus_ring(ui, &folded.header_response, folded.header_response.rect.shrink(3.0));
-    folded.body_returned
+    let header = egui::CollapsingHeader::new(title).id_salt(name).open(Some(open)).icon(super::icons::chevron);
+    let folded = header.show_unindented(ui, |ui| {
+        ui.add_space(2.0);
+        body(ui);
+    });
+    folded.header_response.clicked()
 }

@@ -76,7 +76,7 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
 }
 
 /// A card no wider than the window.
-fn framed(ui: &mut Ui, content: impl FnOnce(&mut Ui, &Colors)) {
+pub fn framed(ui: &mut Ui, content: impl FnOnce(&mut Ui, &Colors)) {
     let colors = Colors::here(ui);
     ui.set_max_width((ui.ctx().content_rect().width() - 2.0 * GAP).clamp(60.0, WIDTH));
     card(&colors).inner_margin(egui::Margin::symmetric(18, 14)).show(ui, |ui| content(ui, &colors));

@@ -1,16 +1,16 @@
 //! The panel itself: a sheet at the right side, over the picture, that slides away.
 
-use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, pos2};
+use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, pos2, vec2};
 
 use super::icons::{self, Icon};
-use super::sections::{self, Saving, Sheet, Thumbs};
+use super::sections::{self, Editing, Sheet, Thumbs};
 use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD, WIDTH};
 
 /// What the panel remembers.
 #[derive(Default)]
 pub struct Memory {
-    saving: Saving,
+    editing: Editing,
     thumbs: Thumbs,
     /// Where the panel was drawn last; `None` while it is closed.
     rect: Option<Rect>,
@@ -85,13 +85,25 @@ impl Memory {
         ui.set_width(ui.available_width() - 4.0);
         ui.spacing_mut().combo_width = ui.available_width();
         let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, size, actions };
-        sections::show(ui, &mut sheet, &mut self.saving, &mut self.thumbs);
+        sections::show(ui, &mut sheet, &mut self.editing, &mut self.thumbs);
         self.follow_focus(ui);
         let Sheet { look, stroke, .. } = sheet;
         if stroke.is_some() && look != state.look {
             actions.push(Action::Look { look: Box::new(look), stroke });
         }
     }
+}
+
+/// Draws a button that brings the panel back, where it was.
+pub fn way_back(ctx: &Context, actions: &mut Vec<Action>) {
+    let corner = ctx.content_rect().right_top() + vec2(-GAP - icons::SIDE - 6.0, GAP);
+    Area::new(id().with("way back")).fixed_pos(corner).order(Order::Middle).fade_in(false).show(ctx, |ui| {
+        theme::card(&Colors::here(ui)).inner_margin(3.0).show(ui, |ui| {
+            if icons::button(ui, Icon::Panel, "Show the panel (P)", true) {
+                actions.push(Action::Panel(true));
+            }
+        });
+    });
 }
 
 /// Seconds between updates of the focus distance, which changes without any input.

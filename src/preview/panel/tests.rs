@@ -1,10 +1,13 @@
 //! The panel without a display: real input events in, actions and shapes out.
 
+mod covers;
 mod gestures;
 mod keyboard;
 mod looks;
 mod paint;
 mod plate;
+mod presets;
+mod sections;
 mod sizes;
 
 use egui::{Event, FullOutput, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2, pos2};

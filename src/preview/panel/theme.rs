@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use egui::style::{HandleShape, ScrollStyle, Selection, WidgetVisuals};
 use egui::{
-    Color32, Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Rect, Response, Shadow,
-    Stroke, StrokeKind, Style, TextStyle, Theme, Ui, Vec2, Visuals,
+    Color32, Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Shadow, Stroke, StrokeKind,
+    Style, TextStyle, Theme, Vec2, Visuals,
 };
 
 use crate::budget::Quality;
@@ -170,12 +170,10 @@ fn visuals(theme: Theme, colors: &Colors) -> Visuals {
         fg_stroke: Stroke::new(1.0, text),
         expansion: 0.0,
     };
-    let focus = Stroke::new(2.0, colors.accent);
     visuals.widgets.noninteractive = widget(colors.card, Stroke::new(1.0, colors.line), colors.text);
     visuals.widgets.inactive = widget(colors.field, Stroke::NONE, colors.text);
     visuals.widgets.hovered = widget(colors.hover, Stroke::NONE, colors.text);
-    // A control in focus is drawn as an active one: it must be seen.
-    visuals.widgets.active = widget(colors.hover, focus, colors.text);
+    visuals.widgets.active = widget(colors.hover, Stroke::NONE, colors.text);
     visuals.widgets.open = widget(colors.hover, Stroke::NONE, colors.text);
     visuals.selection = Selection { bg_fill: colors.accent, stroke: Stroke::new(1.0, colors.on_accent) };
     visuals.weak_text_color = Some(colors.weak);
@@ -212,11 +210,18 @@ pub fn card(colors: &Colors) -> egui::Frame {
         .inner_margin(Margin::same(PAD as i8))
 }
 
-/// Draws a ring around `rect`, if the control has the keyboard focus.
-pub fn focus_ring(ui: &Ui, response: &Response, rect: Rect) {
-    if response.has_focus() {
-        let colors = Colors::here(ui);
-        let outside = StrokeKind::Outside;
-        ui.painter().rect_stroke(rect.expand(1.0), CornerRadius::same(7), Stroke::new(2.0, colors.text), outside);
+/// Draws a ring around the control that has the keyboard focus, as far as it is in sight.
+pub fn focus_ring(ctx: &Context) {
+    let focused = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id));
+    if let Some(response) = focused.filter(|response| response.sense.interactive()) {
+        let colors = Colors::of(ctx.theme());
+        let seen = response.interact_rect.expand(3.0);
+        let painter = ctx.layer_painter(response.layer_id).with_clip_rect(seen);
+        painter.rect_stroke(
+            response.rect.expand(1.0),
+            CornerRadius::same(8),
+            Stroke::new(2.0, colors.text),
+            StrokeKind::Outside,
+        );
     }
 }

@@ -5,9 +5,11 @@ mod looks;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
+use std::time::Duration;
 
 use super::live::{self, Live};
 use super::{Closed, News, Order, SessionEvent, Start, held};
+use crate::files::whole;
 use crate::link::demand::{Demand, Watch};
 use crate::look::Look;
 use crate::pipeline::{PipelineError, Wanted};
@@ -51,6 +53,8 @@ pub(super) struct Host {
 /// A recording without a name of its own is called this, around a number.
 const RECORDING: &str = "bokehcam-";
 const VIDEO: &str = ".mp4";
+/// The size of a recording is told this often.
+const SIZE_PERIOD: Duration = Duration::from_secs(1);
 
 impl Host {
     /// A session that has not started yet; `orders` sends orders to itself.
@@ -85,8 +89,13 @@ impl Host {
         self.tell_choices();
         self.recover();
         self.open();
-        while let Ok(order) = inbox.recv() {
-            let mut next = Some(order);
+        loop {
+            let mut next = match inbox.recv_timeout(SIZE_PERIOD) {
+                Ok(order) => Some(order),
+                Err(mpsc::RecvTimeoutError::Timeout) => None,
+                Err(mpsc::RecvTimeoutError::Disconnected) => return self.close(inbox),
+            };
+            self.tell_size();
             while let Some(order) = next.take() {
                 match order {
                     // Of several looks in the queue only the last counts; the order after them comes next.
@@ -112,7 +121,13 @@ impl Host {
                 }
             }
         }
-        self.close(inbox)
+    }
+
+    /// Tells how large the recording is by now.
+    fn tell_size(&self) {
+        let recording = self.outputs.iter().find(|output| !output.is_camera);
+        let bytes = recording.and_then(|output| whole::bytes_so_far(output.name.as_ref()));
+        bytes.into_iter().for_each(|bytes| self.news.tell(Update::Recorded(bytes)));
     }
 
     /// Ends the run, and hears what became of its outputs.
@@ -168,13 +183,18 @@ impl Host {
                 Err(line) => self.news.note(line),
             },
             Request::Refresh => self.tell_choices(),
-            Request::SavePreset(name, look) => match self.services.save_preset(&name, &look) {
-                Ok(()) => {
-                    self.news.note(format!("saved as preset '{name}'"));
-                    self.news.tell(Update::Presets(self.services.presets()));
-                }
-                Err(line) => self.news.note(line),
-            },
+            Request::SavePreset(name, look) => {
+                let saved = self.services.settings().save_preset(&name, &look);
+                self.tell_presets(saved, &format!("Saved as preset '{name}'"));
+            }
+            Request::RenamePreset(name, new) => {
+                let renamed = self.services.settings().rename_preset(&name, &new);
+                self.tell_presets(renamed, &format!("Preset '{name}' is called '{new}' now"));
+            }
+            Request::DeletePreset(name) => {
+                let deleted = self.services.settings().delete_preset(&name);
+                self.tell_presets(deleted, &format!("Preset '{name}' is deleted"));
+            }
             // These are the window's own, or come another way.
             Request::Look(_) | Request::Snapshot | Request::CopyCommand | Request::FullScreen(_) | Request::Close => {}
         }
@@ -184,7 +204,13 @@ impl Host {
         let sources = self.services.sources();
         let virtual_cameras = self.services.virtual_cameras();
         self.news.tell(Update::Choices { sources, virtual_cameras });
-        self.news.tell(Update::Presets(self.services.presets()));
+        self.news.tell(Update::Presets(self.services.settings().presets()));
+    }
+
+    /// Tells what became of a change of the presets, and which there are now.
+    fn tell_presets(&mut self, changed: Result<(), String>, done: &str) {
+        self.news.note(changed.map_or_else(|line| line, |()| done.to_owned()));
+        self.news.tell(Update::Presets(self.services.settings().presets()));
     }
 
     fn tell_outputs(&mut self) {

@@ -60,8 +60,8 @@ impl Live {
         wrote: impl Fn(Notice) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
     ) -> Result<(Self, Source), String> {
-        let Opened { name, source, takes_plates, .. } = opened;
-        let (has_depth, measured) = (source.has_depth(), source.is_measured());
+        let Opened { name, source, has_depth, takes_plates, .. } = opened;
+        let measured = source.is_measured();
         let crate::source::Source { camera, depth, guide, .. } = source;
         let info = camera.info();
         let look = settings.look.for_source(has_depth);

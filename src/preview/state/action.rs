@@ -26,6 +26,10 @@ pub enum Action {
     Preset(String),
     /// Saves the look as a preset.
     SavePreset(String),
+    /// Gives a preset of the person's another name.
+    RenamePreset(String, String),
+    /// Deletes a preset of the person's.
+    DeletePreset(String),
     /// Shows something else of the frames.
     Show(Shown),
     /// Shows what was before the blur left of this fraction, or nowhere.
@@ -46,6 +50,14 @@ pub enum Action {
     FullScreen(bool),
     /// Text and controls of this size, 1 as usual.
     TextScale(f32),
+    /// Keys without Ctrl do something, or nothing.
+    SingleKeys(bool),
+    /// Closing asks first while something is recorded, or never.
+    AskBeforeClosing(bool),
+    /// Opens or folds a section of the panel.
+    Section(&'static str, bool),
+    /// Tells the person something.
+    Note(String),
     /// Saves what is shown, and what is needed to make it again.
     Snapshot,
     /// Begins a recording (video), or ends it.
@@ -65,7 +77,10 @@ pub enum Action {
     Refresh,
     /// Puts the equivalent command on the clipboard.
     CopyCommand,
+    /// Closes the window, or asks first.
     Close,
+    /// Does not close it after all.
+    StayOpen,
     /// What went wrong is known.
     Dismiss,
 }
@@ -76,6 +91,8 @@ pub enum Request {
     Look(Box<Look>),
     /// Save it under this name.
     SavePreset(String, Box<Look>),
+    RenamePreset(String, String),
+    DeletePreset(String),
     /// Save the frame that is shown.
     Snapshot,
     /// Begin to write to an output. A recording without a name is to be given one.
@@ -108,6 +125,8 @@ pub enum Update {
     Controls(Vec<Knob>),
     /// The outputs that are written to now: after each that was begun or ended, also where that failed.
     Outputs(Vec<Output>),
+    /// Bytes of the recording so far.
+    Recorded(u64),
     /// A line for the person.
     Note(String),
     /// A line that stays until it was read: an output failed.

@@ -1,6 +1,6 @@
 //! How actions change the state.
 
-use super::{Action, Output, Request, Shown, Source, State, TEXT_SCALES};
+use super::{Action, Output, Request, Shown, Source, State};
 use crate::look::{Effect, Look, Strength};
 
 /// Shown when a look or a view needs depth and there is none: what to do.
@@ -37,6 +37,8 @@ impl State {
                 "" => self.note("A preset needs a name."),
                 name => return vec![Request::SavePreset(name.to_owned(), Box::new(self.look.clone()))],
             },
+            Action::RenamePreset(name, new) => return vec![Request::RenamePreset(name, new)],
+            Action::DeletePreset(name) => return vec![Request::DeletePreset(name)],
             Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(NO_DEPTH),
             Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(NOT_FOLLOWED),
             Action::Show(shown) => self.shown = shown,
@@ -47,10 +49,11 @@ impl State {
             Action::Instruments(on) => self.instruments = on,
             Action::Bare(on) => self.bare = on,
             Action::Help(on) => self.help = on,
-            Action::TextScale(scale) if scale.is_finite() => {
-                self.text_scale = scale.clamp(*TEXT_SCALES.start(), *TEXT_SCALES.end());
-            }
-            Action::TextScale(_) => {}
+            Action::TextScale(scale) => self.habits.set_text_scale(scale),
+            Action::SingleKeys(on) => self.habits.single_keys = on,
+            Action::AskBeforeClosing(on) => self.habits.ask_before_closing = on,
+            Action::Section(name, open) => drop(self.habits.sections.insert(name.to_owned(), open)),
+            Action::Note(line) => self.note(line),
             Action::FullScreen(on) => {
                 self.full_screen = on;
                 return vec![Request::FullScreen(on)];
@@ -69,10 +72,18 @@ impl State {
             Action::DeclinePlate => self.declined_plate = true,
             Action::Refresh => return vec![Request::Refresh],
             Action::CopyCommand => return vec![Request::CopyCommand],
-            Action::Close => return vec![Request::Close],
+            Action::Close => return self.close(),
+            Action::StayOpen => self.closing = false,
             Action::Dismiss => self.trouble = None,
         }
         Vec::new()
+    }
+
+    /// Closes the window; asks first, but only once, where something is recorded.
+    fn close(&mut self) -> Vec<Request> {
+        let asks = self.habits.ask_before_closing && self.recording().is_some() && !self.closing;
+        self.closing = asks;
+        if asks { Vec::new() } else { vec![Request::Close] }
     }
 
     /// Keeps the picture, and says what goes out meanwhile.

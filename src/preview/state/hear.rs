@@ -14,7 +14,13 @@ impl State {
             }
             Update::Presets(presets) => self.presets = presets,
             Update::Controls(controls) => self.controls = controls,
-            Update::Outputs(outputs) => self.outputs = outputs,
+            Update::Outputs(outputs) => {
+                self.outputs = outputs;
+                self.recorded_bytes = self.recorded_bytes.filter(|_| self.recording().is_some());
+                // Nothing is lost any more.
+                self.closing &= self.recording().is_some();
+            }
+            Update::Recorded(bytes) => self.recorded_bytes = Some(bytes),
             Update::Note(text) => self.note(text),
             Update::Trouble(text) => self.trouble = Some(text),
         }

@@ -4,6 +4,7 @@
 
 mod action;
 mod apply;
+mod habits;
 mod hear;
 mod history;
 #[cfg(test)]
@@ -15,6 +16,7 @@ pub mod tweak;
 
 pub use action::{Action, Request, Update};
 pub use apply::{NO_DEPTH, NO_PLATE, NO_VIRTUAL_CAMERA};
+pub use habits::{Habits, TEXT_SCALES};
 pub use history::History;
 
 use super::meters::Meters;
@@ -79,9 +81,6 @@ pub struct Note {
     pub text: String,
 }
 
-/// The text scales that can be chosen; 1 is the usual size.
-pub const TEXT_SCALES: std::ops::RangeInclusive<f32> = 0.75..=3.0;
-
 /// All that the window shows, but the picture itself.
 #[derive(Clone, Debug)]
 pub struct State {
@@ -130,10 +129,14 @@ pub struct State {
     pub plate: Option<Step>,
     /// Whether the person wants no plate.
     pub declined_plate: bool,
+    /// Whether the person is asked if the window shall close although something is recorded.
+    pub closing: bool,
+    /// What of the window goes on from run to run.
+    pub habits: Habits,
+    /// Bytes of the recording so far, where they are known.
+    pub recorded_bytes: Option<u64>,
     /// What went wrong with an output, until the person knows.
     pub trouble: Option<String>,
-    /// How large text and controls are, in [`TEXT_SCALES`]; 1 is usual.
-    pub text_scale: f32,
     pub meters: Meters,
     /// The looks before, and those that were undone.
     pub history: History,
@@ -176,8 +179,10 @@ impl State {
             notes: Vec::new(),
             plate: None,
             declined_plate: false,
+            closing: false,
+            habits: Habits::default(),
+            recorded_bytes: None,
             trouble: None,
-            text_scale: 1.0,
             meters: Meters::default(),
             history: History::default(),
             fitted: false,

@@ -24,6 +24,7 @@ pub fn running(has_depth: bool) -> Source {
         size: (1280, 720),
         period_ns: 33_333_333,
         has_depth,
+        is_live: true,
         takes_plates: !has_depth,
         executor: "cpu, 2 threads, AVX2".into(),
         budget_ns: 33_333_333,

@@ -1,6 +1,7 @@
 //! What the window shows, as options of the command line.
 
 use super::{Shown, State};
+use crate::look::Look;
 use crate::preview::services::Switch;
 
 impl State {
@@ -15,7 +16,10 @@ impl State {
             ("full-screen", yes(self.full_screen)),
             ("instruments", yes(self.instruments)),
             ("panel", (!self.panel).then(|| "false".to_owned())),
-            ("text-scale", (self.text_scale != 1.0).then(|| format!("{:.2}", self.text_scale))),
+            // A look without any setting would be the one that is remembered.
+            ("fresh", yes(self.look == Look::default())),
+            ("single-keys", (!self.habits.single_keys).then(|| "false".to_owned())),
+            ("text-scale", (self.habits.text_scale != 1.0).then(|| format!("{:.2}", self.habits.text_scale))),
         ];
         switches.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
     }

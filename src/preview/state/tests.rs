@@ -141,7 +141,7 @@ fn switches_are_what_they_were_set_to() {
     }
     for (asked, got) in [(1.5, 1.5), (9.0, 3.0), (0.0, 0.75), (f32::NAN, 0.75)] {
         state.apply(Action::TextScale(asked));
-        assert_eq!(state.text_scale, got);
+        assert_eq!(state.habits.text_scale, got);
     }
 }
 

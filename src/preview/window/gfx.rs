@@ -7,7 +7,7 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::{Fullscreen, Window};
 
 use super::WindowError;
-use super::memory::Memory;
+use super::memory::Size;
 use crate::compute::device::Device;
 use crate::preview::present::{self, Area, Presenter};
 
@@ -31,17 +31,17 @@ impl Gfx {
     pub fn open(
         events: &ActiveEventLoop,
         ctx: &egui::Context,
-        memory: Option<Memory>,
+        size: Option<Size>,
         full_screen: bool,
         device: Option<Arc<Device>>,
     ) -> Result<Self, WindowError> {
         use winit::platform::{wayland::WindowAttributesExtWayland, x11::WindowAttributesExtX11};
-        let size = memory.map_or(FIRST_SIZE, |memory| LogicalSize::new(memory.width, memory.height));
+        let inner = size.map_or(FIRST_SIZE, |size| LogicalSize::new(size.width, size.height));
         let wanted = Window::default_attributes()
             .with_title(CLASS)
-            .with_inner_size(size)
+            .with_inner_size(inner)
             .with_min_inner_size(LEAST_SIZE)
-            .with_maximized(memory.is_some_and(|memory| memory.maximized))
+            .with_maximized(size.is_some_and(|size| size.maximized))
             .with_fullscreen(full_screen.then_some(Fullscreen::Borderless(None)));
         let wanted = WindowAttributesExtX11::with_name(wanted, CLASS, CLASS);
         let wanted = WindowAttributesExtWayland::with_name(wanted, CLASS, CLASS);
@@ -69,10 +69,10 @@ impl Gfx {
     }
 
     /// The size to remember; `None` in full screen, whose size is not the window's own.
-    pub fn memory(&self) -> Option<Memory> {
+    pub fn size(&self) -> Option<Size> {
         let LogicalSize { width, height } = self.window.inner_size().to_logical::<f64>(self.window.scale_factor());
         let maximized = self.window.is_maximized();
-        (self.window.fullscreen().is_none() && width > 0.0).then_some(Memory { width, height, maximized })
+        (self.window.fullscreen().is_none() && width > 0.0).then_some(Size { width, height, maximized })
     }
 }
 

@@ -1,17 +1,39 @@
-//! What is remembered from one preview to the next: how large the window was.
+//! What is remembered from one preview to the next: how large the window was, and how the person had it.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
 use crate::files::{input, whole};
+use crate::look::{Look, Patch};
+use crate::preview::state::Habits;
+use crate::source::SourceName;
 
-/// The window's size in points, as it was last.
+/// What a preview ended with.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct Memory {
+    /// What the source is called on the command line.
+    pub source: Option<String>,
+    /// How the person had the window.
+    pub habits: Habits,
+    /// The settings of the look, by name.
+    pub look: BTreeMap<String, String>,
+    /// The window's size, if it is known.
+    pub size: Option<Size>,
+}
+
+/// A window's size in points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Memory {
+pub struct Size {
+    /// Columns.
     pub width: f64,
+    /// Rows.
     pub height: f64,
+    /// Whether it filled the screen beside the desktop's bars.
     #[serde(default)]
     pub maximized: bool,
 }
@@ -25,16 +47,44 @@ impl Memory {
     pub fn read(path: &Path) -> Option<Self> {
         let memory: Self = toml::from_str(&input::read_text(path, input::MOST_SETTINGS_BYTES).ok()?).ok()?;
         let sides = LEAST..=MOST;
-        (sides.contains(&memory.width) && sides.contains(&memory.height)).then_some(memory)
+        let size = memory.size.filter(|size| sides.contains(&size.width) && sides.contains(&size.height));
+        Some(Self { size, habits: memory.habits.checked(), ..memory })
     }
 
-    /// Writes the file, whole or not at all. If that fails, the next window just has its initial size again.
-    pub fn write(self, path: &Path) {
-        let Ok(text) = toml::to_string(&self) else { return };
+    /// The source, if it is still there.
+    pub fn source(&self) -> Option<String> {
+        let is_there = |name: &&String| {
+            SourceName::from_str(name).is_ok_and(|name| name.devices().iter().all(|node| node.exists()))
+        };
+        self.source.as_ref().filter(is_there).cloned()
+    }
+
+    /// Remembers a source, by a name that holds wherever the next preview is started.
+    pub fn set_source(&mut self, name: &str) {
+        let is_here = Path::new(name).is_relative() && Path::new(name).is_dir();
+        let absolute = std::path::absolute(name).ok().filter(|_| is_here);
+        let name = absolute.map_or_else(|| name.to_owned(), |path| path.display().to_string());
+        self.source = Some(name).filter(|name| !name.is_empty());
+    }
+
+    /// The look; `None` where none is remembered, or one that cannot be any more.
+    pub fn look(&self) -> Option<Look> {
+        let patch = Patch::parse(self.look.iter().map(|(name, value)| (name.as_str(), value.as_str()))).ok()?;
+        patch.on(&Look::default()).ok().filter(|_| !self.look.is_empty())
+    }
+
+    /// Remembers a look.
+    pub fn set_look(&mut self, look: &Look) {
+        self.look = Patch::of(look).values().into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+    }
+
+    /// Writes the file, whole or not at all. If that fails, the next window is as if it were the first.
+    pub fn write(&self, path: &Path) {
+        let Ok(text) = toml::to_string(self) else { return };
         let folder = path.parent().map_or(Ok(()), fs::create_dir_all);
         let written = folder.and_then(|()| whole::write(path, text.as_bytes(), true));
         if let Err(error) = written {
-            tracing::info!("the window's size is not remembered: {}: {error}", path.display());
+            tracing::info!("the window is not remembered: {}: {error}", path.display());
         }
     }
 }
@@ -48,13 +98,29 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("deep/window.toml");
         assert_eq!(Memory::read(&path), None);
-        let memory = Memory { width: 1280.0, height: 720.5, maximized: true };
+        let look = Look { rim: 0.3, highlights: 4.0, ..Look::default() };
+        let mut habits = Habits { text_scale: 1.5, single_keys: false, ..Habits::default() };
+        habits.sections.insert("For experts".into(), true);
+        let size = Some(Size { width: 1280.0, height: 720.5, maximized: true });
+        let mut memory = Memory { source: Some("0".into()), habits, size, ..Memory::default() };
+        assert_eq!(memory.look(), None);
+        memory.set_look(&look);
         memory.write(&path);
-        assert_eq!(Memory::read(&path), Some(memory));
-        for text in ["", "width = 3\nheight = 4\n", "width = nan\nheight = 700\n", "width"] {
+        let read = Memory::read(&path).unwrap();
+        assert_eq!((read.look(), &read), (Some(look), &memory));
+        for text in ["width", "[size]\nwidth = 3\n", "[habits]\ntext-scale = \"big\"\n"] {
             fs::write(&path, text).unwrap();
             assert_eq!(Memory::read(&path), None, "{text}");
         }
+        // What cannot be is left out, and the rest holds.
+        fs::write(
+            &path,
+            "source = \"1\"\n[habits]\ntext-scale = 1e9\n[size]\nwidth = nan\nheight = 7\n[look]\nrim = \"9\"\n",
+        )
+        .unwrap();
+        let read = Memory::read(&path).unwrap();
+        assert_eq!((read.source.as_deref(), read.size, read.look()), (Some("1"), None, None));
+        assert_eq!(read.habits.text_scale, 3.0);
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1, "nothing is left beside it");
     }
 }

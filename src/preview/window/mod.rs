@@ -14,6 +14,7 @@ use std::sync::atomic::AtomicBool;
 use winit::event_loop::EventLoop;
 
 use app::App;
+pub use memory::{Memory, Size};
 
 use super::session;
 use super::state::State;
@@ -30,8 +31,9 @@ pub struct Preview {
     pub device: Option<Arc<Device>>,
     /// Close the window when the source ends.
     pub close_at_end: bool,
-    /// Where the size of the window is remembered.
-    pub memory: Option<PathBuf>,
+    /// What is remembered of the preview before, and where.
+    pub memory: Memory,
+    pub memory_file: Option<PathBuf>,
     /// Once set, the window closes.
     pub stop: Arc<AtomicBool>,
 }

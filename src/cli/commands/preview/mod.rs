@@ -23,7 +23,7 @@ use crate::pipeline::Pace;
 use crate::preview::session::Start;
 use crate::preview::state::{Output, State};
 use crate::preview::system::System;
-use crate::preview::window::{self, Preview};
+use crate::preview::window::{self, Memory, Preview};
 use crate::sink::Target;
 use crate::source::{self, SourceName};
 
@@ -104,13 +104,22 @@ pub fn show(
     let look = source::fitting_look(&look, &parts.blur.depth, true)?;
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
     let look = Look { effect, ..look };
+    let memory_file = file::state_folder().map(|folder| folder.join("window.toml"));
+    let memory = memory_file.as_deref().filter(|_| !window.fresh).and_then(Memory::read).unwrap_or_default();
+    let before = memory.look().filter(|_| !given.has_look());
+    let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
     let device = computing.choice().device()?;
     let store = FileStore { chosen: global.config.clone(), given };
+    let mut state = first_state(look, &source, window, stream.mirror, &memory);
+    if let Some(before) = before {
+        state.look = before;
+        state.note(AS_IT_WAS);
+    }
+    let look = state.look.clone();
     let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
     system.device.clone_from(&device);
     system.out_size = stream.out_size.map(|size| (size.width, size.height));
     system.force = output.force;
-    let state = first_state(look.clone(), name, window, stream.mirror);
     let close_at_end = frames.frames.is_some() || !frames.repeat;
     let stop = terminal::stop_flag()?;
     let ended = window::show(Preview {
@@ -118,7 +127,7 @@ pub fn show(
         session: Start {
             services: Box::new(system),
             look,
-            source: name.to_owned(),
+            source,
             outputs,
             keep_going: stream.keep_going,
             budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
@@ -128,7 +137,8 @@ pub fn show(
         },
         device: device.clone(),
         close_at_end,
-        memory: file::state_folder().map(|folder| folder.join("window.toml")),
+        memory,
+        memory_file,
         stop,
     })?;
     let written = match (&stream.report, &ended.report) {
@@ -144,8 +154,11 @@ pub fn show(
     }
 }
 
+/// Shown where the look is not the usual one from the start.
+const AS_IT_WAS: &str = "This is the look that you left. R goes back to the usual one.";
+
 /// What the window shows first.
-fn first_state(look: Look, source: &str, window: &Window, mirror: bool) -> State {
+fn first_state(look: Look, source: &str, window: &Window, mirror: bool, memory: &Memory) -> State {
     let mut state = State::new(look, source.to_owned());
     state.shown = window.show;
     state.split = window.split;
@@ -153,7 +166,9 @@ fn first_state(look: Look, source: &str, window: &Window, mirror: bool) -> State
     state.full_screen = window.full_screen;
     state.instruments = window.instruments;
     state.panel = window.panel;
-    state.text_scale = window.text_scale;
+    state.habits = memory.habits.clone();
+    window.text_scale.into_iter().for_each(|scale| state.habits.set_text_scale(scale));
+    state.habits.single_keys = window.single_keys.unwrap_or(state.habits.single_keys);
     state
 }
 

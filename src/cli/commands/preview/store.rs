@@ -1,7 +1,8 @@
 //! The settings file, as the window uses it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use crate::cli::error::CliError;
 use crate::cli::settings::command_line;
 use crate::cli::settings::file::SettingsFile;
 use crate::cli::settings::layers::Given;
@@ -21,6 +22,14 @@ pub(super) struct FileStore {
     pub given: Given,
 }
 
+impl FileStore {
+    /// Changes the file that presets are saved in.
+    fn change(&self, change: impl FnOnce(&Path) -> Result<(), CliError>) -> Result<(), String> {
+        let file = save::file_to_save(self.chosen.as_deref());
+        file.and_then(|file| change(&file)).map_err(|error| error.to_string())
+    }
+}
+
 impl SettingsStore for FileStore {
     fn presets(&mut self) -> Vec<Preset> {
         let file = SettingsFile::load(self.chosen.as_deref()).unwrap_or_else(|error| {
@@ -31,9 +40,15 @@ impl SettingsStore for FileStore {
     }
 
     fn save_preset(&mut self, name: &str, look: &Look) -> Result<(), String> {
-        let saved = save::file_to_save(self.chosen.as_deref());
-        let saved = saved.and_then(|file| presets::save(&file, name, &Patch::of(look).values()));
-        saved.map_err(|error| error.to_string())
+        self.change(|file| presets::save(file, name, &Patch::of(look).values()))
+    }
+
+    fn rename_preset(&mut self, name: &str, new: &str) -> Result<(), String> {
+        self.change(|file| presets::rename(file, name, new))
+    }
+
+    fn delete_preset(&mut self, name: &str) -> Result<(), String> {
+        self.change(|file| presets::delete(file, name))
     }
 
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {

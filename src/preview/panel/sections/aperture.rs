@@ -9,7 +9,6 @@ use super::Sheet;
 use crate::bokeh::aperture::{Aperture, Shape};
 use crate::preview::panel::parts::{Number, number};
 use crate::preview::panel::theme::Colors;
-use crate::preview::panel::theme::focus_ring;
 
 /// Cells of a mask, and pixels of the picture of it: the window may be drawn without smoothing.
 const CELLS: usize = 28;
@@ -78,7 +77,6 @@ fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
             // Thumbnails take a while to make: during a drag only that of the chosen shape is made anew.
             let texture = thumbs.of(ui, index, &aperture, sheet.look.rim, no_drag || is_chosen);
             thumbnail(ui, rect, texture, is_chosen, response.hovered());
-            focus_ring(ui, &response, rect);
             if response.on_hover_text(*name).clicked() && !is_chosen {
                 picked = Some(aperture);
             }

@@ -13,7 +13,7 @@ const WAYS: [(&str, &str); 2] = [
     ("Lens", "What a real lens does: its f-number and focal length"),
 ];
 
-/// The strength and its limit.
+/// The strength.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let by_lens = matches!(sheet.look.strength, Strength::Lens(_));
     if sheet.follows_depth() || by_lens {
@@ -34,7 +34,6 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         Strength::Lens(lens) => lens_numbers(ui, sheet, lens),
         Strength::Default | Strength::AtInfinity(_) | Strength::Percent(_) => by_amount(ui, sheet),
     }
-    limit(ui, sheet);
 }
 
 /// The strength as a radius, with a lens to compare it with.
@@ -87,7 +86,7 @@ fn lens_numbers(ui: &mut Ui, sheet: &mut Sheet, mut lens: Lens) {
 }
 
 /// The largest radius, where the person sets one: without any, near objects would blur without bound.
-fn limit(ui: &mut Ui, sheet: &mut Sheet) {
+pub fn limit(ui: &mut Ui, sheet: &mut Sheet) {
     let height_px = sheet.size.1 as f32;
     let has_limit = sheet.look.max_coc_px.is_some();
     if switch(ui, "Own limit", "Largest blur of anything, near or far; otherwise 6 % of the height", has_limit) {

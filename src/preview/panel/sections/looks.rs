@@ -1,30 +1,54 @@
 //! Presets: looks by name.
 
-use egui::{Align2, CornerRadius, FontFamily, FontId, Rect, Role, Sense, TextEdit, Ui, Vec2, WidgetInfo, vec2};
+use egui::{
+    Align2, CornerRadius, FontFamily, FontId, Key, Label, Rect, Role, Sense, TextEdit, Ui, Vec2, WidgetInfo, vec2,
+};
 
 use super::Sheet;
 use crate::look::Effect;
 use crate::look::presets::Preset;
-use crate::preview::panel::theme::focus_ring;
+use crate::preview::panel::parts::remark;
 use crate::preview::panel::theme::{Colors, medium};
 use crate::preview::state::Action;
 
-/// A preset that is being named.
+/// What is being done with presets.
+#[derive(Debug, Default, PartialEq)]
+enum Doing {
+    #[default]
+    Nothing,
+    /// The look is being saved under a name.
+    Saving,
+    /// One's own are listed, to be renamed or deleted.
+    Listing,
+    Renaming(String),
+    Deleting(String),
+}
+
+/// What is being done with presets, and the name that is being typed for it.
 #[derive(Debug, Default)]
-pub struct Saving {
-    /// The name as typed so far, while one is asked for.
-    name: Option<String>,
+pub struct Editing {
+    doing: Doing,
+    name: String,
     /// Whether the text field is new and still needs the focus.
     ask_focus: bool,
 }
 
-/// The presets, and a way to save one.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving) {
-    let mut asked = false;
+impl Editing {
+    fn begin(&mut self, ui: &Ui, doing: Doing, name: &str) {
+        *self = Self { doing, name: name.to_owned(), ask_focus: true };
+        // In the pass of the click, the button has the focus itself.
+        ui.ctx().request_repaint();
+    }
+}
+
+/// The presets, and ways to save, rename and delete one's own.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
+    let state = sheet.state;
+    let was = std::mem::take(&mut editing.doing);
+    let mut next = None;
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 6.0);
         ui.horizontal_wrapped(|ui| {
-            let state = sheet.state;
             for (index, preset) in state.presets.iter().enumerate() {
                 let needs_depth = preset.patch.effect.is_some_and(Effect::follows_depth);
                 let possible = !needs_depth || sheet.has_depth();
@@ -32,34 +56,107 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving) {
                     sheet.act(Action::Preset(preset.name.clone()));
                 }
             }
-            if saving.name.is_none() && ui.button("Save as…").on_hover_text("Save this look under a name").clicked() {
-                *saving = Saving { name: Some(String::new()), ask_focus: true };
-                // In the pass of the click it has the focus itself.
-                ui.ctx().request_repaint();
-                asked = true;
+            if was != Doing::Saving && ui.button("Save as…").on_hover_text("Save this look under a name").clicked() {
+                next = Some(Doing::Saving);
+            }
+            let has_own = state.presets.iter().any(|preset| preset.own);
+            if has_own && ui.button("Edit…").on_hover_text("Rename or delete looks of your own").clicked() {
+                next = Some(if was == Doing::Listing { Doing::Nothing } else { Doing::Listing });
             }
         });
     });
-    if let Some(name) = saving.name.as_mut().filter(|_| !asked) {
-        let mut done = false;
-        ui.horizontal(|ui| {
-            let edit = TextEdit::singleline(name).hint_text("name").desired_width(150.0).char_limit(40);
-            let edit = ui.add(edit);
-            if std::mem::take(&mut saving.ask_focus) {
-                edit.request_focus();
+    editing.doing = match was {
+        Doing::Nothing => Doing::Nothing,
+        Doing::Saving => save(ui, sheet, editing),
+        Doing::Listing => list(ui, sheet, editing),
+        Doing::Renaming(name) => rename(ui, sheet, editing, name),
+        Doing::Deleting(name) => delete(ui, sheet, name),
+    };
+    if let Some(next) = next {
+        editing.begin(ui, next, "");
+    }
+}
+
+/// Asks for the name of a new preset. One that is there is replaced only by the button that says so.
+fn save(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) -> Doing {
+    let is_there = sheet.state.presets.iter().any(|preset| preset.own && preset.name == editing.name.trim());
+    let (verb, by_enter) = if is_there { ("Replace", false) } else { ("Save", true) };
+    match named(ui, editing, verb, by_enter) {
+        Some(true) => sheet.act(Action::SavePreset(editing.name.trim().to_owned())),
+        Some(false) => {}
+        None => {
+            if is_there {
+                remark(ui, "There is a look of this name already.");
             }
-            let entered = edit.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-            if (ui.button("Save").clicked() || entered) && !name.trim().is_empty() {
-                sheet.actions.push(Action::SavePreset(name.trim().to_owned()));
-                done = true;
-            }
-            let escaped = edit.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Escape));
-            done |= ui.button("Cancel").clicked() || escaped;
-        });
-        if done {
-            saving.name = None;
+            return Doing::Saving;
         }
     }
+    Doing::Nothing
+}
+
+/// Lists one's own presets, each with what can be done with it.
+fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Doing {
+    for preset in sheet.state.presets.iter().filter(|preset| preset.own) {
+        let row = ui.horizontal(|ui| {
+            let [rename, delete] = ["Rename", "Delete"].map(|verb| {
+                let button = ui.button(verb);
+                button.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("{verb} {}", preset.name)));
+                button.clicked()
+            });
+            ui.add(Label::new(&preset.name).truncate());
+            (rename, delete)
+        });
+        match row.inner {
+            (true, _) => {
+                editing.begin(ui, Doing::Nothing, &preset.name);
+                return Doing::Renaming(preset.name.clone());
+            }
+            (_, true) => return Doing::Deleting(preset.name.clone()),
+            _ => {}
+        }
+    }
+    Doing::Listing
+}
+
+fn rename(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, old: String) -> Doing {
+    let new = editing.name.trim().to_owned();
+    match named(ui, editing, "Rename", true) {
+        Some(true) if new != old => sheet.act(Action::RenamePreset(old, new)),
+        Some(_) => {}
+        None => return Doing::Renaming(old),
+    }
+    Doing::Listing
+}
+
+/// Asks before a preset is deleted, as nothing brings it back.
+fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Doing {
+    ui.label(format!("Delete “{name}” for good?"));
+    let (delete, keep) = ui.horizontal(|ui| (ui.button("Delete it").clicked(), ui.button("Keep it").clicked())).inner;
+    if delete {
+        sheet.act(Action::DeletePreset(name));
+    } else if !keep {
+        return Doing::Deleting(name);
+    }
+    Doing::Listing
+}
+
+/// A field for a name and buttons. Whether the name holds or is given up, once one of them is so.
+fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, by_enter: bool) -> Option<bool> {
+    ui.horizontal(|ui| {
+        let edit = TextEdit::singleline(&mut editing.name).hint_text("name").desired_width(140.0).char_limit(40);
+        let edit = ui.add(edit);
+        if std::mem::take(&mut editing.ask_focus) {
+            edit.request_focus();
+        }
+        let left_by = |key| edit.lost_focus() && ui.input(|input| input.key_pressed(key));
+        let (entered, escaped) = (left_by(Key::Enter), left_by(Key::Escape));
+        let holds = ui.button(verb).clicked() || entered && by_enter;
+        if holds && !editing.name.trim().is_empty() {
+            return Some(true);
+        }
+        (ui.button("Cancel").clicked() || escaped).then_some(false)
+    })
+    .inner
 }
 
 /// Draws a preset with the number of its key. Whether it was clicked.
@@ -93,7 +190,6 @@ fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool
         painter.text(at, Align2::CENTER_CENTER, index + 1, font, number_color);
     }
     painter.galley(rect.left_center() + vec2(10.0 + room, -name.size().y / 2.0), name, text);
-    focus_ring(ui, &response, rect);
     let hint = match (possible, preset.own) {
         (false, _) => "needs depth, which this source has not",
         (true, true) => "your own look",

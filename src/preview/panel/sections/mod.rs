@@ -11,13 +11,13 @@ mod source;
 mod view;
 
 pub use aperture::Thumbs;
-pub use looks::Saving;
+pub use looks::Editing;
 
 use egui::Ui;
 
 use super::parts::section;
 use super::state::{Action, State};
-use crate::look::Look;
+use crate::look::{Effect, Look};
 
 /// What the sections read and change while they are drawn.
 pub struct Sheet<'a> {
@@ -54,23 +54,39 @@ impl Sheet<'_> {
     }
 }
 
-/// Draws the sections that the look and the source call for.
-pub fn show(ui: &mut Ui, sheet: &mut Sheet, saving: &mut Saving, thumbs: &mut Thumbs) {
-    looks::show(ui, sheet, saving);
+/// Draws the sections that the look and the source call for: what pictures come from and go to, the look, the window.
+pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbs: &mut Thumbs) {
+    part(ui, sheet, "Source", true, source::show);
+    part(ui, sheet, "Record and call", true, output::show);
+    ui.add_space(4.0);
+    looks::show(ui, sheet, editing);
     ui.add_space(2.0);
     effect::show(ui, sheet);
     if sheet.follows_depth() {
-        section(ui, "Focus", true, |ui| focus::show(ui, sheet));
+        part(ui, sheet, "Focus", true, focus::show);
     }
-    if sheet.look.effect != crate::look::Effect::None {
-        section(ui, "Blur", true, |ui| blur::show(ui, sheet));
-        section(ui, "Aperture", true, |ui| aperture::show(ui, sheet, thumbs));
-        section(ui, "Quality", false, |ui| quality::show(ui, sheet));
+    let blurs = sheet.look.effect != Effect::None;
+    if blurs {
+        part(ui, sheet, "Blur", true, blur::show);
+        part(ui, sheet, "Aperture", true, |ui, sheet| aperture::show(ui, sheet, thumbs));
     }
-    section(ui, "View", true, |ui| view::show(ui, sheet));
-    section(ui, "Source", true, |ui| source::show(ui, sheet));
+    part(ui, sheet, "View", true, view::show);
     if !sheet.state.controls.is_empty() {
-        section(ui, "Camera", false, |ui| source::controls(ui, sheet));
+        part(ui, sheet, "Camera", false, source::controls);
     }
-    section(ui, "Keep", true, |ui| output::show(ui, sheet));
+    part(ui, sheet, "For experts", false, |ui, sheet| {
+        view::internals(ui, sheet);
+        if blurs {
+            blur::limit(ui, sheet);
+            quality::show(ui, sheet);
+        }
+    });
+}
+
+/// Draws a section: open or folded as the person left it, at first as `open` says.
+fn part(ui: &mut Ui, sheet: &mut Sheet, name: &'static str, open: bool, body: impl FnOnce(&mut Ui, &mut Sheet)) {
+    let open = sheet.state.habits.sections.get(name).copied().unwrap_or(open);
+    if section(ui, name, open, |ui| body(ui, sheet)) {
+        sheet.act(Action::Section(name, !open));
+    }
 }

@@ -3,8 +3,7 @@
 use egui::{Align2, ComboBox, CornerRadius, Role, Sense, Stroke, TextStyle, Ui, Vec2, WidgetInfo, vec2};
 
 use super::Sheet;
-use crate::preview::panel::parts::remark;
-use crate::preview::panel::theme::focus_ring;
+use crate::preview::panel::parts::{path, remark};
 use crate::preview::panel::{icons, theme::Colors};
 use crate::preview::state::{Action, NO_VIRTUAL_CAMERA};
 
@@ -16,7 +15,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         sheet.act(Action::Record(recording.is_none()));
     }
     if let Some(output) = recording.filter(|output| !output.name.is_empty()) {
-        remark(ui, &output.name);
+        path(ui, &output.name);
     }
     let half = vec2((ui.available_width() - 6.0) / 2.0, 28.0);
     ui.horizontal(|ui| {
@@ -71,6 +70,5 @@ fn record_button(ui: &mut Ui, on: bool) -> bool {
     icons::record(painter, egui::pos2(left + 7.0, rect.center().y), on, colors.alarm);
     let at = egui::pos2(left + 22.0, rect.center().y);
     painter.galley(Align2::LEFT_CENTER.anchor_size(at, name.size()).min, name, colors.text);
-    focus_ring(ui, &response, rect);
     response.on_hover_text("A video beside the window, until you stop it (V)").clicked()
 }

@@ -6,26 +6,46 @@ use super::Sheet;
 use crate::preview::panel::parts::{Number, choose, number, switch};
 use crate::preview::state::{Action, Shown};
 
-const VIEWS: [(&str, &str, Shown); 4] = [
+type Views = [(&'static str, &'static str, Shown); 2];
+
+const VIEWS: Views = [
     ("Picture", "The blurred picture", Shown::Picture),
-    ("Depth", "Distance in colours: light is near", Shown::Depth),
-    ("CoC", "Circle of confusion: white is sharp, hatched is in front", Shown::Coc),
-    ("Bins", "The layers that are blurred on their own", Shown::Bins),
+    ("Depth", "Distance in colours: light is near (D)", Shown::Depth),
+];
+const INTERNALS: Views = [
+    ("CoC", "Circle of confusion: white is sharp, hatched is in front (C)", Shown::Coc),
+    ("Bins", "The layers that are blurred on their own (N)", Shown::Bins),
 ];
 
-/// The view, how it is shown, and the instruments.
+/// Draws views to choose from; one that is shown already is left for the picture.
+fn choose_view(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
+    let chosen = views.iter().position(|view| view.2 == sheet.state.shown);
+    let has_depth = sheet.has_depth();
+    let options = views.map(|(name, hint, _)| (name, hint));
+    let can = |index: usize| has_depth || views[index].2 != Shown::Depth;
+    if let Some(index) = choose(ui, what, &options, chosen.unwrap_or(usize::MAX), can) {
+        let shown = if chosen == Some(index) { Shown::Picture } else { views[index].2 };
+        sheet.act(Action::Show(shown));
+    }
+}
+
+/// What the blur is made of, and the instruments.
+pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
+    choose_view(ui, sheet, "Show of the blur", INTERNALS);
+    let on = sheet.state.instruments;
+    if switch(ui, "Instruments", "Times, rates and drops (I)", on) {
+        sheet.act(Action::Instruments(!on));
+    }
+}
+
+/// The view, and how it is shown.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
-    let chosen = VIEWS.iter().position(|view| view.2 == state.shown).unwrap_or_default();
-    let has_depth = sheet.has_depth();
-    let options = VIEWS.map(|(name, hint, _)| (name, hint));
-    if let Some(index) = choose(ui, "Show", &options, chosen, |index| index != 1 || has_depth) {
-        sheet.act(Action::Show(VIEWS[index].2));
-    }
+    choose_view(ui, sheet, "Show", VIEWS);
     if switch(ui, "Mirror", "Like a mirror; what is recorded or sent on is not (M)", state.mirror) {
         sheet.act(Action::Mirror(!state.mirror));
     }
-    if switch(ui, "Freeze", "Keep this picture; the source goes on (Z)", state.frozen) {
+    if switch(ui, "Freeze", "Keep this picture, and try looks on it (Z)", state.frozen) {
         sheet.act(Action::Freeze(!state.frozen));
     }
     if switch(ui, "Before and after", "The picture before the blur, left of a line to drag (B)", state.split.is_some())
@@ -45,9 +65,6 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         if number(ui, how, &mut percent) {
             sheet.act(Action::Split(Some(percent / 100.0)));
         }
-    }
-    if switch(ui, "Instruments", "Times, rates and drops (I)", state.instruments) {
-        sheet.act(Action::Instruments(!state.instruments));
     }
     if switch(ui, "Full screen", "F or F11", state.full_screen) {
         sheet.act(Action::FullScreen(!state.full_screen));

@@ -43,7 +43,7 @@ fn a_click_is_where_the_picture_is() {
     let mut window = Window::new();
     window.native = 2.0;
     window.canvas.area = Area { x: 100, y: 60, width: 800, height: 450 };
-    window.state.text_scale = 1.25;
+    window.state.habits.text_scale = 1.25;
     window.wait(0.2);
     let at = |x: f32, y: f32| pos2(x, y) / 2.5;
     assert!(close(point(&window.click(at(100.0 + 400.0, 60.0 + 90.0))), (0.5, 0.2)));

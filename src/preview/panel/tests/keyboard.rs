@@ -64,6 +64,7 @@ fn a_control_in_focus_is_worked_by_the_keyboard() {
         done.extend(window.press(Key::Space, Modifiers::NONE));
         // What closes the panel is open again, as it was.
         (window.state.panel, window.state.help) = (before.panel, before.help);
+        window.pass(Vec::new());
     }
     assert!(done.iter().any(|action| matches!(action, Action::Preset(_))), "{done:?}");
     assert!(done.iter().any(|action| matches!(action, Action::Look { .. })), "{done:?}");
@@ -223,7 +224,7 @@ fn typing_a_name_presses_no_keys() {
     };
     // To the button that asks for a name: the first stop after the presets.
     let mut reached = false;
-    for _ in 0..20 {
+    for _ in 0..60 {
         window.press(Key::Tab, Modifiers::NONE);
         window.press(Key::Enter, Modifiers::NONE);
         (window.state.panel, window.state.help) = (true, false);

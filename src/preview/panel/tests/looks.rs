@@ -106,7 +106,7 @@ fn pictures() {
         });
     }
     shot("large", Theme::Dark, &|state| {
-        state.text_scale = 1.8;
+        state.habits.text_scale = 1.8;
         state.look.strength = crate::look::Strength::Lens(crate::preview::state::tweak::LENS);
     });
     shot("help", Theme::Dark, &|state| state.help = true);

@@ -34,7 +34,7 @@ fn any_window_and_any_text() {
     for size in [(1, 1), (100, 80), (320, 1000), (1280, 720), (4096, 2304)] {
         for text_scale in [0.75, 1.0, 3.0] {
             for mut state in states() {
-                state.text_scale = text_scale;
+                state.habits.text_scale = text_scale;
                 let mut window = Window::of(state, size);
                 window.wait(0.1);
             }
@@ -46,7 +46,7 @@ fn any_window_and_any_text() {
 fn the_panel_is_within_the_window() {
     for (size, text_scale) in [((1280, 720), 1.0), ((640, 480), 1.0), ((1280, 720), 3.0), ((4096, 2304), 2.0)] {
         let mut state = sample::state();
-        state.text_scale = text_scale;
+        state.habits.text_scale = text_scale;
         let mut window = Window::of(state, size);
         window.wait(0.5);
         let rect = window.panel.sheet.rect().expect("the panel is shown");

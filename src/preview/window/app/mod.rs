@@ -27,7 +27,7 @@ use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
 use crate::preview::panel::Panel;
 use crate::preview::session::{Closed, Session, SessionEvent, Wake};
-use crate::preview::state::{Shown, Source, State};
+use crate::preview::state::{Action, Shown, Source, State};
 use crate::preview::views::Views;
 use crate::stats::WindowUse;
 
@@ -79,9 +79,9 @@ pub(super) struct App {
     /// Since when nobody can see it.
     hidden_at: Option<Instant>,
     empty: bool,
-    /// Where the window's size is kept, and what was read from there or measured last.
-    memory: Option<PathBuf>,
-    remembered: Option<Memory>,
+    /// What is remembered of the window, and where.
+    memory: Memory,
+    memory_file: Option<PathBuf>,
     close_at_end: bool,
     stop: Arc<AtomicBool>,
     failed: Option<WindowError>,
@@ -90,7 +90,7 @@ pub(super) struct App {
 impl App {
     /// Starts the session at once, so that the source opens while the window does.
     pub fn new(preview: Preview, proxy: EventLoopProxy<()>) -> Result<Self, WindowError> {
-        let Preview { mut state, session, device, close_at_end, memory, stop } = preview;
+        let Preview { mut state, session, device, close_at_end, memory, memory_file, stop } = preview;
         let wake_pending = Arc::new(AtomicBool::new(false));
         let pending = Arc::clone(&wake_pending);
         // An event loop that is gone needs no waking.
@@ -103,7 +103,6 @@ impl App {
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
         let ctx = egui::Context::default();
-        let remembered = memory.as_deref().and_then(Memory::read);
         Ok(Self {
             state,
             wanted,
@@ -135,7 +134,7 @@ impl App {
             hidden_at: None,
             empty: false,
             memory,
-            remembered,
+            memory_file,
             close_at_end,
             stop,
             failed: None,
@@ -258,7 +257,7 @@ impl ApplicationHandler<()> for App {
         if self.gfx.is_some() {
             return;
         }
-        match Gfx::open(events, &self.ctx, self.remembered, self.state.full_screen, self.device.clone()) {
+        match Gfx::open(events, &self.ctx, self.memory.size, self.state.full_screen, self.device.clone()) {
             Ok(gfx) => {
                 self.gfx = Some(gfx);
                 self.update_wanted();
@@ -286,7 +285,10 @@ impl ApplicationHandler<()> for App {
                 }
                 return self.draw(events);
             }
-            WindowEvent::CloseRequested => return events.exit(),
+            WindowEvent::CloseRequested => {
+                self.perform(Action::Close, events);
+                return self.on_input();
+            }
             WindowEvent::Occluded(hidden) => {
                 self.covered = *hidden;
                 // Waiting while nobody can see the window is no latency.
@@ -296,7 +298,7 @@ impl ApplicationHandler<()> for App {
             WindowEvent::Resized(size) => {
                 gfx.presenter.resize((size.width, size.height));
                 self.empty = size.width == 0 || size.height == 0;
-                self.remembered = gfx.memory().or(self.remembered);
+                self.memory.size = gfx.size().or(self.memory.size);
             }
             _ => {}
         }
@@ -326,9 +328,11 @@ impl ApplicationHandler<()> for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        if let (Some(path), Some(memory)) = (&self.memory, self.gfx.as_ref().and_then(Gfx::memory).or(self.remembered))
-        {
-            memory.write(path);
-        }
+        let Some(path) = &self.memory_file else { return };
+        self.memory.size = self.gfx.as_ref().and_then(Gfx::size).or(self.memory.size);
+        self.memory.habits = self.state.habits.clone();
+        self.memory.set_source(&self.state.source_name);
+        self.memory.set_look(&self.state.look);
+        self.memory.write(path);
     }
 }

@@ -65,7 +65,7 @@ impl App {
     }
 
     /// Applies an action to the state; what this thread cannot do itself goes to the session.
-    fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
+    pub(super) fn perform(&mut self, action: Action, events: &ActiveEventLoop) {
         for request in self.state.apply(action) {
             match request {
                 Request::Snapshot => self.snapshot(),

@@ -1,0 +1,82 @@
+//! The panel's sections: their order, what is folded, the way back, and one ring for the focus.
+
+use egui::{Key, Modifiers, pos2};
+
+use super::{Action, Window, sample};
+use crate::preview::present::Area;
+use crate::preview::state::{Shown, Source, State};
+
+#[test]
+fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {
+    let mut window = Window::of(sample::state(), (1280, 2000));
+    let y = |window: &mut Window, text: &str| window.place_of(text).map(|at| at.y);
+    let [source, record, save, focus] =
+        ["Source", "Record and call", "Save as…", "Focus"].map(|text| y(&mut window, text).expect(text));
+    assert!(source < record && record < save && save < focus);
+    for inner in ["CoC", "Bins", "Terms of the aperture", "Method", "Own limit"] {
+        assert!(window.place_of(inner).is_none(), "{inner}");
+    }
+    window.state.apply(Action::Section("For experts", true));
+    for folded in ["Source", "Record and call", "Focus", "Blur", "Aperture", "View"] {
+        window.state.apply(Action::Section(folded, false));
+    }
+    window.wait(0.5);
+    for inner in ["CoC", "Bins", "Terms of the aperture", "Method", "Own limit", "Instruments"] {
+        assert!(window.place_of(inner).is_some(), "{inner}");
+    }
+    assert_eq!(window.click_on("CoC"), [Action::Show(Shown::Coc)]);
+    assert_eq!(window.click_on("CoC"), [Action::Show(Shown::Picture)]);
+    assert_eq!(window.click_on("View"), [Action::Section("View", true)]);
+    window.wait(0.5);
+    assert!(window.place_of("Mirror").is_some());
+}
+
+#[test]
+fn a_button_brings_the_panel_back() {
+    let mut window = Window::new();
+    window.press(Key::P, Modifiers::NONE);
+    window.pass(vec![egui::Event::PointerMoved(pos2(300.0, 300.0))]);
+    window.wait(0.5);
+    assert!(!window.state.panel);
+    window.click(pos2(1280.0 - 29.0, 29.0));
+    assert!(window.state.panel);
+}
+
+#[test]
+fn its_first_seconds_count_from_the_first_picture() {
+    let mut state = State::new(sample::look(), "slow".into());
+    state.source = Source::Opening;
+    let mut window = Window::of(state, (1280, 720));
+    let canvas = std::mem::replace(&mut window.canvas.area, Area::default());
+    window.wait(20.0);
+    assert!(window.place_of("Record and call").is_some());
+    window.canvas.area = canvas;
+    window.state.source = sample::running(true);
+    window.wait(3.5);
+    assert!(window.place_of("Record and call").is_some());
+    window.wait(1.5);
+    assert!(window.place_of("Record and call").is_none());
+}
+
+/// The rectangles that are drawn with a stroke as wide as the ring's.
+fn rings(window: &mut Window) -> usize {
+    let (_, output) = window.pass_with_output(Vec::new());
+    let color = super::super::theme::Colors::of(window.ctx.theme()).text;
+    let is_ring =
+        |shape: &egui::Shape| matches!(shape, egui::Shape::Rect(rect) if rect.stroke == egui::Stroke::new(2.0, color));
+    let count = output.shapes.iter().filter(|clipped| is_ring(&clipped.shape)).count();
+    output.drop_without_applying_deltas();
+    count
+}
+
+#[test]
+fn whatever_has_the_focus_has_one_and_the_same_ring() {
+    let mut window = Window::new();
+    window.state.apply(Action::Section("For experts", true));
+    assert_eq!(rings(&mut window), 0);
+    for stop in 0..60 {
+        window.press(Key::Tab, Modifiers::NONE);
+        window.wait(0.3);
+        assert_eq!(rings(&mut window), 1, "stop {stop}");
+    }
+}
