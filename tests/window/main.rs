@@ -17,3 +17,4 @@ mod life;
 mod looks;
 mod pictures;
 mod size;
+mod stays;

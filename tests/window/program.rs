@@ -66,6 +66,14 @@ impl<'a> Program<'a> {
         self.process.0.try_wait().unwrap().is_none()
     }
 
+    /// Processor time that it has used, in the kernel's ticks.
+    pub fn cpu_ticks(&self) -> u64 {
+        let stat = fs::read_to_string(format!("/proc/{}/stat", self.process.0.id())).unwrap();
+        // What follows the name, which is in brackets: user and system time are the 12th and 13th.
+        let (_, fields) = stat.rsplit_once(')').unwrap();
+        fields.split_whitespace().skip(11).take(2).map(|field| field.parse::<u64>().unwrap()).sum()
+    }
+
     /// Asks it to end, as Ctrl-C in a terminal does.
     pub fn interrupt(&self) {
         self.process.interrupt();

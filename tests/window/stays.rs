@@ -1,0 +1,110 @@
+//! What stays: a frozen picture, a recording that one is about to break off, a window that nobody sees, a look.
+
+use std::fs;
+use std::thread;
+use std::time::Duration;
+
+use super::input::sym;
+use super::picture::{distance, is_photograph};
+use super::program::{PORTRAIT, Program};
+use super::screen::{Screen, until};
+use super::window::PATIENCE;
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_frozen_picture_follows_the_look() {
+    let screen = Screen::new();
+    let mut program = Program::start(&screen, &[PORTRAIT, "--panel=false", "--quality", "fast"]);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
+    window.key(&[], u32::from('z'));
+    let mut last = None;
+    let frozen = window.until("it stands still", |image| {
+        thread::sleep(Duration::from_millis(600));
+        let same = last.as_ref().is_some_and(|last| distance(last, image) < 0.01);
+        last = Some(image.clone());
+        same
+    });
+    (0..12).for_each(|_| window.key(&[], u32::from(']')));
+    let more = window.until("more blur, in the same picture", |image| distance(image, &frozen) > 0.3);
+    // All of them at once, as they were one stroke.
+    window.key(&[sym::CONTROL], u32::from('z'));
+    window.until("as before", |image| distance(image, &frozen) < 0.2 * distance(&more, &frozen));
+    program.close();
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn closing_asks_while_it_records_and_what_is_recorded_is_whole() {
+    let screen = Screen::new();
+    let mut program = Program::start(&screen, &[PORTRAIT]);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
+    let folder = program.home().to_owned();
+    let ends_with = |end: &str| {
+        let files = fs::read_dir(&folder).unwrap().flatten();
+        files.filter(|file| file.file_name().to_string_lossy().ends_with(end)).count()
+    };
+    window.key(&[], u32::from('v'));
+    until("it is recorded", PATIENCE, || ends_with(".part") == 1);
+    thread::sleep(Duration::from_secs(1));
+    window.close();
+    thread::sleep(Duration::from_secs(1));
+    assert!(program.runs(), "it closed without asking");
+    window.close();
+    let ended = program.end();
+    ended.succeeded();
+    assert_eq!((ends_with(".mp4"), ends_with(".part")), (1, 0));
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_window_that_nobody_sees_computes_nothing() {
+    let screen = Screen::new();
+    let mut program = Program::start(&screen, &[PORTRAIT]);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
+    let used = |program: &Program| {
+        let before = program.cpu_ticks();
+        thread::sleep(Duration::from_secs(3));
+        program.cpu_ticks() - before
+    };
+    let seen = used(&program);
+    window.minimise();
+    // It could be back at once.
+    thread::sleep(Duration::from_secs(4));
+    let unseen = used(&program);
+    assert!(unseen * 5 < seen, "{unseen} of {seen} ticks");
+    window.bring_back();
+    window.until("a picture again", is_photograph);
+    assert!(used(&program) * 2 > seen, "it goes on");
+    program.close();
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_look_is_there_again_unless_one_begins_afresh() {
+    let screen = Screen::new();
+    let remembered = |home: &std::path::Path| fs::read_to_string(home.join("state/bokehcam/window.toml")).unwrap();
+    let mut program = Program::start(&screen, &[PORTRAIT]);
+    let window = program.window();
+    window.until("the first picture", is_photograph);
+    let first = program.home().to_owned();
+    // The preset that has six blades.
+    window.key(&[], u32::from('2'));
+    thread::sleep(Duration::from_secs(1));
+    let ended = program.close();
+    assert!(remembered(&first).contains("polygon:6"), "{}", remembered(&first));
+    fs::remove_file(first.join("report.json")).unwrap();
+    // Without a name, the source is the one that was left; and so is the look.
+    let mut program = Program::start_at(&screen, ended.home, &[]);
+    program.window().until("a picture of the recording", is_photograph);
+    let ended = program.close();
+    let again = remembered(&first);
+    assert!(again.contains("polygon:6") && again.contains("recordings/portrait"), "{again}");
+    fs::remove_file(first.join("report.json")).unwrap();
+    let mut program = Program::start_at(&screen, ended.home, &[PORTRAIT, "--fresh"]);
+    program.window().until("a picture", is_photograph);
+    let _home = program.close().home;
+    assert!(!remembered(&first).contains("polygon:6"), "{}", remembered(&first));
+}
