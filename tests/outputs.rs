@@ -182,6 +182,22 @@ fn an_encoder_that_says_all_is_well_is_not_believed() {
 }
 
 #[test]
+fn an_encoder_that_is_slow_to_begin_costs_no_frames() {
+    let home = Home::new();
+    home.record("self", 75, 0.02);
+    // For a second, in which fifty frames come; its pipe has room for fourteen. What it leaves passes for an mp4.
+    let path = home.fake_ffmpeg(
+        "[ \"$1\" = -version ] && exit\nsleep 1; cat > /dev/null; printf '\\000\\000\\000\\010moov' > \"$out\"",
+    );
+    let args = format!("stream self {BLUR} --pace realtime --to x.mp4 --report report.json");
+    let ran = Ran::from(home.command(&path, &args).output().unwrap());
+    assert_eq!(ran.code, Some(0), "{}", ran.said);
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(home.at("report.json")).unwrap()).unwrap();
+    // A busy machine may lose some.
+    assert!(report["frames"]["delivered"].as_u64() > Some(60), "{}", report["frames"]);
+}
+
+#[test]
 fn an_encoder_that_hangs_does_not_keep_the_program() {
     let home = Home::new();
     home.record("self", 4, 0.01);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
-use rustix::io::Errno;
+use rustix::io::{Errno, ioctl_fionread};
 
 /// How long a reader that takes nothing is waited for once the run is to stop.
 pub(super) const LAST_PATIENCE: Duration = Duration::from_secs(1);
@@ -44,6 +44,22 @@ impl Pipe {
     pub(super) fn own(end: OwnedFd, waits_on: impl FnMut(Duration) -> bool + Send + 'static) -> io::Result<Self> {
         fcntl_setfl(&end, fcntl_getfl(&end)? | OFlags::NONBLOCK)?;
         Ok(Self { file: File::from(end), chunk_bytes: Some(usize::MAX), waits_on: Box::new(waits_on) })
+    }
+
+    /// Waits until the reader has taken all that was written, or has gone, but no longer than `patience`. What is wrong then
+    /// is said by the next write.
+    pub(super) fn settle(&self, patience: Duration) -> io::Result<()> {
+        const TICK: Timespec = Timespec { tv_sec: 0, tv_nsec: 2_000_000 };
+        let began = Instant::now();
+        while ioctl_fionread(&self.file)? > 0 && began.elapsed() < patience {
+            // Asked for nothing, it still tells that the reader has gone.
+            match poll(&mut [PollFd::new(&self.file, PollFlags::empty())], Some(&TICK)) {
+                Ok(0) | Err(Errno::INTR) => {}
+                Ok(_) => break,
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(())
     }
 }
 
@@ -118,6 +134,28 @@ mod tests {
         }
         writes.join().unwrap();
         assert!(all == bytes);
+    }
+
+    #[test]
+    fn a_pipe_is_settled_once_its_reader_has_taken_all_or_has_gone() {
+        const LONG: Duration = Duration::from_secs(60);
+        let (mut reader, writer) = io::pipe().unwrap();
+        let mut pipe = Pipe::own(writer.into(), |_| true).unwrap();
+        pipe.write_all(&[1; 100]).unwrap();
+        let began = Instant::now();
+        pipe.settle(Duration::from_millis(30)).unwrap();
+        assert!(began.elapsed() >= Duration::from_millis(30), "nobody reads");
+        let reads = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(50));
+            reader.read_exact(&mut [0; 100]).unwrap();
+            reader
+        });
+        pipe.settle(LONG).unwrap();
+        assert!(began.elapsed() >= Duration::from_millis(50));
+        pipe.write_all(&[1; 100]).unwrap();
+        drop(reads.join().unwrap());
+        pipe.settle(LONG).unwrap();
+        assert!(began.elapsed() < LONG, "neither waits for more");
     }
 
     #[test]

@@ -12,6 +12,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use self::command::Format;
 use self::container::Container;
@@ -22,6 +23,9 @@ use super::pipe::Pipe;
 use super::{Ending, Options, Sink, SinkError, check_size};
 use crate::files::whole::Part;
 use crate::frame::ColorImage;
+
+/// An encoder that does not read by then gets its frames all the same.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// A file encoded by a child process: H.264 in `.mp4` and `.mkv`, VP9 in `.webm`, at the times of its frames.
 pub struct Ffmpeg {
@@ -35,7 +39,8 @@ pub struct Ffmpeg {
 }
 
 impl Ffmpeg {
-    /// Starts ffmpeg, found through `PATH`, to write `path`.
+    /// Starts ffmpeg, found through `PATH`, to write `path`, and waits until it reads: loading it takes tenths of a second, and
+    /// the first frame would stand in the way of those behind it for as long.
     ///
     /// # Errors
     /// The file exists and `force` is not set, or ffmpeg is missing or cannot be started.
@@ -52,7 +57,9 @@ impl Ffmpeg {
             Some(stdin) => Pipe::own(OwnedFd::from(stdin), move |blocked| !watchdog.hangs(blocked)),
             None => Err(ErrorKind::BrokenPipe.into()),
         };
-        let input = RawVideo::new(pipe.map_err(SinkError::write(path))?, options.size, options.period_ns);
+        let input = pipe.and_then(|pipe| RawVideo::new(pipe, options.size, options.period_ns));
+        let input = input.map_err(SinkError::write(path))?;
+        input.to.settle(PATIENCE).map_err(SinkError::write(path))?;
         Ok(Self { input: Some(input), process, format, output, size: options.size, stop: Arc::clone(&options.stop) })
     }
 

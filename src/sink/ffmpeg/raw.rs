@@ -15,23 +15,22 @@ const LEAST_TICKS: u64 = 1000;
 
 /// A stream of raw frames.
 pub(super) struct RawVideo<W: Write> {
-    to: W,
+    pub(super) to: W,
     converter: Converter,
     /// Time of the first frame.
     first_ns: Option<u64>,
     /// Time of the last frame, in ticks after the first.
     last_ticks: Option<u64>,
-    /// Encoded and not yet written: the header, or a cluster.
+    /// A cluster, encoded and not yet written.
     bytes: Vec<u8>,
 }
 
 impl<W: Write> RawVideo<W> {
-    /// A stream into `to` of frames of `size` that mostly come every `period_ns`. The header is written with the first
-    /// frame.
-    pub(super) fn new(to: W, size: (u32, u32), period_ns: u64) -> Self {
+    /// A stream into `to` of frames of `size` that mostly come every `period_ns`. Its header is written at once.
+    pub(super) fn new(mut to: W, size: (u32, u32), period_ns: u64) -> io::Result<Self> {
         let matrix = Matrix::for_height(size.1);
-        let bytes = header(size, period_ns, matrix);
-        Self { to, converter: Converter::new(matrix), first_ns: None, last_ticks: None, bytes }
+        to.write_all(&header(size, period_ns, matrix))?;
+        Ok(Self { to, converter: Converter::new(matrix), first_ns: None, last_ticks: None, bytes: Vec::new() })
     }
 
     /// Writes a frame that was captured at `time_ns`, as a cluster of its own.
