@@ -12,8 +12,11 @@ use std::process::ExitCode;
 use std::thread;
 
 use bokehcam::bokeh::aperture::{Aperture, Shape, lens_points};
-use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::capture::demo::{self, Demo};
+use bokehcam::capture::{Camera, Shot};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage};
 use bokehcam::scene::{Scene, ThinLens, View};
+use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
@@ -33,13 +36,20 @@ const LENS_RAYS: usize = 720;
 const DISC_FRAMES: [u32; 3] = [0, 8, 16];
 const HEXAGON_FRAMES: [u32; 1] = [0];
 
+/// Of the colours of the demonstration.
+const JPEG_QUALITY: u8 = 82;
+/// What the demonstration may lose by that.
+const LEAST_PSNR_DB: f64 = 34.0;
+/// What changes less in the demonstration, in parts of 255, stands still.
+const LEAST_CHANGE: u8 = 2;
+
 type Outcome = Result<(), Box<dyn Error>>;
 
 /// Renders a recording into its folder.
 type Make = fn(&mut Folder) -> Outcome;
 
 /// The recordings, and what makes each.
-const RECORDINGS: [(&str, Make); 2] = [("portrait", make_portrait), ("stereo", make_stereo)];
+const RECORDINGS: [(&str, Make); 3] = [("portrait", make_portrait), ("stereo", make_stereo), ("demo", make_demo)];
 
 fn main() -> ExitCode {
     let (mut check, mut only) = (false, None);
@@ -49,7 +59,7 @@ fn main() -> ExitCode {
             Some((name, _)) => only = Some(*name),
             None => {
                 eprintln!(
-                    "no option '{argument}': use --check, or none to write; and portrait or stereo for one alone"
+                    "no option '{argument}': use --check, or none to write; and portrait, stereo or demo for one alone"
                 );
                 return ExitCode::from(2);
             }
@@ -104,6 +114,81 @@ fn make_stereo(folder: &mut Folder) -> Outcome {
         writeln!(times, "{:.6}", time_s(frame))?;
     }
     folder.text("times.txt", &times)
+}
+
+/// The loop that is in the program: sheets as [`demo::Layout`] has them.
+fn make_demo(folder: &mut Folder) -> Outcome {
+    let (scene, view) = (Scene::portrait(), View::new(demo::SIZE_PX.0, demo::SIZE_PX.1));
+    let render = |frame: u32| {
+        let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
+        let time_s = f64::from(frame) / f64::from(demo::FRAMES_PER_SECOND);
+        scene.render_pinhole(&view, time_s, SAMPLES_PER_PIXEL, threads(), &mut picture, &mut map);
+        (picture, map)
+    };
+    if folder.check {
+        return check_demo(folder, render);
+    }
+    let frames: Vec<(Vec<u8>, Vec<u8>)> = (0..demo::FRAMES)
+        .map(render)
+        .map(|(picture, map)| (picture.rgb, map.metres.into_iter().map(demo::level).collect()))
+        .collect();
+    let (width, tile) = (demo::SIZE_PX.0 as usize, demo::TILE_PX as usize);
+    let moves: Vec<bool> = frames[0]
+        .1
+        .iter()
+        .enumerate()
+        .map(|(pixel, level)| {
+            let rgb = &frames[0].0[3 * pixel..][..3];
+            frames.iter().any(|(other, levels)| {
+                levels[pixel] != *level
+                    || rgb.iter().zip(&other[3 * pixel..]).any(|(a, b)| a.abs_diff(*b) > LEAST_CHANGE)
+            })
+        })
+        .collect();
+    let tiles: Vec<bool> = (0..demo::SIZE_PX.1 as usize / tile)
+        .flat_map(|row| (0..width / tile).map(move |column| [tile * row, tile * column]))
+        .map(|[y, x]| (y..y + tile).any(|y| moves[y * width + x..][..tile].contains(&true)))
+        .collect();
+    let layout = demo::Layout::new(tiles.iter().copied());
+    let size = (demo::SIZE_PX.0, layout.height_px());
+    let (mut rgb, mut levels) = frames[0].clone();
+    rgb.resize(3 * width * size.1 as usize, 0);
+    levels.resize(width * size.1 as usize, 0);
+    for (number, (picture, map)) in (0..).zip(&frames) {
+        for [to, from] in layout.runs(number) {
+            rgb[3 * to..3 * (to + tile)].copy_from_slice(&picture[3 * from..3 * (from + tile)]);
+            levels[to..to + tile].copy_from_slice(&map[from..from + tile]);
+        }
+    }
+    let tiles: Vec<u8> = tiles.into_iter().map(|moves| if moves { 255 } else { 0 }).collect();
+    let map_size = (demo::SIZE_PX.0 / demo::TILE_PX, demo::SIZE_PX.1 / demo::TILE_PX);
+    folder.encode("moving.png", &tiles, map_size, ExtendedColorType::L8)?;
+    folder.encode("depth.png", &levels, size, ExtendedColorType::L8)?;
+    let mut file = Vec::new();
+    JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY).write_image(
+        &rgb,
+        size.0,
+        size.1,
+        ExtendedColorType::Rgb8,
+    )?;
+    eprintln!("color.jpg: {} kB", file.len() / 1000);
+    Ok(fs::write(folder.root.join("color.jpg"), file)?)
+}
+
+/// Compares the demonstration, as it is played, with what is rendered.
+fn check_demo(folder: &mut Folder, render: impl Fn(u32) -> (ColorImage, DepthMap)) -> Outcome {
+    let mut camera = Demo::new(None)?;
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+    for frame in 0..demo::FRAMES {
+        camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right })?;
+        let (picture, map) = render(frame);
+        let squares = color.rgb.iter().zip(&picture.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
+        let psnr_db = 10.0 * (255.0f64.powi(2) * color.rgb.len() as f64 / squares.sum::<f64>()).log10();
+        let levels = |map: &DepthMap| map.metres.iter().map(|&z_m| i32::from(demo::level(z_m))).collect::<Vec<_>>();
+        let name = format!("frame {frame}, {psnr_db:.1} dB");
+        folder.compare(&name, psnr_db >= LEAST_PSNR_DB, levels(&depth).iter().zip(levels(&map)).map(|(a, b)| a - b));
+    }
+    Ok(())
 }
 
 fn frames(scene: &Scene) -> u32 {

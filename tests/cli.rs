@@ -81,11 +81,14 @@ fn the_version_is_the_packages() {
 
 #[test]
 fn wrong_arguments_cost_one_line_and_exit_code_2() {
-    let cases: [(&[&str], &str); 29] = [
-        (&["stream", "nowhere", "--to", "null"], "a folder with a recording, or synthetic"),
-        (&["stream", "Cargo.toml", "--to", "null"], "a folder with a recording, or synthetic"),
+    let cases: [(&[&str], &str); 32] = [
+        (&["stream", "nowhere", "--to", "null"], "a folder with a recording, demo or synthetic"),
+        (&["stream", "Cargo.toml", "--to", "null"], "a folder with a recording, demo or synthetic"),
         (&["stream", "synthetic", "--to", "film.avi"], "FILE.mp4"),
         (&["stream", "synthetic", "--to", "null", "--loop", "--frames", "1"], "--loop are for recordings"),
+        (&["stream", "demo", "--to", "null", "--start", "1", "--frames", "1"], "demo never ends"),
+        (&["stream", "demo", "--depth", "stereo", "--to", "null"], "has one eye"),
+        (&["stream", "demo", "--depth", "plate", "--to", "null"], "leave --depth out"),
         (&["stream", "synthetic", "--to", "null", "--f-number", "2"], "--sensor-width"),
         (&["stream", "synthetic", "--to", "null", "--size", "640"], "1280x720"),
         (&["stream", "synthetic", "--to", "null", "--depth", "none", "--effect", "dof"], "--effect blur"),

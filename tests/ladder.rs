@@ -113,7 +113,7 @@ fn scenes() -> [(&'static str, Frames); 2] {
         (color, map, recording.time_ns(frame))
     });
     let recorded = recorded.collect();
-    let format = Format { size: (640, 360), fps: 30.0, frames: None, threads: 2, cycle: None };
+    let format = Format { size: (640, 360), fps: 30.0, frames: None, threads: 2 };
     let mut camera = Synthetic::new(format).expect("a scene");
     let synthetic = (0..FRAMES).map(|_| {
         let (mut color, mut map) = (ColorImage::default(), DepthMap::default());

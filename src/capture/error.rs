@@ -30,6 +30,9 @@ pub enum CaptureError {
     /// A picture size or rate that no frame can have.
     #[error("a synthetic camera cannot make {width} x {height} pixels at {fps} frames per second")]
     Format { width: u32, height: u32, fps: f64 },
+    /// The demonstration, which is in the program, cannot be decoded.
+    #[error("demo: it cannot be decoded: {0}")]
+    Demo(String),
     /// Side by side needs two halves.
     #[error(
         "--side-by-side: the pictures of {source_name} are {width}x{height}; two eyes beside each other need an even width"

@@ -1,5 +1,6 @@
 //! Where frames come from.
 
+pub mod demo;
 mod error;
 #[cfg(feature = "camera")]
 pub mod pixels;

@@ -1,9 +1,5 @@
 //! The project's own scene as a camera, with exact depth.
 
-mod cycle;
-
-use cycle::Cycle;
-
 use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
 use crate::frame::Stamp;
 use crate::scene::{Scene, View};
@@ -19,19 +15,14 @@ pub struct Format {
     pub frames: Option<u64>,
     /// Threads that render, > 0.
     pub threads: usize,
-    /// Frames of the scene's motion (which repeats itself after [`Scene::period_s`]) that are rendered once and kept,
-    /// so that any machine plays them at the full rate; fewer where they would take more than 128 MiB. Which one is
-    /// shown when depends on how many are rendered yet. `None` renders every frame anew.
-    pub cycle: Option<u64>,
 }
 
-/// Renders a moving portrait.
+/// Renders a moving portrait, each frame when it is asked for.
 pub struct Synthetic {
     scene: Scene,
     view: View,
     format: Format,
     position: u64,
-    cycle: Option<Cycle>,
 }
 
 /// One ray per pixel: a camera has to keep pace.
@@ -50,20 +41,11 @@ impl Synthetic {
         if !sides.contains(&width) || !sides.contains(&height) || !(0.001..=1000.0).contains(&fps) {
             return Err(CaptureError::Format { width, height, fps });
         }
-        let (scene, view) = (Scene::portrait(), View::new(width, height));
-        let keep = |frames| Cycle::new(scene.clone(), view, frames, fps, format.threads.max(1));
-        Ok(Self { cycle: format.cycle.map(keep), scene, view, format, position: 0 })
+        Ok(Self { scene: Scene::portrait(), view: View::new(width, height), format, position: 0 })
     }
 
     fn time_ns(&self, position: u64) -> u64 {
         (position as f64 / self.format.fps * 1e9).round() as u64
-    }
-
-    fn advance(&mut self) {
-        self.position += 1;
-        if let Some(cycle) = &mut self.cycle {
-            cycle.advance();
-        }
     }
 
     fn at_end(&self) -> bool {
@@ -87,23 +69,17 @@ impl Camera for Synthetic {
         if self.at_end() {
             return Ok(Captured::End);
         }
-        match &mut self.cycle {
-            Some(cycle) => cycle.read(shot),
-            None => {
-                let time_s = self.position as f64 / self.format.fps;
-                let threads = self.format.threads.max(1);
-                self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, shot.color, shot.depth);
-            }
-        }
+        let (time_s, threads) = (self.position as f64 / self.format.fps, self.format.threads.max(1));
+        self.scene.render_pinhole(&self.view, time_s, SAMPLES_PER_PIXEL, threads, shot.color, shot.depth);
         let stamp = Stamp { index: self.position as usize, time_ns: self.time_ns(self.position), captured_ns: None };
-        self.advance();
+        self.position += 1;
         Ok(Captured::Frame(stamp))
     }
 
     fn skip(&mut self, until_ns: u64) -> u64 {
         let from = self.position;
         while !self.at_end() && self.time_ns(self.position) < until_ns {
-            self.advance();
+            self.position += 1;
         }
         self.position - from
     }

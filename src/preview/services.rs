@@ -36,7 +36,7 @@ pub trait Services: Send {
     /// The virtual cameras that can be written to now.
     fn virtual_cameras(&mut self) -> Vec<Choice>;
 
-    /// Opens a source; an empty name is the first camera there is, else the synthetic scene. With a plate, that is taken
+    /// Opens a source; an empty name is the first camera there is, else the demonstration. With a plate, that is taken
     /// at the start, and makes the depth.
     ///
     /// # Errors

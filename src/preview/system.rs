@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::services::{Opened, Services, SettingsStore, Switch};
 use crate::bokeh::{self, Backend, Bokeh};
+use crate::capture::demo;
 use crate::compute::device::Device;
 use crate::knob::Knob;
 use crate::look::{Effect, Look};
@@ -14,16 +15,16 @@ use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
 use crate::source::{self, DepthChoice, DepthFrom, Kind, OneCamera, Options, PlateFile, Source, SourceName};
 
-/// Shown when there is no camera, and the synthetic scene takes its place.
-const NO_CAMERA: &str = "No camera was found, so this is a scene of our own. `bokehcam devices` lists cameras, \
+/// Shown when there is no camera, and the demonstration takes its place.
+const NO_CAMERA: &str = "No camera was found, so this is a demonstration. `bokehcam devices` lists cameras, \
                          `bokehcam doctor` says what is missing.";
+/// Shown with the synthetic scene.
+const RENDERED: &str = "This scene is rendered while it plays, as fast as the machine can; `demo` plays smoothly.";
 /// Shown where a camera gives no depth, so that a portrait never comes.
 const NO_DEPTH: &str = "This camera has no depth, so a band of the picture stays sharp. A plate gives it a portrait (T), and \
                         so does a free network (`bokehcam models`).";
 /// Shown where the command line declines the depth that there is.
 const DECLINED: &str = "This source has depth, and --depth none declines it: leave that out for blur by depth.";
-/// The source that needs no camera.
-const SYNTHETIC: &str = "synthetic";
 
 /// Opens everything as the command line would.
 pub struct System {
@@ -70,11 +71,10 @@ impl System {
     fn open_source(&self, name: &str, with_plate: bool) -> Result<(Source, SourceName), String> {
         let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
         let mut options = self.options.clone();
-        options.cycle = true;
         if with_plate {
             options.depth_choice = DepthChoice::OneCamera(plate());
         }
-        // Only recordings repeat this way: the synthetic scene cycles.
+        // The others have no end.
         options.frames.repeat &= source_name.kind() == Kind::Recording;
         // The window may switch to an effect that needs depth later.
         let look = Look { effect: Effect::Auto, ..self.look.clone() };
@@ -91,10 +91,10 @@ fn plate() -> OneCamera {
 impl Services for System {
     fn sources(&mut self) -> Vec<Choice> {
         let mut sources = devices::cameras();
-        let is_other = |choice: &&Choice| choice.name != SYNTHETIC && !sources.contains(choice);
+        let is_other = |choice: &&Choice| choice.name != demo::NAME && !sources.contains(choice);
         let first = self.first.iter().find(is_other).cloned();
         sources.extend(first);
-        sources.push(Choice { name: SYNTHETIC.into(), label: "Synthetic scene".into() });
+        sources.push(Choice { name: demo::NAME.into(), label: "Demonstration".into() });
         sources
     }
 
@@ -109,7 +109,7 @@ impl Services for System {
             "" => first_camera.map_or_else(
                 || {
                     notes.push(NO_CAMERA.to_owned());
-                    SYNTHETIC.to_owned()
+                    demo::NAME.to_owned()
                 },
                 |camera| camera.name,
             ),
@@ -117,8 +117,10 @@ impl Services for System {
         };
         let (source, source_name) = self.open_source(&name, with_plate)?;
         notes.extend(source.networks.iter().map(|networks| format!("Depth by {networks}.")));
-        if source_name.kind() == Kind::Camera && !source.has_depth() {
-            notes.push(NO_DEPTH.to_owned());
+        match source_name.kind() {
+            Kind::Camera if !source.has_depth() => notes.push(NO_DEPTH.to_owned()),
+            Kind::Synthetic => notes.push(RENDERED.to_owned()),
+            _ => {}
         }
         let is_declined = self.options.depth_choice == DepthChoice::None && !with_plate;
         if is_declined && source.has_depth() {

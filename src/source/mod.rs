@@ -1,4 +1,4 @@
-//! Sources by name: a camera, two of them, a recording or the synthetic scene, with the depth that goes with it.
+//! Sources by name: a camera, two of them, a recording, the demonstration or the synthetic scene, with the depth that goes with it.
 //!
 //! The command line, the window and other programs open them in one way:
 //!
@@ -100,8 +100,6 @@ pub struct Options {
     pub computing: Computing,
     /// Faulty lines in a recording's frame lists become frames that fail, instead of an error on opening.
     pub keep_going: bool,
-    /// The synthetic scene repeats itself, so that it can be played smoothly.
-    pub cycle: bool,
 }
 
 /// What the caller of [`Source::open`] asked for.

@@ -1,4 +1,4 @@
-//! The names of sources, as users write them: cameras, folders of recordings, and `synthetic`.
+//! The names of sources, as users write them: cameras, folders of recordings, `demo` and `synthetic`.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -6,6 +6,10 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::{Frames, SourceError, near};
+use crate::capture::demo;
+
+/// What the synthetic scene is called.
+const SYNTHETIC: &str = "synthetic";
 
 /// What kind of source frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +18,8 @@ pub enum Kind {
     Camera,
     /// A folder with a recording.
     Recording,
+    /// The demonstration.
+    Demo,
     /// The synthetic scene.
     Synthetic,
 }
@@ -30,8 +36,10 @@ pub struct Named {
 /// Where frames come from, as it is written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SourceName {
-    /// The moving scene with known depth.
+    /// The moving scene with known depth, rendered frame by frame.
     Synthetic,
+    /// The demonstration: a loop of that scene, with its depth, that is in the program.
+    Demo,
     /// A folder with a recording.
     Folder(PathBuf),
     /// A camera.
@@ -58,7 +66,8 @@ fn looks_like_a_path(text: &str) -> bool {
 impl fmt::Display for SourceName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            SourceName::Synthetic => f.write_str("synthetic"),
+            SourceName::Synthetic => f.write_str(SYNTHETIC),
+            SourceName::Demo => f.write_str(demo::NAME),
             SourceName::Folder(folder) => folder.display().fmt(f),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => f.write_str(&camera.name),
@@ -71,8 +80,8 @@ impl fmt::Display for SourceName {
 /// What can be a source.
 fn sources() -> &'static str {
     match cfg!(feature = "camera") {
-        true => "a camera, two cameras LEFT,RIGHT, a folder with a recording, or synthetic",
-        false => "a folder with a recording, or synthetic",
+        true => "a camera, two cameras LEFT,RIGHT, a folder with a recording, demo or synthetic",
+        false => "a folder with a recording, demo or synthetic",
     }
 }
 
@@ -143,7 +152,8 @@ impl SourceName {
     pub fn from_os(name: &OsStr) -> Result<Self, String> {
         let path = Path::new(name);
         match name.to_str() {
-            Some("synthetic") => Ok(SourceName::Synthetic),
+            Some(SYNTHETIC) => Ok(SourceName::Synthetic),
+            Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() => Err(format!("it is no folder: use {}", sources())),
             Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
@@ -156,6 +166,7 @@ impl SourceName {
     pub fn kind(&self) -> Kind {
         match self {
             SourceName::Synthetic => Kind::Synthetic,
+            SourceName::Demo => Kind::Demo,
             SourceName::Folder(_) => Kind::Recording,
             #[cfg(feature = "camera")]
             SourceName::Camera(_) | SourceName::Cameras(_) => Kind::Camera,
@@ -169,7 +180,8 @@ impl SourceName {
     pub fn check(&self, frames: &Frames) -> Result<(), SourceError> {
         let what = match self {
             SourceName::Folder(_) => return Ok(()),
-            SourceName::Synthetic => "synthetic",
+            SourceName::Synthetic => SYNTHETIC,
+            SourceName::Demo => demo::NAME,
             #[cfg(feature = "camera")]
             SourceName::Camera(_) | SourceName::Cameras(_) => "a camera",
         };
@@ -192,7 +204,7 @@ impl SourceName {
     /// The device nodes of its cameras.
     pub fn devices(&self) -> Vec<&Path> {
         match self {
-            SourceName::Synthetic | SourceName::Folder(_) => Vec::new(),
+            SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) => Vec::new(),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => vec![&camera.node],
             #[cfg(feature = "camera")]

@@ -6,6 +6,7 @@ use super::{DepthFrom, Options, SourceError, SourceName, Wanted};
 #[cfg(feature = "camera")]
 use super::{Frames, name};
 use crate::capture::Camera;
+use crate::capture::demo::Demo;
 use crate::capture::replay::{Part, Replay};
 use crate::capture::synthetic::{Format, Synthetic};
 #[cfg(feature = "camera")]
@@ -19,7 +20,6 @@ use crate::depth::DepthSource;
 use crate::depth::recorded::Recorded;
 use crate::frame::DepthMap;
 use crate::recording::{Pair, Recording};
-use crate::scene::Scene;
 #[cfg(feature = "camera")]
 use crate::v4l2::{layout::Content, live::Wish};
 
@@ -56,16 +56,10 @@ impl Opened {
             SourceName::Synthetic => {
                 let size = frames.size.map_or(SYNTHETIC_SIZE, |size| (size.width, size.height));
                 let fps = frames.fps.unwrap_or(SYNTHETIC_FPS);
-                let camera = Synthetic::new(Format {
-                    size,
-                    fps,
-                    frames: frames.frames,
-                    threads: cores(),
-                    // After so many frames the scene is where it began.
-                    cycle: wanted.options.cycle.then(|| (Scene::portrait().period_s() * fps) as u64),
-                })?;
+                let camera = Synthetic::new(Format { size, fps, frames: frames.frames, threads: cores() })?;
                 Ok(without_depth(Box::new(camera)))
             }
+            SourceName::Demo => Ok(without_depth(Box::new(Demo::new(frames.frames)?))),
             SourceName::Folder(folder) => {
                 let recording = Arc::new(Recording::open(folder, &wanted.reading())?);
                 let name = folder.display().to_string();

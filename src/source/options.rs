@@ -44,7 +44,7 @@ pub struct Frames {
     /// Stop after this many frames
     #[arg(long, value_name = "N", value_parser = RangedI64ValueParser::<u64>::new().range(1..))]
     pub frames: Option<u64>,
-    /// Picture size; of a camera, the nearest that it has [default: 1280x720 of a camera, 640x480 of `synthetic`]
+    /// Picture size; of a camera, the nearest that it has [default: 1280x720 of a camera, 640x480 of `synthetic`; `demo` has its own]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
     /// Frames per second; of a camera, the nearest that it has [default: 30]

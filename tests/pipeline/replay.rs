@@ -1,10 +1,11 @@
-//! Recordings and the synthetic scene as cameras.
+//! Recordings, the demonstration and the synthetic scene as cameras.
 
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use bokehcam::capture::demo::{self, Demo};
 use bokehcam::capture::replay::{Part, Replay};
 use bokehcam::capture::synthetic::{Format, Synthetic};
 use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot};
@@ -15,6 +16,7 @@ use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::pipeline::{Pace, Run, run};
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::recording::{Options, Recording};
+use bokehcam::scene::{Scene, View};
 use bokehcam::sink::{Sink, Target};
 
 use crate::fakes::*;
@@ -240,33 +242,8 @@ fn asap_twice_gives_identical_files() {
 }
 
 #[test]
-fn a_kept_synthetic_scene_has_the_same_times_and_end() {
-    let format = Format { size: (48, 27), fps: 12.5, frames: Some(9), threads: 1, cycle: Some(5) };
-    let (mut kept, mut anew) =
-        (Synthetic::new(format).unwrap(), Synthetic::new(Format { cycle: None, ..format }).unwrap());
-    assert_eq!(kept.info(), anew.info());
-    let stamp = |camera: &mut Synthetic| {
-        let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
-        match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
-            Captured::Frame(stamp) => {
-                assert_eq!((color.size(), depth.size()), ((48, 27), (48, 27)));
-                Some((stamp, color))
-            }
-            Captured::End => None,
-            other => panic!("{other:?}"),
-        }
-    };
-    assert_eq!(stamp(&mut kept), stamp(&mut anew), "the first frame is the scene's first");
-    assert_eq!((kept.skip(300_000_000), anew.skip(300_000_000)), (3, 3));
-    for _ in 4..10 {
-        assert_eq!(stamp(&mut kept).map(|(stamp, _)| stamp), stamp(&mut anew).map(|(stamp, _)| stamp));
-    }
-    assert!(stamp(&mut kept).is_none());
-}
-
-#[test]
 fn the_synthetic_camera_knows_its_depth() {
-    let format = Format { size: (48, 27), fps: 12.5, frames: Some(3), threads: 1, cycle: None };
+    let format = Format { size: (48, 27), fps: 12.5, frames: Some(3), threads: 1 };
     let mut camera = Synthetic::new(format).unwrap();
     let info = camera.info();
     assert_eq!((info.size, info.period_ns, info.frames), ((48, 27), 80_000_000, Some(3)));
@@ -288,4 +265,65 @@ fn the_synthetic_camera_knows_its_depth() {
     for (size, fps) in [((0, 9), 30.0), ((9, 9000), 30.0), ((9, 9), 0.0), ((9, 9), f64::NAN)] {
         assert!(matches!(Synthetic::new(Format { size, fps, ..format }), Err(CaptureError::Format { .. })));
     }
+}
+
+/// The next frames of the demonstration, as many as come.
+fn demonstrated(camera: &mut Demo, most: usize) -> Vec<(Stamp, ColorImage, DepthMap)> {
+    let mut frames = Vec::new();
+    while frames.len() < most {
+        let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+        match camera.next(Shot { color: &mut color, depth: &mut depth, right: &mut right }).unwrap() {
+            Captured::Frame(stamp) => frames.push((stamp, color, depth)),
+            Captured::End => break,
+            other => panic!("{other:?}"),
+        }
+    }
+    frames
+}
+
+/// The mean square of the differences of two pictures.
+fn apart(a: &ColorImage, b: &ColorImage) -> f64 {
+    let squares = a.rgb.iter().zip(&b.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
+    squares.sum::<f64>() / a.rgb.len() as f64
+}
+
+#[test]
+fn the_demonstration_is_the_rendered_scene_as_nearly_as_it_is_coded() {
+    let (scene, view) = (Scene::portrait(), View::new(demo::SIZE_PX.0, demo::SIZE_PX.1));
+    let frames = demonstrated(&mut Demo::new(None).unwrap(), demo::FRAMES as usize);
+    let (mut picture, mut map) = (ColorImage::default(), DepthMap::default());
+    for index in [0, 29] {
+        let time_s = index as f64 / f64::from(demo::FRAMES_PER_SECOND);
+        scene.render_pinhole(&view, time_s, 16, 2, &mut picture, &mut map);
+        let (_, color, depth) = &frames[index];
+        let psnr_db = 10.0 * (255.0f64.powi(2) / apart(color, &picture)).log10();
+        assert!(psnr_db > 34.0, "frame {index}: {psnr_db} dB");
+        // Half a level; the mathematical functions of another machine may send a ray past an edge.
+        let is_off = |(a, b): &(&f32, &f32)| (a.recip() - b.recip()).abs() > 0.0044;
+        let off = depth.metres.iter().zip(&map.metres).filter(is_off).count();
+        assert!(off * 1000 <= map.metres.len(), "frame {index}: {off} depths");
+    }
+}
+
+#[test]
+fn the_demonstration_goes_round_without_a_jump_until_its_end() {
+    let mut camera = Demo::new(None).unwrap();
+    let info = camera.info();
+    assert_eq!((info.size, info.period_ns, info.frames), (demo::SIZE_PX, 41_666_667, None));
+    assert!(info.brings == Brings::Depth && !info.live);
+    let lap = demo::FRAMES as usize;
+    let frames = demonstrated(&mut camera, lap + 1);
+    assert!(frames.iter().zip(0..).all(|((stamp, ..), index)| stamp.index == index));
+    assert_eq!(frames[lap].0.time_ns, 2_000_000_000);
+    assert!(frames[lap].1 == frames[0].1 && frames[lap].2 == frames[0].2, "it begins again");
+    let steps: Vec<f64> = frames.windows(2).map(|pair| apart(&pair[0].1, &pair[1].1)).collect();
+    let most = steps[..lap - 1].iter().copied().fold(0.0, f64::max);
+    assert!(steps.iter().all(|step| *step > 0.2 * most) && steps[lap - 1] <= most, "even steps: {steps:?}");
+    // Two that are read, some that are passed over, and the end.
+    let mut camera = Demo::new(Some(9)).unwrap();
+    assert_eq!(demonstrated(&mut camera, 2).len(), 2);
+    assert_eq!(camera.skip(200_000_000), 3);
+    let rest = demonstrated(&mut camera, 100);
+    assert_eq!(rest.len(), 4);
+    assert!(rest[0].1 == frames[5].1 && rest[0].2 == frames[5].2);
 }

@@ -76,7 +76,7 @@ impl Services for Small {
         let width =
             name.split(' ').next().and_then(|width| width.parse().ok()).ok_or(format!("no such source: {name}"))?;
         let frames = name.ends_with("no more").then_some(2);
-        let format = Format { size: (width, 18), fps: 60.0, frames, threads: 1, cycle: None };
+        let format = Format { size: (width, 18), fps: 60.0, frames, threads: 1 };
         let scene = Synthetic::new(format).map_err(|error| error.to_string())?;
         let camera: Box<dyn Camera> = if with_plate { Box::new(Plain(scene)) } else { Box::new(scene) };
         let (name, notes, controls) = (name.to_owned(), vec!["a note".to_owned()], Vec::new());

@@ -8,7 +8,7 @@ use super::screen::Screen;
 #[ignore = "needs an X server"]
 fn a_first_picture_comes_and_closing_ends_it_well() {
     let screen = Screen::new();
-    for source in ["synthetic", PORTRAIT] {
+    for source in ["demo", PORTRAIT] {
         let mut program = Program::start(&screen, &[source]);
         let window = program.window();
         window.until("the first picture", is_photograph);

@@ -30,7 +30,7 @@ Examples:
   bokehcam record synthetic --frames 90 --size 320x240 --to recordings/mine
   bokehcam record somewhere/rgbd --depth-scale 1000 --start 2 --end 5 --to excerpt")]
 pub struct RecordCommand {
-    /// A camera, two cameras LEFT,RIGHT, a folder with a recording, or `synthetic`
+    /// A camera, two cameras LEFT,RIGHT, a folder with a recording, `demo` or `synthetic`
     #[arg(value_parser = options::source_name())]
     source: SourceName,
     /// Folder for the recording

@@ -23,7 +23,7 @@ use crate::pipeline::{self, Pace, Run};
 use crate::sink::{self, Target};
 use crate::source::{DepthFrom, Source, SourceName};
 
-/// Blur a camera, a recording or the synthetic scene, frame by frame
+/// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -39,7 +39,7 @@ Examples:
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
-    /// folder with a recording, or `synthetic`
+    /// folder with a recording, `demo` (the demonstration) or `synthetic` (a scene, rendered frame by frame)
     #[arg(value_parser = options::source_name())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]

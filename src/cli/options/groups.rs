@@ -47,7 +47,6 @@ impl Streaming {
             depth_choice: self.blur.depth.clone(),
             computing: self.computing.choice(),
             keep_going: self.stream.keep_going,
-            cycle: false,
         }
     }
 }

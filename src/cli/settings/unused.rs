@@ -44,7 +44,11 @@ type Why = fn(&Run) -> Option<&'static str>;
 
 /// What settings need to have an effect. The first two rows depend on the source alone: `warn_by_source` takes these.
 const NEEDS: [(&[&str], Why); 17] = [
-    (&["size", "fps"], |run| (run.source == From::Source(Kind::Recording)).then_some("a recording has its own")),
+    (&["size", "fps"], |run| match run.source {
+        From::Source(Kind::Recording) => Some("a recording has its own"),
+        From::Source(Kind::Demo) => Some("the demonstration has its own"),
+        _ => None,
+    }),
     (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
     (&["depth-scale", "depth-invalid"], |run| match run.depth {
         DepthFrom::Nothing => Some(NO_DEPTH),
@@ -234,6 +238,8 @@ mod tests {
         assert!(why("tilt", &dof).is_some() && why("tilt", &Run { effect: Effect::TiltShift, ..RUN }).is_none());
         assert!(why("budget-ms", &dof).is_some() && why("budget-ms", &Run { realtime: true, ..dof }).is_none());
         assert!(why("rim", &Run { effect: Effect::None, ..dof }).is_some() && why("rim", &dof).is_none());
-        assert!(why("fps", &Run { source: From::Source(Kind::Recording), ..dof }).is_some());
+        for kind in [Kind::Recording, Kind::Demo] {
+            assert!(why("fps", &Run { source: From::Source(kind), ..dof }).is_some());
+        }
     }
 }

@@ -15,6 +15,9 @@ const PER_LETTER_S: f64 = 0.05;
 const FADES_S: f64 = 0.4;
 /// The most notes that are shown at once.
 const MOST: usize = 3;
+/// What the source is when it is no camera and no recording.
+const DEMONSTRATION: &str =
+    "A demonstration. For a camera: bokehcam devices lists them, bokehcam doctor says what is missing.";
 
 /// When notes were first shown.
 #[derive(Default)]
@@ -26,7 +29,8 @@ pub struct Ages {
 impl Ages {
     /// Draws, upwards from the bottom of the window: the banner, the failure of an output, and the notes.
     pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) {
-        let mut bottom = GAP + banner(ctx, state, actions);
+        let mut bottom = GAP + demonstration(ctx, state);
+        bottom += banner(ctx, state, bottom, actions);
         bottom += trouble(ctx, state, bottom, actions);
         bottom += plate::offer(ctx, state, bottom, actions);
         let now_s = ctx.input(|input| input.time);
@@ -69,6 +73,22 @@ impl Ages {
     }
 }
 
+/// Draws that the source is the demonstration, for as long as it is. Its height.
+fn demonstration(ctx: &Context, state: &State) -> f32 {
+    if !state.is_demonstration() || state.bare {
+        return 0.0;
+    }
+    let area = Area::new(Id::unique("demonstration")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -GAP));
+    let drawn = area.order(Order::Middle).interactable(false).fade_in(false).show(ctx, |ui| {
+        ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 620.0));
+        let colors = Colors::here(ui);
+        card(&colors).inner_margin(egui::Margin::symmetric(14, 6)).show(ui, |ui| {
+            ui.add(Label::new(RichText::new(DEMONSTRATION).color(colors.text)).wrap());
+        });
+    });
+    drawn.response.rect.height() + 6.0
+}
+
 /// Draws why an output failed, `bottom` points above the window's edge, until that is dismissed. Its height.
 fn trouble(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) -> f32 {
     let Some(why) = &state.trouble else { return 0.0 };
@@ -88,9 +108,9 @@ fn trouble(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>)
     drawn.response.rect.height() + 6.0
 }
 
-/// Draws why the source gives no frames and a button to try again: at the bottom, clear of the picture's middle. Its
-/// height, 0 while frames come.
-fn banner(ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
+/// Draws why the source gives no frames and a button to try again, `bottom` points above the window's edge: clear of the
+/// picture's middle. Its height, 0 while frames come.
+fn banner(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) -> f32 {
     let silent;
     let (title, why, button) = match &state.source {
         Source::Running(running) => {
@@ -102,7 +122,7 @@ fn banner(ctx: &Context, state: &State, actions: &mut Vec<Action>) -> f32 {
         Source::Lost(why) => ("No picture", why.as_str(), Some("Try again")),
         Source::Ended => ("The end", "The recording is over.", Some("Play again")),
     };
-    let area = Area::new(Id::unique("banner")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -GAP)).order(Order::Middle);
+    let area = Area::new(Id::unique("banner")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom)).order(Order::Middle);
     let drawn = area.fade_in(false).show(ctx, |ui| {
         let colors = Colors::here(ui);
         ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 360.0));

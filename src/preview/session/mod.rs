@@ -38,7 +38,7 @@ pub struct Start {
     /// Opens sources and outputs, and makes executors.
     pub services: Box<dyn Services>,
     pub look: Look,
-    /// The source; empty for the first camera there is, else the synthetic scene.
+    /// The source; empty for the first camera there is, else the demonstration.
     pub source: String,
     /// Outputs to start together with the source.
     pub outputs: Vec<Output>,

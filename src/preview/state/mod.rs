@@ -22,6 +22,7 @@ pub use history::History;
 use super::meters::Meters;
 use super::views::Legend;
 pub use super::views::Shown;
+use crate::capture::demo;
 use crate::depth::plate::Step;
 use crate::knob::Knob;
 use crate::look::Look;
@@ -206,6 +207,11 @@ impl State {
             self.note(PLATE_TAKEN);
         }
         before != step
+    }
+
+    /// Whether the source is the demonstration.
+    pub fn is_demonstration(&self) -> bool {
+        matches!(&self.source, Source::Running(running) if running.name == demo::NAME)
     }
 
     /// Whether a plate can be taken, and whether that is the way to a portrait.

@@ -29,22 +29,23 @@ use crate::source::{self, SourceName};
 
 use store::FileStore;
 
-/// Show a camera, a recording or the synthetic scene in portrait mode, live, and find a look
+/// Show a camera, a recording or the demonstration in portrait mode, live, and find a look
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  bokehcam preview                          the first camera there is
+  bokehcam preview                          the first camera there is, else the demonstration
   bokehcam preview 0 --mirror --to /dev/video10
   bokehcam preview 0,2 --calib stereo.yml
   bokehcam preview recordings/portrait --preset cinematic
   bokehcam preview recordings/portrait --split 0.5 --highlights 12
-  bokehcam preview synthetic --full-screen
+  bokehcam preview demo --full-screen
 
 In the window, F1 shows all keys. Click to focus there, double-click to follow the subject. What the window sets can be
 copied as a command (K). A recording is played in a loop.")]
 pub struct PreviewCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
-    /// folder with a recording, or `synthetic` [default: the first camera there is]
+    /// folder with a recording, `demo` (the demonstration) or `synthetic` (rendered while it plays)
+    /// [default: the first camera there is, else `demo`]
     source: Option<String>,
     /// Also write to /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or .webm from the start;
     /// may be given more than once

@@ -1,6 +1,6 @@
-//! The plate: offered where it is the way to a portrait, and what to do while it is taken.
+//! What is said of the source at the bottom: the plate, and that it is a demonstration.
 
-use super::super::super::state::{State, sample};
+use super::super::super::state::{Source, State, sample};
 use super::Window;
 use crate::depth::plate::Step;
 
@@ -21,4 +21,18 @@ fn a_lone_camera_is_offered_a_plate_and_what_to_do_for_it_is_shown() {
     let unlike = texts(&|state| state.plate = Some(Step::Unlike));
     assert!(unlike.contains("Take another plate"), "{unlike}");
     assert!(!texts(&|state| state.plate = Some(Step::Ready)).contains("Step out"));
+}
+
+#[test]
+fn that_it_is_a_demonstration_is_said_for_as_long_as_it_is() {
+    let mut window = Window::new();
+    let says = |window: &mut Window| window.texts().iter().any(|text| text.contains("bokehcam doctor"));
+    assert!(!says(&mut window));
+    let Source::Running(running) = &mut window.state.source else { panic!("it runs") };
+    running.name = "demo".into();
+    window.wait(60.0);
+    assert!(says(&mut window));
+    window.state.bare = true;
+    window.pass(Vec::new());
+    assert!(!says(&mut window), "nothing but the picture");
 }
