@@ -13,5 +13,6 @@ pub mod services;
 pub mod session;
 pub mod state;
 pub mod system;
+pub mod texts;
 pub mod views;
 pub mod window;

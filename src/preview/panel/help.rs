@@ -7,6 +7,7 @@ use super::keys::{GROUPS, Group};
 use super::parts::switch;
 use super::state::{Action, State};
 use super::theme::{Colors, GAP, PAD, card, medium};
+use crate::preview::texts::tr;
 
 const GESTURES: [(&str, &str); 6] = [
     ("Click", "focus there"),
@@ -30,7 +31,7 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     let drawn = Modal::new(Id::unique("help")).frame(frame).show(ctx, |ui| {
         ui.set_width(width);
         ui.horizontal(|ui| {
-            ui.heading("Keys and gestures");
+            ui.heading(tr("Keys and gestures"));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if icons::button(ui, Icon::Close, "Close (Esc)", true) {
                     actions.push(Action::Help(false));
@@ -84,11 +85,11 @@ fn table<'a>(ui: &mut Ui, name: &str, rows: impl Iterator<Item = (&'a str, &'a s
     let colors = Colors::here(ui);
     ui.spacing_mut().interact_size.y = 17.0;
     ui.add_space(8.0);
-    ui.label(RichText::new(name).family(medium()).color(colors.accent));
+    ui.label(RichText::new(tr(name)).family(medium()).color(colors.accent));
     Grid::new(name).num_columns(2).spacing(vec2(12.0, 4.0)).min_col_width(104.0).show(ui, |ui| {
         for (keys, does) in rows {
-            ui.label(RichText::new(keys).family(medium()));
-            ui.add(Label::new(RichText::new(does).color(colors.weak)).wrap());
+            ui.label(RichText::new(tr(keys)).family(medium()));
+            ui.add(Label::new(RichText::new(tr(does)).color(colors.weak)).wrap());
             ui.end_row();
         }
     });

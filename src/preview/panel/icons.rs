@@ -8,6 +8,7 @@ use egui::{
 use egui::{Role, vec2};
 
 use super::theme::Colors;
+use crate::preview::texts::tr;
 
 /// Side of an icon button, in points.
 pub const SIDE: f32 = 26.0;
@@ -30,6 +31,7 @@ pub enum Icon {
 /// Draws an icon button. Whether it was clicked.
 pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     let colors = Colors::here(ui);
+    let hint = tr(hint);
     let sense = if enabled { Sense::click() } else { Sense::hover() };
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), sense);
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, hint));

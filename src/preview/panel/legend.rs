@@ -5,6 +5,7 @@ use egui::{Align2, Color32, FontFamily, FontId, Mesh, Painter, Rect, Shape, Stro
 use super::state::State;
 use super::theme::{Colors, GAP, PAD, card};
 use super::views::{BIN_COLORS, Legend, depth_share, diverging, perceptual};
+use crate::preview::texts::{tr, tr_with};
 
 const WIDTH: f32 = 260.0;
 /// Height of a bar of colours.
@@ -32,6 +33,7 @@ pub fn show(ui: &Ui, state: &State) {
     painter.add(card(&colors).paint(rect.shrink(PAD)));
     let inner = rect.shrink2(vec2(16.0, 10.0));
     let title = |text: &str| {
+        let text = tr(text);
         let font = FontId::new(12.5, super::theme::medium());
         painter.text(inner.left_top(), Align2::LEFT_TOP, text, font, colors.text);
     };
@@ -49,7 +51,9 @@ pub fn show(ui: &Ui, state: &State) {
             title("Circle of confusion: radius in pixels");
             ramp(painter, bar, |share| diverging(2.0 * share - 1.0));
             hatch(painter, Rect::from_min_max(bar.min, bar.center_bottom()));
-            let labels = [format!("{most_px:.0} in front"), "0".to_owned(), format!("{most_px:.0} behind")];
+            let most = format!("{most_px:.0}");
+            let [in_front, behind] = ["{} in front", "{} behind"].map(|text| tr_with(text, &[&most]));
+            let labels = [in_front, "0".to_owned(), behind];
             for (label, side) in labels.iter().zip([-1.0, 0.0, 1.0]) {
                 tick(painter, &colors, bar, bar.center().x + side * bar.width() / 2.0, label);
             }

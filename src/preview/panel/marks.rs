@@ -8,6 +8,7 @@ use super::place::Place;
 use super::state::tweak::turned;
 use super::theme::{ON_PICTURE, SHADE, medium};
 use crate::look::Tilt;
+use crate::preview::texts::tr;
 
 /// A mark can be grabbed this near to it, in points.
 const HOLD: f32 = 16.0;
@@ -76,8 +77,8 @@ pub fn split(painter: &Painter, place: &Place, at: f32, held: bool) {
         let points = vec![tip + vec2(side * -3.5, -4.0), tip, tip + vec2(side * -3.5, 4.0)];
         painter.add(Shape::line(points, Stroke::new(1.8, egui::Color32::from_gray(40))));
     }
-    label(painter, pos2(x - 12.0, rect.top() + 14.0), Align2::RIGHT_TOP, "Before");
-    label(painter, pos2(x + 12.0, rect.top() + 14.0), Align2::LEFT_TOP, "After");
+    label(painter, pos2(x - 12.0, rect.top() + 14.0), Align2::RIGHT_TOP, tr("Before"));
+    label(painter, pos2(x + 12.0, rect.top() + 14.0), Align2::LEFT_TOP, tr("After"));
 }
 
 /// A word on the picture, on a dark field.

@@ -8,6 +8,7 @@ use egui::{
 };
 
 use super::theme::{Colors, ROW, medium};
+use crate::preview::texts::{tr, tr_with};
 
 /// A control for a number.
 pub struct Number<'a> {
@@ -28,6 +29,7 @@ pub struct Number<'a> {
 /// Draws a name, a number to drag or type, and a slider under them. Whether the number was changed.
 pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
     let Number { label, hint, range, ratios, digits, around: [before, after] } = how;
+    let (label, hint) = (tr(label), tr(hint));
     let mut changed = false;
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
@@ -101,10 +103,8 @@ fn say_range(
     let (least, most) = (f64::from(*range.start()), f64::from(*range.end()));
     if number < least - half || number > most + half {
         let taken = if number < least { least } else { most };
-        let line = format!(
-            "{label} goes from {before}{least:.digits$}{after} to {before}{most:.digits$}{after}: {before}{taken:.digits$}\
-             {after} was taken."
-        );
+        let [least, most, taken] = [least, most, taken].map(|number| format!("{before}{number:.digits$}{after}"));
+        let line = tr_with("{} goes from {} to {}: {} was taken.", &[&label, &least, &most, &taken]);
         ctx.data_mut(|data| data.insert_temp(said(), line));
     }
 }
@@ -123,11 +123,12 @@ pub fn choose(
     can: impl Fn(usize) -> bool,
 ) -> Option<usize> {
     let colors = Colors::here(ui);
+    let what = tr(what);
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW), Sense::hover());
     ui.painter().rect_filled(rect, CornerRadius::same(7), colors.field);
     let cell_width = rect.width() / options.len().max(1) as f32;
     let mut clicked = None;
-    for (index, (name, hint)) in options.iter().enumerate() {
+    for (index, (name, hint)) in options.iter().map(|(name, hint)| (tr(name), tr(hint))).enumerate() {
         let left = rect.left() + cell_width * index as f32;
         let cell = Rect::from_min_size(pos2(left, rect.top()), Vec2::new(cell_width, ROW));
         let (is_chosen, is_possible) = (index == chosen, can(index));
@@ -150,7 +151,7 @@ pub fn choose(
         let family = if is_chosen { medium() } else { egui::FontFamily::Proportional };
         let font = FontId::new(12.5, family);
         ui.painter().with_clip_rect(cell).text(inner.center(), Align2::CENTER_CENTER, name, font, text);
-        if response.on_hover_text(*hint).clicked() {
+        if response.on_hover_text(hint).clicked() {
             clicked = Some(index);
         }
     }
@@ -160,6 +161,7 @@ pub fn choose(
 /// Draws a name and a switch. Whether it was clicked.
 pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     let colors = Colors::here(ui);
+    let (label, hint) = (tr(label), tr(hint));
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::Switch, ui.is_enabled(), on, label));
     let track = Rect::from_center_size(pos2(rect.right() - 17.0, rect.center().y), Vec2::new(32.0, 18.0));
@@ -181,7 +183,7 @@ pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
 /// A line of explanation.
 pub fn remark(ui: &mut Ui, text: &str) {
     let colors = Colors::here(ui);
-    ui.label(RichText::new(text).text_style(TextStyle::Small).color(colors.weak));
+    ui.label(RichText::new(tr(text)).text_style(TextStyle::Small).color(colors.weak));
 }
 
 /// A path, of which the end says which file it is: a long one is cut at its beginning.
@@ -198,7 +200,7 @@ pub fn path(ui: &mut Ui, path: &str) {
 pub fn section(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui)) -> bool {
     let colors = Colors::here(ui);
     ui.add_space(4.0);
-    let title = RichText::new(name).family(medium()).size(13.5).color(colors.text);
+    let title = RichText::new(tr(name)).family(medium()).size(13.5).color(colors.text);
     let header = egui::CollapsingHeader::new(title).id_salt(name).open(Some(open)).icon(super::icons::chevron);
     let folded = header.show_unindented(ui, |ui| {
         ui.add_space(2.0);

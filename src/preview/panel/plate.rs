@@ -5,6 +5,7 @@ use egui::{Align2, Area, Context, Id, Label, Order, ProgressBar, RichText, Ui, v
 use super::state::{Action, State};
 use super::theme::{Colors, GAP, card, medium};
 use crate::depth::plate::Step;
+use crate::preview::texts::tr;
 
 const WIDTH: f32 = 420.0;
 
@@ -17,16 +18,16 @@ pub fn offer(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action
     let area = Area::new(Id::unique("plate offer")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom));
     let drawn = area.order(Order::Middle).fade_in(false).show(ctx, |ui| {
         framed(ui, |ui, colors| {
-            ui.label(RichText::new("A portrait from this camera alone").family(medium()).size(16.0));
+            ui.label(RichText::new(tr("A portrait from this camera alone")).family(medium()).size(16.0));
             let text = "Step out of the picture for four seconds: what is behind you is then known, and blurred. The camera has \
                         to stand still.";
-            ui.add(Label::new(RichText::new(text).color(colors.text)).wrap());
+            ui.add(Label::new(RichText::new(tr(text)).color(colors.text)).wrap());
             ui.add_space(2.0);
             ui.horizontal(|ui| {
-                if ui.button("Take a plate").on_hover_text("T").clicked() {
+                if ui.button(tr("Take a plate")).on_hover_text("T").clicked() {
                     actions.push(Action::TakePlate);
                 }
-                if ui.button("Not now").clicked() {
+                if ui.button(tr("Not now")).clicked() {
                     actions.push(Action::DeclinePlate);
                 }
             });
@@ -54,7 +55,7 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     area.fade_in(false).show(ctx, |ui| {
         framed(ui, |ui, colors| {
             ui.vertical_centered(|ui| {
-                ui.label(RichText::new(title).family(medium()).size(22.0));
+                ui.label(RichText::new(tr(title)).family(medium()).size(22.0));
                 match step {
                     Step::StepOut(seconds) => {
                         ui.label(RichText::new(seconds.to_string()).family(medium()).size(72.0));
@@ -65,9 +66,9 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
                     _ => {}
                 }
                 if !why.is_empty() {
-                    ui.add(Label::new(RichText::new(why).color(colors.text)).wrap());
+                    ui.add(Label::new(RichText::new(tr(why)).color(colors.text)).wrap());
                 }
-                if step == Step::Unlike && ui.button("Take another plate").on_hover_text("T").clicked() {
+                if step == Step::Unlike && ui.button(tr("Take another plate")).on_hover_text("T").clicked() {
                     actions.push(Action::TakePlate);
                 }
             });

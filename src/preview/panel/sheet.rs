@@ -6,6 +6,7 @@ use super::icons::{self, Icon};
 use super::sections::{self, Editing, Sheet, Thumbs};
 use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD, WIDTH};
+use crate::preview::texts::{tr, tr_with};
 
 /// What the panel remembers.
 #[derive(Default)]
@@ -118,13 +119,13 @@ fn status(ui: &mut Ui, state: &State) {
     }
     let focused = state.look.effect.follows_depth();
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {
-        parts.push(format!("focused at {metres:.2} m"));
+        parts.push(tr_with("focused at {} m", &[&format!("{metres:.2}")]));
     }
     let text = match &state.source {
         Source::Running(_) => parts.join(", "),
-        Source::Opening => "Opening…".to_owned(),
-        Source::Lost(_) => "No picture".to_owned(),
-        Source::Ended => "The recording is over".to_owned(),
+        Source::Opening => tr("Opening…").to_owned(),
+        Source::Lost(_) => tr("No picture").to_owned(),
+        Source::Ended => tr("The recording is over").to_owned(),
     };
     let text = egui::RichText::new(text).text_style(egui::TextStyle::Small).color(colors.weak);
     ui.add(egui::Label::new(text).truncate());
@@ -134,7 +135,7 @@ fn status(ui: &mut Ui, state: &State) {
 fn header(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        ui.heading("Look");
+        ui.heading(tr("Look"));
         let (undo, redo) = state.history.can();
         let buttons = [
             (Icon::Undo, "Undo (Ctrl+Z)", undo, Action::Undo),

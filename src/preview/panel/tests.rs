@@ -9,6 +9,7 @@ mod plate;
 mod presets;
 mod sections;
 mod sizes;
+mod texts;
 
 use egui::{Event, FullOutput, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2, pos2};
 

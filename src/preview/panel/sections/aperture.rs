@@ -9,6 +9,7 @@ use super::Sheet;
 use crate::bokeh::aperture::{Aperture, Shape};
 use crate::preview::panel::parts::{Number, number};
 use crate::preview::panel::theme::Colors;
+use crate::preview::texts::tr;
 
 /// Cells of a mask, and pixels of the picture of it: the window may be drawn without smoothing.
 const CELLS: usize = 28;
@@ -68,16 +69,16 @@ fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
     let mut picked = None;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        for (index, name) in SHAPES.iter().enumerate() {
+        for (index, name) in SHAPES.iter().map(|name| tr(name)).enumerate() {
             let Some(shape) = shape_at(index, &sheet.look) else { continue };
             let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::click());
             let is_chosen = index == chosen;
-            response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, *name));
+            response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, name));
             let aperture = Aperture { shape, intensity: sheet.look.aperture.intensity };
             // Thumbnails take a while to make: during a drag only that of the chosen shape is made anew.
             let texture = thumbs.of(ui, index, &aperture, sheet.look.rim, no_drag || is_chosen);
             thumbnail(ui, rect, texture, is_chosen, response.hovered());
-            if response.on_hover_text(*name).clicked() && !is_chosen {
+            if response.on_hover_text(name).clicked() && !is_chosen {
                 picked = Some(aperture);
             }
         }

@@ -7,6 +7,7 @@ use crate::look::{Look, MAX_COC_PER_HEIGHT, Strength};
 use crate::optics::Lens;
 use crate::preview::panel::parts::{Number, choose, number, remark, switch};
 use crate::preview::state::tweak::{F_NUMBERS, LENS, amount, amount_of, f_number_of, lens_of, short};
+use crate::preview::texts::tr_with;
 
 const WAYS: [(&str, &str); 2] = [
     ("Amount", "Blur as a share of the picture, the same at every distance of focus"),
@@ -62,7 +63,7 @@ fn like_lens(sheet: &Sheet) -> String {
     let share = amount(&sheet.look, sheet.size.1).unwrap_or_default();
     let (f_number, focal_mm) = (f_number_of(share, sheet.state.distance_m(), sheet.size), LENS.focal_length_mm);
     if f_number.is_finite() && f_number < 64.0 {
-        format!("Like {focal_mm:.0} mm at f/{f_number:.1} on full frame")
+        tr_with("Like {} mm at f/{} on full frame", &[&format!("{focal_mm:.0}"), &format!("{f_number:.1}")])
     } else {
         "No blur to be seen".to_owned()
     }

@@ -10,6 +10,7 @@ use crate::look::presets::Preset;
 use crate::preview::panel::parts::remark;
 use crate::preview::panel::theme::{Colors, medium};
 use crate::preview::state::Action;
+use crate::preview::texts::{tr, tr_with};
 
 /// What is being done with presets.
 #[derive(Debug, Default, PartialEq)]
@@ -56,11 +57,13 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
                     sheet.act(Action::Preset(preset.name.clone()));
                 }
             }
-            if was != Doing::Saving && ui.button("Save as…").on_hover_text("Save this look under a name").clicked() {
+            if was != Doing::Saving
+                && ui.button(tr("Save as…")).on_hover_text(tr("Save this look under a name")).clicked()
+            {
                 next = Some(Doing::Saving);
             }
             let has_own = state.presets.iter().any(|preset| preset.own);
-            if has_own && ui.button("Edit…").on_hover_text("Rename or delete looks of your own").clicked() {
+            if has_own && ui.button(tr("Edit…")).on_hover_text(tr("Rename or delete looks of your own")).clicked() {
                 next = Some(if was == Doing::Listing { Doing::Nothing } else { Doing::Listing });
             }
         });
@@ -99,8 +102,8 @@ fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Doing {
     for preset in sheet.state.presets.iter().filter(|preset| preset.own) {
         let row = ui.horizontal(|ui| {
             let [rename, delete] = ["Rename", "Delete"].map(|verb| {
-                let button = ui.button(verb);
-                button.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("{verb} {}", preset.name)));
+                let button = ui.button(tr(verb));
+                button.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("{} {}", tr(verb), preset.name)));
                 button.clicked()
             });
             ui.add(Label::new(&preset.name).truncate());
@@ -130,8 +133,9 @@ fn rename(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, old: String) ->
 
 /// Asks before a preset is deleted, as nothing brings it back.
 fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Doing {
-    ui.label(format!("Delete “{name}” for good?"));
-    let (delete, keep) = ui.horizontal(|ui| (ui.button("Delete it").clicked(), ui.button("Keep it").clicked())).inner;
+    ui.label(tr_with("Delete “{}” for good?", &[&name]));
+    let (delete, keep) =
+        ui.horizontal(|ui| (ui.button(tr("Delete it")).clicked(), ui.button(tr("Keep it")).clicked())).inner;
     if delete {
         sheet.act(Action::DeletePreset(name));
     } else if !keep {
@@ -143,18 +147,18 @@ fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Doing {
 /// A field for a name and buttons. Whether the name holds or is given up, once one of them is so.
 fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, by_enter: bool) -> Option<bool> {
     ui.horizontal(|ui| {
-        let edit = TextEdit::singleline(&mut editing.name).hint_text("name").desired_width(140.0).char_limit(40);
+        let edit = TextEdit::singleline(&mut editing.name).hint_text(tr("name")).desired_width(140.0).char_limit(40);
         let edit = ui.add(edit);
         if std::mem::take(&mut editing.ask_focus) {
             edit.request_focus();
         }
         let left_by = |key| edit.lost_focus() && ui.input(|input| input.key_pressed(key));
         let (entered, escaped) = (left_by(Key::Enter), left_by(Key::Escape));
-        let holds = ui.button(verb).clicked() || entered && by_enter;
+        let holds = ui.button(tr(verb)).clicked() || entered && by_enter;
         if holds && !editing.name.trim().is_empty() {
             return Some(true);
         }
-        (ui.button("Cancel").clicked() || escaped).then_some(false)
+        (ui.button(tr("Cancel")).clicked() || escaped).then_some(false)
     })
     .inner
 }
@@ -195,7 +199,7 @@ fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool
         (true, true) => "your own look",
         (true, false) => "a ready-made look",
     };
-    response.on_hover_text(hint).clicked()
+    response.on_hover_text(tr(hint)).clicked()
 }
 
 fn capitalized(name: &str) -> String {

@@ -8,14 +8,15 @@ use crate::budget::Quality;
 use crate::look::{BackgroundMemory, Refine};
 use crate::preview::panel::parts::{choose, switch};
 use crate::preview::state::tweak::rank_label;
+use crate::preview::texts::tr;
 
 /// Quality, terms, method and refining.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let name = |quality: Option<Quality>| match quality {
-        None => "Auto: as the time allows".to_owned(),
+        None => tr("Auto: as the time allows").to_owned(),
         Some(quality) => quality.to_string(),
     };
-    ui.label("Level");
+    ui.label(tr("Level"));
     ComboBox::from_id_salt("quality").selected_text(name(sheet.look.quality)).show_ui(ui, |ui| {
         for quality in [None].into_iter().chain(Quality::ALL.map(Some)) {
             if ui.selectable_label(sheet.look.quality == quality, name(quality)).clicked() {
@@ -24,7 +25,8 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             }
         }
     });
-    ui.label("Terms of the aperture").on_hover_text("Separable terms: more keep its shape better and cost more");
+    ui.label(tr("Terms of the aperture"))
+        .on_hover_text(tr("Separable terms: more keep its shape better and cost more"));
     let ranks = [None].into_iter().chain((1..=16).map(|terms| Some(Rank::Terms(terms)))).chain([Some(Rank::Full)]);
     ComboBox::from_id_salt("rank").selected_text(rank_label(sheet.look.rank)).show_ui(ui, |ui| {
         for rank in ranks {
@@ -40,7 +42,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             ("Gather", "Every pixel gathers with its own radius: the plain form, for comparison"),
         ];
         let chosen = usize::from(sheet.look.method == Method::Gather);
-        ui.label("Method");
+        ui.label(tr("Method"));
         if let Some(index) = choose(ui, "Method", &methods, chosen, |_| true) {
             sheet.look.method = if index == 0 { Method::Layered } else { Method::Gather };
             sheet.changed(true, "method");
@@ -51,7 +53,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             ("Off", "Only fill holes"),
         ];
         const REFINES: [Refine; 3] = [Refine::Auto, Refine::On, Refine::Off];
-        ui.label("Refine depth");
+        ui.label(tr("Refine depth"));
         let chosen = REFINES.iter().position(|&refine| refine == sheet.look.refine).unwrap_or_default();
         if let Some(index) = choose(ui, "Refine depth", &refines, chosen, |_| true) {
             sheet.look.refine = REFINES[index];

@@ -1,0 +1,123 @@
+//! The table of texts: complete, without what is not there, and used for all that is drawn.
+
+use std::path::Path;
+
+use super::{Window, sample};
+use crate::depth::plate::Step;
+use crate::look::{Effect, Strength};
+use crate::preview::keys::GROUPS;
+use crate::preview::state::{Action, Output, Source, State, tweak};
+use crate::preview::texts::{self, tests as table};
+use crate::preview::views::Legend;
+
+/// Windows that together show about all that can be shown.
+fn windows() -> Vec<Window> {
+    let changes: [&dyn Fn(&mut State); 12] = [
+        &|_| {},
+        &|state| state.look.effect = Effect::TiltShift,
+        &|state| {
+            state.look.strength = Strength::Lens(tweak::LENS);
+            state.look.max_coc_px = Some(30.0);
+            state.look.aperture.shape = crate::bokeh::aperture::Shape::Ring { inner: 0.5 };
+        },
+        &|state| {
+            state.look.aperture.shape =
+                crate::bokeh::aperture::Shape::Polygon { blades: 6, rotation_deg: 0.0, curvature: 0.1 };
+            state.split = Some(0.5);
+        },
+        &|state| state.help = true,
+        &|state| {
+            (state.closing, state.frozen, state.instruments) = (true, true, true);
+            state.meters.fill_for_looks();
+        },
+        &|state| {
+            (state.source, state.legend) = (sample::running(false), Some(Legend::Depth { near_m: 0.5, far_m: 5.0 }))
+        },
+        &|state| {
+            (state.source, state.plate) = (sample::running(false), Some(Step::Unlike));
+            state.legend = Some(Legend::Coc { most_px: 9.0 });
+        },
+        &|state| (state.source, state.plate) = (sample::running(false), Some(Step::StepOut(3))),
+        &|state| {
+            state.source = Source::Lost("gone".into());
+            state.legend = Some(Legend::Bins { count: 2, high_px: [2.0; crate::preview::views::MOST_BINS] });
+        },
+        &|state| (state.source, state.trouble) = (Source::Ended, Some("gone".into())),
+        &|state| (state.source, state.virtual_cameras) = (Source::Opening, Vec::new()),
+    ];
+    let mut windows = Vec::new();
+    for change in changes {
+        let mut state = sample::state();
+        state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
+        for section in ["Camera", "For experts"] {
+            state.apply(Action::Section(section, true));
+        }
+        change(&mut state);
+        windows.push(Window::of(state, (1280, 2400)));
+    }
+    windows
+}
+
+/// The window's own code, each literal in one line.
+fn sources(folder: &Path) -> String {
+    let mut all = String::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = entry.file_name().unwrap().to_string_lossy().into_owned();
+        if entry.is_dir() && name != "tests" {
+            all += &sources(&entry);
+        } else if name.ends_with(".rs") && name != "tests.rs" {
+            all += &std::fs::read_to_string(entry).unwrap();
+        }
+    }
+    let lines: Vec<&str> = all.split("\\\n").collect();
+    lines[1..].iter().fold(lines[0].to_owned(), |all, line| all + line.trim_start())
+}
+
+#[test]
+fn the_table_has_all_texts_and_no_others() {
+    let sources = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/preview"));
+    let is_written = |text: &str| sources.contains(&format!("\"{}\"", text.replace('"', "\\\"")));
+    for mut window in windows() {
+        window.wait(0.3);
+        for act in ["Save as…", "Edit…", "Delete"] {
+            if let Some(at) = window.place_of(act) {
+                window.click(at);
+                window.wait(0.1);
+            }
+        }
+    }
+    for (does, keys) in GROUPS.iter().flat_map(|group| group.bindings).map(|binding| (binding.does, binding.keys)) {
+        (texts::tr(does), texts::tr(keys));
+    }
+    let english = table::english();
+    let missing: Vec<String> =
+        table::seen().into_iter().filter(|text| is_written(text) && !english.contains_key(text)).collect();
+    let lines: Vec<String> = missing.iter().map(|text| format!("{text:?} = \"\"")).collect();
+    assert!(missing.is_empty(), "texts.toml has not:\n{}", lines.join("\n"));
+    let gone: Vec<&String> = english.keys().filter(|text| !is_written(text)).collect();
+    assert!(gone.is_empty(), "texts.toml has what is nowhere: {gone:#?}");
+}
+
+#[test]
+fn all_that_is_drawn_is_translated() {
+    // What is a name, an error's reason or a number is the same in every language.
+    let names =
+        ["Desk camera", "portrait", "clip.mp4", "bokehcam", "cpu, 2", "gone", "Manual Mode", "Aperture Priority"];
+    let english = table::english();
+    texts::speak(english.into_keys().map(|text| (text.clone(), format!("«{text}»"))).collect());
+    let presets: Vec<String> = sample::state().presets.iter().map(|preset| preset.name.to_lowercase()).collect();
+    let controls = ["Brightness", "White balance", "Auto exposure", "Exposure time"];
+    let levels = ["draft", "fast", "balanced", "high", "best", "auto", "full"];
+    let units = ["ms", "fps", "px", "mm", "kB", "MB"];
+    for mut window in windows() {
+        window.wait(0.3);
+        for text in window.texts() {
+            let has_word =
+                text.split(|c: char| !c.is_alphabetic()).any(|word| word.len() > 1 && !units.contains(&word));
+            let is_name = names.iter().chain(&controls).any(|name| text.contains(name))
+                || presets.contains(&text.to_lowercase())
+                || levels.iter().any(|level| text.contains(level));
+            assert!(text.contains('«') || !has_word || is_name, "{text}");
+        }
+    }
+}

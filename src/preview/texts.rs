@@ -1,0 +1,133 @@
+//! The window's texts: in English, as they are where they are used, or as a translation has them.
+//!
+//! `texts.toml` beside this file is the table of all of them. A translation is that file with the right sides filled in: it
+//! is found by the language of the environment or by `--language`. What the program says elsewhere, such as why a
+//! file cannot be read, is in English.
+
+use std::cell::Cell;
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+use crate::files::input;
+
+/// Texts by their English.
+pub type Table = HashMap<String, String>;
+
+thread_local! {
+    /// What this thread, the window's, speaks; English where there is none.
+    static TABLE: Cell<Option<&'static Table>> = const { Cell::new(None) };
+}
+
+/// Speaks by this table from now on, on this thread, which is to be called once.
+pub fn speak(table: Table) {
+    TABLE.set(Some(Box::leak(Box::new(table))));
+}
+
+/// A text in the language that is spoken; itself where that has none for it.
+pub fn tr(english: &str) -> &str {
+    #[cfg(test)]
+    tests::saw(english);
+    TABLE.get().and_then(|table| table.get(english)).filter(|text| !text.is_empty()).map_or(english, String::as_str)
+}
+
+/// The same with values in the places `{}`, in their order.
+pub fn tr_with(english: &str, values: &[&dyn Display]) -> String {
+    let mut text = String::new();
+    let mut values = values.iter();
+    for (index, part) in tr(english).split("{}").enumerate() {
+        if let Some(value) = (index > 0).then(|| values.next()).flatten() {
+            text += &value.to_string();
+        }
+        text += part;
+    }
+    text
+}
+
+/// Reads a translation.
+///
+/// # Errors
+/// It cannot be read, or is no list of texts: one line.
+pub fn read(path: &Path) -> Result<Table, String> {
+    let at = |what: &dyn Display| format!("{}: {what}", path.display()).replace('\n', ", ");
+    let text = input::read_text(path, input::MOST_SETTINGS_BYTES).map_err(|error| at(&error))?;
+    toml::from_str(&text).map_err(|error: toml::de::Error| at(&error.message()))
+}
+
+/// The file of the translation into `language`, such as `de_AT` or `de`, in the folders for data of the environment; `None`
+/// where there is none, as for English.
+pub fn find(language: &str) -> Option<PathBuf> {
+    let language = language.split(['.', '@']).next().filter(|name| is_name(name))?;
+    let short = language.split('_').next().unwrap_or(language);
+    let home = std::env::var_os("HOME").map(|home| Path::new(&home).join(".local/share"));
+    let own = std::env::var_os("XDG_DATA_HOME").map(PathBuf::from).or(home);
+    let all = std::env::var_os("XDG_DATA_DIRS").unwrap_or_else(|| "/usr/local/share:/usr/share".into());
+    let folders: Vec<PathBuf> = own.into_iter().chain(std::env::split_paths(&all)).collect();
+    let named = |name: &str| {
+        folders.iter().map(|folder| folder.join(format!("bokehcam/texts/{name}.toml"))).find(|path| path.is_file())
+    };
+    named(language).or_else(|| named(short))
+}
+
+/// The language of the environment, as POSIX has it.
+pub fn usual_language() -> Option<String> {
+    let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    set("LC_ALL").or_else(|| set("LC_MESSAGES")).or_else(|| set("LANG"))
+}
+
+/// Whether this names a language, and no place among files.
+fn is_name(name: &str) -> bool {
+    !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+}
+
+#[cfg(test)]
+pub mod tests {
+    use std::cell::RefCell;
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    thread_local! {
+        static SEEN: RefCell<BTreeSet<String>> = const { RefCell::new(BTreeSet::new()) };
+    }
+
+    pub fn saw(text: &str) {
+        SEEN.with_borrow_mut(|seen| seen.insert(text.to_owned()));
+    }
+
+    /// What was asked for on this thread.
+    pub fn seen() -> BTreeSet<String> {
+        SEEN.with_borrow(Clone::clone)
+    }
+
+    /// The table that translators begin with.
+    pub fn english() -> Table {
+        toml::from_str(include_str!("texts.toml")).unwrap()
+    }
+
+    #[test]
+    fn a_text_is_translated_and_one_without_translation_stays() {
+        assert_eq!(tr("Mirror"), "Mirror");
+        speak(
+            [("Mirror", "Spiegel"), ("{} of {}", "von {} {}"), ("Depth", "")].map(|(a, b)| (a.into(), b.into())).into(),
+        );
+        assert_eq!([tr("Mirror"), tr("Depth"), tr("Focus")], ["Spiegel", "Depth", "Focus"]);
+        assert_eq!(tr_with("{} of {}", &[&2, &"3"]), "von 2 3");
+        assert_eq!(tr_with("{} m", &[]), " m");
+    }
+
+    #[test]
+    fn a_translation_is_read_or_said_to_be_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("xx.toml");
+        std::fs::write(&path, "\"Mirror\" = \"Spiegel\"\n").unwrap();
+        assert_eq!(read(&path).unwrap()["Mirror"], "Spiegel");
+        std::fs::write(&path, "Mirror = 3\n").unwrap();
+        let line = read(&path).unwrap_err();
+        assert!(line.contains("xx.toml: ") && !line.contains('\n'), "{line}");
+        assert!(read(&folder.path().join("none.toml")).is_err());
+        for odd in ["", "../etc", "C.UTF-8", "zz_ZZ"] {
+            assert_eq!(find(odd), None, "{odd}");
+        }
+    }
+}
