@@ -16,8 +16,7 @@ use crate::source::devices::{self, Choice};
 use crate::source::{self, DepthChoice, DepthFrom, Kind, OneCamera, Options, PlateFile, Source, SourceName};
 
 /// Shown when there is no camera, and the demonstration takes its place.
-const NO_CAMERA: &str = "No camera was found, so this is a demonstration. `bokehcam devices` lists cameras, \
-                         `bokehcam doctor` says what is missing.";
+const NO_CAMERA: &str = "No camera was found.";
 /// Shown with the synthetic scene.
 const RENDERED: &str = "This scene is rendered while it plays, as fast as the machine can; `demo` plays smoothly.";
 /// Shown where a camera gives no depth, so that a portrait never comes.

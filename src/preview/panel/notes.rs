@@ -16,8 +16,7 @@ const FADES_S: f64 = 0.4;
 /// The most notes that are shown at once.
 const MOST: usize = 3;
 /// What the source is when it is no camera and no recording.
-const DEMONSTRATION: &str =
-    "A demonstration. For a camera: bokehcam devices lists them, bokehcam doctor says what is missing.";
+const DEMONSTRATION: &str = "A demonstration, no camera: bokehcam devices lists them, bokehcam doctor helps.";
 
 /// When notes were first shown.
 #[derive(Default)]

@@ -3,20 +3,17 @@
 use std::collections::HashMap;
 
 use egui::epaint::ImageDelta;
-use egui::{Color32, ImageData, TextureFilter, TextureId, TextureWrapMode, TexturesDelta};
+use egui::{Color32, ImageData, TextureId, TexturesDelta};
 
 /// Positions are rounded to this fraction of a texel: 8 bits of weight.
 const PARTS: f32 = 256.0;
 
-/// A texture as egui set it.
+/// A texture as egui set it. It is interpolated, and ends with its edge: no control of ours has another kind.
 #[derive(Debug)]
 pub struct Texture {
     size: [usize; 2],
     /// Row by row, premultiplied `0xAARRGGBB`.
     texels: Vec<u32>,
-    /// Whether to interpolate; otherwise the nearest texel is taken.
-    smooth: bool,
-    wrap: TextureWrapMode,
 }
 
 /// The textures by egui's ids.
@@ -45,24 +42,21 @@ impl Textures {
         }
     }
 
-    /// Replaces a texture, or the part of it at `change.pos`. A part that does not fit in it is ignored.
+    /// Replaces a texture, or the part of it at `change.pos`. What has no texels, or does not fit, is ignored.
     fn apply(&mut self, id: TextureId, change: &ImageDelta) {
         let ImageData::Color(image) = &change.image;
         let texels = image.pixels.iter().map(|&color| packed(color));
         let [width, height] = image.size;
+        if image.pixels.is_empty() {
+            return;
+        }
         let Some([left, top]) = change.pos else {
-            let texture = Texture {
-                size: image.size,
-                texels: texels.collect(),
-                smooth: change.options.magnification == TextureFilter::Linear,
-                wrap: change.options.wrap_mode,
-            };
-            self.0.insert(id, texture);
+            self.0.insert(id, Texture { size: image.size, texels: texels.collect() });
             return;
         };
         let Some(texture) = self.0.get_mut(&id) else { return };
         let [texture_width, texture_height] = texture.size;
-        if left + width > texture_width || top + height > texture_height || width == 0 {
+        if left + width > texture_width || top + height > texture_height {
             return;
         }
         let texels: Vec<u32> = texels.collect();
@@ -84,12 +78,9 @@ impl Texture {
         [uv[0] * self.size[0] as f32, uv[1] * self.size[1] as f32]
     }
 
-    /// The colour at a position in texels, whose centres lie at halves: of the nearest texel, or bilinear if `smooth`.
+    /// The colour at a position in texels, whose centres lie at halves: bilinear.
     #[inline]
     pub fn sample(&self, [x, y]: [f32; 2]) -> u32 {
-        if !self.smooth {
-            return self.texel(x.floor() as i64, y.floor() as i64);
-        }
         let (x, y) = (((x - 0.5) * PARTS).round() as i64, ((y - 0.5) * PARTS).round() as i64);
         let (parts, part_x, part_y) = (PARTS as i64, x & 255, y & 255);
         let (x, y) = (x.div_euclid(parts), y.div_euclid(parts));
@@ -102,25 +93,11 @@ impl Texture {
         mix_rows(upper, lower, part_y as u32)
     }
 
-    /// The texel of a column and row, wrapped where they are beyond the texture.
+    /// The texel of a column and row, that of the edge beyond it.
     #[inline]
     fn texel(&self, x: i64, y: i64) -> u32 {
-        let [width, height] = self.size;
-        let wrapped = |at: i64, side: usize| {
-            let side = side as i64;
-            match self.wrap {
-                TextureWrapMode::ClampToEdge => at.clamp(0, side - 1),
-                TextureWrapMode::Repeat => at.rem_euclid(side),
-                TextureWrapMode::MirroredRepeat => {
-                    let at = at.rem_euclid(2 * side);
-                    at.min(2 * side - 1 - at)
-                }
-            }
-        };
-        if self.texels.is_empty() {
-            return 0;
-        }
-        self.texels[wrapped(y, height) as usize * width + wrapped(x, width) as usize]
+        let [x, y] = [(x, self.size[0]), (y, self.size[1])].map(|(at, side)| at.clamp(0, side as i64 - 1) as usize);
+        self.texels[y * self.size[0] + x]
     }
 }
 
@@ -148,12 +125,12 @@ mod tests {
 
     use super::*;
 
-    fn texture(options: TextureOptions) -> Textures {
+    fn texture() -> Textures {
         let colors = [[0, 0, 0, 0], [255, 255, 255, 255], [200, 100, 50, 255], [10, 20, 30, 40]];
         let colors = colors.map(|[r, g, b, a]| Color32::from_rgba_premultiplied(r, g, b, a));
         let image = ColorImage::new([2, 2], colors.to_vec());
         let mut delta = TexturesDelta::default();
-        delta.push(TextureId::default(), ImageDelta::full(image, options));
+        delta.push(TextureId::default(), ImageDelta::full(image, TextureOptions::LINEAR));
         let mut textures = Textures::default();
         textures.set(&delta);
         delta.clear();
@@ -162,7 +139,7 @@ mod tests {
 
     #[test]
     fn texels_are_met_at_their_centres_and_mixed_between() {
-        let textures = texture(TextureOptions::LINEAR);
+        let textures = texture();
         let texture = textures.get(TextureId::default()).unwrap();
         assert_eq!(texture.sample([0.5, 0.5]), 0);
         assert_eq!(texture.sample([1.5, 1.5]), 0x280a_141e);
@@ -172,20 +149,12 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_texel_is_whole() {
-        let textures = texture(TextureOptions::NEAREST);
-        let texture = textures.get(TextureId::default()).unwrap();
-        assert_eq!(texture.sample([1.01, 0.99]), 0xffff_ffff);
-        assert_eq!(texture.sample([0.99, 1.01]), 0xffc8_6432);
-    }
-
-    #[test]
     fn a_part_may_change_and_a_texture_go() {
-        let mut textures = texture(TextureOptions::NEAREST);
+        let mut textures = texture();
         let mut delta = TexturesDelta::default();
         let dot = ColorImage::new([1, 1], vec![Color32::RED]);
-        delta.push(TextureId::default(), ImageDelta::partial([1, 0], dot.clone(), TextureOptions::NEAREST));
-        delta.push(TextureId::default(), ImageDelta::partial([2, 0], dot, TextureOptions::NEAREST));
+        delta.push(TextureId::default(), ImageDelta::partial([1, 0], dot.clone(), TextureOptions::LINEAR));
+        delta.push(TextureId::default(), ImageDelta::partial([2, 0], dot, TextureOptions::LINEAR));
         textures.set(&delta);
         delta.clear();
         let texture = textures.get(TextureId::default()).unwrap();
