@@ -1,8 +1,12 @@
 //! The shape of the lens opening, sampled as an antialiased mask.
 
+mod outline;
+
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 use std::sync::Arc;
+
+use outline::Outline;
 
 /// A lens opening, drawn as a far highlight shows it (x right, y down), inside the unit disc.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,8 +73,6 @@ pub struct Mask {
 
 /// Samples per mask cell and axis.
 const SUPERSAMPLING: usize = 8;
-/// Ratio of a star's inner to its outer radius.
-const STAR_INNER: f64 = 0.45;
 
 impl Default for Aperture {
     fn default() -> Self {
@@ -86,13 +88,14 @@ impl Aperture {
         let extent = 1.0 + rim / 2.0;
         let cell = 2.0 * extent / size as f64;
         let sub = cell / SUPERSAMPLING as f64;
+        let outline = Outline::of(&self.shape);
         let mut values = vec![0.0; size * size];
         for (index, value) in values.iter_mut().enumerate() {
             let (left, top) = ((index % size) as f64 * cell - extent, (index / size) as f64 * cell - extent);
             for sample in 0..SUPERSAMPLING * SUPERSAMPLING {
                 let x = left + (0.5 + (sample % SUPERSAMPLING) as f64) * sub;
                 let y = top + (0.5 + (sample / SUPERSAMPLING) as f64) * sub;
-                *value += self.transmittance(x, y, rim);
+                *value += self.transmittance(&outline, x, y, rim);
             }
             *value /= (SUPERSAMPLING * SUPERSAMPLING) as f64;
         }
@@ -104,13 +107,23 @@ impl Aperture {
     }
 
     /// Transmittance, 0 to 1, at a point in units of the aperture's radius, with a soft edge of width `rim`.
-    fn transmittance(&self, x: f64, y: f64, rim: f64) -> f64 {
-        let radius = x.hypot(y);
+    fn transmittance(&self, outline: &Outline, x: f64, y: f64, rim: f64) -> f64 {
+        let radius = (x * x + y * y).sqrt();
         if let Shape::Picture(picture) = &self.shape {
             return picture.sample(x, y, rim) * self.radial_intensity(radius.min(1.0));
         }
-        let outline = self.outline_radius(y.atan2(x));
-        let mut value = ramp(radius, outline, rim) * self.radial_intensity((radius / outline).min(1.0));
+        // Most points are clear of the rim whatever their direction.
+        let [least, most] = outline.range;
+        if radius > most + rim / 2.0 {
+            return 0.0;
+        }
+        let is_flat = self.intensity == 0.0 && radius < least - rim / 2.0;
+        let mut value = if is_flat {
+            1.0
+        } else {
+            let edge = outline.towards(x, y);
+            ramp(radius, edge, rim) * self.radial_intensity((radius / edge).min(1.0))
+        };
         if let Shape::Ring { inner } = self.shape
             && inner > 0.0
         {
@@ -118,27 +131,6 @@ impl Aperture {
             value *= 1.0 - ramp(radius, f64::from(inner), rim.min(f64::from(inner)));
         }
         value
-    }
-
-    /// Distance of the outline from the centre in the direction `angle` (radians, clockwise from +x as y is down).
-    fn outline_radius(&self, angle: f64) -> f64 {
-        match self.shape {
-            Shape::Disc | Shape::Ring { .. } | Shape::Picture(_) => 1.0,
-            Shape::Polygon { blades, rotation_deg, curvature } => {
-                let (half, bend) = (PI / f64::from(blades.max(3)), f64::from(curvature).clamp(0.0, 1.0));
-                let from_corner = (angle - PI - f64::from(rotation_deg).to_radians()).rem_euclid(2.0 * half);
-                // The polar form of the straight edge between two corners, bent towards the circle.
-                half.cos() / (from_corner - half).cos() * (1.0 - bend) + bend
-            }
-            Shape::Heart => heart_outline(angle),
-            Shape::Star { points } => {
-                let half = PI / f64::from(points.max(3));
-                let from_tip = ((angle + PI / 2.0 + half).rem_euclid(2.0 * half) - half).abs();
-                // The edge from the tip (1, 0) to the notch at angle `half`, met by the ray at `from_tip`.
-                let (notch_x, notch_y) = (STAR_INNER * half.cos(), STAR_INNER * half.sin());
-                notch_y / (from_tip.sin() * (1.0 - notch_x) + from_tip.cos() * notch_y)
-            }
-        }
     }
 
     /// Radial intensity at `t` = 0 (centre) to 1 (outline). Even a full soap bubble keeps 15 % in its centre.
@@ -172,24 +164,6 @@ fn ramp(radius: f64, edge: f64, rim: f64) -> f64 {
     if rim <= 0.0 { f64::from(u8::from(radius <= edge)) } else { ((edge - radius) / rim + 0.5).clamp(0.0, 1.0) }
 }
 
-/// Radius of the heart (x^2 + y^2 - 1)^3 = x^2 y^3 in direction `angle`, upright for y down and scaled to fit the
-/// square from -1 to 1; found by bisection. Never 0, so that one may divide by it.
-fn heart_outline(angle: f64) -> f64 {
-    const SCALE: f64 = 1.0 / 1.25;
-    let (sin, cos) = (-(angle.sin()), angle.cos());
-    let inside = |r: f64| {
-        let (x, y) = (r * cos, r * sin);
-        (x * x + y * y - 1.0).powi(3) <= x * x * y.powi(3)
-    };
-    // Its farthest points lie 1.42 from the centre.
-    let (mut low, mut high) = (0.0, 1.6);
-    for _ in 0..40 {
-        let middle = 0.5 * (low + high);
-        if inside(middle) { low = middle } else { high = middle }
-    }
-    (low * SCALE).max(1e-3)
-}
-
 impl Mask {
     /// Whether the mask is unchanged by a mirror image left to right, and top to bottom.
     pub fn symmetry(&self) -> (bool, bool) {
@@ -211,7 +185,8 @@ impl Mask {
 /// shows the shape upright.
 pub fn lens_points(aperture: &Aperture, count: usize) -> Vec<glam::DVec2> {
     let golden_angle = PI * (3.0 - 5f64.sqrt());
-    let open = |p: &glam::DVec2| aperture.transmittance(p.x, p.y, 0.0) > 0.5;
+    let outline = Outline::of(&aperture.shape);
+    let open = |p: &glam::DVec2| aperture.transmittance(&outline, p.x, p.y, 0.0) > 0.5;
     let spiral = |n: usize| {
         (0..n).map(move |k| {
             let radius = ((k as f64 + 0.5) / n as f64).sqrt();
@@ -225,6 +200,7 @@ pub fn lens_points(aperture: &Aperture, count: usize) -> Vec<glam::DVec2> {
 
 #[cfg(test)]
 mod tests {
+    use super::outline::STAR_INNER;
     use super::*;
 
     fn of(shape: Shape) -> Aperture {

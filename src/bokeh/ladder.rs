@@ -1,15 +1,16 @@
 //! The rungs that an executor is made for: the filters of each, and the maxima that size the memory they share.
 //! Nothing is allocated when the rung changes.
 
+mod factors;
+
 use std::sync::Arc;
 
-use super::aperture::Mask;
 use super::bank::Bank;
-use super::low_rank::Decomposition;
 use super::rung::{LADDER, MOST_FULL_RADIUS_PX, MOST_RADIUS_PX, Rung, SCALES};
 use super::{Rank, Settings};
 use crate::budget::Quality;
 use crate::optics::CocKind;
+use factors::Factors;
 
 /// How the blurred bins become one picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,10 +42,10 @@ pub struct Ladder {
 
 impl Ladder {
     /// Makes the filters of all rungs where the settings are adaptive, else of [`Settings::quality`] alone.
-    pub fn new(settings: &Settings, mask: &Mask, compositing: Compositing) -> Self {
+    pub fn new(settings: &Settings, compositing: Compositing) -> Self {
         let max_px = settings.far_max_px.max(settings.near_max_px);
         let coarsest = SCALES[SCALES.len() - 1] as f32;
-        let svd = Decomposition::of(mask);
+        let factors = Factors::of(&settings.aperture, settings.rim);
         let mut bank_keys: Vec<(Rank, f32)> = Vec::new();
         let mut banks = Vec::new();
         let wanted = |quality: &Quality| settings.adaptive || *quality == settings.quality;
@@ -62,7 +63,7 @@ impl Ladder {
             };
             let bank = bank_keys.iter().position(|&key| key == (rank, bank_px)).unwrap_or_else(|| {
                 bank_keys.push((rank, bank_px));
-                banks.push(Arc::new(Bank::of(&svd, mask, rank, bank_px)));
+                banks.push(Arc::new(Bank::of(&factors.svd, &factors.mask, rank, bank_px)));
                 banks.len() - 1
             });
             Step { quality, rung, bank }

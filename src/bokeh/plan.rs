@@ -13,7 +13,7 @@
 
 use std::sync::Arc;
 
-use super::bank::{Bank, MASK_CELLS};
+use super::bank::Bank;
 use super::ladder::{Compositing, Ladder};
 use super::rung::{FOCUS_BORDER_PX, MOST_FULL_RADIUS_PX, Rung, scale_within};
 pub use super::share::Share;
@@ -115,8 +115,7 @@ impl Plan {
             (CocKind::Depth, Method::Gather) => Compositing::Gather,
             (CocKind::Uniform | CocKind::Ramp, _) => Compositing::Select,
         };
-        let mask = settings.aperture.mask(MASK_CELLS, settings.rim);
-        let ladder = Arc::new(Ladder::new(settings, &mask, compositing));
+        let ladder = Arc::new(Ladder::new(settings, compositing));
         let level = ladder.nearest(settings.quality);
         let mut plan = Self {
             width: width as usize,
