@@ -8,6 +8,7 @@ use clap::builder::BoolishValueParser;
 use crate::cli::options::named;
 use crate::look::number::within;
 use crate::preview::state::{Shown, TEXT_SCALES};
+use crate::preview::window::ThemeChoice;
 
 /// What a window shows first; all of it can be changed there.
 #[derive(Args, Clone, Debug)]
@@ -46,6 +47,9 @@ pub struct Window {
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]
     pub fresh: bool,
+    /// Light or dark colours
+    #[arg(long, value_parser = named::<ThemeChoice>(), value_name = "WHICH", default_value = "auto")]
+    pub theme: ThemeChoice,
     /// Where snapshots and recordings go [default: the pictures folder]
     #[arg(long, value_name = "DIR")]
     pub save_to: Option<PathBuf>,

@@ -95,7 +95,18 @@ const NEEDS: [(&[&str], Why); 17] = [
         false => Some("frames do not come in real time: add --pace realtime"),
     }),
     (
-        &["show", "split", "full-screen", "instruments", "panel", "text-scale", "single-keys", "fresh", "save-to"],
+        &[
+            "show",
+            "split",
+            "full-screen",
+            "instruments",
+            "panel",
+            "text-scale",
+            "single-keys",
+            "fresh",
+            "theme",
+            "save-to",
+        ],
         |run| (!run.window).then_some("there is no window"),
     ),
 ];

@@ -3,6 +3,7 @@
 mod badges;
 mod canvas;
 mod closing;
+mod fonts;
 mod help;
 mod icons;
 mod instruments;
@@ -18,6 +19,7 @@ mod sheet;
 mod tests;
 mod theme;
 
+pub use fonts::SystemFonts;
 pub use theme::install as dress;
 
 use std::time::Duration;

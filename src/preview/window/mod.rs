@@ -4,6 +4,7 @@
 //! controls are laid out anew when something happened to them, and five times a second while instruments are shown.
 
 mod app;
+mod desktop;
 mod gfx;
 mod memory;
 
@@ -11,6 +12,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use egui_winit::accesskit_winit;
 use winit::event_loop::EventLoop;
 
 use app::App;
@@ -21,12 +23,45 @@ use super::state::State;
 use crate::compute::device::Device;
 use crate::stats::Report;
 
+crate::names::named! {
+    /// The window's colours.
+    pub enum ThemeChoice default Auto {
+        /// As the desktop's other windows
+        Auto = "auto",
+        /// Dark text on light
+        Light = "light",
+        /// Light text on dark
+        Dark = "dark",
+    }
+}
+
+/// What the window's thread is woken for.
+#[derive(Debug)]
+enum Call {
+    /// The session has told something.
+    Session,
+    /// A screen reader came, went, or wants something done.
+    Access(accesskit_winit::Event),
+    /// The desktop has these colours now.
+    Theme(egui::Theme),
+    /// The system has a font for a text.
+    Fonts,
+}
+
+impl From<accesskit_winit::Event> for Call {
+    fn from(event: accesskit_winit::Event) -> Self {
+        Self::Access(event)
+    }
+}
+
 /// What a preview begins with.
 pub struct Preview {
     /// What the window shows first.
     pub state: State,
     /// What the session starts with.
     pub session: session::Start,
+    /// Its colours.
+    pub theme: ThemeChoice,
     /// The GPU to draw with, if any.
     pub device: Option<Arc<Device>>,
     /// Close the window when the source ends.
@@ -91,7 +126,7 @@ fn plain(error: &impl std::fmt::Display) -> String {
 
 /// The event loop. winit panics if a library that the display needs is missing: that becomes an error, too, and the
 /// panic hook is silenced meanwhile.
-fn event_loop() -> Result<EventLoop<()>, WindowError> {
+fn event_loop() -> Result<EventLoop<Call>, WindowError> {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
     let made = std::panic::catch_unwind(|| EventLoop::with_user_event().build());

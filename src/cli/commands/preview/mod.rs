@@ -136,6 +136,7 @@ pub fn show(
             demand: Demand::default(),
             folder: window.save_to.clone().unwrap_or_else(pictures_folder),
         },
+        theme: window.theme,
         device: device.clone(),
         close_at_end,
         memory,

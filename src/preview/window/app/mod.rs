@@ -8,14 +8,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use egui_winit::accesskit_winit::WindowEvent as Access;
 use winit::application::ApplicationHandler;
-use winit::event::WindowEvent;
+use winit::event::{TouchPhase, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::window::WindowId;
 
 use super::gfx::Gfx;
 use super::memory::Memory;
-use super::{Ended, Preview, WindowError};
+use super::{Call, Ended, Preview, ThemeChoice, WindowError, desktop};
 use crate::bokeh;
 use crate::clock::Clock;
 use crate::compute::device::Device;
@@ -25,7 +26,7 @@ use crate::link::Receiver;
 use crate::link::demand::{Demand, Watch};
 use crate::pipeline::{View, Wanted};
 use crate::preview::meters::Totals;
-use crate::preview::panel::Panel;
+use crate::preview::panel::{Panel, SystemFonts};
 use crate::preview::session::{Closed, Session, SessionEvent, Wake};
 use crate::preview::state::{Action, Shown, Source, State};
 use crate::preview::views::Views;
@@ -43,6 +44,8 @@ pub(super) struct App {
     snapshot_due: bool,
     panel: Panel,
     ctx: egui::Context,
+    fonts: SystemFonts,
+    proxy: EventLoopProxy<Call>,
     gfx: Option<Gfx>,
     device: Option<Arc<Device>>,
     session: Session,
@@ -89,26 +92,41 @@ pub(super) struct App {
 
 impl App {
     /// Starts the session at once, so that the source opens while the window does.
-    pub fn new(preview: Preview, proxy: EventLoopProxy<()>) -> Result<Self, WindowError> {
-        let Preview { mut state, session, device, close_at_end, memory, memory_file, stop } = preview;
+    pub fn new(preview: Preview, proxy: EventLoopProxy<Call>) -> Result<Self, WindowError> {
+        let Preview { mut state, session, theme, device, close_at_end, memory, memory_file, stop } = preview;
         let wake_pending = Arc::new(AtomicBool::new(false));
         let pending = Arc::clone(&wake_pending);
         // An event loop that is gone needs no waking.
+        let call = |call: fn() -> Call| {
+            let proxy = proxy.clone();
+            move || drop(proxy.send_event(call()))
+        };
+        let wake_session = call(|| Call::Session);
         let wake: Wake = Arc::new(move || {
             if !pending.swap(true, Ordering::AcqRel) {
-                let _ = proxy.send_event(());
+                wake_session();
             }
         });
         let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
         let ctx = egui::Context::default();
+        let fonts = SystemFonts::new(call(|| Call::Fonts));
+        fonts.install(&ctx);
+        // Dark until the desktop says otherwise: it may take its time, or have nothing to say.
+        ctx.set_theme(if theme == ThemeChoice::Light { egui::Theme::Light } else { egui::Theme::Dark });
+        if theme == ThemeChoice::Auto {
+            let proxy = proxy.clone();
+            desktop::follow(move |theme| proxy.send_event(Call::Theme(theme)).is_ok());
+        }
         Ok(Self {
             state,
             wanted,
             snapshot_due: false,
             panel: Panel::default(),
             ctx,
+            fonts,
+            proxy,
             gfx: None,
             device,
             session: Session::begin(session, wake)?,
@@ -252,13 +270,14 @@ fn window_use(state: &State) -> WindowUse {
     WindowUse::new(*presented, *first_frame_ns, [latency, reaction, present])
 }
 
-impl ApplicationHandler<()> for App {
+impl ApplicationHandler<Call> for App {
     fn resumed(&mut self, events: &ActiveEventLoop) {
         if self.gfx.is_some() {
             return;
         }
         match Gfx::open(events, &self.ctx, self.memory.size, self.state.full_screen, self.device.clone()) {
-            Ok(gfx) => {
+            Ok(mut gfx) => {
+                gfx.input.init_accesskit(events, &gfx.window, self.proxy.clone());
                 self.gfx = Some(gfx);
                 self.update_wanted();
             }
@@ -271,8 +290,20 @@ impl ApplicationHandler<()> for App {
         self.ask_for_redraw();
     }
 
-    fn user_event(&mut self, events: &ActiveEventLoop, (): ()) {
-        self.receive(events);
+    fn user_event(&mut self, events: &ActiveEventLoop, call: Call) {
+        match call {
+            Call::Session => return self.receive(events),
+            Call::Access(event) => match (event.window_event, &mut self.gfx) {
+                (Access::InitialTreeRequested, _) => self.ctx.enable_accesskit(),
+                (Access::AccessibilityDeactivated, _) => self.ctx.disable_accesskit(),
+                (Access::ActionRequested(request), Some(gfx)) => gfx.input.on_accesskit_action_request(request),
+                (Access::ActionRequested(_), None) => {}
+            },
+            Call::Theme(theme) => self.ctx.set_theme(theme),
+            Call::Fonts => self.fonts.install(&self.ctx),
+        }
+        self.layout_at = Some(Instant::now());
+        self.ask_for_redraw();
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
@@ -306,7 +337,10 @@ impl ApplicationHandler<()> for App {
             self.on_input();
         }
         // egui takes a press to be where the pointer is when controls are laid out: before it moves on.
-        if matches!(event, WindowEvent::MouseInput { .. }) {
+        let is_touch = |phase| matches!(phase, TouchPhase::Started | TouchPhase::Ended);
+        if matches!(event, WindowEvent::MouseInput { .. })
+            || matches!(event, WindowEvent::Touch(touch) if is_touch(touch.phase))
+        {
             self.lay_out(events);
         }
     }
