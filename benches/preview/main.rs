@@ -17,6 +17,7 @@ mod reaction;
 #[path = "../../tests/window/screen.rs"]
 #[allow(dead_code)]
 mod screen;
+mod shapes;
 #[path = "../../tests/window/window.rs"]
 #[allow(dead_code)]
 mod window;
@@ -69,6 +70,9 @@ struct Options {
     /// Measure instead how soon the window answers a key, from outside, while the pipeline is busy or stuck
     #[arg(long)]
     reaction: bool,
+    /// Measure instead how soon another aperture is seen, from outside; with each of these programs besides this one
+    #[arg(long, value_name = "PROGRAM", num_args = 0..)]
+    shapes: Option<Vec<PathBuf>>,
     /// Measure instead what a frame of 1280x720 costs that is painted on the CPU
     #[arg(long)]
     paint: bool,
@@ -106,6 +110,11 @@ fn measure(options: &Options) -> Result<()> {
     };
     if options.reaction {
         return reaction::measure(&folder, scratch.path());
+    }
+    if let Some(others) = &options.shapes {
+        let own = PathBuf::from(env!("CARGO_BIN_EXE_bokehcam"));
+        let programs: Vec<PathBuf> = others.iter().cloned().chain([own]).collect();
+        return shapes::measure(&folder, scratch.path(), &programs);
     }
     let screen = Screen::new();
     let mut runs = [Vec::new(), Vec::new()];

@@ -52,6 +52,10 @@ const fn ctrl(key: Key) -> Chord {
     Chord { key, ctrl: true, shift: false }
 }
 
+const fn shift(key: Key) -> Chord {
+    Chord { key, ctrl: false, shift: true }
+}
+
 const fn ctrl_shift(key: Key) -> Chord {
     Chord { key, ctrl: true, shift: true }
 }
@@ -89,6 +93,8 @@ fn way(context: Context) -> f32 {
 fn step_back(state: &State) -> Option<Action> {
     if state.closing {
         Some(Action::StayOpen)
+    } else if state.self_timer {
+        Some(Action::SelfTimer(false))
     } else if state.help {
         Some(Action::Help(false))
     } else if state.bare {
@@ -195,6 +201,9 @@ pub const GROUPS: [Group; 5] = [
         name: "Keep",
         bindings: &[
             once(&[key(Key::S)], "S", "save a snapshot", |_, _| Some(Action::Snapshot)),
+            once(&[shift(Key::S)], "Shift+S", "save one in three seconds", |state, _| {
+                Some(Action::SelfTimer(!state.self_timer))
+            }),
             once(&[key(Key::V)], "V", "start or stop a recording", |state, _| {
                 Some(Action::Record(state.recording().is_none()))
             }),

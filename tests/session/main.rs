@@ -13,6 +13,7 @@ use bokehcam::depth::plate::Step;
 use bokehcam::frame::DepthMap;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
+use bokehcam::preview::folders::is_video;
 use bokehcam::preview::state::{Output, Request, Source, Update};
 
 use watched::{PATIENCE, Watched, is_running, look, radius_px};
@@ -104,8 +105,9 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     watched.until("the command", |told| matches!(told, Update::Note(line) if line.starts_with("Copied: show 32")));
     watched.hear();
     // The film is there already: the command makes another one.
-    let (copied, end) = (watched.copied.clone().unwrap(), r#"bokehcam-1.mp4", "camera"] [("split", "0.5")]"#);
-    assert!(copied.starts_with("show 32 [\"") && copied.ends_with(end), "{copied}");
+    let (copied, end) = (watched.copied.clone().unwrap(), r#"", "camera"] [("split", "0.5")]"#);
+    let film = copied.strip_prefix("show 32 [\"").and_then(|rest| rest.strip_suffix(end));
+    assert!(film.is_some_and(|film| is_video(film.rsplit('/').next().unwrap())), "{copied}");
     let has = |watched: &Watched, line: &str| watched.written.lock().unwrap().iter().any(|written| written == line);
     let began = Instant::now();
     while !has(&watched, "film 32") || !has(&watched, "camera 32") {
@@ -156,11 +158,13 @@ fn a_recording_that_was_broken_off_is_found_at_the_next_start() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at(".bokehcam-3.mp4.77-0.part"), "take").unwrap();
+    std::fs::write(at(".bokehcam 2026-11-23 21-14-05.mp4.77-1.part"), "another take").unwrap();
     std::fs::write(at(".holiday.mp4.77-0.part"), "mine").unwrap();
     let mut watched = Watched::begin_in("32", folder.path());
     watched
         .until("it is told", |told| matches!(told, Update::Note(line) if line.contains("bokehcam-3.mp4.incomplete")));
     watched.session.close();
     assert_eq!(std::fs::read(at("bokehcam-3.mp4.incomplete")).unwrap(), b"take");
+    assert_eq!(std::fs::read(at("bokehcam 2026-11-23 21-14-05.mp4.incomplete")).unwrap(), b"another take");
     assert_eq!(std::fs::read(at(".holiday.mp4.77-0.part")).unwrap(), b"mine");
 }

@@ -18,6 +18,7 @@ use bokehcam::look::presets::Preset;
 use bokehcam::look::{Look, Patch, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
+use bokehcam::preview::folders::Folders;
 use bokehcam::preview::services::{Opened, Services, SettingsStore, Switch};
 use bokehcam::preview::session::{Blurred, Session, SessionEvent, Start};
 use bokehcam::preview::state::{Source, Update};
@@ -174,7 +175,7 @@ impl Watched {
             outputs: Vec::new(),
             keep_going: false,
             budget_ns: None,
-            folder: folder.to_owned(),
+            folders: Folders::at(folder.to_owned()),
             wanted: Arc::default(),
             demand: demand.clone(),
         };

@@ -98,8 +98,12 @@ fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
     std::thread::sleep(Duration::from_millis(500));
     window.key(&[], u32::from('s'));
     window.key(&[], u32::from('k'));
-    let picture = program.home().join("bokehcam.png");
-    until("the snapshot", PATIENCE, || picture.exists());
+    let mut picture = None;
+    until("the snapshot", PATIENCE, || {
+        picture = kept(program.home(), ".png");
+        picture.is_some()
+    });
+    let picture = picture.unwrap();
     until("the command", PATIENCE, || program.said().contains("Copied: bokehcam preview"));
     let ended = program.close();
     let home = ended.home.path();
@@ -108,10 +112,10 @@ fn a_snapshot_is_repeated_by_render_and_a_copied_command_runs() {
         command.args(arguments).current_dir(home).env("XDG_CONFIG_HOME", home).env("DISPLAY", &screen.display);
         command
     };
-    let arguments = ["render", "--like", "bokehcam.png", "--out", "again.png", "--backend", "cpu"];
+    let arguments = ["render", "--like", &picture, "--out", "again.png", "--backend", "cpu"];
     assert!(bokehcam(&arguments).status().unwrap().success());
     let read = |name: &str| read_color(&home.join(name)).unwrap();
-    assert_eq!(read("bokehcam.png"), read("again.png"), "to the bit");
+    assert_eq!(read(&picture), read("again.png"), "to the bit");
 
     let copied = ended.said.split("Copied: bokehcam ").nth(1).and_then(|rest| rest.lines().next()).unwrap();
     assert!(copied.contains("--aperture polygon") && copied.contains("--start=0"), "{copied}");
@@ -128,18 +132,25 @@ fn a_recording_is_begun_and_ended_by_a_key() {
     // From a GPU, pictures come back only while somebody needs them.
     for backend in [&["--backend", "cpu"][..], &["--backend", "gpu", "--adapter", "llvmpipe"]] {
         let (program, window) = start(&screen, backend);
-        let (video, picture) = (program.home().join("bokehcam-1.mp4"), program.home().join("bokehcam.png"));
         window.key(&[], u32::from('s'));
-        until("the snapshot", PATIENCE, || picture.exists());
+        until("the snapshot", PATIENCE, || kept(program.home(), ".png").is_some());
+        let picture = program.home().join(kept(program.home(), ".png").unwrap());
         window.key(&[], u32::from('v'));
-        let has_begun = |file: fs::DirEntry| file.file_name().as_encoded_bytes().starts_with(b".bokehcam-1.mp4.");
+        let has_begun = |file: fs::DirEntry| file.file_name().as_encoded_bytes().starts_with(b".bokehcam 20");
         until("the recording", PATIENCE, || fs::read_dir(program.home()).unwrap().flatten().any(has_begun));
         std::thread::sleep(Duration::from_millis(2500));
         window.key(&[], u32::from('v'));
-        until("the video is whole", PATIENCE, || video.exists());
+        until("the video is whole", PATIENCE, || kept(program.home(), ".mp4").is_some());
         assert!(is_photograph(&read_color(&picture).unwrap()));
         program.close();
     }
+}
+
+/// The name of a file of the window's own in a folder, but for those beside a snapshot.
+fn kept(folder: &Path, ending: &str) -> Option<String> {
+    let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut ours = names.filter(|name| name.starts_with("bokehcam 20") && !name.ends_with("-color.png"));
+    ours.find(|name| name.ends_with(ending))
 }
 
 /// The recording without its depth, in a folder of its own; also one with a picture that is broken, and which.

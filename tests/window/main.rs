@@ -4,6 +4,7 @@
 //! `scripts/test` runs them where there is `Xvfb` and `openbox` (`scripts/setup window` installs both). By hand:
 //! `cargo test --test window -- --include-ignored --test-threads=1`; what a failed test saw lies in `target/tmp/`.
 
+mod desktop;
 mod harness;
 mod input;
 mod picture;

@@ -30,6 +30,11 @@ impl<'a> Program<'a> {
 
     /// Starts it as somebody who has used it before: `home` is what [`Program::end`] gave.
     pub fn start_at(screen: &'a Screen, home: TempDir, arguments: &[&str]) -> Self {
+        Self::start_on(screen, home, "unix:path=/none", arguments)
+    }
+
+    /// Starts it in a session that has this bus.
+    pub fn start_on(screen: &'a Screen, home: TempDir, bus: &str, arguments: &[&str]) -> Self {
         let said = fs::File::create(home.path().join("said")).unwrap();
         let mut command = Command::new("setpriv");
         command
@@ -38,6 +43,7 @@ impl<'a> Program<'a> {
             .arg("--report")
             .arg(home.path().join("report.json"))
             .env("DISPLAY", &screen.display)
+            .env("DBUS_SESSION_BUS_ADDRESS", bus)
             .env("HOME", home.path())
             .env("XDG_CONFIG_HOME", home.path().join("config"))
             .env("XDG_STATE_HOME", home.path().join("state"))

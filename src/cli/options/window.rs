@@ -50,7 +50,7 @@ pub struct Window {
     /// Light or dark colours
     #[arg(long, value_parser = named::<ThemeChoice>(), value_name = "WHICH", default_value = "auto")]
     pub theme: ThemeChoice,
-    /// Where snapshots and recordings go [default: the pictures folder]
+    /// Where snapshots and recordings go [default: the user's folders of pictures and of videos]
     #[arg(long, value_name = "DIR")]
     pub save_to: Option<PathBuf>,
 }

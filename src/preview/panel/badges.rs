@@ -1,4 +1,5 @@
-//! Badges: that something is being written, and for how long, or that the picture is frozen. Always to be seen.
+//! Badges: that something is being written, and for how long, that the picture is frozen, or that the next look is being
+//! worked on. Always to be seen.
 
 use std::time::Duration;
 
@@ -16,7 +17,11 @@ const LIVE: Color32 = Color32::from_rgb(255, 90, 80);
 pub struct Badges {
     recording_s: Option<f64>,
     camera_s: Option<f64>,
+    between_s: Option<f64>,
 }
+
+/// What takes less time needs no word.
+const UNNOTICED_S: f64 = 0.06;
 
 impl Badges {
     /// Draws them at the top right, or to the left of the panel.
@@ -31,10 +36,16 @@ impl Badges {
             Some(bytes) => format!("{text}, {}", size(bytes)),
             None => text,
         };
+        self.between_s = state.between.then(|| self.between_s.unwrap_or(now_s));
+        let is_late = self.between_s.is_some_and(|since_s| now_s - since_s >= UNNOTICED_S);
+        if state.between && !is_late {
+            ctx.request_repaint_after(Duration::from_secs_f64(UNNOTICED_S));
+        }
         let all = [
             (recording.map(sized), LIVE),
             (text("Virtual camera", state.virtual_camera().is_some(), &mut self.camera_s), LIVE),
             (frozen(state).map(str::to_owned), ON_PICTURE),
+            (is_late.then(|| "Working…".to_owned()), ON_PICTURE),
         ];
         if self.recording_s.or(self.camera_s).is_some() {
             ctx.request_repaint_after(Duration::from_secs(1));

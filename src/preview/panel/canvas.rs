@@ -13,8 +13,9 @@ use crate::look::Look;
 pub const RING_S: f64 = 0.9;
 /// Scrolling by this many points doubles the blur.
 const WHEEL_TO_DOUBLE: f32 = 300.0;
-/// The split line can be grabbed this near to it, in points.
+/// The split line can be grabbed this near to it, in points, by a pointer and by a finger.
 const HOLD: f32 = 12.0;
+const FINGER_HOLD: f32 = 28.0;
 
 /// What the gestures remember.
 #[derive(Debug, Default)]
@@ -26,14 +27,14 @@ pub struct Gestures {
 }
 
 impl Gestures {
-    /// Reads the gestures on the picture, and draws the marks on it.
-    pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, actions: &mut Vec<Action>) {
+    /// Reads the gestures on the picture, and draws the marks on it. A touch that wakes the panel is no click.
+    pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, waking: bool, actions: &mut Vec<Action>) {
         // No stop for the Tab key: the arrow keys do what a click does.
         let response = ui.interact(place.rect, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
         let line = split_line(ui, state, &place);
         let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.bare;
         let on_line = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());
-        if !on_line {
+        if !on_line && !waking {
             self.click(&response, state, &place, actions);
         }
         if is_tilt {
@@ -117,7 +118,9 @@ impl Gestures {
 fn split_line(ui: &mut Ui, state: &State, place: &Place) -> Option<Response> {
     let at = state.split?;
     let x = place.rect.left() + at * place.rect.width();
-    let rect = Rect::from_x_y_ranges(x - HOLD..=x + HOLD, place.rect.y_range());
+    // What is pressed next is taken from this pass: where there is no pointer, it will be a finger.
+    let hold = if ui.input(|input| input.pointer.has_pointer()) { HOLD } else { FINGER_HOLD };
+    let rect = Rect::from_x_y_ranges(x - hold..=x + hold, place.rect.y_range());
     let line = ui.interact(rect, Id::unique("split line"), Sense::DRAG);
     Some(line.on_hover_and_drag_cursor(egui::CursorIcon::ResizeHorizontal))
 }

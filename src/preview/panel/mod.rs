@@ -18,6 +18,7 @@ mod sheet;
 #[cfg(test)]
 mod tests;
 mod theme;
+mod timer;
 
 pub use fonts::SystemFonts;
 pub use theme::install as dress;
@@ -44,6 +45,10 @@ pub struct Panel {
     ready: bool,
     /// When pointer or keyboard were used last, in egui's seconds.
     active_s: f64,
+    /// When the pointer was.
+    pointed_s: f64,
+    /// Whether the touch that is going on brought the panel back, and does nothing else.
+    waking: bool,
     /// When a control in hand changed the look last, until it is let go.
     stroke_s: Option<f64>,
     gestures: Gestures,
@@ -54,6 +59,7 @@ pub struct Panel {
     /// What had the focus before something covered the window, and whether something does.
     focused: Option<Id>,
     covered: bool,
+    timer: timer::Timer,
     /// Whether a control had the focus or a list was open at the end of the last pass.
     was_in_hand: bool,
 }
@@ -83,9 +89,12 @@ impl Panel {
         let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };
         self.read_keys(ui, state, size, actions);
         let place = Place::new(canvas, ctx.pixels_per_point(), state.mirror);
-        let awake = self.is_awake(ui, place.is_none());
+        let awake = self.is_awake(ui, state.panel && !state.bare, place.is_none());
         if let Some(place) = place {
-            self.gestures.show(ui, state, place, actions);
+            self.gestures.show(ui, state, place, self.waking, actions);
+        }
+        if state.full_screen && self.pointer_rests(ui) {
+            ctx.set_cursor_icon(egui::CursorIcon::None);
         }
         if !state.bare {
             legend::show(ui, state);
@@ -101,6 +110,7 @@ impl Panel {
         let panel = self.sheet.rect().filter(|_| !state.bare);
         self.badges.show(&ctx, state, panel);
         plate::show(&ctx, state, actions);
+        self.timer.show(&ctx, state, actions);
         self.notes.show(&ctx, state, actions);
         closing::show(&ctx, state, actions);
         if state.help {
@@ -136,15 +146,21 @@ impl Panel {
         });
     }
 
-    /// Whether pointer or keyboard were used a short while ago, or the person `waits` for the first picture.
-    fn is_awake(&mut self, ui: &Ui, waits: bool) -> bool {
-        let (now_s, active) = ui.input(|input| {
+    /// Whether pointer or keyboard were used a short while ago, or the person `waits` for the first picture. A touch that
+    /// brings the panel back is remembered.
+    fn is_awake(&mut self, ui: &Ui, has_panel: bool, waits: bool) -> bool {
+        let began = |event: &Event| matches!(event, Event::Touch { phase: egui::TouchPhase::Start, .. });
+        let (now_s, active, touched) = ui.input(|input| {
             let is_use = |event: &Event| {
                 let is_other = matches!(event, Event::PointerGone | Event::WindowFocused(_) | Event::MouseMoved(_));
                 !is_other && !matches!(event, Event::Key { pressed: false, .. })
             };
-            (input.time, input.events.iter().any(is_use) || input.pointer.any_down())
+            let active = input.events.iter().any(is_use) || input.pointer.any_down();
+            (input.time, active, input.events.iter().any(began))
         });
+        if touched {
+            self.waking = has_panel && now_s - self.active_s > HIDES_AFTER_S && !self.sheet.is_in_use(ui.ctx());
+        }
         // Its first seconds count from the first picture.
         if active || waits {
             self.active_s = now_s;
@@ -154,6 +170,21 @@ impl Panel {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(left_s + 0.01));
         }
         left_s > 0.0
+    }
+
+    /// Whether the pointer has not been moved for so long that nobody looks for it; where it keeps the panel, it stays.
+    fn pointer_rests(&mut self, ui: &Ui) -> bool {
+        let (now_s, at) = ui.input(|input| {
+            if input.pointer.is_moving() || input.pointer.any_down() || input.pointer.any_released() {
+                self.pointed_s = input.time;
+            }
+            (input.time, input.pointer.latest_pos())
+        });
+        let left_s = self.pointed_s + HIDES_AFTER_S - now_s;
+        if left_s > 0.0 {
+            ui.ctx().request_repaint_after(Duration::from_secs_f64(left_s + 0.01));
+        }
+        left_s <= 0.0 && !self.sheet.rect().zip(at).is_some_and(|(panel, at)| panel.contains(at))
     }
 
     /// The action that ends a stroke, once the control is let go: its changes are undone together, later ones apart.

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, Context, CornerRadius, DragValue, FontId, Id, Layout, Rect, RichText, Role, Sense, Slider,
+    Align, Align2, Context, CornerRadius, DragValue, FontId, Id, Layout, Rect, Response, RichText, Role, Sense, Slider,
     SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
 };
 
@@ -178,6 +178,11 @@ pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     let font = TextStyle::Body.resolve(ui.style());
     painter.text(rect.left_center(), Align2::LEFT_CENTER, label, font, ui.visuals().text_color());
     response.on_hover_text(hint).clicked()
+}
+
+/// Tells a screen reader what a list or a field is called.
+pub fn called(control: &Response, name: &str, role: Role) {
+    control.widget_info(|| WidgetInfo::labeled(role, control.enabled(), tr(name)));
 }
 
 /// A line of explanation.

@@ -1,6 +1,8 @@
 //! The panel without a display: real input events in, actions and shapes out.
 
+mod access;
 mod covers;
+mod fonts;
 mod gestures;
 mod keyboard;
 mod looks;
@@ -10,6 +12,8 @@ mod presets;
 mod sections;
 mod sizes;
 mod texts;
+mod timer;
+mod touch;
 
 use egui::{Event, FullOutput, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2, pos2};
 

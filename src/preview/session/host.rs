@@ -3,7 +3,7 @@
 mod looks;
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
@@ -13,6 +13,7 @@ use crate::files::whole;
 use crate::link::demand::{Demand, Watch};
 use crate::look::Look;
 use crate::pipeline::{PipelineError, Wanted};
+use crate::preview::folders::{self, Folders};
 use crate::preview::services::{Services, Switch};
 use crate::preview::state::{Output, Request, Source, Update};
 use crate::sink;
@@ -29,7 +30,7 @@ pub(super) struct Host {
     outputs: Vec<Output>,
     keep_going: bool,
     budget_ns: Option<u64>,
-    folder: PathBuf,
+    folders: Folders,
     wanted: Arc<Wanted>,
     demand: Demand,
     /// Held while something is written: then the source does not rest.
@@ -50,16 +51,13 @@ pub(super) struct Host {
     held: Option<held::HeldBlur>,
 }
 
-/// A recording without a name of its own is called this, around a number.
-const RECORDING: &str = "bokehcam-";
-const VIDEO: &str = ".mp4";
 /// The size of a recording is told this often.
 const SIZE_PERIOD: Duration = Duration::from_secs(1);
 
 impl Host {
     /// A session that has not started yet; `orders` sends orders to itself.
     pub fn new(start: Start, news: News, orders: mpsc::Sender<Order>) -> Self {
-        let Start { services, look, source, outputs, keep_going, budget_ns, folder, wanted, demand } = start;
+        let Start { services, look, source, outputs, keep_going, budget_ns, folders, wanted, demand } = start;
         Self {
             services,
             look,
@@ -68,7 +66,7 @@ impl Host {
             outputs,
             keep_going,
             budget_ns,
-            folder,
+            folders,
             wanted,
             demand,
             watch: None,
@@ -143,8 +141,7 @@ impl Host {
 
     /// Rescues recordings of an earlier preview that was killed.
     fn recover(&self) {
-        let is_ours = |name: &str| name.starts_with(RECORDING) && name.ends_with(VIDEO);
-        for kept in sink::recover_all(&self.folder, is_ours) {
+        for kept in self.folders.all().flat_map(|folder| sink::recover_all(folder, folders::is_video)) {
             self.news.note(format!("An earlier recording was broken off: it is kept as {}", kept.display()));
         }
     }
@@ -182,6 +179,7 @@ impl Host {
                 Ok(controls) => self.news.tell(Update::Controls(controls)),
                 Err(line) => self.news.note(line),
             },
+            Request::OpenFolder(folder) => self.news.open(folder),
             Request::Refresh => self.tell_choices(),
             Request::SavePreset(name, look) => {
                 let saved = self.services.settings().save_preset(&name, &look);
@@ -290,10 +288,8 @@ impl Host {
 
     /// A path for a recording that does not exist yet.
     fn free_name(&self) -> PathBuf {
-        let name = |number: u32| self.folder.join(format!("{RECORDING}{number}{VIDEO}"));
         // What is being written gets its name at the end.
-        let is_taken = |path: &PathBuf| self.outputs.iter().any(|output| path.as_os_str() == output.name.as_str());
-        (1..u32::MAX).map(name).find(|path| !path.exists() && !is_taken(path)).unwrap_or_else(|| name(0))
+        self.folders.free_video(|path| self.outputs.iter().any(|output| path.as_os_str() == output.name.as_str()))
     }
 
     /// Puts the command line that does the same on the clipboard.
@@ -314,7 +310,10 @@ impl Host {
     fn on_output(&mut self, run: u64, Notice { member, fate }: &Notice) {
         match fate {
             Fate::Began => self.news.note(format!("writing to {member}")),
-            Fate::Completed { frames } => self.news.note(format!("{member}: complete, {frames} frames")),
+            Fate::Completed { frames } => {
+                self.news.note(format!("{member}: complete, {frames} frames"));
+                self.news.kept(Path::new(member));
+            }
             Fate::Failed { why, .. } => {
                 tracing::error!("{why}");
                 self.failed.get_or_insert_with(|| why.clone());
@@ -349,10 +348,6 @@ impl Host {
 
     /// Ends the run, if there is one, and completes what it wrote.
     fn stop(&mut self) {
-        if let Some(live) = self.live.take()
-            && let Some(report) = live.stop()
-        {
-            self.report = Some(report);
-        }
+        self.report = self.live.take().and_then(Live::stop).or_else(|| self.report.take());
     }
 }

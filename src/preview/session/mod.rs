@@ -5,7 +5,7 @@ mod held;
 mod host;
 mod live;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 pub use held::{Blurred, Held};
 use host::Host;
 
+use super::folders::{self, Folders};
 use super::services::{Services, Switch};
 use super::state::{Output, Request, Update};
 use crate::budget::Quality;
@@ -47,7 +48,7 @@ pub struct Start {
     /// Time that a frame's blur may take; `None` is the frame period.
     pub budget_ns: Option<u64>,
     /// Where snapshots and recordings go.
-    pub folder: PathBuf,
+    pub folders: Folders,
     /// Where blurred pictures are wanted.
     pub wanted: Arc<Wanted>,
     /// Whether anybody watches: sources rest while nobody does.
@@ -183,6 +184,17 @@ impl News {
         let line = line.into();
         tracing::info!("{line}");
         self.tell(Update::Note(line));
+    }
+
+    /// Tells in which folder a file is now.
+    fn kept(&self, file: &Path) {
+        folders::folder_of(file).into_iter().for_each(|folder| self.tell(Update::Kept(folder)));
+    }
+
+    /// Shows a folder, and tells why not.
+    fn open(&self, folder: PathBuf) {
+        let news = self.clone();
+        folders::open(folder, move |line| news.note(line));
     }
 
     fn send(&self, heard: SessionEvent) {

@@ -1,5 +1,7 @@
 //! What a person can do, what others have to do then, and what they tell.
 
+use std::path::PathBuf;
+
 use super::{Output, Shown, Source};
 use crate::knob::Knob;
 use crate::look::Look;
@@ -60,6 +62,10 @@ pub enum Action {
     Note(String),
     /// Saves what is shown, and what is needed to make it again.
     Snapshot,
+    /// Saves what is shown in a few seconds, or not after all.
+    SelfTimer(bool),
+    /// Shows the folder that something was saved in last.
+    OpenFolder,
     /// Begins a recording (video), or ends it.
     Record(bool),
     /// Writes to this virtual camera, or to none.
@@ -95,6 +101,8 @@ pub enum Request {
     DeletePreset(String),
     /// Save the frame that is shown.
     Snapshot,
+    /// Show a folder.
+    OpenFolder(PathBuf),
     /// Begin to write to an output. A recording without a name is to be given one.
     Begin(Output),
     End(Output),
@@ -127,6 +135,8 @@ pub enum Update {
     Outputs(Vec<Output>),
     /// Bytes of the recording so far.
     Recorded(u64),
+    /// Something was saved in this folder.
+    Kept(PathBuf),
     /// A line for the person.
     Note(String),
     /// A line that stays until it was read: an output failed.

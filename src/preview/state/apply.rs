@@ -59,6 +59,8 @@ impl State {
                 return vec![Request::FullScreen(on)];
             }
             Action::Snapshot => return vec![Request::Snapshot],
+            Action::SelfTimer(on) => self.self_timer = on,
+            Action::OpenFolder => return self.kept_in.clone().map(Request::OpenFolder).into_iter().collect(),
             Action::Record(on) => return self.record(on),
             Action::VirtualCamera(name) => return self.set_virtual_camera(name),
             Action::Open(name) => return self.open(name),

@@ -21,6 +21,7 @@ impl State {
                 self.closing &= self.recording().is_some();
             }
             Update::Recorded(bytes) => self.recorded_bytes = Some(bytes),
+            Update::Kept(folder) => self.kept_in = Some(folder),
             Update::Note(text) => self.note(text),
             Update::Trouble(text) => self.trouble = Some(text),
         }

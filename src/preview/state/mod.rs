@@ -14,6 +14,8 @@ mod switches;
 mod tests;
 pub mod tweak;
 
+use std::path::PathBuf;
+
 pub use action::{Action, Request, Update};
 pub use apply::{NO_DEPTH, NO_PLATE, NO_VIRTUAL_CAMERA};
 pub use habits::{Habits, TEXT_SCALES};
@@ -100,10 +102,16 @@ pub struct State {
     pub presets: Vec<Preset>,
     /// Where pictures go besides the window.
     pub outputs: Vec<Output>,
+    /// Whether a snapshot is due in a few seconds.
+    pub self_timer: bool,
+    /// Where something was saved last.
+    pub kept_in: Option<PathBuf>,
     /// What of a frame is shown.
     pub shown: Shown,
     /// Whether the window shows pictures as a mirror does.
     pub mirror: bool,
+    /// Whether frames are still blurred for the look before, as their own kernels are being made.
+    pub between: bool,
     /// Whether the window keeps the picture it has.
     pub frozen: bool,
     /// Left of this fraction of its width, the picture is shown as before the blur.
@@ -165,8 +173,11 @@ impl State {
             controls: Vec::new(),
             presets: Vec::new(),
             outputs: Vec::new(),
+            self_timer: false,
+            kept_in: None,
             shown: Shown::default(),
             mirror: false,
+            between: false,
             frozen: false,
             split: None,
             panel: true,

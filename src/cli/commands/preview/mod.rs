@@ -2,7 +2,6 @@
 
 mod store;
 
-use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -20,6 +19,7 @@ use crate::cli::terminal;
 use crate::link::demand::Demand;
 use crate::look::{Effect, Look};
 use crate::pipeline::Pace;
+use crate::preview::folders::Folders;
 use crate::preview::session::Start;
 use crate::preview::state::{Output, State};
 use crate::preview::system::System;
@@ -134,7 +134,7 @@ pub fn show(
             budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
             wanted: Arc::default(),
             demand: Demand::default(),
-            folder: window.save_to.clone().unwrap_or_else(pictures_folder),
+            folders: window.save_to.clone().map_or_else(Folders::of_user, Folders::at),
         },
         theme: window.theme,
         device: device.clone(),
@@ -172,12 +172,4 @@ fn first_state(look: Look, source: &str, window: &Window, mirror: bool, memory: 
     window.text_scale.into_iter().for_each(|scale| state.habits.set_text_scale(scale));
     state.habits.single_keys = window.single_keys.unwrap_or(state.habits.single_keys);
     state
-}
-
-/// The user's folder of pictures, else the current folder.
-fn pictures_folder() -> PathBuf {
-    let home = std::env::var_os("HOME").map(PathBuf::from);
-    let named = std::env::var_os("XDG_PICTURES_DIR").map(PathBuf::from);
-    let usual = home.map(|home| home.join("Pictures"));
-    named.into_iter().chain(usual).find(|folder| folder.is_dir()).unwrap_or_default()
 }

@@ -7,7 +7,7 @@ use egui::{
 use super::Sheet;
 use crate::look::Effect;
 use crate::look::presets::Preset;
-use crate::preview::panel::parts::remark;
+use crate::preview::panel::parts::{called, remark};
 use crate::preview::panel::theme::{Colors, medium};
 use crate::preview::state::Action;
 use crate::preview::texts::{tr, tr_with};
@@ -149,6 +149,7 @@ fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, by_enter: bool) -> Opti
     ui.horizontal(|ui| {
         let edit = TextEdit::singleline(&mut editing.name).hint_text(tr("name")).desired_width(140.0).char_limit(40);
         let edit = ui.add(edit);
+        called(&edit, "Name of the preset", Role::TextInput);
         if std::mem::take(&mut editing.ask_focus) {
             edit.request_focus();
         }

@@ -3,7 +3,7 @@
 use egui::{Align2, ComboBox, CornerRadius, Role, Sense, Stroke, TextStyle, Ui, Vec2, WidgetInfo, vec2};
 
 use super::Sheet;
-use crate::preview::panel::parts::{path, remark};
+use crate::preview::panel::parts::{called, path, remark};
 use crate::preview::panel::{icons, theme::Colors};
 use crate::preview::state::{Action, NO_VIRTUAL_CAMERA};
 
@@ -19,15 +19,25 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     }
     let half = vec2((ui.available_width() - 6.0) / 2.0, 28.0);
     ui.horizontal(|ui| {
-        let snapshot = egui::Button::new("Snapshot").min_size(half);
+        let timer = egui::Button::new("3 s").selected(state.self_timer).min_size(vec2(34.0, 28.0));
+        let snapshot = egui::Button::new("Snapshot").min_size(half - vec2(40.0, 0.0));
         if ui.add(snapshot).on_hover_text("Save this picture, with all that is needed to make it again (S)").clicked() {
             sheet.act(Action::Snapshot);
+        }
+        if ui.add(timer).on_hover_text("A snapshot in three seconds (Shift+S)").clicked() {
+            sheet.act(Action::SelfTimer(!state.self_timer));
         }
         let copy = egui::Button::new("Copy command").min_size(half);
         if ui.add(copy).on_hover_text("The command line that does the same, to the clipboard (K)").clicked() {
             sheet.act(Action::CopyCommand);
         }
     });
+    if let Some(folder) = &state.kept_in {
+        let open = egui::Button::new("Open folder").min_size(vec2(ui.available_width(), 28.0));
+        if ui.add(open).on_hover_text(folder.display().to_string()).clicked() {
+            sheet.act(Action::OpenFolder);
+        }
+    }
     ui.label("Virtual camera").on_hover_text("For calls: other programs see the picture as a camera's (O)");
     if state.virtual_cameras.is_empty() {
         remark(ui, NO_VIRTUAL_CAMERA);
@@ -39,7 +49,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         choice.map_or_else(|| name.to_owned(), |choice| choice.label.clone())
     };
     let text = current.map_or_else(|| "Off".to_owned(), |output| label(&output.name));
-    ComboBox::from_id_salt("virtual camera").selected_text(text).truncate().show_ui(ui, |ui| {
+    let cameras = ComboBox::from_id_salt("virtual camera").selected_text(text).truncate().show_ui(ui, |ui| {
         if ui.selectable_label(current.is_none(), "Off").clicked() && current.is_some() {
             sheet.act(Action::VirtualCamera(None));
         }
@@ -50,6 +60,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             }
         }
     });
+    called(&cameras.response, "Virtual camera", Role::ComboBox);
 }
 
 /// Draws the button that starts and stops a recording. Whether it was clicked.

@@ -1,12 +1,12 @@
 //! The quality of the blur.
 
-use egui::{ComboBox, Ui};
+use egui::{ComboBox, Role, Ui};
 
 use super::Sheet;
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::look::{BackgroundMemory, Refine};
-use crate::preview::panel::parts::{choose, switch};
+use crate::preview::panel::parts::{called, choose, switch};
 use crate::preview::state::tweak::rank_label;
 use crate::preview::texts::tr;
 
@@ -17,7 +17,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         Some(quality) => quality.to_string(),
     };
     ui.label(tr("Level"));
-    ComboBox::from_id_salt("quality").selected_text(name(sheet.look.quality)).show_ui(ui, |ui| {
+    let levels = ComboBox::from_id_salt("quality").selected_text(name(sheet.look.quality)).show_ui(ui, |ui| {
         for quality in [None].into_iter().chain(Quality::ALL.map(Some)) {
             if ui.selectable_label(sheet.look.quality == quality, name(quality)).clicked() {
                 sheet.look.quality = quality;
@@ -25,10 +25,11 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             }
         }
     });
+    called(&levels.response, "Level", Role::ComboBox);
     ui.label(tr("Terms of the aperture"))
         .on_hover_text(tr("Separable terms: more keep its shape better and cost more"));
     let ranks = [None].into_iter().chain((1..=16).map(|terms| Some(Rank::Terms(terms)))).chain([Some(Rank::Full)]);
-    ComboBox::from_id_salt("rank").selected_text(rank_label(sheet.look.rank)).show_ui(ui, |ui| {
+    let terms = ComboBox::from_id_salt("rank").selected_text(rank_label(sheet.look.rank)).show_ui(ui, |ui| {
         for rank in ranks {
             if ui.selectable_label(sheet.look.rank == rank, rank_label(rank)).clicked() {
                 sheet.look.rank = rank;
@@ -36,6 +37,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             }
         }
     });
+    called(&terms.response, "Terms of the aperture", Role::ComboBox);
     if sheet.look.effect.follows_depth() {
         let methods = [
             ("Layered", "Depth bins, blurred and put together front to back"),

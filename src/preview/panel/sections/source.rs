@@ -1,10 +1,10 @@
 //! The source, and the camera's controls.
 
-use egui::{ComboBox, Ui};
+use egui::{ComboBox, Role, Ui};
 
 use super::Sheet;
 use crate::knob::Knob;
-use crate::preview::panel::parts::{Number, number, remark, switch};
+use crate::preview::panel::parts::{Number, called, number, remark, switch};
 use crate::preview::state::{Action, Source};
 
 /// The source, and others to choose.
@@ -17,7 +17,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         (None, _) if state.source_name.is_empty() => "the first camera",
         (None, _) => state.source_name.as_str(),
     };
-    ComboBox::from_id_salt("source").selected_text(label).truncate().show_ui(ui, |ui| {
+    let sources = ComboBox::from_id_salt("source").selected_text(label).truncate().show_ui(ui, |ui| {
         for choice in &state.sources {
             let chosen = choice.name == state.source_name;
             if ui.selectable_label(chosen, &choice.label).on_hover_text(&choice.name).clicked() && !chosen {
@@ -28,6 +28,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
             remark(ui, "Nothing else was found.");
         }
     });
+    called(&sources.response, "Source", Role::ComboBox);
     match &state.source {
         Source::Opening => remark(ui, "Opening…"),
         Source::Running(running) => {
@@ -80,14 +81,15 @@ fn knob(ui: &mut Ui, control: &Knob) -> Option<i64> {
         let chosen = control.menu.iter().find(|(value, _)| *value == control.value);
         let text = chosen.map_or("?", |(_, name)| name.as_str());
         let mut picked = None;
-        ui.label(label);
-        ComboBox::from_id_salt(&control.name).selected_text(text).truncate().show_ui(ui, |ui| {
+        ui.label(&label);
+        let menu = ComboBox::from_id_salt(&control.name).selected_text(text).truncate().show_ui(ui, |ui| {
             for (value, name) in &control.menu {
                 if ui.selectable_label(*value == control.value, name).clicked() {
                     picked = Some(*value);
                 }
             }
         });
+        called(&menu.response, &label, Role::ComboBox);
         return picked.filter(|&value| value != control.value);
     }
     let (least, most, step) = control.range;

@@ -3,6 +3,7 @@
 use super::super::{SessionEvent, Still, held};
 use super::Host;
 use crate::look::{Look, Patch};
+use crate::preview::folders;
 use crate::recording::snapshot::{self, Snapshot};
 
 /// Looks that are kept for snapshots: frames that come are of one of the last few.
@@ -53,8 +54,11 @@ impl Host {
         let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
         let Still { picture, color, depth, .. } = still;
         let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
-        match snapshot::save(&self.folder, "bokehcam", &snapshot) {
-            Ok(path) => self.news.note(format!("Saved {}", path.display())),
+        match snapshot::save(&self.folders.pictures, &folders::stem(), &snapshot) {
+            Ok(path) => {
+                self.news.note(format!("Saved {}", path.display()));
+                self.news.kept(&path);
+            }
             Err(error) => self.news.note(error.to_string()),
         }
     }

@@ -52,7 +52,7 @@ impl App {
         view.picture = Picture::in_memory(Pooled::detached(picture));
         view.depth = depth.map(Pooled::detached);
         (view.coc, view.trace.change, view.trace.between, view.trace.quality) = (coc, change, false, quality);
-        self.state.focus_m = focus_m(&coc);
+        (self.state.focus_m, self.state.between) = (focus_m(&coc), false);
         self.drawn = None;
         if self.snapshot_due {
             self.snapshot();

@@ -1,5 +1,6 @@
 //! The window's events.
 
+mod calls;
 mod hold;
 mod show;
 
@@ -8,7 +9,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use egui_winit::accesskit_winit::WindowEvent as Access;
 use winit::application::ApplicationHandler;
 use winit::event::{TouchPhase, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
@@ -16,7 +16,7 @@ use winit::window::WindowId;
 
 use super::gfx::Gfx;
 use super::memory::Memory;
-use super::{Call, Ended, Preview, ThemeChoice, WindowError, desktop};
+use super::{Call, Ended, Preview, WindowError};
 use crate::bokeh;
 use crate::clock::Clock;
 use crate::compute::device::Device;
@@ -97,28 +97,17 @@ impl App {
         let wake_pending = Arc::new(AtomicBool::new(false));
         let pending = Arc::clone(&wake_pending);
         // An event loop that is gone needs no waking.
-        let call = |call: fn() -> Call| {
-            let proxy = proxy.clone();
-            move || drop(proxy.send_event(call()))
-        };
-        let wake_session = call(|| Call::Session);
+        let to_wake = proxy.clone();
         let wake: Wake = Arc::new(move || {
             if !pending.swap(true, Ordering::AcqRel) {
-                wake_session();
+                let _ = to_wake.send_event(Call::Session);
             }
         });
         let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
         let ctx = egui::Context::default();
-        let fonts = SystemFonts::new(call(|| Call::Fonts));
-        fonts.install(&ctx);
-        // Dark until the desktop says otherwise: it may take its time, or have nothing to say.
-        ctx.set_theme(if theme == ThemeChoice::Light { egui::Theme::Light } else { egui::Theme::Dark });
-        if theme == ThemeChoice::Auto {
-            let proxy = proxy.clone();
-            desktop::follow(move |theme| proxy.send_event(Call::Theme(theme)).is_ok());
-        }
+        let fonts = calls::follow(&ctx, theme, &proxy);
         Ok(Self {
             state,
             wanted,
@@ -228,7 +217,7 @@ impl App {
         // A frozen frame has to be in memory, to be saved: frames are replaced until one is.
         let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
         if let Some(view) = newest.filter(|_| !frozen) {
-            self.state.focus_m = hold::focus_m(&view.coc);
+            self.learn_from(&view);
             self.view = Some(view);
             self.view_is_new = true;
             changed = true;
@@ -291,19 +280,7 @@ impl ApplicationHandler<Call> for App {
     }
 
     fn user_event(&mut self, events: &ActiveEventLoop, call: Call) {
-        match call {
-            Call::Session => return self.receive(events),
-            Call::Access(event) => match (event.window_event, &mut self.gfx) {
-                (Access::InitialTreeRequested, _) => self.ctx.enable_accesskit(),
-                (Access::AccessibilityDeactivated, _) => self.ctx.disable_accesskit(),
-                (Access::ActionRequested(request), Some(gfx)) => gfx.input.on_accesskit_action_request(request),
-                (Access::ActionRequested(_), None) => {}
-            },
-            Call::Theme(theme) => self.ctx.set_theme(theme),
-            Call::Fonts => self.fonts.install(&self.ctx),
-        }
-        self.layout_at = Some(Instant::now());
-        self.ask_for_redraw();
+        self.answer(call, events);
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
@@ -337,10 +314,11 @@ impl ApplicationHandler<Call> for App {
             self.on_input();
         }
         // egui takes a press to be where the pointer is when controls are laid out: before it moves on.
-        let is_touch = |phase| matches!(phase, TouchPhase::Started | TouchPhase::Ended);
-        if matches!(event, WindowEvent::MouseInput { .. })
-            || matches!(event, WindowEvent::Touch(touch) if is_touch(touch.phase))
-        {
+        let is_press = match &event {
+            WindowEvent::Touch(touch) => touch.phase != TouchPhase::Moved,
+            other => matches!(other, WindowEvent::MouseInput { .. }),
+        };
+        if is_press {
             self.lay_out(events);
         }
     }

@@ -1,0 +1,37 @@
+//! The self-timer: the seconds until a snapshot, counted in the middle of the window.
+
+use egui::{Align2, Area, Context, Id, Order, RichText, vec2};
+
+use super::state::{Action, State};
+use super::theme::{Colors, card, medium};
+
+/// Time to get back into the picture.
+const DELAY_S: f64 = 3.0;
+
+/// When the snapshot is due, in egui's seconds.
+#[derive(Debug, Default)]
+pub struct Timer {
+    due_s: Option<f64>,
+}
+
+impl Timer {
+    /// Draws the seconds that are left, and asks for the snapshot when none is.
+    pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) {
+        let now_s = ctx.input(|input| input.time);
+        self.due_s = state.self_timer.then(|| self.due_s.unwrap_or(now_s + DELAY_S));
+        let Some(left_s) = self.due_s.map(|due_s| due_s - now_s) else { return };
+        if left_s <= 0.0 {
+            self.due_s = None;
+            actions.extend([Action::SelfTimer(false), Action::Snapshot]);
+            return;
+        }
+        ctx.request_repaint_after_secs((left_s.fract() + 0.005) as f32);
+        let area = Area::new(Id::unique("self-timer")).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
+        area.order(Order::Foreground).interactable(false).fade_in(false).show(ctx, |ui| {
+            let colors = Colors::here(ui);
+            card(&colors).inner_margin(egui::Margin::symmetric(28, 10)).show(ui, |ui| {
+                ui.label(RichText::new(left_s.ceil().to_string()).family(medium()).size(72.0));
+            });
+        });
+    }
+}

@@ -1,0 +1,167 @@
+//! The desktop around the window: its colours, and a screen reader. Both come over a session bus of the test's own.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+
+use bokehcam::frame::ColorImage;
+use zbus::blocking::connection::Builder;
+use zbus::blocking::{Connection, Proxy};
+use zbus::zvariant::{OwnedObjectPath, OwnedValue, Value};
+
+use super::program::{PORTRAIT, Program};
+use super::screen::{Beside, Screen, until};
+use super::window::PATIENCE;
+
+/// A session bus, which ends with it.
+struct Bus {
+    address: String,
+    _daemon: Beside,
+}
+
+impl Bus {
+    fn new() -> Self {
+        let mut daemon = Command::new("setpriv");
+        daemon.args(["--pdeathsig", "KILL", "dbus-daemon", "--session", "--nofork", "--nopidfile", "--print-address"]);
+        // No service of this machine's desktop is started for it.
+        daemon.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+        let mut daemon = Beside::start(daemon.stdout(Stdio::piped()).stderr(Stdio::null()));
+        let mut address = String::new();
+        BufReader::new(daemon.0.stdout.as_mut().unwrap()).read_line(&mut address).unwrap();
+        assert!(!address.is_empty(), "dbus-daemon does not start: scripts/setup window installs it");
+        Self { address: address.trim().to_owned(), _daemon: daemon }
+    }
+
+    fn connect(&self) -> Builder<'_> {
+        Builder::address(self.address.as_str()).unwrap()
+    }
+}
+
+/// A desktop's portal as far as its colours go, with the scheme that it begins with.
+struct Portal(u32);
+
+const APPEARANCE: &str = "org.freedesktop.appearance";
+const PATH: &str = "/org/freedesktop/portal/desktop";
+const SETTINGS: &str = "org.freedesktop.portal.Settings";
+
+#[zbus::interface(name = "org.freedesktop.portal.Settings")]
+impl Portal {
+    /// As old portals have it: the value within another.
+    fn read(&self, namespace: &str, key: &str) -> zbus::fdo::Result<OwnedValue> {
+        if (namespace, key) != (APPEARANCE, "color-scheme") {
+            return Err(zbus::fdo::Error::Failed("there is no such setting".into()));
+        }
+        Ok(OwnedValue::try_from(Value::Value(Box::new(Value::U32(self.0)))).unwrap())
+    }
+}
+
+const DARK: u32 = 1;
+const LIGHT: u32 = 2;
+
+/// Whether what is beside the picture is light.
+fn is_light(image: &ColorImage) -> bool {
+    image.rgb[..3].iter().all(|byte| *byte > 200)
+}
+
+fn is_dark(image: &ColorImage) -> bool {
+    image.rgb[..3].iter().all(|byte| *byte < 50) && image.rgb[..3].iter().any(|byte| *byte > 0)
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn light_and_dark_follow_the_desktop() {
+    let (screen, bus) = (Screen::new(), Bus::new());
+    let portal = bus.connect().name("org.freedesktop.portal.Desktop").unwrap().serve_at(PATH, Portal(LIGHT)).unwrap();
+    let portal: Connection = portal.build().unwrap();
+    let change = |to: u32| {
+        let body = (APPEARANCE, "color-scheme", Value::U32(to));
+        portal.emit_signal(None::<&str>, PATH, SETTINGS, "SettingChanged", &body).unwrap();
+    };
+    let start = |bus: &str, more: &[&str]| {
+        let arguments: Vec<&str> = [PORTRAIT, "--panel=false"].iter().chain(more).copied().collect();
+        let mut program = Program::start_on(&screen, tempfile::tempdir().unwrap(), bus, &arguments);
+        let window = program.window();
+        // A window of another shape than the picture, whose upper left corner is so beside it.
+        window.resize(640, 640);
+        (program, window)
+    };
+    let (program, window) = start(&bus.address, &[]);
+    window.until("light, as the desktop is", is_light);
+    change(DARK);
+    window.until("dark, as the desktop is now", is_dark);
+    change(LIGHT);
+    window.until("light again", is_light);
+    program.close();
+    let (program, window) = start(&bus.address, &["--theme", "dark"]);
+    window.until("dark, as it was asked for", is_dark);
+    program.close();
+    let (program, window) = start("unix:path=/none", &[]);
+    window.until("dark, as nobody says anything", is_dark);
+    let ended = program.close();
+    assert!(!ended.said.contains("scheme"), "{}", ended.said);
+}
+
+/// What a screen reader is told of a control.
+#[derive(Debug)]
+struct Told {
+    name: String,
+    role: String,
+    bus: String,
+    path: OwnedObjectPath,
+}
+
+/// All that a screen reader finds below a place.
+fn read(access: &Connection, (bus, path): (&str, &str), found: &mut Vec<Told>) -> zbus::Result<()> {
+    let place = Proxy::new(access, bus.to_owned(), path.to_owned(), "org.a11y.atspi.Accessible")?;
+    let path = OwnedObjectPath::try_from(path.to_owned())?;
+    let (name, role) = (place.get_property("Name")?, place.call("GetRoleName", &())?);
+    found.push(Told { name, role, bus: bus.to_owned(), path });
+    let children: Vec<(String, OwnedObjectPath)> = place.call("GetChildren", &())?;
+    children.iter().try_for_each(|(bus, path)| read(access, (bus, path.as_str()), found))
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_screen_reader_finds_the_controls_and_works_them() {
+    let (screen, bus) = (Screen::new(), Bus::new());
+    let session = bus.connect().build().unwrap();
+    let status = Proxy::new(&session, "org.a11y.Bus", "/org/a11y/bus", "org.a11y.Status").unwrap();
+    for on in ["IsEnabled", "ScreenReaderEnabled"] {
+        status.set_property(on, true).expect("no at-spi2-core: scripts/setup window installs it");
+    }
+    let launcher = Proxy::new(&session, "org.a11y.Bus", "/org/a11y/bus", "org.a11y.Bus").unwrap();
+    let address: String = launcher.call("GetAddress", &()).unwrap();
+    let access = Builder::address(address.as_str()).unwrap().build().unwrap();
+
+    let mut program = Program::start_on(
+        &screen,
+        tempfile::tempdir().unwrap(),
+        &bus.address,
+        &[PORTRAIT, "--mirror", "--rim", "0.25"],
+    );
+    program.window();
+    let registry = ("org.a11y.atspi.Registry", "/org/a11y/atspi/accessible/root");
+    let mut told = Vec::new();
+    until("the controls are told", PATIENCE, || {
+        told.clear();
+        // What is going away while one asks is asked for again.
+        read(&access, registry, &mut told).is_ok() && told.iter().any(|told| told.name == "Snapshot")
+    });
+    let find = |name: &str, role: &str| {
+        let found = told.iter().find(|told| told.name == name && told.role.contains(role));
+        found.unwrap_or_else(|| panic!("no {role} {name:?} in {told:#?}"))
+    };
+    find("Undo (Ctrl+Z)", "button");
+    find("Mirror", "");
+    let rim = find("Soft rim", "slider");
+    let value = Proxy::new(&access, rim.bus.as_str(), rim.path.as_str(), "org.a11y.atspi.Value").unwrap();
+    let value: f64 = value.get_property("CurrentValue").unwrap();
+    assert!((value - 0.25).abs() < 1e-3, "{value}");
+
+    let snapshot = find("Snapshot", "button");
+    let action = Proxy::new(&access, snapshot.bus.as_str(), snapshot.path.as_str(), "org.a11y.atspi.Action").unwrap();
+    assert!(action.call::<_, _, bool>("DoAction", &(0i32,)).unwrap());
+    let is_snapshot = |file: fs::DirEntry| file.file_name().as_encoded_bytes().starts_with(b"bokehcam 20");
+    until("the snapshot", PATIENCE, || fs::read_dir(program.home()).unwrap().flatten().any(is_snapshot));
+    program.close();
+}
