@@ -20,7 +20,7 @@ const LAYERS: [&[&str]; 12] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 24] = [
+const DOORS: [(&str, &[&str]); 27] = [
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
@@ -30,6 +30,7 @@ const DOORS: [(&str, &[&str]); 24] = [
     ("egui_winit", &["preview/window"]),
     ("image", &["capture/demo", "recording", "sink"]),
     ("indicatif", &["cli"]),
+    ("jiff", &["preview/folders"]),
     ("ort", &["network/onnx_runtime"]),
     ("plotters", &["cli"]),
     ("png", &["recording", "sink"]),
@@ -38,12 +39,14 @@ const DOORS: [(&str, &[&str]); 24] = [
     ("rten_tensor", &["network/built_in"]),
     ("saphyr_parser", &["calibration"]),
     ("sha2", &["network/known"]),
+    ("skrifa", &["preview/panel/fonts"]),
     ("softbuffer", &["preview/present"]),
     ("strsim", &["source", "v4l2"]),
     ("toml_edit", &["cli"]),
     ("v4l", &["v4l2"]),
     ("wgpu", &["bokeh/gpu", "compute/device", "depth/stereo/gpu", "preview/present"]),
     ("winit", &["preview/present", "preview/window"]),
+    ("zbus", &["preview/window"]),
     ("zune_jpeg", &["capture"]),
 ];
 

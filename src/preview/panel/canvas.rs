@@ -1,6 +1,6 @@
 //! Gestures on the picture itself: click, double-click, wheel, drag.
 
-use egui::{Id, Rect, Response, Sense, Ui};
+use egui::{Id, Rect, Response, Role, Sense, Ui, WidgetInfo};
 
 use super::marks::{self, Tilting};
 use super::place::Place;
@@ -31,6 +31,7 @@ impl Gestures {
     pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, waking: bool, actions: &mut Vec<Action>) {
         // No stop for the Tab key: the arrow keys do what a click does.
         let response = ui.interact(place.rect, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
+        response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, "Picture: a click focuses there"));
         let line = split_line(ui, state, &place);
         let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.bare;
         let on_line = line.as_ref().is_some_and(|line| line.hovered() || line.dragged());

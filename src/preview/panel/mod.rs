@@ -41,6 +41,8 @@ const LET_GO_AFTER_S: f64 = 0.8;
 /// What the controls remember from frame to frame besides egui's own memory.
 #[derive(Default)]
 pub struct Panel {
+    /// Whether the panel never hides: a screen reader would not find it again.
+    pub stays: bool,
     /// Whether fonts and styles are installed.
     ready: bool,
     /// When pointer or keyboard were used last, in egui's seconds.
@@ -98,7 +100,7 @@ impl Panel {
         }
         if !state.bare {
             legend::show(ui, state);
-            let shown = state.panel && (awake || self.sheet.is_in_use(&ctx));
+            let shown = state.panel && (awake || self.stays || self.sheet.is_in_use(&ctx));
             self.sheet.show(&ctx, state, shown, size, actions);
             if awake && !state.panel {
                 sheet::way_back(&ctx, actions);

@@ -205,6 +205,10 @@ fn the_panel_hides_itself_and_comes_back() {
     window.press(Key::Tab, Modifiers::NONE);
     window.wait(20.0);
     assert!(is_seen(&window));
+    let mut window = Window::new();
+    window.panel.stays = true;
+    window.wait(20.0);
+    assert!(is_seen(&window), "a screen reader looks for it");
 }
 
 #[test]

@@ -40,8 +40,14 @@ impl App {
         match call {
             Call::Session => return self.receive(events),
             Call::Access(event) => match (event.window_event, &mut self.gfx) {
-                (Access::InitialTreeRequested, _) => self.ctx.enable_accesskit(),
-                (Access::AccessibilityDeactivated, _) => self.ctx.disable_accesskit(),
+                (Access::InitialTreeRequested, _) => {
+                    self.panel.stays = true;
+                    self.ctx.enable_accesskit();
+                }
+                (Access::AccessibilityDeactivated, _) => {
+                    self.panel.stays = false;
+                    self.ctx.disable_accesskit();
+                }
                 (Access::ActionRequested(request), Some(gfx)) => gfx.input.on_accesskit_action_request(request),
                 (Access::ActionRequested(_), None) => {}
             },
