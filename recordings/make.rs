@@ -116,7 +116,7 @@ fn make_stereo(folder: &mut Folder) -> Outcome {
     folder.text("times.txt", &times)
 }
 
-/// The loop that is in the program: sheets as [`demo::Layout`] has them.
+/// The loop that is in the program: a whole picture, then tiles as [`demo::Layout`] has them.
 fn make_demo(folder: &mut Folder) -> Outcome {
     let (scene, view) = (Scene::portrait(), View::new(demo::SIZE_PX.0, demo::SIZE_PX.1));
     let render = |frame: u32| {
@@ -150,29 +150,32 @@ fn make_demo(folder: &mut Folder) -> Outcome {
         .map(|[y, x]| (y..y + tile).any(|y| moves[y * width + x..][..tile].contains(&true)))
         .collect();
     let layout = demo::Layout::new(tiles.iter().copied());
-    let size = (demo::SIZE_PX.0, layout.height_px());
-    let (mut rgb, mut levels) = frames[0].clone();
-    rgb.resize(3 * width * size.1 as usize, 0);
-    levels.resize(width * size.1 as usize, 0);
-    for (number, (picture, map)) in (0..).zip(&frames) {
-        for [to, from] in layout.runs(number) {
-            rgb[3 * to..3 * (to + tile)].copy_from_slice(&picture[3 * from..3 * (from + tile)]);
-            levels[to..to + tile].copy_from_slice(&map[from..from + tile]);
-        }
-    }
     let tiles: Vec<u8> = tiles.into_iter().map(|moves| if moves { 255 } else { 0 }).collect();
     let map_size = (demo::SIZE_PX.0 / demo::TILE_PX, demo::SIZE_PX.1 / demo::TILE_PX);
     folder.encode("moving.png", &tiles, map_size, ExtendedColorType::L8)?;
-    folder.encode("depth.png", &levels, size, ExtendedColorType::L8)?;
-    let mut file = Vec::new();
-    JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY).write_image(
-        &rgb,
-        size.0,
-        size.1,
-        ExtendedColorType::Rgb8,
-    )?;
-    eprintln!("color.jpg: {} kB", file.len() / 1000);
-    Ok(fs::write(folder.root.join("color.jpg"), file)?)
+    let (mut color, mut depth) = (Vec::new(), Vec::new());
+    let mut add = |rgb: &[u8], levels: &[u8], (width, height): (u32, u32)| {
+        let jpeg = JpegEncoder::new_with_quality(&mut color, JPEG_QUALITY);
+        jpeg.write_image(rgb, width, height, ExtendedColorType::Rgb8)?;
+        let png = PngEncoder::new_with_quality(&mut depth, CompressionType::Best, FilterType::Adaptive);
+        png.write_image(levels, width, height, ExtendedColorType::L8)
+    };
+    add(&frames[0].0, &frames[0].1, demo::SIZE_PX)?;
+    let size = layout.size_px();
+    let mut levels = vec![0; width * size.1 as usize];
+    let mut rgb = vec![0; 3 * levels.len()];
+    for (picture, map) in &frames {
+        for [to, from] in layout.runs() {
+            rgb[3 * to..3 * (to + tile)].copy_from_slice(&picture[3 * from..3 * (from + tile)]);
+            levels[to..to + tile].copy_from_slice(&map[from..from + tile]);
+        }
+        add(&rgb, &levels, size)?;
+    }
+    for (name, file) in [("color.mjpeg", color), ("depth.mpng", depth)] {
+        eprintln!("{name}: {} kB", file.len() / 1000);
+        fs::write(folder.root.join(name), file)?;
+    }
+    Ok(())
 }
 
 /// Compares the demonstration, as it is played, with what is rendered.

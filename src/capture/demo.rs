@@ -1,11 +1,10 @@
 //! The demonstration: a short loop of the project's own scene with its depth, which is in the program itself.
 //!
-//! `recordings/make.rs` renders it, anti-aliased, into three files. `color.jpg` and `depth.png` are sheets of one layout: on
-//! top a whole picture, and below it, frame by frame, the tiles that ever change; `moving.png` says which those are. They
-//! are decoded once, so that playing is copying.
+//! `recordings/make.rs` renders it, anti-aliased. `color.mjpeg` and `depth.mpng` are JPEGs and PNGs, one after the other:
+//! first a whole picture, then for each frame the tiles that ever change, side by side; `moving.png` says which those are.
+//! Each is decoded when it is first shown, and kept: from the second round on, playing is copying.
 
 use std::io::Cursor;
-use std::thread;
 
 use image::{DynamicImage, ImageFormat, ImageReader};
 
@@ -14,38 +13,49 @@ use crate::frame::Stamp;
 
 /// What the command line calls it.
 pub const NAME: &str = "demo";
-/// Width and height of its pictures, and of the whole picture on top of a sheet.
+/// Width and height of its pictures.
 pub const SIZE_PX: (u32, u32) = (640, 360);
 /// Its frame rate.
 pub const FRAMES_PER_SECOND: u32 = 24;
 /// Frames of the loop.
 pub const FRAMES: u32 = 48;
-/// Side of a tile: a block of a JPEG, so that tiles beside each other on a sheet do not mix.
+/// Side of a tile: a block of a JPEG, so that tiles beside each other do not mix.
 pub const TILE_PX: u32 = 8;
 /// What the lowest and the highest level of depth stand for.
 const RANGE_M: [f32; 2] = [13.0, 0.44];
 
-const COLOR: &[u8] = include_bytes!("../../recordings/demo/color.jpg");
-const DEPTH: &[u8] = include_bytes!("../../recordings/demo/depth.png");
+const COLOR: &[u8] = include_bytes!("../../recordings/demo/color.mjpeg");
+const DEPTH: &[u8] = include_bytes!("../../recordings/demo/depth.mpng");
 const MOVING: &[u8] = include_bytes!("../../recordings/demo/moving.png");
+/// What each picture of them begins with.
+const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Plays the demonstration, again and again.
 pub struct Demo {
     layout: Layout,
-    /// The sheet of colours, RGB.
-    rgb: Vec<u8>,
-    /// The sheet of depth.
-    levels: Vec<u8>,
-    /// What each level stands for.
+    /// The pictures of each file.
+    color: Vec<&'static [u8]>,
+    depth: Vec<&'static [u8]>,
+    whole: Part,
+    /// What changes in each frame, once it was shown.
+    tiles: Vec<Option<Part>>,
+    /// What each level of depth stands for.
     metres: [f32; 256],
     /// Frames until the end.
     frames: Option<u64>,
     position: u64,
 }
 
-/// Where things are on a sheet, which is as wide as the picture.
+/// A picture, or tiles of one.
+struct Part {
+    rgb: Vec<u8>,
+    levels: Vec<u8>,
+}
+
+/// Where the tiles are that ever change.
 pub struct Layout {
-    /// Column and row of the first pixel of each tile that ever changes.
+    /// Column and row of the first pixel of each.
     moving: Vec<[u32; 2]>,
 }
 
@@ -57,22 +67,17 @@ impl Layout {
         Self { moving: places.zip(moves).filter(|(_, moves)| *moves).map(|(place, _)| place).collect() }
     }
 
-    /// Rows of pixels that the tiles of a frame take.
-    fn frame_px(&self) -> u32 {
-        (self.moving.len() as u32).div_ceil(SIZE_PX.0 / TILE_PX) * TILE_PX
+    /// Width and height in pixels of the tiles of a frame, side by side.
+    pub fn size_px(&self) -> (u32, u32) {
+        (SIZE_PX.0, (self.moving.len() as u32).div_ceil(SIZE_PX.0 / TILE_PX) * TILE_PX)
     }
 
-    /// Rows of pixels of a sheet.
-    pub fn height_px(&self) -> u32 {
-        SIZE_PX.1 + FRAMES * self.frame_px()
-    }
-
-    /// The rows of a frame's tiles, [`TILE_PX`] pixels each: numbers of their first pixels on the sheet and in the picture.
-    pub fn runs(&self, frame: u32) -> impl Iterator<Item = [usize; 2]> {
-        let (width, top) = (SIZE_PX.0, SIZE_PX.1 + frame * self.frame_px());
+    /// The rows of the tiles, [`TILE_PX`] pixels each: numbers of their first pixels among the tiles and in the picture.
+    pub fn runs(&self) -> impl Iterator<Item = [usize; 2]> {
+        let width = SIZE_PX.0;
         self.moving.iter().zip(0..).flat_map(move |(&[column, row], tile)| {
             let start = TILE_PX * tile;
-            let (from_column, from_row) = (start % width, top + start / width * TILE_PX);
+            let (from_column, from_row) = (start % width, start / width * TILE_PX);
             (0..TILE_PX).map(move |y| {
                 [(from_row + y) * width + from_column, (row + y) * width + column].map(|pixel| pixel as usize)
             })
@@ -98,25 +103,39 @@ impl Demo {
     /// # Errors
     /// It cannot be decoded: the program is damaged.
     pub fn new(frames: Option<u64>) -> Result<Self, CaptureError> {
-        let (rgb, levels) = thread::scope(|scope| {
-            let levels = scope.spawn(|| decoded(DEPTH, ImageFormat::Png));
-            (decoded(COLOR, ImageFormat::Jpeg), levels.join())
-        });
-        let levels = levels.map_err(|_| CaptureError::Demo("its depth".into()))?;
-        let (rgb, levels) = (rgb?.into_rgb8(), levels?.into_luma8());
         let moving = decoded(MOVING, ImageFormat::Png)?.into_luma8();
         let layout = Layout::new(moving.iter().map(|&moves| moves != 0));
-        let expected = (SIZE_PX.0, layout.height_px());
-        if rgb.dimensions() != expected || levels.dimensions() != expected {
-            return Err(CaptureError::Demo("its files do not fit each other".into()));
+        let [color, depth] = [(COLOR, JPEG), (DEPTH, PNG)].map(|(file, begin)| pictures(file, begin));
+        if [&color, &depth].iter().any(|pictures| pictures.len() != 1 + FRAMES as usize) {
+            return Err(CaptureError::Demo("pictures are missing".into()));
         }
+        let whole = Part::decode(color[0], depth[0], SIZE_PX)?;
+        let tiles = (0..FRAMES).map(|_| None).collect();
         let metres = std::array::from_fn(|level| metres(level as u8));
-        Ok(Self { layout, rgb: rgb.into_raw(), levels: levels.into_raw(), metres, frames, position: 0 })
+        Ok(Self { layout, color, depth, whole, tiles, metres, frames, position: 0 })
     }
 
     fn at_end(&self) -> bool {
         self.frames.is_some_and(|frames| self.position >= frames)
     }
+}
+
+impl Part {
+    fn decode(color: &[u8], depth: &[u8], size_px: (u32, u32)) -> Result<Self, CaptureError> {
+        let rgb = decoded(color, ImageFormat::Jpeg)?.into_rgb8();
+        let levels = decoded(depth, ImageFormat::Png)?.into_luma8();
+        if [rgb.dimensions(), levels.dimensions()] != [size_px; 2] {
+            return Err(CaptureError::Demo("a picture has the wrong size".into()));
+        }
+        Ok(Self { rgb: rgb.into_raw(), levels: levels.into_raw() })
+    }
+}
+
+/// The pictures of a file, each of which begins like this.
+fn pictures(file: &'static [u8], begin: &[u8]) -> Vec<&'static [u8]> {
+    let mut starts: Vec<usize> = (0..file.len()).filter(|&at| file[at..].starts_with(begin)).collect();
+    starts.push(file.len());
+    starts.windows(2).map(|pair| &file[pair[0]..pair[1]]).collect()
 }
 
 fn decoded(file: &[u8], format: ImageFormat) -> Result<DynamicImage, CaptureError> {
@@ -144,17 +163,23 @@ impl Camera for Demo {
         if self.at_end() {
             return Ok(Captured::End);
         }
-        color.resize(SIZE_PX.0, SIZE_PX.1);
-        depth.resize(SIZE_PX.0, SIZE_PX.1);
-        let (pixels, tile) = (depth.metres.len(), TILE_PX as usize);
-        color.rgb.copy_from_slice(&self.rgb[..3 * pixels]);
+        let Self { layout, whole, .. } = self;
+        let frame = (self.position % u64::from(FRAMES)) as usize;
+        let tiles = match &mut self.tiles[frame] {
+            Some(tiles) => tiles,
+            none => none.insert(Part::decode(self.color[1 + frame], self.depth[1 + frame], layout.size_px())?),
+        };
         let set = |to: &mut [f32], levels: &[u8]| {
             to.iter_mut().zip(levels).for_each(|(to, &level)| *to = self.metres[usize::from(level)]);
         };
-        set(&mut depth.metres, &self.levels[..pixels]);
-        for [from, to] in self.layout.runs((self.position % u64::from(FRAMES)) as u32) {
-            color.rgb[3 * to..3 * (to + tile)].copy_from_slice(&self.rgb[3 * from..3 * (from + tile)]);
-            set(&mut depth.metres[to..to + tile], &self.levels[from..from + tile]);
+        color.resize(SIZE_PX.0, SIZE_PX.1);
+        depth.resize(SIZE_PX.0, SIZE_PX.1);
+        color.rgb.copy_from_slice(&whole.rgb);
+        set(&mut depth.metres, &whole.levels);
+        let side = TILE_PX as usize;
+        for [from, to] in layout.runs() {
+            color.rgb[3 * to..3 * (to + side)].copy_from_slice(&tiles.rgb[3 * from..3 * (from + side)]);
+            set(&mut depth.metres[to..to + side], &tiles.levels[from..from + side]);
         }
         let stamp = Stamp { index: self.position as usize, time_ns: time_ns(self.position), captured_ns: None };
         self.position += 1;
