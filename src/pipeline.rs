@@ -23,7 +23,7 @@ pub mod still;
 mod view;
 mod wanted;
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread::{self, Scope, ScopedJoinHandle};
 
@@ -81,8 +81,8 @@ pub struct Run<'a> {
     pub sink: Box<dyn Sink>,
     /// Real time, or all frames.
     pub pace: Pace,
-    /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss. In real time, depth may take half
-    /// of it before it is made with less effort, and then for fewer frames.
+    /// Time that a frame's blur may take, in nanoseconds; more is counted as a miss. In real time, depth is made with less
+    /// effort, and then for fewer frames, where both do not fit the time until a frame is due.
     pub budget_ns: u64,
     /// Count frames that cannot be read, and go on; otherwise the first one ends the run.
     pub keep_going: bool,
@@ -147,6 +147,8 @@ struct Frame<T> {
     ticket: Ticket,
     stamp: Stamp,
     trace: Trace,
+    /// When the last stage was through with it.
+    since_ns: u64,
     item: T,
 }
 
@@ -178,6 +180,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         rungs,
         misses,
         sink: sink_times,
+        playout,
         latency,
         frame,
         repeats,
@@ -216,7 +219,9 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         clock: &clock,
         times: decode,
     };
-    let blur_ns = AtomicU64::new(0);
+    let efforts = source.as_ref().map_or(&[1.0][..], |source| source.efforts());
+    let picker = quality::Picker::new((quality, finest), run.budget_ns, live_ns, efforts);
+    let order = rate::Order::new(picker.plan());
     let depth = depth::Stage {
         // Without a blur nobody asks for depth.
         look: if executor.is_some() { run.look } else { Look::plain(Effect::None) },
@@ -224,8 +229,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         measured: run.measured,
         adaptive: run.adaptive,
         changes: run.changes,
-        rate: live_ns
-            .map(|_| rate::Rate::new(run.budget_ns, &blur_ns, source.as_ref().map_or(&[1.0], |s| s.efforts()))),
+        rate: live_ns.map(|_| rate::Rate::new(&order)),
+        wanted: run.wanted.clone(),
         source,
         source_name: &info.name,
         keep_going: run.keep_going,
@@ -239,8 +244,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let blur = blur::Stage {
         executor,
         late: live_ns.map(quality::LateRule::new),
-        usual_ns: &blur_ns,
-        picker: quality::Picker::new(quality, finest, run.budget_ns, live_ns),
+        order: &order,
+        picker,
         rule: quality,
         about: &mut about,
         outs: &outs,
@@ -260,7 +265,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         playout: live_ns.map(playout::Playout::new),
         tally: &tally,
         clock: &clock,
-        times: deliver::Times { sink: sink_times, latency, frame, repeats },
+        times: deliver::Times { sink: sink_times, playout, latency, frame, repeats },
     };
 
     let ended = thread::scope(|scope| {

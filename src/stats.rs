@@ -25,6 +25,8 @@ pub struct Timings {
     pub passes: PassHistograms,
     /// Writing or showing a picture.
     pub sink: Histogram,
+    /// Waits of finished pictures for their turn, in real time.
+    pub playout: Histogram,
     /// From capture to delivery.
     pub latency: Histogram,
     /// From one delivery to the next.

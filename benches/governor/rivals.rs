@@ -16,7 +16,7 @@ pub trait Picker {
 
 /// The project's own.
 pub struct Ours {
-    governor: Governor,
+    governor: Governor<1>,
     budget_ns: u64,
 }
 

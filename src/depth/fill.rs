@@ -105,7 +105,7 @@ impl Filler {
 const SKIP_BLOCK: usize = 16;
 
 /// The column ranges of the runs of unknown depths in a row.
-fn holes(row: &[f32]) -> impl Iterator<Item = Range<usize>> {
+pub(super) fn holes(row: &[f32]) -> impl Iterator<Item = Range<usize>> {
     let mut next = 0;
     iter::from_fn(move || {
         // Most pixels are known. `&` instead of an early exit, so that a block becomes vector code.

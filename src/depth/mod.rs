@@ -14,6 +14,7 @@ mod guided_fill;
 pub mod live;
 pub mod matting;
 pub mod misfit;
+pub mod motion;
 pub mod plate;
 pub mod recorded;
 mod reduced;

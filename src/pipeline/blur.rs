@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::depth::Ready;
 use super::quality::{LateRule, Picker};
+use super::rate::Order;
 use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, Trace, hand_on};
 use crate::bokeh::{Bokeh, Finished, Job, PassTimes, Picture};
@@ -37,8 +37,8 @@ pub(super) struct Stage<'a> {
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     pub picker: Picker,
-    /// Told how long frames usually take.
-    pub usual_ns: &'a AtomicU64,
+    /// Tells how depth is to be made.
+    pub order: &'a Order,
     /// At which rung the executor blurs.
     pub rule: QualityRule,
     /// Told when the executor goes over to another backend.
@@ -129,14 +129,16 @@ impl Stage<'_> {
 
     /// Hands a frame on unblurred, unless it is late; returns whether there is anybody to take more.
     fn pass(&mut self, frame: Frame<Ready>, to: &mut Sender<Frame<Blurred>>) -> bool {
-        let Frame { ticket, stamp, trace, item: Ready { color, depth, coc, .. } } = frame;
-        if self.is_late(&ticket, self.clock.now_ns(), 0) {
+        let Frame { ticket, stamp, mut trace, since_ns, item: Ready { color, depth, coc, .. } } = frame;
+        let now_ns = self.clock.now_ns();
+        trace.between_ns += now_ns.saturating_sub(since_ns);
+        if self.is_late(&ticket, now_ns, 0) {
             self.tally.dropped(ticket, Cause::Late);
             return true;
         }
         let item =
             Blurred { picture: Picture::in_memory(color), color: None, depth: depth.filter(|_| self.viewed), coc };
-        hand_on(to, Frame { ticket, stamp, trace, item }, self.tally)
+        hand_on(to, Frame { ticket, stamp, trace, since_ns: now_ns, item }, self.tally)
     }
 
     /// Gives a frame to the executor, unless it is too late for that; returns whether it did.
@@ -146,15 +148,18 @@ impl Stage<'_> {
         frame: Frame<Ready>,
         pending: &mut VecDeque<Pending>,
     ) -> Result<bool, Fault> {
-        let Frame { ticket, stamp, trace, item: Ready { color, depth, coc, .. } } = frame;
+        let Frame { ticket, stamp, mut trace, since_ns, item: Ready { color, depth, coc, times, .. } } = frame;
         let began_ns = self.clock.now_ns();
+        trace.between_ns += began_ns.saturating_sub(since_ns);
+        times.into_iter().for_each(|times| self.picker.note_depth(times));
         // The frame waits for those that are under way.
         let expected_ns = self.picker.expected_ns() * (pending.len() as u64 + 1);
         if self.is_late(&ticket, began_ns, expected_ns) {
             self.tally.dropped(ticket, Cause::Late);
+            self.picker.note_late();
+            self.order.set(self.picker.plan());
             return Ok(false);
         }
-        self.picker.begin(began_ns.saturating_sub(ticket.captured_ns));
         let quality = self.picker.quality();
         let place = self.wanted.as_ref().map_or(Place::Memory, |wanted| wanted.place());
         let job = Job { ticket: ticket.id.0, color, depth, coc, quality, place, out: self.outs.take() };
@@ -184,12 +189,14 @@ impl Stage<'_> {
             return Err(Fault::LostFrame);
         };
         let Finished { picture, color, depth, times, .. } = finished;
-        let blur_ns = self.measure(&done, &times, executor.capacity());
-        let Pending { ticket, stamp, trace, coc, quality, .. } = done;
+        let since_ns = self.clock.now_ns();
+        let blur_ns = self.measure(&done, &times, executor.capacity(), since_ns);
+        let Pending { ticket, stamp, trace, coc, quality, began_ns } = done;
         let item =
             Blurred { picture, color: Some(color).filter(|_| self.viewed), depth: depth.filter(|_| self.viewed), coc };
-        let trace = Trace { blur_ns, passes: times, quality: Some(quality), ..trace };
-        Ok(hand_on(to, Frame { ticket, stamp, trace, item }, self.tally))
+        let between_ns = trace.between_ns + (since_ns - began_ns).saturating_sub(blur_ns);
+        let trace = Trace { blur_ns, between_ns, passes: times, quality: Some(quality), ..trace };
+        Ok(hand_on(to, Frame { ticket, stamp, trace, since_ns, item }, self.tally))
     }
 
     fn is_late(&mut self, ticket: &Ticket, now_ns: u64, expected_ns: u64) -> bool {
@@ -205,8 +212,7 @@ impl Stage<'_> {
     }
 
     /// Records the times of a finished frame; returns how long its blur took.
-    fn measure(&mut self, done: &Pending, passes: &PassTimes, capacity: usize) -> u64 {
-        let now_ns = self.clock.now_ns();
+    fn measure(&mut self, done: &Pending, passes: &PassTimes, capacity: usize, now_ns: u64) -> u64 {
         let mut in_passes_ns = 0;
         for (name, time) in passes.iter() {
             let time_ns = time.as_nanos() as u64;
@@ -221,7 +227,7 @@ impl Stage<'_> {
         // Where frames overlap, wall time says nothing of a single one.
         let took_ns = if capacity > 1 { in_passes_ns } else { blur_ns };
         self.picker.note(done.quality, took_ns, now_ns);
-        self.usual_ns.store(self.picker.usual_ns().unwrap_or(0), Ordering::Relaxed);
+        self.order.set(self.picker.plan());
         blur_ns
     }
 }

@@ -72,8 +72,12 @@ impl Stage<'_> {
                         None => self.pacer.wait(stamp.time_ns, read_ns, stopped),
                     };
                     let ticket = self.tally.captured(captured_ns);
-                    let trace = Trace { decode_ns: read_ns, ..Trace::default() };
-                    let frame = Frame { ticket, stamp, trace, item: Shot { color, depth, right } };
+                    let since_ns = self.clock.now_ns();
+                    // A live camera's frame waited for its turn to be read; a stored one was read before it was captured.
+                    let decode_ns = if stamp.captured_ns.is_some() { read_ns } else { 0 };
+                    let between_ns = since_ns.saturating_sub(captured_ns).saturating_sub(decode_ns);
+                    let trace = Trace { decode_ns: read_ns, between_ns, ..Trace::default() };
+                    let frame = Frame { ticket, stamp, trace, since_ns, item: Shot { color, depth, right } };
                     if !hand_on(&mut to, frame, self.tally) {
                         break;
                     }

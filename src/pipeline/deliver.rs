@@ -28,6 +28,8 @@ pub(super) struct Stage<'a> {
 
 pub(super) struct Times<'a> {
     pub sink: &'a mut Histogram,
+    /// Waits of finished pictures for their turn.
+    pub playout: &'a mut Histogram,
     /// From capture to delivery.
     pub latency: &'a mut Histogram,
     /// From one delivery to the next.
@@ -43,7 +45,7 @@ impl Stage<'_> {
         // Ticket of the frame that was sent to the viewer last, where that decides whether it was delivered.
         let mut at_viewer = None;
         loop {
-            let Frame { ticket, stamp, trace, item: mut frame } = match self.next(&mut from) {
+            let Frame { ticket, stamp, mut trace, since_ns, item: mut frame } = match self.next(&mut from) {
                 Received::Item(frame) => frame,
                 Received::Nothing => match self.sink.repeat()? {
                     ControlFlow::Continue(shown) => {
@@ -57,10 +59,15 @@ impl Stage<'_> {
             if self.mirror {
                 frame.picture.memory_mut().map(mirror);
             }
+            let ready_ns = self.clock.now_ns();
+            trace.between_ns += ready_ns.saturating_sub(since_ns);
             if let Some(playout) = &mut self.playout {
-                self.clock.sleep_until_ns(playout.due_ns(ticket.captured_ns, self.clock.now_ns()));
+                self.clock.sleep_until_ns(playout.due_ns(ticket.captured_ns, ready_ns));
+                trace.playout_ns = self.clock.now_ns() - ready_ns;
+                self.times.playout.add(trace.playout_ns);
             }
-            let began_ns = self.clock.now_ns();
+            let began_ns = ready_ns + trace.playout_ns;
+            trace.age_ns = began_ns.saturating_sub(ticket.captured_ns);
             if let Some(picture) = frame.picture.memory() {
                 match self.sink.put(picture, stamp.time_ns) {
                     Ok(flow) if flow.is_break() => break,

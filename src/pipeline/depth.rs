@@ -8,7 +8,9 @@ use super::change::{Change, Executor, Swap};
 use super::coc::{CocMaker, Finish};
 use super::fit_check::{FitCheck, Verdict};
 use super::rate::Rate;
+use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, hand_on};
+use crate::budget::DepthTimes;
 use crate::clock::Clock;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
@@ -26,6 +28,8 @@ pub(super) struct Ready {
     pub color: Pooled<ColorImage>,
     pub depth: Option<Pooled<DepthMap>>,
     pub coc: CocField,
+    /// What its depth took; `None` where it has none.
+    pub times: Option<DepthTimes>,
     /// The last change of what blurs, if there was one: every frame since then brings it.
     pub swap: Option<Arc<Swap>>,
 }
@@ -50,6 +54,8 @@ pub(super) struct Stage<'a> {
     pub times: &'a mut Histogram,
     /// Notices depth that does not fit the pictures.
     pub check: FitCheck,
+    /// Whether frames are wanted with depth of their own.
+    pub wanted: Option<Arc<Wanted>>,
     /// Counts frames that took over the depth of the one before.
     pub held: &'a mut u64,
 }
@@ -63,7 +69,7 @@ impl Stage<'_> {
         let mut swap: Option<Arc<Swap>> = None;
         let (mut change, mut between) = (0, false);
         loop {
-            let Frame { ticket, stamp, mut trace, item: Shot { mut color, depth, right } } =
+            let Frame { ticket, stamp, mut trace, since_ns, item: Shot { mut color, depth, right } } =
                 match from.recv_timeout(IDLE) {
                     Received::Item(frame) => frame,
                     Received::Ended => break,
@@ -85,6 +91,8 @@ impl Stage<'_> {
                 }
             }
             let began_ns = self.clock.now_ns();
+            trace.between_ns += began_ns.saturating_sub(since_ns);
+            let held_before = *self.held;
             // A CoC that is the same for every frame needs no depth.
             let made = match coc.fixed() {
                 Some(field) => Ok((None, field)),
@@ -113,8 +121,14 @@ impl Stage<'_> {
                 }
             };
             (trace.change, trace.between) = (change, between);
-            trace.depth_ns = self.clock.now_ns() - began_ns;
-            let frame = Frame { ticket, stamp, trace, item: Ready { color, depth, coc, swap: swap.clone() } };
+            let since_ns = self.clock.now_ns();
+            (trace.depth_ns, trace.depth_held) = (since_ns - began_ns, *self.held > held_before);
+            let effort = (!trace.depth_held).then(|| self.rate.as_ref().map_or(0, Rate::effort));
+            let age_ns = began_ns.saturating_sub(ticket.captured_ns);
+            let times = DepthTimes { effort, took_ns: trace.depth_ns, age_ns, at_ns: since_ns };
+            let times = depth.is_some().then_some(times);
+            let item = Ready { color, depth, coc, times, swap: swap.clone() };
+            let frame = Frame { ticket, stamp, trace, since_ns, item };
             if !hand_on(&mut to, frame, self.tally) {
                 break;
             }
@@ -142,6 +156,9 @@ impl Stage<'_> {
         let began_ns = self.clock.now_ns();
         if let Some(source) = &mut self.source {
             source.rectify(color);
+        }
+        if self.wanted.as_ref().is_some_and(|wanted| wanted.wants_own_depth()) {
+            self.rate.iter_mut().for_each(Rate::forget);
         }
         if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
             let mut map = brought.unwrap_or_else(|| self.depths.take());
@@ -173,7 +190,7 @@ impl Stage<'_> {
         let now_ns = self.clock.now_ns();
         self.times.add(now_ns - began_ns);
         if let Some(rate) = &mut self.rate {
-            rate.made((&map, field), color, now_ns - began_ns, now_ns);
+            rate.made((&map, field), color);
         }
         Ok((map, field))
     }

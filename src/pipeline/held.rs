@@ -1,22 +1,27 @@
 //! Depth that several frames share.
 
 use crate::color::light_of_codes;
+use crate::depth::motion::Motion;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
+use crate::optics::CocField;
 
-/// A map that later frames are given. Around a subject it has a matte of its own: what is behind stays as it was, and the
-/// nearer surface's colours follow those of each frame.
+/// A map that later frames are given, moved as their pictures have. Around a subject it has a matte of its own: what is
+/// behind stays as it was, and the nearer surface's colours follow those of each frame.
 pub(super) struct Held {
     /// Its mixed pixels have the light of the farther surface in place of the difference.
     map: DepthMap,
     light: Box<[f32; 256]>,
+    motion: Motion,
 }
 
 /// Of less than this share of a pixel, no colour is told from a frame.
 const LEAST_SHARE: f32 = 0.05;
+/// Surfaces move apart from each other whose CoC differs by so many pixels.
+const APART_PX: f32 = 1.0;
 
 impl Held {
     pub fn new() -> Self {
-        Self { map: DepthMap::default(), light: light_of_codes() }
+        Self { map: DepthMap::default(), light: light_of_codes(), motion: Motion::default() }
     }
 
     /// Whether there was none yet.
@@ -24,9 +29,11 @@ impl Held {
         self.map.metres.is_empty()
     }
 
-    /// Keeps the map of a picture.
-    pub fn keep(&mut self, map: &DepthMap, color: &ColorImage) {
+    /// Keeps the map of a picture, which has this CoC.
+    pub fn keep(&mut self, map: &DepthMap, color: &ColorImage, field: &CocField) {
         copy(map, &mut self.map);
+        let jump = if let CocField::Depth(lens) = field { lens.inverse_depth_of_px(APART_PX) } else { f32::INFINITY };
+        self.motion.keep(map, color, jump);
         let matte = &mut self.map.matte.pixels;
         matte.clear();
         if map.subject_m.is_some() && map.size() == color.size() {
@@ -39,23 +46,43 @@ impl Held {
     }
 
     /// Gives a later picture the map.
-    pub fn give(&self, map: &mut DepthMap, color: &ColorImage) {
+    pub fn give(&mut self, map: &mut DepthMap, color: &ColorImage) {
         copy(&self.map, map);
+        let Self { map: held, light, motion } = self;
+        let moved = motion.find(held, color);
+        if moved {
+            motion.warp(held, map);
+        }
         map.matte.pixels.clear();
         if map.size() != color.size() {
             return;
         }
-        map.matte.pixels.extend(self.map.matte.pixels.iter().map(|pixel| {
-            let own = own(&self.light, color, pixel);
-            let (share, rest) = (pixel.share.max(LEAST_SHARE), (1.0 - pixel.share).max(1e-3));
-            let difference = |p: usize| {
-                let difference = (own[p] - pixel.difference[p]) / share;
-                // No surface is darker than black, or brighter than white.
-                difference.clamp(-own[p] / rest, (1.0 - own[p]) / rest)
-            };
-            MixedPixel { difference: std::array::from_fn(difference), ..*pixel }
+        let (width, height) = (color.width as i32, color.height as i32);
+        map.matte.pixels.extend(held.matte.pixels.iter().filter_map(|pixel| {
+            let [right, down] = if moved { motion.of(pixel.at as usize, pixel.near_m) } else { [0; 2] };
+            let (x, y) = (pixel.at as i32 % width + right, pixel.at as i32 / width + down);
+            let pixel = MixedPixel { at: (y * width + x) as u32, ..*pixel };
+            ((0..width).contains(&x) && (0..height).contains(&y)).then(|| with_colors(light, color, &pixel))
         }));
+        if moved {
+            // Of two that have come to one place, the one of which more is seen.
+            let pixels = &mut map.matte.pixels;
+            pixels.sort_unstable_by(|a, b| a.at.cmp(&b.at).then(b.share.total_cmp(&a.share)));
+            pixels.dedup_by_key(|pixel| pixel.at);
+        }
     }
+}
+
+/// A held pixel with the difference of the colours that it has in a picture.
+fn with_colors(light: &[f32; 256], color: &ColorImage, pixel: &MixedPixel) -> MixedPixel {
+    let own = own(light, color, pixel);
+    let (share, rest) = (pixel.share.max(LEAST_SHARE), (1.0 - pixel.share).max(1e-3));
+    let difference = |p: usize| {
+        let difference = (own[p] - pixel.difference[p]) / share;
+        // No surface is darker than black, or brighter than white.
+        difference.clamp(-own[p] / rest, (1.0 - own[p]) / rest)
+    };
+    MixedPixel { difference: std::array::from_fn(difference), ..*pixel }
 }
 
 /// The light of a pixel in a picture.
@@ -72,6 +99,45 @@ fn copy(from: &DepthMap, to: &mut DepthMap) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optics::DepthCoc;
+
+    const FIELD: CocField =
+        CocField::Depth(DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 });
+
+    /// A person of noise, `right` px beside their place before a wall of noise.
+    fn person(right: i32) -> (ColorImage, DepthMap) {
+        let (width, height) = (640, 360);
+        let (mut color, mut map) = (ColorImage::new(width, height), DepthMap::new(width, height));
+        map.subject_m = Some(1.0);
+        for at in 0..width * height {
+            let (x, y) = ((at % width) as i32 - right, (at / width) as i32);
+            let near = (240..400).contains(&x) && (80..280).contains(&y);
+            let hash = ((if near { x } else { x + right } / 2) as u32).wrapping_mul(7919)
+                ^ (y as u32 / 2).wrapping_mul(104_729);
+            let luma = 60 + (hash.wrapping_mul(0x9e37_79b9) >> 25) as u8;
+            color.rgb[3 * at as usize..][..3].copy_from_slice(&if near { [luma, 40, 40] } else { [40, luma, 200] });
+            map.metres[at as usize] = if near { 1.0 } else { 9.0 };
+            if near && x == 240 {
+                let pixel = MixedPixel { at, near_m: 1.0, far_m: 9.0, share: 0.5, behind: 0.5, difference: [0.1; 3] };
+                map.matte.pixels.push(pixel);
+            }
+        }
+        (color, map)
+    }
+
+    #[test]
+    fn a_map_and_its_matte_move_with_the_picture() {
+        let (then, now) = (person(0), person(6));
+        let mut held = Held::new();
+        held.keep(&then.1, &then.0, &FIELD);
+        let mut given = DepthMap::default();
+        held.give(&mut given, &now.0);
+        assert!(given.metres == now.1.metres, "the map has moved");
+        let places = |map: &DepthMap| map.matte.pixels.iter().map(|pixel| pixel.at).collect::<Vec<_>>();
+        assert_eq!(places(&given), places(&now.1));
+        held.give(&mut given, &then.0);
+        assert!(given.metres == then.1.metres && places(&given) == places(&then.1), "what rests is where it was");
+    }
 
     #[test]
     fn what_rests_is_as_it_was_and_what_moved_has_its_own_colours() {
@@ -87,7 +153,7 @@ mod tests {
         let mut map = DepthMap { subject_m: Some(1.0), ..DepthMap::new(3, 1) };
         map.matte.pixels = vec![pixel(0, 1.0, 1.0), pixel(1, 0.5, 1.0)];
         let mut held = Held::new();
-        held.keep(&map, &color);
+        held.keep(&map, &color, &FIELD);
         let mut given = DepthMap::default();
         held.give(&mut given, &color);
         for (a, b) in given.matte.pixels.iter().zip(&map.matte.pixels) {
@@ -98,7 +164,7 @@ mod tests {
         held.give(&mut given, &color);
         assert!(given.matte.pixels[1].difference.iter().all(|difference| difference.abs() < 1e-5));
         // A map that was measured has none: each frame finds its own.
-        held.keep(&DepthMap { subject_m: None, ..map }, &color);
+        held.keep(&DepthMap { subject_m: None, ..map }, &color, &FIELD);
         held.give(&mut given, &color);
         assert!(given.matte.pixels.is_empty() && given.subject_m.is_none());
     }

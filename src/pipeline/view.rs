@@ -43,13 +43,21 @@ pub struct View {
 /// What a frame took on its way, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Trace {
+    /// Whether its depth was taken over from an earlier frame.
+    pub depth_held: bool,
     /// Reading and decoding, waits excluded.
     pub decode_ns: u64,
-    /// Depth and CoC; next to nothing where they were taken over from the frame before.
+    /// Depth and CoC.
     pub depth_ns: u64,
     /// The blur; 0 where there was none.
     pub blur_ns: u64,
-    /// Its passes.
+    /// All waits between stages until it was ready: in links, and where the executor had others in hand.
+    pub between_ns: u64,
+    /// The wait for its turn, so that frames come as evenly as they were taken.
+    pub playout_ns: u64,
+    /// How old it was then: all of the above, but for a stored frame's decoding, which is over when it is captured.
+    pub age_ns: u64,
+    /// The blur's passes.
     pub passes: PassTimes,
     /// The number of the last change before it; 0 where there was none.
     pub change: u64,

@@ -1,4 +1,4 @@
-//! Where blurred pictures are wanted: in memory, on the GPU that blurs, or both.
+//! Where blurred pictures are wanted: in memory, on the GPU that blurs, or both; and whether with depth of their own.
 
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
@@ -12,12 +12,13 @@ pub struct Wanted {
     place: AtomicU8,
     /// Whether somebody needs them in memory, wherever else they are wanted.
     needed: AtomicBool,
+    own_depth: AtomicBool,
 }
 
 impl Wanted {
     /// Where pictures are wanted.
     pub fn new(place: Place) -> Self {
-        Self { place: AtomicU8::new(place as u8), needed: AtomicBool::new(false) }
+        Self { place: AtomicU8::new(place as u8), ..Self::default() }
     }
 
     /// Where they are wanted from now on.
@@ -28,6 +29,16 @@ impl Wanted {
     /// Whether they are needed in memory from now on, besides.
     pub fn need(&self, needed: bool) {
         self.needed.store(needed, Ordering::Relaxed);
+    }
+
+    /// Whether each frame is to have depth of its own from now on, however little time there is.
+    pub fn want_own_depth(&self, own: bool) {
+        self.own_depth.store(own, Ordering::Relaxed);
+    }
+
+    /// Whether it is now.
+    pub fn wants_own_depth(&self) -> bool {
+        self.own_depth.load(Ordering::Relaxed)
     }
 
     /// Where they are wanted now.

@@ -47,7 +47,12 @@ pub struct Stages {
     pub decode_ms: f64,
     pub depth_ms: f64,
     pub blur_ms: f64,
+    /// Waits between the stages, the way to the screen included.
+    pub between_ms: f64,
+    pub playout_ms: f64,
     pub present_ms: f64,
+    /// Share of the frames with depth of their own.
+    own_depth: f64,
     /// Of these, the first `seen` are in use.
     passes: [(&'static str, f64); PASSES],
     seen: usize,
@@ -57,6 +62,11 @@ impl Stages {
     /// The blur's passes, by name.
     pub fn passes(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
         self.passes[..self.seen].iter().copied()
+    }
+
+    /// Every how many frames depth is made.
+    pub fn depth_every(&self) -> u32 {
+        if self.own_depth > 0.0 { self.own_depth.recip().round() as u32 } else { 1 }
     }
 }
 
@@ -137,7 +147,7 @@ impl Meters {
         };
         self.next = (self.next + 1) % FRAMES;
         self.held = (self.held + 1).min(FRAMES);
-        self.stages.add(trace, present_ns, self.held == 1);
+        self.stages.add(trace, (latency_ns, present_ns), self.held == 1);
     }
 
     /// Counts an input whose effect was on the screen this much later.
@@ -164,8 +174,10 @@ impl Meters {
                 blur_ns: (blur_ms * 1e6) as u64,
                 passes,
                 quality,
-                change: 0,
-                between: false,
+                depth_held: k % 2 == 1,
+                between_ns: 3_000_000,
+                playout_ns: 4_000_000,
+                ..Trace::default()
             };
             self.count(&trace, k * 33_400_000, 41_000_000 + k * 20_000, 1_900_000);
         }
@@ -173,6 +185,8 @@ impl Meters {
         self.frames.captured = 300;
         self.frames.dropped.late = 2;
         self.frames.dropped.evicted = 5;
+        self.frames.dropped.driver = 112;
+        self.frames.dropped.unpaired = 31;
     }
 
     /// The last frames, the oldest first.
@@ -212,9 +226,13 @@ impl Meters {
 
 impl Stages {
     /// Moves the means towards the times of a frame; the first frame sets them.
-    fn add(&mut self, trace: &Trace, present_ns: u64, first: bool) {
+    fn add(&mut self, trace: &Trace, (latency_ns, present_ns): (u64, u64), first: bool) {
         let weight = if first { 1.0 } else { EASE };
         let ease = |mean_ms: &mut f64, ns: u64| *mean_ms += (ns as f64 * MS - *mean_ms) * weight;
+        let to_screen_ns = latency_ns.saturating_sub(trace.age_ns + present_ns);
+        ease(&mut self.between_ms, trace.between_ns + to_screen_ns);
+        ease(&mut self.playout_ms, trace.playout_ns);
+        self.own_depth += (f64::from(u8::from(!trace.depth_held)) - self.own_depth) * weight;
         ease(&mut self.decode_ms, trace.decode_ns);
         ease(&mut self.depth_ms, trace.depth_ns);
         ease(&mut self.blur_ms, trace.blur_ns);
@@ -291,5 +309,33 @@ mod tests {
         passes.add("blur", std::time::Duration::from_millis(7));
         meters.count(&Trace { passes, ..Trace::default() }, 1, 1, 1);
         assert_eq!(meters.stages().passes().collect::<Vec<_>>(), [("blur", 7.0)]);
+    }
+
+    #[test]
+    fn the_stages_and_waits_make_up_the_latency_and_depth_counts_as_often_as_it_is_made() {
+        for every in 1..=3 {
+            let mut meters = Meters::default();
+            for k in 0..200 {
+                let depth_ns = if k % every == 0 { 30_000_000 } else { 1_000_000 };
+                let trace = Trace {
+                    depth_ns,
+                    age_ns: depth_ns + 20_000_000,
+                    depth_held: k % every > 0,
+                    blur_ns: 9_000_000,
+                    between_ns: 4_000_000,
+                    playout_ns: 7_000_000,
+                    ..Trace::default()
+                };
+                // 3 ms from the pipeline to the window, and 2 in it.
+                meters.count(&trace, k * PERIOD_NS, trace.age_ns + 5_000_000, 2_000_000);
+            }
+            let stages = meters.stages();
+            let parts = [stages.depth_ms, stages.blur_ms, stages.between_ms, stages.playout_ms, stages.present_ms];
+            let depth_ms = 1.0 + 29.0 / every as f64;
+            assert!((stages.between_ms - 7.0).abs() < 1e-6, "{stages:?}");
+            let sum_ms = parts.iter().sum::<f64>();
+            assert!((sum_ms - (depth_ms + 25.0)).abs() < 1.5, "{every}: {sum_ms}");
+            assert_eq!(u64::from(stages.depth_every()), every);
+        }
     }
 }

@@ -43,7 +43,7 @@ pub struct Report {
     pub budget_ms: f64,
     /// Frames whose blur took longer.
     pub misses: u64,
-    /// Frames that took over the depth of the one before, to save time.
+    /// Frames that took over the depth of an earlier one, moved with the picture, to save time.
     pub depth_held: u64,
     /// Times that a live output was given its last picture again, because no new one came.
     pub repeats: u64,
@@ -156,6 +156,7 @@ impl Report {
         for (name, times) in timings.passes.iter() {
             stage(format!("blur.{name}"), times);
         }
+        stage("playout".into(), &timings.playout);
         stage("sink".into(), &timings.sink);
         Self {
             frames,
@@ -273,7 +274,7 @@ impl fmt::Display for Report {
             write!(f, "\nquality: {}; {} changes", shares.join(", "), self.quality.switches)?;
         }
         if self.depth_held > 0 {
-            write!(f, "\ndepth: {} frames took over that of the one before, to save time", self.depth_held)?;
+            write!(f, "\ndepth: {} frames took over that of an earlier one, to save time", self.depth_held)?;
         }
         Ok(())
     }

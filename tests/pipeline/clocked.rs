@@ -1,6 +1,7 @@
 //! Runs on a clock that only the stages here move, one frame at a time: what is measured is exact, and the machine has
 //! no say in it.
 
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
@@ -14,9 +15,10 @@ use bokehcam::compute::Backend;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::{DepthError, DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::link::live;
 use bokehcam::look::Look;
 use bokehcam::optics::CocField;
-use bokehcam::pipeline::{Change, Executor, Pace, Run, run};
+use bokehcam::pipeline::{Change, Executor, Pace, Run, Trace, Wanted, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::stats::{Cause, Report};
 
@@ -151,6 +153,20 @@ fn play(
     changes: Option<mpsc::Receiver<Change>>,
     before: impl FnMut(usize) + Send + 'static,
 ) -> (Report, Vec<CocField>) {
+    let (report, fields, _) = play_seen((frames, pace), (depth_ns, budget_ns), changes, None, before);
+    (report, fields)
+}
+
+/// The same; gives what the frames took, too.
+fn play_seen(
+    (frames, pace): (usize, Pace),
+    (depth_ns, budget_ns): (u64, u64),
+    changes: Option<mpsc::Receiver<Change>>,
+    wanted: Option<Arc<Wanted>>,
+    before: impl FnMut(usize) + Send + 'static,
+) -> (Report, Vec<CocField>, Vec<Trace>) {
+    let (view, views) = live();
+    let (views, traces) = (RefCell::new(views), RefCell::new(Vec::new()));
     let (clock, fields, delivered) = (Clock::manual(), Arc::default(), Arc::<AtomicU64>::default());
     let camera = Lockstep {
         clock: clock.clone(),
@@ -167,15 +183,20 @@ fn play(
         look: dof(10.0),
         changes,
         budget_ns,
+        wanted,
+        view: Some(view),
         clock: clock.clone(),
-        progress: &|progress| delivered.store(progress.delivered, Ordering::SeqCst),
+        progress: &|progress| {
+            traces.borrow_mut().extend(views.borrow_mut().try_recv().map(|view| view.trace));
+            delivered.store(progress.delivered, Ordering::SeqCst);
+        },
         ..simple(Box::new(camera), Box::new(Slow(clock)), &stop, pace)
     })
     .unwrap();
     assert!(report.frames.balance(), "{:?}", report.frames);
     assert_eq!((report.frames.captured, report.frames.delivered), (frames as u64, frames as u64));
     let fields = fields.lock().unwrap().clone();
-    (report, fields)
+    (report, fields, traces.into_inner())
 }
 
 /// Within what a histogram rounds by.
@@ -203,11 +224,11 @@ fn each_time_is_that_of_its_own_stage_and_latency_is_all_since_the_capture() {
 
 #[test]
 fn a_change_of_the_look_holds_from_its_frame_on_where_depth_is_held_too() {
-    // Depth has 5 ms a frame and takes 14: each is for three frames.
+    // Depth has 9 ms a frame and takes 14: each is for two frames.
     let (send, changes) = mpsc::channel();
     let before = move |frame: usize| {
-        // In every place of such three.
-        if frame >= 30 && frame.is_multiple_of(4) {
+        // In both places of such two.
+        if frame >= 30 && frame.is_multiple_of(5) {
             let look = dof(10.0 + frame as f32);
             let _ = send.send(Change { number: frame as u64, look, bokeh: Executor::Keep });
         }
@@ -216,9 +237,48 @@ fn a_change_of_the_look_holds_from_its_frame_on_where_depth_is_held_too() {
     assert!(report.depth_held > 20, "{} of 60 frames took over the depth of another", report.depth_held);
     for (frame, field) in fields.into_iter().enumerate() {
         let CocField::Depth(lens) = field else { panic!("no such rule was given") };
-        let expected_px = if frame < 32 { 10.0 } else { 10.0 + (frame / 4 * 4) as f32 };
+        let expected_px = if frame < 30 { 10.0 } else { 10.0 + (frame / 5 * 5) as f32 };
         assert_eq!(lens.max_coc_px, expected_px, "frame {frame}");
     }
+}
+
+#[test]
+fn the_stages_and_the_waits_are_all_of_a_frames_age() {
+    for pace in [Pace::Asap, Pace::Realtime] {
+        let (report, _, traces) = play_seen((40, pace), (DEPTH_NS, PERIOD_NS), None, None, |_| {});
+        assert_eq!(traces.len(), 40);
+        for trace in &traces {
+            let Trace { decode_ns, depth_ns, blur_ns, between_ns, playout_ns, age_ns, .. } = *trace;
+            assert_eq!((decode_ns, depth_ns, blur_ns), (READ_NS, DEPTH_NS, BLUR_NS));
+            // The driver had it for a while.
+            assert_eq!(between_ns, AGE_NS - READ_NS, "nothing else waits where there is one frame at a time");
+            assert_eq!(age_ns, decode_ns + depth_ns + blur_ns + between_ns + playout_ns);
+        }
+        let waited = report.stages_ms.0.iter().any(|(name, _)| name == "playout");
+        assert_eq!(waited, pace == Pace::Realtime);
+    }
+    // A blur that is sometimes late makes the others wait.
+    let before = |_: usize| {};
+    let (_, _, traces) = play_seen((60, Pace::Realtime), (14 * MS, 10 * MS), None, None, before);
+    let held = traces.iter().filter(|trace| trace.depth_held);
+    let waits: Vec<u64> = held.map(|trace| trace.playout_ns).collect();
+    assert!(waits.len() > 20 && waits[10..].iter().all(|wait_ns| *wait_ns > 5 * MS), "{waits:?}");
+}
+
+#[test]
+fn whoever_asks_for_depth_of_its_own_gets_it_with_the_next_frame() {
+    let wanted = Arc::new(Wanted::default());
+    let asks = Arc::clone(&wanted);
+    let before = move |frame: usize| match frame {
+        40 => asks.want_own_depth(true),
+        43 => asks.want_own_depth(false),
+        _ => {}
+    };
+    let (report, _, traces) = play_seen((60, Pace::Realtime), (14 * MS, 10 * MS), None, Some(wanted), before);
+    let held: Vec<bool> = traces.iter().map(|trace| trace.depth_held).collect();
+    assert_eq!(held.iter().filter(|held| **held).count() as u64, report.depth_held);
+    assert_eq!(held[40..46], [false, false, false, true, false, true], "{held:?}");
+    assert_eq!(held[34..40].iter().filter(|held| **held).count(), 3);
 }
 
 /// Loses frames between those that it gives: as many as their number, of each cause.

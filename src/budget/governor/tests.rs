@@ -1,4 +1,5 @@
 use super::*;
+use crate::budget::load::{IDLE_NS, LEARN_FROM, LEARN_MOST, RECENT};
 
 const COSTS: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
 const BUDGET_NS: u64 = 1_000_000;
@@ -6,7 +7,7 @@ const PERIOD_NS: u64 = 33_000_000;
 
 /// A machine of this load (nanoseconds at the cheapest rung) with a governor, its samples `late` frames late.
 struct Machine {
-    governor: Governor,
+    governor: Governor<1>,
     costs: [f64; 5],
     under_way: std::collections::VecDeque<(usize, f64)>,
     late: usize,

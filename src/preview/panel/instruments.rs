@@ -3,7 +3,8 @@
 use std::fmt::Write;
 use std::time::Duration;
 
-use egui::{Align2, Area, Context, Id, Mesh, Order, Rect, RichText, Sense, Shape, Stroke, TextStyle, Theme, Ui};
+use egui::text::LayoutJob;
+use egui::{Align, Align2, Area, Context, Id, Mesh, Order, Rect, RichText, Sense, Shape, Stroke, TextStyle, Theme, Ui};
 use egui::{pos2, vec2};
 
 use super::meters::{FRAMES, Summary};
@@ -55,7 +56,7 @@ impl Cache {
         ui.horizontal(|ui| {
             ui.label(RichText::new(format!("{fps:.1}")).family(medium()).size(22.0));
             ui.label(RichText::new("fps").color(colors.weak));
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
                 let last = state.meters.bars().last().and_then(|bar| bar.quality);
                 let (color, letter) = rung(last, theme(ui));
                 let name = last.map_or("no blur", Quality::name);
@@ -70,11 +71,19 @@ impl Cache {
         row(ui, "Dropped", &drops(state));
         let stages = state.meters.stages();
         row(ui, "Decode", &ms(stages.decode_ms));
-        row(ui, "Depth", &ms(stages.depth_ms));
+        let depth = match stages.depth_every() {
+            1 => ms(stages.depth_ms),
+            2 => format!("{}, every 2nd frame", ms(stages.depth_ms)),
+            3 => format!("{}, every 3rd frame", ms(stages.depth_ms)),
+            every => format!("{}, every {every}th frame", ms(stages.depth_ms)),
+        };
+        row(ui, "Depth", &depth);
         row(ui, "Blur", &ms(stages.blur_ms));
         for (name, pass_ms) in stages.passes() {
             row(ui, &format!("     {name}"), &ms(pass_ms));
         }
+        row(ui, "Between stages", &ms(stages.between_ms));
+        row(ui, "Play-out delay", &ms(stages.playout_ms));
         row(ui, "Present", &ms(stages.present_ms));
         if !executor.is_empty() {
             ui.add(egui::Label::new(RichText::new(executor).text_style(TextStyle::Small).color(colors.weak)).wrap());
@@ -90,14 +99,18 @@ fn ms(ms: f64) -> String {
     format!("{ms:.1} ms")
 }
 
-/// A name and a value.
+/// A name and a value, in as many lines as it needs beside the name.
 fn row(ui: &mut Ui, name: &str, value: &str) {
     let colors = Colors::here(ui);
-    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 16.0), Sense::hover());
-    let font = TextStyle::Small.resolve(ui.style());
-    let painter = ui.painter();
-    painter.text(rect.left_center(), Align2::LEFT_CENTER, name, font.clone(), colors.weak);
-    painter.text(rect.right_center(), Align2::RIGHT_CENTER, value, font, colors.text);
+    let (font, width) = (TextStyle::Small.resolve(ui.style()), ui.available_width());
+    let name = ui.painter().layout_no_wrap(name.to_owned(), font.clone(), colors.weak);
+    let mut job = LayoutJob::simple(value.to_owned(), font, colors.text, (width - name.size().x - GAP).max(0.0));
+    job.halign = Align::RIGHT;
+    let value = ui.painter().layout_job(job);
+    let (rect, _) = ui.allocate_exact_size(vec2(width, value.size().y.max(16.0)), Sense::hover());
+    let top = rect.top() + 0.5 * (16.0 - name.size().y);
+    ui.painter().galley(pos2(rect.left(), top), name, colors.weak);
+    ui.painter().galley(pos2(rect.right(), top), value, colors.text);
 }
 
 /// Dropped frames by cause, those that there are.

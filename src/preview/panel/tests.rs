@@ -92,13 +92,11 @@ impl Window {
         actions
     }
 
-    /// All texts that are drawn, and their middles.
-    fn places(&mut self) -> Vec<(String, Pos2)> {
-        fn add(shape: &egui::Shape, to: &mut Vec<(String, Pos2)>) {
+    /// All texts that are drawn, and where.
+    fn boxes(&mut self) -> Vec<(String, Rect)> {
+        fn add(shape: &egui::Shape, to: &mut Vec<(String, Rect)>) {
             match shape {
-                egui::Shape::Text(text) => {
-                    to.push((text.galley.text().to_owned(), text.visual_bounding_rect().center()));
-                }
+                egui::Shape::Text(text) => to.push((text.galley.text().to_owned(), text.visual_bounding_rect())),
                 egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| add(shape, to)),
                 _ => {}
             }
@@ -108,6 +106,11 @@ impl Window {
         output.shapes.iter().for_each(|clipped| add(&clipped.shape, &mut texts));
         output.drop_without_applying_deltas();
         texts
+    }
+
+    /// All texts that are drawn, and their middles.
+    fn places(&mut self) -> Vec<(String, Pos2)> {
+        self.boxes().into_iter().map(|(text, at)| (text, at.center())).collect()
     }
 
     fn texts(&mut self) -> Vec<String> {

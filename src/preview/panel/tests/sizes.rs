@@ -1,5 +1,7 @@
 //! Windows of all sizes, texts of all sizes, everything open: nothing panics, and nothing is nowhere.
 
+use egui::Rect;
+
 use super::{Window, sample};
 use crate::look::Effect;
 use crate::preview::state::{Shown, Source, State};
@@ -60,4 +62,24 @@ fn a_canvas_without_pixels_is_no_picture() {
     let mut window = Window::new();
     window.canvas = crate::preview::panel::Canvas::default();
     assert!(window.click(egui::pos2(200.0, 200.0)).is_empty());
+}
+
+#[test]
+fn in_the_instruments_no_text_runs_over_another() {
+    for text_scale in [1.0, 1.6] {
+        let mut state = sample::state();
+        (state.instruments, state.panel, state.text_scale) = (true, false, text_scale);
+        state.meters.fill_for_looks();
+        let mut window = Window::of(state, (1280, 720));
+        window.wait(0.5);
+        let texts = window.boxes();
+        for wanted in ["150 of 300:", "every 2nd frame", "Play-out delay", "Between stages"] {
+            assert!(texts.iter().any(|(text, _)| text.contains(wanted)), "{wanted}: {texts:?}");
+        }
+        let over = |a: &Rect, b: &Rect| a.shrink(0.5).intersects(b.shrink(0.5));
+        for (k, (text, at)) in texts.iter().enumerate() {
+            let under = texts[..k].iter().find(|(_, other)| over(at, other));
+            assert!(under.is_none(), "{text} at {at} runs over {under:?}");
+        }
+    }
 }

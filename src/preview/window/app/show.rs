@@ -7,6 +7,7 @@ use winit::window::Fullscreen;
 
 use super::App;
 use crate::compute::Place;
+use crate::pipeline::Trace;
 use crate::preview::panel::Canvas;
 use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::Still;
@@ -98,17 +99,20 @@ impl App {
             (true, false) => Place::Device,
             (true, true) => Place::Both,
         });
+        self.wanted.want_own_depth(self.snapshot_due);
     }
 
-    /// Saves the frame that is shown. If it is only on the GPU, or was blurred between two looks so that no settings
-    /// could repeat it, the next frame that is neither is saved instead.
+    /// Saves the frame that is shown. If it is only on the GPU, was blurred between two looks so that no settings could repeat
+    /// it, or has the depth of an earlier frame, the next frame that has none of that is saved instead.
     pub(super) fn snapshot(&mut self) {
         let Some(view) = &self.view else { return self.state.note(NO_PICTURE) };
         let is_running = matches!(self.state.source, Source::Running(_));
         if view.picture.memory().is_none() && !is_running {
             return self.state.note(NO_PICTURE);
         }
-        self.snapshot_due = view.picture.memory().is_none() || is_running && view.trace.between;
+        let Trace { between, depth_held, .. } = view.trace;
+        let is_frozen = self.state.frozen && view.picture.memory().is_some();
+        self.snapshot_due = view.picture.memory().is_none() || is_running && !is_frozen && (between || depth_held);
         self.update_wanted();
         let Some(picture) = view.picture.memory().filter(|_| !self.snapshot_due) else { return };
         self.session.save(Still {

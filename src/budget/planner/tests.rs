@@ -1,0 +1,127 @@
+use super::*;
+
+const MS: u64 = 1_000_000;
+const PERIOD_NS: u64 = 33 * MS;
+/// The blur's rungs, from draft to balanced, and two efforts of depth.
+const RUNGS: [f64; 3] = [0.68, 0.7, 1.0];
+const EFFORTS: [f64; 2] = [0.5, 1.0];
+const BALANCED: usize = 2;
+
+fn planner(efforts: &[f64]) -> Planner {
+    Planner::new((PERIOD_NS, Some(PERIOD_NS)), efforts, &RUNGS, [BALANCED, BALANCED])
+}
+
+/// Plays frames of a machine where depth at full effort and the usual blur take so long, in milliseconds; returns the plans.
+fn play(planner: &mut Planner, (depth_ms, blur_ms): (f64, f64), frames: u64) -> Vec<Plan> {
+    let ns = |ms: f64| (ms * MS as f64) as u64;
+    let mut since = usize::MAX;
+    (0..frames)
+        .map(|frame| {
+            let plan = planner.plan();
+            let at_ns = frame * PERIOD_NS;
+            let is_own = since >= plan.frames;
+            since = if is_own { 1 } else { since + 1 };
+            let took_ns = if is_own { ns(depth_ms * planner.efforts[plan.effort]) } else { 2 * MS };
+            let effort = is_own.then_some(plan.effort);
+            planner.note_depth(DepthTimes { effort, took_ns, age_ns: 4 * MS, at_ns });
+            planner.note_blur(Sample { rung: plan.rung, took_ns: ns(blur_ms * RUNGS[plan.rung]), at_ns });
+            plan
+        })
+        .collect()
+}
+
+/// The plan that is kept, and how often it changes from there on.
+fn settled(efforts: &[f64], times_ms: (f64, f64)) -> (Plan, usize) {
+    let mut planner = planner(efforts);
+    play(&mut planner, times_ms, 300);
+    let plans = play(&mut planner, times_ms, 900);
+    (plans[899], plans.windows(2).filter(|pair| pair[0] != pair[1]).count())
+}
+
+#[test]
+fn with_less_time_effort_goes_first_then_the_blur_then_depth_of_its_own() {
+    let plan = |frames, effort, rung| Plan { frames, effort, rung };
+    for (depth_ms, blur_ms, expected) in [
+        (12.0, 12.0, plan(1, 1, 2)),
+        (24.0, 18.0, plan(1, 1, 2)),
+        // Together too late: with less effort not.
+        (27.0, 22.0, plan(1, 0, 2)),
+        (40.0, 20.0, plan(1, 0, 2)),
+        (50.0, 28.0, plan(1, 0, 1)),
+        // No effort makes depth fast enough for each frame; the blur has most of its budget in any case.
+        (70.0, 15.0, plan(2, 0, 2)),
+        (70.0, 20.0, plan(2, 0, 1)),
+        (140.0, 15.0, plan(3, 0, 2)),
+        // A blur that nothing makes fast enough is no reason to hold depth.
+        (10.0, 60.0, plan(1, 1, 0)),
+    ] {
+        let (found, changes) = settled(&EFFORTS, (depth_ms, blur_ms));
+        assert_eq!((found, changes), (expected, 0), "{depth_ms} and {blur_ms} ms");
+    }
+}
+
+/// The case of a recording of 1280x720 on two cores: depth takes more than a frame's time, and the blur half of it.
+#[test]
+fn a_blur_that_fits_is_not_lowered_where_depth_does_not() {
+    for depth_ms in [30.0, 35.0, 60.0, 100.0] {
+        let (plan, _) = settled(&[1.0], (depth_ms, 15.0));
+        assert!(plan.rung == BALANCED && plan.frames > 1, "{depth_ms} ms: {plan:?}");
+    }
+}
+
+/// A frame that is older than two periods is dropped.
+#[test]
+fn the_blur_is_lowered_where_that_keeps_frames_from_being_dropped() {
+    let (plan, _) = settled(&[1.0], (43.0, 16.0));
+    assert!(plan.rung < BALANCED && plan.frames == 2, "{plan:?}");
+}
+
+#[test]
+fn all_the_time_there_is_is_taken_and_no_more() {
+    for depth_ms in (2..90).step_by(3) {
+        for blur_ms in (2..60).step_by(3) {
+            let times_ms = (f64::from(depth_ms), f64::from(blur_ms));
+            let (plan, changes) = settled(&EFFORTS, times_ms);
+            assert!(changes <= 2, "{times_ms:?}: {changes} changes in half a minute");
+            let finer = [
+                (plan.rung < BALANCED).then(|| Plan { rung: plan.rung + 1, ..plan }),
+                (plan.frames > 1).then(|| Plan { frames: plan.frames - 1, ..plan }),
+                (plan.frames == 1 && plan.effort == 0).then(|| Plan { effort: 1, ..plan }),
+            ];
+            let took = |plan: Plan| (times_ms.0 * EFFORTS[plan.effort], times_ms.1 * RUNGS[plan.rung]);
+            for finer in finer.into_iter().flatten() {
+                let (depth_ms, blur_ms) = took(finer);
+                // Half of its time is a stage's own; above, there is room only if both are in time.
+                let share_ms = (depth_ms + 2.0 * (finer.frames - 1) as f64) / finer.frames as f64;
+                let has_room = share_ms < 0.8 * 29.7 && blur_ms < 0.8 * 33.0 && 4.0 + depth_ms + blur_ms < 0.8 * 52.8;
+                assert!(!has_room, "{times_ms:?}: {plan:?} where there is time for {finer:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn without_a_pace_depth_is_as_good_as_it_gets() {
+    let mut planner = Planner::new((PERIOD_NS, None), &EFFORTS, &RUNGS, [BALANCED, BALANCED]);
+    let plans = play(&mut planner, (500.0, 60.0), 100);
+    assert!(plans.iter().all(|plan| plan.frames == 1 && plan.effort == 1));
+    assert_eq!(plans[99].rung, 0);
+}
+
+#[test]
+fn a_gpu_takes_a_finer_blur_while_depth_is_shared() {
+    let mut planner = Planner::new((PERIOD_NS, Some(PERIOD_NS)), &[1.0], &[0.7, 1.0, 2.0], [1, 1]);
+    let plan = play(&mut planner, (45.0, 3.0), 300)[299];
+    assert_eq!((plan.frames, plan.rung), (2, 2));
+}
+
+#[test]
+fn frames_that_are_all_too_late_lower_the_plan_as_well() {
+    let mut planner = planner(&[1.0]);
+    for frame in 0..60 {
+        let depth = DepthTimes { effort: Some(0), took_ns: 70 * MS, age_ns: 4 * MS, at_ns: frame * PERIOD_NS };
+        planner.note_depth(depth);
+        planner.note_late();
+    }
+    assert_eq!(planner.plan().frames, 3);
+}

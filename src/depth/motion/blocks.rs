@@ -1,0 +1,185 @@
+//! Block matching on reduced pictures, from coarse to fine.
+
+use crate::depth::reduced::block_px;
+use crate::frame::ColorImage;
+
+use super::Vector;
+
+/// Columns and rows of a cell of each level; what is compared is twice as large, and has it in its middle.
+pub const CELL: usize = 4;
+const WINDOW: usize = 2 * CELL;
+/// Levels, each of half the size of the one before.
+const LEVELS: usize = 3;
+/// Pixels of the coarsest level that are searched either way.
+const SEARCH: i32 = 4;
+/// Another vector than none has to be better by so many codes a pixel.
+const AT_REST: u32 = (WINDOW * WINDOW) as u32;
+
+/// A picture's luma.
+#[derive(Debug, Default)]
+struct Level {
+    width: usize,
+    height: usize,
+    luma: Vec<u8>,
+    /// Per cell.
+    moved: Vec<Vector>,
+}
+
+/// Finds how the blocks of a picture moved.
+#[derive(Debug, Default)]
+pub struct Blocks {
+    then: [Level; LEVELS],
+    now: [Level; LEVELS],
+    /// Sums of a row of blocks.
+    sums: Vec<u16>,
+}
+
+impl Blocks {
+    /// Keeps a picture.
+    #[inline(always)]
+    pub fn keep(&mut self, color: &ColorImage) {
+        reduce(color, &mut self.then, &mut self.sums);
+    }
+
+    /// Finds where its blocks are in a later one; of those of the finest level, that do not rest.
+    #[inline(always)]
+    pub fn find(&mut self, color: &ColorImage, rests: impl Fn((usize, usize)) -> bool) {
+        reduce(color, &mut self.now, &mut self.sums);
+        for level in (0..LEVELS).rev() {
+            let (finer, coarser) = self.then.split_at_mut(level + 1);
+            let (then, now) = (&mut finer[level], &self.now[level]);
+            let (across, down) = then.cells();
+            then.moved.clear();
+            for row in 0..down {
+                for column in 0..across {
+                    if level == 0 && rests((column, row)) {
+                        then.moved.push([0; 2]);
+                        continue;
+                    }
+                    let at = [column, row].map(|cell| (cell * CELL) as i32 - (CELL / 2) as i32);
+                    let at =
+                        [at[0].clamp(0, (then.width - WINDOW) as i32), at[1].clamp(0, (then.height - WINDOW) as i32)];
+                    let mut best = Best { then, now, at, moved: [0; 2], sad: 0 };
+                    best.sad = best.sad_of([0; 2]).unwrap_or(0).saturating_sub(AT_REST);
+                    match coarser.first() {
+                        None => best.search_all(),
+                        Some(coarser) => best.search_near(coarser, [column, row]),
+                    }
+                    let moved = best.moved;
+                    then.moved.push(moved);
+                }
+            }
+        }
+    }
+
+    /// How the cell moved, in pixels of the finest level.
+    #[inline(always)]
+    pub fn of(&self, (column, row): (usize, usize)) -> Vector {
+        let (across, down) = self.then[0].cells();
+        self.then[0].moved[row.min(down - 1) * across + column.min(across - 1)]
+    }
+}
+
+impl Level {
+    fn cells(&self) -> (usize, usize) {
+        (self.width.div_ceil(CELL), self.height.div_ceil(CELL))
+    }
+}
+
+/// The best match of a block so far.
+struct Best<'a> {
+    then: &'a Level,
+    now: &'a Level,
+    at: Vector,
+    moved: Vector,
+    sad: u32,
+}
+
+impl Best<'_> {
+    #[inline(always)]
+    fn search_all(&mut self) {
+        for y in -SEARCH..=SEARCH {
+            (-SEARCH..=SEARCH).for_each(|x| self.look([x, y]));
+        }
+    }
+
+    /// Around the vectors of the next coarser level.
+    #[inline(always)]
+    fn search_near(&mut self, coarser: &Level, [column, row]: [usize; 2]) {
+        let (across, down) = coarser.cells();
+        let mut last = [0; 2];
+        for [x, y] in [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]] {
+            let place = |cell: usize, by: i32, count: usize| (cell as i32 / 2 + by).clamp(0, count as i32 - 1) as usize;
+            let moved = coarser.moved[place(row, y, down) * across + place(column, x, across)].map(|px| 2 * px);
+            if moved != last {
+                self.look(moved);
+                last = moved;
+            }
+        }
+        let [x, y] = self.moved;
+        for by in [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]] {
+            self.look([x + by[0], y + by[1]]);
+        }
+    }
+
+    #[inline(always)]
+    fn look(&mut self, moved: Vector) {
+        if let Some(sad) = self.sad_of(moved).filter(|&sad| sad < self.sad) {
+            (self.moved, self.sad) = (moved, sad);
+        }
+    }
+
+    /// The sum of absolute differences; `None` outside of the picture.
+    #[inline(always)]
+    fn sad_of(&self, moved: Vector) -> Option<u32> {
+        let (width, height) = (self.now.width, self.now.height);
+        let [x, y] = [self.at[0] + moved[0], self.at[1] + moved[1]];
+        if x < 0 || y < 0 || x as usize + WINDOW > width || y as usize + WINDOW > height {
+            return None;
+        }
+        let then = &self.then.luma[self.at[1] as usize * width + self.at[0] as usize..];
+        let now = &self.now.luma[y as usize * width + x as usize..];
+        let rows = then.chunks(width).zip(now.chunks(width)).take(WINDOW);
+        Some(rows.fold(0, |sum, (then, now)| {
+            let pairs = then[..WINDOW].iter().zip(&now[..WINDOW]);
+            sum + pairs.fold(0, |sum, (then, now)| sum + u32::from(then.abs_diff(*now)))
+        }))
+    }
+}
+
+/// Makes the levels of a picture: the mean luma of blocks, and of four pixels each.
+#[inline(always)]
+fn reduce(color: &ColorImage, levels: &mut [Level; LEVELS], sums: &mut Vec<u16>) {
+    let (block, width) = (block_px(color.width), color.width as usize);
+    let [finest, ..] = levels;
+    (finest.width, finest.height) = (width / block, color.height as usize / block);
+    finest.luma.resize(finest.width * finest.height, 0);
+    sums.resize(3 * width, 0);
+    // Green counts twice.
+    let scale = 65536 / (4 * block * block) as u32;
+    for (row, luma) in finest.luma.chunks_exact_mut(finest.width).enumerate() {
+        sums.fill(0);
+        for line in color.rgb[3 * width * block * row..].chunks_exact(3 * width).take(block) {
+            sums.iter_mut().zip(line).for_each(|(sum, &code)| *sum += u16::from(code));
+        }
+        for (luma, block) in luma.iter_mut().zip(sums.chunks_exact(3 * block)) {
+            let sum: u32 =
+                block.as_chunks::<3>().0.iter().map(|&[r, g, b]| u32::from(r) + 2 * u32::from(g) + u32::from(b)).sum();
+            *luma = ((sum * scale) >> 16) as u8;
+        }
+    }
+    for level in 1..LEVELS {
+        let (finer, coarser) = levels.split_at_mut(level);
+        let (from, to) = (&finer[level - 1], &mut coarser[0]);
+        (to.width, to.height) = ((from.width / 2).max(WINDOW), (from.height / 2).max(WINDOW));
+        to.luma.resize(to.width * to.height, 0);
+        for (row, luma) in to.luma.chunks_exact_mut(to.width).enumerate() {
+            let line = |row: usize| &from.luma[row.min(from.height - 1) * from.width..][..from.width];
+            let (above, below) = (line(2 * row), line(2 * row + 1));
+            let pairs = above.as_chunks::<2>().0.iter().zip(below.as_chunks::<2>().0);
+            for (luma, (&[a, b], &[c, d])) in luma.iter_mut().zip(pairs) {
+                *luma = ((u16::from(a) + u16::from(b) + u16::from(c) + u16::from(d) + 2) / 4) as u8;
+            }
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Depth that moves.
+
+use std::ops::Range;
+
+use pulp::WithSimd;
+
+use super::Vector;
+use super::layers::{Cell, Grid};
+use crate::depth::fill::holes;
+use crate::frame::DepthMap;
+
+/// Moves a map.
+pub struct Warp<'a> {
+    pub cells: &'a [Cell],
+    pub grid: &'a Grid,
+    pub from: &'a DepthMap,
+    /// A copy, to begin with.
+    pub to: &'a mut DepthMap,
+    pub above: &'a mut Vec<Above>,
+}
+
+/// Of a column, the row after the hole that was filled last, how many rows that has, and what is above it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Above {
+    end: usize,
+    rows: usize,
+    metres: f32,
+}
+
+/// What nothing was moved to.
+const HOLE: f32 = f32::INFINITY;
+
+impl WithSimd for Warp<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+        let Self { cells, grid, from, .. } = self;
+        let (width, size) = (from.width as usize, (from.width as usize, from.height as usize));
+        let place = |at: usize| (at % grid.cells().0, at / grid.cells().0);
+        let moving = || cells.iter().enumerate().filter(|(_, cell)| cell.moves());
+        for (at, cell) in moving() {
+            let [xs, ys] = grid.part(place(at), size);
+            let [near, far] = [cell.near.moved, cell.far_moved()].map(|moved| moved != [0; 2]);
+            for y in ys {
+                for metres in &mut self.to.metres[y * width..][xs.clone()] {
+                    let is_near = *metres < cell.split_m;
+                    *metres = if (is_near & near) | (!is_near & far) { HOLE } else { *metres };
+                }
+            }
+        }
+        for (at, cell) in moving() {
+            let part = grid.part(place(at), size);
+            let [near, far] = [cell.near.moved, cell.far_moved()];
+            if near == far {
+                lay(from, self.to, part, self.on_map(near), |_| true);
+                continue;
+            }
+            if near != [0; 2] {
+                lay(from, self.to, part.clone(), self.on_map(near), |metres| metres < cell.split_m);
+            }
+            if far != [0; 2] {
+                lay(from, self.to, part, self.on_map(far), |metres| metres >= cell.split_m);
+            }
+        }
+        self.fill();
+    }
+}
+
+impl Warp<'_> {
+    /// A vector in pixels of the map.
+    fn on_map(&self, [x, y]: Vector) -> Vector {
+        let (width, height) = self.grid.size;
+        let on_map = |px: i32, of: u32, count: usize| (px as f32 * of as f32 / count as f32).round() as i32;
+        [on_map(x, self.from.width, width), on_map(y, self.from.height, height)]
+    }
+
+    /// Fills the holes: each is as far as the farther of its sides, across where it is narrower.
+    #[inline(always)]
+    fn fill(&mut self) {
+        let (width, height) = (self.to.width as usize, self.to.height as usize);
+        self.above.clear();
+        self.above.resize(width, Above::default());
+        let farther = |a: f32, b: f32| if b != HOLE && b > a { b } else { a };
+        for y in 0..height {
+            let (before, rest) = self.to.metres.split_at_mut(y * width);
+            let (row, below) = rest.split_at_mut(width);
+            let mut filled_until = 0;
+            loop {
+                let next = holes(&row[filled_until..]).next();
+                let Some(hole) = next else { break };
+                let hole = filled_until + hole.start..filled_until + hole.end;
+                let left_m = hole.start.checked_sub(1).map_or(0.0, |x| row[x]);
+                let right_m = row.get(hole.end).copied().unwrap_or(0.0);
+                let beside_m = farther(left_m, right_m);
+                for x in hole.clone() {
+                    let above = match self.above[x] {
+                        above if y > 0 && above.end == y => above,
+                        _ => {
+                            Above { metres: if y > 0 { before[(y - 1) * width + x] } else { 0.0 }, ..Above::default() }
+                        }
+                    };
+                    let under = below.chunks_exact(width).take(hole.len()).position(|row| row[x] != HOLE);
+                    let under_m = under.map_or(0.0, |rows| below[rows * width + x]);
+                    let is_lower = above.rows + under.unwrap_or(height - y) < hole.len();
+                    let across_m = farther(above.metres, under_m);
+                    row[x] = if is_lower && across_m > 0.0 || beside_m <= 0.0 { across_m } else { beside_m };
+                    self.above[x] = Above { end: y + 1, rows: above.rows + 1, ..above };
+                }
+                filled_until = hole.end;
+            }
+        }
+    }
+}
+
+/// Lays what `is_taken` of a part where it has moved to, over what is farther. What is beyond the border of the picture is
+/// like what is at it.
+#[inline(always)]
+fn lay(
+    from: &DepthMap,
+    to: &mut DepthMap,
+    [xs, ys]: [Range<usize>; 2],
+    [right, down]: Vector,
+    is_taken: impl Fn(f32) -> bool,
+) {
+    let (width, height) = (from.width as usize, from.height as usize);
+    let reach = |px: &Range<usize>, by: i32, count: usize| {
+        let begins = if px.start == 0 { 0 } else { (px.start as i32 + by).clamp(0, count as i32) };
+        let ends = if px.end == count { count as i32 } else { (px.end as i32 + by).clamp(0, count as i32) };
+        begins as usize..ends.max(begins) as usize
+    };
+    let (columns, rows) = (reach(&xs, right, width), reach(&ys, down, height));
+    // Between what the border is repeated for, it is a plain move.
+    let inner = |px: usize| ((px as i32 + right).max(0) as usize).clamp(columns.start, columns.end);
+    let (begins, ends) = (inner(xs.start), inner(xs.end));
+    for y in rows {
+        let line = (y as i32 - down).clamp(ys.start as i32, ys.end as i32 - 1) as usize;
+        let source = &from.metres[line * width..][..width];
+        let target = &mut to.metres[y * width..][..width];
+        let put = |target: &mut f32, metres: f32| {
+            let is_over = is_taken(metres) & (metres < *target);
+            *target = if is_over { metres } else { *target };
+        };
+        target[columns.start..begins].iter_mut().for_each(|target| put(target, source[xs.start]));
+        if begins < ends {
+            let moved = &source[(begins as i32 - right) as usize..];
+            target[begins..ends].iter_mut().zip(moved).for_each(|(target, &metres)| put(target, metres));
+        }
+        target[ends..columns.end].iter_mut().for_each(|target| put(target, source[xs.end - 1]));
+    }
+}
