@@ -68,7 +68,7 @@ fn a_canvas_without_pixels_is_no_picture() {
 fn in_the_instruments_no_text_runs_over_another() {
     for text_scale in [1.0, 1.6] {
         let mut state = sample::state();
-        (state.instruments, state.panel, state.text_scale) = (true, false, text_scale);
+        (state.instruments, state.panel, state.habits.text_scale) = (true, false, text_scale);
         state.meters.fill_for_looks();
         let mut window = Window::of(state, (1280, 720));
         window.wait(0.5);
