@@ -44,11 +44,36 @@ pub fn tr_with(english: &str, values: &[&dyn Display]) -> String {
     text
 }
 
+/// The table to speak by: of the language that was chosen, or of a file; else of the environment's language. `None` is
+/// English.
+///
+/// # Errors
+/// There is no translation into the language that was chosen, or it cannot be read: one line.
+pub fn chosen(language: Option<&str>) -> Result<Option<Table>, String> {
+    let Some(name) = language else {
+        let path = usual_language().and_then(|language| find(&language));
+        // Nobody asked for this one: the window is in English then.
+        return Ok(
+            path.and_then(|path| read(&path).map_err(|line| tracing::warn!("{line}; the window is in English")).ok())
+        );
+    };
+    if ["en", "C", "POSIX"].contains(&name) {
+        return Ok(None);
+    }
+    let is_file = name.ends_with(".toml").then(|| PathBuf::from(name));
+    let none = || {
+        format!(
+            "there is no translation '{name}': put one at ~/.local/share/bokehcam/texts/{name}.toml, or name a file"
+        )
+    };
+    is_file.or_else(|| find(name)).ok_or_else(none).and_then(|path| read(&path)).map(Some)
+}
+
 /// Reads a translation.
 ///
 /// # Errors
 /// It cannot be read, or is no list of texts: one line.
-pub fn read(path: &Path) -> Result<Table, String> {
+fn read(path: &Path) -> Result<Table, String> {
     let at = |what: &dyn Display| format!("{}: {what}", path.display()).replace('\n', ", ");
     let text = input::read_text(path, input::MOST_SETTINGS_BYTES).map_err(|error| at(&error))?;
     toml::from_str(&text).map_err(|error: toml::de::Error| at(&error.message()))
@@ -56,7 +81,7 @@ pub fn read(path: &Path) -> Result<Table, String> {
 
 /// The file of the translation into `language`, such as `de_AT` or `de`, in the folders for data of the environment; `None`
 /// where there is none, as for English.
-pub fn find(language: &str) -> Option<PathBuf> {
+fn find(language: &str) -> Option<PathBuf> {
     let language = language.split(['.', '@']).next().filter(|name| is_name(name))?;
     let short = language.split('_').next().unwrap_or(language);
     let home = std::env::var_os("HOME").map(|home| Path::new(&home).join(".local/share"));
@@ -70,7 +95,7 @@ pub fn find(language: &str) -> Option<PathBuf> {
 }
 
 /// The language of the environment, as POSIX has it.
-pub fn usual_language() -> Option<String> {
+fn usual_language() -> Option<String> {
     let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     set("LC_ALL").or_else(|| set("LC_MESSAGES")).or_else(|| set("LANG"))
 }
@@ -129,5 +154,8 @@ pub mod tests {
         for odd in ["", "../etc", "C.UTF-8", "zz_ZZ"] {
             assert_eq!(find(odd), None, "{odd}");
         }
+        assert_eq!(chosen(Some("en")), Ok(None));
+        assert!(chosen(Some("zz")).unwrap_err().contains("no translation 'zz'"));
+        assert!(chosen(Some("/nowhere/zz.toml")).unwrap_err().contains("/nowhere/zz.toml: "));
     }
 }

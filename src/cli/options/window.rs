@@ -42,6 +42,9 @@ pub struct Window {
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_missing_value = "true",
           value_parser = BoolishValueParser::new(), hide_possible_values = true)]
     pub single_keys: Option<bool>,
+    /// Language of the window's texts, such as de, or a file with a translation [default: the environment's]
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    pub language: Option<String>,
     /// Begin with nothing remembered: no look, no source, no sizes of the window before
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,

@@ -104,6 +104,7 @@ const NEEDS: [(&[&str], Why); 17] = [
             "text-scale",
             "single-keys",
             "fresh",
+            "language",
             "theme",
             "save-to",
         ],

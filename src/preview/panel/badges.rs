@@ -7,6 +7,7 @@ use egui::{Align2, Color32, Context, CornerRadius, FontId, Id, LayerId, Order, R
 
 use super::state::State;
 use super::theme::{GAP, ON_PICTURE, medium};
+use crate::preview::texts::tr;
 
 const HEIGHT: f32 = 24.0;
 /// Red enough for a dot on a dark badge.
@@ -29,7 +30,7 @@ impl Badges {
         let now_s = ctx.input(|input| input.time);
         let text = |name: &str, is_on: bool, since_s: &mut Option<f64>| {
             *since_s = is_on.then(|| since_s.unwrap_or(now_s));
-            since_s.map(|since_s| format!("{name} {}", elapsed(now_s - since_s)))
+            since_s.map(|since_s| format!("{} {}", tr(name), elapsed(now_s - since_s)))
         };
         let recording = text("Recording", state.recording().is_some(), &mut self.recording_s);
         let sized = |text| match state.recorded_bytes {
@@ -44,8 +45,8 @@ impl Badges {
         let all = [
             (recording.map(sized), LIVE),
             (text("Virtual camera", state.virtual_camera().is_some(), &mut self.camera_s), LIVE),
-            (frozen(state).map(str::to_owned), ON_PICTURE),
-            (is_late.then(|| "Working…".to_owned()), ON_PICTURE),
+            (frozen(state).map(|text| tr(text).to_owned()), ON_PICTURE),
+            (is_late.then(|| tr("Working…").to_owned()), ON_PICTURE),
         ];
         if self.recording_s.or(self.camera_s).is_some() {
             ctx.request_repaint_after(Duration::from_secs(1));

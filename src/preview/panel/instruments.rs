@@ -11,6 +11,7 @@ use super::meters::{FRAMES, Summary};
 use super::state::{Source, State};
 use super::theme::{Colors, GAP, PAD, card, medium, rung};
 use crate::budget::Quality;
+use crate::preview::texts::{tr, tr_with};
 
 const WIDTH: f32 = 286.0;
 /// Height of the graph.
@@ -59,7 +60,7 @@ impl Cache {
             ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
                 let last = state.meters.bars().last().and_then(|bar| bar.quality);
                 let (color, letter) = rung(last, theme(ui));
-                let name = last.map_or("no blur", Quality::name);
+                let name = last.map_or(tr("no blur"), Quality::name);
                 ui.label(RichText::new(format!("{letter} {name}")).color(color).family(medium()));
             });
         });
@@ -73,9 +74,9 @@ impl Cache {
         row(ui, "Decode", &ms(stages.decode_ms));
         let depth = match stages.depth_every() {
             1 => ms(stages.depth_ms),
-            2 => format!("{}, every 2nd frame", ms(stages.depth_ms)),
-            3 => format!("{}, every 3rd frame", ms(stages.depth_ms)),
-            every => format!("{}, every {every}th frame", ms(stages.depth_ms)),
+            2 => tr_with("{}, every 2nd frame", &[&ms(stages.depth_ms)]),
+            3 => tr_with("{}, every 3rd frame", &[&ms(stages.depth_ms)]),
+            every => tr_with("{}, every {}th frame", &[&ms(stages.depth_ms), &every]),
         };
         row(ui, "Depth", &depth);
         row(ui, "Blur", &ms(stages.blur_ms));
@@ -103,7 +104,7 @@ fn ms(ms: f64) -> String {
 fn row(ui: &mut Ui, name: &str, value: &str) {
     let colors = Colors::here(ui);
     let (font, width) = (TextStyle::Small.resolve(ui.style()), ui.available_width());
-    let name = ui.painter().layout_no_wrap(name.to_owned(), font.clone(), colors.weak);
+    let name = ui.painter().layout_no_wrap(tr(name).to_owned(), font.clone(), colors.weak);
     let mut job = LayoutJob::simple(value.to_owned(), font, colors.text, (width - name.size().x - GAP).max(0.0));
     job.halign = Align::RIGHT;
     let value = ui.painter().layout_job(job);
@@ -118,9 +119,9 @@ fn drops(state: &State) -> String {
     let frames = state.meters.frames();
     let total = frames.dropped.total();
     if total == 0 {
-        return format!("none of {}", frames.captured);
+        return tr_with("none of {}", &[&frames.captured]);
     }
-    let mut text = format!("{total} of {}:", frames.captured);
+    let mut text = tr_with("{} of {}:", &[&total, &frames.captured]);
     for (cause, count) in frames.dropped.by_cause().into_iter().filter(|(_, count)| *count > 0) {
         // Writing to a string does not fail.
         let _ = write!(text, " {count} {cause}");
@@ -182,7 +183,7 @@ fn graph(ui: &mut Ui, state: &State, budget_ms: f32) {
         let y = plot.bottom() - budget_ms / top_ms * plot.height();
         let ends = [pos2(plot.left(), y), pos2(plot.right(), y)];
         painter.extend(Shape::dashed_line(&ends, Stroke::new(1.5, colors.text), 5.0, 4.0));
-        let text = format!("budget {budget_ms:.1} ms");
+        let text = tr_with("budget {}", &[&ms(budget_ms.into())]);
         let small = egui::FontId::new(11.0, egui::FontFamily::Proportional);
         painter.text(pos2(plot.left() + 5.0, y - 2.0), Align2::LEFT_BOTTOM, text, small, colors.text);
     }

@@ -7,6 +7,7 @@ use egui::{Align2, Area, Context, Id, Label, Order, RichText, Ui, vec2};
 use super::plate;
 use super::state::{Action, Source, State};
 use super::theme::{Colors, GAP, card, medium};
+use crate::preview::texts::{tr, tr_with};
 
 /// A note is shown for this long, plus some time per letter to read it.
 const SHOWN_S: f64 = 3.5;
@@ -64,7 +65,7 @@ impl Ages {
                 ui.set_opacity(opacity);
                 let colors = Colors::here(ui);
                 card(&colors).inner_margin(egui::Margin::symmetric(14, 9)).show(ui, |ui| {
-                    ui.add(Label::new(RichText::new(text).color(colors.text)).wrap());
+                    ui.add(Label::new(RichText::new(tr(text)).color(colors.text)).wrap());
                 });
             });
             bottom += drawn.response.rect.height() + 6.0;
@@ -96,10 +97,10 @@ fn trouble(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>)
         let colors = Colors::here(ui);
         ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 460.0));
         card(&colors).show(ui, |ui| {
-            ui.label(RichText::new("An output failed").family(medium()).size(16.0));
-            ui.add(Label::new(RichText::new(why).color(colors.text)).wrap());
+            ui.label(RichText::new(tr("An output failed")).family(medium()).size(16.0));
+            ui.add(Label::new(RichText::new(tr(why)).color(colors.text)).wrap());
             ui.add_space(2.0);
-            if ui.button("I see").clicked() {
+            if ui.button(tr("I see")).clicked() {
                 actions.push(Action::Dismiss);
             }
         });
@@ -114,7 +115,8 @@ fn banner(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) 
     let (title, why, button) = match &state.source {
         Source::Running(running) => {
             let Some(silent_s) = state.silent_s else { return 0.0 };
-            silent = format!("{}: nothing for {silent_s} s. It goes on by itself once frames come.", running.label);
+            silent =
+                tr_with("{}: nothing for {} s. It goes on by itself once frames come.", &[&running.label, &silent_s]);
             ("No picture", silent.as_str(), Some("Try again"))
         }
         Source::Opening => ("Opening…", "", None),
@@ -137,13 +139,13 @@ fn banner_text(
     (title, why, button): (&str, &str, Option<&str>),
     actions: &mut Vec<Action>,
 ) {
-    ui.label(RichText::new(title).family(medium()).size(16.0));
+    ui.label(RichText::new(tr(title)).family(medium()).size(16.0));
     if !why.is_empty() {
-        ui.add(Label::new(RichText::new(why).color(colors.text)).wrap());
+        ui.add(Label::new(RichText::new(tr(why)).color(colors.text)).wrap());
     }
     if let Some(button) = button {
         ui.add_space(2.0);
-        if ui.button(button).on_hover_text("F5").clicked() {
+        if ui.button(tr(button)).on_hover_text(tr("F5")).clicked() {
             actions.push(Action::Retry);
         }
     }

@@ -23,6 +23,7 @@ use crate::preview::folders::Folders;
 use crate::preview::session::Start;
 use crate::preview::state::{Output, State};
 use crate::preview::system::System;
+use crate::preview::texts;
 use crate::preview::window::{self, Memory, Preview};
 use crate::sink::Target;
 use crate::source::{self, SourceName};
@@ -109,6 +110,9 @@ pub fn show(
     let memory = memory_file.as_deref().filter(|_| !window.fresh).and_then(Memory::read).unwrap_or_default();
     let before = memory.look().filter(|_| !given.has_look());
     let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
+    let texts =
+        texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
+    texts.into_iter().for_each(texts::speak);
     let device = computing.choice().device()?;
     let store = FileStore { chosen: global.config.clone(), given };
     let mut state = first_state(look, &source, window, stream.mirror, &memory);
