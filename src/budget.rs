@@ -6,7 +6,7 @@ mod planner;
 mod quality;
 mod window;
 
-pub use governor::Governor;
+pub use governor::{Governor, Times};
 pub use load::{MAX_RUNGS, Sample};
 pub(crate) use planner::DEADLINE_PERIODS;
 pub use planner::{DepthTimes, Plan, Planner};

@@ -36,6 +36,17 @@ pub struct Governor<const STAGES: usize> {
     went_up: bool,
 }
 
+/// How long stages take, in nanoseconds, over a share of the time there is: with that as a whole they are compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Times<const STAGES: usize> {
+    /// What nearly all frames stay below.
+    pub high_ns: [f64; STAGES],
+    /// A little more than the median.
+    pub usual_ns: [f64; STAGES],
+    /// The share.
+    pub share: f64,
+}
+
 impl Governor<1> {
     /// A governor of one ladder with these relative costs, the cheapest first, that starts at rung `start`.
     ///
@@ -64,7 +75,7 @@ impl Governor<1> {
     /// Samples may come late: one of another rung than the present one only adds to the loads.
     pub fn note(&mut self, sample: Sample, budget_ns: u64) {
         if self.learn_from(0, sample) {
-            self.choose(|_, [took_ns], _| took_ns <= budget_ns as f64);
+            self.choose(|_, times| times.high_ns[0] <= budget_ns as f64);
         }
     }
 }
@@ -116,9 +127,8 @@ impl<const STAGES: usize> Governor<STAGES> {
         noted == Noted::Own
     }
 
-    /// Chooses the plan for the next frame: the finest that `fits`, where each stage takes so many nanoseconds. These are the
-    /// measured ones over a share of the time, which comes with them.
-    pub fn choose(&mut self, fits: impl Fn(usize, [f64; STAGES], f64) -> bool) {
+    /// Chooses the plan for the next frame: the finest that `fits` with these times of the stages.
+    pub fn choose(&mut self, fits: impl Fn(usize, Times<STAGES>) -> bool) {
         self.frames_at_plan = self.frames_at_plan.saturating_add(1);
         if self.went_up && self.frames_at_plan >= REGRET * self.patience {
             // The step up has held: the next one needs no more than the usual patience.
@@ -126,9 +136,10 @@ impl<const STAGES: usize> Governor<STAGES> {
         }
         let highs = self.stages.each_ref().map(Load::high);
         let fits = |plan: usize, newest: usize, share: f64| {
-            let rungs = self.plans[plan];
-            let took_ns = |stage: usize| highs[stage][newest] * self.stages[stage].costs()[rungs[stage]] / share;
-            fits(plan, std::array::from_fn(took_ns), share)
+            let cost = |stage: usize| self.stages[stage].costs()[self.plans[plan][stage]] / share;
+            let high_ns = std::array::from_fn(|stage| highs[stage].0[newest] * cost(stage));
+            let usual_ns = std::array::from_fn(|stage| highs[stage].1 * cost(stage));
+            fits(plan, Times { high_ns, usual_ns, share })
         };
         // One or two frames of a plan prove nothing.
         if self.frames_at_plan >= LEARN_LEAST as u32 && self.plan > 0 && !fits(self.plan, 0, KEEP) {

@@ -120,10 +120,10 @@ impl Load {
         Noted::Own
     }
 
-    /// The load that nearly all frames stayed below, and that of the newest ones.
-    pub fn high(&self) -> [f64; 2] {
+    /// The load that nearly all frames stayed below, and that of the newest ones; and what is usual now.
+    pub fn high(&self) -> ([f64; 2], f64) {
         let current = ABOVE_MEDIAN * self.loads.median(5);
-        [(LOADS, HIGH), (RECENT, HIGH_RECENT)].map(|(count, p)| self.percentile(count, p).max(current))
+        ([(LOADS, HIGH), (RECENT, HIGH_RECENT)].map(|(count, p)| self.percentile(count, p).max(current)), current)
     }
 
     /// The load that a fraction `p` of the last `count` frames does not exceed; 0 after fewer than [`RECENT`] frames,

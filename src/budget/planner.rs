@@ -1,6 +1,6 @@
 //! What a frame gets in the time there is: one choice for its depth and its blur.
 
-use super::governor::Governor;
+use super::governor::{Governor, Times};
 use super::load::Sample;
 use super::window::Window;
 
@@ -167,21 +167,24 @@ impl Planner {
         let Self { governor, plans, least_blur, budget_ns, period_ns, ages, held, .. } = self;
         let budget_ns = *budget_ns as f64;
         let Some(period_ns) = period_ns.map(|period_ns| period_ns as f64) else {
-            return governor.choose(|_, [_, blur_ns], _| blur_ns <= budget_ns);
+            return governor.choose(|_, times| times.high_ns[BLUR] <= budget_ns);
         };
         // Who gives the blur less leaves depth no more.
         let frame_ns = budget_ns.min(period_ns);
-        let (age_ns, held_ns) = (ages.percentile(AGES, 0.95), held.median(AGES));
+        let (old_ns, age_ns, held_ns) = (ages.percentile(AGES, 0.95), ages.median(AGES), held.median(AGES));
         let late_ns = DEADLINE_PERIODS as f64 * period_ns;
-        governor.choose(|plan, [depth_ns, blur_ns], share| {
+        governor.choose(|plan, Times { high_ns: [depth_ns, blur_ns], usual_ns, share }| {
             let Plan { frames, rung, .. } = plans[plan];
             let (is_cheapest, is_shared) = (rung == 0, frames > 1);
             let share_ns = (depth_ns + (frames - 1) as f64 * held_ns) / frames as f64;
             let keeps_up =
                 (share_ns <= MOST_DEPTH * frame_ns || frames == MOST_FRAMES) && (blur_ns <= budget_ns || is_cheapest);
-            let ready_ns = age_ns + depth_ns + blur_ns;
+            // Bad luck rarely comes together.
+            let luck =
+                (old_ns - age_ns).powi(2) + (depth_ns - usual_ns[DEPTH]).powi(2) + (blur_ns - usual_ns[BLUR]).powi(2);
+            let ready_ns = age_ns + usual_ns[DEPTH] + usual_ns[BLUR] + luck.sqrt();
             // It would be dropped, and with a cheaper blur it would not.
-            let soonest_ns = age_ns + share * (depth_ns + blur_ns * least_blur[rung]);
+            let soonest_ns = age_ns + share * (usual_ns[DEPTH] + usual_ns[BLUR] * least_blur[rung]);
             let is_lost = ready_ns > late_ns && soonest_ns <= late_ns;
             let is_in_time = ready_ns <= DEADLINE_SHARE * late_ns;
             let has_less =

@@ -143,7 +143,7 @@ fn without_time_depth_is_made_with_less_effort_and_every_picture_is_straightened
             depth: Some(Box::new(Slow { effort: last.clone(), most: 1 })),
             bokeh: Some(Box::new(fake_bokeh(2, Trouble::default()))),
             look: dof(),
-            ..simple(Box::new(two_eyes(150)), fake_sink(&received), &stop, pace)
+            ..simple(Box::new(two_eyes(400)), fake_sink(&received), &stop, pace)
         })
         .unwrap();
         assert_eq!((report.depth_held > 0, last.load(Ordering::SeqCst)), (held, effort), "{pace:?}");
