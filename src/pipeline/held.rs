@@ -168,4 +168,54 @@ mod tests {
         held.give(&mut given, &color);
         assert!(given.matte.pixels.is_empty() && given.subject_m.is_none());
     }
+
+    /// The bundled recording, whose frames are a twelfth of a second apart: blurred by depth that moved, they are more like
+    /// those blurred by their own than by depth that stays where it was.
+    #[test]
+    fn what_moved_blurs_a_real_motion_more_like_its_own_depth() {
+        use crate::computing::Computing;
+        use crate::depth::focus::FocusRule;
+        use crate::look::{Effect, Look, Strength};
+        use crate::pipeline::still::{Depth, blur};
+        use crate::recording::still::{read_color, read_depth};
+
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+        let frame = |k: usize| {
+            let file = |of: &str| folder.join(format!("{of}/{k:06}.png"));
+            (read_color(&file("rgb")).unwrap(), read_depth(&file("depth"), 5000.0, None).unwrap())
+        };
+        let lens = DepthCoc { coc_at_infinity_px: 14.0, focus_m: 1.2, range_m: 0.0, max_coc_px: 20.0 };
+        let strength = Strength::AtInfinity(14.0);
+        let look = Look { focus: FocusRule::Metres(1.2), strength, ..Look::plain(Effect::Dof) };
+        let blurred = |color: &ColorImage, map: &DepthMap| {
+            blur(&look, color.clone(), Some(Depth::Final(map.clone())), &Computing::default()).unwrap().0
+        };
+        // Squared differences in all, and beside outlines.
+        let (mut off, mut counts) = ([[0.0; 2]; 2], [0.0; 2]);
+        for k in [1, 7, 13, 19] {
+            let (then, now) = (frame(k - 1), frame(k));
+            let mut held = Held::new();
+            held.keep(&then.1, &then.0, &CocField::Depth(lens));
+            let mut moved = DepthMap::default();
+            held.give(&mut moved, &now.0);
+            let own = blurred(&now.0, &now.1);
+            let others = [&then.1, &moved].map(|map| blurred(&now.0, map));
+            let width = own.width as usize;
+            let coc = |at: usize| lens.coc_px(now.1.metres[at]);
+            for at in 4 * width..own.rgb.len() / 3 - 4 * width {
+                let around = [at - 4, at + 4, at - 4 * width, at + 4 * width];
+                let at_outline = around.iter().any(|&other| (coc(at) - coc(other)).abs() > 1.0);
+                for part in 0..1 + usize::from(at_outline) {
+                    counts[part] += 3.0;
+                    for (other, off) in others.iter().zip(&mut off) {
+                        let apart = |p: usize| f64::from(own.rgb[3 * at + p].abs_diff(other.rgb[3 * at + p])).powi(2);
+                        off[part] += (0..3).map(apart).sum::<f64>();
+                    }
+                }
+            }
+        }
+        let psnr = off.map(|off| [0, 1].map(|part: usize| 10.0 * (65025.0 * counts[part] / off[part]).log10()));
+        println!("PSNR in dB, all and at outlines: {:.1?} held, {:.1?} moved", psnr[0], psnr[1]);
+        assert!((0..2).all(|part| psnr[1][part] > psnr[0][part] + 1.5), "{psnr:?}");
+    }
 }

@@ -84,9 +84,9 @@ fn all_the_time_there_is_is_taken_and_no_more() {
             let (plan, changes) = settled(&EFFORTS, times_ms);
             assert!(changes <= 2, "{times_ms:?}: {changes} changes in half a minute");
             let finer = [
-                (plan.rung < BALANCED).then(|| Plan { rung: plan.rung + 1, ..plan }),
+                (plan.rung < BALANCED).then_some(Plan { rung: plan.rung + 1, ..plan }),
                 (plan.frames > 1).then(|| Plan { frames: plan.frames - 1, ..plan }),
-                (plan.frames == 1 && plan.effort == 0).then(|| Plan { effort: 1, ..plan }),
+                (plan.frames == 1 && plan.effort == 0).then_some(Plan { effort: 1, ..plan }),
             ];
             let took = |plan: Plan| (times_ms.0 * EFFORTS[plan.effort], times_ms.1 * RUNGS[plan.rung]);
             for finer in finer.into_iter().flatten() {
