@@ -17,9 +17,9 @@ const FIRST_KEY: u8 = b'6';
 const SHAPES: [&str; 4] = ["heart", "star:5", "polygon:6", "polygon:7:10"];
 const DISC: &str = "aperture = \"disc\"\ncoc-at-infinity = \"6%\"\nmax-coc = 60\nhighlights = 20\n";
 /// Times that each key is pressed.
-const ROUNDS: usize = 9;
+const ROUNDS: usize = 5;
 /// Nothing changes by itself for this long before a key is pressed.
-const REST: Duration = Duration::from_millis(700);
+const REST: Duration = Duration::from_millis(400);
 
 /// Measures and prints, with each of `programs` in turn; `recording` has depth.
 pub fn measure(recording: &Path, scratch: &Path, programs: &[PathBuf]) -> Result<()> {
@@ -49,7 +49,7 @@ pub fn measure(recording: &Path, scratch: &Path, programs: &[PathBuf]) -> Result
 fn shapes(program: &Path, recording: &Path, scratch: &Path) -> Result<Vec<f64>> {
     let screen = Screen::new();
     let mut command = Command::new(program);
-    command.arg("--quiet").arg("preview").arg(recording).args(["--start", "0", "--end", "0.05"]);
+    command.arg("--quiet").arg("preview").arg(recording).args(["--start", "0", "--end", "0.02"]);
     command.args(["--backend", "cpu", "--panel=false", "--quality", "draft"]);
     command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY").stderr(Stdio::null());
     command.env("XDG_STATE_HOME", scratch).env("XDG_CONFIG_HOME", scratch);
