@@ -70,7 +70,7 @@ struct Options {
     /// Measure instead how soon the window answers a key, from outside, while the pipeline is busy or stuck
     #[arg(long)]
     reaction: bool,
-    /// Measure instead how soon another aperture is seen, from outside; with each of these programs besides this one
+    /// Measure instead how long another aperture is worked on; with each of these programs besides this one
     #[arg(long, value_name = "PROGRAM", num_args = 0..)]
     shapes: Option<Vec<PathBuf>>,
     /// Measure instead what a frame of 1280x720 costs that is painted on the CPU
