@@ -9,6 +9,7 @@ struct Window {
     mirror: u32,                    // 1: flipped left to right
     stale: vec4<f32>,               // weights of red, green and blue where all is grey; w is 1 then
     divider: vec4<u32>,             // the edges of its three stripes, in columns of the area
+    part: vec4<u32>,                // z > 0: pixels are squares of that side, seen from column x and row y on
     stripes: array<vec4<f32>, 3>,
     background: vec4<f32>,          // w is 1 where the window wants linear light
 }
@@ -78,9 +79,14 @@ fn shown(place: vec2<u32>) -> vec3<f32> {
         }
     }
     let is_before = place.x < window.split;
-    let column = select(place.x, window.area.z - 1u - place.x, window.mirror == 1u);
+    let factor = window.part.z;
+    let seen = place + window.part.xy;
+    let whole = select(window.area.z, window.size.x * factor, factor > 0u);
+    let column = select(seen.x, whole - 1u - seen.x, window.mirror == 1u);
     var color: vec3<f32>;
-    if all(window.size == window.area.zw) {
+    if factor > 0u {
+        color = pixel(column / factor, seen.y / factor, is_before);
+    } else if all(window.size == window.area.zw) {
         color = pixel(column, place.y, is_before);
     } else {
         color = filtered(vec2(column, place.y), is_before);

@@ -98,6 +98,7 @@ fn window() {
             let (picture, background) = (Image::Memory(views.image()), [1, 2, 3]);
             let drawing = Drawing {
                 area,
+                part: None,
                 picture,
                 before,
                 mirror: at.is_multiple_of(2),

@@ -20,7 +20,7 @@ const LAYERS: [&[&str]; 12] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 27] = [
+const DOORS: [(&str, &[&str]); 28] = [
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
@@ -35,6 +35,7 @@ const DOORS: [(&str, &[&str]); 27] = [
     ("plotters", &["cli"]),
     ("png", &["recording", "sink"]),
     ("rustix", &["compute/memory", "clock", "files", "link/bell", "sink/ffmpeg", "sink/pipe", "v4l2"]),
+    ("rfd", &["preview/dialog"]),
     ("rten", &["network/built_in"]),
     ("rten_tensor", &["network/built_in"]),
     ("saphyr_parser", &["calibration"]),

@@ -9,13 +9,21 @@ mod gpu;
 use bokehcam::frame::ColorImage;
 use bokehcam::preview::panel;
 use bokehcam::preview::present::soft::Painter;
-use bokehcam::preview::present::{Area, Controls, Drawing, Image};
+use bokehcam::preview::present::{Area, Controls, Drawing, Image, enlarged};
 use common::{color, noise};
 
 const BACKGROUND: [u8; 3] = [9, 8, 7];
 
 fn drawing(picture: &ColorImage, area: Area) -> Drawing<'_> {
-    Drawing { area, picture: Image::Memory(picture), before: None, mirror: false, stale: false, background: BACKGROUND }
+    Drawing {
+        area,
+        picture: Image::Memory(picture),
+        part: None,
+        before: None,
+        mirror: false,
+        stale: false,
+        background: BACKGROUND,
+    }
 }
 
 fn area(x: u32, y: u32, width: u32, height: u32) -> Area {
@@ -233,4 +241,47 @@ fn text_and_controls_are_painted_over_the_picture() {
     });
     painter.paint(&mut pixels, 1, &shown);
     assert!(pixels.iter().all(|&pixel| pixel == plain));
+}
+
+/// A picture enlarged around several places, in windows that are smaller and larger than it, in every manner.
+fn enlargements<'a>(picture: &'a ColorImage, before: &'a ColorImage) -> Vec<(String, (u32, u32), Drawing<'a>)> {
+    let mut all = Vec::new();
+    for window in [(40, 30), (97, 60)] {
+        for (factor, center) in [(1, [0.5, 0.5]), (1, [0.9, 0.1]), (2, [0.3, 0.6]), (4, [1.0, 1.0]), (8, [0.37, 0.71])]
+        {
+            let (place, part) = enlarged(picture.size(), window, factor, center);
+            for (manner, drawing) in manners(picture, before, place) {
+                let what = format!("{window:?} at {factor} around {center:?}, {manner}");
+                all.push((what, window, Drawing { part: Some(part), ..drawing }));
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn an_enlarged_picture_shows_its_pixels_as_they_are() {
+    let (picture, before) = (noise(64, 48), noise(64, 48));
+    for (what, window, shown) in enlargements(&picture, &before).into_iter().filter(|(.., shown)| !shown.stale) {
+        let pixels = paint(window, &shown, None);
+        let (place, part) = (shown.area, shown.part.unwrap());
+        let whole = 64 * part.factor;
+        let divider = shown.before.map(|(_, at)| (at * whole as f32).round() as i64 - i64::from(part.at.0));
+        for y in 0..window.1 {
+            for x in 0..window.0 {
+                let there = (x >= place.x && y >= place.y).then(|| (x - place.x, y - place.y));
+                let inside = there.filter(|(x, y)| *x < place.width && *y < place.height);
+                let expected = inside.map_or(BACKGROUND, |(x, y)| {
+                    let seen = x + part.at.0;
+                    let column = if shown.mirror { whole - 1 - seen } else { seen };
+                    let is_before = divider.is_some_and(|at| i64::from(x) < at);
+                    let source = if is_before { &before } else { &picture };
+                    at(source, column / part.factor, (y + part.at.1) / part.factor)
+                });
+                let near_divider =
+                    inside.zip(divider).is_some_and(|((x, _), at)| (at - 2..at + 2).contains(&i64::from(x)));
+                assert!(near_divider || pixels[(y * window.0 + x) as usize] == word(expected), "{what}: {x}, {y}");
+            }
+        }
+    }
 }

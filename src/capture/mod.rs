@@ -2,18 +2,22 @@
 
 pub mod demo;
 mod error;
+pub mod photo;
 #[cfg(feature = "camera")]
 pub mod pixels;
 pub mod replay;
+mod seek;
 pub mod side_by_side;
 pub mod synthetic;
 pub mod two_eyes;
 #[cfg(feature = "camera")]
 pub mod v4l2;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 pub use error::CaptureError;
+pub use seek::{Seeker, Wish};
 
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::stats::Cause;
@@ -40,6 +44,19 @@ pub trait Camera: Send {
 
     /// How long the last call of [`Camera::next`] waited for the frame to come, in nanoseconds.
     fn waited_ns(&self) -> u64 {
+        0
+    }
+
+    /// What says which frame is wanted next, where one can go back and forth.
+    fn seeker(&self) -> Option<Arc<Seeker>> {
+        None
+    }
+
+    /// Goes to the frame at a place that the [seeker](Camera::seeker) knows: it is read next, and media time goes on as if it
+    /// came after the one before. Returns by how much, in nanoseconds, the source's own time is ahead of media time from then
+    /// on.
+    fn seek(&mut self, place: usize) -> i64 {
+        let _ = place;
         0
     }
 

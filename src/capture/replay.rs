@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use super::{Brings, Camera, CaptureError, Captured, Seeker, Shot, SourceInfo};
 use crate::frame::Stamp;
 use crate::recording::{Recording, Scratch};
 
@@ -33,8 +33,13 @@ pub struct Replay {
     right_eye: bool,
     looped: bool,
     limit: Option<u64>,
-    /// Frames read or passed over so far, over all laps.
+    seeker: Arc<Seeker>,
+    /// The next frame, over all laps.
     position: u64,
+    /// Frames read or passed over so far.
+    given: u64,
+    /// What to add to the time of a position for media time: other than 0 after a seek.
+    behind_ns: i64,
     /// Good frames of this lap: a loop without any would never end.
     good: u64,
 }
@@ -57,7 +62,10 @@ impl Replay {
                 length_s: end_ns as f64 / 1e9,
             });
         }
-        let lap_ns = recording.time_ns(lap.end - 1) - recording.time_ns(lap.start) + recording.period_ns();
+        let first_ns = recording.time_ns(lap.start);
+        let lap_ns = recording.time_ns(lap.end - 1) - first_ns + recording.period_ns();
+        let times_ns = lap.clone().map(|frame| recording.time_ns(frame) - first_ns).collect();
+        let seeker = Seeker::new(lap.start, times_ns, lap_ns);
         Ok(Self {
             recording,
             scratch: Scratch::default(),
@@ -67,7 +75,10 @@ impl Replay {
             right_eye: false,
             looped: part.looped,
             limit: part.frames,
+            seeker: Arc::new(seeker),
             position: 0,
+            given: 0,
+            behind_ns: 0,
             good: 0,
         })
     }
@@ -86,15 +97,27 @@ impl Replay {
 
     /// The frame at the present position, if there is one.
     fn stamp(&self) -> Option<Stamp> {
-        if self.total().is_some_and(|total| self.position >= total) {
+        let lap_len = self.lap.len() as u64;
+        let is_over = self.limit.is_some_and(|limit| self.given >= limit);
+        if is_over || !self.looped && self.position >= lap_len {
             return None;
         }
-        let lap_len = self.lap.len() as u64;
         let index = self.lap.start + (self.position % lap_len) as usize;
-        let in_lap_ns = self.recording.time_ns(index) - self.recording.time_ns(self.lap.start);
         // Media time beyond 64 bits ends the loop.
-        let time_ns = (self.position / lap_len).checked_mul(self.lap_ns)?.checked_add(in_lap_ns)?;
+        let time_ns = self.own_ns(self.position)?.checked_add_signed(self.behind_ns)?;
         Some(Stamp { index, time_ns, captured_ns: None })
+    }
+
+    /// When a position is, where all are played in their order; `None` beyond 64 bits.
+    fn own_ns(&self, position: u64) -> Option<u64> {
+        let lap_len = self.lap.len() as u64;
+        let in_lap_ns = self.seeker.time_ns((position % lap_len) as usize);
+        (position / lap_len).checked_mul(self.lap_ns)?.checked_add(in_lap_ns)
+    }
+
+    fn advance(&mut self) {
+        self.position += 1;
+        self.given += 1;
     }
 }
 
@@ -114,12 +137,12 @@ impl Camera for Replay {
         let Some(stamp) = self.stamp() else { return Ok(Captured::End) };
         if stamp.index == self.lap.start {
             // A whole lap without a good frame.
-            if self.position > 0 && self.good == 0 {
+            if self.given > 0 && self.good == 0 {
                 return Ok(Captured::End);
             }
             self.good = 0;
         }
-        self.position += 1;
+        self.advance();
         let Shot { color, right, .. } = shot;
         let mut read = self.recording.read_color(stamp.index, &mut self.scratch, color);
         if self.right_eye && read.is_ok() {
@@ -135,12 +158,28 @@ impl Camera for Replay {
     }
 
     fn skip(&mut self, until_ns: u64) -> u64 {
-        let from = self.position;
+        let from = self.given;
         while self.stamp().is_some_and(|stamp| stamp.time_ns < until_ns) {
-            self.position += 1;
+            self.advance();
             // It counts as good: it is not known to be bad.
             self.good += 1;
         }
-        self.position - from
+        self.given - from
+    }
+
+    fn seeker(&self) -> Option<Arc<Seeker>> {
+        Some(Arc::clone(&self.seeker))
+    }
+
+    fn seek(&mut self, place: usize) -> i64 {
+        let lap_len = self.lap.len() as u64;
+        let next_ns = self.own_ns(self.position).unwrap_or(u64::MAX).saturating_add_signed(self.behind_ns);
+        let lap = if self.looped { self.position / lap_len } else { 0 };
+        self.position = lap * lap_len + (place as u64).min(lap_len - 1);
+        let own_ns = self.own_ns(self.position).unwrap_or(u64::MAX);
+        self.behind_ns = next_ns.wrapping_sub(own_ns).cast_signed();
+        // What was passed over is not known to be bad.
+        self.good += 1;
+        -self.behind_ns
     }
 }

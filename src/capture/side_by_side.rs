@@ -1,6 +1,8 @@
 //! A stereo camera that gives both eyes beside each other in one picture.
 
-use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use std::sync::Arc;
+
+use super::{Brings, Camera, CaptureError, Captured, Seeker, Shot, SourceInfo};
 use crate::frame::{ColorImage, luma_of};
 
 /// Splits the pictures of another camera: the left half is the left eye's, the right half the right eye's.
@@ -58,6 +60,14 @@ impl Camera for SideBySide {
 
     fn waited_ns(&self) -> u64 {
         self.camera.waited_ns()
+    }
+
+    fn seeker(&self) -> Option<Arc<Seeker>> {
+        self.camera.seeker()
+    }
+
+    fn seek(&mut self, place: usize) -> i64 {
+        self.camera.seek(place)
     }
 
     fn rest(&mut self) {

@@ -10,6 +10,8 @@ pub struct Beside {
     scratch: Scratch,
     /// Media time of one loop: from the first frame to the end of the last.
     lap_ns: u64,
+    /// By how much the colours' own time is ahead of media time.
+    ahead_ns: i64,
     /// Index of the picture that `map` holds; `None` after a failed read, which leaves `map` unspecified.
     last: Option<usize>,
     map: DepthMap,
@@ -25,7 +27,7 @@ impl Beside {
             return Err(DepthError::NoDepth { source_name: name.to_owned() });
         }
         let lap_ns = recording.time_ns(recording.len() - 1) + recording.period_ns();
-        Ok(Self { recording, scratch: Scratch::default(), lap_ns, last: None, map: DepthMap::default() })
+        Ok(Self { recording, scratch: Scratch::default(), lap_ns, ahead_ns: 0, last: None, map: DepthMap::default() })
     }
 
     /// Index of the recording's frame that is shown at media time `time_ns`, by binary search within the loop.
@@ -42,7 +44,7 @@ impl Beside {
 
 impl DepthSource for Beside {
     fn read(&mut self, Seen { stamp, .. }: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
-        let index = self.index_at(stamp.time_ns);
+        let index = self.index_at(stamp.time_ns.saturating_add_signed(self.ahead_ns));
         // Colours at a higher rate show one depth picture several times: it is decoded once.
         if self.last != Some(index) {
             self.last = None;
@@ -52,6 +54,10 @@ impl DepthSource for Beside {
         map.resize(self.map.width, self.map.height);
         map.metres.copy_from_slice(&self.map.metres);
         Ok(())
+    }
+
+    fn jump(&mut self, ahead_ns: i64) {
+        self.ahead_ns = ahead_ns;
     }
 }
 

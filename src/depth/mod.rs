@@ -10,6 +10,7 @@ pub mod defocus;
 pub mod fill;
 pub mod focus;
 mod guided_fill;
+pub mod kept;
 #[cfg(feature = "camera")]
 pub mod live;
 pub mod matting;
@@ -58,6 +59,12 @@ pub trait DepthSource: Send {
     /// Whether its maps have all that is behind the nearer surface, so that nothing need be remembered.
     fn knows_background(&self) -> bool {
         false
+    }
+
+    /// Another scene comes, as somebody went back or forth in the source: its own time is ahead of media time by so many
+    /// nanoseconds from now on.
+    fn jump(&mut self, ahead_ns: i64) {
+        let _ = ahead_ns;
     }
 
     /// No frame came for a while: lets go of the device, if there is one, until [`DepthSource::read`] is called again.

@@ -33,6 +33,11 @@ impl Demand {
         self.0.watched.load(Ordering::Acquire) > 0
     }
 
+    /// Wakes who waits, though nobody watches.
+    pub fn ring(&self) {
+        self.0.bell.ring();
+    }
+
     /// Sleeps until an output is watched, but no longer than `patience`; it may also wake for nothing.
     pub fn wait(&self, patience: Duration) {
         if !self.is_watched() {

@@ -132,7 +132,7 @@ impl Stage<'_> {
         let Frame { ticket, stamp, mut trace, since_ns, item: Ready { color, depth, coc, .. } } = frame;
         let now_ns = self.clock.now_ns();
         trace.between_ns += now_ns.saturating_sub(since_ns);
-        if self.is_late(&ticket, now_ns, 0) {
+        if !trace.asked && self.is_late(&ticket, now_ns, 0) {
             self.tally.dropped(ticket, Cause::Late);
             return true;
         }
@@ -154,7 +154,7 @@ impl Stage<'_> {
         times.into_iter().for_each(|times| self.picker.note_depth(times));
         // The frame waits for those that are under way.
         let expected_ns = self.picker.expected_ns() * (pending.len() as u64 + 1);
-        if self.is_late(&ticket, began_ns, expected_ns) {
+        if !trace.asked && self.is_late(&ticket, began_ns, expected_ns) {
             self.tally.dropped(ticket, Cause::Late);
             self.picker.note_late();
             self.order.set(self.picker.plan());

@@ -18,6 +18,8 @@ pub(super) struct Shot {
     pub depth: Option<Pooled<DepthMap>>,
     /// The other eye's picture.
     pub right: Option<Pooled<GrayImage>>,
+    /// By how much the source's own time is ahead of media time, in nanoseconds.
+    pub ahead_ns: i64,
 }
 
 pub(super) struct Stage<'a> {
@@ -44,8 +46,17 @@ impl Stage<'_> {
         // For a camera that brings neither: they stay empty.
         let (mut no_depth, mut no_right) = (DepthMap::default(), GrayImage::default());
         let mut complained = false;
+        let seeker = self.camera.seeker();
+        if let Some((seeker, demand)) = seeker.as_ref().zip(self.demand.as_ref()) {
+            seeker.wake(demand);
+        }
+        let (mut seek, mut ahead_ns) = (0, 0);
         while !stopped() {
-            if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
+            let wish = seeker.as_ref().and_then(|seeker| seeker.wish_after(seek));
+            if let Some(wish) = wish {
+                (seek, ahead_ns) = (wish.number, self.camera.seek(wish.place));
+                self.pacer.sought();
+            } else if let Some(demand) = self.demand.as_ref().filter(|demand| !demand.is_watched()) {
                 self.camera.rest();
                 let rest_began_ns = self.clock.now_ns();
                 demand.wait(PATIENCE);
@@ -67,17 +78,19 @@ impl Stage<'_> {
                     let read_ns = (self.clock.now_ns() - began_ns).saturating_sub(self.camera.waited_ns());
                     self.times.add(read_ns);
                     // A live camera stamps its frames; stored ones are captured when they are due.
+                    let has_wish = || seeker.as_ref().is_some_and(|seeker| seeker.wish_after(seek).is_some());
                     let captured_ns = match stamp.captured_ns {
                         Some(captured_ns) => captured_ns,
-                        None => self.pacer.wait(stamp.time_ns, read_ns, stopped),
+                        None => self.pacer.wait(stamp.time_ns, read_ns, || stopped() || has_wish()),
                     };
                     let ticket = self.tally.captured(captured_ns);
                     let since_ns = self.clock.now_ns();
                     // A live camera's frame waited for its turn to be read; a stored one was read before it was captured.
                     let decode_ns = if stamp.captured_ns.is_some() { read_ns } else { 0 };
                     let between_ns = since_ns.saturating_sub(captured_ns).saturating_sub(decode_ns);
-                    let trace = Trace { decode_ns: read_ns, between_ns, ..Trace::default() };
-                    let frame = Frame { ticket, stamp, trace, since_ns, item: Shot { color, depth, right } };
+                    let trace =
+                        Trace { decode_ns: read_ns, between_ns, seek, asked: wish.is_some(), ..Trace::default() };
+                    let frame = Frame { ticket, stamp, trace, since_ns, item: Shot { color, depth, right, ahead_ns } };
                     if !hand_on(&mut to, frame, self.tally) {
                         break;
                     }

@@ -52,13 +52,12 @@ impl Finisher {
         }
     }
 
-    fn is(&self, finish: Finish) -> bool {
-        finish
-            == match self {
-                Self::Keep => Finish::Keep,
-                Self::Fill(_) => Finish::Fill,
-                Self::Refine(_) => Finish::Refine,
-            }
+    fn finish(&self) -> Finish {
+        match self {
+            Self::Keep => Finish::Keep,
+            Self::Fill(_) => Finish::Fill,
+            Self::Refine(_) => Finish::Refine,
+        }
     }
 }
 
@@ -94,12 +93,19 @@ impl CocMaker {
         }
     }
 
+    /// Another scene comes: nothing is left of those before.
+    pub fn forget(&mut self) {
+        self.focus = Focus::new(focus_of(self.rule));
+        self.finisher = Finisher::new(self.finisher.finish(), self.mending);
+        self.background = self.background.take().map(|_| Background::default());
+    }
+
     /// Follows another rule, from where the lens stands now.
     pub fn follow(&mut self, rule: CocRule, finish: Finish) {
         match (self.rule, rule) {
             (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
                 self.focus.follow(focus);
-                if !self.finisher.is(finish) {
+                if self.finisher.finish() != finish {
                     self.finisher = Finisher::new(finish, self.mending);
                 }
             }

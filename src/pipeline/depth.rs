@@ -68,8 +68,9 @@ impl Stage<'_> {
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
         let (mut change, mut between) = (0, false);
+        let mut seek = 0;
         loop {
-            let Frame { ticket, stamp, mut trace, since_ns, item: Shot { mut color, depth, right } } =
+            let Frame { ticket, stamp, mut trace, since_ns, item: Shot { mut color, depth, right, ahead_ns } } =
                 match from.recv_timeout(IDLE) {
                     Received::Item(frame) => frame,
                     Received::Ended => break,
@@ -89,6 +90,11 @@ impl Stage<'_> {
                     let number = swap.map_or(1, |last| last.number + 1);
                     swap = Some(Arc::new(Swap::new(number, executor, look.quality_rule(self.adaptive))));
                 }
+            }
+            if std::mem::replace(&mut seek, trace.seek) != trace.seek {
+                coc.forget();
+                self.rate.iter_mut().for_each(Rate::forget);
+                self.source.iter_mut().for_each(|source| source.jump(ahead_ns));
             }
             let began_ns = self.clock.now_ns();
             trace.between_ns += began_ns.saturating_sub(since_ns);

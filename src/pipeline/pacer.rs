@@ -38,6 +38,11 @@ impl Pacer {
         self.epoch_ns = self.epoch_ns.map(|epoch_ns| epoch_ns + rest_ns);
     }
 
+    /// The next frame is due at once: it was asked for.
+    pub(super) fn sought(&mut self) {
+        self.epoch_ns = None;
+    }
+
     /// Waits until the frame of media time `time_ns`, which took `read_ns` to read, is due, or until `stop` says so.
     /// Returns the time at which it was captured: when it was due, or now where nothing is paced.
     pub(super) fn wait(&mut self, time_ns: u64, read_ns: u64, stop: impl Fn() -> bool) -> u64 {

@@ -65,4 +65,8 @@ pub struct Trace {
     pub between: bool,
     /// The rung it was blurred at.
     pub quality: Option<Quality>,
+    /// The number of the last wish of a [`Seeker`](crate::capture::Seeker) before it; 0 where there was none.
+    pub seek: u64,
+    /// Whether it is the frame of that wish: it is shown however late it is.
+    pub asked: bool,
 }

@@ -190,7 +190,27 @@ pub const GROUPS: [Group; 5] = [
             once(&[key(Key::B)], "B", "before and after, side by side", |state, _| {
                 Some(Action::Split(if state.split.is_some() { None } else { Some(0.5) }))
             }),
-            once(&[key(Key::Z)], "Z", "freeze the picture", |state, _| Some(Action::Freeze(!state.frozen))),
+            once(&[key(Key::Z)], "Z", "freeze the picture, pause a recording", |state, _| {
+                Some(Action::Freeze(!state.frozen))
+            }),
+            held(
+                &[key(Key::PageUp), key(Key::PageDown)],
+                "PageUp, PageDown",
+                "of a recording: stop, one frame back or on",
+                |state, context| state.transport.map(|_| Action::Step(way(context) as i32)),
+            ),
+            once(&[key(Key::Home)], "Home", "the recording's first frame", |state, _| {
+                state.transport.map(|_| Action::Seek(0))
+            }),
+            once(&[key(Key::X)], "X", "pixels as they are (100 %), all of the picture", |state, _| {
+                Some(Action::Zoom(u32::from(state.zoom.factor == 0), None))
+            }),
+            once(
+                &[key(Key::Minus), key(Key::Plus), key(Key::Minus), key(Key::Equals)],
+                "Minus, Plus",
+                "smaller, larger: 100, 200, 400, 800 %",
+                |state, context| Some(Action::Zoom(state.zoom.stepped(way(context) as i32), None)),
+            ),
             once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
             once(&[key(Key::D)], "D", "show depth", |state, _| show(state, Shown::Depth)),
             once(&[key(Key::C)], "C", "show the circle of confusion", |state, _| show(state, Shown::Coc)),

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use super::state::Camera;
 use crate::bokeh::{self, Bokeh};
 use crate::knob::Knob;
 use crate::look::{Look, presets::Preset};
@@ -11,6 +12,18 @@ use crate::source::{Source, devices::Choice};
 
 /// An option of the command line that is not part of the look: its name and its value.
 pub type Switch = (String, String);
+
+/// What a person is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Browse {
+    /// The folder of a recording.
+    Folder,
+    /// The file of a photo.
+    Photo,
+}
+
+/// Asks the person and waits for the answer: the name of a source, or nothing. An error is one line.
+pub type Pick = Box<dyn FnOnce() -> Result<Option<String>, String> + Send>;
 
 /// A source that was opened.
 pub struct Opened {
@@ -42,6 +55,36 @@ pub trait Services: Send {
     /// # Errors
     /// It cannot be opened.
     fn open(&mut self, name: &str, with_plate: bool) -> Result<Opened, String>;
+
+    /// Whether other devices came, or some went, since this was asked last.
+    fn devices_changed(&mut self) -> bool {
+        false
+    }
+
+    /// Whether what somebody offers can be a source.
+    ///
+    /// # Errors
+    /// It cannot: one line.
+    fn check(&self, name: &str) -> Result<(), String> {
+        let _ = name;
+        Ok(())
+    }
+
+    /// A way to ask the person for a source.
+    fn browse(&self, what: Browse) -> Pick {
+        let _ = what;
+        Box::new(|| Err("there is no file dialog".to_owned()))
+    }
+
+    /// What is known of the camera that was opened last; nothing of other sources.
+    fn camera(&self) -> Camera {
+        Camera::default()
+    }
+
+    /// Opens the source of this name with pictures of another size (columns, rows) and rate from now on.
+    fn choose_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
+        let _ = (name, size, fps);
+    }
 
     /// Sets a control of the camera that was opened last; gives back all of its controls.
     ///

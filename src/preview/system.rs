@@ -5,15 +5,20 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::services::{Opened, Services, SettingsStore, Switch};
+use super::dialog;
+use super::services::{Browse, Opened, Pick, Services, SettingsStore, Switch};
+use super::state::Camera;
 use crate::bokeh::{self, Backend, Bokeh};
 use crate::capture::demo;
 use crate::compute::device::Device;
 use crate::knob::Knob;
 use crate::look::{Effect, Look};
+use crate::recording::{Options as Reading, Recording};
 use crate::sink::{self, Sink, Target};
 use crate::source::devices::{self, Choice};
-use crate::source::{self, DepthChoice, DepthFrom, Kind, OneCamera, Options, PlateFile, Source, SourceName};
+use crate::source::{
+    self, DepthChoice, DepthFrom, Kind, OneCamera, Options, PlateFile, Size, Source, SourceName, modes,
+};
 
 /// Shown when there is no camera, and the demonstration takes its place.
 const NO_CAMERA: &str = "No camera was found.";
@@ -39,8 +44,14 @@ pub struct System {
     pub force: bool,
     /// Where settings are kept.
     pub settings: Box<dyn SettingsStore>,
-    /// The source that was opened first: it stays on the list, even if it is no camera.
-    first: Option<Choice>,
+    /// The sources that were opened, the last one first: they stay on the list, even if they are no cameras.
+    opened: Vec<Choice>,
+    /// The camera of which other pictures were chosen, and which.
+    mode: Option<(String, Size, f64)>,
+    /// The device nodes as they were last, and whether they were others before that.
+    nodes: (Vec<String>, bool),
+    /// What is known of the camera that was opened last.
+    facts: Camera,
     /// Values of the camera's knobs that were turned, by name.
     turned: BTreeMap<String, i64>,
     /// The camera that was opened last, where it has knobs.
@@ -59,10 +70,26 @@ impl System {
             out_size: None,
             force: false,
             settings,
-            first: None,
+            opened: Vec::new(),
+            mode: None,
+            nodes: (devices::nodes(), false),
+            facts: Camera::default(),
             turned: BTreeMap::new(),
             camera: None,
             with_plate: false,
+        }
+    }
+
+    /// What is known of the camera that was opened, if it is one alone.
+    fn facts_of(&self, source: &Source) -> Camera {
+        let is_relative = matches!(source.depth_from, DepthFrom::Relative | DepthFrom::Networks | DepthFrom::Plate);
+        let Some(camera) = &self.camera else { return Camera { is_relative, ..Camera::default() } };
+        let is_lone = matches!(source.depth_from, DepthFrom::Nothing | DepthFrom::Networks | DepthFrom::Plate);
+        let is_pair = self.options.stereo.side_by_side;
+        Camera {
+            modes: modes::modes(camera),
+            faces_user: is_lone && !is_pair && modes::faces_user(camera),
+            is_relative,
         }
     }
 
@@ -74,7 +101,10 @@ impl System {
             options.depth_choice = DepthChoice::OneCamera(plate());
         }
         // The others have no end.
-        options.frames.repeat &= source_name.kind() == Kind::Recording;
+        options.frames.repeat &= matches!(source_name.kind(), Kind::Recording | Kind::Photo);
+        if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == name) {
+            (options.frames.size, options.frames.fps) = (Some(*size), Some(*fps));
+        }
         // The window may switch to an effect that needs depth later.
         let look = Look { effect: Effect::Auto, ..self.look.clone() };
         let source = Source::open(&source_name, &options, Some(&look)).map_err(|error| error.to_string())?;
@@ -90,9 +120,10 @@ fn plate() -> OneCamera {
 impl Services for System {
     fn sources(&mut self) -> Vec<Choice> {
         let mut sources = devices::cameras();
-        let is_other = |choice: &&Choice| choice.name != demo::NAME && !sources.contains(choice);
-        let first = self.first.iter().find(is_other).cloned();
-        sources.extend(first);
+        let is_other =
+            |choice: &&Choice| choice.name != demo::NAME && !sources.iter().any(|camera| camera.name == choice.name);
+        let opened: Vec<Choice> = self.opened.iter().filter(is_other).cloned().collect();
+        sources.extend(opened);
         sources.push(Choice { name: demo::NAME.into(), label: "Demonstration".into() });
         sources
     }
@@ -127,13 +158,47 @@ impl Services for System {
         }
         let has_depth = source.has_depth() && !is_declined;
         self.turned.clear();
-        self.first.get_or_insert_with(|| Choice { name: name.clone(), label: name.clone() });
+        notes.extend(source_name.note(&source));
+        self.opened.retain(|choice| choice.name != name);
+        self.opened.insert(0, Choice::of(&name));
         self.camera = devices::camera_of(&source_name);
         let controls = self.camera.as_deref().map(devices::knobs).unwrap_or_default();
         self.with_plate = with_plate;
         let is_replaceable = matches!(source.depth_from, DepthFrom::Nothing | DepthFrom::Networks | DepthFrom::Plate);
+        self.facts = self.facts_of(&source);
         let takes_plates = self.camera.is_some() && is_replaceable;
         Ok(Opened { name, source, has_depth, takes_plates, notes, controls })
+    }
+
+    fn devices_changed(&mut self) -> bool {
+        let nodes = devices::nodes();
+        let differ = nodes != self.nodes.0;
+        // Once more a moment later: a node is there before everybody may open it.
+        let again = std::mem::replace(&mut self.nodes, (nodes, differ)).1;
+        differ || again
+    }
+
+    fn check(&self, name: &str) -> Result<(), String> {
+        let source_name = SourceName::from_str(name).map_err(|error| format!("{name}: {error}"))?;
+        match &source_name {
+            SourceName::Folder(folder) => {
+                let reading = Reading { keep_going: true, ..Reading::default() };
+                Recording::open(folder, &reading).map(drop).map_err(|error| error.to_string())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn browse(&self, what: Browse) -> Pick {
+        Box::new(move || dialog::pick(what))
+    }
+
+    fn camera(&self) -> Camera {
+        self.facts.clone()
+    }
+
+    fn choose_mode(&mut self, name: &str, (width, height): (u32, u32), fps: f64) {
+        self.mode = Some((name.to_owned(), Size { width, height }, fps));
     }
 
     fn turn(&mut self, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
@@ -175,6 +240,10 @@ impl Services for System {
         if !self.turned.is_empty() {
             let controls: Vec<String> = self.turned.iter().map(|(name, value)| format!("{name}={value}")).collect();
             switches.push(("control".into(), controls.join(",")));
+        }
+        if let Some((_, size, fps)) = self.mode.as_ref().filter(|(camera, ..)| camera == source) {
+            switches.push(("size".into(), format!("{}x{}", size.width, size.height)));
+            switches.push(("fps".into(), format!("{}", (fps * 1000.0).round() / 1000.0)));
         }
         if self.with_plate {
             switches.push(("depth".into(), plate().kinds()));

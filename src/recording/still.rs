@@ -141,6 +141,17 @@ pub fn read_depth(path: &Path, depth_scale: f32, invalid: Option<u16>) -> Result
     }
 }
 
+/// Reads relative inverse depth of a picture of `color` pixels: grey, 8 or 16 bits, white is near unless it is said to be far.
+/// The distances are in units of the nearest.
+///
+/// # Errors
+/// As [`read_color`]; it is not grey, or does not cover the picture.
+pub fn read_inverse_depth(path: &Path, white_is_far: bool, color: (u32, u32)) -> Result<DepthMap, RecordingError> {
+    let (mut scratch, mut map) = (Scratch::default(), DepthMap::default());
+    let read = decode::inverse_depth(path, white_is_far, color, &mut scratch, &mut map);
+    read.map(|()| map).map_err(RecordingError::picture(path))
+}
+
 /// Reads a disparity map in pixels from a `.pfm`, or from a 16-bit grey PNG of 256 units per pixel, where 0 is unknown
 /// (KITTI). At most 8192 x 8192 pixels.
 ///

@@ -17,6 +17,23 @@ pub struct Choice {
     pub label: String,
 }
 
+/// A path longer than this is shown by its end.
+const LONG: usize = 36;
+
+impl Choice {
+    /// What is no device: called by its name, of which a long path keeps the end.
+    pub fn of(name: &str) -> Self {
+        let is_short = |from: &usize| name[*from..].chars().count() < LONG;
+        let cuts = || name.match_indices('/').map(|(at, _)| at).skip(1);
+        let end = cuts().find(is_short).or(cuts().last());
+        let label = match end.filter(|_| name.chars().count() > LONG) {
+            Some(from) => format!("…{}", &name[from..]),
+            None => name.to_owned(),
+        };
+        Self { name: name.to_owned(), label }
+    }
+}
+
 /// Cameras.
 pub fn cameras() -> Vec<Choice> {
     #[cfg(feature = "camera")]
@@ -76,4 +93,30 @@ pub fn turn(camera: &str, knob: &str, value: i64) -> Result<Vec<Knob>, String> {
     return knobs::turn(camera, knob, value).map_err(|error| error.to_string());
     #[cfg(not(feature = "camera"))]
     return Err(format!("{camera}: this build leaves cameras out (feature `camera`), so {knob} cannot be {value}"));
+}
+
+/// The device nodes that may be cameras: a look into one folder.
+pub fn nodes() -> Vec<String> {
+    let entries = std::fs::read_dir("/dev").into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    names.retain(|name| name.starts_with("video"));
+    names.sort_unstable();
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Choice;
+
+    #[test]
+    fn a_long_path_keeps_its_end() {
+        let label = |name: &str| Choice::of(name).label;
+        assert_eq!(label("recordings/portrait"), "recordings/portrait");
+        let long = "/home/somebody/with/many/folders/recordings/portrait";
+        assert_eq!(label(long), "…/many/folders/recordings/portrait");
+        assert_eq!(Choice::of(long).name, long);
+        let last = format!("/home/{}", "ü".repeat(60));
+        assert_eq!(label(&last), format!("…/{}", "ü".repeat(60)));
+        assert_eq!(label(&"x".repeat(50)), "x".repeat(50));
+    }
 }

@@ -1,4 +1,5 @@
-//! Sources by name: a camera, two of them, a recording, the demonstration or the synthetic scene, with the depth that goes with it.
+//! Sources by name: a camera, two of them, a recording, a photo, the demonstration or the synthetic scene, with the depth
+//! that goes with it.
 //!
 //! The command line, the window and other programs open them in one way:
 //!
@@ -17,12 +18,14 @@ pub mod devices;
 mod elsewhere;
 mod error;
 mod eyes;
+pub mod modes;
 mod name;
 mod near;
 mod networks;
 pub mod one_camera;
 mod opened;
 pub mod options;
+mod photo;
 #[cfg(feature = "camera")]
 pub mod registration;
 

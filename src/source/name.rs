@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{Frames, SourceError, near};
+use super::{DepthFrom, Frames, Source, SourceError, near, photo};
 use crate::capture::demo;
 
 /// What the synthetic scene is called.
@@ -20,6 +20,8 @@ pub enum Kind {
     Recording,
     /// The demonstration.
     Demo,
+    /// A photo: one frame that stands still.
+    Photo,
     /// The synthetic scene.
     Synthetic,
 }
@@ -42,6 +44,8 @@ pub enum SourceName {
     Demo,
     /// A folder with a recording.
     Folder(PathBuf),
+    /// A PNG or JPEG.
+    Photo(PathBuf),
     /// A camera.
     #[cfg(feature = "camera")]
     Camera(Named),
@@ -68,7 +72,7 @@ impl fmt::Display for SourceName {
         match self {
             SourceName::Synthetic => f.write_str(SYNTHETIC),
             SourceName::Demo => f.write_str(demo::NAME),
-            SourceName::Folder(folder) => folder.display().fmt(f),
+            SourceName::Folder(path) | SourceName::Photo(path) => path.display().fmt(f),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => f.write_str(&camera.name),
             #[cfg(feature = "camera")]
@@ -80,8 +84,8 @@ impl fmt::Display for SourceName {
 /// What can be a source.
 fn sources() -> &'static str {
     match cfg!(feature = "camera") {
-        true => "a camera, two cameras LEFT,RIGHT, a folder with a recording, demo or synthetic",
-        false => "a folder with a recording, demo or synthetic",
+        true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
+        false => "a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
     }
 }
 
@@ -155,7 +159,8 @@ impl SourceName {
             Some(SYNTHETIC) => Ok(SourceName::Synthetic),
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
-            _ if path.is_file() => Err(format!("it is no folder: use {}", sources())),
+            _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
+            _ if path.is_file() => Err(format!("it is neither a folder nor a photo: use {}", sources())),
             Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
             Some(text) => parse_cameras(text),
             None => Err(no_folder(&path.display().to_string())),
@@ -168,6 +173,7 @@ impl SourceName {
             SourceName::Synthetic => Kind::Synthetic,
             SourceName::Demo => Kind::Demo,
             SourceName::Folder(_) => Kind::Recording,
+            SourceName::Photo(_) => Kind::Photo,
             #[cfg(feature = "camera")]
             SourceName::Camera(_) | SourceName::Cameras(_) => Kind::Camera,
         }
@@ -180,6 +186,11 @@ impl SourceName {
     pub fn check(&self, frames: &Frames) -> Result<(), SourceError> {
         let what = match self {
             SourceName::Folder(_) => return Ok(()),
+            SourceName::Photo(_) if frames.start.is_none() && frames.end.is_none() => return Ok(()),
+            SourceName::Photo(_) => {
+                let what = "--start and --end are for recordings: a photo is one frame; --loop --frames N repeats it";
+                return Err(SourceError::Usage(what.to_owned()));
+            }
             SourceName::Synthetic => SYNTHETIC,
             SourceName::Demo => demo::NAME,
             #[cfg(feature = "camera")]
@@ -193,18 +204,29 @@ impl SourceName {
         )))
     }
 
-    /// The folder of a recording.
+    /// The folder of a recording, or the file of a photo: what is read.
     pub fn folder(&self) -> Option<&Path> {
         match self {
-            SourceName::Folder(folder) => Some(folder),
+            SourceName::Folder(path) | SourceName::Photo(path) => Some(path),
             _ => None,
         }
+    }
+
+    /// What is to be said of a source with this name that was opened: one line.
+    pub fn note(&self, source: &Source) -> Option<String> {
+        let SourceName::Photo(path) = self else { return None };
+        let depth = match source.depth_from {
+            DepthFrom::Nothing => "without depth: a map NAME-depth.png beside it would be taken",
+            DepthFrom::Networks | DepthFrom::Plate => "with depth that is made of it",
+            _ => "with the depth beside it",
+        };
+        Some(format!("{}: a photo, one frame that stands still, {depth}", path.display()))
     }
 
     /// The device nodes of its cameras.
     pub fn devices(&self) -> Vec<&Path> {
         match self {
-            SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) => Vec::new(),
+            SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) | SourceName::Photo(_) => Vec::new(),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => vec![&camera.node],
             #[cfg(feature = "camera")]

@@ -74,11 +74,11 @@ pub fn installed() -> OneCamera {
     OneCamera::default()
 }
 
-/// Gives a camera that has no depth that of the installed networks, if there are any and nothing else is asked for.
+/// Gives a camera or a photo that has no depth that of the installed networks, if there are any and nothing else is asked for.
 #[cfg(feature = "networks")]
 pub(super) fn for_lone_camera(source: Source, name: &SourceName, wanted: &Wanted) -> Source {
-    let is_lone =
-        name.kind() == Kind::Camera && !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
+    let is_one = matches!(name.kind(), Kind::Camera | Kind::Photo);
+    let is_lone = is_one && !source.has_depth() && wanted.options.depth_choice == DepthChoice::Auto;
     let needs_metres = wanted.look.is_some_and(|look| look.needs_metres().is_some());
     // A source that is recorded has no look: what it shows is kept, and not what can be made of it at any time.
     if !is_lone || needs_metres || !wanted.look.is_some_and(|look| look.effect.follows_depth()) {

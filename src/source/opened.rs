@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{DepthFrom, Options, SourceError, SourceName, Wanted};
+use super::{DepthFrom, Options, SourceError, SourceName, Wanted, photo};
 #[cfg(feature = "camera")]
 use super::{Frames, name};
 use crate::capture::Camera;
 use crate::capture::demo::Demo;
+use crate::capture::photo::Photo;
 use crate::capture::replay::{Part, Replay};
 use crate::capture::synthetic::{Format, Synthetic};
 #[cfg(feature = "camera")]
@@ -17,6 +18,7 @@ use crate::capture::v4l2::V4l2Camera;
 use crate::clock::Clock;
 use crate::compute::thread_pool::cores;
 use crate::depth::DepthSource;
+use crate::depth::kept::Kept;
 use crate::depth::recorded::Recorded;
 use crate::frame::DepthMap;
 use crate::recording::{Pair, Recording};
@@ -90,6 +92,13 @@ impl Opened {
                     disparities,
                     ..without_depth(Box::new(camera))
                 })
+            }
+            SourceName::Photo(path) => {
+                let (color, map, depth_from) = photo::read(path, wanted.options)?;
+                wanted.check_relative(depth_from)?;
+                let camera = Photo::new(color, &path.display().to_string(), frames.repeat, frames.frames);
+                let depth = map.map(|map| Box::new(Kept(map)) as Box<dyn DepthSource>);
+                Ok(Self { depth, depth_from, ..without_depth(Box::new(camera)) })
             }
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => {

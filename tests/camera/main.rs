@@ -13,6 +13,7 @@ mod faults;
 mod formats;
 mod knobs;
 mod machine;
+mod modes;
 mod plate;
 mod two_eyes;
 mod virtual_camera;

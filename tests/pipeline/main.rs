@@ -11,5 +11,6 @@ mod live;
 #[path = "../common/planes.rs"]
 mod planes;
 mod replay;
+mod seek;
 mod setup;
 mod stereo;

@@ -22,11 +22,11 @@ use bokehcam::sink::{Sink, Target};
 use crate::fakes::*;
 use crate::setup::*;
 
-const FRAMES: usize = 10;
-const STEP_NS: u64 = 40_000_000;
+pub const FRAMES: usize = 10;
+pub const STEP_NS: u64 = 40_000_000;
 
 /// Ten frames at 25 per second; their bytes are their numbers, their depth 1 m plus as many decimetres.
-fn record(dir: &Path, with_depth: bool) {
+pub fn record(dir: &Path, with_depth: bool) {
     let mut writer = Writer::create(dir, &WriterOptions { depth_scale: 5000.0, overwrite: false }).unwrap();
     for frame in 0..FRAMES {
         let mut color = ColorImage::new(SIZE.0, SIZE.1);
@@ -38,7 +38,7 @@ fn record(dir: &Path, with_depth: bool) {
     writer.finish().unwrap();
 }
 
-fn open(dir: &Path) -> Arc<Recording> {
+pub fn open(dir: &Path) -> Arc<Recording> {
     Arc::new(Recording::open(dir, &Options::default()).unwrap())
 }
 
@@ -47,7 +47,7 @@ fn replay(dir: &Path, part: Part) -> Result<Replay, CaptureError> {
 }
 
 /// Index, media time in milliseconds and first byte of all frames; at most `limit`.
-fn play(camera: &mut dyn Camera, limit: usize) -> Vec<(usize, u64, u8)> {
+pub fn play(camera: &mut dyn Camera, limit: usize) -> Vec<(usize, u64, u8)> {
     let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
     let mut frames = Vec::new();
     while frames.len() < limit {
@@ -134,12 +134,12 @@ fn a_loop_of_nothing_but_bad_frames_ends() {
     assert_eq!((frames.captured, frames.dropped.corrupt), (2, 2));
 }
 
-fn sink_options() -> bokehcam::sink::Options {
+pub fn sink_options() -> bokehcam::sink::Options {
     bokehcam::sink::Options::new(SIZE, STEP_NS)
 }
 
 /// A frame of which only the stamp counts.
-fn seen(stamp: Stamp) -> Seen<'static> {
+pub fn seen(stamp: Stamp) -> Seen<'static> {
     static BLACK: ColorImage = ColorImage { width: 0, height: 0, rgb: Vec::new() };
     Seen { stamp, color: &BLACK, right: None }
 }

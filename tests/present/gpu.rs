@@ -213,3 +213,15 @@ fn bytes(device: &Device, picture: &DevicePicture) -> Vec<u8> {
     bytes.truncate((picture.size().0 * picture.size().1 * 3) as usize);
     bytes
 }
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn an_enlarged_picture_is_the_same_on_both() {
+    let device = device();
+    let mut canvas = Canvas::new(Arc::clone(&device), FORMAT);
+    let (picture, before) = (noise(64, 48), noise(64, 48));
+    for (what, window, shown) in enlargements(&picture, &before) {
+        let ours = drawn(&device, &mut canvas, window, &shown);
+        close(&ours, &paint(window, &shown, None), (1, 10_000, 1), &what);
+    }
+}

@@ -198,7 +198,7 @@ impl Watched {
         while let Some(heard) = self.session.hear() {
             match heard {
                 SessionEvent::Update(told) => self.told.push(told),
-                SessionEvent::Views(views, guide) => (self.views, self.guide) = (Some(views), guide),
+                SessionEvent::Views(views, guide, _) => (self.views, self.guide) = (Some(views), guide),
                 SessionEvent::Copy(text) => self.copied = Some(text),
                 SessionEvent::Blurred(blurred) => self.blurred.push(*blurred),
             }

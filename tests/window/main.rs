@@ -18,4 +18,5 @@ mod life;
 mod looks;
 mod pictures;
 mod size;
+mod sources;
 mod stays;

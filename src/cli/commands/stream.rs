@@ -39,7 +39,8 @@ Examples:
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
-    /// folder with a recording, `demo` (the demonstration) or `synthetic` (a scene, rendered frame by frame)
+    /// folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or `synthetic` (a scene, rendered frame by
+    /// frame)
     #[arg(value_parser = options::source_name())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]
@@ -120,6 +121,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
 
     if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
         terminal::say(&format!("depth by {networks}"));
+    }
+    if let Some(note) = command.source.note(&source).filter(|_| !global.quiet) {
+        terminal::say(&note);
     }
     if info.live && !global.quiet {
         terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));

@@ -41,6 +41,9 @@ pub struct Given {
     pub behind: Vec<String>,
     /// All settings from flags, environment and preset; of the preset only those that differ from the defaults.
     pub settings: Vec<Setting>,
+    /// The names of all settings that anything states: flags, environment, preset or file.
+    #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window alone has a default of its own"))]
+    pub stated: Vec<String>,
 }
 
 impl Given {
@@ -139,9 +142,11 @@ impl Layers {
             _ => false,
         };
         let settings = resolved.iter().filter(is_given_or_preset).cloned().collect();
+        let stated = resolved.iter().filter(|setting| setting.origin != "default");
+        let stated = stated.map(|setting| setting.name.clone()).collect();
         let given = resolved.into_iter().filter(is_given);
         let switches = given.filter_map(|setting| Some((setting.name, setting.value?))).collect();
-        Given { switches, behind, settings }
+        Given { switches, behind, settings, stated }
     }
 
     /// Adds the values that no stronger layer has or excludes.

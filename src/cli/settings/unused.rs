@@ -47,6 +47,7 @@ const NEEDS: [(&[&str], Why); 17] = [
     (&["size", "fps"], |run| match run.source {
         From::Source(Kind::Recording) => Some("a recording has its own"),
         From::Source(Kind::Demo) => Some("the demonstration has its own"),
+        From::Source(Kind::Photo) => Some("a photo has its own size, and stands still"),
         _ => None,
     }),
     (&["format", "control"], |run| (run.source != From::Source(Kind::Camera)).then_some("the source is no camera")),
@@ -193,6 +194,9 @@ fn as_given(setting: &Setting) -> String {
 pub fn warn_of_no_depth(source: From) {
     let fix = match source {
         From::Picture => "--depth-map FILE gives its depth",
+        From::Source(Kind::Photo) => {
+            "a map NAME-depth.png beside NAME gives its depth, or a network (`bokehcam models`)"
+        }
         From::Source(Kind::Recording) => "--depth FOLDER takes another recording's",
         From::Source(Kind::Camera) => {
             "one camera alone gives a portrait by --depth plate (step aside once), or by a network (`bokehcam models`)"

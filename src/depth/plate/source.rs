@@ -231,4 +231,8 @@ impl DepthSource for PlateDepth {
     fn set_effort(&mut self, effort: usize) {
         self.companion.iter_mut().for_each(|companion| companion.set_effort(effort));
     }
+
+    fn jump(&mut self, ahead_ns: i64) {
+        self.companion.iter_mut().for_each(|companion| companion.jump(ahead_ns));
+    }
 }

@@ -203,6 +203,10 @@ impl DepthSource for SingleCamera {
         // Nobody saves effort but where time is short.
         self.is_live = true;
     }
+
+    fn jump(&mut self, _: i64) {
+        self.last_ns = None;
+    }
 }
 
 impl Companion for SingleCamera {

@@ -67,7 +67,12 @@ impl Badges {
 
 /// That the picture stays, and what does not.
 fn frozen(state: &State) -> Option<&'static str> {
-    state.frozen.then_some(if state.outputs.is_empty() { "Frozen" } else { "Frozen here, live outside" })
+    let text = match (state.can_pause(), state.outputs.is_empty()) {
+        (true, _) => "Paused",
+        (false, true) => "Frozen",
+        (false, false) => "Frozen here, live outside",
+    };
+    state.frozen.then_some(text)
 }
 
 /// A size as one says it.

@@ -13,6 +13,8 @@ use crate::look::Look;
 pub const RING_S: f64 = 0.9;
 /// Scrolling by this many points doubles the blur.
 const WHEEL_TO_DOUBLE: f32 = 300.0;
+/// Two fingers that part by this power of two make a step of the size; so does a notch of the wheel with Ctrl.
+const PINCH: f32 = 0.25;
 /// The split line can be grabbed this near to it, in points, by a pointer and by a finger.
 const HOLD: f32 = 12.0;
 const FINGER_HOLD: f32 = 28.0;
@@ -24,13 +26,15 @@ pub struct Gestures {
     ring: Option<([f32; 2], f64)>,
     /// Which of the marks of tilt-shift is being dragged.
     tilting: Option<Tilting>,
+    /// How far the wheel or two fingers have enlarged the picture since the last step, as a power of two.
+    pinched: f32,
 }
 
 impl Gestures {
     /// Reads the gestures on the picture, and draws the marks on it. A touch that wakes the panel is no click.
     pub fn show(&mut self, ui: &mut Ui, state: &State, place: Place, waking: bool, actions: &mut Vec<Action>) {
         // No stop for the Tab key: the arrow keys do what a click does.
-        let response = ui.interact(place.rect, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
+        let response = ui.interact(place.seen, Id::unique("picture"), Sense::CLICK | Sense::DRAG);
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, "Picture: a click focuses there"));
         let line = split_line(ui, state, &place);
         let is_tilt = state.look.effect == Effect::TiltShift && state.shown == Shown::Picture && !state.bare;
@@ -43,6 +47,10 @@ impl Gestures {
         }
         if response.hovered() {
             wheel(ui, state, &place, actions);
+            self.zoom(ui, state, &place, actions);
+        }
+        if state.zoom.factor > 0 && !on_line && self.tilting.is_none() {
+            pan(&response, &place, actions);
         }
         self.draw(ui, state, &place, is_tilt, on_line);
         if let Some(at) = line.filter(Response::dragged).and_then(|line| line.interact_pointer_pos()) {
@@ -85,9 +93,26 @@ impl Gestures {
         }
     }
 
+    /// Enlarges the picture step by step, by the wheel with Ctrl or by two fingers; a key's step goes to the pointer, too.
+    fn zoom(&mut self, ui: &Ui, state: &State, place: &Place, actions: &mut Vec<Action>) {
+        let (factor, at) = ui.input(|input| (input.zoom_delta(), input.pointer.hover_pos()));
+        let here = at.map(|at| place.fractions(at));
+        for action in actions.iter_mut() {
+            if let Action::Zoom(_, at @ None) = action {
+                *at = here;
+            }
+        }
+        self.pinched += factor.log2();
+        if self.pinched.abs() >= PINCH {
+            let step = self.pinched.signum() as i32;
+            self.pinched = 0.0;
+            actions.push(Action::Zoom(state.zoom.stepped(step), here));
+        }
+    }
+
     /// Draws the marks on the picture: split line, band of tilt-shift, point of focus and the ring of a click.
     fn draw(&mut self, ui: &Ui, state: &State, place: &Place, is_tilt: bool, line_held: bool) {
-        let painter = ui.painter().with_clip_rect(place.rect);
+        let painter = ui.painter().with_clip_rect(place.seen);
         let now = ui.input(|input| input.time);
         if state.bare {
             return;
@@ -121,9 +146,21 @@ fn split_line(ui: &mut Ui, state: &State, place: &Place) -> Option<Response> {
     let x = place.rect.left() + at * place.rect.width();
     // What is pressed next is taken from this pass: where there is no pointer, it will be a finger.
     let hold = if ui.input(|input| input.pointer.has_pointer()) { HOLD } else { FINGER_HOLD };
-    let rect = Rect::from_x_y_ranges(x - hold..=x + hold, place.rect.y_range());
+    let rect = Rect::from_x_y_ranges(x - hold..=x + hold, place.seen.y_range());
+    if !place.seen.intersects(rect) {
+        return None;
+    }
     let line = ui.interact(rect, Id::unique("split line"), Sense::DRAG);
     Some(line.on_hover_and_drag_cursor(egui::CursorIcon::ResizeHorizontal))
+}
+
+/// Moves an enlarged picture by dragging it.
+fn pan(response: &Response, place: &Place, actions: &mut Vec<Action>) {
+    let by = response.drag_delta();
+    if response.dragged() && by != egui::Vec2::ZERO {
+        // From where it is, and not from where it was once asked to be: at its edges it goes no further.
+        actions.push(Action::Pan(place.fractions(place.seen.center() - by)));
+    }
 }
 
 /// Changes the amount of blur by the wheel.

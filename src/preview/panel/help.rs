@@ -9,10 +9,13 @@ use super::state::{Action, State};
 use super::theme::{Colors, GAP, PAD, card, medium};
 use crate::preview::texts::tr;
 
-const GESTURES: [(&str, &str); 6] = [
+const GESTURES: [(&str, &str); 9] = [
     ("Click", "focus there"),
     ("Double-click", "follow the subject"),
     ("Wheel", "less blur, more blur"),
+    ("Ctrl+Wheel, pinch", "larger, smaller: pixels as they are"),
+    ("Drag", "move the enlarged picture"),
+    ("Alt", "depth and blur under the pointer"),
     ("Drag the line", "move the split between before and after"),
     ("Drag the marks", "move, widen and turn the band of tilt-shift"),
     ("Tab", "from control to control; Space and the arrow keys change it"),

@@ -26,6 +26,12 @@ pub enum Icon {
     Close,
     /// Sliders.
     Panel,
+    Play,
+    Pause,
+    /// One frame back.
+    Back,
+    /// One frame on.
+    Forward,
 }
 
 /// Draws an icon button. Whether it was clicked.
@@ -66,12 +72,34 @@ fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
                 painter.circle_filled(at + vec2(knob, y), 2.4, color);
             }
         }
+        Icon::Play => triangle(painter, at + vec2(1.0, 0.0), 1.0, color),
+        Icon::Pause => {
+            for x in [-3.5, 3.5] {
+                bar(painter, at + vec2(x, 0.0), color);
+            }
+        }
+        Icon::Back | Icon::Forward => {
+            let side = if icon == Icon::Back { -1.0 } else { 1.0 };
+            triangle(painter, at + vec2(-2.0 * side, 0.0), side, color);
+            bar(painter, at + vec2(6.0 * side, 0.0), color);
+        }
         Icon::Close => {
             for down in [-1.0, 1.0] {
                 painter.line_segment([at + vec2(-4.5, -4.5 * down), at + vec2(4.5, 4.5 * down)], stroke);
             }
         }
     }
+}
+
+/// A triangle that points to the right (`side` is 1) or left (-1).
+fn triangle(painter: &Painter, at: Pos2, side: f32, color: Color32) {
+    let points = [vec2(-4.0, -6.0), vec2(6.0, 0.0), vec2(-4.0, 6.0)].map(|point| at + vec2(side * point.x, point.y));
+    painter.add(Shape::convex_polygon(points.to_vec(), color, Stroke::NONE));
+}
+
+/// An upright bar.
+fn bar(painter: &Painter, at: Pos2, color: Color32) {
+    painter.rect_filled(Rect::from_center_size(at, vec2(3.0, 12.0)), CornerRadius::same(1), color);
 }
 
 /// A half circle with an arrow that points down at its left (`side` is -1) or right (1) end.

@@ -13,8 +13,8 @@ const BAR: f32 = 14.0;
 /// Steps of a bar of colours.
 const CELLS: usize = 64;
 
-/// Draws the legend of what is shown, at the bottom left, unless the window is too small for it.
-pub fn show(ui: &Ui, state: &State) {
+/// Draws the legend of what is shown, at the left, `above` points from the bottom, unless the window is too small for it.
+pub fn show(ui: &Ui, state: &State, above: f32) {
     let Some(legend) = state.legend else { return };
     let window = ui.ctx().content_rect();
     if window.width() < WIDTH * 1.2 || window.height() < 120.0 {
@@ -26,7 +26,8 @@ pub fn show(ui: &Ui, state: &State) {
         Legend::Depth { .. } | Legend::Coc { .. } => 0,
     };
     let height = if rows > 0 { 40.0 + 20.0 * rows as f32 } else { 76.0 };
-    let rect = Rect::from_min_size(pos2(window.left() + GAP, window.bottom() - GAP - height), vec2(WIDTH, height));
+    let rect =
+        Rect::from_min_size(pos2(window.left() + GAP, window.bottom() - GAP - above - height), vec2(WIDTH, height));
     let colors = Colors::here(ui);
     let painter = ui.painter();
     // The card adds its inner margin.

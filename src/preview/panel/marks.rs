@@ -67,8 +67,8 @@ pub fn point(painter: &Painter, at: Pos2) {
 
 /// The line between before (left) and after.
 pub fn split(painter: &Painter, place: &Place, at: f32, held: bool) {
-    let rect = place.rect;
-    let x = rect.left() + at * rect.width();
+    let x = place.rect.left() + at * place.rect.width();
+    let rect = place.seen;
     line(painter, [pos2(x, rect.top()), pos2(x, rect.bottom())], if held { 3.0 } else { 2.0 });
     let grip = pos2(x, rect.center().y);
     dot(painter, grip, if held { 15.0 } else { 13.0 });

@@ -13,12 +13,14 @@ mod notes;
 mod parts;
 mod place;
 mod plate;
+mod probe;
 mod sections;
 mod sheet;
 #[cfg(test)]
 mod tests;
 mod theme;
 mod timer;
+mod transport;
 
 pub use fonts::SystemFonts;
 pub use theme::install as dress;
@@ -27,7 +29,7 @@ use std::time::Duration;
 
 use egui::{Context, Event, Id, Ui};
 
-use super::present::Area;
+use super::present::{Area, Part};
 use super::state::{Action, State};
 use super::{keys, meters, state, views};
 use canvas::Gestures;
@@ -62,6 +64,9 @@ pub struct Panel {
     focused: Option<Id>,
     covered: bool,
     timer: timer::Timer,
+    transport: transport::Bar,
+    /// The place of the picture, as fractions, of which somebody wants to know more.
+    pub probed: Option<[f32; 2]>,
     /// Whether a control had the focus or a list was open at the end of the last pass.
     was_in_hand: bool,
 }
@@ -73,6 +78,8 @@ pub struct Canvas {
     pub area: Area,
     /// The picture's own columns and rows.
     pub size: (u32, u32),
+    /// The part of the enlarged picture that is seen there.
+    pub part: Option<Part>,
 }
 
 impl Panel {
@@ -92,19 +99,28 @@ impl Panel {
         self.read_keys(ui, state, size, actions);
         let place = Place::new(canvas, ctx.pixels_per_point(), state.mirror);
         let awake = self.is_awake(ui, state.panel && !state.bare, place.is_none());
+        self.probed = None;
         if let Some(place) = place {
             self.gestures.show(ui, state, place, self.waking, actions);
+            self.probed = probe::place(ui, state, &place);
         }
         if state.full_screen && self.pointer_rests(ui) {
             ctx.set_cursor_icon(egui::CursorIcon::None);
         }
+        if self.probed.is_some() {
+            probe::show(&ctx, state);
+        }
+        let mut bottom = 0.0;
         if !state.bare {
-            legend::show(ui, state);
-            let shown = state.panel && (awake || self.stays || self.sheet.is_in_use(&ctx));
-            self.sheet.show(&ctx, state, shown, size, actions);
+            let in_use = awake || self.stays || self.sheet.is_in_use(&ctx);
+            self.sheet.show(&ctx, state, state.panel && in_use, size, actions);
             if awake && !state.panel {
                 sheet::way_back(&ctx, actions);
             }
+            if in_use {
+                bottom = self.transport.show(&ctx, state, self.sheet.rect(), actions);
+            }
+            legend::show(ui, state, bottom);
             if state.instruments {
                 self.instruments.show(&ctx, state);
             }
@@ -113,7 +129,7 @@ impl Panel {
         self.badges.show(&ctx, state, panel);
         plate::show(&ctx, state, actions);
         self.timer.show(&ctx, state, actions);
-        self.notes.show(&ctx, state, actions);
+        self.notes.show(&ctx, state, bottom, actions);
         closing::show(&ctx, state, actions);
         if state.help {
             help::show(&ctx, state, actions);

@@ -27,9 +27,10 @@ pub struct Ages {
 }
 
 impl Ages {
-    /// Draws, upwards from the bottom of the window: the banner, the failure of an output, and the notes.
-    pub fn show(&mut self, ctx: &Context, state: &State, actions: &mut Vec<Action>) {
-        let mut bottom = GAP + demonstration(ctx, state);
+    /// Draws, upwards from `bottom` points above the bottom of the window: the banner, the
+    /// failure of an output, and the notes.
+    pub fn show(&mut self, ctx: &Context, state: &State, mut bottom: f32, actions: &mut Vec<Action>) {
+        bottom += GAP + demonstration(ctx, state, bottom);
         bottom += banner(ctx, state, bottom, actions);
         bottom += trouble(ctx, state, bottom, actions);
         bottom += plate::offer(ctx, state, bottom, actions);
@@ -73,17 +74,17 @@ impl Ages {
     }
 }
 
-/// Draws that the source is the demonstration, for as long as it is. Its height.
-fn demonstration(ctx: &Context, state: &State) -> f32 {
+/// Draws that the source is the demonstration, for as long as it is, `bottom` points above the window's edge. Its height.
+fn demonstration(ctx: &Context, state: &State, bottom: f32) -> f32 {
     if !state.is_demonstration() || state.bare {
         return 0.0;
     }
-    let area = Area::new(Id::unique("demonstration")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -GAP));
+    let area = Area::new(Id::unique("demonstration")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom - GAP));
     let drawn = area.order(Order::Middle).interactable(false).fade_in(false).show(ctx, |ui| {
         ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 620.0));
         let colors = Colors::here(ui);
         card(&colors).inner_margin(egui::Margin::symmetric(14, 6)).show(ui, |ui| {
-            ui.add(Label::new(RichText::new(DEMONSTRATION).color(colors.text)).wrap());
+            ui.add(Label::new(RichText::new(tr(DEMONSTRATION)).color(colors.text)).wrap());
         });
     });
     drawn.response.rect.height() + 6.0

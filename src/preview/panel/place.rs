@@ -8,6 +8,8 @@ use super::Canvas;
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     pub rect: Rect,
+    /// What of it is in the window.
+    pub seen: Rect,
     /// The picture's own columns and rows.
     pub size: Vec2,
     /// Whether it is shown flipped left to right.
@@ -21,12 +23,17 @@ impl Place {
         if area.width == 0 || area.height == 0 || canvas.size.0 == 0 || canvas.size.1 == 0 {
             return None;
         }
-        let points = |pixels: u32| pixels as f32 / pixels_per_point;
-        let rect = Rect::from_min_size(
-            pos2(points(area.x), points(area.y)),
-            Vec2::new(points(area.width), points(area.height)),
-        );
-        Some(Self { rect, size: Vec2::new(canvas.size.0 as f32, canvas.size.1 as f32), mirror })
+        let rect = |(x, y): (f32, f32), (width, height): (u32, u32)| {
+            let size = Vec2::new(width as f32, height as f32);
+            Rect::from_min_size(pos2(x, y) / pixels_per_point, size / pixels_per_point)
+        };
+        let corner = (area.x as f32, area.y as f32);
+        let seen = rect(corner, (area.width, area.height));
+        let whole = canvas.part.map_or(seen, |part| {
+            let corner = (corner.0 - part.at.0 as f32, corner.1 - part.at.1 as f32);
+            rect(corner, (canvas.size.0 * part.factor, canvas.size.1 * part.factor))
+        });
+        Some(Self { rect: whole, seen, size: Vec2::new(canvas.size.0 as f32, canvas.size.1 as f32), mirror })
     }
 
     /// The position on the screen of a point of the picture, given as fractions of its width and height.

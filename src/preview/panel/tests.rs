@@ -14,6 +14,8 @@ mod sizes;
 mod texts;
 mod timer;
 mod touch;
+mod transport;
+mod zoom;
 
 use egui::{Event, FullOutput, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2, pos2};
 
@@ -44,7 +46,7 @@ impl Window {
             ctx: egui::Context::default(),
             panel: Panel::default(),
             state,
-            canvas: Canvas { area, size: (1280, 720) },
+            canvas: Canvas { area, size: (1280, 720), part: None },
             size: Vec2::new(width as f32, height as f32),
             native: 1.0,
             time_s: 0.0,

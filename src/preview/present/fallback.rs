@@ -137,6 +137,7 @@ mod tests {
         let drawing = Drawing {
             area: Area { x: 0, y: 0, width: SIZE.0, height: SIZE.1 },
             picture: Image::Memory(&picture),
+            part: None,
             before: None,
             mirror: false,
             stale: false,

@@ -5,11 +5,13 @@
 
 mod fallback;
 pub mod gpu;
+mod part;
 pub mod soft;
 mod split;
 
 use std::sync::Arc;
 
+pub use part::{Part, enlarged};
 pub use split::Split;
 use winit::window::Window;
 
@@ -49,8 +51,10 @@ impl Image<'_> {
 pub struct Drawing<'a> {
     /// Where the picture goes, scaled to fill it; the rest of the window is the background.
     pub area: Area,
+    /// The part of the enlarged picture that fills the area instead: its pixels as they are.
+    pub part: Option<Part>,
     pub picture: Image<'a>,
-    /// A picture of the same size to show instead, left of this fraction of the area's width.
+    /// A picture of the same size to show instead, left of this fraction of the picture's width as it is shown.
     pub before: Option<(&'a ColorImage, f32)>,
     /// Whether pictures are flipped left to right; the split is not.
     pub mirror: bool,

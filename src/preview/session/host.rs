@@ -1,15 +1,14 @@
 //! The session's own thread.
 
 mod looks;
+mod sources;
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
-use std::time::Duration;
 
 use super::live::{self, Live};
 use super::{Closed, News, Order, SessionEvent, Start, held};
-use crate::files::whole;
 use crate::link::demand::{Demand, Watch};
 use crate::look::Look;
 use crate::pipeline::{PipelineError, Wanted};
@@ -51,9 +50,6 @@ pub(super) struct Host {
     held: Option<held::HeldBlur>,
 }
 
-/// The size of a recording is told this often.
-const SIZE_PERIOD: Duration = Duration::from_secs(1);
-
 impl Host {
     /// A session that has not started yet; `orders` sends orders to itself.
     pub fn new(start: Start, news: News, orders: mpsc::Sender<Order>) -> Self {
@@ -87,13 +83,8 @@ impl Host {
         self.tell_choices();
         self.recover();
         self.open();
-        loop {
-            let mut next = match inbox.recv_timeout(SIZE_PERIOD) {
-                Ok(order) => Some(order),
-                Err(mpsc::RecvTimeoutError::Timeout) => None,
-                Err(mpsc::RecvTimeoutError::Disconnected) => return self.close(inbox),
-            };
-            self.tell_size();
+        while let Some(order) = self.next(inbox) {
+            let mut next = Some(order);
             while let Some(order) = next.take() {
                 match order {
                     // Of several looks in the queue only the last counts; the order after them comes next.
@@ -119,13 +110,7 @@ impl Host {
                 }
             }
         }
-    }
-
-    /// Tells how large the recording is by now.
-    fn tell_size(&self) {
-        let recording = self.outputs.iter().find(|output| !output.is_camera);
-        let bytes = recording.and_then(|output| whole::bytes_so_far(output.name.as_ref()));
-        bytes.into_iter().for_each(|bytes| self.news.tell(Update::Recorded(bytes)));
+        self.close(inbox)
     }
 
     /// Ends the run, and hears what became of its outputs.
@@ -193,16 +178,8 @@ impl Host {
                 let deleted = self.services.settings().delete_preset(&name);
                 self.tell_presets(deleted, &format!("Preset '{name}' is deleted"));
             }
-            // These are the window's own, or come another way.
-            Request::Look(_) | Request::Snapshot | Request::CopyCommand | Request::FullScreen(_) | Request::Close => {}
+            other => self.on_offer(other),
         }
-    }
-
-    fn tell_choices(&mut self) {
-        let sources = self.services.sources();
-        let virtual_cameras = self.services.virtual_cameras();
-        self.news.tell(Update::Choices { sources, virtual_cameras });
-        self.news.tell(Update::Presets(self.services.settings().presets()));
     }
 
     /// Tells what became of a change of the presets, and which there are now.
@@ -236,6 +213,8 @@ impl Host {
             Err(line) => return self.without_source(Source::Lost(line)),
         };
         self.source.clone_from(&opened.name);
+        self.tell_choices();
+        self.news.tell(Update::Camera(self.services.camera()));
         self.news.tell(Update::Controls(opened.controls.clone()));
         opened.notes.iter().for_each(|line| self.news.note(line));
         self.runs += 1;

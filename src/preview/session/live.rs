@@ -75,7 +75,7 @@ impl Live {
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), settings.keep_going);
         let (wanted, demand) = (Arc::clone(&settings.wanted), settings.demand.clone());
-        news.send(SessionEvent::Views(views, guide.clone()));
+        news.send(SessionEvent::Views(views, guide.clone(), camera.seeker()));
         let run = move || {
             pipeline::run(Run {
                 camera,

@@ -18,6 +18,7 @@ use super::folders::{self, Folders};
 use super::services::{Services, Switch};
 use super::state::{Output, Request, Update};
 use crate::budget::Quality;
+use crate::capture::Seeker;
 use crate::depth::plate::Guide;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
@@ -58,8 +59,9 @@ pub struct Start {
 /// What comes from a session.
 pub enum SessionEvent {
     Update(Update),
-    /// A new run started: its frames come from here, and how far its plate is, if that makes its depth.
-    Views(Receiver<View>, Option<Arc<Guide>>),
+    /// A new run started: its frames come from here, how far its plate is, if that makes its depth, and what goes back and
+    /// forth in it, if it is a recording.
+    Views(Receiver<View>, Option<Arc<Guide>>, Option<Arc<Seeker>>),
     /// A text for the clipboard.
     Copy(String),
     /// The frame that stays, in another look.

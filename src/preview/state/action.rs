@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::{Output, Shown, Source};
+use super::{Camera, Output, Shown, Source};
 use crate::knob::Knob;
 use crate::look::Look;
 use crate::look::presets::Preset;
+use crate::preview::services::Browse;
 use crate::source::devices::Choice;
 
 /// What a person can do. Every control and key is one of these.
@@ -40,6 +41,14 @@ pub enum Action {
     Mirror(bool),
     /// Keeps the picture, or lets the next ones come.
     Freeze(bool),
+    /// Shows the picture so many times as large (0: as large as fits), around a point of it or what was in the middle.
+    Zoom(u32, Option<[f32; 2]>),
+    /// This point of an enlarged picture comes to the window's middle.
+    Pan([f32; 2]),
+    /// Goes to the frame at this place of the recording.
+    Seek(usize),
+    /// Stops so many frames after the one that is shown.
+    Step(i32),
     /// Opens or closes the panel.
     Panel(bool),
     /// Shows or hides the instruments.
@@ -71,6 +80,10 @@ pub enum Action {
     /// Writes to this virtual camera, or to none.
     VirtualCamera(Option<String>),
     Open(String),
+    /// Asks for a source by a dialog.
+    Browse(Browse),
+    /// Other pictures of the camera: their columns and rows, and frames per second.
+    Mode((u32, u32), f64),
     /// Opens the source again.
     Retry,
     /// Sets a control of the camera.
@@ -107,9 +120,16 @@ pub enum Request {
     Begin(Output),
     End(Output),
     Open(String),
+    /// Open it, if it can be a source.
+    Offer(String),
+    Browse(Browse),
+    /// Open the camera again with pictures of this size and rate.
+    Mode((u32, u32), f64),
     Control(String, i64),
     /// Take a plate, and use it.
     TakePlate,
+    /// Show the frame at this place of the recording.
+    Seek(usize),
     /// Look which sources and virtual cameras there are.
     Refresh,
     /// Put the equivalent command on the clipboard.
@@ -131,6 +151,10 @@ pub enum Update {
     },
     Presets(Vec<Preset>),
     Controls(Vec<Knob>),
+    /// What else is known of the camera, before it runs.
+    Camera(Camera),
+    /// What somebody offered can be a source.
+    Offered(String),
     /// The outputs that are written to now: after each that was begun or ended, also where that failed.
     Outputs(Vec<Output>),
     /// Bytes of the recording so far.

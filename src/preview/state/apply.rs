@@ -43,8 +43,12 @@ impl State {
             Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(NOT_FOLLOWED),
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
-            Action::Mirror(on) => self.mirror = on,
+            Action::Mirror(on) => (self.mirror, self.mirror_chosen) = (on, true),
             Action::Freeze(on) => self.freeze(on),
+            Action::Zoom(factor, at) => self.set_zoom(factor, at),
+            Action::Pan(center) => self.zoom.center = center,
+            Action::Seek(place) => return self.seek(place),
+            Action::Step(by) => return self.step(by),
             Action::Panel(on) => self.panel = on,
             Action::Instruments(on) => self.instruments = on,
             Action::Bare(on) => self.bare = on,
@@ -64,6 +68,8 @@ impl State {
             Action::Record(on) => return self.record(on),
             Action::VirtualCamera(name) => return self.set_virtual_camera(name),
             Action::Open(name) => return self.open(name),
+            Action::Browse(what) => return vec![Request::Browse(what)],
+            Action::Mode(size, fps) => return self.set_mode(size, fps),
             Action::Retry => return self.open(self.source_name.clone()),
             Action::Control(name, value) => return self.set_control(name, value),
             Action::TakePlate if self.takes_plates()[0] => {
@@ -178,13 +184,13 @@ impl State {
     }
 
     /// Asks for a source, and forgets what was known of the one before.
-    fn open(&mut self, name: String) -> Vec<Request> {
+    pub(super) fn open(&mut self, name: String) -> Vec<Request> {
         if name != self.source_name {
             self.controls.clear();
             self.source_name.clone_from(&name);
         }
         self.source = Source::Opening;
-        self.frozen = false;
+        (self.frozen, self.transport) = (false, None);
         self.focus_m = None;
         vec![Request::Open(name)]
     }

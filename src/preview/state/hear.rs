@@ -14,6 +14,8 @@ impl State {
             }
             Update::Presets(presets) => self.presets = presets,
             Update::Controls(controls) => self.controls = controls,
+            Update::Camera(camera) => self.set_camera(camera),
+            Update::Offered(name) => return self.open(name).pop(),
             Update::Outputs(outputs) => {
                 self.outputs = outputs;
                 self.recorded_bytes = self.recorded_bytes.filter(|_| self.recording().is_some());

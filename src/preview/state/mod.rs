@@ -4,6 +4,7 @@
 
 mod action;
 mod apply;
+mod camera;
 mod habits;
 mod hear;
 mod history;
@@ -12,18 +13,23 @@ pub mod sample;
 mod switches;
 #[cfg(test)]
 mod tests;
+mod transport;
 pub mod tweak;
+mod zoom;
 
 use std::path::PathBuf;
 
 pub use action::{Action, Request, Update};
 pub use apply::{NO_DEPTH, NO_PLATE, NO_VIRTUAL_CAMERA};
+pub use camera::Camera;
 pub use habits::{Habits, TEXT_SCALES};
 pub use history::History;
+pub use transport::Transport;
+pub use zoom::{FACTORS as ZOOM_FACTORS, Zoom};
 
 use super::meters::Meters;
-use super::views::Legend;
 pub use super::views::Shown;
+use super::views::{Legend, Probe};
 use crate::capture::demo;
 use crate::depth::plate::Step;
 use crate::knob::Knob;
@@ -99,6 +105,8 @@ pub struct State {
     /// The virtual cameras that can be chosen.
     pub virtual_cameras: Vec<Choice>,
     pub controls: Vec<Knob>,
+    /// What else is known of the camera.
+    pub camera: Camera,
     pub presets: Vec<Preset>,
     /// Where pictures go besides the window.
     pub outputs: Vec<Output>,
@@ -112,8 +120,15 @@ pub struct State {
     pub mirror: bool,
     /// Whether frames are still blurred for the look before, as their own kernels are being made.
     pub between: bool,
+    /// Whether somebody said so; otherwise it depends on the camera.
+    pub mirror_chosen: bool,
     /// Whether the window keeps the picture it has.
     pub frozen: bool,
+    /// Where the recording is, if the source is one.
+    pub transport: Option<Transport>,
+    pub zoom: Zoom,
+    /// What is under the pointer, where that is shown.
+    pub probe: Option<Probe>,
     /// Left of this fraction of its width, the picture is shown as before the blur.
     pub split: Option<f32>,
     /// Whether the panel is open.
@@ -171,6 +186,7 @@ impl State {
             sources: Vec::new(),
             virtual_cameras: Vec::new(),
             controls: Vec::new(),
+            camera: Camera::default(),
             presets: Vec::new(),
             outputs: Vec::new(),
             self_timer: false,
@@ -178,7 +194,11 @@ impl State {
             shown: Shown::default(),
             mirror: false,
             between: false,
+            mirror_chosen: false,
             frozen: false,
+            zoom: Zoom::default(),
+            probe: None,
+            transport: None,
             split: None,
             panel: true,
             instruments: false,

@@ -12,7 +12,7 @@ impl State {
         let switches = [
             ("show", shown.map(|shown| shown.to_string())),
             ("split", self.split.map(|at| format!("{at:.3}"))),
-            ("mirror", yes(self.mirror)),
+            ("mirror", (self.mirror != self.camera.faces_user).then(|| self.mirror.to_string())),
             ("full-screen", yes(self.full_screen)),
             ("instruments", yes(self.instruments)),
             ("panel", (!self.panel).then(|| "false".to_owned())),

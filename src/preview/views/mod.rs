@@ -3,6 +3,7 @@
 mod bins;
 mod colors;
 mod depth;
+mod probe;
 mod radius;
 mod sample;
 #[cfg(test)]
@@ -11,6 +12,7 @@ mod tests;
 pub use bins::MOST as MOST_BINS;
 pub use colors::{BINS as BIN_COLORS, diverging, perceptual};
 pub use depth::share_of as depth_share;
+pub use probe::Probe;
 
 use crate::bokeh::Settings;
 use crate::frame::ColorImage;

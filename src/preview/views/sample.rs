@@ -53,6 +53,6 @@ pub fn depth_row(depth: &DepthMap, y: u32, rows: u32) -> &[f32] {
 }
 
 /// The index `at` of `from` pixels, scaled to an index of `to` pixels.
-fn scaled(at: u32, from: u32, to: u32) -> u32 {
+pub fn scaled(at: u32, from: u32, to: u32) -> u32 {
     (u64::from(at) * u64::from(to) / u64::from(from.max(1))) as u32
 }

@@ -165,3 +165,25 @@ fn what_cannot_be_shown_is_not() {
         assert!(views.draw(shown, &view, Some(&settings)).is_none() && views.legend().is_none());
     }
 }
+
+#[test]
+fn a_probe_is_the_value_of_its_pixel_whatever_the_size_of_the_map() {
+    for map in [(40, 30), (20, 15)] {
+        let mut view = view((40, 30), map, CocField::Depth(LENS));
+        for x in [0.0, 0.3, 0.62, 1.0] {
+            let column = ((x * 40.0) as u32).min(39) * map.0 / 40;
+            let expected_m = 0.5 + 9.5 * column as f32 / map.0 as f32;
+            let probe = Probe::of(&view, [x, 0.5]);
+            assert!((probe.depth_m.unwrap() - expected_m).abs() < 1e-5, "{probe:?} at {x}");
+            assert!((probe.coc_px - LENS.coc_px(expected_m)).abs() < 1e-5);
+            assert_eq!(probe.coc_px < 0.0, expected_m < LENS.focus_m, "negative in front");
+        }
+        view.depth = None;
+        assert_eq!(Probe::of(&view, [0.5; 2]).depth_m, None);
+    }
+    let even = view((8, 8), (8, 8), CocField::Uniform { radius_px: 3.0 });
+    assert_eq!(Probe::of(&even, [0.9; 2]).coc_px, 3.0);
+    let ramp = Ramp { normal: glam::vec2(0.0, 1.0), offset_px: 4.0, half_band_px: 1.0, slope: 0.5, max_px: 9.0 };
+    let view = view((8, 8), (8, 8), CocField::Ramp(ramp));
+    assert_eq!(Probe::of(&view, [0.1, 0.95]).coc_px, ramp.coc_px(0.5, 7.5));
+}

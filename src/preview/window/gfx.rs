@@ -9,7 +9,8 @@ use winit::window::{Fullscreen, Window};
 use super::WindowError;
 use super::memory::Size;
 use crate::compute::device::Device;
-use crate::preview::present::{self, Area, Presenter};
+use crate::preview::present::{self, Area, Part, Presenter, enlarged};
+use crate::preview::state::Zoom;
 
 /// The window, egui's input from it, and its presenter.
 pub(super) struct Gfx {
@@ -62,10 +63,15 @@ impl Gfx {
         Ok(Self { window, input, presenter })
     }
 
-    /// Where a picture of `size` lies in the window: centred, as large as fits.
-    pub fn area(&self, size: (u32, u32)) -> Area {
+    /// Where a picture of `size` lies in the window: centred, as large as fits or enlarged, and then which part of it is seen.
+    pub fn area(&self, size: (u32, u32), zoom: Zoom, mirror: bool) -> (Area, Option<Part>) {
         let PhysicalSize { width, height } = self.window.inner_size();
-        fitted(size, (width, height))
+        if zoom.factor == 0 {
+            return (fitted(size, (width, height)), None);
+        }
+        let [x, y] = zoom.center;
+        let (area, part) = enlarged(size, (width, height), zoom.factor, [if mirror { 1.0 - x } else { x }, y]);
+        (area, Some(part))
     }
 
     /// The size to remember; `None` in full screen, whose size is not the window's own.

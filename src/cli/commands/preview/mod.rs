@@ -45,7 +45,7 @@ In the window, F1 shows all keys. Click to focus there, double-click to follow t
 copied as a command (K). A recording is played in a loop.")]
 pub struct PreviewCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
-    /// folder with a recording, `demo` (the demonstration) or `synthetic` (rendered while it plays)
+    /// folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or `synthetic` (rendered while it plays)
     /// [default: the first camera there is, else `demo`]
     source: Option<String>,
     /// Also write to /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or .webm from the start;
@@ -114,6 +114,7 @@ pub fn show(
         texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
     texts.into_iter().for_each(texts::speak);
     let device = computing.choice().device()?;
+    let mirror_chosen = given.stated.iter().any(|name| name == "mirror");
     let store = FileStore { chosen: global.config.clone(), given };
     let mut state = first_state(look, &source, window, stream.mirror, &memory);
     if let Some(before) = before {
@@ -125,6 +126,7 @@ pub fn show(
     system.device.clone_from(&device);
     system.out_size = stream.out_size.map(|size| (size.width, size.height));
     system.force = output.force;
+    state.mirror_chosen = mirror_chosen;
     let close_at_end = frames.frames.is_some() || !frames.repeat;
     let stop = terminal::stop_flag()?;
     let ended = window::show(Preview {

@@ -3,8 +3,8 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::preview::panel::parts::{Number, choose, number, switch};
-use crate::preview::state::{Action, Shown};
+use crate::preview::panel::parts::{Number, choose, number, remark, switch};
+use crate::preview::state::{Action, Shown, ZOOM_FACTORS};
 
 type Views = [(&'static str, &'static str, Shown); 2];
 
@@ -42,10 +42,23 @@ pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     choose_view(ui, sheet, "Show", VIEWS);
+    let zooms = ["Fit", "100 %", "200 %", "400 %", "800 %"]
+        .map(|name| (name, "Pixels of the window for one of the picture (X, +, -)"));
+    let chosen = ZOOM_FACTORS.iter().position(|factor| *factor == state.zoom.factor).unwrap_or_default();
+    if let Some(index) = choose(ui, "Size", &zooms, chosen, |_| true) {
+        sheet.act(Action::Zoom(ZOOM_FACTORS[index], None));
+    }
     if switch(ui, "Mirror", "Like a mirror; what is recorded or sent on is not (M)", state.mirror) {
         sheet.act(Action::Mirror(!state.mirror));
     }
-    if switch(ui, "Freeze", "Keep this picture, and try looks on it (Z)", state.frozen) {
+    if state.mirror {
+        remark(ui, "In this window alone: what goes out is not mirrored.");
+    }
+    let (freeze, hint) = match state.can_pause() {
+        true => ("Pause", "The recording stands still, and looks can be tried on its picture (Z)"),
+        false => ("Freeze", "Keep this picture, and try looks on it (Z)"),
+    };
+    if switch(ui, freeze, hint, state.frozen) {
         sheet.act(Action::Freeze(!state.frozen));
     }
     if switch(ui, "Before and after", "The picture before the blur, left of a line to drag (B)", state.split.is_some())

@@ -8,7 +8,7 @@ use super::{Action, Window, on_panel, pressed};
 use crate::look::Strength;
 use crate::optics::Lens;
 use crate::preview::keys::GROUPS;
-use crate::preview::state::{Output, Source};
+use crate::preview::state::{Output, Source, Transport};
 
 #[test]
 fn every_key_reaches_the_window() {
@@ -17,6 +17,8 @@ fn every_key_reaches_the_window() {
         // Something to undo and to redo, and some range to take back.
         window.state.look.focus_range_m = 0.5;
         window.state.look.focus = crate::depth::focus::FocusRule::Metres(2.0);
+        // A recording to go back and forth in.
+        window.state.transport = Some(Transport { frames: 9, ..Transport::default() });
         for chord in binding.chords.iter().take(6) {
             let mut modifiers = if chord.ctrl { Modifiers::CTRL | Modifiers::COMMAND } else { Modifiers::NONE };
             modifiers.shift = chord.shift;

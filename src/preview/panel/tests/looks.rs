@@ -10,7 +10,7 @@ use crate::depth::plate::Step;
 use crate::frame::ColorImage;
 use crate::look::Effect;
 use crate::preview::panel::theme::{Colors, rung};
-use crate::preview::state::{Source, sample};
+use crate::preview::state::{Source, Transport, sample};
 use crate::preview::views::Legend;
 use crate::recording::still::{read_color, write_color};
 
@@ -58,6 +58,7 @@ fn window(theme: Theme, size: (u32, u32), change: impl FnOnce(&mut crate::previe
         canvas: super::Canvas {
             area: crate::preview::present::Area { x: 0, y: 0, width: size.0, height: size.1 },
             size: (1280, 720),
+            part: None,
         },
         size: egui::vec2(size.0 as f32, size.1 as f32),
         native: 1.0,
@@ -114,6 +115,14 @@ fn pictures() {
     shot("lost", Theme::Light, &|state| {
         state.source = Source::Lost("the camera was unplugged (/dev/video0)".into());
     });
+    for (name, theme) in [("recording", Theme::Dark), ("recording-light", Theme::Light)] {
+        shot(name, theme, &|state| {
+            let (length_ns, time_ns) = (61_500_000_000, 23_456_000_000);
+            state.transport = Some(Transport { place: 280, frames: 738, time_ns, length_ns });
+            state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
+            state.note("holiday.jpg: a photo, one frame that stands still, with the depth beside it");
+        });
+    }
     shot("depth", Theme::Dark, &|state| {
         state.legend = Some(Legend::Depth { near_m: 0.9, far_m: 5.2 });
         state.panel = false;

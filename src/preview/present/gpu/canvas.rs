@@ -26,6 +26,7 @@ pub struct Window {
     pub mirror: u32,
     pub stale: [f32; 4],
     pub divider: [u32; 4],
+    pub part: [u32; 4],
     pub stripes: [[f32; 4]; 3],
     pub background: [f32; 4],
 }
@@ -153,6 +154,7 @@ impl Canvas {
         let mut window = Window {
             area: if shown { [area.x, area.y, area.width, area.height] } else { [0; 4] },
             size: [width, height],
+            part: drawing.part.map_or([0; 4], |part| [part.at.0, part.at.1, part.factor, 0]),
             mirror: u32::from(drawing.mirror),
             stale: [red, green, blue, flag(drawing.stale)],
             background: color(drawing.background, flag(self.linear)),

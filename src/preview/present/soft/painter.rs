@@ -86,7 +86,9 @@ impl Painter {
         let around = self.around.begin_frame(age, drawing);
         let picture = match drawing.picture {
             Image::Memory(picture) if !picture.rgb.is_empty() && drawing.area.width > 0 && drawing.area.height > 0 => {
-                self.scaler.adapt(picture, drawing.area);
+                if drawing.part.is_none() {
+                    self.scaler.adapt(picture, drawing.area);
+                }
                 Some(picture)
             }
             _ => None,

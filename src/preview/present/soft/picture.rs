@@ -47,9 +47,17 @@ impl Scaler {
             let columns = columns.start..columns.end.min(row.len());
             let Some(row) = row.get_mut(columns.clone()).filter(|row| !row.is_empty()) else { return };
             let width = drawing.area.width as usize;
+            // Of how many columns the area shows those from which on.
+            let (whole, first) =
+                drawing.part.map_or((width, 0), |part| ((part.factor * picture.width) as usize, part.at.0 as usize));
+            let (start, end) = (first + columns.start, first + columns.end);
             // Mirrored, columns come from the other side, and are reversed below.
-            let from = if drawing.mirror { width - columns.end..width - columns.start } else { columns };
-            let rgb = if picture.size() == (drawing.area.width, drawing.area.height) {
+            let from = if drawing.mirror { whole - end..whole - start } else { start..end };
+            let rgb = if let Some(part) = drawing.part {
+                scratch.line.resize(3 * from.len(), 0);
+                part.row(&picture.rgb, picture.width, part.at.1 as usize + y, from, &mut scratch.line);
+                &scratch.line[..]
+            } else if picture.size() == (drawing.area.width, drawing.area.height) {
                 &picture.rgb[3 * (y * width + from.start)..3 * (y * width + from.end)]
             } else {
                 scratch.line.resize(3 * from.len(), 0);

@@ -1,7 +1,9 @@
 //! The window's events.
 
 mod calls;
+mod drop;
 mod hold;
+mod seek;
 mod show;
 
 use std::path::PathBuf;
@@ -54,6 +56,7 @@ pub(super) struct App {
     frames: Option<Receiver<View>>,
     /// How far the plate is, where that makes the depth.
     guide: Option<Arc<Guide>>,
+    seeking: seek::Seeking,
     view: Option<View>,
     /// Whether `view` was not on the screen yet.
     view_is_new: bool,
@@ -77,6 +80,8 @@ pub(super) struct App {
     laid_out: Instant,
     /// The oldest input whose effect is not on the screen yet.
     input_at: Option<Instant>,
+    /// Whether something was dropped on the window just now: files of one drop come one after the other.
+    has_dropped: bool,
     /// Whether the window is hidden completely, and whether it has no pixels.
     covered: bool,
     /// Since when nobody can see it.
@@ -122,6 +127,7 @@ impl App {
             wake_pending,
             frames: None,
             guide: None,
+            seeking: seek::Seeking::default(),
             view: None,
             view_is_new: false,
             false_colors: Views::default(),
@@ -137,6 +143,7 @@ impl App {
             layout_at: Some(Instant::now()),
             laid_out: Instant::now(),
             input_at: None,
+            has_dropped: false,
             covered: false,
             hidden_at: None,
             empty: false,
@@ -173,8 +180,9 @@ impl App {
         let mut changed = false;
         while let Some(event) = self.session.hear() {
             match event {
-                SessionEvent::Views(frames, guide) => {
+                SessionEvent::Views(frames, guide, seeker) => {
                     self.guide = guide;
+                    (self.seeking, self.state.transport) = (seek::Seeking::of(seeker), None);
                     changed |= self.state.guide(None);
                     self.heard_at = Instant::now();
                     // It was meant for the source before.
@@ -216,8 +224,11 @@ impl App {
         }
         // A frozen frame has to be in memory, to be saved: frames are replaced until one is.
         let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
-        if let Some(view) = newest.filter(|_| !frozen) {
+        if let Some(view) = newest.filter(|view| !frozen || self.seeking.is_answer(view)) {
+            self.note_place(&view);
             self.learn_from(&view);
+            // Another frame stays now.
+            self.held = None;
             self.view = Some(view);
             self.view_is_new = true;
             changed = true;
@@ -297,6 +308,7 @@ impl ApplicationHandler<Call> for App {
                 self.perform(Action::Close, events);
                 return self.on_input();
             }
+            WindowEvent::DroppedFile(path) => return self.on_drop(path),
             WindowEvent::Occluded(hidden) => {
                 self.covered = *hidden;
                 // Waiting while nobody can see the window is no latency.
@@ -324,6 +336,7 @@ impl ApplicationHandler<Call> for App {
     }
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        self.has_dropped = false;
         if self.stop.load(Ordering::Relaxed) {
             return events.exit();
         }

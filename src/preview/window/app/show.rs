@@ -12,6 +12,7 @@ use crate::preview::panel::Canvas;
 use crate::preview::present::{Area, Controls, Drawing, Image};
 use crate::preview::session::Still;
 use crate::preview::state::{Action, Request, Source, State};
+use crate::preview::views::Probe;
 
 /// Shown when there is nothing to save.
 const NO_PICTURE: &str = "There is no picture to save.";
@@ -45,7 +46,8 @@ impl App {
     pub(super) fn lay_out(&mut self, events: &ActiveEventLoop) {
         let size = self.picture_size();
         let Some(gfx) = &mut self.gfx else { return };
-        let canvas = Canvas { area: gfx.area(size), size };
+        let (area, part) = gfx.area(size, self.state.zoom, self.state.mirror);
+        let canvas = Canvas { area, size, part };
         let input = gfx.input.take_egui_input(&gfx.window);
         let mut actions = Vec::new();
         let (panel, state) = (&mut self.panel, &self.state);
@@ -57,6 +59,11 @@ impl App {
         self.laid_out = Instant::now();
         let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
         self.layout_at = self.laid_out.checked_add(wait);
+        let probe = self.panel.probed.and_then(|at| Some(Probe::of(self.view.as_ref()?, at)));
+        if std::mem::replace(&mut self.state.probe, probe) != probe {
+            self.layout_at = Some(self.laid_out);
+            gfx.window.request_redraw();
+        }
         if !actions.is_empty() {
             // Another layout right away shows what they changed.
             self.layout_at = Some(self.laid_out);
@@ -76,6 +83,7 @@ impl App {
                         gfx.window.set_fullscreen(on.then_some(Fullscreen::Borderless(None)));
                     }
                 }
+                Request::Seek(place) => self.seek(place),
                 Request::Close => events.exit(),
                 Request::Look(look) => {
                     self.session.order(Request::Look(look));
@@ -145,8 +153,10 @@ impl App {
         // Where nothing was blurred, before and after are the same.
         let before = view.map(|view| view.color.as_deref().unwrap_or(in_memory));
         let background = if self.ctx.theme() == egui::Theme::Dark { [18, 18, 20] } else { [232, 232, 236] };
+        let (area, part) = gfx.area(size, self.state.zoom, *mirror);
         let drawing = Drawing {
-            area: if self.view.is_some() { gfx.area(size) } else { Area::default() },
+            area: if self.view.is_some() { area } else { Area::default() },
+            part,
             picture: false_colors.map_or(picture, Image::Memory),
             before: before.zip(*split),
             mirror: *mirror,

@@ -1,0 +1,88 @@
+//! A photo as a camera: one frame that stands still.
+
+use super::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
+use crate::frame::{ColorImage, Stamp};
+
+/// Gives one picture again and again.
+pub struct Photo {
+    name: String,
+    color: ColorImage,
+    /// Frames in all; `None` never ends.
+    frames: Option<u64>,
+    given: u64,
+}
+
+/// Ten a second: what is changed is soon seen, and each has the time that a photo of many pixels needs.
+const PERIOD_NS: u64 = 100_000_000;
+
+impl Photo {
+    /// `color`, once, or so many times, or, `repeated` without a number, without end.
+    pub fn new(color: ColorImage, name: &str, repeated: bool, frames: Option<u64>) -> Self {
+        let frames = if repeated { frames } else { Some(1) };
+        Self { name: name.to_owned(), color, frames, given: 0 }
+    }
+
+    fn at_end(&self) -> bool {
+        self.frames.is_some_and(|frames| self.given >= frames)
+    }
+}
+
+impl Camera for Photo {
+    fn info(&self) -> SourceInfo {
+        SourceInfo {
+            name: self.name.clone(),
+            size: self.color.size(),
+            period_ns: PERIOD_NS,
+            frames: self.frames,
+            live: false,
+            brings: Brings::Color,
+        }
+    }
+
+    fn next(&mut self, shot: Shot) -> Result<Captured, CaptureError> {
+        if self.at_end() {
+            return Ok(Captured::End);
+        }
+        shot.color.resize(self.color.width, self.color.height);
+        shot.color.rgb.copy_from_slice(&self.color.rgb);
+        let stamp = Stamp { index: 0, time_ns: self.given.saturating_mul(PERIOD_NS), captured_ns: None };
+        self.given += 1;
+        Ok(Captured::Frame(stamp))
+    }
+
+    fn skip(&mut self, until_ns: u64) -> u64 {
+        let from = self.given;
+        let until = until_ns.div_ceil(PERIOD_NS);
+        self.given = from.max(self.frames.map_or(until, |frames| until.min(frames)));
+        self.given - from
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::{DepthMap, GrayImage};
+
+    #[test]
+    fn a_photo_is_one_frame_or_as_many_as_are_asked_for() {
+        let mut color = ColorImage::new(3, 2);
+        color.rgb.fill(7);
+        let count = |repeated, frames, skip_ns| {
+            let mut photo = Photo::new(color.clone(), "photo", repeated, frames);
+            let (mut into, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+            let mut times_ns = Vec::new();
+            let skipped = photo.skip(skip_ns);
+            while times_ns.len() < 5 {
+                let shot = Shot { color: &mut into, depth: &mut depth, right: &mut right };
+                let Captured::Frame(stamp) = photo.next(shot).unwrap() else { break };
+                assert!(into == color && stamp.index == 0);
+                times_ns.push(stamp.time_ns / 1_000_000);
+            }
+            (skipped, times_ns)
+        };
+        assert_eq!(count(false, None, 0), (0, vec![0]));
+        assert_eq!(count(true, Some(3), 0), (0, vec![0, 100, 200]));
+        assert_eq!(count(true, None, 250_000_000), (3, vec![300, 400, 500, 600, 700]));
+        assert_eq!(count(true, Some(2), 250_000_000), (2, vec![]));
+    }
+}

@@ -1,0 +1,15 @@
+//! One map for every frame: that of a photo.
+
+use super::{DepthError, DepthSource, Seen};
+use crate::frame::DepthMap;
+
+/// The depth of a picture that stands still.
+pub struct Kept(pub DepthMap);
+
+impl DepthSource for Kept {
+    fn read(&mut self, _: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        map.resize(self.0.width, self.0.height);
+        map.metres.copy_from_slice(&self.0.metres);
+        Ok(())
+    }
+}

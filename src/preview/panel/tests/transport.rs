@@ -1,0 +1,81 @@
+//! The bar under a recording.
+
+use egui::{Key, Modifiers, pos2};
+
+use super::super::super::state::{Action, Output, Transport};
+use super::Window;
+
+const TRANSPORT: Transport = Transport { place: 3, frames: 101, time_ns: 1_230_000_000, length_ns: 61_000_000_000 };
+
+fn of_a_recording() -> Window {
+    let mut window = Window::new();
+    window.state.transport = Some(TRANSPORT);
+    // Awake: the pointer is over the picture.
+    window.pass(vec![egui::Event::PointerMoved(pos2(300.0, 300.0))]);
+    window.wait(0.3);
+    window
+}
+
+#[test]
+fn a_recording_has_a_bar_that_goes_with_the_panel_and_a_camera_has_none() {
+    let mut window = of_a_recording();
+    let time = "0:01.23 / 1:01.00";
+    assert!(window.place_of(time).is_some_and(|at| at.y > 680.0), "{:?}", window.texts());
+    window.state.bare = true;
+    assert!(window.place_of(time).is_none());
+    window.state.bare = false;
+    window.wait(5.0);
+    assert!(window.place_of(time).is_none(), "it hides");
+    let mut camera = of_a_recording();
+    camera.state.transport = None;
+    assert!(camera.place_of(time).is_none());
+}
+
+#[test]
+fn keys_step_pause_and_go_to_the_start() {
+    let mut window = of_a_recording();
+    assert_eq!(window.press(Key::PageDown, Modifiers::NONE), [Action::Step(1)]);
+    assert!(window.state.frozen && window.state.transport.unwrap().place == 4);
+    window.press(Key::PageUp, Modifiers::NONE);
+    window.press(Key::PageUp, Modifiers::NONE);
+    assert_eq!(window.state.transport.unwrap().place, 2);
+    assert_eq!(window.press(Key::Home, Modifiers::NONE), [Action::Seek(0)]);
+    // The first frame follows the last.
+    window.press(Key::PageUp, Modifiers::NONE);
+    assert_eq!(window.state.transport.unwrap().place, 100);
+    window.press(Key::Z, Modifiers::NONE);
+    assert!(!window.state.frozen);
+    window.state.transport = None;
+    assert!(window.press(Key::PageDown, Modifiers::NONE).is_empty() && !window.state.frozen);
+}
+
+#[test]
+fn the_line_is_dragged_while_the_recording_stands_still_and_plays_on_after() {
+    let mut window = of_a_recording();
+    // Right of the time, left of the panel.
+    let actions = window.drag(pos2(400.0, 688.0), pos2(700.0, 688.0));
+    let sought: Vec<usize> = actions
+        .iter()
+        .filter_map(|action| match action {
+            Action::Seek(place) => Some(*place),
+            _ => None,
+        })
+        .collect();
+    assert!(sought.len() > 4 && sought.is_sorted() && sought.last() < Some(&101), "{actions:?}");
+    let freezes: Vec<&Action> = actions.iter().filter(|action| matches!(action, Action::Freeze(_))).collect();
+    assert_eq!(freezes, [&Action::Freeze(true), &Action::Freeze(false)]);
+    assert!(!actions.iter().any(|action| matches!(action, Action::Look { .. })), "no click on the picture");
+    // What stood still before stands still after.
+    window.state.frozen = true;
+    let actions = window.drag(pos2(700.0, 688.0), pos2(500.0, 688.0));
+    assert!(!actions.iter().any(|action| matches!(action, Action::Freeze(_))), "{actions:?}");
+}
+
+#[test]
+fn it_is_a_pause_unless_something_is_written() {
+    let mut window = of_a_recording();
+    window.state.frozen = true;
+    assert!(window.texts().iter().any(|text| text == "Paused"));
+    window.state.outputs = vec![Output { name: "film.mp4".into(), is_camera: false }];
+    assert!(window.texts().iter().any(|text| text == "Frozen"));
+}

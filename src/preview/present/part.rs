@@ -1,0 +1,55 @@
+//! The part of an enlarged picture that is seen.
+
+use super::Area;
+
+/// A picture whose pixels are squares of the window, of which only a part is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Pixels of the window along a side of one of the picture, > 0.
+    pub factor: u32,
+    /// The column and row of the enlarged picture, as it is seen (mirrored), at the area's top left.
+    pub at: (u32, u32),
+}
+
+/// Where a picture of `size` goes in a window, enlarged by a whole `factor`, and which part of it is seen. In the window's middle
+/// is `center`, as fractions of the picture as it is seen, as far as nothing is left empty for that.
+pub fn enlarged(size: (u32, u32), window: (u32, u32), factor: u32, center: [f32; 2]) -> (Area, Part) {
+    let side = |side: u32, window: u32, center: f32| {
+        let whole = side.saturating_mul(factor);
+        let hidden = whole.saturating_sub(window);
+        let at = (center * whole as f32 - window as f32 / 2.0).round().clamp(0.0, hidden as f32) as u32;
+        // Offset and length of the area, and what is left out before it.
+        (window.saturating_sub(whole) / 2, whole.min(window), at.min(hidden))
+    };
+    let (x, width, left) = side(size.0, window.0, center[0]);
+    let (y, height, above) = side(size.1, window.1, center[1]);
+    (Area { x, y, width, height }, Part { factor, at: (left, above) })
+}
+
+impl Part {
+    /// Fills `line` (RGB) with the columns `from` of row `y` of the enlarged picture, which is `width` pixels wide before that.
+    pub fn row(self, rgb: &[u8], width: u32, y: usize, from: std::ops::Range<usize>, line: &mut [u8]) {
+        let factor = self.factor.max(1) as usize;
+        let row = &rgb.as_chunks::<3>().0[y / factor * width as usize..];
+        for (pixel, column) in line.as_chunks_mut::<3>().0.iter_mut().zip(from) {
+            *pixel = row[column / factor];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_is_what_was_asked_for_and_nothing_is_left_empty() {
+        let seen = |factor, center| enlarged((100, 50), (160, 120), factor, center);
+        let area = |x, y, width, height| Area { x, y, width, height };
+        assert_eq!(seen(1, [0.5, 0.5]), (area(30, 35, 100, 50), Part { factor: 1, at: (0, 0) }));
+        assert_eq!(seen(2, [0.5, 0.5]), (area(0, 10, 160, 100), Part { factor: 2, at: (20, 0) }));
+        assert_eq!(seen(4, [0.5, 0.25]), (area(0, 0, 160, 120), Part { factor: 4, at: (120, 0) }));
+        assert_eq!(seen(4, [1.0, 1.0]), (area(0, 0, 160, 120), Part { factor: 4, at: (240, 80) }));
+        assert_eq!(seen(4, [f32::NAN, -3.0]).1.at, (0, 0));
+        assert_eq!(enlarged((100, 50), (0, 0), 2, [0.5; 2]).0, area(0, 0, 0, 0));
+    }
+}

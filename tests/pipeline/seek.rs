@@ -1,0 +1,207 @@
+//! Back and forth in a recording: picture, depth and right eye of the frame that was asked for, in times that only go on.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use bokehcam::capture::replay::{Part, Replay};
+use bokehcam::capture::{Brings, Camera, Captured, Shot};
+use bokehcam::depth::beside::Beside;
+use bokehcam::depth::recorded::Recorded;
+use bokehcam::depth::{DepthError, DepthSource, Seen};
+use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
+use bokehcam::link::demand::Demand;
+use bokehcam::link::{self, Receiver};
+use bokehcam::pipeline::{Pace, Run, View, run};
+use bokehcam::recording::{Options, Recording, Scratch};
+use bokehcam::sink::Target;
+
+use crate::replay::{FRAMES, STEP_NS, open, play, record, seen, sink_options};
+use crate::setup::*;
+
+fn looped(dir: &Path, start_s: f64) -> Replay {
+    Replay::new(open(dir), "test recording", &Part { start_s, looped: true, ..Part::default() }).unwrap()
+}
+
+#[test]
+fn the_frame_that_is_asked_for_comes_next_and_media_time_only_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    let mut camera = looped(folder.path(), 0.0);
+    let seeker = camera.seeker().unwrap();
+    assert_eq!((seeker.frames(), seeker.length_ns(), seeker.time_ns(3)), (FRAMES, 10 * STEP_NS, 3 * STEP_NS));
+    let mut frames = play(&mut camera, 2);
+    // On, back, across the seam, to the same frame again, and beyond the end.
+    for place in [7, 3, 9, 9, 0, 99] {
+        camera.seek(place);
+        frames.extend(play(&mut camera, 2));
+    }
+    let indices = [0, 1, 7, 8, 3, 4, 9, 0, 9, 0, 0, 1, 9, 0];
+    assert!(frames.iter().map(|frame| frame.0).eq(indices), "{frames:?}");
+    assert!(frames.iter().map(|frame| usize::from(frame.2)).eq(indices), "the pictures are those of the frames");
+    assert!(frames.iter().map(|frame| frame.1).eq((0..14).map(|k| 40 * k)), "a period after each other: {frames:?}");
+    // Nothing that was asked for is passed over, and what comes after it is.
+    camera.seek(2);
+    assert_eq!(camera.skip(14 * STEP_NS), 0);
+    assert_eq!(camera.skip(16 * STEP_NS), 2);
+    assert_eq!(play(&mut camera, 1), [(4, 640, 4)]);
+}
+
+#[test]
+fn a_part_is_sought_in_by_its_own_places_and_ends_where_it_did() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    let part = Part { start_s: 0.08, end_s: Some(0.28), ..Part::default() };
+    let mut camera = Replay::new(open(folder.path()), "test recording", &part).unwrap();
+    let seeker = camera.seeker().unwrap();
+    assert_eq!((seeker.frames(), seeker.length_ns()), (5, 5 * STEP_NS));
+    let stamp = |index| Stamp { index, time_ns: 0, captured_ns: None };
+    assert_eq!([2, 6].map(|index| seeker.place_of(stamp(index))), [0, 4]);
+    camera.seek(4);
+    assert_eq!(play(&mut camera, 9), [(6, 0, 6)]);
+    camera.seek(1);
+    assert_eq!(play(&mut camera, 9).len(), 4, "from the second to the last");
+    // A number of frames is kept to, wherever they are.
+    let mut few = Replay::new(open(folder.path()), "test recording", &Part { frames: Some(3), ..part }).unwrap();
+    few.seek(4);
+    assert_eq!(play(&mut few, 9).len(), 1);
+    few.seek(0);
+    assert_eq!(play(&mut few, 9).len(), 2);
+}
+
+#[test]
+fn the_newest_wish_counts_and_each_counts_once() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), false);
+    let seeker = looped(folder.path(), 0.0).seeker().unwrap();
+    assert_eq!(seeker.wish_after(0), None);
+    assert_eq!([3, 8, 99].map(|place| seeker.go_to(place)), [1, 2, 3]);
+    let wish = seeker.wish_after(0).unwrap();
+    assert_eq!((wish.number, wish.place, seeker.wish_after(3)), (3, 9, None));
+}
+
+#[test]
+fn the_right_eye_is_that_of_the_frame() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/stereo");
+    let recording = Arc::new(Recording::open(&folder, &Options::default()).unwrap());
+    let part = Part { looped: true, ..Part::default() };
+    let mut camera = Replay::new(Arc::clone(&recording), "stereo", &part).unwrap().with_right_eye();
+    assert_eq!(camera.info().brings, Brings::RightEye);
+    let (mut color, mut depth, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+    let (mut scratch, mut own_color, mut own_right) = (Scratch::default(), ColorImage::default(), GrayImage::default());
+    let last = recording.len() - 1;
+    assert!(last > 1);
+    for place in [last, 0, last / 2] {
+        camera.seek(place);
+        let shot = Shot { color: &mut color, depth: &mut depth, right: &mut right };
+        let Captured::Frame(stamp) = camera.next(shot).unwrap() else { panic!("frame {place}") };
+        recording.read_color(place, &mut scratch, &mut own_color).unwrap();
+        recording.read_right(place, &mut scratch, &mut own_right).unwrap();
+        assert!(stamp.index == place && color == own_color && right == own_right);
+    }
+}
+
+#[test]
+fn depth_of_another_recording_stays_beside_the_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), true);
+    let mut camera = looped(folder.path(), 0.0);
+    let mut depth = Beside::new(Recording::open(folder.path(), &Options::default()).unwrap(), "beside").unwrap();
+    let (mut color, mut map, mut right) = (ColorImage::default(), DepthMap::default(), GrayImage::default());
+    for place in [None, Some(6), None, Some(2), Some(9), None, None, Some(5)] {
+        if let Some(place) = place {
+            depth.jump(camera.seek(place));
+        }
+        let shot = Shot { color: &mut color, depth: &mut DepthMap::default(), right: &mut right };
+        let Captured::Frame(stamp) = camera.next(shot).unwrap() else { panic!("{place:?}") };
+        depth.read(seen(stamp), &mut map).unwrap();
+        let expected_m = 1.0 + 0.1 * f32::from(color.rgb[0]);
+        assert!(map.metres.iter().all(|&m| (m - expected_m).abs() < 1e-3), "{stamp:?}: {}", map.metres[0]);
+    }
+}
+
+/// Recorded depth that counts the scenes it was told of.
+struct Told(Recorded, Arc<std::sync::atomic::AtomicUsize>);
+
+impl DepthSource for Told {
+    fn read(&mut self, seen: Seen, map: &mut DepthMap) -> Result<(), DepthError> {
+        self.0.read(seen, map)
+    }
+    fn jump(&mut self, _: i64) {
+        self.1.fetch_add(1, Ordering::SeqCst);
+    }
+}
+
+#[test]
+fn while_nobody_watches_each_wish_brings_its_one_frame_with_its_depth() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), true);
+    let camera = looped(folder.path(), 0.0);
+    let seeker = camera.seeker().unwrap();
+    let jumps = Arc::default();
+    let depth = Told(Recorded::new(open(folder.path()), "test").unwrap(), Arc::clone(&jumps));
+    let (stop, demand) = (AtomicBool::new(false), Demand::new());
+    let (view, mut views) = link::live::<View>();
+    let sink = Target::Null.open(&sink_options()).unwrap();
+    let simple = simple(Box::new(camera), sink, &stop, Pace::Realtime);
+    let bokeh = fake_bokeh(2, Default::default());
+    let run_of = Run {
+        depth: Some(Box::new(depth)),
+        bokeh: Some(Box::new(bokeh)),
+        look: dof(),
+        demand: Some(demand.clone()),
+        view: Some(view),
+        ..simple
+    };
+    let next = |views: &mut Receiver<View>, number: u64, place: usize| {
+        let began = Instant::now();
+        let view = loop {
+            if let Some(view) = views.try_recv() {
+                break view;
+            }
+            assert!(began.elapsed() < Duration::from_secs(60), "frame {place} never came");
+            std::thread::sleep(Duration::from_millis(1));
+        };
+        assert_eq!((view.stamp.index, view.trace.seek, view.trace.asked), (place, number, true));
+        assert_eq!(usize::from(view.color.as_ref().unwrap().rgb[0]), place);
+        let depth = view.depth.as_ref().unwrap();
+        assert!(depth.metres.iter().all(|&m| (m - 1.0 - 0.1 * place as f32).abs() < 1e-3));
+        drop(view);
+        std::thread::sleep(Duration::from_millis(150));
+        assert!(views.try_recv().is_none(), "no other frame comes");
+    };
+    let checked = || {
+        // Also where a check fails.
+        let _end = SetAtEnd(&stop);
+        for (number, place) in [(1, 6), (2, 7), (3, 0), (4, 9)] {
+            assert_eq!(seeker.go_to(place), number);
+            next(&mut views, number, place);
+        }
+        // Once somebody watches it goes on from there, over the seam.
+        let _watch = demand.watch();
+        let began = Instant::now();
+        while began.elapsed() < Duration::from_secs(60) {
+            if let Some(view) = views.try_recv() {
+                return assert!(view.stamp.index < 9 && view.trace.seek == 4 && !view.trace.asked, "{:?}", view.stamp);
+            }
+        }
+        panic!("it never went on");
+    };
+    let report = std::thread::scope(|scope| {
+        let checked = scope.spawn(checked);
+        let report = run(run_of).unwrap();
+        checked.join().unwrap();
+        report
+    });
+    assert!(report.frames.balance());
+    assert_eq!(jumps.load(Ordering::SeqCst), 4, "depth is told each time");
+}
+
+struct SetAtEnd<'a>(&'a AtomicBool);
+
+impl Drop for SetAtEnd<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::SeqCst);
+    }
+}
