@@ -89,7 +89,7 @@ impl Passes {
             ..RawInput::default()
         };
         input.viewports.entry(egui::ViewportId::ROOT).or_default().native_pixels_per_point = Some(1.0);
-        let (panel, state, canvas) = (&mut self.panel, &self.state, Canvas { area, size: SIZE });
+        let (panel, state, canvas) = (&mut self.panel, &self.state, Canvas { area, size: SIZE, ..Canvas::default() });
         let output = self.context.run_ui(input, |ui| panel.show(ui, state, canvas, &mut Vec::new()));
         let primitives = self.context.tessellate(output.shapes, 1.0);
         Controls { primitives, textures: output.textures_delta, pixels_per_point: 1.0 }

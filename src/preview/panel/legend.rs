@@ -116,10 +116,10 @@ fn draw_bin_entry(painter: &Painter, colors: &Colors, at: egui::Pos2, index: usi
     let low_px = index.checked_sub(1).map(|before| high_px[before]);
     let number = |px: f32| if px < 0.0 { format!("−{:.1}", -px) } else { format!("{px:.1}") };
     let range = match (low_px, high_px[index].is_finite()) {
-        (None, false) => "all".to_owned(),
-        (None, true) => format!("to {} px", number(high_px[index])),
-        (Some(low_px), false) => format!("from {} px", number(low_px)),
-        (Some(low_px), true) => format!("{} to {} px", number(low_px), number(high_px[index])),
+        (None, false) => tr("all").to_owned(),
+        (None, true) => tr_with("to {} px", &[&number(high_px[index])]),
+        (Some(low_px), false) => tr_with("from {} px", &[&number(low_px)]),
+        (Some(low_px), true) => tr_with("{} to {} px", &[&number(low_px), &number(high_px[index])]),
     };
     let font = FontId::new(12.0, FontFamily::Proportional);
     painter.text(swatch.right_center() + vec2(6.0, 0.0), Align2::LEFT_CENTER, range, font, colors.text);

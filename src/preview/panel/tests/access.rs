@@ -13,7 +13,7 @@ struct Tree(Vec<(NodeId, Node)>);
 impl Tree {
     fn of(state: State) -> Self {
         let mut window = Window::of(state, (1280, 4000));
-        for folded in ["Quality", "Camera", "Save as…"] {
+        for folded in ["For experts", "Camera", "Save as…"] {
             if let Some(at) = window.place_of(folded) {
                 window.click(at);
                 window.wait(0.4);

@@ -3,7 +3,6 @@
 use egui::{Key, Modifiers, pos2};
 
 use super::{Action, Window, sample};
-use crate::preview::present::Area;
 use crate::preview::state::{Shown, Source, State};
 
 #[test]
@@ -47,7 +46,7 @@ fn its_first_seconds_count_from_the_first_picture() {
     let mut state = State::new(sample::look(), "slow".into());
     state.source = Source::Opening;
     let mut window = Window::of(state, (1280, 720));
-    let canvas = std::mem::replace(&mut window.canvas.area, Area::default());
+    let canvas = std::mem::take(&mut window.canvas.area);
     window.wait(20.0);
     assert!(window.place_of("Record and call").is_some());
     window.canvas.area = canvas;

@@ -6,14 +6,19 @@ use super::{Window, sample};
 use crate::depth::plate::Step;
 use crate::look::{Effect, Strength};
 use crate::preview::keys::GROUPS;
-use crate::preview::state::{Action, Output, Source, State, tweak};
+use crate::preview::state::{Action, Output, Source, State, Transport, tweak};
 use crate::preview::texts::{self, tests as table};
 use crate::preview::views::Legend;
 
 /// Windows that together show about all that can be shown.
 fn windows() -> Vec<Window> {
-    let changes: [&dyn Fn(&mut State); 12] = [
+    let changes: [&dyn Fn(&mut State); 13] = [
         &|_| {},
+        &|state| {
+            state.transport = Some(Transport { place: 3, frames: 24, time_ns: 1, length_ns: 9 });
+            (state.self_timer, state.kept_in, state.frozen) = (true, Some("gone".into()), true);
+            (state.mirror, state.between) = (true, true);
+        },
         &|state| state.look.effect = Effect::TiltShift,
         &|state| {
             state.look.strength = Strength::Lens(tweak::LENS);
@@ -87,7 +92,8 @@ fn the_table_has_all_texts_and_no_others() {
         }
     }
     for (does, keys) in GROUPS.iter().flat_map(|group| group.bindings).map(|binding| (binding.does, binding.keys)) {
-        (texts::tr(does), texts::tr(keys));
+        texts::tr(does);
+        texts::tr(keys);
     }
     let english = table::english();
     let missing: Vec<String> =
@@ -114,7 +120,9 @@ fn all_that_is_drawn_is_translated() {
         for text in window.texts() {
             let has_word =
                 text.split(|c: char| !c.is_alphabetic()).any(|word| word.len() > 1 && !units.contains(&word));
-            let is_name = names.iter().chain(&controls).any(|name| text.contains(name))
+            // The blur's passes are called as in the report.
+            let is_name = text.starts_with("     ")
+                || names.iter().chain(&controls).any(|name| text.contains(name))
                 || presets.contains(&text.to_lowercase())
                 || levels.iter().any(|level| text.contains(level));
             assert!(text.contains('«') || !has_word || is_name, "{text}");

@@ -1,0 +1,83 @@
+//! What comes from the session: news, and frames.
+
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use winit::event_loop::ActiveEventLoop;
+
+use super::App;
+use super::seek::Seeking;
+use crate::link::Receiver;
+use crate::preview::session::SessionEvent;
+use crate::preview::state::Source;
+
+impl App {
+    /// Handles what the session sent, and takes the newest frame.
+    pub(super) fn receive(&mut self, events: &ActiveEventLoop) {
+        // First of all, so that what comes after the queue was read wakes this thread again.
+        self.wake_pending.swap(false, Ordering::AcqRel);
+        let mut changed = false;
+        while let Some(event) = self.session.hear() {
+            match event {
+                SessionEvent::Views(frames, guide, seeker) => {
+                    self.guide = guide;
+                    (self.seeking, self.state.transport) = (Seeking::of(seeker), None);
+                    changed |= self.state.guide(None);
+                    self.heard_at = Instant::now();
+                    // It was meant for the source before.
+                    self.snapshot_due = false;
+                    self.frames = Some(frames);
+                    self.state.meters.restart();
+                }
+                SessionEvent::Blurred(blurred) => changed |= self.show_again(*blurred),
+                SessionEvent::Copy(text) => {
+                    if let Some(gfx) = &mut self.gfx {
+                        gfx.input.set_clipboard_text(text);
+                    }
+                }
+                SessionEvent::Update(told) => {
+                    if let Some(look) = self.state.hear(told) {
+                        self.session.order(look);
+                    }
+                    changed = true;
+                }
+            }
+        }
+        if changed {
+            self.update_settings();
+            self.layout_at = Some(Instant::now());
+            self.update_wanted();
+            self.set_title();
+            if self.close_at_end && matches!(self.state.source, Source::Ended | Source::Lost(_)) {
+                events.exit();
+            }
+        }
+        let newest = self.frames.as_mut().and_then(Receiver::try_recv);
+        if newest.is_some() {
+            self.heard_at = Instant::now();
+            self.check_silence();
+            if self.state.guide(self.guide.as_ref().map(|guide| guide.step())) {
+                self.layout_at = Some(Instant::now());
+                changed = true;
+            }
+        }
+        // A frozen frame has to be in memory, to be saved: frames are replaced until one is.
+        let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
+        if let Some(view) = newest.filter(|view| !frozen || self.seeking.is_answer(view)) {
+            self.note_place(&view);
+            self.learn_from(&view);
+            // Another frame stays now.
+            self.held = None;
+            self.view = Some(view);
+            self.view_is_new = true;
+            changed = true;
+            if self.snapshot_due {
+                self.snapshot();
+            }
+        }
+        self.hold();
+        if changed {
+            self.ask_for_redraw();
+        }
+    }
+}
