@@ -116,7 +116,7 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
     }
     watched.session.order(Request::End(output("film", false)));
     watched
-        .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("film: complete")));
+        .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
     // A recording ends with its source, and a virtual camera goes on with the next one.
     watched.session.order(Request::Open("48".into()));
     watched.until("the other runs", |told| is_running(told, 48));

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use egui::{Align2, Color32, Context, CornerRadius, FontId, Id, LayerId, Order, Rect, vec2};
 
+use super::icons;
 use super::state::State;
 use super::theme::{GAP, ON_PICTURE, medium};
 use crate::preview::texts::tr;
@@ -52,7 +53,9 @@ impl Badges {
             ctx.request_repaint_after(Duration::from_secs(1));
         }
         let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("badges")));
-        let right = panel.map_or(ctx.content_rect().right(), |panel| panel.left());
+        // Beside the panel, or the button that brings it back.
+        let beside = if state.panel || state.bare { 0.0 } else { icons::SIDE + 14.0 };
+        let right = panel.map_or(ctx.content_rect().right() - beside, |panel| panel.left());
         let mut corner = egui::pos2(right, ctx.content_rect().top()) + vec2(-GAP, GAP);
         for (text, color) in all.into_iter().filter_map(|(text, color)| Some((text?, color))) {
             let galley = painter.layout_no_wrap(text, FontId::new(12.5, medium()), ON_PICTURE);

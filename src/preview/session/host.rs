@@ -251,7 +251,7 @@ impl Host {
 
     /// Opens an output and adds it to the run; a recording without a name is given one.
     fn write_to(&mut self, mut output: Output) {
-        let Some(live) = &self.live else { return self.news.note("there is no source to write out") };
+        let Some(live) = &self.live else { return self.news.note("There is no source to write out.") };
         if output.name.is_empty() {
             output.name = self.free_name().display().to_string();
         }
@@ -288,9 +288,9 @@ impl Host {
     /// Takes note of what became of an output of the run of this number.
     fn on_output(&mut self, run: u64, Notice { member, fate }: &Notice) {
         match fate {
-            Fate::Began => self.news.note(format!("writing to {member}")),
+            Fate::Began => self.news.note(format!("Writing to {member}")),
             Fate::Completed { frames } => {
-                self.news.note(format!("{member}: complete, {frames} frames"));
+                self.news.note(format!("Complete: {member}, {frames} frames"));
                 self.news.kept(Path::new(member));
             }
             Fate::Failed { why, .. } => {

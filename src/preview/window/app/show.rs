@@ -120,7 +120,7 @@ impl App {
         }
         let Trace { between, depth_held, .. } = view.trace;
         let is_frozen = self.state.frozen && view.picture.memory().is_some();
-        self.snapshot_due = view.picture.memory().is_none() || is_running && !is_frozen && (between || depth_held);
+        self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
         self.update_wanted();
         let Some(picture) = view.picture.memory().filter(|_| !self.snapshot_due) else { return };
         self.session.save(Still {
