@@ -37,7 +37,11 @@ impl Folders {
             let named = named.as_deref().zip(home).and_then(|(text, home)| named_in(text, variable, home));
             let given = env::var_os(variable).map(PathBuf::from);
             let all = [given, named, home.map(|home| home.join(usual))];
-            all.into_iter().flatten().find(|folder| folder.is_dir()).unwrap_or_default()
+            all.into_iter()
+                .flatten()
+                .find(|folder| folder.is_dir())
+                .or_else(|| env::current_dir().ok())
+                .unwrap_or_default()
         };
         Self { pictures: folder("XDG_PICTURES_DIR", "Pictures"), videos: folder("XDG_VIDEOS_DIR", "Videos") }
     }

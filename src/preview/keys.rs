@@ -157,7 +157,7 @@ pub const GROUPS: [Group; 5] = [
             }),
             held(&[ctrl(Key::Z)], "Ctrl+Z", "undo", |_, _| Some(Action::Undo)),
             held(&[ctrl_shift(Key::Z), ctrl(Key::Y)], "Ctrl+Shift+Z", "redo", |_, _| Some(Action::Redo)),
-            once(&[key(Key::R)], "R", "back to the look at the start", |_, _| Some(Action::Reset)),
+            once(&[key(Key::R)], "R", "back to the usual look", |_, _| Some(Action::Reset)),
         ],
     },
     Group {

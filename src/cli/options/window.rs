@@ -45,7 +45,7 @@ pub struct Window {
     /// Language of the window's texts, such as de, or a file with a translation [default: the environment's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     pub language: Option<String>,
-    /// Begin with nothing remembered: no look, no source, no sizes of the window before
+    /// Begin with nothing remembered (look, source, sizes), and leave that as it is
     #[arg(long, value_name = "YES", num_args = 0..=1, require_equals = true, default_value_t = false,
           default_missing_value = "true", value_parser = BoolishValueParser::new(), hide_default_value = true,
           hide_possible_values = true)]

@@ -46,7 +46,12 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
         if switch(ui, "Single keys", hint, state.habits.single_keys) {
             actions.push(Action::SingleKeys(!state.habits.single_keys));
         }
-        let height = (window.height() - 2.0 * (GAP + PAD) - 70.0).max(20.0);
+        let (asks, hint) =
+            (state.habits.ask_before_closing, "While something is recorded, closing the window asks first");
+        if switch(ui, "Ask before closing", hint, asks) {
+            actions.push(Action::AskBeforeClosing(!asks));
+        }
+        let height = (window.height() - 2.0 * (GAP + PAD) - 100.0).max(20.0);
         ScrollArea::vertical().max_height(height).show(ui, |ui| {
             ui.scroll_with_delta(vec2(0.0, scrolled(ui, height)));
             let gestures = |ui: &mut Ui| table(ui, "On the picture", GESTURES.into_iter());

@@ -56,6 +56,12 @@ impl State {
         })
     }
 
+    /// The look to be kept for the next time: as it was chosen, whatever this source has not.
+    pub fn chosen_look(&self) -> Look {
+        let is_fitted = self.fitted && self.look.effect == Effect::TiltShift;
+        Look { effect: if is_fitted { Effect::Auto } else { self.look.effect }, ..self.look.clone() }
+    }
+
     /// A look as far as the source allows it; remembers if that changed its effect.
     pub(super) fn fitting(&mut self, look: Look) -> Look {
         let fitted = look.for_source(self.may_have_depth());

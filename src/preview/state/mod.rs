@@ -224,8 +224,11 @@ impl State {
 
     /// Adds a line for the person.
     pub fn note(&mut self, text: impl Into<String>) {
+        let text = text.into();
+        // Said once more, it is shown anew, and once.
+        self.notes.retain(|note| note.text != text);
         self.noted += 1;
-        self.notes.push(Note { number: self.noted, text: text.into() });
+        self.notes.push(Note { number: self.noted, text });
         if self.notes.len() > NOTES {
             self.notes.remove(0);
         }

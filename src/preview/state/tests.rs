@@ -100,9 +100,10 @@ fn what_needs_depth_says_so_where_there_is_none() {
     let toy = Look { effect: Effect::TiltShift, ..look() };
     assert_eq!(state.hear(Update::Source(running(false))), Some(Request::Look(Box::new(toy.clone()))));
     for action in [Action::Preset("cinematic".into()), Action::Show(Shown::Depth)] {
-        let before = state.notes.len();
+        let before = state.notes.last().map(|note| note.number);
         assert_eq!(state.apply(action), []);
-        assert_eq!((state.notes.len(), &state.notes.last().unwrap().text[..]), (before + 1, NO_DEPTH));
+        let said = state.notes.last().unwrap();
+        assert!(Some(said.number) > before && said.text == NO_DEPTH, "{said:?}");
     }
     assert_eq!((state.shown, &state.look), (Shown::Picture, &toy));
     assert_eq!(state.apply(Action::Reset), [], "nor does the first look follow any");
@@ -324,4 +325,23 @@ fn a_plate_is_offered_where_a_camera_has_no_depth_and_its_end_is_told_once() {
     // A plate that was there from the start is no news.
     assert!(state.guide(Some(Step::Ready)));
     assert_eq!(state.notes.len(), notes + 1);
+}
+
+#[test]
+fn a_source_without_depth_changes_no_look_for_the_next_time() {
+    let mut state = state();
+    let chosen = state.look.clone();
+    assert_eq!(chosen.effect, Effect::Auto);
+    state.hear(Update::Source(running(false)));
+    assert_eq!((state.look.effect, state.chosen_look()), (Effect::TiltShift, chosen));
+    let tilted = Look { effect: Effect::Blur, ..state.look.clone() };
+    state.apply(Action::Look { look: Box::new(tilted.clone()), stroke: None });
+    assert_eq!(state.chosen_look(), tilted, "that was chosen");
+}
+
+#[test]
+fn what_is_said_twice_is_shown_once() {
+    let mut state = state();
+    ["a", "b", "a"].map(|line| state.note(line));
+    assert_eq!(state.notes.iter().map(|note| note.text.as_str()).collect::<Vec<_>>(), ["b", "a"]);
 }

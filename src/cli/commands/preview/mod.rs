@@ -107,8 +107,10 @@ pub fn show(
     let effect = if look.effect.follows_depth() { Effect::Auto } else { look.effect };
     let look = Look { effect, ..look };
     let memory_file = file::state_folder().map(|folder| folder.join("window.toml"));
-    let memory = memory_file.as_deref().filter(|_| !window.fresh).and_then(Memory::read).unwrap_or_default();
-    let before = memory.look().filter(|_| !given.has_look());
+    // What begins afresh leaves alone what was there.
+    let memory_file = memory_file.filter(|_| !window.fresh);
+    let memory = memory_file.as_deref().and_then(Memory::read).unwrap_or_default();
+    let before = memory.look().filter(|before| !given.has_look() && *before != look);
     let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
     let texts =
         texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;

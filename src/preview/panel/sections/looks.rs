@@ -138,7 +138,7 @@ fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Doing {
         ui.horizontal(|ui| (ui.button(tr("Delete it")).clicked(), ui.button(tr("Keep it")).clicked())).inner;
     if delete {
         sheet.act(Action::DeletePreset(name));
-    } else if !keep {
+    } else if !keep && !ui.input(|input| input.key_pressed(Key::Escape)) {
         return Doing::Deleting(name);
     }
     Doing::Listing
@@ -155,6 +155,9 @@ fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, by_enter: bool) -> Opti
         }
         let left_by = |key| edit.lost_focus() && ui.input(|input| input.key_pressed(key));
         let (entered, escaped) = (left_by(Key::Enter), left_by(Key::Escape));
+        if entered && !by_enter {
+            edit.request_focus();
+        }
         let holds = ui.button(tr(verb)).clicked() || entered && by_enter;
         if holds && !editing.name.trim().is_empty() {
             return Some(true);
@@ -167,14 +170,14 @@ fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, by_enter: bool) -> Opti
 /// Draws a preset with the number of its key. Whether it was clicked.
 fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> bool {
     let colors = Colors::here(ui);
-    let family = if chosen { medium() } else { FontFamily::Proportional };
-    let shown = capitalized(&preset.name);
+    // One's own are called as one called them.
+    let shown = if preset.own { preset.name.clone() } else { capitalized(&preset.name) };
     let (text, number_color) = match (chosen, possible) {
         (true, _) => (colors.on_accent, colors.on_accent),
         (false, true) => (colors.text, colors.weak),
         (false, false) => (colors.weak.gamma_multiply(0.6), colors.weak.gamma_multiply(0.6)),
     };
-    let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, family), text);
+    let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, medium()), text);
     // The keys 1 to 9.
     let has_key = index < 9;
     let room = if has_key { 14.0 } else { 0.0 };

@@ -43,10 +43,18 @@ fn it_does_not_ask_who_said_so_nor_when_nothing_would_be_lost() {
     window.state.apply(Action::Close);
     window.wait(0.2);
     window.click_on("Do not ask again");
-    assert!(!window.state.habits.ask_before_closing);
     window.click_on("Keep recording");
+    assert!(!window.state.closing && window.state.habits.ask_before_closing, "who does not close has decided nothing");
+    window.state.apply(Action::Close);
+    window.wait(0.2);
+    // Enter loses nothing.
+    window.press(Key::Enter, Modifiers::NONE);
     assert!(!window.state.closing);
-    assert_eq!(window.state.apply(Action::Close).len(), 1);
+    window.state.apply(Action::Close);
+    window.wait(0.2);
+    window.click_on("Do not ask again");
+    assert!(window.click_on("Stop and close").contains(&Action::Close));
+    assert!(!window.state.habits.ask_before_closing);
     let mut state = recording();
     state.apply(Action::Close);
     assert!(state.closing);
