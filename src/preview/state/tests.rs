@@ -342,6 +342,6 @@ fn a_source_without_depth_changes_no_look_for_the_next_time() {
 #[test]
 fn what_is_said_twice_is_shown_once() {
     let mut state = state();
-    ["a", "b", "a"].map(|line| state.note(line));
+    ["a", "b", "a"].iter().for_each(|line| state.note(*line));
     assert_eq!(state.notes.iter().map(|note| note.text.as_str()).collect::<Vec<_>>(), ["b", "a"]);
 }
