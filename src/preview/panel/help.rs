@@ -33,7 +33,7 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
     let frame = card(&Colors::of(ctx.theme()));
     let drawn = Modal::new(Id::unique("help")).frame(frame).show(ctx, |ui| {
         ui.set_width(width);
-        ui.set_max_height(window.height() - 2.0 * (GAP + PAD));
+        ui.set_max_height((window.height() - 2.0 * (GAP + PAD)).max(20.0));
         ui.horizontal(|ui| {
             ui.heading(tr("Keys and gestures"));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
