@@ -115,7 +115,8 @@ fn nothing_is_captured_while_nobody_watches_unless_it_is_written() {
     watched.session.order(Request::Begin(film.clone()));
     watched.frame("frames come for the film", |_| true);
     watched.session.order(Request::End(film));
-    watched.until("the film is complete", |told| matches!(told, Update::Note(line) if line.contains("complete")));
+    watched
+        .until("the film is complete", |told| matches!(told, Update::Note(line) if line.starts_with("Complete: film")));
     std::thread::sleep(Duration::from_millis(500));
     assert!(rests(&mut watched));
     watched.watch = Some(watched.demand.watch());
