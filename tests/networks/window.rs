@@ -2,35 +2,18 @@
 
 use std::fs;
 
-use bokehcam::look::{Look, presets::Preset};
-use bokehcam::preview::services::{Services, SettingsStore};
+use bokehcam::look::Look;
+use bokehcam::preview::services::Services;
 use bokehcam::preview::system::System;
 use bokehcam::source::{DepthChoice, Options};
 use tempfile::TempDir;
 
+#[path = "../common/store.rs"]
+mod store;
+
 use super::onnx::{Side, matte, model, node, port};
 use super::{WEIGHTS, written};
-
-/// What the window asks of a settings file.
-struct NoStore;
-
-impl SettingsStore for NoStore {
-    fn presets(&mut self) -> Vec<Preset> {
-        Vec::new()
-    }
-    fn save_preset(&mut self, _: &str, _: &Look) -> Result<(), String> {
-        Err("no file".into())
-    }
-    fn rename_preset(&mut self, _: &str, _: &str) -> Result<(), String> {
-        Err("no file".into())
-    }
-    fn delete_preset(&mut self, _: &str) -> Result<(), String> {
-        Err("no file".into())
-    }
-    fn command(&self, _: &Look, _: &str, _: &[String], _: &[(String, String)]) -> String {
-        String::new()
-    }
-}
+use store::NoStore;
 
 #[test]
 fn the_window_says_in_one_line_why_a_network_cannot_be_used_and_goes_on() {

@@ -3,6 +3,8 @@
 #![allow(missing_docs)]
 
 mod plug;
+#[path = "../common/store.rs"]
+mod store;
 
 use std::path::Path;
 use std::sync::atomic::Ordering;

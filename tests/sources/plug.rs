@@ -12,7 +12,6 @@ use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::knob::Knob;
 use bokehcam::link::Receiver;
 use bokehcam::link::demand::{Demand, Watch};
-use bokehcam::look::presets::Preset;
 use bokehcam::look::{Look, Strength};
 use bokehcam::pipeline::View;
 use bokehcam::preview::folders::Folders;
@@ -26,28 +25,10 @@ use bokehcam::source::devices::Choice;
 use bokehcam::source::modes::Mode;
 use bokehcam::source::{self, Frames, Options};
 
+use super::store::NoStore;
+
 pub const PATIENCE: Duration = Duration::from_secs(60);
 pub const FRAMES: usize = 12;
-
-pub struct NoStore;
-
-impl SettingsStore for NoStore {
-    fn presets(&mut self) -> Vec<Preset> {
-        Vec::new()
-    }
-    fn save_preset(&mut self, _: &str, _: &Look) -> Result<(), String> {
-        Err("no file".into())
-    }
-    fn rename_preset(&mut self, _: &str, _: &str) -> Result<(), String> {
-        Err("no file".into())
-    }
-    fn delete_preset(&mut self, _: &str) -> Result<(), String> {
-        Err("no file".into())
-    }
-    fn command(&self, _: &Look, source: &str, _: &[String], _: &[Switch]) -> String {
-        source.to_owned()
-    }
-}
 
 /// Frames as bright as twenty times their number, each 2 m away and a decimetre more than the one before.
 pub fn record(dir: &Path) {

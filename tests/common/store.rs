@@ -1,0 +1,25 @@
+//! A settings file that is none.
+
+use bokehcam::look::{Look, presets::Preset};
+use bokehcam::preview::services::{SettingsStore, Switch};
+
+/// Has no presets, and takes none; a command is its source.
+pub struct NoStore;
+
+impl SettingsStore for NoStore {
+    fn presets(&mut self) -> Vec<Preset> {
+        Vec::new()
+    }
+    fn save_preset(&mut self, _: &str, _: &Look) -> Result<(), String> {
+        Err("no file".into())
+    }
+    fn rename_preset(&mut self, _: &str, _: &str) -> Result<(), String> {
+        Err("no file".into())
+    }
+    fn delete_preset(&mut self, _: &str) -> Result<(), String> {
+        Err("no file".into())
+    }
+    fn command(&self, _: &Look, source: &str, _: &[String], _: &[Switch]) -> String {
+        source.to_owned()
+    }
+}
