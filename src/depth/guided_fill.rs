@@ -4,6 +4,8 @@
 //! and shoulders along. Where the colours of the near and the far side of a hole differ, the colour of each pixel
 //! tells which side it belongs to; the near side grows into the hole until the colour is no longer its own.
 
+use std::ops::Range;
+
 use crate::frame::{ColorImage, DepthMap};
 
 /// Depths within this ratio are one surface: nothing to decide.
@@ -20,9 +22,34 @@ const LONGEST: f32 = 0.12;
 /// Decides by colour which holes belong to the nearer side; owns the memory for it.
 #[derive(Debug, Default)]
 pub struct GuidedHoleFill {
+    /// Per pixel the depth of the near side that claims it, and whether it is a hole still. Nothing between two frames.
     claims_m: Vec<f32>,
-    /// The holes line by line.
-    marks: Vec<bool>,
+    is_hole: Vec<bool>,
+    columns: Columns,
+}
+
+/// Pixels of a row or a column, one after the other.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    /// The number of the row or column.
+    pub line: u32,
+    pub start: u32,
+    pub end: u32,
+}
+
+impl Run {
+    /// The pixels of its line.
+    #[inline(always)]
+    pub fn range(self) -> Range<usize> {
+        self.start as usize..self.end as usize
+    }
+
+    /// The same, of a row, in a map of so many columns.
+    #[inline(always)]
+    pub fn of_row(self, width: usize) -> Range<usize> {
+        let first = self.line as usize * width;
+        first + self.start as usize..first + self.end as usize
+    }
 }
 
 /// A row or a column: its pixels are `first`, `first + step`, and so on.
@@ -40,89 +67,100 @@ impl Line {
 }
 
 impl GuidedHoleFill {
-    /// Moves holes (`hole`, one flag a pixel) of a map that was filled from behind to the near side that has their
-    /// colour, along rows and then, for what is left, along columns; what was moved is no hole any more. Does nothing
-    /// when the picture has another size than the map.
-    pub fn claim(&mut self, map: &mut DepthMap, hole: &mut [bool], color: &ColorImage) {
+    /// Moves `holes`, row by row, of a map that was filled from behind to the near side that has their colour, along rows and
+    /// then, for what is left, along columns. Does nothing when the picture has another size than the map.
+    pub fn claim(&mut self, map: &mut DepthMap, holes: &[Run], color: &ColorImage) {
         let (width, height) = (map.width as usize, map.height as usize);
-        if color.size() != map.size() || map.metres.is_empty() {
+        if color.size() != map.size() || holes.is_empty() {
             return;
         }
+        self.claims_m.resize(width * height, 0.0);
+        self.is_hole.resize(width * height, false);
+        let in_map = |hole: &Run| hole.of_row(width);
+        holes.iter().for_each(|hole| self.is_hole[in_map(hole)].fill(true));
         let longest = ((width as f32 * LONGEST) as usize).max(4);
-        let rows = (0..height).map(|y| Line { first: y * width, step: 1, length: width });
-        self.marks.clear();
-        self.marks.extend_from_slice(hole);
-        self.along(rows, width, longest, map, hole, color);
-        let columns = (0..width).map(|x| Line { first: x, step: width, length: height });
-        turn(hole, width, &mut self.marks);
-        self.along(columns, 1, longest, map, hole, color);
+        for &hole in holes {
+            let line = Line { first: hole.line as usize * width, step: 1, length: width };
+            claim_run(line, hole.range(), longest, &map.metres, &color.rgb, &mut self.claims_m);
+        }
+        let places = || holes.iter().flat_map(in_map);
+        self.agree(places(), width, map);
+        holes.iter().for_each(|hole| self.claims_m[in_map(hole)].fill(0.0));
+        let Self { claims_m, is_hole, columns, .. } = self;
+        columns.collect(places().filter(|&k| is_hole[k]), width);
+        for &hole in &columns.runs {
+            let line = Line { first: hole.line as usize, step: width, length: height };
+            claim_run(line, hole.range(), longest, &map.metres, &color.rgb, claims_m);
+        }
+        self.agree(places(), 1, map);
+        for hole in holes {
+            self.claims_m[in_map(hole)].fill(0.0);
+            self.is_hole[in_map(hole)].fill(false);
+        }
     }
 
-    /// Claims along each line, then lets two of three neighbours across the lines (`across` apart) agree.
-    fn along(
-        &mut self,
-        lines: impl Iterator<Item = Line>,
-        across: usize,
-        longest: usize,
-        map: &mut DepthMap,
-        hole: &mut [bool],
-        color: &ColorImage,
-    ) {
-        self.claims_m.clear();
-        self.claims_m.resize(map.metres.len(), 0.0);
-        let mut marks = &self.marks[..];
-        for line in lines {
-            let hole;
-            (hole, marks) = marks.split_at(line.length);
-            claim_line(line, longest, &map.metres, hole, &color.rgb, &mut self.claims_m);
-        }
-        for (k, hole) in hole.iter_mut().enumerate().filter(|(_, hole)| **hole) {
-            let claim_m = |k: Option<usize>| k.and_then(|k| self.claims_m.get(k)).copied().unwrap_or(0.0);
+    /// Lets two of three neighbours across the lines, `across` apart, agree on the claims of holes; what was claimed is none any
+    /// more.
+    fn agree(&mut self, places: impl Iterator<Item = usize>, across: usize, map: &mut DepthMap) {
+        let Self { claims_m, is_hole, .. } = self;
+        for k in places {
+            if !is_hole[k] {
+                continue;
+            }
+            let claim_m = |k: Option<usize>| k.and_then(|k| claims_m.get(k)).copied().unwrap_or(0.0);
             let claims = [claim_m(k.checked_sub(across)), claim_m(Some(k)), claim_m(Some(k + across))];
             if claims.iter().filter(|&&claim_m| claim_m > 0.0).count() >= 2 {
                 map.metres[k] = if claims[1] > 0.0 { claims[1] } else { claims[0].min(claims[2]) };
-                *hole = false;
+                is_hole[k] = false;
             }
         }
     }
 }
 
-/// Columns to rows, in square blocks that fit the cache.
-fn turn(from: &[bool], width: usize, to: &mut [bool]) {
-    const BLOCK: usize = 64;
-    let height = from.len() / width;
-    for top in (0..height).step_by(BLOCK) {
-        for left in (0..width).step_by(BLOCK) {
-            for x in left..(left + BLOCK).min(width) {
-                let rows = top..(top + BLOCK).min(height);
-                for (to, y) in to[x * height..][rows.clone()].iter_mut().zip(rows) {
-                    *to = from[y * width + x];
+/// The holes of a map, column by column.
+#[derive(Debug, Default)]
+struct Columns {
+    runs: Vec<Run>,
+    /// Per column, the place of its last run plus one.
+    last: Vec<u32>,
+}
+
+impl Columns {
+    /// Takes the `places` of holes, in order.
+    fn collect(&mut self, places: impl Iterator<Item = usize>, width: usize) {
+        let Self { runs, last } = self;
+        runs.clear();
+        last.clear();
+        last.resize(width, 0);
+        for k in places {
+            let (x, y) = (k % width, (k / width) as u32);
+            match runs.get_mut((last[x] as usize).wrapping_sub(1)) {
+                Some(run) if run.end == y => run.end += 1,
+                _ => {
+                    runs.push(Run { line: x as u32, start: y, end: y + 1 });
+                    last[x] = runs.len() as u32;
                 }
             }
         }
     }
 }
 
-/// Claims in one line, whose own holes are `hole`.
-fn claim_line(line: Line, longest: usize, metres: &[f32], hole: &[bool], rgb: &[u8], claims: &mut [f32]) {
-    const MANY: usize = 16;
-    let none = |some: &[bool]| !some.iter().fold(false, |any, &hole| any | hole);
-    let skip = |start: usize| start + MANY * hole[start..].chunks_exact(MANY).take_while(|some| none(some)).count();
-    let mut start = skip(0);
-    while let Some(first) = hole[start..].iter().position(|&hole| hole).map(|k| start + k) {
-        let end = hole[first..].iter().position(|&hole| !hole).map_or(line.length, |k| first + k);
-        start = skip(end);
-        if first == 0 || end == line.length || end - first > longest {
-            continue;
-        }
-        let (before_m, after_m) = (metres[line.at(first - 1)], metres[line.at(end)]);
-        let before = mean_color(rgb, line, first.saturating_sub(SAMPLE_PX)..first);
-        let after = mean_color(rgb, line, end..(end + SAMPLE_PX).min(line.length));
-        if before_m * SAME_SURFACE < after_m {
-            grow(line, first..end, before_m, (before, after), rgb, claims);
-        } else if after_m * SAME_SURFACE < before_m {
-            grow(line, (first..end).rev(), after_m, (after, before), rgb, claims);
-        }
+/// Claims for the near side in a hole of a line.
+fn claim_run(line: Line, hole: Range<usize>, longest: usize, metres: &[f32], rgb: &[u8], claims_m: &mut [f32]) {
+    let Range { start, end } = hole;
+    if start == 0 || end == line.length || end - start > longest {
+        return;
+    }
+    let (before_m, after_m) = (metres[line.at(start - 1)], metres[line.at(end)]);
+    let colors = || {
+        let before = mean_color(rgb, line, start.saturating_sub(SAMPLE_PX)..start);
+        (before, mean_color(rgb, line, end..(end + SAMPLE_PX).min(line.length)))
+    };
+    if before_m * SAME_SURFACE < after_m {
+        grow(line, hole, before_m, colors(), rgb, claims_m);
+    } else if after_m * SAME_SURFACE < before_m {
+        let (before, after) = colors();
+        grow(line, hole.rev(), after_m, (after, before), rgb, claims_m);
     }
 }
 
@@ -133,19 +171,19 @@ fn grow(
     near_m: f32,
     (mut near, far): ([f32; 3], [f32; 3]),
     rgb: &[u8],
-    claims: &mut [f32],
+    claims_m: &mut [f32],
 ) {
     for k in pixels {
         let own = mean_color(rgb, line, k..k + 1);
         if distance(own, near) * PREFERENCE >= distance(own, far) {
             break;
         }
-        claims[line.at(k)] = near_m;
+        claims_m[line.at(k)] = near_m;
         near = std::array::from_fn(|p| near[p] + FOLLOW * (own[p] - near[p]));
     }
 }
 
-fn mean_color(rgb: &[u8], line: Line, pixels: std::ops::Range<usize>) -> [f32; 3] {
+fn mean_color(rgb: &[u8], line: Line, pixels: Range<usize>) -> [f32; 3] {
     let count = pixels.len().max(1) as f32;
     std::array::from_fn(|p| pixels.clone().map(|k| f32::from(rgb[3 * line.at(k) + p])).sum::<f32>() / count)
 }
@@ -169,8 +207,8 @@ mod tests {
             map.metres[k] = if x < 40 { 1.0 } else { 3.0 };
             color.rgb[3 * k..3 * k + 3].copy_from_slice(if x < 45 { &[40, 30, 25] } else { &[180, 190, 185] });
         }
-        let mut hole: Vec<bool> = (0..(width * height) as usize).map(|k| (40..48).contains(&(k % 80))).collect();
-        GuidedHoleFill::default().claim(&mut map, &mut hole, &color);
+        let holes: Vec<Run> = (0..height).map(|line| Run { line, start: 40, end: 48 }).collect();
+        GuidedHoleFill::default().claim(&mut map, &holes, &color);
         for (k, &metres) in map.metres.iter().enumerate() {
             assert_eq!(metres, if k % 80 < 45 { 1.0 } else { 3.0 }, "column {}", k % 80);
         }
@@ -185,11 +223,11 @@ mod tests {
             ..DepthMap::default()
         };
         let before = map.clone();
-        let mut hole = [false, false, false, true, true, true, false, false, false].repeat(3);
+        let holes = [0, 1, 2].map(|line| Run { line, start: 3, end: 6 });
         let mut guided = GuidedHoleFill::default();
-        guided.claim(&mut map, &mut hole, &ColorImage::new(9, 3));
+        guided.claim(&mut map, &holes, &ColorImage::new(9, 3));
         assert_eq!(map, before);
-        guided.claim(&mut map, &mut hole, &ColorImage::new(3, 1));
+        guided.claim(&mut map, &holes, &ColorImage::new(3, 1));
         assert_eq!(map, before);
     }
 }

@@ -10,9 +10,13 @@
 //! 2007); its mean would invent depths at edges, the mode does not (Min, Lu, Do, *Depth video enhancement based on
 //! weighted mode filtering*, 2012).
 
+use std::iter;
+use std::ops::Range;
+
 use pulp::{Arch, WithSimd};
 
-use super::planes::{Planes, SetDepths};
+use super::planes::{Planes, SetColors, SetDepths};
+use super::tiles::Tiles;
 use super::votes::{self, REACH_LANES, Votes, Weights, jump_at};
 
 /// How far from a jump a depth may be wrong, in pixels.
@@ -31,8 +35,7 @@ pub struct Aligner {
     edge: Vec<bool>,
     band: Vec<bool>,
     scratch: Vec<bool>,
-    /// How much each depth counts as a vote, 0 to 1.
-    confidence: Vec<f32>,
+    tiles: Tiles,
     /// Weight of votes by distance.
     nearby: Weights,
     /// Pixels to ask, in order: first those at an edge, then the neighbours of those that changed.
@@ -50,7 +53,7 @@ impl Default for Aligner {
             edge: Vec::new(),
             band: Vec::new(),
             scratch: Vec::new(),
-            confidence: Vec::new(),
+            tiles: Tiles::default(),
             nearby: votes::weights_by_distance(),
             front: Vec::new(),
             asked: Vec::new(),
@@ -63,36 +66,37 @@ impl Aligner {
     /// Moves the edges of `inverse` onto those of the picture `rgb`. Steps of inverse depth above `jump` are edges;
     /// depths that are `unknown` were made up.
     pub fn align(&mut self, arch: Arch, inverse: &mut [f32], unknown: &[bool], rgb: &[u8], width: usize, jump: f32) {
-        let height = inverse.len().checked_div(width).unwrap_or(0);
         self.moved.clear();
         self.asked.clear();
         for round in 0..ROUNDS {
-            let Self { planes, edge, band, scratch, confidence, nearby, front, asked, moved } = self;
-            confidence.resize(inverse.len(), 0.0);
-            arch.dispatch(FindBand { inverse, width, jump, edge, band, scratch });
-            // Only what moved in the round before can move its neighbours now.
-            front.clear();
+            let Self { planes, edge, band, scratch, tiles, nearby, front, asked, moved } = self;
             if round == 0 {
-                front.extend((0..).zip(&*edge).filter(|(_, edge)| **edge).map(|(k, _)| k));
+                for mask in [&mut *edge, &mut *band, &mut *scratch] {
+                    mask.clear();
+                    mask.resize(inverse.len(), false);
+                }
+                arch.dispatch(FindEdges { inverse, width, jump, columns: |_| iter::once(0..width), edge });
+                tiles.find(edge, width);
+                front.clear();
+                tiles.find_all(edge, front);
             } else {
+                // Only what moved in the round before can have moved edges, and can move its neighbours now.
+                arch.dispatch(FindEdges { inverse, width, jump, columns: |y| tiles.columns(y), edge });
+            }
+            arch.dispatch(FindBand { tiles, width, edge, band, scratch });
+            if round > 0 {
+                front.clear();
                 front.extend(moved.iter().filter(|&&k| band[k as usize]));
             }
             if front.is_empty() {
                 break;
             }
             if round == 0 {
-                planes.set_colors(rgb, width, height, REACH_LANES);
+                planes.resize(width, inverse.len() / width, REACH_LANES);
+                arch.dispatch(SetColors { planes, tiles, rgb });
             }
-            for ((confidence, &band), &unknown) in confidence.iter_mut().zip(&*band).zip(unknown) {
-                *confidence = if unknown {
-                    MADE_UP
-                } else if band {
-                    UNSURE
-                } else {
-                    1.0
-                };
-            }
-            arch.dispatch(SetDepths { planes, inverse, confidence });
+            let (flags, weights) = ([unknown, &**band], [MADE_UP, UNSURE]);
+            arch.dispatch(SetDepths { planes, tiles, inverse, flags, weights });
             moved.clear();
             arch.dispatch(Vote { planes, band, nearby, inverse, jump, front, moved });
             if round == 0 {
@@ -123,55 +127,91 @@ fn decide(asked: &[u32], inverse: &mut [f32], rgb: &[u8], width: usize, jump: f3
     }
 }
 
-/// Marks both sides of every jump (`edge`) and what lies within [`BAND_PX`] of one (`band`).
-struct FindBand<'a> {
+/// Marks both sides of every jump, in some columns of each row.
+struct FindEdges<'a, C> {
     inverse: &'a [f32],
     width: usize,
     jump: f32,
-    edge: &'a mut Vec<bool>,
-    band: &'a mut Vec<bool>,
-    scratch: &'a mut Vec<bool>,
+    columns: C,
+    edge: &'a mut [bool],
+}
+
+impl<I: Iterator<Item = Range<usize>>, C: Fn(usize) -> I> WithSimd for FindEdges<'_, C> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { inverse, width, jump, columns, edge } = self;
+        let height = inverse.len() / width;
+        for y in 0..height {
+            let row = &inverse[y * width..][..width];
+            let above = &inverse[y.saturating_sub(1) * width..][..width];
+            let below = &inverse[(y + 1).min(height - 1) * width..][..width];
+            let edge = &mut edge[y * width..][..width];
+            for columns in columns(y) {
+                let Range { start, end } = columns;
+                // At the ends of the row a pixel is its own neighbour.
+                for x in [start, end - 1] {
+                    let around = [above[x], below[x], row[x.saturating_sub(1)], row[(x + 1).min(width - 1)]];
+                    edge[x] = around.into_iter().any(|beside| is_jump(row[x], beside, jump));
+                }
+                if end - start <= 2 {
+                    continue;
+                }
+                let (from, len) = (start + 1, end - start - 2);
+                let [above, left, here, right, below] =
+                    [&above[from..], &row[start..], &row[from..], &row[from + 1..], &below[from..]]
+                        .map(|row| &row[..len]);
+                for (k, edge) in edge[from..][..len].iter_mut().enumerate() {
+                    let is = |beside: f32| is_jump(here[k], beside, jump);
+                    *edge = is(above[k]) | is(below[k]) | is(left[k]) | is(right[k]);
+                }
+            }
+        }
+    }
+}
+
+/// Marks what lies within [`BAND_PX`] of an edge.
+struct FindBand<'a> {
+    tiles: &'a Tiles,
+    width: usize,
+    edge: &'a [bool],
+    band: &'a mut [bool],
+    scratch: &'a mut [bool],
 }
 
 impl WithSimd for FindBand<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { inverse, width, jump, edge, band, scratch } = self;
-        let height = inverse.len() / width;
-        for mask in [&mut *edge, &mut *band, &mut *scratch] {
-            mask.clear();
-            mask.resize(inverse.len(), false);
-        }
-        for y in 0..height {
-            let row = &inverse[y * width..][..width];
-            let above = &inverse[y.saturating_sub(1) * width..][..width];
-            let below = &inverse[(y + 1).min(height - 1) * width..][..width];
-            let out = &mut edge[y * width..][..width];
-            for (((out, &here), &above), &below) in out.iter_mut().zip(row).zip(above).zip(below) {
-                *out = is_jump(here, above, jump) | is_jump(here, below, jump);
-            }
-            // The same along the row; its ends have one neighbour.
-            for (out, three) in out[1.min(width)..].iter_mut().zip(row.windows(3)) {
-                *out |= is_jump(three[1], three[0], jump) | is_jump(three[1], three[2], jump);
-            }
-            if width > 1 {
-                out[0] |= is_jump(row[0], row[1], jump);
-                out[width - 1] |= is_jump(row[width - 1], row[width - 2], jump);
-            }
-        }
+        let Self { tiles, width, edge, band, scratch } = self;
+        let height = edge.len() / width;
         // The edge pixel itself is the first of the band. Along rows, then down the columns.
         const REST_PX: usize = BAND_PX - 1;
-        for (row, out) in edge.chunks_exact(width).zip(scratch.chunks_exact_mut(width)) {
-            out.copy_from_slice(row);
-            for px in 1..=REST_PX.min(width - 1) {
-                or_assign(&mut out[px..], &row[..width - px]);
-                or_assign(&mut out[..width - px], &row[px..]);
+        for y in 0..height {
+            for columns in tiles.columns(y) {
+                let row = &edge[y * width..][..width];
+                let out = &mut scratch[y * width..][..width];
+                out[columns.clone()].copy_from_slice(&row[columns.clone()]);
+                for px in 1..=REST_PX {
+                    let Range { start, end } = columns;
+                    // What has no neighbour so far to the left, or to the right, is left out.
+                    let (after, before) = (start.max(px), end.min(width.saturating_sub(px)));
+                    if after < end {
+                        or_assign(&mut out[after..end], &row[after - px..end - px]);
+                    }
+                    if start < before {
+                        or_assign(&mut out[start..before], &row[start + px..before + px]);
+                    }
+                }
             }
         }
-        for (y, out) in band.chunks_exact_mut(width).enumerate() {
-            for other in y.saturating_sub(REST_PX)..(y + BAND_PX).min(height) {
-                or_assign(out, &scratch[other * width..][..width]);
+        for y in 0..height {
+            for columns in tiles.columns(y) {
+                let out = &mut band[y * width..][columns.clone()];
+                out.fill(false);
+                for other in y.saturating_sub(REST_PX)..(y + BAND_PX).min(height) {
+                    or_assign(out, &scratch[other * width..][columns.clone()]);
+                }
             }
         }
     }

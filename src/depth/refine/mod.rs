@@ -11,6 +11,7 @@ mod outlines;
 mod planes;
 mod smooth;
 mod temporal;
+mod tiles;
 mod upsample;
 mod votes;
 

@@ -43,9 +43,11 @@ pub struct TemporalFilter {
     held: Vec<f32>,
     /// The last picture.
     rgb: Vec<u8>,
-    /// Change of colour since the last frame, then its mean over 3x3 pixels.
-    change: Vec<f32>,
-    smooth_change: Vec<f32>,
+    /// Change of colour since the last frame, summed up over 3x3 pixels.
+    change: Vec<u16>,
+    /// The same of three rows, summed up along them; and of the pixels of one.
+    rows: [Vec<u16>; 3],
+    single: Vec<u16>,
     /// Memory for the samples of the median.
     looks: Vec<f32>,
 }
@@ -66,13 +68,12 @@ impl TemporalFilter {
         let same_size = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
         let in_order = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
         if same_size && in_order {
-            self.change.resize(inverse.len(), 0.0);
-            self.smooth_change.resize(inverse.len(), 0.0);
-            let (change, smooth) = (&mut self.change, &mut self.smooth_change);
-            arch.dispatch(Change { rgb, before: &self.rgb, width, change, smooth });
+            self.change.resize(inverse.len(), 0);
+            let Self { change, rows, single, rgb: before, .. } = self;
+            arch.dispatch(Change { rgb, before, width, rows, single, change });
             let moved = (MOVED * self.median_change()).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
-            let Self { mean, count, held, smooth_change, .. } = self;
-            arch.dispatch(Average { inverse, mean, count, held, change: smooth_change, moved, limits });
+            let Self { mean, count, held, change, .. } = self;
+            arch.dispatch(Average { inverse, mean, count, held, change, moved, limits });
         } else {
             self.mean.clear();
             self.mean.extend_from_slice(inverse);
@@ -81,60 +82,72 @@ impl TemporalFilter {
                 state.resize(inverse.len(), 0.0);
             }
             self.count.fill(1.0);
+            self.rgb.clear();
+            self.rgb.extend_from_slice(rgb);
         }
-        self.rgb.clear();
-        self.rgb.extend_from_slice(rgb);
         (self.width, self.time_ns) = (width, time_ns);
     }
 
-    /// The median of the smoothed change over a grid of samples.
+    /// The median of the mean change over a grid of samples.
     fn median_change(&mut self) -> f32 {
-        let height = self.smooth_change.len() / self.width;
+        let height = self.change.len() / self.width;
         self.looks.clear();
         for y in (0..height).step_by(height.div_ceil(LOOKS)) {
-            let row = &self.smooth_change[y * self.width..][..self.width];
-            self.looks.extend(row.iter().step_by(self.width.div_ceil(LOOKS)));
+            let row = &self.change[y * self.width..][..self.width];
+            self.looks.extend(row.iter().step_by(self.width.div_ceil(LOOKS)).map(|&change| per_pixel(change)));
         }
         let middle = self.looks.len() / 2;
         *self.looks.select_nth_unstable_by(middle, f32::total_cmp).1
     }
 }
 
-/// How much the colours around each pixel changed: the mean over 3x3 pixels, in `smooth`.
+/// The mean of a change that was summed up over 3x3 pixels.
+#[inline(always)]
+fn per_pixel(change: u16) -> f32 {
+    f32::from(change) / 9.0
+}
+
+/// How much the colours around each pixel changed, summed up over 3x3 pixels: at the border the outermost ones count twice.
+/// Remembers the picture.
 struct Change<'a> {
     rgb: &'a [u8],
-    before: &'a [u8],
+    before: &'a mut [u8],
     width: usize,
-    change: &'a mut [f32],
-    smooth: &'a mut [f32],
+    rows: &'a mut [Vec<u16>; 3],
+    single: &'a mut Vec<u16>,
+    change: &'a mut [u16],
 }
 
 impl WithSimd for Change<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { rgb, before, width, change, smooth } = self;
-        for ((now, before), change) in rgb.chunks_exact(3).zip(before.chunks_exact(3)).zip(change.iter_mut()) {
-            let apart = |k: usize| u16::from(now[k].abs_diff(before[k]));
-            *change = f32::from(apart(0) + apart(1) + apart(2));
+        let Self { rgb, before, width, rows, single, change } = self;
+        let (height, last) = (change.len() / width, width - 1);
+        for row in rows.iter_mut().chain([&mut *single]) {
+            row.resize(width, 0);
         }
-        // Along rows, then down the columns; at the border the outermost pixel counts twice.
-        for (row, out) in change.chunks_exact(width).zip(smooth.chunks_exact_mut(width)) {
-            out[0] = row[0] + row[0] + row[1.min(width - 1)];
-            for (out, three) in out[1..].iter_mut().zip(row.windows(3)) {
-                *out = three[0] + three[1] + three[2];
+        let pictures = rgb.chunks_exact(3 * width).zip(before.chunks_exact_mut(3 * width));
+        for (y, (now, before)) in pictures.enumerate() {
+            let pixels = now.as_chunks::<3>().0.iter().zip(before.as_chunks::<3>().0);
+            for ((now, before), single) in pixels.zip(&mut *single) {
+                let apart = |p: usize| u16::from(now[p].abs_diff(before[p]));
+                *single = apart(0) + apart(1) + apart(2);
             }
-            if width > 1 {
-                out[width - 1] = row[width - 2] + 2.0 * row[width - 1];
+            before.copy_from_slice(now);
+            let row = &mut rows[y % 3];
+            row[0] = 2 * single[0] + single[1.min(last)];
+            row[last] = single[last.saturating_sub(1)] + 2 * single[last];
+            for (sum, three) in row.iter_mut().skip(1).zip(single.windows(3)) {
+                *sum = three[0] + three[1] + three[2];
             }
-        }
-        change.copy_from_slice(smooth);
-        let height = change.len() / width;
-        let row = |y: usize| &change[y * width..(y + 1) * width];
-        for (y, out) in smooth.chunks_exact_mut(width).enumerate() {
-            let three = row(y.saturating_sub(1)).iter().zip(row(y)).zip(row((y + 1).min(height - 1)));
-            for (out, ((above, here), below)) in out.iter_mut().zip(three) {
-                *out = (above + here + below) / 9.0;
+            // The row above has all its neighbours now; the last one is its own.
+            for y in y.saturating_sub(1)..if y + 1 < height { y } else { height } {
+                let [above, here, below] = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| &rows[y % 3]);
+                let out = &mut change[y * width..][..width];
+                for (out, ((above, here), below)) in out.iter_mut().zip(above.iter().zip(here).zip(below)) {
+                    *out = above + here + below;
+                }
             }
         }
     }
@@ -146,7 +159,7 @@ struct Average<'a> {
     mean: &'a mut [f32],
     count: &'a mut [f32],
     held: &'a mut [f32],
-    change: &'a [f32],
+    change: &'a [u16],
     /// Up to this change of colour a pixel rests.
     moved: f32,
     limits: Limits,
@@ -161,7 +174,7 @@ impl WithSimd for Average<'_> {
         let state = mean.iter_mut().zip(count).zip(held).zip(change);
         for (inverse, (((mean, count), held), &change)) in inverse.iter_mut().zip(state) {
             // From 1 up to the bound to 0 at twice the bound: the weight of the past.
-            let rest = unit(2.0 - change * per_moved);
+            let rest = unit(2.0 - per_pixel(change) * per_moved);
             let step = *inverse - *mean;
             let noise_share = unit(step.abs() * per_noise);
             let changed = noise_share >= 1.0;

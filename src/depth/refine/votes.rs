@@ -75,9 +75,10 @@ impl Votes {
                 *weight = [0.0; LANES];
                 continue;
             }
-            let [from_depth, confidence, red, green, blue] = planes.window(x, row);
+            let ([from_depth, confidence], [red, green, blue]) = planes.window(x, row);
             for lane in 0..LANES {
-                let (red, green, blue) = (red[lane] - center[0], green[lane] - center[1], blue[lane] - center[2]);
+                let of = |plane: &[u8; LANES], p: usize| f32::from(plane[lane]) - center[p];
+                let (red, green, blue) = (of(red, 0), of(green, 1), of(blue, 2));
                 let apart = red * red + green * green + blue * blue;
                 let alike = 1.0 - apart * QUARTER_T;
                 let alike = if alike > 0.0 { alike } else { 0.0 };

@@ -1,0 +1,92 @@
+//! The parts of a picture that have edges: only there, edges are aligned.
+
+use std::ops::Range;
+
+/// Columns and rows of a tile: more than an edge moves in all rounds, and what a window reaches from there.
+const COLUMNS: usize = 32;
+const ROWS: usize = 24;
+
+/// The tiles of a picture that have an edge, and those around them.
+#[derive(Debug, Default)]
+pub struct Tiles {
+    width: usize,
+    across: usize,
+    has_edge: Vec<bool>,
+    is_near: Vec<bool>,
+}
+
+impl Tiles {
+    /// Looks where a picture of so many columns has edges.
+    pub fn find(&mut self, edge: &[bool], width: usize) {
+        let down = (edge.len() / width).div_ceil(ROWS);
+        (self.width, self.across) = (width, width.div_ceil(COLUMNS));
+        for tiles in [&mut self.has_edge, &mut self.is_near] {
+            tiles.clear();
+            tiles.resize(self.across * down, false);
+        }
+        for (y, row) in edge.chunks_exact(width).enumerate() {
+            let tiles = &mut self.has_edge[y / ROWS * self.across..][..self.across];
+            for (has_edge, columns) in tiles.iter_mut().zip(row.chunks(COLUMNS)) {
+                *has_edge |= columns.iter().fold(false, |any, edge| any | edge);
+            }
+        }
+        for k in (0..self.has_edge.len()).filter(|&k| self.has_edge[k]) {
+            let (row, column) = (k / self.across, k % self.across);
+            for row in row.saturating_sub(1)..(row + 2).min(down) {
+                let tiles = &mut self.is_near[row * self.across..][..self.across];
+                tiles[column.saturating_sub(1)..(column + 2).min(self.across)].fill(true);
+            }
+        }
+    }
+
+    /// Adds the places of all edges, in order.
+    pub fn find_all(&self, edge: &[bool], places: &mut Vec<u32>) {
+        for (y, row) in edge.chunks_exact(self.width).enumerate() {
+            let tiles = &self.has_edge[y / ROWS * self.across..][..self.across];
+            for (k, _) in tiles.iter().enumerate().filter(|(_, has_edge)| **has_edge) {
+                let columns = k * COLUMNS..((k + 1) * COLUMNS).min(self.width);
+                let first = (y * self.width + columns.start) as u32;
+                places.extend((first..).zip(&row[columns]).filter(|(_, edge)| **edge).map(|(place, _)| place));
+            }
+        }
+    }
+
+    /// The columns of row `y` near edges, from the left; each range begins at an even one.
+    pub fn columns(&self, y: usize) -> impl Iterator<Item = Range<usize>> + use<'_> {
+        let tiles = &self.is_near[y / ROWS * self.across..][..self.across];
+        let runs = tiles.chunk_by(|a, b| a == b).scan(0, |begin, run| {
+            let first = *begin;
+            *begin += run.len();
+            Some((run[0], first * COLUMNS..(*begin * COLUMNS).min(self.width)))
+        });
+        runs.filter_map(|(is_near, columns)| is_near.then_some(columns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_around_an_edge_is_near_it_and_nothing_is_far_from_it() {
+        let (width, height) = (7 * COLUMNS + 5, 5 * ROWS + 1);
+        for (x, y) in [(0, 0), (width - 1, height - 1), (3 * COLUMNS, 2 * ROWS), (4 * COLUMNS - 1, 3 * ROWS - 1)] {
+            let mut edge = vec![false; width * height];
+            edge[y * width + x] = true;
+            let mut tiles = Tiles::default();
+            tiles.find(&edge, width);
+            for row in 0..height {
+                let mut is_near = vec![false; width];
+                for columns in tiles.columns(row) {
+                    assert!(columns.start.is_multiple_of(2));
+                    is_near[columns].fill(true);
+                }
+                for (column, is_near) in is_near.into_iter().enumerate() {
+                    let (right, down) = (column.abs_diff(x), row.abs_diff(y));
+                    assert!(is_near || right > COLUMNS || down > ROWS, "{column},{row} for {x},{y}");
+                    assert!(!is_near || right < 2 * COLUMNS && down < 2 * ROWS, "{column},{row} for {x},{y}");
+                }
+            }
+        }
+    }
+}
