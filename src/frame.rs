@@ -1,5 +1,6 @@
 //! Pictures and depth maps: what travels between the stages.
 
+pub mod crop;
 pub mod fit;
 mod matte;
 pub mod scale;

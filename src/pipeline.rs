@@ -19,6 +19,7 @@ mod places;
 mod playout;
 mod quality;
 mod rate;
+mod staging;
 pub mod still;
 mod view;
 mod wanted;
@@ -42,6 +43,7 @@ use crate::clock::{self, Clock};
 use crate::compute::Backend;
 use crate::computing::Computing;
 use crate::depth::DepthSource;
+use crate::frame::crop::Cropper;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::demand::Demand;
 use crate::link::pool::Pool;
@@ -266,6 +268,8 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         tally: &tally,
         clock: &clock,
         times: deliver::Times { sink: sink_times, playout, latency, frame, repeats },
+        cropper: Cropper::default(),
+        cropped: ColorImage::default(),
     };
 
     let ended = thread::scope(|scope| {

@@ -86,7 +86,7 @@ fn it_is_seen_how_outlines_lie() {
 /// How far the CoC is off, on average, in pixels.
 fn coc_error_px(refine: Refine, color: &ColorImage, map: DepthMap, truth: &DepthMap) -> f32 {
     let look = Look { refine, focus: "1.2".parse().unwrap(), ..Look::default() };
-    let (field, map) = coc_and_depth(&look, color, Some(Depth::Measured(map))).unwrap();
+    let (field, map) = coc_and_depth(&look, &mut color.clone(), Some(Depth::Measured(map))).unwrap();
     let map = map.unwrap();
     let bokehcam::optics::CocField::Depth(lens) = field else { panic!("the blur follows depth") };
     let step = truth.width / map.width;

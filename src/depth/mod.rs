@@ -4,11 +4,13 @@
 
 pub mod agreement;
 mod alignment;
+pub mod backdrop;
 pub mod background;
 pub mod beside;
 pub mod defocus;
 pub mod fill;
 pub mod focus;
+pub mod follow;
 mod guided_fill;
 pub mod kept;
 #[cfg(feature = "camera")]

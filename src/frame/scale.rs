@@ -23,8 +23,14 @@ pub struct Scale {
 impl Scale {
     /// Takes other sizes (columns, rows), neither with a side of 0. Allocates only when one changes.
     pub fn adapt(&mut self, from: (usize, usize), to: (usize, usize)) {
-        self.across.adapt(from.0, to.0);
-        self.down.adapt(from.1, to.1);
+        self.adapt_part(from, [(0.0, from.0 as f64), (0.0, from.1 as f64)], to);
+    }
+
+    /// The same for a part of the source: where it begins, and how long it is, across and down, in pixels and parts of pixels.
+    /// It lies within the source. Allocates no more when another part is taken.
+    pub fn adapt_part(&mut self, from: (usize, usize), [across, down]: [(f64, f64); 2], to: (usize, usize)) {
+        self.across.adapt(from.0, across, to.0);
+        self.down.adapt(from.1, down, to.1);
     }
 
     /// Writes these `columns` of the row `y` of the scaled picture to `scaled`, 3 bytes each; `from` are the pixels of
@@ -112,6 +118,8 @@ fn share(value: u8, weight: u16) -> u16 {
 #[derive(Debug, Default)]
 struct Axis {
     from: usize,
+    /// Where the part begins, and how long it is.
+    part: (f64, f64),
     firsts: Vec<usize>,
     taps: usize,
     /// `taps` of each pixel; they sum to 1.
@@ -119,18 +127,19 @@ struct Axis {
 }
 
 impl Axis {
-    fn adapt(&mut self, from: usize, to: usize) {
-        if (self.from, self.firsts.len()) == (from, to) {
+    fn adapt(&mut self, from: usize, part: (f64, f64), to: usize) {
+        if (self.from, self.part, self.firsts.len()) == (from, part, to) {
             return;
         }
-        let ratio = from as f64 / to as f64;
+        let (begin, length) = part;
+        let ratio = length / to as f64;
         let reach = ratio.max(1.0);
-        self.from = from;
+        (self.from, self.part) = (from, part);
         self.taps = ((2.0 * reach).ceil() as usize).min(from);
         self.firsts.clear();
         self.weights.clear();
         for pixel in 0..to {
-            let center = (pixel as f64 + 0.5) * ratio - 0.5;
+            let center = begin + (pixel as f64 + 0.5) * ratio - 0.5;
             let first = ((center - reach).floor() + 1.0).clamp(0.0, (from - self.taps) as f64) as usize;
             let start = self.weights.len();
             let tent = |tap: usize| (1.0 - ((first + tap) as f64 - center).abs() / reach).max(0.0);

@@ -4,6 +4,7 @@
 //! pictures of one size it becomes the executor's [`bokeh::Settings`] and a [`CocRule`].
 
 mod aperture;
+mod behind;
 mod coc;
 mod effect;
 pub mod number;
@@ -14,6 +15,7 @@ mod strength;
 mod tilt;
 
 pub use aperture::ApertureName;
+pub use behind::{BehindName, Follow};
 pub use coc::{CocAtInfinity, CocRule};
 pub use effect::{BackgroundMemory, Effect, Refine};
 pub use patch::{LookError, Value};
@@ -23,6 +25,7 @@ pub use tilt::Tilt;
 
 use crate::bokeh::{self, aperture::Aperture};
 use crate::budget::Quality;
+use crate::depth::backdrop::Behind;
 use crate::depth::focus::FocusRule;
 use crate::optics::{CocField, CocKind};
 
@@ -62,6 +65,10 @@ pub struct Look {
     pub refine: Refine,
     /// Whether a stream remembers what lies behind things.
     pub background_memory: BackgroundMemory,
+    /// What is behind the subject.
+    pub behind: Behind,
+    /// Whether a stream keeps the subject in the middle.
+    pub follow: Follow,
     /// The band of the effect `tilt-shift`.
     pub tilt: Tilt,
     /// The lens opening.
@@ -87,6 +94,8 @@ impl Default for Look {
             max_coc_px: None,
             refine: Refine::Auto,
             background_memory: BackgroundMemory::On,
+            behind: Behind::Blur,
+            follow: Follow::OFF,
             tilt: Tilt { center_y: 0.55, band: 0.15, angle_deg: 0.0 },
             aperture: Aperture::default(),
             // Rank 3 is then as good as rank 7 of a hard disc.

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::settings::{SETTINGS, Setting, setting};
-use super::{ApertureName, Look, Patch, Strength};
+use super::{ApertureName, BehindName, Look, Patch, Strength};
 use crate::bokeh::aperture::Shape;
+use crate::depth::backdrop::Behind;
 use crate::optics::Lens;
 use crate::recording::RecordingError;
 
@@ -16,9 +17,9 @@ pub enum LookError {
     /// A lens is not known by all of its numbers.
     #[error("a lens needs all of --f-number, --focal-length and --sensor-width")]
     Lens,
-    /// The picture of the aperture cannot be read.
+    /// A picture that it names cannot be read.
     #[error(transparent)]
-    Aperture(#[from] RecordingError),
+    Picture(#[from] RecordingError),
 }
 
 impl Patch {
@@ -40,6 +41,8 @@ impl Patch {
             max_coc_px: Some(look.max_coc_px.into()),
             refine: Some(look.refine),
             background_memory: Some(look.background_memory),
+            behind: BehindName::of(&look.behind),
+            follow: Some(look.follow),
             tilt: Some(look.tilt),
             aperture: ApertureName::of(&look.aperture.shape),
             intensity: Some(look.aperture.intensity),
@@ -77,13 +80,16 @@ impl Patch {
         self
     }
 
-    /// Reads the picture of the aperture, if it has one, so that [`Patch::on`] need not.
+    /// Reads the pictures that it names, so that [`Patch::on`] need not.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// One cannot be read.
     pub fn load(&mut self) -> Result<(), RecordingError> {
         if let Some(name) = &mut self.aperture {
             *name = ApertureName::Drawn(name.load()?);
+        }
+        if let Some(name) = &mut self.behind {
+            *name = BehindName::Known(name.load()?);
         }
         Ok(())
     }
@@ -91,13 +97,13 @@ impl Patch {
     /// `base` with these settings; what it does not set is as before.
     ///
     /// # Errors
-    /// A lens misses a number, or the picture of the aperture cannot be read.
+    /// A lens misses a number, or a picture cannot be read.
     pub fn on(&self, base: &Look) -> Result<Look, LookError> {
         let mut look = base.clone();
         macro_rules! take {
             ($($field:ident),+) => { $(if let Some(value) = self.$field { look.$field = value; })+ };
         }
-        take!(effect, method, focus, focus_range_m, refine, background_memory, tilt, rim, highlights);
+        take!(effect, method, focus, focus_range_m, refine, background_memory, follow, tilt, rim, highlights);
         look.strength = self.strength(base.strength)?;
         if let Some(max_coc_px) = self.max_coc_px {
             look.max_coc_px = max_coc_px.chosen();
@@ -107,6 +113,11 @@ impl Patch {
             // The base has this picture already: it is not read again.
             (Some(ApertureName::Image(file)), Shape::Picture(picture)) if picture.file.as_ref() == Some(file) => {}
             (Some(name), _) => look.aperture.shape = name.load()?,
+        }
+        match (&self.behind, &look.behind) {
+            (None, _) => {}
+            (Some(BehindName::Image(file)), Behind::Picture(picture)) if picture.file.as_ref() == Some(file) => {}
+            (Some(name), _) => look.behind = name.load()?,
         }
         if let Some(intensity) = self.intensity {
             look.aperture.intensity = intensity;

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use super::number::{OrAuto, above_zero, not_negative, within};
-use super::{ApertureName, BackgroundMemory, Effect, Look, MOST_RADIUS_PX, Refine, Strength, Tilt};
+use super::{ApertureName, BackgroundMemory, BehindName, Effect, Follow, Look, MOST_RADIUS_PX, Refine, Strength, Tilt};
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::depth::focus::FocusRule;
@@ -114,6 +114,10 @@ settings! {
     refine: Refine = "refine" "WHEN" Blur Refine::from_str, one of names_of::<Refine>();
     /// What a stream shows of what things hide, where blur lets it through
     background_memory: BackgroundMemory = "background-memory" "WHETHER" Blur BackgroundMemory::from_str, one of names_of::<BackgroundMemory>();
+    /// What is behind the subject: blur (the room), color:#RRGGBB or image:FILE
+    behind: BehindName = "behind" "WHAT" Blur BehindName::from_str;
+    /// Keep the subject in the middle by showing a part of the picture: the largest zoom, up to 4, or off
+    follow: Follow = "follow" "ZOOM" Blur Follow::from_str;
     /// Sharp band of tilt-shift: CENTER_Y[:BAND[:ANGLE_DEG]], the first two as fractions of the height
     tilt: Tilt = "tilt" "BAND" Blur Tilt::from_str;
     /// disc, ring:INNER, polygon:N[:ROTATION_DEG[:CURVATURE]], heart, star:N or image:FILE

@@ -7,6 +7,7 @@ use super::playout::Playout;
 use super::{Ended, Frame, Progress, View};
 use crate::clock::Clock;
 use crate::frame::ColorImage;
+use crate::frame::crop::Cropper;
 use crate::link::{self, Received, Receiver, Sender};
 use crate::sink::Sink;
 use crate::stats::{Cause, Histogram, Tally, Ticket};
@@ -24,6 +25,9 @@ pub(super) struct Stage<'a> {
     /// When pictures are due; `None` shows them as they come.
     pub playout: Option<Playout>,
     pub times: Times<'a>,
+    pub cropper: Cropper,
+    /// The part of the picture that goes out.
+    pub cropped: ColorImage,
 }
 
 pub(super) struct Times<'a> {
@@ -56,8 +60,11 @@ impl Stage<'_> {
                 },
                 Received::Ended => break,
             };
+            let part = trace.part.zip(frame.picture.memory());
+            let is_cropped = part.map(|(part, whole)| self.cropper.crop(whole, &part, &mut self.cropped)).is_some();
             if self.mirror {
-                frame.picture.memory_mut().map(mirror);
+                let out = if is_cropped { Some(&mut self.cropped) } else { frame.picture.memory_mut() };
+                out.map(mirror);
             }
             let ready_ns = self.clock.now_ns();
             trace.between_ns += ready_ns.saturating_sub(since_ns);
@@ -68,8 +75,8 @@ impl Stage<'_> {
             }
             let began_ns = ready_ns + trace.playout_ns;
             trace.age_ns = began_ns.saturating_sub(ticket.captured_ns);
-            if let Some(picture) = frame.picture.memory() {
-                match self.sink.put(picture, stamp.time_ns) {
+            if let Some(whole) = frame.picture.memory() {
+                match self.sink.put(if is_cropped { &self.cropped } else { whole }, stamp.time_ns) {
                     Ok(flow) if flow.is_break() => break,
                     Ok(_) => {}
                     Err(error) => {

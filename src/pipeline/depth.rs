@@ -8,6 +8,7 @@ use super::change::{Change, Executor, Swap};
 use super::coc::{CocMaker, Finish};
 use super::fit_check::{FitCheck, Verdict};
 use super::rate::Rate;
+use super::staging::Staging;
 use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, hand_on};
 use crate::budget::DepthTimes;
@@ -65,6 +66,7 @@ impl Stage<'_> {
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
         let mut coc = CocMaker::new(self.look.coc_rule(self.size), self.finish(&self.look));
         coc.remember(self.remembers(&self.look));
+        let mut staging = Staging::new(&self.look);
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
         let (mut change, mut between) = (0, false);
@@ -84,6 +86,7 @@ impl Stage<'_> {
             for Change { number, look, bokeh } in self.changes.iter().flat_map(mpsc::Receiver::try_iter) {
                 coc.follow(look.coc_rule(self.size), self.finish(&look));
                 coc.remember(self.remembers(&look));
+                staging.follow(&look);
                 (change, between) = (number, matches!(bokeh, Executor::Meanwhile));
                 self.rate.iter_mut().for_each(Rate::forget);
                 if let Executor::To(executor) = bokeh {
@@ -106,7 +109,7 @@ impl Stage<'_> {
                     .depth_and_coc(&mut coc, (depth, right), &mut color, stamp)
                     .map(|(map, field)| (Some(map), field)),
             };
-            let (depth, coc) = match made {
+            let (mut depth, coc) = match made {
                 Ok(made) => made,
                 Err(fault) => {
                     let (cause, goes_on) = match &fault {
@@ -127,6 +130,7 @@ impl Stage<'_> {
                 }
             };
             (trace.change, trace.between) = (change, between);
+            trace.part = depth.as_mut().and_then(|map| staging.stage(&mut color, map, &coc, stamp.time_ns));
             let since_ns = self.clock.now_ns();
             (trace.depth_ns, trace.depth_held) = (since_ns - began_ns, *self.held > held_before);
             let effort = (!trace.depth_held).then(|| self.rate.as_ref().map_or(0, Rate::effort));

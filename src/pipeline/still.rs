@@ -1,5 +1,6 @@
 //! One picture on its own: the same blur as in a stream, without one.
 
+use super::staging::Staging;
 use super::{CocMaker, Finish};
 use crate::bokeh::{Bokeh, BokehError, Job};
 use crate::budget::Quality;
@@ -8,7 +9,7 @@ use crate::computing::Computing;
 use crate::depth::misfit::Misfit;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
-use crate::look::{Look, Refine};
+use crate::look::{Follow, Look, Refine};
 use crate::optics::CocField;
 
 /// A depth map for one picture.
@@ -21,13 +22,13 @@ pub enum Depth {
 
 /// What `color` is blurred by: the circle of confusion of every pixel, and the depth map if that follows depth. A
 /// measured map is returned with its holes filled, and refined if the look asks for it; or where it leaves that open and
-/// the map does not fit the picture.
+/// the map does not fit the picture. What the look puts behind the subject is put into the picture.
 ///
 /// # Errors
 /// [`BokehError::NoDepth`] when the blur follows depth and there is none.
 pub fn coc_and_depth(
     look: &Look,
-    color: &ColorImage,
+    color: &mut ColorImage,
     depth: Option<Depth>,
 ) -> Result<(CocField, Option<DepthMap>), BokehError> {
     let (finish, mending, map) = match depth {
@@ -44,7 +45,11 @@ pub fn coc_and_depth(
     match (maker.fixed(), map) {
         (Some(field), _) => Ok((field, None)),
         (None, None) => Err(BokehError::NoDepth),
-        (None, Some(mut map)) => Ok((maker.make(&mut map, color, 0), Some(map))),
+        (None, Some(mut map)) => {
+            let field = maker.make(&mut map, color, 0);
+            Staging::new(&Look { follow: Follow::OFF, ..look.clone() }).stage(color, &mut map, &field, 0);
+            Ok((field, Some(map)))
+        }
     }
 }
 
@@ -54,13 +59,13 @@ pub fn coc_and_depth(
 /// The blur follows depth and there is none, is too wide for the picture, or there is no such GPU.
 pub fn blur(
     look: &Look,
-    color: ColorImage,
+    mut color: ColorImage,
     depth: Option<Depth>,
     computing: &Computing,
 ) -> Result<(ColorImage, String), BokehError> {
     let size = color.size();
     let Some(settings) = look.settings(size, false) else { return Ok((color, "not blurred".to_string())) };
-    let (coc, depth) = coc_and_depth(look, &color, depth)?;
+    let (coc, depth) = coc_and_depth(look, &mut color, depth)?;
     let mut bokeh = computing.blur(&settings, size)?;
     Ok((blur_with(&mut *bokeh, settings.quality, color, depth, coc)?, bokeh.describe()))
 }

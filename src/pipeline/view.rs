@@ -2,6 +2,7 @@
 
 use crate::bokeh::{PassTimes, Picture};
 use crate::budget::Quality;
+use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap, Stamp};
 use crate::link::pool::Pooled;
 use crate::optics::CocField;
@@ -67,6 +68,8 @@ pub struct Trace {
     pub quality: Option<Quality>,
     /// The number of the last wish of a [`Seeker`](crate::capture::Seeker) before it; 0 where there was none.
     pub seek: u64,
+    /// The part of it that goes out; `None` is all.
+    pub part: Option<Crop>,
     /// Whether it is the frame of that wish: it is shown however late it is.
     pub asked: bool,
 }

@@ -166,7 +166,8 @@ fn measure(
             "--effect none leaves nothing to measure: use dof, tilt-shift or blur".to_string(),
         ));
     };
-    let (coc, depth) = coc_and_depth(&look, color, Some(Depth::Measured(depth.clone())))?;
+    let mut color = color.clone();
+    let (coc, depth) = coc_and_depth(&look, &mut color, Some(Depth::Measured(depth.clone())))?;
     let mut bokeh = computing.blur(&settings, size)?;
     let buffers = Buffers {
         colors: Pool::new(bokeh.capacity(), || color.clone()),

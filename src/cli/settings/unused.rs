@@ -43,7 +43,7 @@ pub enum From {
 type Why = fn(&Run) -> Option<&'static str>;
 
 /// What settings need to have an effect. The first two rows depend on the source alone: `warn_by_source` takes these.
-const NEEDS: [(&[&str], Why); 17] = [
+const NEEDS: [(&[&str], Why); 19] = [
     (&["size", "fps"], |run| match run.source {
         From::Source(Kind::Recording) => Some("a recording has its own"),
         From::Source(Kind::Demo) => Some("the demonstration has its own"),
@@ -81,6 +81,11 @@ const NEEDS: [(&[&str], Why); 17] = [
         (From::Picture | From::Bench, _) => Some("a picture on its own has nothing to remember"),
         (_, DepthFrom::Plate) => Some("the plate has what lies behind"),
         _ => dof(run),
+    }),
+    (&["behind"], |run| if run.source == From::Bench { Some("the scene is its own") } else { dof(run) }),
+    (&["follow"], |run| match run.source {
+        From::Picture | From::Bench => Some("a picture on its own is shown as a whole"),
+        From::Source(_) => dof(run),
     }),
     (&["tilt"], |run| (run.effect != Effect::TiltShift).then_some("the effect is not tilt-shift")),
     (&["coc-at-infinity", "f-number", "focal-length", "sensor-width"], |run| {
@@ -234,7 +239,7 @@ mod tests {
         let all = all_settings();
         let is_camera = |name: &&str| ["format", "control"].contains(name);
         let is_setting = |name: &&str| all.get_arguments().any(|arg| arg.get_long() == Some(name));
-        let window = |name: &&str| cfg!(feature = "window") || !NEEDS[15].0.contains(name);
+        let window = |name: &&str| cfg!(feature = "window") || !NEEDS[NEEDS.len() - 1].0.contains(name);
         assert!(names.iter().all(|name| is_setting(name) || is_camera(name) || !window(name)), "{names:?}");
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]));

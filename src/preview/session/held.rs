@@ -69,13 +69,14 @@ impl HeldBlur {
             BokehError::NoDepth => NO_DEPTH.to_owned(),
             error => error.to_string(),
         };
-        let (coc, depth) = still::coc_and_depth(&fixed, color, depth.clone().map(Depth::Final)).map_err(plain)?;
+        let mut color = color.clone();
+        let (coc, depth) = still::coc_and_depth(&fixed, &mut color, depth.clone().map(Depth::Final)).map_err(plain)?;
         if self.executor.as_ref().is_none_or(|(made_for, _)| *made_for != settings) {
             let executor = services.executor(&settings, color.size())?;
             self.executor = Some((settings.clone(), executor));
         }
         let Some((_, executor)) = &mut self.executor else { return Err(BokehError::Lost.to_string()) };
-        let blurred = still::blur_with(&mut **executor, settings.quality, color.clone(), depth.clone(), coc);
+        let blurred = still::blur_with(&mut **executor, settings.quality, color, depth.clone(), coc);
         match blurred {
             Ok(picture) => {
                 Ok(Blurred { number: *number, picture, depth, coc, change, quality: Some(settings.quality) })

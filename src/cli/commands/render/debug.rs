@@ -93,7 +93,7 @@ impl Range {
 /// # Errors
 /// As without a folder; the folder or a file in it cannot be written, or exists and may not be overwritten.
 pub fn blurred(
-    color: ColorImage,
+    mut color: ColorImage,
     depth: Option<Depth>,
     look: &Look,
     computing: &Computing,
@@ -111,7 +111,7 @@ pub fn blurred(
             }
             settings.check(size)?;
             let mut bokeh = CpuBokeh::new(Plan::new(&settings, size.0, size.1), computing.threads);
-            let (coc, depth) = coc_and_depth(look, &color, depth)?;
+            let (coc, depth) = coc_and_depth(look, &mut color, depth)?;
             bokeh.blur(&color, depth.as_ref(), &coc, &mut result)?;
             output.collect(&bokeh, &color, depth.as_ref(), &coc);
         }

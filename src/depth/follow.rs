@@ -1,0 +1,224 @@
+//! Keeps the subject in the middle: which part of the picture to show, from frame to frame.
+//!
+//! What is in focus has a place and a size in the depth map; the part shown glides there as a camera on a good head does: a
+//! critically damped spring, which sets out only when the subject has really moved, and comes to rest.
+
+use crate::frame::DepthMap;
+use crate::frame::crop::Crop;
+use crate::optics::DepthCoc;
+
+/// What is in focus: so near to the focal plane, as ratios of inverse depths.
+const IN_FOCUS: std::ops::RangeInclusive<f32> = 0.8..=1.25;
+/// Columns that are looked at.
+const LOOKS: usize = 160;
+/// Less of a picture is no subject.
+const LEAST_SHARE: f32 = 0.005;
+/// The subject reaches from here to there: what is beyond is hands, chairs and noise.
+const REACHES: [f32; 2] = [0.04, 0.96];
+/// Its width and height are at most this of the part shown, and so much is left above it.
+const FILLS: [f32; 2] = [0.75, 0.8];
+const HEADROOM: f32 = 0.09;
+/// A resting part sets out when the subject is off by more than this, in sides of the part shown or of its logarithm; it rests
+/// again when it is as near as this.
+const START: f32 = 0.07;
+const STOP: f32 = 0.004;
+/// Time constant of the spring: after five of them it is there.
+const TIME_CONSTANT_S: f32 = 0.2;
+/// Frames further apart do not follow each other.
+const LONGEST_GAP_NS: u64 = 2_000_000_000;
+
+/// Follows the subject of frame after frame.
+#[derive(Debug)]
+pub struct Follower {
+    most_zoom: f32,
+    columns: Vec<u32>,
+    rows: Vec<u32>,
+    target: [f32; 3],
+    /// Where it is, and how fast that changes, in 1/s: middle across and down, and logarithm of the zoom.
+    place: [f32; 3],
+    speed: [f32; 3],
+    moves: bool,
+    time_ns: Option<u64>,
+}
+
+impl Follower {
+    /// Shows a part as large as `most_zoom` makes it, at most.
+    pub fn new(most_zoom: f32) -> Self {
+        Self {
+            most_zoom,
+            columns: Vec::new(),
+            rows: Vec::new(),
+            target: [0.0; 3],
+            place: [0.0; 3],
+            speed: [0.0; 3],
+            moves: false,
+            time_ns: None,
+        }
+    }
+
+    /// Shows a part as large as this makes it from now on, at most, from where it is.
+    pub fn limit(&mut self, most_zoom: f32) {
+        self.most_zoom = most_zoom;
+    }
+
+    /// The part to show of the frame at `time_ns` of media time, whose depth has no holes. The first frame sets it at once.
+    pub fn part(&mut self, map: &DepthMap, lens: &DepthCoc, time_ns: u64) -> Crop {
+        let seen = self.subject(map, lens);
+        let follows = self.time_ns.filter(|&last_ns| (last_ns..=last_ns + LONGEST_GAP_NS).contains(&time_ns));
+        let wanted = seen.unwrap_or(if follows.is_some() { self.target } else { numbers(Crop::WHOLE) });
+        match follows {
+            None => (self.place, self.target, self.speed, self.moves) = (wanted, wanted, [0.0; 3], false),
+            Some(last_ns) => {
+                let off = off(self.place, wanted);
+                self.moves = off > if self.moves { STOP } else { START };
+                if self.moves {
+                    self.target = wanted;
+                    self.glide((time_ns - last_ns) as f32 * 1e-9);
+                } else {
+                    self.speed = [0.0; 3];
+                }
+            }
+        }
+        self.time_ns = Some(time_ns);
+        let [x, y, zoom] = self.place;
+        Crop { center: [x, y], zoom: zoom.exp() }.inside()
+    }
+
+    /// Lets the spring pull for so many seconds.
+    fn glide(&mut self, passed_s: f32) {
+        let rate = TIME_CONSTANT_S.recip();
+        let fall = (-rate * passed_s).exp();
+        for ((place, speed), target) in self.place.iter_mut().zip(&mut self.speed).zip(self.target) {
+            // The exact solution, so that it depends on the times of frames alone and not on how many there are.
+            let off = *place - target;
+            let pull = *speed + rate * off;
+            *place = target + (off + pull * passed_s) * fall;
+            *speed = (*speed - rate * pull * passed_s) * fall;
+        }
+    }
+
+    /// What would show the subject best; `None` where nothing is in focus.
+    fn subject(&mut self, map: &DepthMap, lens: &DepthCoc) -> Option<[f32; 3]> {
+        let (width, height) = (map.width as usize, map.height as usize);
+        let step = (width / LOOKS).max(1);
+        for (counts, side) in [(&mut self.columns, width), (&mut self.rows, height)] {
+            counts.clear();
+            counts.resize(side.div_ceil(step), 0);
+        }
+        let mut count = 0;
+        for (row, y) in self.rows.iter_mut().zip((0..height).step_by(step)) {
+            let metres = map.metres[y * width..][..width].iter().step_by(step);
+            for (column, &metres) in self.columns.iter_mut().zip(metres) {
+                let inverse = DepthMap::inverse_of(metres);
+                let is_in_focus =
+                    lens.far_m() * inverse >= *IN_FOCUS.start() && lens.near_m() * inverse <= *IN_FOCUS.end();
+                *column += u32::from(is_in_focus);
+                *row += u32::from(is_in_focus);
+            }
+            count += *row;
+        }
+        if (count as f32) < LEAST_SHARE * (self.columns.len() * self.rows.len()) as f32 {
+            return None;
+        }
+        let place = |counts: &[u32], share: f32| {
+            let due = share * count as f32;
+            let mut sum = 0.0;
+            let at = counts.iter().position(|&count| {
+                sum += count as f32;
+                sum >= due
+            });
+            (at.unwrap_or_default() as f32 + 0.5) / counts.len() as f32
+        };
+        let [left, right] = REACHES.map(|share| place(&self.columns, share));
+        let [top, bottom] = REACHES.map(|share| place(&self.rows, share));
+        let zoom = (FILLS[0] / (right - left).max(1e-3)).min(FILLS[1] / (bottom - top).max(1e-3));
+        let zoom = zoom.clamp(1.0, self.most_zoom);
+        let middle = 0.5 * (top + bottom);
+        let below_headroom = top + (0.5 - HEADROOM) / zoom;
+        Some(numbers(Crop { center: [place(&self.columns, 0.5), middle.min(below_headroom)], zoom }.inside()))
+    }
+}
+
+fn numbers(Crop { center: [x, y], zoom }: Crop) -> [f32; 3] {
+    [x, y, zoom.ln()]
+}
+
+/// How far two parts are apart, in sides of the part shown.
+fn off(a: [f32; 3], b: [f32; 3]) -> f32 {
+    let zoom = b[2].exp();
+    let moved = zoom * (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+    moved.max((a[2] - b[2]).abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LENS: DepthCoc = DepthCoc { coc_at_infinity_px: 10.0, focus_m: 1.0, range_m: 0.0, max_coc_px: 20.0 };
+    const PERIOD_NS: u64 = 33_333_333;
+
+    /// A person whose head is at `x`, as a fraction of the width, before a wall; a lamp in front.
+    fn person(x: f32) -> DepthMap {
+        let (width, height) = (320, 180);
+        let mut map = DepthMap::new(width, height);
+        for (at, metres) in (0..).zip(&mut map.metres) {
+            let (u, v) = ((at % width) as f32 / width as f32 - x, (at / width) as f32 / height as f32);
+            let is_head = u.abs() < 0.06 && (0.3..0.55).contains(&v);
+            let is_body = u.abs() < 0.12 && v >= 0.55;
+            *metres = if is_head || is_body { 1.05 } else { 4.0 };
+            if at % width > width - 20 {
+                *metres = 0.4;
+            }
+        }
+        map
+    }
+
+    #[test]
+    fn the_first_frame_shows_the_subject_at_once_and_no_larger_than_was_said() {
+        for most in [1.2, 1.5, 3.0] {
+            let part = Follower::new(most).part(&person(0.4), &LENS, 7);
+            assert!((part.center[0] - 0.4).abs() < 0.02 || part.zoom < 1.3, "{part:?}");
+            assert!(part.zoom <= most + 1e-5 && part.zoom > 1.1);
+            let top = part.center[1] - 0.5 / part.zoom;
+            assert!(top < 0.3 && top >= 0.0, "the head is in it: {part:?}");
+            assert_eq!(part, part.inside());
+        }
+    }
+
+    #[test]
+    fn it_glides_to_where_the_subject_went_without_passing_it_and_rests() {
+        let mut follower = Follower::new(1.6);
+        let (before, after) = (person(0.4), person(0.6));
+        let first = follower.part(&before, &LENS, 0);
+        let places: Vec<f32> = (1..90).map(|k| follower.part(&after, &LENS, k * PERIOD_NS).center[0]).collect();
+        assert!(places.is_sorted(), "{places:?}");
+        let last = *places.last().unwrap();
+        assert!((last - 0.6).abs() < 0.01 && first.center[0] < 0.42);
+        let steps = || places.windows(2).map(|pair| pair[1] - pair[0]);
+        assert!(steps().fold(0.0, f32::max) < 0.02, "a small step each time");
+        assert!(steps().skip(70).all(|step| step == 0.0), "it rests");
+    }
+
+    #[test]
+    fn small_movements_and_frames_without_a_subject_leave_it_where_it_is() {
+        let mut follower = Follower::new(1.6);
+        let first = follower.part(&person(0.5), &LENS, 0);
+        let empty = DepthMap { metres: vec![9.0; 320 * 180], ..DepthMap::new(320, 180) };
+        for k in 1..60 {
+            let map = if k % 7 == 0 { empty.clone() } else { person(0.5 + 0.02 * ((k % 3) as f32 - 1.0)) };
+            assert_eq!(follower.part(&map, &LENS, k * PERIOD_NS), first);
+        }
+        assert_eq!(Follower::new(2.0).part(&empty, &LENS, 0), Crop::WHOLE);
+    }
+
+    #[test]
+    fn how_many_frames_there_are_makes_no_difference() {
+        let places = |every: u64| {
+            let mut follower = Follower::new(1.6);
+            follower.part(&person(0.4), &LENS, 0);
+            (1..=12 / every).map(|k| follower.part(&person(0.6), &LENS, k * every * PERIOD_NS)).last().unwrap()
+        };
+        let (often, rarely) = (places(1), places(3));
+        assert!((often.center[0] - rarely.center[0]).abs() < 1e-3, "{often:?} {rarely:?}");
+    }
+}

@@ -1,0 +1,97 @@
+//! A part of a picture, enlarged to the whole.
+
+use super::ColorImage;
+use super::scale::Scale;
+
+/// A part of a picture, of its proportions, as fractions of its width and height: within 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crop {
+    /// Of the part's middle.
+    pub center: [f32; 2],
+    /// How much larger it is shown, at least 1: the part's side is the reciprocal.
+    pub zoom: f32,
+}
+
+impl Crop {
+    /// All of the picture.
+    pub const WHOLE: Self = Self { center: [0.5; 2], zoom: 1.0 };
+
+    /// The same, moved into the picture.
+    pub fn inside(self) -> Self {
+        let zoom = self.zoom.max(1.0);
+        let half = 0.5 / zoom;
+        Self { center: self.center.map(|center| center.clamp(half, 1.0 - half)), zoom }
+    }
+
+    /// Where it begins, and how long it is, along a side of so many pixels.
+    fn along(&self, axis: usize, side: u32) -> (f64, f64) {
+        let (side, length) = (f64::from(side), f64::from(side) / f64::from(self.zoom));
+        let begin = f64::from(self.center[axis]) * side - 0.5 * length;
+        (begin.clamp(0.0, side - length), length)
+    }
+}
+
+/// Enlarges parts of pictures; owns the memory for it.
+#[derive(Debug, Default)]
+pub struct Cropper {
+    scale: Scale,
+    row: Vec<u16>,
+}
+
+impl Cropper {
+    /// Writes a part of `from` to `into`, as large as `from`: bilinear, to fractions of a pixel, so that it glides.
+    pub fn crop(&mut self, from: &ColorImage, crop: &Crop, into: &mut ColorImage) {
+        into.resize(from.width, from.height);
+        let (width, height) = (from.width as usize, from.height as usize);
+        if from.rgb.is_empty() {
+            return;
+        }
+        let parts = [crop.along(0, from.width), crop.along(1, from.height)];
+        self.scale.adapt_part((width, height), parts, (width, height));
+        for (y, row) in into.rgb.chunks_exact_mut(3 * width).enumerate() {
+            self.scale.row(&from.rgb, y, 0..width, &mut self.row, row);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Red grows to the right and green downwards, by one code in two pixels.
+    fn ramp(width: u32, height: u32) -> ColorImage {
+        let pixel = |at: u32| [(at % width / 2) as u8, (at / width / 2) as u8, 77];
+        ColorImage { width, height, rgb: (0..width * height).flat_map(pixel).collect() }
+    }
+
+    #[test]
+    fn the_whole_is_the_picture_to_the_bit() {
+        let (from, mut into) = (ramp(90, 50), ColorImage::default());
+        Cropper::default().crop(&from, &Crop::WHOLE, &mut into);
+        assert_eq!(into, from);
+    }
+
+    #[test]
+    fn a_part_is_where_it_was_and_as_much_larger_as_was_said() {
+        let (from, mut into) = (ramp(320, 200), ColorImage::default());
+        let mut cropper = Cropper::default();
+        for (center, zoom) in [([0.5, 0.5], 2.0), ([0.25, 0.75], 2.0), ([0.4, 0.6], 1.25), ([0.613, 0.5], 1.7)] {
+            cropper.crop(&from, &Crop { center, zoom }, &mut into);
+            for (x, y) in [(5, 5), (160, 100), (300, 30), (12, 190)] {
+                let pixel = into.rgb.as_chunks::<3>().0[y * 320 + x];
+                let due = [(x, 320.0, center[0]), (y, 200.0, center[1])]
+                    .map(|(at, side, center)| ((at as f32 + 0.5 - side / 2.0) / zoom + center * side - 0.5) / 2.0);
+                for (code, due) in pixel.iter().zip(due) {
+                    assert!((f32::from(*code) - due).abs() <= 1.0, "{code} not {due} at {x}, {y}, {zoom} times");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_beyond_the_border_is_moved_inside() {
+        let inside = Crop { center: [0.9, -3.0], zoom: 2.0 }.inside();
+        assert_eq!(inside, Crop { center: [0.75, 0.25], zoom: 2.0 });
+        assert_eq!(Crop { center: [0.9, 0.1], zoom: 0.5 }.inside(), Crop::WHOLE);
+    }
+}

@@ -1,0 +1,145 @@
+//! What stands behind the subject as it is written: its picture, if any, not yet read; and how far the picture follows.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use super::number::number_in;
+use crate::depth::backdrop::{Behind, BehindPicture};
+use crate::recording::RecordingError;
+use crate::recording::still::read_color;
+
+/// What is behind the subject as it is written: its picture, if any, not yet read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BehindName {
+    /// What needs no reading, or was read.
+    Known(Behind),
+    /// `image:FILE`, not read.
+    Image(PathBuf),
+}
+
+impl FromStr for BehindName {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        const FORMS: &str = "use blur, color:#RRGGBB or image:FILE";
+        match text.split_once(':') {
+            None if text == "blur" => Some(Self::Known(Behind::Blur)),
+            Some(("color", color)) => rgb(color).map(|rgb| Self::Known(Behind::Color(rgb))),
+            Some(("image", file)) if !file.is_empty() => Some(Self::Image(file.into())),
+            _ => None,
+        }
+        .ok_or_else(|| FORMS.to_string())
+    }
+}
+
+/// The colour `#RRGGBB`; the sign, which shells take for a comment, may be missing.
+fn rgb(text: &str) -> Option<[u8; 3]> {
+    let digits = text.strip_prefix('#').unwrap_or(text);
+    let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && !digits.starts_with('+'))?;
+    let [_, red, green, blue] = number.to_be_bytes();
+    Some([red, green, blue])
+}
+
+impl fmt::Display for BehindName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Image(file) => write!(f, "image:{}", file.display()),
+            Self::Known(Behind::Blur) => f.write_str("blur"),
+            Self::Known(Behind::Color([red, green, blue])) => write!(f, "color:#{red:02x}{green:02x}{blue:02x}"),
+            Self::Known(Behind::Picture(picture)) => match &picture.file {
+                Some(file) => write!(f, "image:{}", file.display()),
+                None => f.write_str("image"),
+            },
+        }
+    }
+}
+
+impl BehindName {
+    /// The name of what is behind; a picture of which no file is known has none.
+    pub fn of(behind: &Behind) -> Option<Self> {
+        match behind {
+            Behind::Picture(picture) if picture.file.is_none() => None,
+            behind => Some(Self::Known(behind.clone())),
+        }
+    }
+
+    /// What is behind.
+    ///
+    /// # Errors
+    /// The picture of `image:FILE` cannot be read.
+    pub fn load(&self) -> Result<Behind, RecordingError> {
+        Ok(match self {
+            Self::Known(behind) => behind.clone(),
+            Self::Image(file) => {
+                Behind::Picture(Arc::new(BehindPicture { file: Some(file.clone()), image: read_color(file)? }))
+            }
+        })
+    }
+}
+
+/// How much larger the picture may become to keep the subject in its middle: 1, which is off, to [`Follow::MOST`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Follow(f32);
+
+impl Follow {
+    /// It stays as it is.
+    pub const OFF: Self = Self(1.0);
+    /// Beyond this there is little left of a camera's pixels.
+    pub const MOST: f32 = 4.0;
+
+    /// Off from 1 down, and no more than [`Follow::MOST`].
+    pub fn to(zoom: f32) -> Self {
+        Self(if zoom > 1.0 { zoom.min(Self::MOST) } else { 1.0 })
+    }
+
+    /// How much larger the picture may become; `None` where it stays as it is.
+    pub fn zoom(self) -> Option<f32> {
+        (self != Self::OFF).then_some(self.0)
+    }
+}
+
+impl FromStr for Follow {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let zoom = if text == "off" { Some(1.0) } else { number_in(text, 1.0, Self::MOST) };
+        zoom.map(Self::to).ok_or_else(|| format!("use off, or the largest zoom: a number from 1 to {}", Self::MOST))
+    }
+}
+
+impl fmt::Display for Follow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.zoom() {
+            Some(zoom) => write!(f, "{zoom}"),
+            None => f.write_str("off"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_behind_reads_back_what_it_prints() {
+        for text in ["blur", "color:#00b140", "color:#ffffff", "image:a:b.png"] {
+            assert_eq!(text.parse::<BehindName>().unwrap().to_string(), text);
+        }
+        assert_eq!("color:00B140".parse::<BehindName>(), "color:#00b140".parse());
+        for text in ["off", "1.5", "4"] {
+            assert_eq!(text.parse::<Follow>().unwrap().to_string(), text);
+        }
+        assert_eq!("1".parse(), Ok(Follow::OFF));
+    }
+
+    #[test]
+    fn wrong_values_say_what_is_accepted() {
+        for text in ["", "green", "color", "color:#12345", "color:#1234567", "color:+12345", "color:#gg0000", "image:"]
+        {
+            assert!(text.parse::<BehindName>().unwrap_err().contains("color:#RRGGBB"), "{text}");
+        }
+        for text in ["", "on", "0.5", "4.1", "nan", "-2"] {
+            assert!(text.parse::<Follow>().unwrap_err().contains("1 to 4"), "{text}");
+        }
+    }
+}
