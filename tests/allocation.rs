@@ -105,7 +105,7 @@ fn window() {
                 stale: at.is_multiple_of(3),
                 background,
             };
-            painter.paint(&mut pixels, 1, &drawing);
+            painter.paint(&mut pixels, &drawing);
         }
         meters.presented(&view, at * 33_000_000, 2_000_000);
         meters.reacted(5_000_000);

@@ -39,7 +39,7 @@ fn painter(size: (u32, u32), controls: Option<Controls>) -> Painter {
 
 fn paint(size: (u32, u32), drawing: &Drawing, controls: Option<Controls>) -> Vec<u32> {
     let mut pixels = vec![0xdead_beef; (size.0 * size.1) as usize];
-    painter(size, controls).paint(&mut pixels, 0, drawing);
+    painter(size, controls).paint(&mut pixels, drawing);
     pixels
 }
 
@@ -178,34 +178,6 @@ fn a_stale_picture_is_grey_and_darker() {
 }
 
 #[test]
-fn buffers_that_come_back_show_the_same_as_new_ones() {
-    let (size, context) = ((200, 120), context());
-    let mut painter = painter(size, None);
-    let picture = noise(100, 100);
-    let drawings = [area(50, 10, 100, 100), area(0, 0, 100, 100), area(40, 0, 120, 120)];
-    let (mut buffers, mut ages) = (vec![vec![0xdead_beef; (size.0 * size.1) as usize]; 3], [0_u8; 3]);
-    for frame in 0..40_usize {
-        if frame % 7 == 3 {
-            let mut fresh = controls(&context, size, 1.0);
-            if frame % 2 == 0 {
-                fresh.primitives.truncate(frame / 7);
-            }
-            painter.set_controls(fresh);
-        }
-        let shown = drawing(&picture, drawings[frame / 9 % 3]);
-        // Buffers in no order at all.
-        let k = (frame * frame + frame / 5) % 3;
-        painter.paint(&mut buffers[k], ages[k], &shown);
-        let mut expected = vec![0; (size.0 * size.1) as usize];
-        ages.iter_mut().for_each(|age| *age = if *age == 0 { 0 } else { *age + 1 });
-        ages[k] = 1;
-        painter.paint(&mut expected, 0, &shown);
-        ages.iter_mut().for_each(|age| *age = if *age == 0 { 0 } else { *age + 1 });
-        assert_eq!(buffers[k], expected, "frame {frame}");
-    }
-}
-
-#[test]
 fn what_does_not_fit_is_cut_and_what_is_nothing_shows_nothing() {
     let picture = noise(64, 48);
     let beyond = paint((40, 30), &drawing(&picture, area(10, 10, 64, 48)), None);
@@ -226,7 +198,7 @@ fn text_and_controls_are_painted_over_the_picture() {
     let mut painter = painter(size, Some(controls(&context, size, 1.0)));
     painter.set_controls(controls(&context, size, 1.0));
     let mut pixels = vec![0; 480 * 480];
-    painter.paint(&mut pixels, 0, &shown);
+    painter.paint(&mut pixels, &shown);
     let plain = word([90, 140, 60]);
     let changed = pixels.iter().filter(|&&pixel| pixel != plain).count();
     assert!(changed > 480 * 480 / 10, "{changed}");
@@ -239,7 +211,7 @@ fn text_and_controls_are_painted_over_the_picture() {
         textures: egui::TexturesDelta::default(),
         pixels_per_point: 1.0,
     });
-    painter.paint(&mut pixels, 1, &shown);
+    painter.paint(&mut pixels, &shown);
     assert!(pixels.iter().all(|&pixel| pixel == plain));
 }
 

@@ -40,7 +40,7 @@ pub fn measure() {
             let mut paint = |frame| {
                 prepare(frame, painter);
                 let began = Instant::now();
-                painter.paint(&mut pixels, 1, drawing);
+                painter.paint(&mut pixels, drawing);
                 began.elapsed().as_secs_f64() * 1e3
             };
             let mut took_ms: Vec<f64> = (0..FRAMES).map(&mut paint).collect();

@@ -17,6 +17,8 @@ pub struct Folders {
 /// What all names begin with, and what those of recordings end with.
 const NAME: &str = "bokehcam";
 const VIDEO: &str = ".mp4";
+/// The date and the time of day in between.
+const TIME: &str = "%Y-%m-%d %H-%M-%S";
 
 impl Folders {
     /// One folder for all.
@@ -65,7 +67,7 @@ impl Folders {
 
 /// The name of a file that is made now, without its ending: with the date and the time of day here.
 pub fn stem() -> String {
-    jiff::ZonedDateTime::now().strftime(&format!("{NAME} %Y-%m-%d %H-%M-%S")).to_string()
+    jiff::ZonedDateTime::now().strftime(&format!("{NAME} {TIME}")).to_string()
 }
 
 /// Whether a recording without a name of its own is called so, now or by earlier versions: `bokehcam-7.mp4`.
@@ -75,10 +77,9 @@ pub fn is_video(name: &str) -> bool {
     if let Some(number) = rest.strip_prefix('-') {
         return is_number(number);
     }
-    const DATE: &[u8] = b" 0000-00-00 00-00-00";
-    let Some((date, number)) = rest.split_at_checked(DATE.len()) else { return false };
-    let fits = |(byte, wanted): (u8, &u8)| if *wanted == b'0' { byte.is_ascii_digit() } else { byte == *wanted };
-    date.bytes().zip(DATE).all(fits) && (number.is_empty() || number.strip_prefix('-').is_some_and(is_number))
+    let Some((date, number)) = rest.split_at_checked(" 0000-00-00 00-00-00".len()) else { return false };
+    let is_date = jiff::civil::DateTime::strptime(format!(" {TIME}"), date).is_ok();
+    is_date && (number.is_empty() || number.strip_prefix('-').is_some_and(is_number))
 }
 
 /// The folder that a file is in, whole; `None` where there is no such file.

@@ -40,6 +40,8 @@ pub struct Group {
 pub struct Context {
     /// Columns and rows of the picture; some blur is a share of them.
     pub size: (u32, u32),
+    /// Pixels of the window along a side of one of the picture's, where all of it is seen.
+    pub fit: f32,
     /// Index of the pressed chord in [`Binding::chords`].
     pub chord: usize,
 }
@@ -202,14 +204,14 @@ pub const GROUPS: [Group; 5] = [
             once(&[key(Key::Home)], "Home", "the recording's first frame", |state, _| {
                 state.transport.map(|_| Action::Seek(0))
             }),
-            once(&[key(Key::X)], "X", "pixels as they are (100 %), all of the picture", |state, _| {
-                Some(Action::Zoom(u32::from(state.zoom.factor == 0), None))
+            once(&[key(Key::X)], "X", "pixels as they are (100 %), all of the picture", |state, context| {
+                Some(Action::Zoom(if state.zoom.factor == 0 { state.zoom.stepped(1, context.fit) } else { 0 }, None))
             }),
             once(
                 &[key(Key::Minus), key(Key::Plus), key(Key::Minus), key(Key::Equals)],
                 "Minus, Plus",
                 "smaller, larger: 100, 200, 400, 800 %",
-                |state, context| Some(Action::Zoom(state.zoom.stepped(way(context) as i32), None)),
+                |state, context| Some(Action::Zoom(state.zoom.stepped(way(context) as i32, context.fit), None)),
             ),
             once(&[key(Key::M)], "M", "mirror the window", |state, _| Some(Action::Mirror(!state.mirror))),
             once(&[key(Key::D)], "D", "show depth", |state, _| show(state, Shown::Depth)),
@@ -302,7 +304,7 @@ impl Chord {
 }
 
 /// The action that is bound to the key in `event`, if any. While a control is `focused`, it keeps some keys to itself.
-pub fn action(event: &Event, state: &State, size: (u32, u32), focused: bool) -> Option<Action> {
+pub fn action(event: &Event, state: &State, context: Context, focused: bool) -> Option<Action> {
     let Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { return None };
     let bindings = GROUPS.iter().flat_map(|group| group.bindings);
     let found = bindings.filter(|binding| binding.repeats || !repeat).find_map(|binding| {
@@ -316,7 +318,7 @@ pub fn action(event: &Event, state: &State, size: (u32, u32), focused: bool) -> 
     if focused && is_for_controls(binding.chords[chord]) {
         return None;
     }
-    (binding.make)(state, Context { size, chord }).filter(|action| is_uncovered(action, state))
+    (binding.make)(state, Context { chord, ..context }).filter(|action| is_uncovered(action, state))
 }
 
 #[cfg(test)]

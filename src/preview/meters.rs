@@ -1,5 +1,7 @@
 //! What the instruments show: the last frames, how long they took, and what became of the others.
 
+use std::collections::VecDeque;
+
 use crate::budget::{Quality, Window};
 use crate::pipeline::{Trace, View};
 use crate::stats::{Frames, Histogram};
@@ -10,8 +12,6 @@ pub const FRAMES: usize = 240;
 const MS: f64 = 1e-6;
 /// Weight of a new frame in the moving means of the stages, which single frames shall not make jump.
 const EASE: f64 = 0.08;
-/// The most passes of a blur that are listed.
-const PASSES: usize = 16;
 
 /// One frame, for the graph.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,24 +25,25 @@ pub struct Bar {
 }
 
 /// The last frames, and totals of all.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Meters {
-    /// A ring buffer: `held` frames, and the index of the next one to write.
-    bars: [Bar; FRAMES],
-    held: usize,
-    next: usize,
+    /// The last [`FRAMES`], the oldest first.
+    bars: VecDeque<Bar>,
     latency_ms: Window<FRAMES>,
     reaction_ms: Window<FRAMES>,
-    stages: Stages,
-    frames: Frames,
+    /// Mean times of the last frames.
+    pub stages: Stages,
+    /// What became of the source's frames.
+    pub frames: Frames,
     /// When the last frame was presented, and when the preview started.
     last_ns: Option<u64>,
     begun_ns: Option<u64>,
-    totals: Totals,
+    /// What was presented in all.
+    pub totals: Totals,
 }
 
 /// Moving means of the stages' times, in milliseconds.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Stages {
     pub decode_ms: f64,
     pub depth_ms: f64,
@@ -53,17 +54,11 @@ pub struct Stages {
     pub present_ms: f64,
     /// Share of the frames with depth of their own.
     own_depth: f64,
-    /// Of these, the first `seen` are in use.
-    passes: [(&'static str, f64); PASSES],
-    seen: usize,
+    /// The blur's passes, by name.
+    pub passes: Vec<(&'static str, f64)>,
 }
 
 impl Stages {
-    /// The blur's passes, by name.
-    pub fn passes(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
-        self.passes[..self.seen].iter().copied()
-    }
-
     /// Every how many frames depth is made.
     pub fn depth_every(&self) -> u32 {
         if self.own_depth > 0.0 { self.own_depth.recip().round() as u32 } else { 1 }
@@ -92,23 +87,6 @@ pub struct Summary {
     pub latency_ms: [f64; 2],
     /// Median and 99th percentile from input to picture, in milliseconds.
     pub reaction_ms: [f64; 2],
-}
-
-impl Default for Meters {
-    fn default() -> Self {
-        Self {
-            bars: [Bar::default(); FRAMES],
-            held: 0,
-            next: 0,
-            latency_ms: Window::default(),
-            reaction_ms: Window::default(),
-            stages: Stages::default(),
-            frames: Frames::default(),
-            last_ns: None,
-            begun_ns: None,
-            totals: Totals::default(),
-        }
-    }
 }
 
 impl Meters {
@@ -140,14 +118,17 @@ impl Meters {
         }
         let interval_ms = self.last_ns.replace(now_ns).map(|last_ns| now_ns.saturating_sub(last_ns) as f64 * MS);
         self.latency_ms.push(latency_ns as f64 * MS);
-        self.bars[self.next] = Bar {
+        self.stages.add(trace, (latency_ns, present_ns), self.bars.is_empty());
+        if self.bars.len() == FRAMES {
+            self.bars.pop_front();
+        }
+        // All at once, and never again.
+        self.bars.reserve(FRAMES - self.bars.len());
+        self.bars.push_back(Bar {
             blur_ms: (trace.blur_ns as f64 * MS) as f32,
             interval_ms: interval_ms.unwrap_or_default() as f32,
             quality: trace.quality,
-        };
-        self.next = (self.next + 1) % FRAMES;
-        self.held = (self.held + 1).min(FRAMES);
-        self.stages.add(trace, (latency_ns, present_ns), self.held == 1);
+        });
     }
 
     /// Counts an input whose effect was on the screen this much later.
@@ -191,23 +172,7 @@ impl Meters {
 
     /// The last frames, the oldest first.
     pub fn bars(&self) -> impl ExactSizeIterator<Item = &Bar> {
-        let first = self.next + FRAMES - self.held;
-        (0..self.held).map(move |k| &self.bars[(first + k) % FRAMES])
-    }
-
-    /// Mean times of the last frames.
-    pub fn stages(&self) -> &Stages {
-        &self.stages
-    }
-
-    /// What became of the source's frames.
-    pub fn frames(&self) -> &Frames {
-        &self.frames
-    }
-
-    /// What was presented in all.
-    pub fn totals(&self) -> &Totals {
-        &self.totals
+        self.bars.iter()
     }
 
     /// The numbers of the last frames. To be called a few times a second, as it sorts.
@@ -239,13 +204,9 @@ impl Stages {
         ease(&mut self.present_ms, present_ns);
         for (name, time) in trace.passes.iter() {
             let ms = time.as_secs_f64() * 1e3;
-            match self.passes[..self.seen].iter_mut().find(|pass| pass.0 == name) {
+            match self.passes.iter_mut().find(|pass| pass.0 == name) {
                 Some(pass) => pass.1 += (ms - pass.1) * weight,
-                None if self.seen < PASSES => {
-                    self.passes[self.seen] = (name, ms);
-                    self.seen += 1;
-                }
-                None => {}
+                None => self.passes.push((name, ms)),
             }
         }
     }
@@ -285,7 +246,7 @@ mod tests {
         assert!((summary.fps - 25.0).abs() < 1e-3, "{summary:?}");
         assert!((summary.latency_ms[0] - 5.049).abs() < 2e-3 && (summary.latency_ms[1] - 5.098).abs() < 2e-3);
         assert_eq!(summary.reaction_ms, [0.0; 2]);
-        let totals = meters.totals();
+        let totals = meters.totals;
         assert_eq!((totals.presented, totals.first_frame_ns), (100, Some(PERIOD_NS)));
         assert_eq!(Meters::default().summary(), Summary::default());
     }
@@ -296,19 +257,19 @@ mod tests {
         meters.reacted(9_000_000);
         meters.restart();
         assert_eq!((meters.bars().len(), meters.summary()), (0, Summary::default()));
-        assert_eq!((meters.totals().presented, meters.totals().reaction.samples()), (10, 1));
+        assert_eq!((meters.totals.presented, meters.totals.reaction.samples()), (10, 1));
         meters.count(&Trace::default(), 10 * PERIOD_NS, 1, 1);
-        assert_eq!(meters.totals().first_frame_ns, Some(PERIOD_NS), "the first frame is the first of all");
+        assert_eq!(meters.totals.first_frame_ns, Some(PERIOD_NS), "the first frame is the first of all");
     }
 
     #[test]
     fn stages_follow_the_frames() {
         let mut meters = ran(400);
-        assert!((meters.stages().present_ms - 2.0).abs() < 1e-9);
+        assert!((meters.stages.present_ms - 2.0).abs() < 1e-9);
         let mut passes = crate::bokeh::PassTimes::new();
         passes.add("blur", std::time::Duration::from_millis(7));
         meters.count(&Trace { passes, ..Trace::default() }, 1, 1, 1);
-        assert_eq!(meters.stages().passes().collect::<Vec<_>>(), [("blur", 7.0)]);
+        assert_eq!(meters.stages.passes, [("blur", 7.0)]);
     }
 
     #[test]
@@ -329,7 +290,7 @@ mod tests {
                 // 3 ms from the pipeline to the window, and 2 in it.
                 meters.count(&trace, k * PERIOD_NS, trace.age_ns + 5_000_000, 2_000_000);
             }
-            let stages = meters.stages();
+            let stages = meters.stages;
             let parts = [stages.depth_ms, stages.blur_ms, stages.between_ms, stages.playout_ms, stages.present_ms];
             let depth_ms = 1.0 + 29.0 / every as f64;
             assert!((stages.between_ms - 7.0).abs() < 1e-6, "{stages:?}");

@@ -39,6 +39,8 @@ pub struct Opened {
     pub notes: Vec<String>,
     /// The camera's controls, such as exposure, if it has any.
     pub controls: Vec<Knob>,
+    /// What else is known of the camera; nothing of other sources.
+    pub camera: Camera,
 }
 
 /// What a session needs of the system.
@@ -74,11 +76,6 @@ pub trait Services: Send {
     fn browse(&self, what: Browse) -> Pick {
         let _ = what;
         Box::new(|| Err("there is no file dialog".to_owned()))
-    }
-
-    /// What is known of the camera that was opened last; nothing of other sources.
-    fn camera(&self) -> Camera {
-        Camera::default()
     }
 
     /// Opens the source of this name with pictures of another size (columns, rows) and rate from now on.

@@ -50,8 +50,6 @@ pub struct System {
     mode: Option<(String, Size, f64)>,
     /// The device nodes as they were last, and whether they were others before that.
     nodes: (Vec<String>, bool),
-    /// What is known of the camera that was opened last.
-    facts: Camera,
     /// Values of the camera's knobs that were turned, by name.
     turned: BTreeMap<String, i64>,
     /// The camera that was opened last, where it has knobs.
@@ -73,7 +71,6 @@ impl System {
             opened: Vec::new(),
             mode: None,
             nodes: (devices::nodes(), false),
-            facts: Camera::default(),
             turned: BTreeMap::new(),
             camera: None,
             with_plate: false,
@@ -165,9 +162,9 @@ impl Services for System {
         let controls = self.camera.as_deref().map(devices::knobs).unwrap_or_default();
         self.with_plate = with_plate;
         let is_replaceable = matches!(source.depth_from, DepthFrom::Nothing | DepthFrom::Networks | DepthFrom::Plate);
-        self.facts = self.facts_of(&source);
+        let camera = self.facts_of(&source);
         let takes_plates = self.camera.is_some() && is_replaceable;
-        Ok(Opened { name, source, has_depth, takes_plates, notes, controls })
+        Ok(Opened { name, source, has_depth, takes_plates, notes, controls, camera })
     }
 
     fn devices_changed(&mut self) -> bool {
@@ -191,10 +188,6 @@ impl Services for System {
 
     fn browse(&self, what: Browse) -> Pick {
         Box::new(move || dialog::pick(what))
-    }
-
-    fn camera(&self) -> Camera {
-        self.facts.clone()
     }
 
     fn choose_mode(&mut self, name: &str, (width, height): (u32, u32), fps: f64) {

@@ -118,7 +118,7 @@ fn both_presenters_show_the_same_controls() {
         for frame in 0..3 {
             painter.set_controls(controls(&ours, (500, 500), pixels_per_point));
             canvas.set_controls(controls(&theirs, (500, 500), pixels_per_point));
-            painter.paint(&mut pixels, 1, &shown);
+            painter.paint(&mut pixels, &shown);
             let drawn = drawn(&device, &mut canvas, (500, 500), &shown);
             // Shadows are laid over each other, and rounded, in another order.
             close(&pixels, &drawn, (3, 500, 24), &format!("frame {frame} at {pixels_per_point}"));

@@ -11,7 +11,8 @@ use bokehcam::pipeline::still::{self, Depth};
 use bokehcam::preview::session::{Blurred, Held};
 use bokehcam::preview::state::{Output, Request, Update};
 
-use super::watched::{PATIENCE, Watched, is_running, look};
+use super::heard::{PATIENCE, look};
+use super::watched::{Watched, is_running};
 
 /// A session whose first frame stays.
 fn holding(source: &str) -> (Watched, View) {

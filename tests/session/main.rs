@@ -2,6 +2,8 @@
 #![cfg(feature = "window")]
 #![allow(missing_docs)]
 
+#[path = "../common/heard.rs"]
+mod heard;
 mod held;
 mod watched;
 
@@ -16,7 +18,8 @@ use bokehcam::optics::CocField;
 use bokehcam::preview::folders::is_video;
 use bokehcam::preview::state::{Output, Request, Source, Update};
 
-use watched::{PATIENCE, Watched, is_running, look, radius_px};
+use heard::{PATIENCE, look};
+use watched::{Watched, is_running, radius_px};
 
 #[test]
 fn a_look_takes_effect_while_frames_go_on() {
@@ -40,7 +43,7 @@ fn a_look_takes_effect_while_frames_go_on() {
     watched.frame("an even blur", |view| radius_px(view) == -5.0);
     watched.session.order(Request::Look(Box::new(Look { effect: Effect::None, ..near })));
     watched.frame("no blur", |view| view.color.is_none());
-    let report = watched.session.close().report.unwrap();
+    let report = watched.heard.session.close().report.unwrap();
     assert!(report.frames.balance(), "{:?}", report.frames);
 }
 
@@ -61,7 +64,7 @@ fn sources_come_and_go_and_one_that_is_lost_can_be_tried_again() {
     watched.session.order(Request::Open("24 then no more".into()));
     watched.until("it runs again", |told| is_running(told, 24));
     watched.until("and ends", |told| *told == Update::Source(Source::Ended));
-    let report = watched.session.close().report.unwrap();
+    let report = watched.heard.session.close().report.unwrap();
     assert!(report.frames.balance() && report.frames.captured == 2, "{:?}", report.frames);
 }
 
@@ -87,7 +90,7 @@ fn a_plate_is_taken_where_there_was_no_depth_and_again_without_a_new_run() {
         watched.until("it runs", |told| is_running(told, width));
         assert!(watched.guide.is_none());
     }
-    assert!(watched.session.close().report.unwrap().frames.balance());
+    assert!(watched.heard.session.close().report.unwrap().frames.balance());
 }
 
 #[test]
@@ -126,7 +129,7 @@ fn outputs_are_begun_and_completed_and_one_that_cannot_be_is_told() {
         std::thread::sleep(Duration::from_millis(5));
     }
     let written = Arc::clone(&watched.written);
-    watched.session.close().report.unwrap();
+    watched.heard.session.close().report.unwrap();
     let complete = written.lock().unwrap().iter().filter(|line| *line == "camera complete").count();
     assert_eq!(complete, 2, "once for each source");
 }
@@ -144,13 +147,13 @@ fn an_output_that_fails_is_told_for_good_and_is_not_forgotten_at_the_end() {
             watched.until("it is written", |told| matches!(told, Update::Outputs(outputs) if outputs.len() == 1));
             watched.frame("a frame", |_| true);
         }
-        let closed = watched.session.close();
+        let closed = watched.heard.session.close();
         assert!(closed.failed.as_ref().is_some_and(|line| line.contains(why)), "{closed:?}");
         assert!(closed.report.unwrap().frames.balance());
     }
     let mut watched = Watched::begin("32");
     watched.until("it runs", |told| is_running(told, 32));
-    assert_eq!(watched.session.close().failed, None);
+    assert_eq!(watched.heard.session.close().failed, None);
 }
 
 #[test]
@@ -163,7 +166,7 @@ fn a_recording_that_was_broken_off_is_found_at_the_next_start() {
     let mut watched = Watched::begin_in("32", folder.path());
     watched
         .until("it is told", |told| matches!(told, Update::Note(line) if line.contains("bokehcam-3.mp4.incomplete")));
-    watched.session.close();
+    watched.heard.session.close();
     assert_eq!(std::fs::read(at("bokehcam-3.mp4.incomplete")).unwrap(), b"take");
     assert_eq!(std::fs::read(at("bokehcam 2026-11-23 21-14-05.mp4.incomplete")).unwrap(), b"another take");
     assert_eq!(std::fs::read(at(".holiday.mp4.77-0.part")).unwrap(), b"mine");

@@ -1,29 +1,26 @@
 //! A session as the window has it, on sources and outputs of the tests' own.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Deref, DerefMut};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
 
 use bokehcam::bokeh::{self, Backend, Bokeh};
 use bokehcam::capture::synthetic::{Format, Synthetic};
-use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo};
-use bokehcam::depth::plate::{Guide, PlateDepth};
+use bokehcam::capture::{Brings, Camera as Capture, CaptureError, Captured, Shot, SourceInfo};
+use bokehcam::depth::plate::PlateDepth;
 use bokehcam::frame::ColorImage;
 use bokehcam::knob::Knob;
-use bokehcam::link::Receiver;
-use bokehcam::link::demand::{Demand, Watch};
 use bokehcam::look::presets::Preset;
-use bokehcam::look::{Look, Patch, Strength};
+use bokehcam::look::{Look, Patch};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
-use bokehcam::preview::folders::Folders;
 use bokehcam::preview::services::{Opened, Services, SettingsStore, Switch};
-use bokehcam::preview::session::{Blurred, Session, SessionEvent, Start};
-use bokehcam::preview::state::{Source, Update};
+use bokehcam::preview::state::{Camera, Source, Update};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use bokehcam::source::{self, devices::Choice};
+
+use super::heard::Heard;
 
 /// Opens small synthetic scenes: the name is their width, `24 then no more` has two frames, and `nothing` is not there.
 struct Small {
@@ -57,7 +54,7 @@ impl Sink for Film {
 /// A camera that does not know its depth.
 struct Plain(Synthetic);
 
-impl Camera for Plain {
+impl Capture for Plain {
     fn info(&self) -> SourceInfo {
         SourceInfo { brings: Brings::Color, ..self.0.info() }
     }
@@ -79,7 +76,7 @@ impl Services for Small {
         let frames = name.ends_with("no more").then_some(2);
         let format = Format { size: (width, 18), fps: 60.0, frames, threads: 1 };
         let scene = Synthetic::new(format).map_err(|error| error.to_string())?;
-        let camera: Box<dyn Camera> = if with_plate { Box::new(Plain(scene)) } else { Box::new(scene) };
+        let camera: Box<dyn Capture> = if with_plate { Box::new(Plain(scene)) } else { Box::new(scene) };
         let (name, notes, controls) = (name.to_owned(), vec!["a note".to_owned()], Vec::new());
         let mut source = source::Source::of(camera, None);
         if with_plate {
@@ -88,7 +85,7 @@ impl Services for Small {
             source.depth = Some(Box::new(plate));
         }
         let has_depth = source.has_depth();
-        Ok(Opened { name, source, has_depth, takes_plates: true, notes, controls })
+        Ok(Opened { name, source, has_depth, takes_plates: true, notes, controls, camera: Camera::default() })
     }
     fn turn(&mut self, _: &str, _: i64) -> Result<Vec<Knob>, String> {
         Err("it has no controls".into())
@@ -133,26 +130,11 @@ impl SettingsStore for NoSettings {
     }
 }
 
-/// A session as the window has it: what it said so far, and where its frames come from.
+/// A session on these services.
 pub struct Watched {
-    pub session: Session,
-    pub views: Option<Receiver<View>>,
-    pub guide: Option<Arc<Guide>>,
-    pub told: Vec<Update>,
-    pub copied: Option<String>,
-    /// The frames that stay, in other looks.
-    pub blurred: Vec<Blurred>,
-    /// Somebody watches while it is held.
-    pub watch: Option<Watch>,
-    pub demand: Demand,
+    pub heard: Heard,
     pub executors: Arc<AtomicUsize>,
     pub written: Arc<Mutex<Vec<String>>>,
-}
-
-pub const PATIENCE: Duration = Duration::from_secs(120);
-
-pub fn look() -> Look {
-    Look { strength: Strength::AtInfinity(2.0), ..Look::default() }
 }
 
 impl Watched {
@@ -161,77 +143,22 @@ impl Watched {
     }
 
     pub fn begin_in(source: &str, folder: &Path) -> Self {
-        let (executors, written) = (Arc::<AtomicUsize>::default(), Arc::<Mutex<Vec<String>>>::default());
-        let demand = Demand::default();
-        let watch = Some(demand.watch());
-        let start = Start {
-            services: Box::new(Small {
-                executors: Arc::clone(&executors),
-                written: Arc::clone(&written),
-                settings: NoSettings,
-            }),
-            look: look(),
-            source: source.into(),
-            outputs: Vec::new(),
-            keep_going: false,
-            budget_ns: None,
-            folders: Folders::at(folder.to_owned()),
-            wanted: Arc::default(),
-            demand: demand.clone(),
-        };
-        let session = Session::begin(start, Arc::new(|| {})).unwrap();
-        Self {
-            session,
-            views: None,
-            guide: None,
-            told: Vec::new(),
-            copied: None,
-            blurred: Vec::new(),
-            watch,
-            demand,
-            executors,
-            written,
-        }
+        let small = Small { executors: Arc::default(), written: Arc::default(), settings: NoSettings };
+        let (executors, written) = (Arc::clone(&small.executors), Arc::clone(&small.written));
+        Self { heard: Heard::begin(Box::new(small), source, folder), executors, written }
     }
+}
 
-    pub fn hear(&mut self) {
-        while let Some(heard) = self.session.hear() {
-            match heard {
-                SessionEvent::Update(told) => self.told.push(told),
-                SessionEvent::Views(views, guide, _) => (self.views, self.guide) = (Some(views), guide),
-                SessionEvent::Copy(text) => self.copied = Some(text),
-                SessionEvent::Blurred(blurred) => self.blurred.push(*blurred),
-            }
-        }
+impl Deref for Watched {
+    type Target = Heard;
+    fn deref(&self) -> &Heard {
+        &self.heard
     }
+}
 
-    /// Waits until something was said; what was said before it is forgotten.
-    #[track_caller]
-    pub fn until(&mut self, what: &str, is: impl Fn(&Update) -> bool) {
-        let began = Instant::now();
-        loop {
-            self.hear();
-            if let Some(at) = self.told.iter().position(&is) {
-                self.told.drain(..=at);
-                return;
-            }
-            assert!(began.elapsed() < PATIENCE, "never heard: {what}; {:?}", self.told);
-            std::thread::sleep(Duration::from_millis(2));
-        }
-    }
-
-    /// Waits for a frame.
-    #[track_caller]
-    pub fn frame(&mut self, what: &str, is: impl Fn(&View) -> bool) -> View {
-        let began = Instant::now();
-        loop {
-            self.hear();
-            if let Some(view) = self.views.as_mut().and_then(Receiver::try_recv).filter(&is) {
-                return view;
-            }
-            assert!(began.elapsed() < PATIENCE, "never seen: {what}");
-            std::thread::sleep(Duration::from_millis(2));
-        }
+impl DerefMut for Watched {
+    fn deref_mut(&mut self) -> &mut Heard {
+        &mut self.heard
     }
 }
 

@@ -2,6 +2,8 @@
 #![cfg(feature = "window")]
 #![allow(missing_docs)]
 
+#[path = "../common/heard.rs"]
+mod heard;
 mod plug;
 #[path = "../common/store.rs"]
 mod store;
@@ -46,7 +48,7 @@ fn a_recording_is_sought_in_while_it_plays_and_what_is_written_stays_whole() {
         assert!((seeker.place_of(after.stamp) + FRAMES - place) % FRAMES <= 6, "{:?}", after.stamp);
     }
     watched.session.order(Request::End(output));
-    let closed = watched.session.close();
+    let closed = watched.heard.session.close();
     assert_eq!(closed.failed, None);
     assert!(closed.report.unwrap().frames.balance());
     assert!(film.metadata().unwrap().len() > 48 * 32 * 3 / 2, "the film is there");
@@ -58,7 +60,7 @@ fn what_never_ends_has_no_places() {
     let mut watched = Watched::begin("synthetic", folder.path());
     watched.frame("a frame", |_| true);
     assert!(watched.seeker.is_none());
-    watched.session.close();
+    watched.heard.session.close();
 }
 
 fn is_running(told: &Update) -> bool {
@@ -89,7 +91,7 @@ fn a_photo_is_opened_with_the_depth_beside_it_and_follows_the_look() {
     let stronger = Look { strength: Strength::AtInfinity(5.0), ..Look::default() };
     watched.session.order(Request::Look(Box::new(stronger)));
     watched.frame("another look", |view| view.trace.change > change && !view.trace.between);
-    assert!(watched.session.close().report.unwrap().frames.balance());
+    assert!(watched.heard.session.close().report.unwrap().frames.balance());
 
     // Other names, a snapshot, and what is no photo.
     let open = |path: &Path| {
@@ -153,7 +155,7 @@ fn what_is_offered_is_opened_only_if_it_can_be_and_stays_on_the_list() {
     let names: Vec<&str> =
         sources.iter().map(|choice| choice.name.as_str()).filter(|name| !name.starts_with("/dev/")).collect();
     assert_eq!(names, ["synthetic", again.as_str(), name.as_str(), "demo"]);
-    watched.session.close();
+    watched.heard.session.close();
 }
 
 #[test]
@@ -178,5 +180,5 @@ fn a_camera_that_comes_is_offered_and_opened_where_it_was_missing_and_its_pictur
     watched.frame("a frame of the other size", |view| view.picture.size() == (32, 24));
     watched.is_in.store(false, Ordering::SeqCst);
     watched.until("it has gone", |told| matches!(told, Update::Choices { .. }) && !has_it(told));
-    watched.session.close();
+    watched.heard.session.close();
 }

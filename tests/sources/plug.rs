@@ -1,23 +1,17 @@
 //! A session on the system, with a camera that can be plugged in.
 
+use std::ops::{Deref, DerefMut};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 use bokehcam::bokeh::{self, Bokeh};
-use bokehcam::capture::Seeker;
 use bokehcam::capture::synthetic::{Format, Synthetic};
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::knob::Knob;
-use bokehcam::link::Receiver;
-use bokehcam::link::demand::{Demand, Watch};
-use bokehcam::look::{Look, Strength};
-use bokehcam::pipeline::View;
-use bokehcam::preview::folders::Folders;
+use bokehcam::look::Look;
 use bokehcam::preview::services::{Opened, Services, SettingsStore, Switch};
-use bokehcam::preview::session::{Session, SessionEvent, Start};
-use bokehcam::preview::state::{Camera, Update};
+use bokehcam::preview::state::Camera;
 use bokehcam::preview::system::System;
 use bokehcam::recording::tum::{Writer, WriterOptions};
 use bokehcam::sink::Sink;
@@ -25,9 +19,9 @@ use bokehcam::source::devices::Choice;
 use bokehcam::source::modes::Mode;
 use bokehcam::source::{self, Frames, Options};
 
+use super::heard::{Heard, look};
 use super::store::NoStore;
 
-pub const PATIENCE: Duration = Duration::from_secs(60);
 pub const FRAMES: usize = 12;
 
 /// Frames as bright as twenty times their number, each 2 m away and a decimetre more than the one before.
@@ -68,7 +62,11 @@ impl Services for Plug {
                 let format = Format { size: (width, height), fps, frames: None, threads: 1 };
                 let source = source::Source::of(Box::new(Synthetic::new(format).unwrap()), None);
                 let (name, has_depth) = (name.into(), source.has_depth());
-                Ok(Opened { name, source, has_depth, takes_plates: false, notes: Vec::new(), controls: Vec::new() })
+                let modes =
+                    vec![Mode { size: (64, 48), fps: vec![30.0] }, Mode { size: (32, 24), fps: vec![60.0, 30.0] }];
+                let camera = Camera { modes, faces_user: true, is_relative: false };
+                let (notes, controls) = (Vec::new(), Vec::new());
+                Ok(Opened { name, source, has_depth, takes_plates: false, notes, controls, camera })
             }
             _ => self.system.open(name, with_plate),
         }
@@ -76,10 +74,6 @@ impl Services for Plug {
     fn devices_changed(&mut self) -> bool {
         let is_in = self.is_in.load(Ordering::SeqCst);
         std::mem::replace(&mut self.was_in, is_in) != is_in
-    }
-    fn camera(&self) -> Camera {
-        let modes = vec![Mode { size: (64, 48), fps: vec![30.0] }, Mode { size: (32, 24), fps: vec![60.0, 30.0] }];
-        Camera { modes, faces_user: true, is_relative: false }
     }
     fn choose_mode(&mut self, name: &str, size: (u32, u32), fps: f64) {
         assert_eq!(name, CAMERA);
@@ -111,74 +105,31 @@ impl Services for Plug {
     }
 }
 
-/// A session as the window has it.
+/// A session on them.
 pub struct Watched {
-    pub session: Session,
-    pub views: Option<Receiver<View>>,
-    pub seeker: Option<Arc<Seeker>>,
-    pub told: Vec<Update>,
+    pub heard: Heard,
     pub is_in: Arc<AtomicBool>,
-    /// Somebody watches.
-    _watch: Watch,
 }
 
 impl Watched {
     pub fn begin(source: &str, folder: &Path) -> Self {
         let options = Options { frames: Frames { repeat: true, ..Frames::default() }, ..Options::default() };
-        let look = Look { strength: Strength::AtInfinity(2.0), ..Look::default() };
-        let system = System::new(options, look.clone(), Box::new(NoStore));
+        let system = System::new(options, look(), Box::new(NoStore));
         let is_in = Arc::<AtomicBool>::default();
-        let demand = Demand::default();
-        let watch = demand.watch();
-        let start = Start {
-            services: Box::new(Plug { system, is_in: Arc::clone(&is_in), was_in: false, mode: None }),
-            look,
-            source: source.into(),
-            outputs: Vec::new(),
-            keep_going: false,
-            budget_ns: None,
-            folders: Folders::at(folder.to_owned()),
-            wanted: Arc::default(),
-            demand: demand.clone(),
-        };
-        let session = Session::begin(start, Arc::new(|| {})).unwrap();
-        Self { session, views: None, seeker: None, told: Vec::new(), is_in, _watch: watch }
+        let plug = Plug { system, is_in: Arc::clone(&is_in), was_in: false, mode: None };
+        Self { heard: Heard::begin(Box::new(plug), source, folder), is_in }
     }
+}
 
-    pub fn hear(&mut self) {
-        while let Some(heard) = self.session.hear() {
-            match heard {
-                SessionEvent::Views(views, _, seeker) => (self.views, self.seeker) = (Some(views), seeker),
-                SessionEvent::Update(told) => self.told.push(told),
-                _ => {}
-            }
-        }
+impl Deref for Watched {
+    type Target = Heard;
+    fn deref(&self) -> &Heard {
+        &self.heard
     }
+}
 
-    /// Waits until something was said; what was said before it is forgotten.
-    #[track_caller]
-    pub fn until(&mut self, what: &str, is: impl Fn(&Update) -> bool) -> Update {
-        let began = Instant::now();
-        loop {
-            self.hear();
-            if let Some(at) = self.told.iter().position(&is) {
-                return self.told.drain(..=at).next_back().unwrap();
-            }
-            assert!(began.elapsed() < PATIENCE, "never heard: {what}; {:?}", self.told);
-            std::thread::sleep(Duration::from_millis(2));
-        }
-    }
-
-    #[track_caller]
-    pub fn frame(&mut self, what: &str, is: impl Fn(&View) -> bool) -> View {
-        let began = Instant::now();
-        loop {
-            self.hear();
-            if let Some(view) = self.views.as_mut().and_then(Receiver::try_recv).filter(&is) {
-                return view;
-            }
-            assert!(began.elapsed() < PATIENCE, "never seen: {what}");
-            std::thread::sleep(Duration::from_millis(1));
-        }
+impl DerefMut for Watched {
+    fn deref_mut(&mut self) -> &mut Heard {
+        &mut self.heard
     }
 }

@@ -83,6 +83,45 @@ fn a_window_that_nobody_sees_computes_nothing() {
 
 #[test]
 #[ignore = "needs an X server"]
+fn a_photo_that_nobody_changes_is_computed_once() {
+    let screen = Screen::new();
+    let photo = format!("{PORTRAIT}/rgb/000000.png");
+    let mut program = Program::start(&screen, &[&photo, "--panel=false"]);
+    let window = program.window();
+    let first = window.until("the photo", is_photograph);
+    thread::sleep(Duration::from_secs(3));
+    let before = program.cpu_ticks();
+    thread::sleep(Duration::from_secs(4));
+    let used = program.cpu_ticks() - before;
+    assert!(used <= 12, "{used} ticks in 4 s");
+    // It still follows what one does.
+    (0..12).for_each(|_| window.key(&[], u32::from(']')));
+    window.until("more blur", |image| distance(image, &first) > 0.3);
+    program.close();
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn a_photo_gets_its_depth_once_a_look_follows_it() {
+    let screen = Screen::new();
+    let folder = tempfile::tempdir().unwrap();
+    let photo = folder.path().join("photo.png");
+    fs::copy(format!("{PORTRAIT}/rgb/000000.png"), &photo).unwrap();
+    fs::copy(format!("{PORTRAIT}/depth/000000.png"), folder.path().join("photo-depth.png")).unwrap();
+    let name = photo.display().to_string();
+    let mut program = Program::start(&screen, &[&name, "--effect", "blur", "--panel=false"]);
+    let window = program.window();
+    window.until("the photo", is_photograph);
+    thread::sleep(Duration::from_secs(2));
+    // A preset that follows depth, and a view of that.
+    window.key(&[], u32::from('1'));
+    window.key(&[], u32::from('d'));
+    window.until("depth, in fewer colours than a photo has", |image| !is_photograph(image));
+    program.close();
+}
+
+#[test]
+#[ignore = "needs an X server"]
 fn a_look_is_there_again_unless_one_begins_afresh() {
     let screen = Screen::new();
     let remembered = |home: &std::path::Path| fs::read_to_string(home.join("state/bokehcam/window.toml")).unwrap();

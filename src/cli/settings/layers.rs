@@ -11,7 +11,7 @@ use clap::parser::{RawValues, ValueSource};
 use clap::{Arg, ArgMatches, Command};
 
 use super::file::SettingsFile;
-use super::table::{Values, all_settings, excluded_by, on_settings, parse_flags};
+use super::table::{STATED_BY_WINDOW, Values, all_settings, excluded_by, on_settings, parse_flags};
 use crate::cli::error::CliError;
 use crate::cli::log::one_line;
 use crate::look::{SETTINGS, settings};
@@ -104,26 +104,15 @@ impl Layers {
 
     /// What the command line gave, for putting together a command that does the same and for warnings.
     pub fn given(&self, matches: &ArgMatches) -> Given {
-        /// Never repeated in a command: they are for one run only, or the window states them itself.
-        const NOT_REPEATED: [&str; 12] = [
-            "preset",
-            "report",
-            "force",
-            "mirror",
-            "show",
-            "split",
-            "full-screen",
-            "instruments",
-            "panel",
-            "text-scale",
-            "single-keys",
-            "fresh",
-        ];
+        /// Never repeated in a command: they are for one run only, or the window states them itself, as it does
+        /// [`STATED_BY_WINDOW`].
+        const NOT_REPEATED: [&str; 4] = ["preset", "report", "force", "mirror"];
         let is_given = |setting: &Setting| {
             let name = setting.name.as_str();
             ["flag", "environment"].contains(&setting.origin)
                 && settings::setting(name).is_none()
                 && !NOT_REPEATED.contains(&name)
+                && !STATED_BY_WINDOW.contains(&name)
         };
         let resolved = self.resolved(matches);
         let is_behind = |setting: &&Setting| {

@@ -15,6 +15,12 @@ pub type Values = BTreeMap<String, String>;
 /// What the variables of settings begin with.
 pub const PREFIX: &str = "BOKEHCAM_";
 
+/// Settings of the window alone that it states itself in the commands that it puts together: they may have changed since.
+pub const STATED_BY_WINDOW: [&str; 8] =
+    ["show", "split", "full-screen", "instruments", "panel", "text-scale", "single-keys", "fresh"];
+/// The others of the window alone, which stay as they were given.
+pub const GIVEN_TO_WINDOW: [&str; 3] = ["language", "theme", "save-to"];
+
 /// The variable of a setting: `BOKEHCAM_` and the flag's name in capitals.
 pub fn variable(setting: &str) -> String {
     format!("{PREFIX}{}", setting.replace('-', "_").to_uppercase())

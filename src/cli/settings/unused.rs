@@ -3,7 +3,7 @@
 //! Given are those of flags, the environment and a preset; the settings file is meant for all runs.
 
 use super::layers::Setting;
-use super::table::variable;
+use super::table::{GIVEN_TO_WINDOW, STATED_BY_WINDOW, variable};
 use crate::cli::log;
 use crate::look::Effect;
 use crate::source::{DepthFrom, Kind};
@@ -43,7 +43,7 @@ pub enum From {
 type Why = fn(&Run) -> Option<&'static str>;
 
 /// What settings need to have an effect. The first two rows depend on the source alone: `warn_by_source` takes these.
-const NEEDS: [(&[&str], Why); 19] = [
+const NEEDS: &[(&[&str], Why)] = &[
     (&["size", "fps"], |run| match run.source {
         From::Source(Kind::Recording) => Some("a recording has its own"),
         From::Source(Kind::Demo) => Some("the demonstration has its own"),
@@ -100,22 +100,8 @@ const NEEDS: [(&[&str], Why); 19] = [
         true => blur(run),
         false => Some("frames do not come in real time: add --pace realtime"),
     }),
-    (
-        &[
-            "show",
-            "split",
-            "full-screen",
-            "instruments",
-            "panel",
-            "text-scale",
-            "single-keys",
-            "fresh",
-            "language",
-            "theme",
-            "save-to",
-        ],
-        |run| (!run.window).then_some("there is no window"),
-    ),
+    (&STATED_BY_WINDOW, windowless),
+    (&GIVEN_TO_WINDOW, windowless),
 ];
 
 const NO_DEPTH: &str = "there is no depth";
@@ -133,6 +119,11 @@ fn dof(run: &Run) -> Option<&'static str> {
 /// Settings of the blur need any effect that blurs.
 fn blur(run: &Run) -> Option<&'static str> {
     (run.effect == Effect::None).then_some("nothing is blurred")
+}
+
+/// Settings of the window need one.
+fn windowless(run: &Run) -> Option<&'static str> {
+    (!run.window).then_some("there is no window")
 }
 
 /// Warns of the given settings that have no effect in this run.
@@ -239,7 +230,8 @@ mod tests {
         let all = all_settings();
         let is_camera = |name: &&str| ["format", "control"].contains(name);
         let is_setting = |name: &&str| all.get_arguments().any(|arg| arg.get_long() == Some(name));
-        let window = |name: &&str| cfg!(feature = "window") || !NEEDS[NEEDS.len() - 1].0.contains(name);
+        let is_of_window = |name: &&str| STATED_BY_WINDOW.contains(name) || GIVEN_TO_WINDOW.contains(name);
+        let window = |name: &&str| cfg!(feature = "window") || !is_of_window(name);
         assert!(names.iter().all(|name| is_setting(name) || is_camera(name) || !window(name)), "{names:?}");
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]));

@@ -3,14 +3,14 @@
 
 use std::time::Duration;
 
-use egui::{Align2, Color32, Context, CornerRadius, FontId, Id, LayerId, Order, Rect, vec2};
+use egui::{Align2, Color32, Context, Id, LayerId, Order, Rect, vec2};
 
 use super::icons;
+use super::marks::label;
 use super::state::State;
-use super::theme::{GAP, ON_PICTURE, medium};
+use super::theme::{GAP, ON_PICTURE};
 use crate::preview::texts::tr;
 
-const HEIGHT: f32 = 24.0;
 /// Red enough for a dot on a dark badge.
 const LIVE: Color32 = Color32::from_rgb(255, 90, 80);
 
@@ -58,12 +58,7 @@ impl Badges {
         let right = panel.map_or(ctx.content_rect().right() - beside, |panel| panel.left());
         let mut corner = egui::pos2(right, ctx.content_rect().top()) + vec2(-GAP, GAP);
         for (text, color) in all.into_iter().filter_map(|(text, color)| Some((text?, color))) {
-            let galley = painter.layout_no_wrap(text, FontId::new(12.5, medium()), ON_PICTURE);
-            let rect = Align2::RIGHT_TOP.anchor_size(corner, vec2(galley.size().x + 34.0, HEIGHT));
-            painter.rect_filled(rect, CornerRadius::same(12), Color32::from_black_alpha(190));
-            painter.circle_filled(rect.left_center() + vec2(13.0, 0.0), 4.5, color);
-            painter.galley(rect.left_center() + vec2(23.0, -galley.size().y / 2.0), galley, ON_PICTURE);
-            corner.y += HEIGHT + 6.0;
+            corner.y += label(&painter, corner, Align2::RIGHT_TOP, &text, Some(color)).height() + 6.0;
         }
     }
 }

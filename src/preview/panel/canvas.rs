@@ -3,7 +3,7 @@
 use egui::{Id, Rect, Response, Role, Sense, Ui, WidgetInfo};
 
 use super::marks::{self, Tilting};
-use super::place::Place;
+use super::place::{Place, fit};
 use super::state::{Action, Shown, State, tweak};
 use crate::depth::focus::FocusRule;
 use crate::look::Effect;
@@ -106,7 +106,8 @@ impl Gestures {
         if self.pinched.abs() >= PINCH {
             let step = self.pinched.signum() as i32;
             self.pinched = 0.0;
-            actions.push(Action::Zoom(state.zoom.stepped(step), here));
+            let size = (place.size.x as u32, place.size.y as u32);
+            actions.push(Action::Zoom(state.zoom.stepped(step, fit(ui.ctx(), size)), here));
         }
     }
 

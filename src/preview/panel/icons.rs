@@ -2,11 +2,10 @@
 
 use std::f32::consts::TAU;
 
-use egui::{
-    Color32, CornerRadius, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo,
-};
+use egui::{Color32, CornerRadius, Painter, Pos2, Rect, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, WidgetInfo};
 use egui::{Role, vec2};
 
+use super::parts::Hinted;
 use super::theme::Colors;
 use crate::preview::texts::tr;
 
@@ -37,24 +36,27 @@ pub enum Icon {
 /// Draws an icon button. Whether it was clicked.
 pub fn button(ui: &mut Ui, icon: Icon, hint: &str, enabled: bool) -> bool {
     let colors = Colors::here(ui);
-    let hint = tr(hint);
     let sense = if enabled { Sense::click() } else { Sense::hover() };
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), sense);
-    response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, hint));
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, tr(hint)));
     if enabled && response.hovered() {
         ui.painter().rect_filled(rect, CornerRadius::same(7), colors.hover);
     }
     let color = if enabled { colors.text } else { colors.weak.gamma_multiply(0.45) };
     draw(ui.painter(), icon, rect.center(), color);
-    response.on_hover_text(hint).clicked()
+    response.hint(hint).clicked()
 }
 
 /// Draws an icon around its centre `at`; offsets are in points.
 fn draw(painter: &Painter, icon: Icon, at: Pos2, color: Color32) {
     let stroke = Stroke::new(1.6, color);
     match icon {
-        Icon::Undo => curved_arrow(painter, at, -1.0, stroke),
-        Icon::Redo => curved_arrow(painter, at, 1.0, stroke),
+        Icon::Undo | Icon::Redo => {
+            let side = if icon == Icon::Undo { -1.0 } else { 1.0 };
+            arc(painter, at + vec2(side, 1.5), 5.5, [0.5, 1.0], stroke);
+            let tip = at + vec2(side * 6.5, 3.0);
+            painter.add(Shape::line(vec![tip + vec2(-3.6, -3.4), tip, tip + vec2(3.6, -3.4)], stroke));
+        }
         Icon::Reset => {
             arc(painter, at, 6.0, [0.12, 0.92], stroke);
             let tip = at + Vec2::angled(0.12 * TAU) * 6.0;
@@ -102,21 +104,6 @@ fn bar(painter: &Painter, at: Pos2, color: Color32) {
     painter.rect_filled(Rect::from_center_size(at, vec2(3.0, 12.0)), CornerRadius::same(1), color);
 }
 
-/// A half circle with an arrow that points down at its left (`side` is -1) or right (1) end.
-fn curved_arrow(painter: &Painter, at: Pos2, side: f32, stroke: Stroke) {
-    let mut curve: Vec<Pos2> = (0..=14)
-        .map(|k| {
-            let angle = 0.5 * TAU * k as f32 / 14.0;
-            at + vec2(side * (1.0 - 5.5 * angle.cos()), 1.5 - 5.5 * angle.sin())
-        })
-        .collect();
-    let tip = at + vec2(side * 6.5, 3.0);
-    // Both ends reach a little below the half circle.
-    (curve[0], curve[14]) = (at + vec2(side * -4.5, 3.5), tip);
-    painter.add(Shape::line(curve, stroke));
-    painter.add(Shape::line(vec![tip + vec2(-3.6, -3.4), tip, tip + vec2(3.6, -3.4)], stroke));
-}
-
 /// A part of a circle, from the first of `turns` (of a whole turn, clockwise from the right) to the second.
 fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: Stroke) {
     let points = (0..=20).map(|k| {
@@ -124,15 +111,6 @@ fn arc(painter: &Painter, center: Pos2, radius: f32, turns: [f32; 2], stroke: St
         center + Vec2::angled(turn * TAU) * radius
     });
     painter.add(Shape::line(points.collect(), stroke));
-}
-
-/// The arrow before a section's title: it points right where the section is folded, down where it is open.
-pub fn chevron(ui: &mut Ui, openness: f32, response: &Response) {
-    let colors = Colors::here(ui);
-    let center = response.rect.center();
-    let turned = egui::emath::Rot2::from_angle(openness * TAU / 4.0);
-    let points = [vec2(-2.0, -4.0), vec2(2.5, 0.0), vec2(-2.0, 4.0)].map(|point| center + turned * point);
-    ui.painter().add(Shape::line(points.to_vec(), Stroke::new(1.6, colors.weak)));
 }
 
 /// A dot, as on a recorder's button; a square, to stop, while it records.

@@ -7,9 +7,10 @@ use egui::text::LayoutJob;
 use egui::{Align, Align2, Area, Context, Id, Mesh, Order, Rect, RichText, Sense, Shape, Stroke, TextStyle, Theme, Ui};
 use egui::{pos2, vec2};
 
+use super::cards;
 use super::meters::{FRAMES, Summary};
 use super::state::{Source, State};
-use super::theme::{Colors, GAP, PAD, card, medium, rung};
+use super::theme::{Colors, GAP, PAD, medium, rung};
 use crate::budget::Quality;
 use crate::preview::texts::{tr, tr_with};
 
@@ -36,13 +37,10 @@ impl Cache {
         ctx.request_repaint_after(Duration::from_millis(200));
         let window = ctx.content_rect();
         let area = Area::new(Id::unique("instruments")).fixed_pos(window.min + vec2(GAP, GAP)).order(Order::Middle);
-        area.interactable(false).fade_in(false).show(ctx, |ui| {
-            let colors = Colors::here(ui);
-            card(&colors).show(ui, |ui| {
-                ui.set_width((WIDTH - 2.0 * PAD).min(window.width() - 2.0 * (GAP + PAD)).max(40.0));
-                ui.spacing_mut().item_spacing.y = 3.0;
-                self.rows(ui, state);
-            });
+        cards::show(ctx, area.interactable(false), WIDTH, PAD, |ui, _| {
+            ui.set_width(ui.available_width());
+            ui.spacing_mut().item_spacing.y = 3.0;
+            self.rows(ui, state);
         });
     }
 
@@ -70,7 +68,7 @@ impl Cache {
             row(ui, "Input to picture", &format!("{:.0} ms, p99 {:.0} ms", reaction_ms[0], reaction_ms[1]));
         }
         row(ui, "Dropped", &drops(state));
-        let stages = state.meters.stages();
+        let stages = &state.meters.stages;
         row(ui, "Decode", &ms(stages.decode_ms));
         let depth = match stages.depth_every() {
             1 => ms(stages.depth_ms),
@@ -80,7 +78,7 @@ impl Cache {
         };
         row(ui, "Depth", &depth);
         row(ui, "Blur", &ms(stages.blur_ms));
-        for (name, pass_ms) in stages.passes() {
+        for &(name, pass_ms) in &stages.passes {
             row(ui, &format!("     {name}"), &ms(pass_ms));
         }
         row(ui, "Between stages", &ms(stages.between_ms));
@@ -116,7 +114,7 @@ fn row(ui: &mut Ui, name: &str, value: &str) {
 
 /// Dropped frames by cause, those that there are.
 fn drops(state: &State) -> String {
-    let frames = state.meters.frames();
+    let frames = &state.meters.frames;
     let total = frames.dropped.total();
     if total == 0 {
         return tr_with("none of {}", &[&frames.captured]);

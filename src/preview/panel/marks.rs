@@ -2,7 +2,7 @@
 //!
 //! They are light with a dark border, so that they stand out on any picture.
 
-use egui::{Align2, CornerRadius, FontFamily, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
+use egui::{Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
 use super::place::Place;
 use super::state::tweak::turned;
@@ -75,18 +75,23 @@ pub fn split(painter: &Painter, place: &Place, at: f32, held: bool) {
     for side in [-1.0, 1.0] {
         let tip = grip + vec2(side * 7.5, 0.0);
         let points = vec![tip + vec2(side * -3.5, -4.0), tip, tip + vec2(side * -3.5, 4.0)];
-        painter.add(Shape::line(points, Stroke::new(1.8, egui::Color32::from_gray(40))));
+        painter.add(Shape::line(points, Stroke::new(1.8, Color32::from_gray(40))));
     }
-    label(painter, pos2(x - 12.0, rect.top() + 14.0), Align2::RIGHT_TOP, tr("Before"));
-    label(painter, pos2(x + 12.0, rect.top() + 14.0), Align2::LEFT_TOP, tr("After"));
+    label(painter, pos2(x - 12.0, rect.top() + 14.0), Align2::RIGHT_TOP, tr("Before"), None);
+    label(painter, pos2(x + 12.0, rect.top() + 14.0), Align2::LEFT_TOP, tr("After"), None);
 }
 
-/// A word on the picture, on a dark field.
-pub fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) {
+/// Words on the picture, on a dark field, after a dot if it has a colour. Where they are.
+pub fn label(painter: &Painter, at: Pos2, align: Align2, text: &str, dot: Option<Color32>) -> Rect {
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::new(12.5, medium()), ON_PICTURE);
-    let rect = align.anchor_size(at, galley.size() + vec2(14.0, 6.0));
-    painter.rect_filled(rect, CornerRadius::same(9), egui::Color32::from_black_alpha(190));
-    painter.galley(rect.min + vec2(7.0, 3.0), galley, ON_PICTURE);
+    let left = if dot.is_some() { 23.0 } else { 8.0 };
+    let rect = align.anchor_size(at, galley.size() + vec2(left + 8.0, 8.0));
+    painter.rect_filled(rect, CornerRadius::same(9), Color32::from_black_alpha(190));
+    if let Some(color) = dot {
+        painter.circle_filled(rect.left_center() + vec2(13.0, 0.0), 4.5, color);
+    }
+    painter.galley(rect.min + vec2(left, 4.0), galley, ON_PICTURE);
+    rect
 }
 
 /// The band of tilt-shift on the screen, in points.
@@ -188,13 +193,10 @@ pub fn tilt(painter: &Painter, tilt: &Tilt, place: &Place, near: Option<Tilting>
         dot(painter, band.edge(tilt, side), size(Tilting::Edge, 5.5));
     }
     dot(painter, turn_grip, size(Tilting::Turn, 6.5));
-    painter.circle_filled(turn_grip, 3.0, egui::Color32::from_gray(40));
+    painter.circle_filled(turn_grip, 3.0, Color32::from_gray(40));
     dot(painter, band.middle, size(Tilting::Middle, 9.0));
-    let text = format!("{:.0}°", tilt.angle_deg);
     if near == Some(Tilting::Turn) {
-        let font = FontId::new(12.5, FontFamily::Proportional);
-        let at = Rect::from_center_size(turn_grip + vec2(0.0, -24.0), vec2(44.0, 20.0));
-        painter.rect_filled(at, CornerRadius::same(9), egui::Color32::from_black_alpha(190));
-        painter.text(at.center(), Align2::CENTER_CENTER, text, font, ON_PICTURE);
+        let text = format!("{:.0}°", tilt.angle_deg);
+        label(painter, turn_grip + vec2(0.0, -24.0), Align2::CENTER_CENTER, &text, None);
     }
 }

@@ -2,6 +2,7 @@
 
 mod badges;
 mod canvas;
+mod cards;
 mod closing;
 mod fonts;
 mod help;
@@ -27,7 +28,7 @@ pub use theme::install as dress;
 
 use std::time::Duration;
 
-use egui::{Context, Event, Id, Ui};
+use egui::{Context, Event, Id, Ui, Vec2};
 
 use super::present::{Area, Part};
 use super::state::{Action, State};
@@ -37,6 +38,10 @@ use place::Place;
 
 /// After this many seconds without pointer or keyboard the panel hides.
 const HIDES_AFTER_S: f64 = 4.0;
+/// Points that the controls need: text is no larger than leaves them so many.
+const LEAST_SIZE: Vec2 = Vec2::new(320.0, 200.0);
+/// Shown when they have not.
+const CRAMPED: &str = "The window is too small for text of this size: it is as large as there is room for.";
 /// A key or the wheel that rests for this many seconds counts as let go.
 const LET_GO_AFTER_S: f64 = 0.8;
 
@@ -67,6 +72,8 @@ pub struct Panel {
     transport: transport::Bar,
     /// The place of the picture, as fractions, of which somebody wants to know more.
     pub probed: Option<[f32; 2]>,
+    /// Whether the window has no room for text of the size that was chosen.
+    cramped: bool,
     /// Whether a control had the focus or a list was open at the end of the last pass.
     was_in_hand: bool,
 }
@@ -90,11 +97,8 @@ impl Panel {
             theme::install(&ctx);
             self.active_s = ctx.input(|input| input.time);
         }
-        // A new scale holds from the next pass on.
-        if (ctx.zoom_factor() - state.habits.text_scale).abs() > 1e-3 {
-            ctx.set_zoom_factor(state.habits.text_scale);
-        }
         let first = actions.len();
+        self.set_text_scale(&ctx, state.habits.text_scale, actions);
         let size = if canvas.size.1 > 0 { canvas.size } else { (1280, 720) };
         self.read_keys(ui, state, size, actions);
         let place = Place::new(canvas, ctx.pixels_per_point(), state.mirror);
@@ -141,6 +145,19 @@ impl Panel {
         self.settle(ui, &actions[first..]).into_iter().for_each(|settle| actions.push(settle));
     }
 
+    /// Makes text and controls as large as was chosen, as far as there is room for them, and tells where there is not; a new
+    /// scale holds from the next pass on.
+    fn set_text_scale(&mut self, ctx: &Context, chosen: f32, actions: &mut Vec<Action>) {
+        let window = ctx.content_rect().size() * ctx.zoom_factor();
+        let most = (window.x / LEAST_SIZE.x).min(window.y / LEAST_SIZE.y).max(1.0);
+        if !std::mem::replace(&mut self.cramped, chosen > most) && self.cramped {
+            actions.push(Action::Note(CRAMPED.to_owned()));
+        }
+        if (ctx.zoom_factor() - chosen.min(most)).abs() > 1e-3 {
+            ctx.set_zoom_factor(chosen.min(most));
+        }
+    }
+
     /// Gives the focus back to what had it, once nothing covers the window any more.
     fn give_back_focus(&mut self, ctx: &Context, covered: bool) {
         match (std::mem::replace(&mut self.covered, covered), covered) {
@@ -156,11 +173,13 @@ impl Panel {
         if ctx.text_edit_focused() {
             return;
         }
-        // egui has already used Esc to drop the focus or to close a list: it must not close anything else.
-        let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape)) && self.was_in_hand;
+        // egui has already used Esc to drop the focus or to close a list, or a question does: it must not close anything else.
+        let is_used = self.was_in_hand || self.sheet.is_asking() && !state.help && !state.closing;
+        let escaped = ui.input(|input| input.key_pressed(egui::Key::Escape)) && is_used;
         let focused = ctx.memory(|memory| memory.focused().is_some()) || escaped;
+        let context = keys::Context { size, fit: place::fit(ctx, size), chord: 0 };
         ui.input(|input| {
-            actions.extend(input.events.iter().filter_map(|event| keys::action(event, state, size, focused)));
+            actions.extend(input.events.iter().filter_map(|event| keys::action(event, state, context, focused)));
         });
     }
 
@@ -183,26 +202,19 @@ impl Panel {
         if active || waits {
             self.active_s = now_s;
         }
-        let left_s = self.active_s + HIDES_AFTER_S - now_s;
-        if left_s > 0.0 {
-            ui.ctx().request_repaint_after(Duration::from_secs_f64(left_s + 0.01));
-        }
-        left_s > 0.0
+        is_before(ui, self.active_s + HIDES_AFTER_S)
     }
 
     /// Whether the pointer has not been moved for so long that nobody looks for it; where it keeps the panel, it stays.
     fn pointer_rests(&mut self, ui: &Ui) -> bool {
-        let (now_s, at) = ui.input(|input| {
+        let at = ui.input(|input| {
             if input.pointer.is_moving() || input.pointer.any_down() || input.pointer.any_released() {
                 self.pointed_s = input.time;
             }
-            (input.time, input.pointer.latest_pos())
+            input.pointer.latest_pos()
         });
-        let left_s = self.pointed_s + HIDES_AFTER_S - now_s;
-        if left_s > 0.0 {
-            ui.ctx().request_repaint_after(Duration::from_secs_f64(left_s + 0.01));
-        }
-        left_s <= 0.0 && !self.sheet.rect().zip(at).is_some_and(|(panel, at)| panel.contains(at))
+        !is_before(ui, self.pointed_s + HIDES_AFTER_S)
+            && !self.sheet.rect().zip(at).is_some_and(|(panel, at)| panel.contains(at))
     }
 
     /// The action that ends a stroke, once the control is let go: its changes are undone together, later ones apart.
@@ -219,4 +231,13 @@ impl Panel {
         }
         None
     }
+}
+
+/// Whether it is not yet this time, in egui's seconds; when it is, there is another pass.
+fn is_before(ui: &Ui, end_s: f64) -> bool {
+    let left_s = end_s - ui.input(|input| input.time);
+    if left_s > 0.0 {
+        ui.ctx().request_repaint_after(Duration::from_secs_f64(left_s + 0.01));
+    }
+    left_s > 0.0
 }

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use egui::{Align2, Area, Context, Id, Label, Order, RichText, Ui, vec2};
+use egui::{Context, Id, Order};
 
+use super::cards::Stack;
 use super::plate;
 use super::state::{Action, Source, State};
-use super::theme::{Colors, GAP, card, medium};
-use crate::preview::texts::{tr, tr_with};
+use super::theme::GAP;
+use crate::preview::texts::tr_with;
 
 /// A note is shown for this long, plus some time per letter to read it.
 const SHOWN_S: f64 = 3.5;
@@ -29,11 +30,16 @@ pub struct Ages {
 impl Ages {
     /// Draws, upwards from `bottom` points above the bottom of the window: the banner, the
     /// failure of an output, and the notes.
-    pub fn show(&mut self, ctx: &Context, state: &State, mut bottom: f32, actions: &mut Vec<Action>) {
-        bottom += GAP + demonstration(ctx, state, bottom);
-        bottom += banner(ctx, state, bottom, actions);
-        bottom += trouble(ctx, state, bottom, actions);
-        bottom += plate::offer(ctx, state, bottom, actions);
+    pub fn show(&mut self, ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) {
+        let mut stack = Stack { ctx, bottom: bottom + GAP };
+        if state.is_demonstration() && !state.bare {
+            stack.tell(Id::unique("demonstration"), Order::Middle, 620.0, 1.0, DEMONSTRATION);
+        }
+        banner(&mut stack, state, actions);
+        if let Some(why) = &state.trouble {
+            stack.ask("trouble", 460.0, ["An output failed", why], [("I see", "", Action::Dismiss)], actions);
+        }
+        plate::offer(&mut stack, state, actions);
         let now_s = ctx.input(|input| input.time);
         self.seen.retain(|(number, _)| state.notes.iter().any(|note| note.number == *number));
         for note in &state.notes {
@@ -60,94 +66,24 @@ impl Ages {
             ctx.request_repaint_after(Duration::from_secs_f64(next_s + 0.005));
         }
         for (&(text, opacity), place) in shown.iter().rev().take(MOST).zip(0..) {
-            let area = Area::new(Id::unique(("note", place))).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom));
-            let drawn = area.order(Order::Foreground).interactable(false).fade_in(false).show(ctx, |ui| {
-                ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 460.0));
-                ui.set_opacity(opacity);
-                let colors = Colors::here(ui);
-                card(&colors).inner_margin(egui::Margin::symmetric(14, 9)).show(ui, |ui| {
-                    ui.add(Label::new(RichText::new(tr(text)).color(colors.text)).wrap());
-                });
-            });
-            bottom += drawn.response.rect.height() + 6.0;
+            stack.tell(Id::unique(("note", place)), Order::Foreground, 460.0, opacity, text);
         }
     }
 }
 
-/// Draws that the source is the demonstration, for as long as it is, `bottom` points above the window's edge. Its height.
-fn demonstration(ctx: &Context, state: &State, bottom: f32) -> f32 {
-    if !state.is_demonstration() || state.bare {
-        return 0.0;
-    }
-    let area = Area::new(Id::unique("demonstration")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom - GAP));
-    let drawn = area.order(Order::Middle).interactable(false).fade_in(false).show(ctx, |ui| {
-        ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 620.0));
-        let colors = Colors::here(ui);
-        card(&colors).inner_margin(egui::Margin::symmetric(14, 6)).show(ui, |ui| {
-            ui.add(Label::new(RichText::new(tr(DEMONSTRATION)).color(colors.text)).wrap());
-        });
-    });
-    drawn.response.rect.height() + 6.0
-}
-
-/// Draws why an output failed, `bottom` points above the window's edge, until that is dismissed. Its height.
-fn trouble(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) -> f32 {
-    let Some(why) = &state.trouble else { return 0.0 };
-    let area = Area::new(Id::unique("trouble")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom)).order(Order::Middle);
-    let drawn = area.fade_in(false).show(ctx, |ui| {
-        let colors = Colors::here(ui);
-        ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 460.0));
-        card(&colors).show(ui, |ui| {
-            ui.label(RichText::new(tr("An output failed")).family(medium()).size(16.0));
-            ui.add(Label::new(RichText::new(tr(why)).color(colors.text)).wrap());
-            ui.add_space(2.0);
-            if ui.button(tr("I see")).clicked() {
-                actions.push(Action::Dismiss);
-            }
-        });
-    });
-    drawn.response.rect.height() + 6.0
-}
-
-/// Draws why the source gives no frames and a button to try again, `bottom` points above the window's edge: clear of the
-/// picture's middle. Its height, 0 while frames come.
-fn banner(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) -> f32 {
+/// Draws why the source gives no frames and a button to try again, clear of the picture's middle.
+fn banner(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     let silent;
-    let (title, why, button) = match &state.source {
-        Source::Running(running) => {
-            let Some(silent_s) = state.silent_s else { return 0.0 };
+    let (title, why, button) = match (&state.source, state.silent_s) {
+        (Source::Running(_), None) => return,
+        (Source::Running(running), Some(silent_s)) => {
             silent =
                 tr_with("{}: nothing for {} s. It goes on by itself once frames come.", &[&running.label, &silent_s]);
             ("No picture", silent.as_str(), Some("Try again"))
         }
-        Source::Opening => ("Opening…", "", None),
-        Source::Lost(why) => ("No picture", why.as_str(), Some("Try again")),
-        Source::Ended => ("The end", "The recording is over.", Some("Play again")),
+        (Source::Opening, _) => ("Opening…", "", None),
+        (Source::Lost(why), _) => ("No picture", why.as_str(), Some("Try again")),
+        (Source::Ended, _) => ("The end", "The recording is over.", Some("Play again")),
     };
-    let area = Area::new(Id::unique("banner")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom)).order(Order::Middle);
-    let drawn = area.fade_in(false).show(ctx, |ui| {
-        let colors = Colors::here(ui);
-        ui.set_max_width((ctx.content_rect().width() - 2.0 * GAP).clamp(60.0, 360.0));
-        card(&colors).show(ui, |ui| banner_text(ui, &colors, (title, why, button), actions));
-    });
-    drawn.response.rect.height() + 6.0
-}
-
-/// The banner's title, reason and button.
-fn banner_text(
-    ui: &mut Ui,
-    colors: &Colors,
-    (title, why, button): (&str, &str, Option<&str>),
-    actions: &mut Vec<Action>,
-) {
-    ui.label(RichText::new(tr(title)).family(medium()).size(16.0));
-    if !why.is_empty() {
-        ui.add(Label::new(RichText::new(tr(why)).color(colors.text)).wrap());
-    }
-    if let Some(button) = button {
-        ui.add_space(2.0);
-        if ui.button(tr(button)).on_hover_text(tr("F5")).clicked() {
-            actions.push(Action::Retry);
-        }
-    }
+    stack.ask("banner", 360.0, [title, why], button.map(|text| (text, "F5", Action::Retry)), actions);
 }

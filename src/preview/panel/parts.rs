@@ -3,38 +3,75 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, Context, CornerRadius, DragValue, FontId, Id, Layout, Rect, Response, RichText, Role, Sense, Slider,
-    SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
+    Align, Align2, ComboBox, Context, CornerRadius, DragValue, EventFilter, FontId, Id, Key, Layout, Rect, Response,
+    RichText, Role, Sense, Slider, SliderClamping, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2,
 };
 
 use super::theme::{Colors, ROW, medium};
 use crate::preview::texts::{tr, tr_with};
 
 /// A control for a number.
+#[derive(Clone)]
 pub struct Number<'a> {
-    /// What it is called.
-    pub label: &'a str,
+    label: &'a str,
     /// What it does, shown while the pointer rests on it.
-    pub hint: &'a str,
-    /// Least and largest value.
-    pub range: RangeInclusive<f32>,
-    /// Whether the slider is logarithmic.
-    pub ratios: bool,
+    hint: &'a str,
+    range: RangeInclusive<f32>,
     /// Digits after the point.
-    pub digits: usize,
-    /// Prefix and suffix of the number.
-    pub around: [&'a str; 2],
+    digits: usize,
+    /// Whether the slider is logarithmic.
+    ratios: bool,
+    /// Before and after the number.
+    around: [&'a str; 2],
+}
+
+impl<'a> Number<'a> {
+    /// A number of this range, without a unit, on a linear slider.
+    pub fn new(label: &'a str, hint: &'a str, range: RangeInclusive<f32>, digits: usize) -> Self {
+        Self { label, hint, range, digits, ratios: false, around: ["", ""] }
+    }
+
+    /// The same with a unit, before and after it.
+    pub fn unit(self, before: &'a str, after: &'a str) -> Self {
+        Self { around: [before, after], ..self }
+    }
+
+    /// The same on a logarithmic slider.
+    pub fn ratios(self) -> Self {
+        Self { ratios: true, ..self }
+    }
+
+    pub fn label(&self) -> &'a str {
+        self.label
+    }
+}
+
+/// Controls with a hint, shown while the pointer rests on them.
+pub trait Hinted {
+    /// Shows a text of the table, unless it is empty; not where the control is scrolled out of sight, though egui takes it to
+    /// be there.
+    fn hint(self, text: &str) -> Self;
+}
+
+impl Hinted for Response {
+    fn hint(self, text: &str) -> Self {
+        let is_out_of_sight = |at| self.rect.contains(at) && !self.interact_rect.contains(at);
+        match text.is_empty() || self.ctx.pointer_latest_pos().is_some_and(is_out_of_sight) {
+            true => self,
+            false => self.on_hover_text(tr(text)),
+        }
+    }
 }
 
 /// Draws a name, a number to drag or type, and a slider under them. Whether the number was changed.
-pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
-    let Number { label, hint, range, ratios, digits, around: [before, after] } = how;
-    let (label, hint) = (tr(label), tr(hint));
+pub fn number(ui: &mut Ui, how: &Number, value: &mut f32) -> bool {
+    let Number { label, hint, ref range, digits, ratios, around: [before, after] } = *how;
+    let label = tr(label);
     let mut changed = false;
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
         let name = ui.horizontal(|ui| {
-            let name = ui.label(label).on_hover_text(hint);
+            let name = ui.label(label).hint(hint);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 ui.spacing_mut().button_padding = Vec2::new(5.0, 1.0);
                 ui.spacing_mut().interact_size = Vec2::new(24.0, 20.0);
@@ -56,11 +93,11 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
                     let number: f64 = text.trim().replace(',', ".").parse().ok()?;
                     // On its way through the panel, Tab leaves behind what was there.
                     if (number - shown).abs() > 0.1f64.powi(digits as i32) {
-                        say_range(&ctx, (label, before, after), digits, &range, number);
+                        say_range(&ctx, how, number);
                     }
                     Some(number)
                 });
-                let is_other = ui.add(drag).labelled_by(name.id).on_hover_text(hint).changed();
+                let is_other = ui.add(drag).labelled_by(name.id).hint(hint).changed();
                 // The keyboard's way through the panel leaves behind the number as it is shown, rounded.
                 if is_other && (typed - *value).abs() > 0.501 * 0.1f32.powi(digits as i32) {
                     (*value, changed) = (typed, true);
@@ -73,10 +110,9 @@ pub fn number(ui: &mut Ui, how: Number, value: &mut f32) -> bool {
         // A logarithmic slider that begins at 0 has to begin its decades somewhere.
         let least = if ratios { f64::from(*range.start()).max(1e-3) } else { 0.0 };
         let mut slid = *value;
-        let slider = Slider::new(&mut slid, range).clamping(SliderClamping::Edits).show_value(false);
-        let slider =
-            ui.add(slider.logarithmic(ratios).smallest_positive(least)).labelled_by(name.inner.id).on_hover_text(hint);
-        if slider.changed() {
+        let slider = Slider::new(&mut slid, range.clone()).clamping(SliderClamping::Edits).show_value(false);
+        let slider = ui.add(slider.logarithmic(ratios).smallest_positive(least)).labelled_by(name.inner.id);
+        if slider.hint(hint).changed() {
             // A digit more than is shown.
             let steps = 10f32.powi(digits as i32 + 1);
             (*value, changed) = ((slid * steps).round() / steps, true);
@@ -91,20 +127,15 @@ fn said() -> Id {
 }
 
 /// Says what becomes of a number that was typed, if it cannot be.
-fn say_range(
-    ctx: &Context,
-    (label, before, after): (&str, &str, &str),
-    digits: usize,
-    range: &RangeInclusive<f32>,
-    number: f64,
-) {
+fn say_range(ctx: &Context, how: &Number, number: f64) {
+    let Number { label, ref range, digits, around: [before, after], .. } = *how;
     // As it is shown: half a step beyond is the end itself.
     let half = 0.5 * 0.1f64.powi(digits as i32);
     let (least, most) = (f64::from(*range.start()), f64::from(*range.end()));
     if number < least - half || number > most + half {
         let taken = if number < least { least } else { most };
         let [least, most, taken] = [least, most, taken].map(|number| format!("{before}{number:.digits$}{after}"));
-        let line = tr_with("{} goes from {} to {}: {} was taken.", &[&label, &least, &most, &taken]);
+        let line = tr_with("{} goes from {} to {}: {} was taken.", &[&tr(label), &least, &most, &taken]);
         ctx.data_mut(|data| data.insert_temp(said(), line));
     }
 }
@@ -114,70 +145,121 @@ pub fn take_said(ctx: &Context) -> Option<String> {
     ctx.data_mut(|data| data.remove_temp(said()))
 }
 
-/// Draws options side by side, each with a name and a hint; `can` says which may be chosen. The one that was clicked.
-pub fn choose(
+/// Draws options side by side, each with a name, a hint and what it stands for; `can` says which may be chosen. The one that
+/// was clicked, or chosen by the arrow keys.
+pub fn choose<T: PartialEq + Copy>(
     ui: &mut Ui,
     what: &str,
-    options: &[(&str, &str)],
-    chosen: usize,
-    can: impl Fn(usize) -> bool,
-) -> Option<usize> {
+    options: &[(&str, &str, T)],
+    chosen: T,
+    can: impl Fn(T) -> bool,
+) -> Option<T> {
     let colors = Colors::here(ui);
     let what = tr(what);
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW), Sense::hover());
     ui.painter().rect_filled(rect, CornerRadius::same(7), colors.field);
     let cell_width = rect.width() / options.len().max(1) as f32;
-    let mut clicked = None;
-    for (index, (name, hint)) in options.iter().map(|(name, hint)| (tr(name), tr(hint))).enumerate() {
+    let mut group = Group::default();
+    for (index, &(name, hint, option)) in options.iter().enumerate() {
+        let name = tr(name);
         let left = rect.left() + cell_width * index as f32;
         let cell = Rect::from_min_size(pos2(left, rect.top()), Vec2::new(cell_width, ROW));
-        let (is_chosen, is_possible) = (index == chosen, can(index));
+        let (is_chosen, is_possible) = (option == chosen, can(option));
         let sense = if is_possible { Sense::click() } else { Sense::hover() };
         let response = ui.interact(cell, ui.scope_id().with((what, index)), sense);
         response
             .widget_info(|| WidgetInfo::selected(Role::RadioButton, is_possible, is_chosen, format!("{what}: {name}")));
         let inner = cell.shrink(2.0);
-        let text = if is_chosen {
-            ui.painter().rect_filled(inner, CornerRadius::same(6), colors.accent);
-            colors.on_accent
-        } else if !is_possible {
-            colors.weak.gamma_multiply(0.6)
-        } else {
-            if response.hovered() {
-                ui.painter().rect_filled(inner, CornerRadius::same(6), colors.hover);
-            }
-            colors.text
-        };
+        let is_hovered = is_possible && response.hovered();
+        if is_chosen || is_hovered {
+            ui.painter().rect_filled(inner, CornerRadius::same(6), colors.fill(is_chosen, is_hovered));
+        }
+        let text = colors.on_fill(is_chosen, is_possible);
         let family = if is_chosen { medium() } else { egui::FontFamily::Proportional };
         let font = FontId::new(12.5, family);
         ui.painter().with_clip_rect(cell).text(inner.center(), Align2::CENTER_CENTER, name, font, text);
-        if response.on_hover_text(hint).clicked() {
-            clicked = Some(index);
+        group.add(response.hint(hint), option);
+    }
+    group.chosen(ui)
+}
+
+/// Controls of which one is chosen: by a click, or by an arrow key that goes on to it from its neighbour.
+pub struct Group<T>(Vec<(Response, T)>);
+
+impl<T> Default for Group<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T> Group<T> {
+    /// Adds the next control; those that can only be hovered are never chosen.
+    pub fn add(&mut self, control: Response, option: T) {
+        if control.sense.senses_click() {
+            self.0.push((control, option));
         }
     }
-    clicked
+
+    /// What was chosen in this pass, if anything.
+    pub fn chosen(mut self, ui: &Ui) -> Option<T> {
+        let focused = self.0.iter().position(|(control, _)| control.has_focus());
+        let by_arrow = focused.and_then(|at| {
+            let arrows = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
+            ui.memory_mut(|memory| memory.set_focus_lock_filter(self.0[at].0.id, arrows));
+            let pressed = |key| ui.input(|input| input.key_pressed(key));
+            match (pressed(Key::ArrowLeft), pressed(Key::ArrowRight)) {
+                (true, false) => at.checked_sub(1),
+                (false, true) => Some(at + 1).filter(|next| *next < self.0.len()),
+                _ => None,
+            }
+        });
+        by_arrow.into_iter().for_each(|next| self.0[next].0.request_focus());
+        let chosen = by_arrow.or_else(|| self.0.iter().position(|(control, _)| control.clicked()));
+        chosen.map(|index| self.0.swap_remove(index).1)
+    }
+}
+
+/// Draws a list that opens, of names, each with a hint (or none) and what it stands for. Another one that was chosen.
+pub fn list<'a, T: PartialEq>(
+    ui: &mut Ui,
+    what: &str,
+    shown: &str,
+    options: impl IntoIterator<Item = (String, &'a str, T)>,
+    chosen: &T,
+) -> Option<T> {
+    let mut picked = None;
+    let menu = ComboBox::from_id_salt(what).selected_text(shown).truncate().show_ui(ui, |ui| {
+        for (name, hint, option) in options {
+            let is_chosen = option == *chosen;
+            if ui.selectable_label(is_chosen, name).hint(hint).clicked() && !is_chosen {
+                picked = Some(option);
+            }
+        }
+    });
+    called(&menu.response, what, Role::ComboBox);
+    picked
 }
 
 /// Draws a name and a switch. Whether it was clicked.
 pub fn switch(ui: &mut Ui, label: &str, hint: &str, on: bool) -> bool {
     let colors = Colors::here(ui);
-    let (label, hint) = (tr(label), tr(hint));
+    let label = tr(label);
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 24.0), Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::Switch, ui.is_enabled(), on, label));
     let track = Rect::from_center_size(pos2(rect.right() - 17.0, rect.center().y), Vec2::new(32.0, 18.0));
-    let fill = match (on, response.hovered()) {
-        (true, _) => colors.accent,
-        (false, true) => colors.hover,
-        (false, false) => colors.field,
-    };
     let painter = ui.painter();
-    painter.rect_filled(track, CornerRadius::same(9), fill);
+    painter.rect_filled(track, CornerRadius::same(9), colors.fill(on, response.hovered()));
     painter.rect_stroke(track, CornerRadius::same(9), Stroke::new(1.0, colors.line), StrokeKind::Inside);
     let x = if on { track.right() - 9.0 } else { track.left() + 9.0 };
     painter.circle_filled(pos2(x, track.center().y), 6.5, if on { colors.on_accent } else { colors.weak });
     let font = TextStyle::Body.resolve(ui.style());
     painter.text(rect.left_center(), Align2::LEFT_CENTER, label, font, ui.visuals().text_color());
-    response.on_hover_text(hint).clicked()
+    response.hint(hint).clicked()
+}
+
+/// Draws a button. Whether it was clicked.
+pub fn button(ui: &mut Ui, text: &str, hint: &str) -> bool {
+    ui.button(tr(text)).hint(hint).clicked()
 }
 
 /// Tells a screen reader what a list or a field is called.
@@ -206,7 +288,7 @@ pub fn section(ui: &mut Ui, name: &str, open: bool, body: impl FnOnce(&mut Ui)) 
     let colors = Colors::here(ui);
     ui.add_space(4.0);
     let title = RichText::new(tr(name)).family(medium()).size(13.5).color(colors.text);
-    let header = egui::CollapsingHeader::new(title).id_salt(name).open(Some(open)).icon(super::icons::chevron);
+    let header = egui::CollapsingHeader::new(title).id_salt(name).open(Some(open));
     let folded = header.show_unindented(ui, |ui| {
         ui.add_space(2.0);
         body(ui);

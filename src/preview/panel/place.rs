@@ -1,6 +1,6 @@
 //! The picture's place on the screen.
 
-use egui::{Pos2, Rect, Vec2, pos2};
+use egui::{Context, Pos2, Rect, Vec2, pos2};
 
 use super::Canvas;
 
@@ -14,6 +14,12 @@ pub struct Place {
     pub size: Vec2,
     /// Whether it is shown flipped left to right.
     pub mirror: bool,
+}
+
+/// Pixels of the window along a side of one of a picture's, where all of the picture is seen as large as fits.
+pub fn fit(ctx: &Context, (width, height): (u32, u32)) -> f32 {
+    let window = ctx.content_rect().size() * ctx.pixels_per_point();
+    (window.x / width.max(1) as f32).min(window.y / height.max(1) as f32)
 }
 
 impl Place {

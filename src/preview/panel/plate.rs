@@ -1,39 +1,25 @@
 //! The plate: the offer to take one, and what to do while it is taken.
 
-use egui::{Align2, Area, Context, Id, Label, Order, ProgressBar, RichText, Ui, vec2};
+use egui::{Context, ProgressBar, RichText};
 
+use super::cards::{self, Stack, words};
+use super::parts::button;
 use super::state::{Action, State};
-use super::theme::{Colors, GAP, card, medium};
+use super::theme::medium;
 use crate::depth::plate::Step;
 use crate::preview::texts::tr;
 
 const WIDTH: f32 = 420.0;
 
-/// Draws the offer to take a plate, `bottom` points above the window's edge, where that is the way to a portrait. Its
-/// height.
-pub fn offer(ctx: &Context, state: &State, bottom: f32, actions: &mut Vec<Action>) -> f32 {
+/// Draws the offer to take a plate, where that is the way to a portrait.
+pub fn offer(stack: &mut Stack, state: &State, actions: &mut Vec<Action>) {
     if !state.takes_plates()[1] || state.declined_plate || state.plate.is_some() || state.bare {
-        return 0.0;
+        return;
     }
-    let area = Area::new(Id::unique("plate offer")).anchor(Align2::CENTER_BOTTOM, vec2(0.0, -bottom));
-    let drawn = area.order(Order::Middle).fade_in(false).show(ctx, |ui| {
-        framed(ui, |ui, colors| {
-            ui.label(RichText::new(tr("A portrait from this camera alone")).family(medium()).size(16.0));
-            let text = "Step out of the picture for four seconds: what is behind you is then known, and blurred. The camera has \
-                        to stand still.";
-            ui.add(Label::new(RichText::new(tr(text)).color(colors.text)).wrap());
-            ui.add_space(2.0);
-            ui.horizontal(|ui| {
-                if ui.button(tr("Take a plate")).on_hover_text("T").clicked() {
-                    actions.push(Action::TakePlate);
-                }
-                if ui.button(tr("Not now")).clicked() {
-                    actions.push(Action::DeclinePlate);
-                }
-            });
-        });
-    });
-    drawn.response.rect.height() + 6.0
+    let text = "Step out of the picture for four seconds: what is behind you is then known, and blurred. The camera has to \
+                stand still.";
+    let buttons = [("Take a plate", "T", Action::TakePlate), ("Not now", "", Action::DeclinePlate)];
+    stack.ask("plate offer", WIDTH, ["A portrait from this camera alone", text], buttons, actions);
 }
 
 /// Draws, in the middle of the window, what the person has to do for the plate now.
@@ -51,34 +37,22 @@ pub fn show(ctx: &Context, state: &State, actions: &mut Vec<Action>) {
             "The camera was moved, or the light has changed: nobody can be told from what is behind, so all is blurred.",
         ),
     };
-    let area = Area::new(Id::unique("plate")).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).order(Order::Foreground);
-    area.fade_in(false).show(ctx, |ui| {
-        framed(ui, |ui, colors| {
-            ui.vertical_centered(|ui| {
-                ui.label(RichText::new(tr(title)).family(medium()).size(22.0));
-                match step {
-                    Step::StepOut(seconds) => {
-                        ui.label(RichText::new(seconds.to_string()).family(medium()).size(72.0));
-                    }
-                    Step::Taking(percent) => {
-                        ui.add(ProgressBar::new(percent as f32 / 100.0).desired_width(WIDTH / 2.0));
-                    }
-                    _ => {}
+    cards::in_middle(ctx, "plate", WIDTH, |ui, colors| {
+        ui.vertical_centered(|ui| {
+            ui.label(RichText::new(tr(title)).family(medium()).size(22.0));
+            match step {
+                Step::StepOut(seconds) => {
+                    ui.label(RichText::new(seconds.to_string()).family(medium()).size(72.0));
                 }
-                if !why.is_empty() {
-                    ui.add(Label::new(RichText::new(tr(why)).color(colors.text)).wrap());
+                Step::Taking(percent) => {
+                    ui.add(ProgressBar::new(percent as f32 / 100.0).desired_width(WIDTH / 2.0));
                 }
-                if step == Step::Unlike && ui.button(tr("Take another plate")).on_hover_text("T").clicked() {
-                    actions.push(Action::TakePlate);
-                }
-            });
+                _ => {}
+            }
+            words(ui, colors, why);
+            if step == Step::Unlike && button(ui, "Take another plate", "T") {
+                actions.push(Action::TakePlate);
+            }
         });
     });
-}
-
-/// A card no wider than the window.
-pub fn framed(ui: &mut Ui, content: impl FnOnce(&mut Ui, &Colors)) {
-    let colors = Colors::here(ui);
-    ui.set_max_width((ui.ctx().content_rect().width() - 2.0 * GAP).clamp(60.0, WIDTH));
-    card(&colors).inner_margin(egui::Margin::symmetric(18, 14)).show(ui, |ui| content(ui, &colors));
 }

@@ -1,10 +1,10 @@
 //! What is under the pointer: its depth and its blur.
 
-use egui::{Align2, Context, CornerRadius, FontFamily, FontId, Id, LayerId, Order, Ui, vec2};
+use egui::{Align, Align2, Context, Id, LayerId, Order, Ui, vec2};
 
+use super::marks::label;
 use super::place::Place;
 use super::state::{Shown, State};
-use super::theme::{ON_PICTURE, SHADE};
 use crate::frame::DepthMap;
 use crate::preview::texts::{tr, tr_with};
 use crate::preview::views::Probe;
@@ -29,20 +29,11 @@ pub fn show(ctx: &Context, state: &State) {
     let Some((probe, at)) = state.probe.zip(ctx.pointer_latest_pos()) else { return };
     let painter = ctx.layer_painter(LayerId::new(Order::Middle, Id::unique("probe")));
     let text = text(probe, state.camera.is_relative);
-    let galley = painter.layout_no_wrap(text, FontId::new(12.5, FontFamily::Proportional), ON_PICTURE);
-    let (window, size) = (ctx.content_rect(), galley.size() + vec2(14.0, 8.0));
     // Right and below, unless that is outside.
-    let right = at.x + 16.0 + size.x < window.right();
-    let below = at.y + 20.0 + size.y < window.bottom();
-    let corner = match (right, below) {
-        (true, true) => at + vec2(16.0, 20.0),
-        (false, true) => at + vec2(-12.0 - size.x, 20.0),
-        (true, false) => at + vec2(16.0, -12.0 - size.y),
-        (false, false) => at + vec2(-12.0 - size.x, -12.0 - size.y),
-    };
-    let rect = Align2::LEFT_TOP.anchor_size(corner, size);
-    painter.rect_filled(rect, CornerRadius::same(6), SHADE);
-    painter.galley(rect.min + vec2(7.0, 4.0), galley, ON_PICTURE);
+    let window = ctx.content_rect();
+    let (x, dx) = if at.x + 240.0 < window.right() { (Align::Min, 16.0) } else { (Align::Max, -12.0) };
+    let (y, dy) = if at.y + 50.0 < window.bottom() { (Align::Min, 20.0) } else { (Align::Max, -12.0) };
+    label(&painter, at + vec2(dx, dy), Align2([x, y]), &text, None);
 }
 
 /// Relative distances are in units of the nearest one, and have no metres.

@@ -2,6 +2,7 @@
 
 use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, pos2, vec2};
 
+use super::cards;
 use super::icons::{self, Icon};
 use super::sections::{self, Editing, Sheet, Thumbs};
 use super::state::{Action, Source, State};
@@ -29,6 +30,11 @@ impl Memory {
         let pointer = ctx.input(|input| input.pointer.latest_pos());
         let under_pointer = self.rect.zip(pointer).is_some_and(|(rect, at)| rect.contains(at));
         under_pointer || ctx.memory(|memory| memory.focused().is_some()) || ctx.any_popup_open()
+    }
+
+    /// Whether it asks something that Esc gives up.
+    pub fn is_asking(&self) -> bool {
+        self.rect.is_some() && self.editing.is_asking()
     }
 
     /// Where it was drawn last, if it is open.
@@ -61,7 +67,7 @@ impl Memory {
                 scroll.show(ui, |ui| self.body(ui, state, size, actions));
             });
         });
-        if shown && matches!(state.source, Source::Running(_)) {
+        if shown && matches!(state.source, Source::Running(_)) && !state.stands_still() {
             ctx.request_repaint_after_secs(STATUS_PERIOD_S);
         }
         self.rect = shown.then_some(drawn.response.rect);
@@ -82,8 +88,6 @@ impl Memory {
 
     /// Draws the sections, and turns what they changed of the look into an action.
     fn body(&mut self, ui: &mut Ui, state: &State, size: (u32, u32), actions: &mut Vec<Action>) {
-        // Room for the scroll bar, which floats over the right edge.
-        ui.set_width(ui.available_width() - 4.0);
         ui.spacing_mut().combo_width = ui.available_width();
         let mut sheet = Sheet { state, look: state.look.clone(), stroke: None, size, actions };
         sections::show(ui, &mut sheet, &mut self.editing, &mut self.thumbs);
@@ -98,12 +102,11 @@ impl Memory {
 /// Draws a button that brings the panel back, where it was.
 pub fn way_back(ctx: &Context, actions: &mut Vec<Action>) {
     let corner = ctx.content_rect().right_top() + vec2(-GAP - icons::SIDE - 6.0, GAP);
-    Area::new(id().with("way back")).fixed_pos(corner).order(Order::Middle).fade_in(false).show(ctx, |ui| {
-        theme::card(&Colors::here(ui)).inner_margin(3.0).show(ui, |ui| {
-            if icons::button(ui, Icon::Panel, "Show the panel (P)", true) {
-                actions.push(Action::Panel(true));
-            }
-        });
+    let area = Area::new(id().with("way back")).fixed_pos(corner).order(Order::Middle);
+    cards::show(ctx, area, 60.0, 3, |ui, _| {
+        if icons::button(ui, Icon::Panel, "Show the panel (P)", true) {
+            actions.push(Action::Panel(true));
+        }
     });
 }
 

@@ -6,7 +6,6 @@ mod fonts;
 mod gestures;
 mod keyboard;
 mod looks;
-mod paint;
 mod plate;
 mod presets;
 mod sections;
@@ -17,10 +16,13 @@ mod touch;
 mod transport;
 mod zoom;
 
-use egui::{Event, FullOutput, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, Vec2, pos2};
+use egui::pos2;
+use egui::{Event, FullOutput, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, RawInput, Rect, TouchPhase, Vec2};
 
 use super::super::state::{Action, State, sample};
 use super::{Canvas, Panel};
+use crate::depth::focus::FocusRule;
+use crate::look::Look;
 use crate::preview::present::Area;
 
 /// A window of the controls alone.
@@ -40,9 +42,19 @@ impl Window {
         Self::of(sample::state(), (1280, 720))
     }
 
-    fn of(state: State, (width, height): (u32, u32)) -> Self {
+    fn of(state: State, size: (u32, u32)) -> Self {
+        let mut window = Self::unseen(state, size);
+        // Fonts and measures hold from the second pass on.
+        for _ in 0..4 {
+            window.pass(Vec::new());
+        }
+        window
+    }
+
+    /// The same before its first pass.
+    fn unseen(state: State, (width, height): (u32, u32)) -> Self {
         let area = Area { x: 0, y: 0, width, height };
-        let mut window = Self {
+        Self {
             ctx: egui::Context::default(),
             panel: Panel::default(),
             state,
@@ -50,12 +62,7 @@ impl Window {
             size: Vec2::new(width as f32, height as f32),
             native: 1.0,
             time_s: 0.0,
-        };
-        // Fonts and measures hold from the second pass on.
-        for _ in 0..4 {
-            window.pass(Vec::new());
         }
-        window
     }
 
     /// One pass of egui; what was done is applied, as the window does.
@@ -155,6 +162,32 @@ fn pressed(key: Key, modifiers: Modifiers, pressed: bool) -> Event {
 
 fn button(pos: Pos2, pressed: bool) -> Event {
     Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE }
+}
+
+/// A turn of the wheel.
+fn scrolled(unit: MouseWheelUnit, by: f32, modifiers: Modifiers) -> Event {
+    let source = egui::MouseWheelSource::Unknown;
+    Event::MouseWheel { unit, delta: Vec2::new(0.0, by), phase: TouchPhase::Move, source, modifiers }
+}
+
+/// The last look that was made.
+fn last_look(actions: &[Action]) -> Option<Look> {
+    actions.iter().rev().find_map(|action| match action {
+        Action::Look { look, .. } => Some((**look).clone()),
+        _ => None,
+    })
+}
+
+/// The point of the picture that was focused last.
+fn point(actions: &[Action]) -> [f32; 2] {
+    match last_look(actions).map(|look| look.focus) {
+        Some(FocusRule::Point { x, y }) => [x, y],
+        other => panic!("{other:?} of {actions:?}"),
+    }
+}
+
+fn close(a: [f32; 2], b: [f32; 2]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3)
 }
 
 /// Where on the panel one may click without hitting the picture.

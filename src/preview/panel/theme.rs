@@ -77,6 +77,24 @@ impl Colors {
         }
     }
 
+    /// Behind a control that is chosen, or under the pointer.
+    pub fn fill(&self, chosen: bool, hovered: bool) -> Color32 {
+        match (chosen, hovered) {
+            (true, _) => self.accent,
+            (false, true) => self.hover,
+            (false, false) => self.field,
+        }
+    }
+
+    /// Text there; weak where it cannot be chosen.
+    pub fn on_fill(&self, chosen: bool, possible: bool) -> Color32 {
+        match (chosen, possible) {
+            (true, _) => self.on_accent,
+            (false, true) => self.text,
+            (false, false) => self.weak.gamma_multiply(0.6),
+        }
+    }
+
     /// The colours of the theme that is in use.
     pub fn here(ui: &egui::Ui) -> Self {
         Self::of(if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light })
@@ -153,7 +171,13 @@ fn style(theme: Theme) -> Style {
     spacing.combo_width = WIDTH - 2.0 * PAD;
     spacing.menu_margin = Margin::same(6);
     spacing.window_margin = Margin::same(PAD as i8);
-    spacing.scroll = ScrollStyle { bar_width: 6.0, floating_width: 4.0, ..ScrollStyle::floating() };
+    spacing.scroll = ScrollStyle {
+        bar_width: 6.0,
+        floating_width: 4.0,
+        // Nothing lies under it.
+        floating_allocated_width: 10.0,
+        ..ScrollStyle::floating()
+    };
     style.interaction.selectable_labels = false;
     style
 }

@@ -1,9 +1,10 @@
 //! The self-timer: the seconds until a snapshot, counted in the middle of the window.
 
-use egui::{Align2, Area, Context, Id, Order, RichText, vec2};
+use egui::{Context, RichText};
 
+use super::cards;
 use super::state::{Action, State};
-use super::theme::{Colors, card, medium};
+use super::theme::medium;
 
 /// Time to get back into the picture.
 const DELAY_S: f64 = 3.0;
@@ -26,12 +27,8 @@ impl Timer {
             return;
         }
         ctx.request_repaint_after_secs((left_s.fract() + 0.005) as f32);
-        let area = Area::new(Id::unique("self-timer")).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
-        area.order(Order::Foreground).interactable(false).fade_in(false).show(ctx, |ui| {
-            let colors = Colors::here(ui);
-            card(&colors).inner_margin(egui::Margin::symmetric(28, 10)).show(ui, |ui| {
-                ui.label(RichText::new(left_s.ceil().to_string()).family(medium()).size(72.0));
-            });
+        cards::in_middle(ctx, "self-timer", 200.0, |ui, _| {
+            ui.label(RichText::new(left_s.ceil().to_string()).family(medium()).size(72.0));
         });
     }
 }

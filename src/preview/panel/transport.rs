@@ -1,10 +1,11 @@
 //! The bar under a recording: pause, step and a line to drag.
 
-use egui::{Area, Context, Id, Order, Rect, Slider, pos2};
+use egui::{Area, Context, Id, Margin, Order, Rect, Slider, pos2};
 
+use super::cards;
 use super::icons::{self, Icon};
 use super::state::{Action, Source, State};
-use super::theme::{Colors, GAP, card};
+use super::theme::GAP;
 use crate::preview::texts::tr_with;
 
 const HEIGHT: f32 = 44.0;
@@ -30,50 +31,48 @@ impl Bar {
             return 0.0;
         }
         let corner = pos2(left, window.bottom() - GAP - HEIGHT);
-        Area::new(Id::unique("transport")).fixed_pos(corner).order(Order::Middle).fade_in(false).show(ctx, |ui| {
-            let colors = Colors::here(ui);
-            card(&colors).inner_margin(egui::Margin::symmetric(8, 4)).show(ui, |ui| {
-                ui.set_width(width - 16.0);
-                ui.set_height(HEIGHT - 8.0);
-                ui.horizontal_centered(|ui| {
-                    ui.spacing_mut().item_spacing.x = 4.0;
-                    let (play, hint) = match (state.frozen, state.can_pause()) {
-                        (true, _) => (Icon::Play, "Play (Z)"),
-                        (false, true) => (Icon::Pause, "Pause (Z)"),
-                        (false, false) => (Icon::Pause, "Freeze the window; what is written goes on (Z)"),
-                    };
-                    let buttons = [
-                        (Icon::Back, "One frame back (Page Up)", Action::Step(-1)),
-                        (play, hint, Action::Freeze(!state.frozen)),
-                        (Icon::Forward, "One frame on (Page Down)", Action::Step(1)),
-                    ];
-                    for (icon, hint, action) in buttons {
-                        if icons::button(ui, icon, hint, true) {
-                            actions.push(action);
-                        }
+        let area = Area::new(Id::unique("transport")).fixed_pos(corner).order(Order::Middle);
+        cards::show(ctx, area, width, Margin::symmetric(8, 4), |ui, _| {
+            ui.set_width(width - 16.0);
+            ui.set_height(HEIGHT - 8.0);
+            ui.horizontal_centered(|ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
+                let (play, hint) = match (state.frozen, state.can_pause()) {
+                    (true, _) => (Icon::Play, "Play (Z)"),
+                    (false, true) => (Icon::Pause, "Pause (Z)"),
+                    (false, false) => (Icon::Pause, "Freeze the window; what is written goes on (Z)"),
+                };
+                let buttons = [
+                    (Icon::Back, "One frame back (Page Up)", Action::Step(-1)),
+                    (play, hint, Action::Freeze(!state.frozen)),
+                    (Icon::Forward, "One frame on (Page Down)", Action::Step(1)),
+                ];
+                for (icon, hint, action) in buttons {
+                    if icons::button(ui, icon, hint, true) {
+                        actions.push(action);
                     }
-                    let times = format!("{} / {}", clock(transport.time_ns), clock(transport.length_ns));
-                    let frame = tr_with("Frame {} of {}", &[&(transport.place + 1), &transport.frames]);
-                    let shows_time = width >= LEAST_WIDTH;
-                    let text = egui::RichText::new(if shows_time { &times } else { "" }).monospace().size(12.5);
-                    let label = ui.label(text).on_hover_text(&frame);
-                    ui.spacing_mut().slider_width = (ui.available_width() - 6.0).max(20.0);
-                    let mut place = transport.place;
-                    let line = Slider::new(&mut place, 0..=transport.frames.saturating_sub(1)).show_value(false);
-                    let line = ui.add(line).labelled_by(label.id);
-                    let is_moved = line.changed();
-                    if line.drag_started() && !state.frozen && state.can_pause() {
-                        self.plays_on = true;
-                        actions.push(Action::Freeze(true));
-                    }
-                    if is_moved {
-                        actions.push(Action::Seek(place));
-                    }
-                    if line.drag_stopped() && std::mem::take(&mut self.plays_on) {
-                        actions.push(Action::Freeze(false));
-                    }
-                    line.on_hover_text(&frame);
-                });
+                }
+                let times = format!("{} / {}", clock(transport.time_ns), clock(transport.length_ns));
+                let frame = tr_with("Frame {} of {}", &[&(transport.place + 1), &transport.frames]);
+                let shows_time = width >= LEAST_WIDTH;
+                let text = egui::RichText::new(if shows_time { &times } else { "" }).monospace().size(12.5);
+                let label = ui.label(text).on_hover_text(&frame);
+                ui.spacing_mut().slider_width = (ui.available_width() - 6.0).max(20.0);
+                let mut place = transport.place;
+                let line = Slider::new(&mut place, 0..=transport.frames.saturating_sub(1)).show_value(false);
+                let line = ui.add(line).labelled_by(label.id);
+                let is_moved = line.changed();
+                if line.drag_started() && !state.frozen && state.can_pause() {
+                    self.plays_on = true;
+                    actions.push(Action::Freeze(true));
+                }
+                if is_moved {
+                    actions.push(Action::Seek(place));
+                }
+                if line.drag_stopped() && std::mem::take(&mut self.plays_on) {
+                    actions.push(Action::Freeze(false));
+                }
+                line.on_hover_text_at_pointer(&frame);
             });
         });
         HEIGHT + 6.0

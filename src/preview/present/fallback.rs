@@ -53,10 +53,6 @@ impl<Other: FnOnce(Painter) -> Result<Box<dyn Presenter>, PresentError>> Present
     fn has_device(&self) -> bool {
         self.active.has_device()
     }
-
-    fn describe(&self) -> String {
-        self.active.describe()
-    }
 }
 
 #[cfg(test)]
@@ -89,9 +85,6 @@ mod tests {
         fn has_device(&self) -> bool {
             true
         }
-        fn describe(&self) -> String {
-            "a GPU".to_owned()
-        }
     }
 
     type Screen = Rc<RefCell<Vec<u32>>>;
@@ -106,11 +99,8 @@ mod tests {
             self.0.set_controls(controls);
         }
         fn present(&mut self, drawing: &Drawing) -> Result<(), PresentError> {
-            self.0.paint(&mut self.1.borrow_mut(), 0, drawing);
+            self.0.paint(&mut self.1.borrow_mut(), drawing);
             Ok(())
-        }
-        fn describe(&self) -> String {
-            "the CPU".to_owned()
         }
     }
 

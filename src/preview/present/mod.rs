@@ -108,9 +108,6 @@ pub trait Presenter {
     fn has_device(&self) -> bool {
         false
     }
-
-    /// One line: what draws.
-    fn describe(&self) -> String;
 }
 
 /// The window cannot be drawn to.

@@ -5,15 +5,15 @@ mod sources;
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, mpsc};
+use std::sync::mpsc;
 
-use super::live::{self, Live};
+use super::live::Live;
 use super::{Closed, News, Order, SessionEvent, Start, held};
-use crate::link::demand::{Demand, Watch};
+use crate::link::demand::Watch;
 use crate::look::Look;
-use crate::pipeline::{PipelineError, Wanted};
-use crate::preview::folders::{self, Folders};
-use crate::preview::services::{Services, Switch};
+use crate::pipeline::PipelineError;
+use crate::preview::folders;
+use crate::preview::services::Switch;
 use crate::preview::state::{Output, Request, Source, Update};
 use crate::sink;
 use crate::sink::switch::{Fate, Notice};
@@ -21,17 +21,10 @@ use crate::stats::Report;
 
 /// The session, on its own thread.
 pub(super) struct Host {
-    services: Box<dyn Services>,
-    look: Look,
-    source: String,
+    /// As it began; look, source and outputs are those of now.
+    start: Start,
     /// Whether a plate makes its depth, by a wish of the window's.
     with_plate: bool,
-    outputs: Vec<Output>,
-    keep_going: bool,
-    budget_ns: Option<u64>,
-    folders: Folders,
-    wanted: Arc<Wanted>,
-    demand: Demand,
     /// Held while something is written: then the source does not rest.
     watch: Option<Watch>,
     news: News,
@@ -53,18 +46,9 @@ pub(super) struct Host {
 impl Host {
     /// A session that has not started yet; `orders` sends orders to itself.
     pub fn new(start: Start, news: News, orders: mpsc::Sender<Order>) -> Self {
-        let Start { services, look, source, outputs, keep_going, budget_ns, folders, wanted, demand } = start;
         Self {
-            services,
-            look,
-            source,
+            start,
             with_plate: false,
-            outputs,
-            keep_going,
-            budget_ns,
-            folders,
-            wanted,
-            demand,
             watch: None,
             news,
             orders,
@@ -126,7 +110,7 @@ impl Host {
 
     /// Rescues recordings of an earlier preview that was killed.
     fn recover(&self) {
-        for kept in self.folders.all().flat_map(|folder| sink::recover_all(folder, folders::is_video)) {
+        for kept in self.start.folders.all().flat_map(|folder| sink::recover_all(folder, folders::is_video)) {
             self.news.note(format!("An earlier recording was broken off: it is kept as {}", kept.display()));
         }
     }
@@ -136,8 +120,8 @@ impl Host {
         match request {
             Request::Open(name) => {
                 // A plate is of one camera.
-                self.with_plate &= self.source == name;
-                self.source = name;
+                self.with_plate &= self.start.source == name;
+                self.start.source = name;
                 self.stop();
                 self.open();
             }
@@ -154,44 +138,48 @@ impl Host {
                 self.tell_outputs();
             }
             Request::End(output) => {
-                self.outputs.retain(|other| *other != output);
+                self.start.outputs.retain(|other| *other != output);
                 if let Some(live) = &self.live {
                     live.end(&output);
                 }
                 self.tell_outputs();
             }
-            Request::Control(name, value) => match self.services.turn(&name, value) {
+            Request::Control(name, value) => match self.start.services.turn(&name, value) {
                 Ok(controls) => self.news.tell(Update::Controls(controls)),
                 Err(line) => self.news.note(line),
             },
             Request::OpenFolder(folder) => self.news.open(folder),
             Request::Refresh => self.tell_choices(),
             Request::SavePreset(name, look) => {
-                let saved = self.services.settings().save_preset(&name, &look);
+                let saved = self.start.services.settings().save_preset(&name, &look);
                 self.tell_presets(saved, &format!("Saved as preset '{name}'"));
             }
             Request::RenamePreset(name, new) => {
-                let renamed = self.services.settings().rename_preset(&name, &new);
+                let renamed = self.start.services.settings().rename_preset(&name, &new);
                 self.tell_presets(renamed, &format!("Preset '{name}' is called '{new}' now"));
             }
             Request::DeletePreset(name) => {
-                let deleted = self.services.settings().delete_preset(&name);
+                let deleted = self.start.services.settings().delete_preset(&name);
                 self.tell_presets(deleted, &format!("Preset '{name}' is deleted"));
             }
-            other => self.on_offer(other),
+            Request::Offer(name) => self.offer(name),
+            Request::Browse(what) => self.browse(what),
+            Request::Mode(size, fps) => self.set_mode(size, fps),
+            // All else is the window's own, or comes another way.
+            _ => {}
         }
     }
 
     /// Tells what became of a change of the presets, and which there are now.
     fn tell_presets(&mut self, changed: Result<(), String>, done: &str) {
         self.news.note(changed.map_or_else(|line| line, |()| done.to_owned()));
-        self.news.tell(Update::Presets(self.services.settings().presets()));
+        self.news.tell(Update::Presets(self.start.services.settings().presets()));
     }
 
     fn tell_outputs(&mut self) {
-        self.wanted.need(!self.outputs.is_empty());
-        self.watch = (!self.outputs.is_empty()).then(|| self.demand.watch());
-        self.news.tell(Update::Outputs(self.outputs.clone()));
+        self.start.wanted.need(!self.start.outputs.is_empty());
+        self.watch = (!self.start.outputs.is_empty()).then(|| self.start.demand.watch());
+        self.news.tell(Update::Outputs(self.start.outputs.clone()));
     }
 
     /// Tells that there is no running source; `source` says why. Recordings are over; a virtual camera goes on with the
@@ -199,7 +187,7 @@ impl Host {
     fn without_source(&mut self, source: Source) {
         // Before the first run, the recordings that were asked for at the start still wait for a source.
         if self.began {
-            self.outputs.retain(|output| output.is_camera);
+            self.start.outputs.retain(|output| output.is_camera);
         }
         self.tell_outputs();
         self.news.tell(Update::Source(source));
@@ -208,17 +196,17 @@ impl Host {
     /// Opens the source and starts a run of it.
     fn open(&mut self) {
         self.news.tell(Update::Source(Source::Opening));
-        let opened = match self.services.open(&self.source, self.with_plate) {
+        let opened = match self.start.services.open(&self.start.source, self.with_plate) {
             Ok(opened) => opened,
             Err(line) => return self.without_source(Source::Lost(line)),
         };
-        self.source.clone_from(&opened.name);
+        self.start.source.clone_from(&opened.name);
         self.tell_choices();
-        self.news.tell(Update::Camera(self.services.camera()));
+        self.news.tell(Update::Camera(opened.camera.clone()));
         self.news.tell(Update::Controls(opened.controls.clone()));
         opened.notes.iter().for_each(|line| self.news.note(line));
         self.runs += 1;
-        self.wanted.need(!self.outputs.is_empty());
+        self.start.wanted.need(!self.start.outputs.is_empty());
         let (orders, run) = (self.orders.clone(), self.runs);
         let to_host = orders.clone();
         let wrote = move |written| {
@@ -227,21 +215,14 @@ impl Host {
         let ended = move |ended| {
             let _ = orders.send(Order::Ended(run, Box::new(ended)));
         };
-        let settings = live::Settings {
-            look: &self.look,
-            keep_going: self.keep_going,
-            budget_ns: self.budget_ns,
-            wanted: Arc::clone(&self.wanted),
-            demand: self.demand.clone(),
-        };
-        match Live::begin(opened, &settings, &mut *self.services, &self.news, wrote, ended) {
+        match Live::begin(opened, &mut self.start, &self.news, wrote, ended) {
             Ok((live, source)) => {
-                self.looks = VecDeque::from([(0, live.effective(&self.look))]);
+                self.looks = VecDeque::from([(0, live.effective(&self.start.look))]);
                 self.live = Some(live);
                 self.news.tell(Update::Source(source));
                 // A recording ends with its source; a virtual camera goes on with the next one.
                 let first = !std::mem::replace(&mut self.began, true);
-                let outputs = std::mem::take(&mut self.outputs);
+                let outputs = std::mem::take(&mut self.start.outputs);
                 outputs.into_iter().filter(|output| output.is_camera || first).for_each(|output| self.write_to(output));
                 self.tell_outputs();
             }
@@ -255,11 +236,11 @@ impl Host {
         if output.name.is_empty() {
             output.name = self.free_name().display().to_string();
         }
-        match self.services.output(&output.name, live.size, live.period_ns, &live.stop) {
+        match self.start.services.output(&output.name, live.size, live.period_ns, &live.stop) {
             Ok(sink) => {
-                self.wanted.need(true);
+                self.start.wanted.need(true);
                 live.write_to(&output, sink);
-                self.outputs.push(output);
+                self.start.outputs.push(output);
             }
             Err(line) => self.news.note(line),
         }
@@ -268,7 +249,9 @@ impl Host {
     /// A path for a recording that does not exist yet.
     fn free_name(&self) -> PathBuf {
         // What is being written gets its name at the end.
-        self.folders.free_video(|path| self.outputs.iter().any(|output| path.as_os_str() == output.name.as_str()))
+        self.start
+            .folders
+            .free_video(|path| self.start.outputs.iter().any(|output| path.as_os_str() == output.name.as_str()))
     }
 
     /// Puts the command line that does the same on the clipboard.
@@ -278,9 +261,9 @@ impl Host {
             true => output.name.clone(),
             false => self.free_name().display().to_string(),
         };
-        let outputs: Vec<String> = self.outputs.iter().map(again).collect();
-        let look = self.live.as_ref().map_or_else(|| self.look.clone(), |live| live.effective(&self.look));
-        let command = self.services.command(&look, &self.source, &outputs, switches);
+        let outputs: Vec<String> = self.start.outputs.iter().map(again).collect();
+        let look = self.effective_look();
+        let command = self.start.services.command(&look, &self.start.source, &outputs, switches);
         self.news.note(format!("Copied: {command}"));
         self.news.send(SessionEvent::Copy(command));
     }
@@ -299,7 +282,7 @@ impl Host {
                 self.news.tell(Update::Trouble(why.clone()));
                 // The output of an earlier run may share its name with one of the present run.
                 if run == self.runs {
-                    self.outputs.retain(|output| output.name != *member);
+                    self.start.outputs.retain(|output| output.name != *member);
                     self.tell_outputs();
                 }
             }

@@ -1,5 +1,6 @@
 //! One run of the pipeline.
 
+use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -8,26 +9,18 @@ use std::time::Instant;
 
 use super::super::services::{Opened, Services};
 use super::super::state::{Output, Running, Source};
-use super::{News, SessionEvent};
+use super::{News, SessionEvent, Start};
 use crate::bokeh;
 use crate::clock::Clock;
 use crate::depth::plate::Guide;
-use crate::link::{self, demand::Demand};
+use crate::link;
 use crate::look::Look;
-use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run, Wanted};
+use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run};
 use crate::sink::Sink;
 use crate::sink::switch::Notice;
 use crate::sink::{Switch, Switchboard};
+use crate::source::{Kind, SourceName};
 use crate::stats::Report;
-
-/// What a run starts with besides its source.
-pub(super) struct Settings<'a> {
-    pub look: &'a Look,
-    pub keep_going: bool,
-    pub budget_ns: Option<u64>,
-    pub wanted: Arc<Wanted>,
-    pub demand: Demand,
-}
 
 /// A run, and the channels into it.
 pub(super) struct Live {
@@ -54,8 +47,7 @@ impl Live {
     /// The executor cannot be made, or the system gives no thread: one line.
     pub(super) fn begin(
         opened: Opened,
-        settings: &Settings,
-        services: &mut dyn Services,
+        start: &mut Start,
         news: &News,
         wrote: impl Fn(Notice) + Send + Sync + 'static,
         ended: impl FnOnce(Result<Report, PipelineError>) + Send + 'static,
@@ -64,17 +56,18 @@ impl Live {
         let measured = source.is_measured();
         let crate::source::Source { camera, depth, guide, .. } = source;
         let info = camera.info();
-        let look = settings.look.for_source(has_depth);
+        let is_photo = SourceName::from_str(&name).is_ok_and(|name| name.kind() == Kind::Photo);
+        let look = start.look.for_source(has_depth);
         let made_for = look.settings(info.size, ADAPTIVE);
-        let bokeh = made_for.as_ref().map(|made_for| services.executor(made_for, info.size)).transpose()?;
+        let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
         let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
-        let budget_ns = settings.budget_ns.unwrap_or(info.period_ns);
+        let budget_ns = start.budget_ns.unwrap_or(info.period_ns);
         let (sink, board) = Switch::new("window", wrote);
         let (changes, to_come) = mpsc::channel();
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
-        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), settings.keep_going);
-        let (wanted, demand) = (Arc::clone(&settings.wanted), settings.demand.clone());
+        let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), start.keep_going);
+        let (wanted, demand) = (Arc::clone(&start.wanted), start.demand.clone());
         news.send(SessionEvent::Views(views, guide.clone(), camera.seeker()));
         let run = move || {
             pipeline::run(Run {
@@ -115,6 +108,7 @@ impl Live {
             period_ns: info.period_ns,
             has_depth,
             is_live: info.live,
+            is_photo,
             takes_plates,
             executor,
             budget_ns,

@@ -6,6 +6,9 @@ use crate::look::{Effect, Look, Strength};
 /// Shown when a look or a view needs depth and there is none: what to do.
 pub const NO_DEPTH: &str =
     "This source has no depth. A second camera beside it, a depth camera or a recording with depth gives it.";
+/// The same for a photo.
+pub const NO_DEPTH_OF_PHOTO: &str =
+    "This photo has no depth. A network gives it (`bokehcam models`), or a depth map beside it: NAME-depth.png.";
 /// Shown when depth is to be viewed while it is not computed.
 pub const NOT_FOLLOWED: &str = "Depth is made only while the blur follows it: choose Depth as the effect first.";
 /// Shown when a plate is to be taken of what is no camera.
@@ -35,11 +38,14 @@ impl State {
             Action::Preset(name) => return self.set_preset(&name),
             Action::SavePreset(name) => match name.trim() {
                 "" => self.note("A preset needs a name."),
-                name => return vec![Request::SavePreset(name.to_owned(), Box::new(self.look.clone()))],
+                name => {
+                    self.chosen_preset = Some(name.to_owned());
+                    return vec![Request::SavePreset(name.to_owned(), Box::new(self.look.clone()))];
+                }
             },
             Action::RenamePreset(name, new) => return vec![Request::RenamePreset(name, new)],
             Action::DeletePreset(name) => return vec![Request::DeletePreset(name)],
-            Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(NO_DEPTH),
+            Action::Show(Shown::Depth) if !self.may_have_depth() => self.note(self.no_depth()),
             Action::Show(Shown::Depth) if !self.look.effect.follows_depth() => self.note(NOT_FOLLOWED),
             Action::Show(shown) => self.shown = shown,
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
@@ -102,6 +108,11 @@ impl State {
         self.frozen = on;
     }
 
+    /// What to do where depth is needed and there is none.
+    pub fn no_depth(&self) -> &'static str {
+        if self.is_photo() { NO_DEPTH_OF_PHOTO } else { NO_DEPTH }
+    }
+
     /// Changes the look as far as the source allows it; the one before can be undone.
     fn set_look(&mut self, look: Look, stroke: Option<&'static str>) -> Vec<Request> {
         let look = self.fitting(look);
@@ -136,11 +147,14 @@ impl State {
             return Vec::new();
         };
         if preset.patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
-            self.note(NO_DEPTH);
+            self.note(self.no_depth());
             return Vec::new();
         }
         match preset.patch.on(&self.look) {
-            Ok(look) => self.set_look(look, None),
+            Ok(look) => {
+                self.chosen_preset = Some(name.to_owned());
+                self.set_look(look, None)
+            }
             Err(error) => {
                 let line = format!("preset {name}: {error}");
                 self.note(line);
@@ -190,7 +204,7 @@ impl State {
             self.source_name.clone_from(&name);
         }
         self.source = Source::Opening;
-        (self.frozen, self.transport) = (false, None);
+        (self.frozen, self.settled, self.transport) = (false, false, None);
         self.focus_m = None;
         vec![Request::Open(name)]
     }

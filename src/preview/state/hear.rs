@@ -1,6 +1,5 @@
 //! How the session's updates change the state.
 
-use super::apply::NO_DEPTH;
 use super::{Request, Shown, Source, State, Update};
 use crate::look::{Effect, Look};
 
@@ -39,7 +38,7 @@ impl State {
         self.source = source;
         if self.shown == Shown::Depth && !self.may_have_depth() {
             self.shown = Shown::Picture;
-            self.note(NO_DEPTH);
+            self.note(self.no_depth());
         }
         let look = match &self.source {
             // An effect that was replaced by tilt-shift for want of depth comes back, unless another was chosen since.

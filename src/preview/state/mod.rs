@@ -20,12 +20,12 @@ mod zoom;
 use std::path::PathBuf;
 
 pub use action::{Action, Request, Update};
-pub use apply::{NO_DEPTH, NO_PLATE, NO_VIRTUAL_CAMERA};
+pub use apply::NO_VIRTUAL_CAMERA;
 pub use camera::Camera;
 pub use habits::{Habits, TEXT_SCALES};
 pub use history::History;
 pub use transport::Transport;
-pub use zoom::{FACTORS as ZOOM_FACTORS, Zoom};
+pub use zoom::Zoom;
 
 use super::meters::Meters;
 pub use super::views::Shown;
@@ -66,6 +66,8 @@ pub struct Running {
     pub has_depth: bool,
     /// Whether its frames come at their own pace, as a camera's do. Others can stand still.
     pub is_live: bool,
+    /// Whether it is a photo: one picture that stands still.
+    pub is_photo: bool,
     /// Whether it is a camera that a plate can be taken with.
     pub takes_plates: bool,
     pub executor: String,
@@ -91,7 +93,7 @@ pub struct Note {
 }
 
 /// All that the window shows, but the picture itself.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct State {
     /// The look as it was chosen.
     pub look: Look,
@@ -108,6 +110,8 @@ pub struct State {
     /// What else is known of the camera.
     pub camera: Camera,
     pub presets: Vec<Preset>,
+    /// The name of the one that was chosen or saved last.
+    chosen_preset: Option<String>,
     /// Where pictures go besides the window.
     pub outputs: Vec<Output>,
     /// Whether a snapshot is due in a few seconds.
@@ -124,6 +128,8 @@ pub struct State {
     pub mirror_chosen: bool,
     /// Whether the window keeps the picture it has.
     pub frozen: bool,
+    /// Whether the picture of a photo is there: all that follow would be the same.
+    pub settled: bool,
     /// Where the recording is, if the source is one.
     pub transport: Option<Transport>,
     pub zoom: Zoom,
@@ -178,48 +184,7 @@ const NOTES: usize = 6;
 impl State {
     /// A window that opens `source_name` and shows it in `look`, with the panel open.
     pub fn new(look: Look, source_name: String) -> Self {
-        Self {
-            first_look: look.clone(),
-            look,
-            source_name,
-            source: Source::default(),
-            sources: Vec::new(),
-            virtual_cameras: Vec::new(),
-            controls: Vec::new(),
-            camera: Camera::default(),
-            presets: Vec::new(),
-            outputs: Vec::new(),
-            self_timer: false,
-            kept_in: None,
-            shown: Shown::default(),
-            mirror: false,
-            between: false,
-            mirror_chosen: false,
-            frozen: false,
-            zoom: Zoom::default(),
-            probe: None,
-            transport: None,
-            split: None,
-            panel: true,
-            instruments: false,
-            bare: false,
-            help: false,
-            full_screen: false,
-            silent_s: None,
-            focus_m: None,
-            legend: None,
-            notes: Vec::new(),
-            plate: None,
-            declined_plate: false,
-            closing: false,
-            habits: Habits::default(),
-            recorded_bytes: None,
-            trouble: None,
-            meters: Meters::default(),
-            history: History::default(),
-            fitted: false,
-            noted: 0,
-        }
+        Self { first_look: look.clone(), look, source_name, panel: true, ..Self::default() }
     }
 
     /// Adds a line for the person.
@@ -256,14 +221,19 @@ impl State {
         }
     }
 
-    /// Whether the picture that is shown stays: it was frozen, or no others come.
-    pub fn keeps_picture(&self) -> bool {
-        self.frozen || matches!(self.source, Source::Lost(_) | Source::Ended)
+    /// Whether the source is a photo.
+    pub fn is_photo(&self) -> bool {
+        matches!(&self.source, Source::Running(running) if running.is_photo)
     }
 
-    /// Whether the window needs no frames: it is frozen, and the source can stand still.
+    /// Whether the picture that is shown stays: it was frozen, is a photo's, or no others come.
+    pub fn keeps_picture(&self) -> bool {
+        self.frozen || self.settled || matches!(self.source, Source::Lost(_) | Source::Ended)
+    }
+
+    /// Whether the window needs no frames: it keeps its picture, and the source can stand still.
     pub fn stands_still(&self) -> bool {
-        self.frozen && matches!(&self.source, Source::Running(running) if !running.is_live)
+        (self.frozen || self.settled) && matches!(&self.source, Source::Running(running) if !running.is_live)
     }
 
     /// Whether frames have depth, as far as is known: without a running source they may.
@@ -289,9 +259,15 @@ impl State {
         self.outputs.iter().find(|output| output.is_camera)
     }
 
-    /// Whether the look is that of a preset; where it is focused does not matter.
-    pub fn is_in_use(&self, preset: &Preset) -> bool {
-        let used = preset.patch.on(&self.look);
-        used.is_ok_and(|look| Look { focus: self.look.focus, ..look } == self.look)
+    /// The index of the preset that the look is of, wherever it is focused: of several that look the same, the one that was
+    /// chosen or saved last, else the first.
+    pub fn preset_in_use(&self) -> Option<usize> {
+        let is_in_use = |preset: &Preset| {
+            let used = preset.patch.on(&self.look);
+            used.is_ok_and(|look| Look { focus: self.look.focus, ..look } == self.look)
+        };
+        let all = self.presets.iter().enumerate().filter(|(_, preset)| is_in_use(preset));
+        let is_other = |preset: &Preset| self.chosen_preset.as_ref() != Some(&preset.name);
+        all.min_by_key(|(index, preset)| (is_other(preset), *index)).map(|(index, _)| index)
     }
 }

@@ -25,6 +25,7 @@ pub fn running(has_depth: bool) -> Source {
         period_ns: 33_333_333,
         has_depth,
         is_live: true,
+        is_photo: false,
         takes_plates: !has_depth,
         executor: "cpu, 2 threads, AVX2".into(),
         budget_ns: 33_333_333,

@@ -1,3 +1,4 @@
+use super::apply::{NO_DEPTH, NO_DEPTH_OF_PHOTO, NO_PLATE};
 use super::sample::{blurred, look, running, state};
 use super::*;
 use crate::look::{Effect, Look, Strength};
@@ -82,15 +83,47 @@ fn presets_are_looks_by_name() {
     let mut state = state();
     let effects = state.apply(Action::Preset("cinematic".into()));
     assert_eq!((effects.len(), radius_px(&state)), (1, 30.0));
-    let in_use: Vec<_> = state.presets.iter().filter(|preset| state.is_in_use(preset)).map(|p| &p.name[..]).collect();
-    assert_eq!(in_use, ["cinematic"]);
+    assert_eq!(state.preset_in_use(), Some(1));
     // Where it is focused is no part of what a preset is.
     state.look.focus = crate::depth::focus::FocusRule::Metres(3.0);
-    assert!(state.is_in_use(&state.presets[1]));
+    assert_eq!(state.preset_in_use(), Some(1));
     assert_eq!(state.apply(Action::Preset("nothing".into())), []);
     assert!(state.notes.last().unwrap().text.contains("nothing"));
     assert_eq!(state.apply(Action::SavePreset("  mine ".into())).len(), 1);
     assert_eq!(state.apply(Action::SavePreset("  ".into())), []);
+}
+
+#[test]
+fn of_presets_that_look_the_same_the_one_that_was_chosen_is_in_use() {
+    let mut state = state();
+    let same = Preset { name: "mine".into(), own: true, ..state.presets[1].clone() };
+    state.presets.push(same);
+    let mine = state.presets.len() - 1;
+    for (name, index) in [("cinematic", 1), ("mine", mine), ("cinematic", 1)] {
+        state.apply(Action::Preset(name.into()));
+        assert_eq!(state.preset_in_use(), Some(index), "{name}");
+    }
+    state.apply(Action::SavePreset("mine".into()));
+    assert_eq!(state.preset_in_use(), Some(mine), "just saved");
+    set(&mut state, 3.0, None);
+    assert_eq!(state.preset_in_use(), None);
+}
+
+#[test]
+fn a_photo_is_told_what_gives_it_depth() {
+    let mut state = state();
+    let Source::Running(camera) = running(false) else { unreachable!() };
+    let photo = Source::Running(Running { is_photo: true, is_live: false, ..camera.clone() });
+    for (source, hint) in [(Source::Running(camera), NO_DEPTH), (photo, NO_DEPTH_OF_PHOTO)] {
+        state.hear(Update::Source(source));
+        state.apply(Action::Show(Shown::Depth));
+        assert_eq!(state.notes.last().unwrap().text, hint);
+    }
+    assert!(!state.stands_still(), "not before its picture is there");
+    state.settled = true;
+    assert!(state.stands_still() && state.keeps_picture() && !state.frozen);
+    state.apply(Action::Open("another".into()));
+    assert!(!state.stands_still() && !state.keeps_picture());
 }
 
 #[test]
@@ -118,24 +151,8 @@ fn what_needs_depth_says_so_where_there_is_none() {
 }
 
 #[test]
-fn switches_are_what_they_were_set_to() {
+fn what_is_set_beyond_its_range_is_at_its_end() {
     let mut state = state();
-    for on in [true, false] {
-        for action in [
-            Action::Mirror(on),
-            Action::Freeze(on),
-            Action::Panel(on),
-            Action::Instruments(on),
-            Action::Bare(on),
-            Action::Help(on),
-        ] {
-            assert_eq!(state.apply(action), []);
-        }
-        let switches = [state.mirror, state.frozen, state.panel, state.instruments, state.bare, state.help];
-        assert_eq!(switches, [on; 6]);
-        assert_eq!(state.apply(Action::FullScreen(on)), [Request::FullScreen(on)]);
-        assert_eq!(state.full_screen, on);
-    }
     for (asked, got) in [(0.3, Some(0.3)), (-1.0, Some(0.0)), (7.0, Some(1.0)), (f32::NAN, None)] {
         state.apply(Action::Split(Some(asked)));
         assert_eq!(state.split, got);
@@ -190,19 +207,6 @@ fn controls_of_the_camera_stay_in_their_range() {
     assert_eq!(set(&mut state, 64), [], "it is that already");
     assert_eq!(state.apply(Action::Control("exposure_time_absolute".into(), 3)), [], "it cannot be changed now");
     assert_eq!(state.apply(Action::Control("nothing".into(), 3)), []);
-}
-
-#[test]
-fn what_others_do_is_asked_of_them() {
-    let mut state = state();
-    for (action, effect) in [
-        (Action::Snapshot, Request::Snapshot),
-        (Action::Refresh, Request::Refresh),
-        (Action::CopyCommand, Request::CopyCommand),
-        (Action::Close, Request::Close),
-    ] {
-        assert_eq!(state.apply(action), [effect]);
-    }
 }
 
 #[test]

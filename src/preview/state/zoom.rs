@@ -12,7 +12,7 @@ pub struct Zoom {
 }
 
 /// The factors that can be chosen.
-pub const FACTORS: [u32; 5] = [0, 1, 2, 4, 8];
+const FACTORS: [u32; 5] = [0, 1, 2, 4, 8];
 
 impl Default for Zoom {
     fn default() -> Self {
@@ -21,10 +21,14 @@ impl Default for Zoom {
 }
 
 impl Zoom {
-    /// The factor so many steps on, within those there are.
-    pub fn stepped(self, by: i32) -> u32 {
-        let at = FACTORS.iter().position(|factor| *factor == self.factor).unwrap_or(0);
-        FACTORS[at.saturating_add_signed(by as isize).min(FACTORS.len() - 1)]
+    /// The next larger factor (`by` > 0), or the next smaller one. Where all of the picture is seen at `fit` pixels of the window
+    /// for one of its own, those that would show it smaller are left out.
+    pub fn stepped(self, by: i32, fit: f32) -> u32 {
+        let mut factors = FACTORS.into_iter().filter(|&factor| factor == 0 || factor as f32 > 0.99 * fit);
+        match by > 0 {
+            true => factors.find(|factor| *factor > self.factor).unwrap_or(self.factor),
+            false => factors.take_while(|factor| *factor < self.factor).last().unwrap_or(0),
+        }
     }
 }
 

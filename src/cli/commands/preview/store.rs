@@ -8,6 +8,7 @@ use crate::cli::settings::file::SettingsFile;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::presets;
 use crate::cli::settings::save;
+use crate::cli::settings::table::GIVEN_TO_WINDOW;
 use crate::cli::terminal::print;
 use crate::look::Value;
 use crate::look::presets::Preset;
@@ -54,7 +55,9 @@ impl SettingsStore for FileStore {
     fn command(&self, look: &Look, source: &str, outputs: &[String], switches: &[Switch]) -> String {
         let mut switches = switches.to_vec();
         let is_new = |(name, _): &&Switch| !switches.iter().any(|(other, _)| other == name);
-        let given: Vec<Switch> = self.given.switches.iter().filter(is_new).cloned().collect();
+        // What writes to outputs is `stream`, which has no window.
+        let has_effect = |(name, _): &&Switch| outputs.is_empty() || !GIVEN_TO_WINDOW.contains(&name.as_str());
+        let given: Vec<Switch> = self.given.switches.iter().filter(is_new).filter(has_effect).cloned().collect();
         // The window's own switches override those of the command line; controls of the camera come last.
         let at = switches.iter().position(|(name, _)| name == "control").unwrap_or(switches.len());
         switches.splice(at..at, given);
@@ -66,5 +69,28 @@ impl SettingsStore for FileStore {
         // A closed standard output is no reason to fail.
         let _ = print(format!("{command}\n").as_bytes());
         command
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_has_what_was_given_to_a_window_only_where_there_is_one() {
+        let given = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+        let switches =
+            vec![given("theme", "light"), given("language", "de"), given("save-to", "."), given("fps", "15")];
+        let store = FileStore { chosen: None, given: Given { switches, ..Given::default() } };
+        let command = |outputs: &[String]| store.command(&Look::default(), "demo", outputs, &[]);
+        let window = command(&[]);
+        for switch in ["--theme=light", "--language=de", "--save-to=.", "--fps=15"] {
+            assert!(window.contains(switch), "{switch} is not in {window}");
+        }
+        let stream = command(&["/dev/video9".to_owned()]);
+        assert!(stream.starts_with("bokehcam stream") && stream.contains("--fps=15"), "{stream}");
+        for switch in ["--theme", "--language", "--save-to"] {
+            assert!(!stream.contains(switch), "{switch} is in {stream}");
+        }
     }
 }

@@ -7,13 +7,12 @@ use egui::{Role, WidgetInfo, pos2};
 
 use super::Sheet;
 use crate::bokeh::aperture::{Aperture, Shape};
-use crate::preview::panel::parts::{Number, number};
+use crate::preview::panel::parts::{Group, Hinted, Number, number};
 use crate::preview::panel::theme::Colors;
 use crate::preview::texts::tr;
 
-/// Cells of a mask, and pixels of the picture of it: the window may be drawn without smoothing.
-const CELLS: usize = 28;
-const SIDE_PX: usize = 84;
+/// Pixels along a side of a thumbnail's picture, which is smoothed where it is shown larger.
+const CELLS: usize = 56;
 /// Side of a thumbnail, in points.
 const SIDE: f32 = 40.0;
 
@@ -28,62 +27,61 @@ pub struct Thumbs {
 /// The shape, its numbers, and the highlights that show it.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
     shape_row(ui, sheet, thumbs);
-    let before = sheet.look.aperture.clone();
-    let how = |label, hint, range, digits, around| Number { label, hint, range, ratios: false, digits, around };
-    match &mut sheet.look.aperture.shape {
-        Shape::Disc | Shape::Heart | Shape::Picture(_) => {}
-        Shape::Ring { inner } => {
-            number(ui, how("Hole", "Its radius", 0.0..=0.95, 2, ["", ""]), inner);
-        }
+    let mut shape = sheet.look.aperture.shape.clone();
+    let changed = match &mut shape {
+        Shape::Disc | Shape::Heart | Shape::Picture(_) => false,
+        Shape::Ring { inner } => number(ui, &Number::new("Hole", "Its radius", 0.0..=0.95, 2), inner),
         Shape::Polygon { blades, rotation_deg, curvature } => {
-            whole(ui, how("Blades", "How many", 3.0..=16.0, 0, ["", ""]), blades);
-            number(ui, how("Rotation", "Clockwise", -180.0..=180.0, 0, ["", "°"]), rotation_deg);
-            number(ui, how("Curvature", "Straight blades to a circle", 0.0..=1.0, 2, ["", ""]), curvature);
+            let turn = Number::new("Rotation", "Clockwise", -180.0..=180.0, 0).unit("", "°");
+            let curve = Number::new("Curvature", "Straight blades to a circle", 0.0..=1.0, 2);
+            // All of them are drawn, whichever changed.
+            whole(ui, "Blades", blades) | number(ui, &turn, rotation_deg) | number(ui, &curve, curvature)
         }
-        Shape::Star { points } => whole(ui, how("Points", "How many", 3.0..=16.0, 0, ["", ""]), points),
+        Shape::Star { points } => whole(ui, "Points", points),
+    };
+    if changed {
+        sheet.look.aperture.shape = shape;
+        sheet.changed(true, "aperture");
     }
-    let intensity =
-        how("Intensity", "-1: soap bubbles; 1: bright in the middle, soft at the rim", -1.0..=1.0, 2, ["", ""]);
-    number(ui, intensity, &mut sheet.look.aperture.intensity);
-    let changed = before != sheet.look.aperture;
-    sheet.changed(changed, "aperture");
-    let soft = number(ui, how("Soft rim", "As a share of the radius", 0.0..=1.0, 2, ["", ""]), &mut sheet.look.rim);
-    sheet.changed(soft, "rim");
-    let highlights = how("Highlights", "How much brighter lights are than white; 0 is off", 0.0..=50.0, 1, ["", "×"]);
-    let bright = number(ui, highlights, &mut sheet.look.highlights);
-    sheet.changed(bright, "highlights");
+    let hint = "-1: soap bubbles; 1: bright in the middle, soft at the rim";
+    let (intensity, rim, highlights) = (sheet.look.aperture.intensity, sheet.look.rim, sheet.look.highlights);
+    let how = Number::new("Intensity", hint, -1.0..=1.0, 2);
+    sheet.number(ui, &how, intensity, |look, intensity| look.aperture.intensity = intensity);
+    let how = Number::new("Soft rim", "As a share of the radius", 0.0..=1.0, 2);
+    sheet.number(ui, &how, rim, |look, rim| look.rim = rim);
+    let hint = "How much brighter lights are than white; 0 is off";
+    let how = Number::new("Highlights", hint, 0.0..=50.0, 1).unit("", "×");
+    sheet.number(ui, &how, highlights, |look, highlights| look.highlights = highlights);
 }
 
-/// A number without a fraction.
-fn whole(ui: &mut Ui, how: Number, value: &mut u32) {
+/// A number of edges or points, without a fraction.
+fn whole(ui: &mut Ui, label: &str, value: &mut u32) -> bool {
     let mut real = *value as f32;
-    if number(ui, how, &mut real) {
-        *value = real.round() as u32;
-    }
+    let changed = number(ui, &Number::new(label, "How many", 3.0..=16.0, 0), &mut real);
+    *value = real.round() as u32;
+    changed
 }
 
 /// The shapes to choose from, side by side, as thumbnails.
 fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
     let chosen = index_of(&sheet.look.aperture.shape);
     let no_drag = !ui.input(|input| input.pointer.any_down());
-    let mut picked = None;
+    let mut shapes = Group::default();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        for (index, name) in SHAPES.iter().map(|name| tr(name)).enumerate() {
+        for (index, name) in SHAPES.into_iter().enumerate() {
             let Some(shape) = shape_at(index, &sheet.look) else { continue };
             let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::click());
             let is_chosen = index == chosen;
-            response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, name));
+            response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_chosen, tr(name)));
             let aperture = Aperture { shape, intensity: sheet.look.aperture.intensity };
             // Thumbnails take a while to make: during a drag only that of the chosen shape is made anew.
             let texture = thumbs.of(ui, index, &aperture, sheet.look.rim, no_drag || is_chosen);
             thumbnail(ui, rect, texture, is_chosen, response.hovered());
-            if response.on_hover_text(name).clicked() && !is_chosen {
-                picked = Some(aperture);
-            }
+            shapes.add(response.hint(name), aperture);
         }
     });
-    if let Some(aperture) = picked {
+    if let Some(aperture) = shapes.chosen(ui) {
         sheet.look.aperture = aperture;
         sheet.changed(true, "shape");
     }
@@ -93,7 +91,7 @@ fn shape_row(ui: &mut Ui, sheet: &mut Sheet, thumbs: &mut Thumbs) {
 fn thumbnail(ui: &Ui, rect: Rect, texture: Option<egui::TextureId>, chosen: bool, hovered: bool) {
     let colors = Colors::here(ui);
     let painter = ui.painter();
-    painter.rect_filled(rect, CornerRadius::same(8), if hovered { colors.hover } else { colors.field });
+    painter.rect_filled(rect, CornerRadius::same(8), colors.fill(false, hovered));
     let light = if chosen { colors.accent } else { colors.text };
     if let Some(texture) = texture {
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
@@ -154,25 +152,16 @@ impl Thumbs {
     }
 }
 
-/// A thumbnail: white, as opaque as the aperture is bright there, interpolated from its mask.
+/// A thumbnail: white, as opaque as the aperture is bright there.
 fn picture(aperture: &Aperture, rim: f32) -> ColorImage {
     let mask = aperture.mask(CELLS, rim);
     let brightest = mask.values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let at = |x: usize, y: usize| mask.values[y * CELLS + x] / brightest;
-    // The two cells around the centre of a pixel, and how far it is to the second.
-    let place = |k: usize| {
-        let cell = ((k as f64 + 0.5) / SIDE_PX as f64 * CELLS as f64 - 0.5).clamp(0.0, CELLS as f64 - 1.0);
-        (cell as usize, (cell as usize + 1).min(CELLS - 1), cell.fract())
-    };
-    let pixel = |k: usize| {
-        let ((x0, x1, fx), (y0, y1, fy)) = (place(k % SIDE_PX), place(k / SIDE_PX));
-        let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-        let light = mix(mix(at(x0, y0), at(x1, y0), fx), mix(at(x0, y1), at(x1, y1), fx), fy);
+    let pixel = |light: &f64| {
         // About the gamma of a display, so that the opacity looks like the light.
-        let opacity = (light.powf(1.0 / 1.8) * 255.0).round() as u8;
+        let opacity = ((light / brightest).powf(1.0 / 1.8) * 255.0).round() as u8;
         Color32::from_rgba_premultiplied(opacity, opacity, opacity, opacity)
     };
-    ColorImage::new([SIDE_PX, SIDE_PX], (0..SIDE_PX * SIDE_PX).map(pixel).collect())
+    ColorImage::new([CELLS, CELLS], mask.values.iter().map(pixel).collect())
 }
 
 #[cfg(test)]
@@ -182,12 +171,12 @@ mod tests {
     #[test]
     fn pictures_show_the_shape() {
         let light = |shape: Shape, intensity: f32, (x, y): (usize, usize)| {
-            picture(&Aperture { shape, intensity }, 0.1).pixels[y * SIDE_PX + x].a()
+            picture(&Aperture { shape, intensity }, 0.1).pixels[y * CELLS + x].a()
         };
-        let middle = (SIDE_PX / 2, SIDE_PX / 2);
+        let middle = (CELLS / 2, CELLS / 2);
         assert_eq!((light(Shape::Disc, 0.0, middle), light(Shape::Disc, 0.0, (0, 0))), (255, 0));
         assert_eq!(light(Shape::Ring { inner: 0.5 }, 0.0, middle), 0);
-        let rim = (6, SIDE_PX / 2);
+        let rim = (4, CELLS / 2);
         assert!(light(Shape::Disc, -1.0, rim) > light(Shape::Disc, -1.0, middle), "a soap bubble is bright at its rim");
     }
 }

@@ -1,13 +1,14 @@
 //! Presets: looks by name.
 
 use egui::{
-    Align2, CornerRadius, FontFamily, FontId, Key, Label, Rect, Role, Sense, TextEdit, Ui, Vec2, WidgetInfo, vec2,
+    Align2, CornerRadius, FontFamily, FontId, Key, Label, Rect, Response, Role, Sense, TextEdit, Ui, Vec2, WidgetInfo,
+    vec2,
 };
 
 use super::Sheet;
 use crate::look::Effect;
 use crate::look::presets::Preset;
-use crate::preview::panel::parts::{called, remark};
+use crate::preview::panel::parts::{Group, Hinted, button, called, remark};
 use crate::preview::panel::theme::{Colors, medium};
 use crate::preview::state::Action;
 use crate::preview::texts::{tr, tr_with};
@@ -35,6 +36,11 @@ pub struct Editing {
 }
 
 impl Editing {
+    /// Whether something is being done that Esc gives up.
+    pub fn is_asking(&self) -> bool {
+        self.doing != Doing::Nothing
+    }
+
     fn begin(&mut self, ui: &Ui, doing: Doing, name: &str) {
         *self = Self { doing, name: name.to_owned(), ask_focus: true };
         // In the pass of the click, the button has the focus itself.
@@ -50,20 +56,20 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
     ui.scope(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 6.0);
         ui.horizontal_wrapped(|ui| {
+            let (mut chips, lit) = (Group::default(), state.preset_in_use());
             for (index, preset) in state.presets.iter().enumerate() {
                 let needs_depth = preset.patch.effect.is_some_and(Effect::follows_depth);
                 let possible = !needs_depth || sheet.has_depth();
-                if chip(ui, index, preset, state.is_in_use(preset), possible) {
-                    sheet.act(Action::Preset(preset.name.clone()));
-                }
+                chips.add(chip(ui, index, preset, lit == Some(index), possible), preset);
             }
-            if was != Doing::Saving
-                && ui.button(tr("Save as…")).on_hover_text(tr("Save this look under a name")).clicked()
-            {
+            if let Some(preset) = chips.chosen(ui) {
+                sheet.act(Action::Preset(preset.name.clone()));
+            }
+            if was != Doing::Saving && button(ui, "Save as…", "Save this look under a name") {
                 next = Some(Doing::Saving);
             }
             let has_own = state.presets.iter().any(|preset| preset.own);
-            if has_own && ui.button(tr("Edit…")).on_hover_text(tr("Rename or delete looks of your own")).clicked() {
+            if has_own && button(ui, "Edit…", "Rename or delete looks of your own") {
                 next = Some(if was == Doing::Listing { Doing::Nothing } else { Doing::Listing });
             }
         });
@@ -84,7 +90,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) {
 fn save(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing) -> Doing {
     let is_there = sheet.state.presets.iter().any(|preset| preset.own && preset.name == editing.name.trim());
     let (verb, by_enter) = if is_there { ("Replace", false) } else { ("Save", true) };
-    match named(ui, editing, verb, by_enter) {
+    match named(ui, editing, verb, (by_enter, sheet.gives_up(ui))) {
         Some(true) => sheet.act(Action::SavePreset(editing.name.trim().to_owned())),
         Some(false) => {}
         None => {
@@ -118,12 +124,12 @@ fn list(ui: &mut Ui, sheet: &Sheet, editing: &mut Editing) -> Doing {
             _ => {}
         }
     }
-    Doing::Listing
+    if sheet.gives_up(ui) { Doing::Nothing } else { Doing::Listing }
 }
 
 fn rename(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, old: String) -> Doing {
     let new = editing.name.trim().to_owned();
-    match named(ui, editing, "Rename", true) {
+    match named(ui, editing, "Rename", (true, sheet.gives_up(ui))) {
         Some(true) if new != old => sheet.act(Action::RenamePreset(old, new)),
         Some(_) => {}
         None => return Doing::Renaming(old),
@@ -138,14 +144,14 @@ fn delete(ui: &mut Ui, sheet: &mut Sheet, name: String) -> Doing {
         ui.horizontal(|ui| (ui.button(tr("Delete it")).clicked(), ui.button(tr("Keep it")).clicked())).inner;
     if delete {
         sheet.act(Action::DeletePreset(name));
-    } else if !keep && !ui.input(|input| input.key_pressed(Key::Escape)) {
+    } else if !keep && !sheet.gives_up(ui) {
         return Doing::Deleting(name);
     }
     Doing::Listing
 }
 
 /// A field for a name and buttons. Whether the name holds or is given up, once one of them is so.
-fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, by_enter: bool) -> Option<bool> {
+fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, (by_enter, gives_up): (bool, bool)) -> Option<bool> {
     ui.horizontal(|ui| {
         let edit = TextEdit::singleline(&mut editing.name).hint_text(tr("name")).desired_width(140.0).char_limit(40);
         let edit = ui.add(edit);
@@ -153,8 +159,7 @@ fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, by_enter: bool) -> Opti
         if std::mem::take(&mut editing.ask_focus) {
             edit.request_focus();
         }
-        let left_by = |key| edit.lost_focus() && ui.input(|input| input.key_pressed(key));
-        let (entered, escaped) = (left_by(Key::Enter), left_by(Key::Escape));
+        let entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
         if entered && !by_enter {
             edit.request_focus();
         }
@@ -162,21 +167,18 @@ fn named(ui: &mut Ui, editing: &mut Editing, verb: &str, by_enter: bool) -> Opti
         if holds && !editing.name.trim().is_empty() {
             return Some(true);
         }
-        (ui.button(tr("Cancel")).clicked() || escaped).then_some(false)
+        (ui.button(tr("Cancel")).clicked() || gives_up).then_some(false)
     })
     .inner
 }
 
-/// Draws a preset with the number of its key. Whether it was clicked.
-fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> bool {
+/// Draws a preset with the number of its key.
+fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool) -> Response {
     let colors = Colors::here(ui);
     // One's own are called as one called them.
     let shown = if preset.own { preset.name.clone() } else { capitalized(&preset.name) };
-    let (text, number_color) = match (chosen, possible) {
-        (true, _) => (colors.on_accent, colors.on_accent),
-        (false, true) => (colors.text, colors.weak),
-        (false, false) => (colors.weak.gamma_multiply(0.6), colors.weak.gamma_multiply(0.6)),
-    };
+    let text = colors.on_fill(chosen, possible);
+    let number_color = if possible && !chosen { colors.weak } else { text };
     let name = ui.painter().layout_no_wrap(shown, FontId::new(13.0, medium()), text);
     // The keys 1 to 9.
     let has_key = index < 9;
@@ -185,25 +187,19 @@ fn chip(ui: &mut Ui, index: usize, preset: &Preset, chosen: bool, possible: bool
     let sense = if possible { Sense::click() } else { Sense::hover() };
     let (rect, response) = ui.allocate_exact_size(size, sense);
     response.widget_info(|| WidgetInfo::selected(Role::RadioButton, possible, chosen, &preset.name));
-    let fill = match (chosen, possible && response.hovered()) {
-        (true, _) => colors.accent,
-        (false, true) => colors.hover,
-        (false, false) => colors.field,
-    };
     let painter = ui.painter();
-    painter.rect_filled(rect, CornerRadius::same(14), fill);
+    painter.rect_filled(rect, CornerRadius::same(14), colors.fill(chosen, possible && response.hovered()));
     if has_key {
         let at = Rect::from_min_size(rect.min, Vec2::new(24.0, rect.height())).center();
         let font = FontId::new(11.0, FontFamily::Proportional);
         painter.text(at, Align2::CENTER_CENTER, index + 1, font, number_color);
     }
     painter.galley(rect.left_center() + vec2(10.0 + room, -name.size().y / 2.0), name, text);
-    let hint = match (possible, preset.own) {
+    response.hint(match (possible, preset.own) {
         (false, _) => "needs depth, which this source has not",
         (true, true) => "your own look",
         (true, false) => "a ready-made look",
-    };
-    response.on_hover_text(tr(hint)).clicked()
+    })
 }
 
 fn capitalized(name: &str) -> String {

@@ -13,9 +13,9 @@ mod view;
 pub use aperture::Thumbs;
 pub use looks::Editing;
 
-use egui::Ui;
+use egui::{Key, Ui};
 
-use super::parts::section;
+use super::parts::{Number, button, choose, number, section, switch};
 use super::state::{Action, State};
 use crate::look::{Effect, Look};
 
@@ -43,6 +43,48 @@ impl Sheet<'_> {
 
     fn act(&mut self, action: Action) {
         self.actions.push(action);
+    }
+
+    /// Draws a number of the look, which `set` changes; the number's name is the stroke.
+    fn number(&mut self, ui: &mut Ui, how: &Number<'static>, mut value: f32, set: impl FnOnce(&mut Look, f32)) {
+        if number(ui, how, &mut value) {
+            set(&mut self.look, value);
+            self.stroke = Some(how.label());
+        }
+    }
+
+    /// Draws options of the look side by side; `set` takes the one that is chosen.
+    fn choose<T: PartialEq + Copy>(
+        &mut self,
+        ui: &mut Ui,
+        what: &'static str,
+        options: &[(&str, &str, T)],
+        chosen: T,
+        set: impl FnOnce(&mut Look, T),
+    ) {
+        if let Some(option) = choose(ui, what, options, chosen, |_| true).filter(|option| *option != chosen) {
+            set(&mut self.look, option);
+            self.stroke = Some(what);
+        }
+    }
+
+    /// Draws a switch, which the action of its new state changes.
+    fn switch(&mut self, ui: &mut Ui, label: &str, hint: &str, on: bool, act: impl FnOnce(bool) -> Action) {
+        if switch(ui, label, hint, on) {
+            self.act(act(!on));
+        }
+    }
+
+    /// Draws a button that does this.
+    fn button(&mut self, ui: &mut Ui, text: &str, hint: &str, action: Action) {
+        if button(ui, text, hint) {
+            self.act(action);
+        }
+    }
+
+    /// Whether Esc gives up what is asked here: nothing else is open over it.
+    fn gives_up(&self, ui: &Ui) -> bool {
+        !self.state.help && !self.state.closing && ui.input(|input| input.key_pressed(Key::Escape))
     }
 
     fn has_depth(&self) -> bool {

@@ -1,14 +1,24 @@
 //! The quality of the blur.
 
-use egui::{ComboBox, Role, Ui};
+use egui::Ui;
 
 use super::Sheet;
 use crate::bokeh::{Method, Rank};
 use crate::budget::Quality;
 use crate::look::{BackgroundMemory, Refine};
-use crate::preview::panel::parts::{called, choose, switch};
+use crate::preview::panel::parts::{Hinted, list, switch};
 use crate::preview::state::tweak::rank_label;
 use crate::preview::texts::tr;
+
+const METHODS: [(&str, &str, Method); 2] = [
+    ("Layered", "Depth bins, blurred and put together front to back", Method::Layered),
+    ("Gather", "Every pixel gathers with its own radius: the plain form, for comparison", Method::Gather),
+];
+const REFINES: [(&str, &str, Refine); 3] = [
+    ("Auto", "Where depth was measured", Refine::Auto),
+    ("On", "Always fit depth to the picture's edges", Refine::On),
+    ("Off", "Only fill holes", Refine::Off),
+];
 
 /// Quality, terms, method and refining.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
@@ -17,50 +27,24 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         Some(quality) => quality.to_string(),
     };
     ui.label(tr("Level"));
-    let levels = ComboBox::from_id_salt("quality").selected_text(name(sheet.look.quality)).show_ui(ui, |ui| {
-        for quality in [None].into_iter().chain(Quality::ALL.map(Some)) {
-            if ui.selectable_label(sheet.look.quality == quality, name(quality)).clicked() {
-                sheet.look.quality = quality;
-                sheet.changed(true, "quality");
-            }
-        }
-    });
-    called(&levels.response, "Level", Role::ComboBox);
-    ui.label(tr("Terms of the aperture"))
-        .on_hover_text(tr("Separable terms: more keep its shape better and cost more"));
+    let (quality, rank) = (sheet.look.quality, sheet.look.rank);
+    let levels = [None].into_iter().chain(Quality::ALL.map(Some)).map(|level| (name(level), "", level));
+    if let Some(quality) = list(ui, "Level", &name(quality), levels, &quality) {
+        sheet.look.quality = quality;
+        sheet.changed(true, "quality");
+    }
+    ui.label(tr("Terms of the aperture")).hint("Separable terms: more keep its shape better and cost more");
     let ranks = [None].into_iter().chain((1..=16).map(|terms| Some(Rank::Terms(terms)))).chain([Some(Rank::Full)]);
-    let terms = ComboBox::from_id_salt("rank").selected_text(rank_label(sheet.look.rank)).show_ui(ui, |ui| {
-        for rank in ranks {
-            if ui.selectable_label(sheet.look.rank == rank, rank_label(rank)).clicked() {
-                sheet.look.rank = rank;
-                sheet.changed(true, "rank");
-            }
-        }
-    });
-    called(&terms.response, "Terms of the aperture", Role::ComboBox);
-    if sheet.look.effect.follows_depth() {
-        let methods = [
-            ("Layered", "Depth bins, blurred and put together front to back"),
-            ("Gather", "Every pixel gathers with its own radius: the plain form, for comparison"),
-        ];
-        let chosen = usize::from(sheet.look.method == Method::Gather);
+    let ranks = ranks.map(|rank| (rank_label(rank), "", rank));
+    if let Some(rank) = list(ui, "Terms of the aperture", &rank_label(rank), ranks, &rank) {
+        sheet.look.rank = rank;
+        sheet.changed(true, "rank");
+    }
+    if sheet.follows_depth() {
         ui.label(tr("Method"));
-        if let Some(index) = choose(ui, "Method", &methods, chosen, |_| true) {
-            sheet.look.method = if index == 0 { Method::Layered } else { Method::Gather };
-            sheet.changed(true, "method");
-        }
-        let refines = [
-            ("Auto", "Where depth was measured"),
-            ("On", "Always fit depth to the picture's edges"),
-            ("Off", "Only fill holes"),
-        ];
-        const REFINES: [Refine; 3] = [Refine::Auto, Refine::On, Refine::Off];
+        sheet.choose(ui, "Method", &METHODS, sheet.look.method, |look, method| look.method = method);
         ui.label(tr("Refine depth"));
-        let chosen = REFINES.iter().position(|&refine| refine == sheet.look.refine).unwrap_or_default();
-        if let Some(index) = choose(ui, "Refine depth", &refines, chosen, |_| true) {
-            sheet.look.refine = REFINES[index];
-            sheet.changed(true, "refine");
-        }
+        sheet.choose(ui, "Refine depth", &REFINES, sheet.look.refine, |look, refine| look.refine = refine);
         let remembers = sheet.look.background_memory == BackgroundMemory::On;
         let hint = "What was seen before of what things hide now is shown where blur lets it through";
         if switch(ui, "Remember the background", hint, remembers) {

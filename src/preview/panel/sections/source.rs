@@ -1,10 +1,10 @@
 //! The source, and the camera's controls.
 
-use egui::{ComboBox, Role, Ui};
+use egui::Ui;
 
 use super::Sheet;
 use crate::knob::Knob;
-use crate::preview::panel::parts::{Number, called, number, remark, switch};
+use crate::preview::panel::parts::{Number, list, number, remark, switch};
 use crate::preview::services::Browse;
 use crate::preview::state::{Action, Source};
 use crate::preview::texts::{tr, tr_with};
@@ -19,18 +19,10 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         (None, _) if state.source_name.is_empty() => tr("the first camera"),
         (None, _) => state.source_name.as_str(),
     };
-    let sources = ComboBox::from_id_salt("source").selected_text(label).truncate().show_ui(ui, |ui| {
-        for choice in &state.sources {
-            let chosen = choice.name == state.source_name;
-            if ui.selectable_label(chosen, &choice.label).on_hover_text(&choice.name).clicked() && !chosen {
-                sheet.act(Action::Open(choice.name.clone()));
-            }
-        }
-        if state.sources.is_empty() {
-            remark(ui, "Nothing else was found.");
-        }
-    });
-    called(&sources.response, "Source", Role::ComboBox);
+    let sources = state.sources.iter().map(|choice| (choice.label.clone(), &choice.name[..], &choice.name[..]));
+    if let Some(name) = list(ui, "Source", label, sources, &&state.source_name[..]) {
+        sheet.act(Action::Open(name.to_owned()));
+    }
     match &state.source {
         Source::Opening => remark(ui, "Opening…"),
         Source::Running(running) => {
@@ -44,28 +36,20 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         Source::Ended => remark(ui, "It came to its end."),
     }
     modes(ui, sheet);
+    let hint = "It can also be dropped on the window";
     ui.horizontal(|ui| {
-        for (text, what) in [("Open folder…", Browse::Folder), ("Open photo…", Browse::Photo)] {
-            if ui.button(tr(text)).on_hover_text(tr("It can also be dropped on the window")).clicked() {
-                sheet.act(Action::Browse(what));
-            }
-        }
+        sheet.button(ui, "Open folder…", hint, Action::Browse(Browse::Folder));
+        sheet.button(ui, "Open photo…", hint, Action::Browse(Browse::Photo));
     });
     ui.horizontal(|ui| {
-        if ui.button(tr("Look for others")).on_hover_text(tr("Look again which cameras there are (F5)")).clicked() {
-            sheet.act(Action::Refresh);
-        }
-        if ui.button(tr("Open again")).on_hover_text(tr("Close the source and open it anew")).clicked() {
-            sheet.act(Action::Retry);
-        }
+        sheet.button(ui, "Look for others", "Look again which cameras there are (F5)", Action::Refresh);
+        sheet.button(ui, "Open again", "Close the source and open it anew", Action::Retry);
     });
     if state.takes_plates()[0] {
         let text = if state.plate.is_some() { "Take another plate" } else { "Take a plate" };
         let hint =
             "A picture of what is behind you gives a portrait without any network; the camera has to stand still (T)";
-        if ui.button(tr(text)).on_hover_text(tr(hint)).clicked() {
-            sheet.act(Action::TakePlate);
-        }
+        sheet.button(ui, text, hint, Action::TakePlate);
     }
 }
 
@@ -74,29 +58,25 @@ fn modes(ui: &mut Ui, sheet: &mut Sheet) {
     let (state, Source::Running(running)) = (sheet.state, &sheet.state.source) else { return };
     let Some(mode) = state.camera.modes.iter().find(|mode| mode.size == running.size) else { return };
     let now_fps = 1e9 / running.period_ns.max(1) as f64;
+    let off_by = |fps: &f64| (fps - now_fps).abs();
+    let nearest = |all: &[f64]| all.iter().copied().min_by(|a, b| off_by(a).total_cmp(&off_by(b)));
     let size_text = |(width, height): (u32, u32)| format!("{width} × {height}");
     let fps_text = |fps: f64| format!("{} fps", (fps * 100.0).round() / 100.0);
-    let nearest = |all: &[f64]| all.iter().copied().min_by(|a, b| (a - now_fps).abs().total_cmp(&(b - now_fps).abs()));
-    let half = (ui.available_width() - 6.0) / 2.0;
-    ui.horizontal(|ui| {
-        ui.spacing_mut().combo_width = half;
-        ComboBox::from_id_salt("size").width(half).selected_text(size_text(mode.size)).show_ui(ui, |ui| {
-            for other in &state.camera.modes {
-                let chosen = other.size == mode.size;
-                if ui.selectable_label(chosen, size_text(other.size)).clicked() && !chosen {
-                    sheet.act(Action::Mode(other.size, nearest(&other.fps).unwrap_or(now_fps)));
-                }
-            }
-        });
-        ComboBox::from_id_salt("rate").width(half).selected_text(fps_text(now_fps)).show_ui(ui, |ui| {
-            for &fps in &mode.fps {
-                let chosen = (fps - now_fps).abs() < 0.1;
-                if ui.selectable_label(chosen, fps_text(fps)).clicked() && !chosen {
-                    sheet.act(Action::Mode(mode.size, fps));
-                }
-            }
-        });
-    });
+    let sizes = state.camera.modes.iter().map(|mode| (size_text(mode.size), "", mode.size));
+    let rates = mode.fps.iter().map(|&fps| (fps_text(fps), "", fps));
+    let rate = nearest(&mode.fps).filter(|fps| off_by(fps) < 0.1).unwrap_or(now_fps);
+    let [size, rate] = ui
+        .horizontal(|ui| {
+            ui.spacing_mut().combo_width = (ui.available_width() - 6.0) / 2.0;
+            let size = list(ui, "Size", &size_text(mode.size), sizes, &mode.size);
+            let size = size.and_then(|size| state.camera.modes.iter().find(|mode| mode.size == size));
+            let size = size.map(|mode| (mode.size, nearest(&mode.fps).unwrap_or(now_fps)));
+            [size, list(ui, "Frame rate", &fps_text(now_fps), rates, &rate).map(|fps| (mode.size, fps))]
+        })
+        .inner;
+    if let Some((size, fps)) = size.or(rate) {
+        sheet.act(Action::Mode(size, fps));
+    }
 }
 
 /// The camera's own controls.
@@ -120,23 +100,14 @@ fn knob(ui: &mut Ui, control: &Knob) -> Option<i64> {
     if !control.menu.is_empty() {
         let chosen = control.menu.iter().find(|(value, _)| *value == control.value);
         let text = chosen.map_or("?", |(_, name)| name.as_str());
-        let mut picked = None;
         ui.label(&label);
-        let menu = ComboBox::from_id_salt(&control.name).selected_text(text).truncate().show_ui(ui, |ui| {
-            for (value, name) in &control.menu {
-                if ui.selectable_label(*value == control.value, name).clicked() {
-                    picked = Some(*value);
-                }
-            }
-        });
-        called(&menu.response, &label, Role::ComboBox);
-        return picked.filter(|&value| value != control.value);
+        let options = control.menu.iter().map(|(value, name)| (name.clone(), "", *value));
+        return list(ui, &label, text, options, &control.value);
     }
     let (least, most, step) = control.range;
     let mut value = control.value as f32;
     let range = least as f32..=(most.max(least)) as f32;
-    let how = Number { label: &label, hint: &hint, range, ratios: false, digits: 0, around: ["", ""] };
-    if !number(ui, how, &mut value) {
+    if !number(ui, &Number::new(&label, &hint, range, 0), &mut value) {
         return None;
     }
     // The driver takes only whole steps from the least value.

@@ -3,8 +3,8 @@
 use egui::Ui;
 
 use super::Sheet;
-use crate::preview::panel::parts::{Number, choose, number, remark, switch};
-use crate::preview::state::{Action, Shown, ZOOM_FACTORS};
+use crate::preview::panel::parts::{Number, choose, number, remark};
+use crate::preview::state::{Action, Shown};
 
 type Views = [(&'static str, &'static str, Shown); 2];
 
@@ -17,40 +17,38 @@ const INTERNALS: Views = [
     ("Bins", "The layers that are blurred on their own (N)", Shown::Bins),
 ];
 
+const ZOOM_HINT: &str = "Pixels of the window for one of the picture (X, +, -)";
+const ZOOMS: [(&str, &str, u32); 5] = [
+    ("Fit", ZOOM_HINT, 0),
+    ("100 %", ZOOM_HINT, 1),
+    ("200 %", ZOOM_HINT, 2),
+    ("400 %", ZOOM_HINT, 4),
+    ("800 %", ZOOM_HINT, 8),
+];
+
 /// Draws views to choose from; one that is shown already is left for the picture.
 fn choose_view(ui: &mut Ui, sheet: &mut Sheet, what: &str, views: Views) {
-    let chosen = views.iter().position(|view| view.2 == sheet.state.shown);
-    let has_depth = sheet.has_depth();
-    let options = views.map(|(name, hint, _)| (name, hint));
-    let can = |index: usize| has_depth || views[index].2 != Shown::Depth;
-    if let Some(index) = choose(ui, what, &options, chosen.unwrap_or(usize::MAX), can) {
-        let shown = if chosen == Some(index) { Shown::Picture } else { views[index].2 };
-        sheet.act(Action::Show(shown));
+    let (now, has_depth) = (sheet.state.shown, sheet.has_depth());
+    if let Some(shown) = choose(ui, what, &views, now, |shown| has_depth || shown != Shown::Depth) {
+        sheet.act(Action::Show(if shown == now { Shown::Picture } else { shown }));
     }
 }
 
 /// What the blur is made of, and the instruments.
 pub fn internals(ui: &mut Ui, sheet: &mut Sheet) {
     choose_view(ui, sheet, "Show of the blur", INTERNALS);
-    let on = sheet.state.instruments;
-    if switch(ui, "Instruments", "Times, rates and drops (I)", on) {
-        sheet.act(Action::Instruments(!on));
-    }
+    sheet.switch(ui, "Instruments", "Times, rates and drops (I)", sheet.state.instruments, Action::Instruments);
 }
 
 /// The view, and how it is shown.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let state = sheet.state;
     choose_view(ui, sheet, "Show", VIEWS);
-    let zooms = ["Fit", "100 %", "200 %", "400 %", "800 %"]
-        .map(|name| (name, "Pixels of the window for one of the picture (X, +, -)"));
-    let chosen = ZOOM_FACTORS.iter().position(|factor| *factor == state.zoom.factor).unwrap_or_default();
-    if let Some(index) = choose(ui, "Size", &zooms, chosen, |_| true) {
-        sheet.act(Action::Zoom(ZOOM_FACTORS[index], None));
+    if let Some(factor) = choose(ui, "Size", &ZOOMS, state.zoom.factor, |_| true) {
+        sheet.act(Action::Zoom(factor, None));
     }
-    if switch(ui, "Mirror", "Like a mirror; what is recorded or sent on is not (M)", state.mirror) {
-        sheet.act(Action::Mirror(!state.mirror));
-    }
+    let hint = "Like a mirror; what is recorded or sent on is not (M)";
+    sheet.switch(ui, "Mirror", hint, state.mirror, Action::Mirror);
     if state.mirror {
         remark(ui, "In this window alone: what goes out is not mirrored.");
     }
@@ -58,28 +56,15 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         true => ("Pause", "The recording stands still, and looks can be tried on its picture (Z)"),
         false => ("Freeze", "Keep this picture, and try looks on it (Z)"),
     };
-    if switch(ui, freeze, hint, state.frozen) {
-        sheet.act(Action::Freeze(!state.frozen));
-    }
-    if switch(ui, "Before and after", "The picture before the blur, left of a line to drag (B)", state.split.is_some())
-    {
-        sheet.act(Action::Split(if state.split.is_some() { None } else { Some(0.5) }));
-    }
+    sheet.switch(ui, freeze, hint, state.frozen, Action::Freeze);
+    let hint = "The picture before the blur, left of a line to drag (B)";
+    sheet.switch(ui, "Before and after", hint, state.split.is_some(), |on| Action::Split(on.then_some(0.5)));
     if let Some(at) = state.split {
+        let hint = "From the left; it can also be dragged on the picture";
         let mut percent = at * 100.0;
-        let how = Number {
-            label: "Line at",
-            hint: "From the left; it can also be dragged on the picture",
-            range: 0.0..=100.0,
-            ratios: false,
-            digits: 0,
-            around: ["", " %"],
-        };
-        if number(ui, how, &mut percent) {
+        if number(ui, &Number::new("Line at", hint, 0.0..=100.0, 0).unit("", " %"), &mut percent) {
             sheet.act(Action::Split(Some(percent / 100.0)));
         }
     }
-    if switch(ui, "Full screen", "F or F11", state.full_screen) {
-        sheet.act(Action::FullScreen(!state.full_screen));
-    }
+    sheet.switch(ui, "Full screen", "F or F11", state.full_screen, Action::FullScreen);
 }

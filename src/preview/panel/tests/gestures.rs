@@ -1,40 +1,20 @@
 //! What one does to the picture.
 
-use egui::{Event, Modifiers, Pos2, pos2, vec2};
+use egui::{Event, Modifiers, Pos2, pos2};
 
-use super::{Action, Window, on_panel, sample};
+use super::{Action, Window, close, last_look, on_panel, point, sample, scrolled};
 use crate::depth::focus::FocusRule;
 use crate::look::Effect;
-use crate::look::Look;
 use crate::preview::present::Area;
-
-/// The last look that was made.
-fn last_look(actions: &[Action]) -> Option<Look> {
-    actions.iter().rev().find_map(|action| match action {
-        Action::Look { look, .. } => Some((**look).clone()),
-        _ => None,
-    })
-}
-
-fn point(actions: &[Action]) -> (f32, f32) {
-    match last_look(actions).map(|look| look.focus) {
-        Some(FocusRule::Point { x, y }) => (x, y),
-        other => panic!("{other:?} of {actions:?}"),
-    }
-}
-
-fn close((x, y): (f32, f32), (to_x, to_y): (f32, f32)) -> bool {
-    (x - to_x).abs() < 2e-3 && (y - to_y).abs() < 2e-3
-}
 
 #[test]
 fn a_click_focuses_there() {
     let mut window = Window::new();
-    assert!(close(point(&window.click(pos2(320.0, 180.0))), (0.25, 0.25)));
+    assert!(close(point(&window.click(pos2(320.0, 180.0))), [0.25, 0.25]));
     // In a mirror, left is right.
     window.wait(1.0);
     window.state.mirror = true;
-    assert!(close(point(&window.click(pos2(320.0, 540.0))), (0.75, 0.75)));
+    assert!(close(point(&window.click(pos2(320.0, 540.0))), [0.75, 0.75]));
 }
 
 #[test]
@@ -46,7 +26,7 @@ fn a_click_is_where_the_picture_is() {
     window.state.habits.text_scale = 1.25;
     window.wait(0.2);
     let at = |x: f32, y: f32| pos2(x, y) / 2.5;
-    assert!(close(point(&window.click(at(100.0 + 400.0, 60.0 + 90.0))), (0.5, 0.2)));
+    assert!(close(point(&window.click(at(100.0 + 400.0, 60.0 + 90.0))), [0.5, 0.2]));
     window.wait(1.0);
     let beside = window.click(at(40.0, 300.0));
     assert_eq!(last_look(&beside), None, "beside the picture");
@@ -91,15 +71,8 @@ fn the_split_is_dragged() {
 }
 
 fn wheel(window: &mut Window, at: Pos2, delta: f32) -> Vec<Action> {
-    let scroll = Event::MouseWheel {
-        unit: egui::MouseWheelUnit::Point,
-        delta: vec2(0.0, delta),
-        phase: egui::TouchPhase::Move,
-        source: egui::MouseWheelSource::Unknown,
-        modifiers: Modifiers::NONE,
-    };
     let mut actions = window.pass(vec![Event::PointerMoved(at)]);
-    actions.extend(window.pass(vec![scroll]));
+    actions.extend(window.pass(vec![scrolled(egui::MouseWheelUnit::Point, delta, Modifiers::NONE)]));
     actions.extend(window.wait(1.5));
     actions
 }

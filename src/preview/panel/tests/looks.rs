@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
-use egui::{Event, Theme, pos2};
+use egui::{Color32, Event, Key, Modifiers, Theme, pos2};
 
-use super::paint::{Painter, over};
-use super::{Window, button};
+use super::{Window, button, pressed, scrolled};
 use crate::depth::plate::Step;
 use crate::frame::ColorImage;
 use crate::look::Effect;
 use crate::preview::panel::theme::{Colors, rung};
-use crate::preview::state::{Source, Transport, sample};
+use crate::preview::present::soft::Painter;
+use crate::preview::present::{Controls, Drawing, Image};
+use crate::preview::state::{Action, Source, State, Transport, sample};
 use crate::preview::views::Legend;
 use crate::recording::still::{read_color, write_color};
 
@@ -33,54 +34,57 @@ fn backdrop((width, height): (u32, u32)) -> ColorImage {
     image
 }
 
-fn save(window: &mut Window, painter: &mut Painter, name: &str) {
-    let mut image = backdrop((window.size.x as u32, window.size.y as u32));
-    let mut last = None;
-    for _ in 0..30 {
-        let (_, output) = window.pass_with_output(Vec::new());
-        last = Some(painter.learn(output));
-    }
-    let output = last.unwrap();
-    let primitives = window.ctx.tessellate(output.shapes.clone(), output.pixels_per_point);
-    painter.paint(&primitives, output.pixels_per_point, &mut image);
-    output.drop_without_applying_deltas();
-    write_color(&std::env::temp_dir().join(format!("panel-{name}.png")), &image, true).unwrap();
+/// A window, and what draws it from its first pass on.
+struct Seen {
+    window: Window,
+    painter: Painter,
 }
 
-/// A window whose textures are known from the beginning.
-fn window(theme: Theme, size: (u32, u32), change: impl FnOnce(&mut crate::preview::state::State)) -> (Window, Painter) {
-    let mut state = sample::state();
-    change(&mut state);
-    let mut window = Window {
-        ctx: egui::Context::default(),
-        panel: Default::default(),
-        state,
-        canvas: super::Canvas {
-            area: crate::preview::present::Area { x: 0, y: 0, width: size.0, height: size.1 },
-            size: (1280, 720),
-            part: None,
-        },
-        size: egui::vec2(size.0 as f32, size.1 as f32),
-        native: 1.0,
-        time_s: 0.0,
-    };
-    window.ctx.set_theme(theme);
-    let mut painter = Painter::default();
-    for _ in 0..3 {
-        let (_, output) = window.pass_with_output(Vec::new());
-        painter.learn(output).drop_without_applying_deltas();
+impl Seen {
+    fn new(theme: Theme, size: (u32, u32), change: impl FnOnce(&mut State)) -> Self {
+        let mut state = sample::state();
+        change(&mut state);
+        let window = Window::unseen(state, size);
+        window.ctx.set_theme(theme);
+        let mut painter = Painter::new();
+        painter.resize(size);
+        let mut seen = Self { window, painter };
+        (0..3).for_each(|_| seen.pass(Vec::new()));
+        seen
     }
-    (window, painter)
+
+    fn pass(&mut self, events: Vec<Event>) {
+        let (_, output) = self.window.pass_with_output(events);
+        let (textures, pixels_per_point) = (output.textures_delta, output.pixels_per_point);
+        let primitives = self.window.ctx.tessellate(output.shapes, pixels_per_point);
+        self.painter.set_controls(Controls { primitives, textures, pixels_per_point });
+    }
+
+    fn save(&mut self, name: &str) {
+        (0..30).for_each(|_| self.pass(Vec::new()));
+        let area = self.window.canvas.area;
+        let mut image = backdrop((area.width, area.height));
+        let mut pixels = vec![0; (area.width * area.height) as usize];
+        let drawing = Drawing {
+            area,
+            part: None,
+            picture: Image::Memory(&image),
+            before: None,
+            mirror: false,
+            stale: false,
+            background: [0; 3],
+        };
+        self.painter.paint(&mut pixels, &drawing);
+        image.rgb = pixels.iter().flat_map(|pixel| pixel.to_be_bytes().into_iter().skip(1)).collect();
+        write_color(&std::env::temp_dir().join(format!("panel-{name}.png")), &image, true).unwrap();
+    }
 }
 
 #[test]
 #[ignore = "writes pictures to look at"]
 fn pictures() {
     let size = (1280, 720);
-    let shot = |name: &str, theme: Theme, change: &dyn Fn(&mut crate::preview::state::State)| {
-        let (mut window, mut painter) = window(theme, size, |state| change(state));
-        save(&mut window, &mut painter, name);
-    };
+    let shot = |name: &str, theme: Theme, change: &dyn Fn(&mut State)| Seen::new(theme, size, change).save(name);
     shot("dark", Theme::Dark, &|_| {});
     shot("light", Theme::Light, &|_| {});
     shot("instruments", Theme::Dark, &|state| {
@@ -97,8 +101,8 @@ fn pictures() {
     shot("badges", Theme::Dark, &|state| {
         state.panel = false;
         state.frozen = true;
-        state.apply(crate::preview::state::Action::Record(true));
-        state.apply(crate::preview::state::Action::VirtualCamera(Some("/dev/video9".into())));
+        state.apply(Action::Record(true));
+        state.apply(Action::VirtualCamera(Some("/dev/video9".into())));
     });
     // From the offer to the portrait.
     for (name, step) in [("offer", None), ("step-out", Some(Step::StepOut(3))), ("taking", Some(Step::Taking(60)))] {
@@ -138,38 +142,22 @@ fn pictures() {
         state.instruments = true;
         state.meters.fill_for_looks();
     });
-    let (mut window, mut painter) = window(Theme::Dark, size, |state| {
+    let mut seen = Seen::new(Theme::Dark, size, |state| {
         state.look.aperture.shape =
             crate::bokeh::aperture::Shape::Polygon { blades: 6, rotation_deg: 10.0, curvature: 0.2 };
     });
-    let at = pos2(1120.0, 400.0);
-    window.pass(vec![Event::PointerMoved(at)]);
+    seen.pass(vec![Event::PointerMoved(pos2(1120.0, 400.0))]);
     for part in 1..=3 {
-        for _ in 0..40 {
-            let scroll = Event::MouseWheel {
-                unit: egui::MouseWheelUnit::Point,
-                delta: egui::vec2(0.0, -12.0),
-                phase: egui::TouchPhase::Move,
-                source: egui::MouseWheelSource::Unknown,
-                modifiers: egui::Modifiers::NONE,
-            };
-            let (_, output) = window.pass_with_output(vec![scroll]);
-            painter.learn(output).drop_without_applying_deltas();
-        }
-        save(&mut window, &mut painter, &format!("scrolled-{part}"));
+        (0..40).for_each(|_| seen.pass(vec![scrolled(egui::MouseWheelUnit::Point, -12.0, Modifiers::NONE)]));
+        seen.save(&format!("scrolled-{part}"));
     }
-    for _ in 0..20 {
-        for down in [true, false] {
-            let (_, output) =
-                window.pass_with_output(vec![super::pressed(egui::Key::Tab, egui::Modifiers::NONE, down)]);
-            painter.learn(output).drop_without_applying_deltas();
-        }
+    for down in [true, false].repeat(20) {
+        seen.pass(vec![pressed(Key::Tab, Modifiers::NONE, down)]);
     }
-    save(&mut window, &mut painter, "focused");
-    window.pass(vec![Event::PointerMoved(pos2(300.0, 300.0))]);
-    window.pass(vec![button(pos2(300.0, 300.0), true)]);
-    window.pass(vec![button(pos2(300.0, 300.0), false)]);
-    save(&mut window, &mut painter, "clicked");
+    seen.save("focused");
+    let at = pos2(300.0, 300.0);
+    [Event::PointerMoved(at), button(at, true), button(at, false)].into_iter().for_each(|event| seen.pass(vec![event]));
+    seen.save("clicked");
 }
 
 /// Relative luminance (WCAG 2) of an sRGB colour, 0 to 255.
@@ -186,9 +174,15 @@ fn contrast(text: [f32; 3], behind: [f32; 3]) -> f32 {
     (a.max(b) + 0.05) / (a.min(b) + 0.05)
 }
 
+/// A colour over a grey picture, as it comes out.
+fn over(color: Color32, grey: u8) -> [f32; 3] {
+    let [r, g, b, a] = color.to_array().map(f32::from);
+    [r, g, b].map(|channel| channel + f32::from(grey) * (1.0 - a / 255.0))
+}
+
 #[test]
 fn text_can_be_read_over_any_picture() {
-    let solid = |color: egui::Color32| over(color, 0);
+    let solid = |color: Color32| over(color, 0);
     for theme in [Theme::Dark, Theme::Light] {
         let colors = Colors::of(theme);
         for picture in [0, 60, 128, 200, 255] {

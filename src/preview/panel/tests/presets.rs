@@ -66,6 +66,33 @@ fn ones_own_are_renamed_and_deleted() {
 }
 
 #[test]
+fn escape_gives_up_what_is_asked_and_closes_nothing_else() {
+    let mut window = Window::new();
+    let escape = |window: &mut Window| {
+        window.press(Key::Escape, Modifiers::NONE);
+        window.wait(0.1);
+        assert!(window.state.panel, "the panel stays");
+    };
+    window.click_on("Edit…");
+    window.click_on("Delete");
+    assert!(window.place_of("Delete it").is_some());
+    escape(&mut window);
+    assert!(window.place_of("Delete it").is_none() && window.place_of("Delete").is_some());
+    escape(&mut window);
+    assert!(window.place_of("Delete").is_none());
+    window.click_on("Save as…");
+    // The help is over it, and goes first.
+    window.state.help = true;
+    window.wait(0.2);
+    escape(&mut window);
+    assert!(!window.state.help && window.place_of("Cancel").is_some());
+    escape(&mut window);
+    assert!(window.place_of("Cancel").is_none());
+    window.press(Key::Escape, Modifiers::NONE);
+    assert!(!window.state.panel, "nothing is asked any more");
+}
+
+#[test]
 fn a_number_that_cannot_be_is_told() {
     let mut window = Window::new();
     let said = |window: &Window| window.state.notes.iter().map(|note| note.text.clone()).collect::<Vec<_>>();

@@ -4,7 +4,7 @@ use egui::Rect;
 
 use super::{Window, sample};
 use crate::look::Effect;
-use crate::preview::state::{Shown, Source, State};
+use crate::preview::state::{self, Output, Source, State};
 use crate::preview::views::Legend;
 
 fn states() -> Vec<State> {
@@ -21,7 +21,7 @@ fn states() -> Vec<State> {
     tilt.legend = Some(Legend::Coc { most_px: 0.0 });
     all.push(tilt);
     let mut off = base.clone();
-    (off.look.effect, off.shown, off.source) = (Effect::None, Shown::Bins, Source::Lost("why ".repeat(200)));
+    (off.look.effect, off.shown, off.source) = (Effect::None, state::Shown::Bins, Source::Lost("why ".repeat(200)));
     off.legend = Some(Legend::Bins { count: 13, high_px: [f32::INFINITY; 13] });
     off.focus_m = Some(f32::INFINITY);
     all.push(off);
@@ -54,6 +54,106 @@ fn the_panel_is_within_the_window() {
         let rect = window.panel.sheet.rect().expect("the panel is shown");
         let whole = window.ctx.content_rect();
         assert!(whole.expand(1.0).contains_rect(rect), "{size:?} at {text_scale}: {rect} in {whole}");
+    }
+}
+
+/// What is done to a window, and what then has to be seen in it.
+type Shown<'a> = (&'a dyn Fn(&mut State), &'a [&'a str]);
+
+#[test]
+fn the_largest_text_in_a_small_window_cuts_nothing_off() {
+    let shown: [Shown; 3] = [
+        (&|_| {}, &["Look", "Source"]),
+        (&|state| state.help = true, &["Keys and gestures", "Single keys", "Ask before closing", "1 – 9"]),
+        (
+            &|state| state.closing = true,
+            &["Stop recording and close?", "Keep recording", "Stop and close", "Do not ask again"],
+        ),
+    ];
+    for (change, texts) in shown {
+        let mut state = sample::state();
+        state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
+        state.habits.text_scale = 3.0;
+        change(&mut state);
+        let mut window = Window::of(state, (500, 400));
+        window.wait(0.5);
+        let whole = window.ctx.content_rect();
+        assert!(whole.contains_rect(window.panel.sheet.rect().expect("the panel")), "{whole}");
+        let boxes = window.boxes();
+        for text in texts {
+            let at = boxes.iter().find(|(shown, _)| shown == text).unwrap_or_else(|| panic!("{text}: {boxes:?}")).1;
+            assert!(whole.contains_rect(at), "{text} at {at} in {whole}");
+        }
+        let said = window.state.notes.iter().filter(|note| note.text.contains("too small for text")).count();
+        assert_eq!(said, 1, "that it is smaller than was chosen");
+    }
+    let mut state = sample::state();
+    state.habits.text_scale = 3.0;
+    let mut window = Window::of(state, (1280, 720));
+    window.wait(0.5);
+    assert!(window.ctx.zoom_factor() == 3.0 && window.state.notes.is_empty());
+}
+
+#[test]
+fn the_scroll_bar_covers_no_control() {
+    let mut window = Window::new();
+    window.wait(0.3);
+    let panel = window.panel.sheet.rect().unwrap();
+    // Over the bar, which is at its widest then.
+    window.pass(vec![egui::Event::PointerMoved(panel.right_center() - egui::vec2(16.0, -40.0))]);
+    window.wait(0.5);
+    let (_, output) = window.pass_with_output(Vec::new());
+    let bars = output.shapes.iter().filter_map(|clipped| match &clipped.shape {
+        egui::Shape::Rect(shape) => Some(shape.rect),
+        _ => None,
+    });
+    let is_bar = |rect: &Rect| panel.contains_rect(*rect) && rect.width() < 8.0 && rect.height() > 40.0;
+    let left = bars.filter(is_bar).map(|bar| bar.left()).fold(f32::INFINITY, f32::min);
+    output.drop_without_applying_deltas();
+    assert!(left > panel.right() - 30.0, "no bar in {panel}");
+    let mut seen = 0;
+    for _ in 0..40 {
+        window.press(egui::Key::Tab, egui::Modifiers::NONE);
+        window.wait(0.1);
+        let Some(id) = window.ctx.memory(|memory| memory.focused()) else { continue };
+        let rect = window.ctx.read_response(id).unwrap().rect;
+        // The buttons beside the title are above it.
+        if rect.top() > panel.top() + 60.0 {
+            assert!(rect.right() <= left, "{rect} under the bar at {left}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 20, "only {seen}");
+}
+
+#[test]
+fn where_a_control_is_scrolled_out_of_sight_it_gives_no_hint() {
+    let mut window = Window::of(sample::state(), (1280, 500));
+    window.pass(vec![egui::Event::PointerMoved(super::on_panel())]);
+    window.wait(0.5);
+    // What is scrolled begins under the line of the source.
+    let boxes = window.boxes();
+    let top = boxes.iter().find(|(shown, _)| shown.starts_with("Desk camera, ")).expect("the line").1.bottom() + 6.0;
+    let scroll = |window: &mut Window, by: f32| {
+        window.pass(vec![super::scrolled(egui::MouseWheelUnit::Point, by, egui::Modifiers::NONE)]);
+        window.wait(0.8);
+    };
+    for _ in 0..100 {
+        if window.place_of("Subject").is_some_and(|at| at.y < 300.0) {
+            break;
+        }
+        scroll(&mut window, -60.0);
+    }
+    // Its upper third is out of sight.
+    let at = window.place_of("Subject").expect("the option");
+    scroll(&mut window, top + 4.0 - at.y);
+    let at = window.place_of("Subject").expect("the option");
+    assert!((at.y - top - 4.0).abs() < 2.0, "{at} under {top}");
+    for (y, hints) in [(top + 8.0, true), (top - 5.0, false)] {
+        window.pass(vec![egui::Event::PointerMoved(egui::pos2(at.x, y))]);
+        window.wait(2.0);
+        let is_seen = window.texts().iter().any(|text| text.starts_with("Follows the nearest"));
+        assert_eq!(is_seen, hints, "at {y}, where it begins at {top}");
     }
 }
 

@@ -72,6 +72,19 @@ fn the_line_is_dragged_while_the_recording_stands_still_and_plays_on_after() {
 }
 
 #[test]
+fn the_hint_of_the_line_is_at_the_pointer() {
+    let mut window = of_a_recording();
+    for x in [400.0, 800.0] {
+        window.pass(vec![egui::Event::PointerMoved(pos2(x, 688.0))]);
+        window.wait(2.0);
+        let at = window.place_of("Frame 4 of 101").expect("a hint");
+        assert!((at.x - x).abs() < 90.0, "{at} for {x}");
+        window.pass(vec![egui::Event::PointerMoved(pos2(x, 300.0))]);
+        window.wait(0.5);
+    }
+}
+
+#[test]
 fn it_is_a_pause_unless_something_is_written() {
     let mut window = of_a_recording();
     window.state.frozen = true;

@@ -1,10 +1,9 @@
 //! An enlarged picture: by keys, wheel and fingers, dragged, clicked; and what is said of the pixel under the pointer.
 
-use egui::{Event, Key, Modifiers, Pos2, pos2, vec2};
+use egui::{Event, Key, Modifiers, Pos2, pos2};
 
 use super::super::super::state::{Action, Shown, Zoom};
-use super::{Window, button};
-use crate::depth::focus::FocusRule;
+use super::{Window, button, close, point, scrolled};
 use crate::preview::present::enlarged;
 use crate::preview::views::Probe;
 
@@ -16,21 +15,6 @@ fn place(window: &mut Window) {
     let (area, part) = enlarged(picture, size, factor, center);
     (window.canvas.area, window.canvas.part) = (area, Some(part));
     window.pass(Vec::new());
-}
-
-fn point(actions: &[Action]) -> [f32; 2] {
-    let focus = actions.iter().rev().find_map(|action| match action {
-        Action::Look { look, .. } => Some(look.focus),
-        _ => None,
-    });
-    match focus {
-        Some(FocusRule::Point { x, y }) => [x, y],
-        other => panic!("{other:?} of {actions:?}"),
-    }
-}
-
-fn close(a: [f32; 2], b: [f32; 2]) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3)
 }
 
 /// A window at 400 % around a point right of and above the middle.
@@ -57,6 +41,24 @@ fn a_key_shows_the_pixels_under_the_pointer_and_all_of_the_picture_again() {
     assert_eq!(window.state.zoom.factor, 2);
     window.press(Key::X, Modifiers::NONE);
     assert_eq!(window.state.zoom.factor, 0);
+}
+
+#[test]
+fn a_small_picture_is_never_made_smaller_by_a_key() {
+    let mut window = Window::new();
+    // All of it is seen at 4.2 pixels of the window for one of its own.
+    window.canvas.size = (300, 170);
+    window.pass(vec![Event::PointerMoved(pos2(320.0, 180.0))]);
+    for key in [Key::X, Key::Plus] {
+        window.press(key, Modifiers::NONE);
+        assert_eq!(window.state.zoom.factor, 8, "{key:?}");
+        window.press(if key == Key::X { key } else { Key::Minus }, Modifiers::NONE);
+        assert_eq!(window.state.zoom.factor, 0, "all of it again");
+    }
+    // What was chosen in the panel goes on from there.
+    window.state.zoom.factor = 2;
+    window.press(Key::Plus, Modifiers::NONE);
+    assert_eq!(window.state.zoom.factor, 8);
 }
 
 #[test]
@@ -103,14 +105,8 @@ fn the_wheel_with_ctrl_and_two_fingers_enlarge_around_the_pointer() {
     let look = window.state.look.clone();
     window.pass(vec![Event::Zoom(1.3)]);
     assert!(window.state.zoom.factor == 1 && close(window.state.zoom.center, [0.75, 0.25]), "{:?}", window.state.zoom);
-    let scroll = Event::MouseWheel {
-        unit: egui::MouseWheelUnit::Line,
-        delta: vec2(0.0, 2.0),
-        phase: egui::TouchPhase::Move,
-        source: egui::MouseWheelSource::Unknown,
-        modifiers: Modifiers::CTRL | Modifiers::COMMAND,
-    };
-    window.pass(vec![scroll]);
+    let ctrl = Modifiers::CTRL | Modifiers::COMMAND;
+    window.pass(vec![scrolled(egui::MouseWheelUnit::Line, 2.0, ctrl)]);
     window.wait(0.5);
     assert!(window.state.zoom.factor > 1, "{:?}", window.state.zoom);
     assert_eq!(window.state.look, look, "the blur is the wheel's alone");

@@ -148,9 +148,4 @@ impl Presenter for Gpu {
     fn takes(&self, picture: &DevicePicture) -> bool {
         picture.is_on(&self.device)
     }
-
-    fn describe(&self) -> String {
-        let mode = if self.config.present_mode == wgpu::PresentMode::Mailbox { "newest picture" } else { "in order" };
-        format!("{}, {mode}", self.device.name)
-    }
 }

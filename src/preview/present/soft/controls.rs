@@ -54,7 +54,7 @@ impl Overlay {
     pub fn set(&mut self, controls: Controls) {
         let Controls { primitives, mut textures, pixels_per_point } = controls;
         // Only the controls so far still needed these.
-        self.textures.free(self.freed.drain(..));
+        self.freed.drain(..).for_each(|id| drop(self.textures.0.remove(&id)));
         self.textures.set(&textures);
         self.freed.extend(&textures.free);
         textures.clear();
@@ -69,7 +69,7 @@ impl Overlay {
         let width = self.size.0;
         // Only what was painted before has to be cleared.
         for (row, cells) in self.pixels.chunks_exact_mut(width.max(1)).zip(&mut self.cells) {
-            for columns in runs(std::mem::take(cells), self.cell_px, 0..width) {
+            for columns in runs(std::mem::take(cells), self.cell_px, width) {
                 row[columns].fill(0);
             }
         }
@@ -94,7 +94,7 @@ impl Overlay {
 
     fn fill_mesh(&mut self, mesh: &Mesh, clip: Clip) {
         let Self { textures, pixels, cells, cell_px, size, .. } = self;
-        let Some(texture) = textures.get(mesh.texture_id) else { return };
+        let Some(texture) = textures.0.get(&mesh.texture_id) else { return };
         let (width, cell_px) = (size.0, *cell_px);
         for corners in mesh.indices.as_chunks::<3>().0 {
             let Some(corners) = corners_of(mesh, *corners, self.pixels_per_point) else { continue };
@@ -102,14 +102,12 @@ impl Overlay {
         }
     }
 
-    /// Blends the controls over some columns of the row `y`; `row` holds just these columns.
-    pub fn blend(&self, arch: Arch, y: usize, columns: Range<usize>, row: &mut [u32]) {
+    /// Blends the controls over the row `y`.
+    pub fn blend(&self, arch: Arch, y: usize, row: &mut [u32]) {
         let Some(&cells) = self.cells.get(y) else { return };
-        let start = columns.start;
         let from = &self.pixels[y * self.size.0..][..self.size.0];
-        for run in runs(cells, self.cell_px, columns) {
-            let to = &mut row[run.start - start..run.end - start];
-            arch.dispatch(Blend { from: &from[run], to });
+        for run in runs(cells, self.cell_px, self.size.0) {
+            arch.dispatch(Blend { from: &from[run.clone()], to: &mut row[run] });
         }
     }
 }
@@ -143,8 +141,8 @@ fn fill_triangle(
     });
 }
 
-/// The runs of set bits of a row's `cells`, as ranges of columns clipped to `within`.
-fn runs(mut cells: u64, cell_px: usize, within: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+/// The runs of set bits of a row's `cells`, as ranges of its `width` columns.
+fn runs(mut cells: u64, cell_px: usize, width: usize) -> impl Iterator<Item = Range<usize>> {
     // Cells that were shifted out of `cells` so far.
     let mut passed = 0;
     std::iter::from_fn(move || {
@@ -158,9 +156,8 @@ fn runs(mut cells: u64, cell_px: usize, within: Range<usize>) -> impl Iterator<I
         cells = cells >> (count - 1) >> 1;
         let first = passed + skipped;
         passed = first + count;
-        Some((first * cell_px).max(within.start)..(passed * cell_px).min(within.end))
+        Some((first * cell_px).min(width)..(passed * cell_px).min(width))
     })
-    .filter(|run| run.start < run.end)
 }
 
 /// Blends one run of the controls over the picture's pixels.
@@ -186,10 +183,9 @@ mod tests {
 
     #[test]
     fn runs_are_the_cells_that_are_set() {
-        let all = |cells, within| runs(cells, 10, within).map(|run| (run.start, run.end)).collect::<Vec<_>>();
-        assert!(all(0, 0..100).is_empty());
-        assert_eq!(all(u64::MAX, 0..640), [(0, 640)]);
-        assert_eq!(all(1 << 63 | 0b1011, 5..635), [(5, 20), (30, 40), (630, 635)]);
-        assert_eq!(all(0b1011, 20..35), [(30, 35)]);
+        let all = |cells, width| runs(cells, 10, width).map(|run| (run.start, run.end)).collect::<Vec<_>>();
+        assert!(all(0, 100).is_empty());
+        assert_eq!(all(u64::MAX, 640), [(0, 640)]);
+        assert_eq!(all(1 << 63 | 0b1011, 635), [(0, 20), (30, 40), (630, 635)]);
     }
 }

@@ -58,17 +58,12 @@ impl Presenter for Soft {
         let Some((width, height)) = self.size else { return Ok(()) };
         self.surface.resize(width, height).map_err(fault)?;
         let mut buffer = self.surface.buffer_mut().map_err(fault)?;
-        let age = buffer.age();
         // The buffer may be longer than the window.
         let pixels = width.get() as usize * height.get() as usize;
         if let Some(pixels) = buffer.get_mut(..pixels) {
-            self.painter.paint(pixels, age, drawing);
+            self.painter.paint(pixels, drawing);
         }
         self.window.pre_present_notify();
         buffer.present().map_err(fault)
-    }
-
-    fn describe(&self) -> String {
-        "the CPU, into shared memory".to_owned()
     }
 }

@@ -18,8 +18,6 @@ const MANY_SCALED: u64 = 700_000;
 /// At most this many threads, and half of the cores. The blur needs the others: waiting for a thread that gets no core
 /// takes longer than to paint alone.
 const MOST_THREADS: usize = 4;
-/// Buffers whose content is remembered: windows are double or triple buffered.
-const BUFFERS: usize = 4;
 
 /// Paints a window's content.
 pub struct Painter {
@@ -33,18 +31,6 @@ pub struct Painter {
     scratch: Vec<Scratch>,
     /// A flag for each band, for [`DisjointParts`].
     taken: Vec<AtomicBool>,
-    around: Around,
-}
-
-/// The window around the picture, which is painted only into buffers that show an older version of it.
-#[derive(Debug, Default)]
-struct Around {
-    area: Area,
-    background: [u8; 3],
-    /// Counts the changes of area, background, size and controls.
-    version: u64,
-    /// The version in each of the last buffers, the one painted last first.
-    painted: [u64; BUFFERS],
 }
 
 impl Painter {
@@ -58,7 +44,6 @@ impl Painter {
             workers: None,
             scratch: vec![Scratch::default()],
             taken: Vec::new(),
-            around: Around::default(),
         }
     }
 
@@ -67,23 +52,19 @@ impl Painter {
         self.size = (size.0 as usize, size.1 as usize);
         self.overlay.resize(self.size);
         self.taken.resize_with(self.size.1.div_ceil(BAND), AtomicBool::default);
-        self.around.version += 1;
     }
 
     /// Controls to paint from now on.
     pub fn set_controls(&mut self, controls: Controls) {
         self.overlay.set(controls);
-        self.around.version += 1;
     }
 
-    /// Paints the window into `pixels`: rows of `0x00RRGGBB` without gaps, of the window's size. `age` is how many
-    /// calls ago this buffer was painted, 0 if its content is unknown.
-    pub fn paint(&mut self, pixels: &mut [u32], age: u8, drawing: &Drawing) {
+    /// Paints the window into `pixels`: rows of `0x00RRGGBB` without gaps, of the window's size.
+    pub fn paint(&mut self, pixels: &mut [u32], drawing: &Drawing) {
         if pixels.len() != self.size.0 * self.size.1 || pixels.is_empty() {
             return;
         }
         self.overlay.paint();
-        let around = self.around.begin_frame(age, drawing);
         let picture = match drawing.picture {
             Image::Memory(picture) if !picture.rgb.is_empty() && drawing.area.width > 0 && drawing.area.height > 0 => {
                 if drawing.part.is_none() {
@@ -95,7 +76,7 @@ impl Painter {
         };
         let Self { arch, size: (width, _), overlay, scaler, workers, scratch, taken, .. } = self;
         let (arch, width, overlay, scaler) = (*arch, *width, &*overlay, &*scaler);
-        let window = Window { arch, width, overlay, scaler, drawing, picture, around };
+        let window = Window { arch, width, overlay, scaler, drawing, picture };
         let bands = pixels.len().div_ceil(width * BAND);
         let paint_band = |scratch: &mut Scratch, band: usize, pixels: &mut [u32]| {
             for (y, row) in (band * BAND..).zip(pixels.chunks_exact_mut(width)) {
@@ -129,23 +110,6 @@ fn needs_threads(drawing: &Drawing) -> bool {
     u64::from(area.width) * u64::from(area.height) > if scaled { MANY_SCALED } else { MANY_COPIED }
 }
 
-impl Around {
-    /// Takes note of what is to be painted into a buffer of this `age`; whether the window around the picture has to be
-    /// painted, too.
-    fn begin_frame(&mut self, age: u8, drawing: &Drawing) -> bool {
-        let looks = (drawing.area, drawing.background);
-        if (self.area, self.background) != looks {
-            (self.area, self.background) = looks;
-            self.version += 1;
-        }
-        let in_buffer = usize::from(age).checked_sub(1).and_then(|ago| self.painted.get(ago));
-        let needed = in_buffer != Some(&self.version);
-        self.painted.rotate_right(1);
-        self.painted[0] = self.version;
-        needed
-    }
-}
-
 /// What the threads share while they paint a frame.
 struct Window<'a> {
     arch: Arch,
@@ -155,34 +119,25 @@ struct Window<'a> {
     drawing: &'a Drawing<'a>,
     /// The picture, where there is one in memory.
     picture: Option<&'a ColorImage>,
-    /// Whether the window around it is painted, too.
-    around: bool,
 }
 
 impl Window<'_> {
     /// Paints row `y` of the window: picture and background, and the controls over them.
     fn paint_row(&self, y: usize, scratch: &mut Scratch, row: &mut [u32]) {
-        let Self { arch, width, overlay, scaler, drawing, picture, around } = *self;
+        let Self { arch, width, overlay, scaler, drawing, picture } = *self;
         let Area { x, y: top, width: area_width, height } = drawing.area;
         let [r, g, b] = drawing.background;
         let background = u32::from_be_bytes([0, r, g, b]);
         let (left, right) = ((x as usize).min(width), (x as usize + area_width as usize).min(width));
         let (top, bottom) = (top as usize, top as usize + height as usize);
-        let Some(picture) = picture.filter(|_| (top..bottom).contains(&y)) else {
-            // Without a picture its area is background, too.
-            if around || self.picture.is_none() {
-                row.fill(background);
-                overlay.blend(arch, y, 0..width, row);
+        match picture.filter(|_| (top..bottom).contains(&y)) {
+            Some(picture) => {
+                scaler.paint_row(arch, (drawing, picture), y - top, scratch, &mut row[left..right]);
+                row[..left].fill(background);
+                row[right..].fill(background);
             }
-            return;
-        };
-        scaler.paint_row(arch, (drawing, picture), y - top, scratch, &mut row[left..right]);
-        if around {
-            row[..left].fill(background);
-            row[right..].fill(background);
-            overlay.blend(arch, y, 0..width, row);
-        } else {
-            overlay.blend(arch, y, left..right, &mut row[left..right]);
+            None => row.fill(background),
         }
+        overlay.blend(arch, y, row);
     }
 }

@@ -18,28 +18,12 @@ pub struct Texture {
 
 /// The textures by egui's ids.
 #[derive(Debug, Default)]
-pub struct Textures(HashMap<TextureId, Texture>);
+pub struct Textures(pub HashMap<TextureId, Texture>);
 
 impl Textures {
-    /// The texture, if egui has set it.
-    pub fn get(&self, id: TextureId) -> Option<&Texture> {
-        self.0.get(&id)
-    }
-
     /// Adds new textures and changes others.
     pub fn set(&mut self, delta: &TexturesDelta) {
-        for (&id, changes) in &delta.set {
-            for change in changes {
-                self.apply(id, change);
-            }
-        }
-    }
-
-    /// Drops textures.
-    pub fn free(&mut self, ids: impl Iterator<Item = TextureId>) {
-        for id in ids {
-            self.0.remove(&id);
-        }
+        delta.set.iter().for_each(|(id, changes)| changes.iter().for_each(|change| self.apply(*id, change)));
     }
 
     /// Replaces a texture, or the part of it at `change.pos`. What has no texels, or does not fit, is ignored.
@@ -140,7 +124,7 @@ mod tests {
     #[test]
     fn texels_are_met_at_their_centres_and_mixed_between() {
         let textures = texture();
-        let texture = textures.get(TextureId::default()).unwrap();
+        let texture = &textures.0[&TextureId::default()];
         assert_eq!(texture.sample([0.5, 0.5]), 0);
         assert_eq!(texture.sample([1.5, 1.5]), 0x280a_141e);
         assert_eq!(texture.sample([1.0, 0.5]), 0x8080_8080, "half way");
@@ -157,9 +141,9 @@ mod tests {
         delta.push(TextureId::default(), ImageDelta::partial([2, 0], dot, TextureOptions::LINEAR));
         textures.set(&delta);
         delta.clear();
-        let texture = textures.get(TextureId::default()).unwrap();
+        let texture = &textures.0[&TextureId::default()];
         assert_eq!((texture.sample([1.5, 0.5]), texture.sample([0.5, 1.5])), (0xffff_0000, 0xffc8_6432));
-        textures.free([TextureId::default()].into_iter());
-        assert!(textures.get(TextureId::default()).is_none());
+        textures.0.remove(&TextureId::default());
+        assert!(textures.0.is_empty());
     }
 }

@@ -12,26 +12,30 @@ const KEPT_LOOKS: usize = 512;
 impl Host {
     /// Blurs with another look from now on, and remembers it by its number for snapshots.
     pub(super) fn adopt(&mut self, look: Look) {
-        self.look = look;
+        self.start.look = look;
         let number = self.looks.back().map_or(0, |(last, _)| last + 1);
-        let effective = self.live.as_ref().map_or_else(|| self.look.clone(), |live| live.effective(&self.look));
-        self.looks.push_back((number, effective));
+        self.looks.push_back((number, self.effective_look()));
         if self.looks.len() > KEPT_LOOKS {
             self.looks.pop_front();
         }
         // What is on the screen comes first.
         self.blur_held();
         if let Some(live) = &mut self.live
-            && let Err(line) = live.adopt(&self.look, number, &mut *self.services)
+            && let Err(line) = live.adopt(&self.start.look, number, &mut *self.start.services)
         {
             self.news.note(line);
         }
     }
 
+    /// The look as far as the source allows it.
+    pub(super) fn effective_look(&self) -> Look {
+        self.live.as_ref().map_or_else(|| self.start.look.clone(), |live| live.effective(&self.start.look))
+    }
+
     /// Keeps the frame that stays from now on, or lets it go.
     pub(super) fn hold(&mut self, held: Option<held::Held>) {
         let is_behind = held.as_ref().is_some_and(|held| held.is_behind);
-        self.held = held.map(|held| held::HeldBlur::new(held, self.look.focus));
+        self.held = held.map(|held| held::HeldBlur::new(held, self.start.look.focus));
         if is_behind {
             self.blur_held();
         }
@@ -40,7 +44,7 @@ impl Host {
     /// Blurs the frame that stays as the last look says.
     fn blur_held(&mut self) {
         if let (Some(held), Some((number, look))) = (&mut self.held, self.looks.back()) {
-            match held.blur(look, *number, &mut *self.services) {
+            match held.blur(look, *number, &mut *self.start.services) {
                 Ok(blurred) => self.news.send(SessionEvent::Blurred(Box::new(blurred))),
                 Err(line) => self.news.note(line),
             }
@@ -50,11 +54,11 @@ impl Host {
     /// Saves a snapshot with the settings that repeat it: those of the look that its frame was blurred with.
     pub(super) fn save(&self, still: &Still) {
         let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
-        let look = its_look.map_or(&self.look, |(_, look)| look);
+        let look = its_look.map_or(&self.start.look, |(_, look)| look);
         let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
         let Still { picture, color, depth, .. } = still;
         let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
-        match snapshot::save(&self.folders.pictures, &folders::stem(), &snapshot) {
+        match snapshot::save(&self.start.folders.pictures, &folders::stem(), &snapshot) {
             Ok(path) => {
                 self.news.note(format!("Saved {}", path.display()));
                 self.news.kept(&path);

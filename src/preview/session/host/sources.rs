@@ -29,53 +29,42 @@ impl Host {
 
     /// Tells how large the recording is by now.
     fn tell_size(&self) {
-        let recording = self.outputs.iter().find(|output| !output.is_camera);
+        let recording = self.start.outputs.iter().find(|output| !output.is_camera);
         let bytes = recording.and_then(|output| whole::bytes_so_far(output.name.as_ref()));
         bytes.into_iter().for_each(|bytes| self.news.tell(Update::Recorded(bytes)));
     }
 
     pub(super) fn tell_choices(&mut self) {
-        let sources = self.services.sources();
-        let virtual_cameras = self.services.virtual_cameras();
+        let sources = self.start.services.sources();
+        let virtual_cameras = self.start.services.virtual_cameras();
         self.news.tell(Update::Choices { sources, virtual_cameras });
-        self.news.tell(Update::Presets(self.services.settings().presets()));
-    }
-
-    /// Carries out what is about other sources.
-    pub(super) fn on_offer(&mut self, request: Request) {
-        match request {
-            Request::Offer(name) => self.offer(name),
-            Request::Browse(what) => self.browse(what),
-            Request::Mode(size, fps) => self.set_mode(size, fps),
-            // All else is the window's own, or comes another way.
-            _ => {}
-        }
+        self.news.tell(Update::Presets(self.start.services.settings().presets()));
     }
 
     /// Tells which sources there are, if those of the system are others by now, and opens the one that was missing.
     fn look_for_devices(&mut self) {
-        if !self.services.devices_changed() {
+        if !self.start.services.devices_changed() {
             return;
         }
         self.tell_choices();
-        let is_there = self.services.sources().iter().any(|choice| choice.name == self.source);
-        if self.live.is_none() && is_there && self.source.starts_with("/dev/") {
+        let is_there = self.start.services.sources().iter().any(|choice| choice.name == self.start.source);
+        if self.live.is_none() && is_there && self.start.source.starts_with("/dev/") {
             self.open();
         }
     }
 
     /// Tells the window to open a source that somebody offers, unless that cannot be one: then what runs goes on.
-    fn offer(&self, name: String) {
-        match self.services.check(&name) {
+    pub(super) fn offer(&self, name: String) {
+        match self.start.services.check(&name) {
             Ok(()) => self.news.tell(Update::Offered(name)),
             Err(line) => self.news.note(line),
         }
     }
 
     /// Asks the person for a file or folder, on a thread of its own.
-    fn browse(&self, what: Browse) {
+    pub(super) fn browse(&self, what: Browse) {
         let (orders, news) = (self.orders.clone(), self.news.clone());
-        let pick = self.services.browse(what);
+        let pick = self.start.services.browse(what);
         let asked = std::thread::Builder::new().name("dialog".into()).spawn(move || match pick() {
             Ok(Some(name)) => drop(orders.send(Order::Do(Request::Offer(name)))),
             Ok(None) => {}
@@ -87,8 +76,8 @@ impl Host {
     }
 
     /// Opens the camera again with other pictures.
-    fn set_mode(&mut self, size: (u32, u32), fps: f64) {
-        self.services.choose_mode(&self.source, size, fps);
+    pub(super) fn set_mode(&mut self, size: (u32, u32), fps: f64) {
+        self.start.services.choose_mode(&self.start.source, size, fps);
         self.stop();
         self.open();
     }

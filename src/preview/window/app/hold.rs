@@ -5,7 +5,9 @@ use std::time::{Duration, Instant};
 use super::App;
 use crate::bokeh::Picture;
 use crate::link::pool::Pooled;
+use crate::look::Look;
 use crate::optics::CocField;
+use crate::pipeline::View;
 use crate::preview::session::{Blurred, Held};
 use crate::preview::state::Source;
 
@@ -38,8 +40,14 @@ impl App {
             color,
             depth,
             coc: view.coc,
-            is_behind: view.trace.between || self.snapshot_due,
+            // A photo was blurred as well as the time between frames allows.
+            is_behind: view.trace.between || self.snapshot_due || self.state.settled,
         }));
+    }
+
+    /// Whether a frame was made without the depth that a look follows, and others would have it.
+    pub(super) fn lacks_depth(&self, view: &View, look: &Look) -> bool {
+        view.depth.is_none() && look.effect.follows_depth() && self.state.may_have_depth()
     }
 
     /// Shows the picture that stays in another look; whether it is still the one that stays.

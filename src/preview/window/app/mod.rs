@@ -198,7 +198,7 @@ impl App {
 }
 
 fn window_use(state: &State) -> WindowUse {
-    let Totals { presented, first_frame_ns, latency, reaction, present } = state.meters.totals();
+    let Totals { presented, first_frame_ns, latency, reaction, present } = &state.meters.totals;
     WindowUse::new(*presented, *first_frame_ns, [latency, reaction, present])
 }
 

@@ -21,7 +21,7 @@ impl App {
             match event {
                 SessionEvent::Views(frames, guide, seeker) => {
                     self.guide = guide;
-                    (self.seeking, self.state.transport) = (Seeking::of(seeker), None);
+                    (self.seeking, self.state.transport, self.state.settled) = (Seeking::of(seeker), None, false);
                     changed |= self.state.guide(None);
                     self.heard_at = Instant::now();
                     // It was meant for the source before.
@@ -62,10 +62,15 @@ impl App {
             }
         }
         // A frozen frame has to be in memory, to be saved: frames are replaced until one is.
-        let frozen = self.state.frozen && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
-        if let Some(view) = newest.filter(|view| !frozen || self.seeking.is_answer(view)) {
+        let stays = self.state.frozen || self.state.settled;
+        let stays = stays && self.view.as_ref().is_some_and(|view| view.picture.memory().is_some());
+        if let Some(view) = newest.filter(|view| !stays || self.seeking.is_answer(view)) {
             self.note_place(&view);
             self.learn_from(&view);
+            let is_whole = view.picture.memory().is_some() && !view.trace.between && !view.trace.depth_held;
+            // A number of frames that was asked for is shown.
+            let may_settle = self.state.is_photo() && !self.close_at_end;
+            self.state.settled = may_settle && is_whole && !self.lacks_depth(&view, &self.state.look);
             // Another frame stays now.
             self.held = None;
             self.view = Some(view);
@@ -76,6 +81,7 @@ impl App {
             }
         }
         self.hold();
+        self.watch();
         if changed {
             self.ask_for_redraw();
         }

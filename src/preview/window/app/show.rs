@@ -86,6 +86,9 @@ impl App {
                 Request::Seek(place) => self.seek(place),
                 Request::Close => events.exit(),
                 Request::Look(look) => {
+                    // Before the look, so that nobody tries it on a photo's picture without depth.
+                    self.state.settled &= !self.view.as_ref().is_some_and(|view| self.lacks_depth(view, &look));
+                    self.hold();
                     self.session.order(Request::Look(look));
                     self.update_settings();
                 }
@@ -101,7 +104,8 @@ impl App {
     /// other than drawing uses them.
     pub(super) fn update_wanted(&self) {
         let drawn_on_gpu = self.gfx.as_ref().is_some_and(|gfx| gfx.presenter.has_device());
-        let used_in_memory = self.state.frozen || self.snapshot_due || !self.state.outputs.is_empty();
+        let used_in_memory =
+            self.state.frozen || self.state.is_photo() || self.snapshot_due || !self.state.outputs.is_empty();
         self.wanted.set(match (drawn_on_gpu, used_in_memory) {
             (false, _) => Place::Memory,
             (true, false) => Place::Device,
@@ -119,7 +123,7 @@ impl App {
             return self.state.note(NO_PICTURE);
         }
         let Trace { between, depth_held, .. } = view.trace;
-        let is_frozen = self.state.frozen && view.picture.memory().is_some();
+        let is_frozen = self.state.keeps_picture() && view.picture.memory().is_some();
         self.snapshot_due = view.picture.memory().is_none() || is_running && (between || depth_held && !is_frozen);
         self.update_wanted();
         let Some(picture) = view.picture.memory().filter(|_| !self.snapshot_due) else { return };

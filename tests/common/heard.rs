@@ -1,0 +1,99 @@
+//! A session as the window has it: what it said so far, and where its frames come from.
+#![allow(dead_code)]
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bokehcam::capture::Seeker;
+use bokehcam::depth::plate::Guide;
+use bokehcam::link::Receiver;
+use bokehcam::link::demand::{Demand, Watch};
+use bokehcam::look::{Look, Strength};
+use bokehcam::pipeline::View;
+use bokehcam::preview::folders::Folders;
+use bokehcam::preview::services::Services;
+use bokehcam::preview::session::{Blurred, Session, SessionEvent, Start};
+use bokehcam::preview::state::Update;
+
+pub const PATIENCE: Duration = Duration::from_secs(120);
+
+pub fn look() -> Look {
+    Look { strength: Strength::AtInfinity(2.0), ..Look::default() }
+}
+
+pub struct Heard {
+    pub session: Session,
+    pub views: Option<Receiver<View>>,
+    pub guide: Option<Arc<Guide>>,
+    pub seeker: Option<Arc<Seeker>>,
+    pub told: Vec<Update>,
+    pub copied: Option<String>,
+    /// The frames that stay, in other looks.
+    pub blurred: Vec<Blurred>,
+    /// Somebody watches while it is held.
+    pub watch: Option<Watch>,
+    pub demand: Demand,
+}
+
+impl Heard {
+    pub fn begin(services: Box<dyn Services>, source: &str, folder: &Path) -> Self {
+        let demand = Demand::default();
+        let watch = Some(demand.watch());
+        let start = Start {
+            services,
+            look: look(),
+            source: source.into(),
+            outputs: Vec::new(),
+            keep_going: false,
+            budget_ns: None,
+            folders: Folders::at(folder.to_owned()),
+            wanted: Arc::default(),
+            demand: demand.clone(),
+        };
+        let session = Session::begin(start, Arc::new(|| {})).unwrap();
+        let (told, blurred) = (Vec::new(), Vec::new());
+        Self { session, views: None, guide: None, seeker: None, told, copied: None, blurred, watch, demand }
+    }
+
+    pub fn hear(&mut self) {
+        while let Some(heard) = self.session.hear() {
+            match heard {
+                SessionEvent::Update(told) => self.told.push(told),
+                SessionEvent::Views(views, guide, seeker) => {
+                    (self.views, self.guide, self.seeker) = (Some(views), guide, seeker);
+                }
+                SessionEvent::Copy(text) => self.copied = Some(text),
+                SessionEvent::Blurred(blurred) => self.blurred.push(*blurred),
+            }
+        }
+    }
+
+    /// Waits until something was said; what was said before it is forgotten.
+    #[track_caller]
+    pub fn until(&mut self, what: &str, is: impl Fn(&Update) -> bool) -> Update {
+        let began = Instant::now();
+        loop {
+            self.hear();
+            if let Some(at) = self.told.iter().position(&is) {
+                return self.told.drain(..=at).next_back().unwrap();
+            }
+            assert!(began.elapsed() < PATIENCE, "never heard: {what}; {:?}", self.told);
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Waits for a frame.
+    #[track_caller]
+    pub fn frame(&mut self, what: &str, is: impl Fn(&View) -> bool) -> View {
+        let began = Instant::now();
+        loop {
+            self.hear();
+            if let Some(view) = self.views.as_mut().and_then(Receiver::try_recv).filter(&is) {
+                return view;
+            }
+            assert!(began.elapsed() < PATIENCE, "never seen: {what}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
