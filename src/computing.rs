@@ -1,10 +1,10 @@
 //! Which processor does the work: one choice for the blur and for stereo matching.
 
-#[cfg(feature = "window")]
+#[cfg(feature = "gpu")]
 use std::sync::Arc;
 
 use crate::bokeh::{self, Backend, Bokeh, BokehError};
-#[cfg(feature = "window")]
+#[cfg(feature = "gpu")]
 use crate::compute::device::Device;
 use crate::compute::thread_pool::cores;
 use crate::depth::DepthError;
@@ -26,7 +26,7 @@ impl Computing {
     ///
     /// # Errors
     /// A GPU was asked for and there is none that fits.
-    #[cfg(feature = "window")]
+    #[cfg(feature = "gpu")]
     pub fn device(&self) -> Result<Option<Arc<Device>>, BokehError> {
         let asked_for = self.backend == Backend::Gpu || self.adapter.is_some();
         if self.backend == Backend::Cpu {
@@ -63,5 +63,44 @@ impl Computing {
         let threads = self.threads.unwrap_or_else(cores);
         let settings = stereo::Settings { size, disparities, effort, threads };
         Ok(stereo::create(&settings, self.backend, self.adapter.as_deref())?)
+    }
+}
+
+/// Makes one executor after the other, on one device.
+pub struct Executors {
+    computing: Computing,
+    /// The GPU, if there is one; it is opened for the first executor.
+    #[cfg(feature = "gpu")]
+    device: Option<Option<Arc<Device>>>,
+}
+
+impl Executors {
+    /// As `computing` says.
+    pub fn new(computing: Computing) -> Self {
+        Self {
+            computing,
+            #[cfg(feature = "gpu")]
+            device: None,
+        }
+    }
+
+    /// An executor for pictures of `size` pixels.
+    ///
+    /// # Errors
+    /// As for [`Computing::blur`].
+    pub fn blur(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
+        let threads = self.computing.threads;
+        #[cfg(feature = "gpu")]
+        {
+            let device = match &self.device {
+                Some(device) => device,
+                None => self.device.insert(self.computing.device()?),
+            };
+            // A device that failed does not recover.
+            if let Some(device) = device.as_ref().filter(|device| device.check().is_ok()) {
+                return bokeh::create_on(settings, size, Arc::clone(device), threads);
+            }
+        }
+        bokeh::create(settings, size, Backend::Cpu, None, threads)
     }
 }

@@ -29,7 +29,7 @@
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `scene`, `v4l2` |
+//! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `scene`, `v4l2`, `control` |
 //! | 2 | `compute`, [`calibration`] |
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
@@ -52,6 +52,8 @@ pub mod color;
 #[doc(hidden)]
 pub mod compute;
 pub mod computing;
+#[doc(hidden)]
+pub mod control;
 pub mod depth;
 #[doc(hidden)]
 pub mod files;

@@ -28,7 +28,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread::{self, Scope, ScopedJoinHandle};
 
-pub use change::{Change, Executor};
+pub use change::{Change, Changes, Executor};
 pub use coc::{CocMaker, Finish};
 use places::{MOST_IN_FLIGHT, Places};
 

@@ -3,10 +3,12 @@
 //! Memory is fixed, however long the run, and counting a frame allocates nothing.
 
 mod histogram;
+mod pulse;
 mod report;
 mod tally;
 
 pub use histogram::{Histogram, PassHistograms};
+pub use pulse::Pulse;
 pub use report::{About, QualityUse, Report, RungCounts, Spread, StageMs, StagesMs, Versions, WindowUse};
 pub use tally::{Cause, Dropped, Frames, Tally, Ticket};
 

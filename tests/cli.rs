@@ -47,8 +47,9 @@ fn dumped(dump: &str, name: &str) -> (String, String) {
     (value.to_string(), origin.to_string())
 }
 
-const COMMANDS: [&[&str]; 12] = [
+const COMMANDS: [&[&str]; 13] = [
     &["stream"],
+    &["ctl"],
     &["render"],
     &["depth"],
     &["record"],

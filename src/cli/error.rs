@@ -54,6 +54,9 @@ pub enum CliError {
     /// No plate could be taken.
     #[error("no plate: {0}")]
     NoPlate(String),
+    /// A run does not do what it was asked for.
+    #[error("{0}")]
+    Control(String),
     /// A diagram cannot be drawn.
     #[error("the diagram cannot be drawn: {0}")]
     Diagram(String),

@@ -1,6 +1,7 @@
 //! The command line: arguments to options, and one function per command.
 
 mod commands;
+mod controlled;
 mod error;
 mod files;
 mod focus;

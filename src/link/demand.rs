@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::bell::Bell;
-use super::sync::{Arc, AtomicUsize, Ordering};
+use super::sync::{Arc, AtomicBool, AtomicUsize, Ordering};
 
 /// A count of watched outputs that can be waited for. Clones share it.
 #[derive(Clone, Debug)]
@@ -12,12 +12,13 @@ pub struct Demand(Arc<Shared>);
 #[derive(Debug)]
 struct Shared {
     watched: AtomicUsize,
+    withheld: AtomicBool,
     bell: Bell,
 }
 
 impl Demand {
     pub fn new() -> Self {
-        Self(Arc::new(Shared { watched: AtomicUsize::new(0), bell: Bell::new() }))
+        Self(Arc::new(Shared { watched: AtomicUsize::new(0), withheld: AtomicBool::new(false), bell: Bell::new() }))
     }
 
     /// One more output is watched: until the returned [`Watch`] is dropped.
@@ -28,9 +29,21 @@ impl Demand {
         Watch(self.clone())
     }
 
-    /// Whether any output is watched.
+    /// Whether any output is watched, and may show something.
     pub fn is_watched(&self) -> bool {
+        !self.0.withheld.load(Ordering::Acquire) && self.has_watchers()
+    }
+
+    /// Whether any output is watched, though it may show nothing.
+    pub fn has_watchers(&self) -> bool {
         self.0.watched.load(Ordering::Acquire) > 0
+    }
+
+    /// Nobody counts as watching from now on, whoever does; or everybody again.
+    pub fn withhold(&self, withheld: bool) {
+        self.0.withheld.store(withheld, Ordering::Release);
+        // As for a watch.
+        self.0.bell.ring();
     }
 
     /// Wakes who waits, though nobody watches.
@@ -78,6 +91,18 @@ mod tests {
         assert!(demand.is_watched());
         drop(second);
         assert!(!demand.is_watched());
+    }
+
+    #[test]
+    fn what_is_withheld_is_not_watched_until_it_is_given_again() {
+        let demand = Demand::new();
+        let watch = demand.watch();
+        demand.withhold(true);
+        assert!(demand.has_watchers() && !demand.is_watched());
+        demand.withhold(false);
+        assert!(demand.is_watched());
+        drop(watch);
+        assert!(!demand.has_watchers());
     }
 
     #[test]

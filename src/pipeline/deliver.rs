@@ -115,6 +115,7 @@ impl Stage<'_> {
                 delivered: frames.delivered,
                 dropped: frames.dropped.total(),
                 total: self.total,
+                quality: trace.quality,
             });
         }
         // The viewer still takes the last one.

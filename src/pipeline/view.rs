@@ -19,6 +19,8 @@ pub struct Progress {
     pub dropped: u64,
     /// Frames to be captured in all, where that is known.
     pub total: Option<u64>,
+    /// The rung that the last frame was blurred at; `None` where it was not.
+    pub quality: Option<Quality>,
 }
 
 /// A frame, for who looks at more than the picture.

@@ -5,6 +5,7 @@
 //! person does is an [`state::Action`]; [`state::State::apply`] makes of it another state and the
 //! [`state::Request`]s that only others can bring about.
 
+pub mod control;
 pub mod dialog;
 pub mod folders;
 pub mod keys;

@@ -4,7 +4,6 @@
 //! exists is overwritten unless that was asked for, and then only by what is whole. What has frames and cannot have its
 //! name is kept as `NAME.incomplete`.
 
-#[cfg(feature = "camera")]
 mod card;
 mod error;
 mod ffmpeg;
@@ -14,6 +13,7 @@ mod output;
 mod pipe;
 mod png;
 mod rate;
+mod shutter;
 mod steady;
 pub mod switch;
 mod target;
@@ -33,6 +33,7 @@ pub use loopback::Loopback;
 pub use output::recover_all;
 pub use pipe::Pipe;
 pub use png::PngFolder;
+pub use shutter::{Release, Shutter};
 pub use switch::{Switch, Switchboard};
 pub use target::Target;
 pub use tee::Tee;
@@ -75,6 +76,15 @@ pub trait Sink: Send {
     /// It could not be written.
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         Ok(ControlFlow::Continue(false))
+    }
+
+    /// Takes the still card in the place of a picture, so that nothing of the pictures before can be seen any more. Whoever
+    /// calls it goes on to do so, at the times of frames, until the next picture.
+    ///
+    /// # Errors
+    /// As for [`Sink::put`].
+    fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.put(card, time_ns)
     }
 
     /// Called in place of [`Sink::put`] for a frame that is not in CPU memory: a preview alone gets it.

@@ -112,6 +112,17 @@ impl Switch {
         }
     }
 
+    /// Gives a picture to each member.
+    fn give(&mut self, mut give: impl FnMut(&mut dyn Sink) -> Result<ControlFlow<()>, SinkError>) {
+        self.take_orders();
+        self.silent = Duration::ZERO;
+        self.each(|member| {
+            let flow = give(&mut *member.sink)?;
+            member.life.frames += u64::from(flow.is_continue());
+            Ok(flow)
+        });
+    }
+
     /// Completes a member, or drops one that has failed, on a thread of its own.
     fn take_out(&mut self, at: usize, ending: Result<Ending, SinkError>) {
         let Member { sink, life } = self.members.remove(at);
@@ -141,13 +152,12 @@ impl Switch {
 
 impl Sink for Switch {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.take_orders();
-        self.silent = Duration::ZERO;
-        self.each(|member| {
-            let flow = member.sink.put(frame, time_ns)?;
-            member.life.frames += u64::from(flow.is_continue());
-            Ok(flow)
-        });
+        self.give(|sink| sink.put(frame, time_ns));
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.give(|sink| sink.cover(card, time_ns));
         Ok(ControlFlow::Continue(()))
     }
 

@@ -91,6 +91,11 @@ impl Sink for Tee {
         Ok(flow.map_continue(|_| ()))
     }
 
+    fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        let flow = self.each(|sink| Ok(sink.cover(card, time_ns)?.map_continue(|()| true)))?;
+        Ok(flow.map_continue(|_| ()))
+    }
+
     fn hold(&self) -> Option<Duration> {
         self.sinks.iter().filter_map(|(_, sink)| sink.hold()).min()
     }

@@ -50,6 +50,7 @@ impl Heard {
             folders: Folders::at(folder.to_owned()),
             wanted: Arc::default(),
             demand: demand.clone(),
+            off: Arc::default(),
         };
         let session = Session::begin(start, Arc::new(|| {})).unwrap();
         let (told, blurred) = (Vec::new(), Vec::new());

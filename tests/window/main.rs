@@ -13,6 +13,7 @@ mod screen;
 mod wayland;
 mod window;
 
+mod control;
 mod keys;
 mod life;
 mod looks;

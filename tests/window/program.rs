@@ -36,6 +36,8 @@ impl<'a> Program<'a> {
     /// Starts it in a session that has this bus.
     pub fn start_on(screen: &'a Screen, home: TempDir, bus: &str, arguments: &[&str]) -> Self {
         let said = fs::File::create(home.path().join("said")).unwrap();
+        let runtime = home.path().join("run");
+        fs::create_dir_all(&runtime).unwrap();
         let mut command = Command::new("setpriv");
         command
             .args(["--pdeathsig", "KILL", env!("CARGO_BIN_EXE_bokehcam"), "preview"])
@@ -44,6 +46,7 @@ impl<'a> Program<'a> {
             .arg(home.path().join("report.json"))
             .env("DISPLAY", &screen.display)
             .env("DBUS_SESSION_BUS_ADDRESS", bus)
+            .env("XDG_RUNTIME_DIR", runtime)
             .env("HOME", home.path())
             .env("XDG_CONFIG_HOME", home.path().join("config"))
             .env("XDG_STATE_HOME", home.path().join("state"))

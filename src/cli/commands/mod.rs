@@ -2,6 +2,7 @@
 
 mod aperture;
 mod bench;
+mod ctl;
 mod depth;
 mod devices;
 mod doctor;
@@ -49,6 +50,7 @@ pub enum Command {
     Stream(Box<stream::StreamCommand>),
     Render(Box<render::RenderCommand>),
     Depth(Box<depth::DepthCommand>),
+    Ctl(ctl::CtlCommand),
     Record(Box<record::RecordCommand>),
     Plate(Box<plate::PlateCommand>),
     Aperture(aperture::ApertureCommand),
@@ -108,6 +110,7 @@ pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Lay
         Command::Stream(command) => stream::run(&command, &cli.global, layers.given(matches)),
         Command::Render(command) => render::run(&command, &cli.global, &layers.given(matches)),
         Command::Depth(command) => depth::run(&command, &cli.global),
+        Command::Ctl(command) => ctl::run(command, &cli.global),
         Command::Record(command) => record::run(&command, &cli.global, &layers.given(matches)),
         Command::Plate(command) => plate::run(&command, &cli.global, &layers.given(matches)),
         Command::Aperture(command) => aperture::run(&command, &cli.global),

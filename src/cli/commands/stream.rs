@@ -1,11 +1,17 @@
 //! `stream`: a source, blurred, into a sink.
 
+mod control;
+
 use std::sync::Arc;
+use std::time::Duration;
 
 use clap::Args;
 
+use control::{Beat, Facts, Looks};
+
 #[cfg(feature = "window")]
 use crate::cli::commands::preview;
+use crate::cli::controlled;
 use crate::cli::error::CliError;
 use crate::cli::files::{check_report, write_report};
 use crate::cli::focus;
@@ -17,11 +23,13 @@ use crate::cli::sinks;
 use crate::cli::terminal;
 use crate::clock::Clock;
 use crate::compute::Backend;
+use crate::computing::Executors;
+use crate::control::{Name, Status};
 use crate::link::demand::Demand;
 use crate::look::Strength;
-use crate::pipeline::{self, Pace, Run};
-use crate::sink::{self, Target};
-use crate::source::{DepthFrom, Source, SourceName};
+use crate::pipeline::{self, Changes, Pace, Run};
+use crate::sink::{self, Shutter, Target};
+use crate::source::{DepthChoice, DepthFrom, Source, SourceName};
 
 /// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
 #[derive(Args, Debug)]
@@ -45,6 +53,9 @@ pub struct StreamCommand {
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]
     to: Vec<Target>,
+    /// What `bokehcam ctl` knows this run by [default: stream, or stream-2 and so on]
+    #[arg(long, value_name = "NAME")]
+    name: Option<Name>,
     #[command(flatten)]
     parts: options::Streaming,
     #[cfg(feature = "window")]
@@ -71,48 +82,62 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     #[cfg(feature = "window")]
     if command.to.contains(&Target::Window) {
         let others: Vec<Target> = command.to.iter().filter(|target| **target != Target::Window).cloned().collect();
-        return preview::show(&command.source.to_string(), &others, &command.window, parts, (global, given));
+        return preview::show(
+            &command.source.to_string(),
+            &others,
+            &command.window,
+            parts,
+            (global, given),
+            command.name.as_ref(),
+        );
     }
     check_report(stream.report.as_deref(), output.force, &command.to)?;
     if stream.pace == Some(Pace::Asap) && !command.source.devices().is_empty() {
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
     }
+    let is_live = stream.pace == Some(Pace::Realtime)
+        || !command.source.devices().is_empty()
+        || command.to.iter().any(Target::is_live);
+    let wish = controlled::Wish { name: command.name.as_ref(), command: "stream", is_live };
+    let claim = controlled::claim(&wish, global)?;
     let look = look::look(&parts.blur, &parts.computing.quality)?;
     let options = parts.source_options();
     let source = Source::open(&command.source, &options, Some(&look))?;
     let info = source.camera.info();
     let measured = source.is_measured();
+    let has_depth = source.has_depth() && options.depth_choice != DepthChoice::None;
     let is_live = info.live || command.to.iter().any(Target::is_live);
     let pace = stream.pace.unwrap_or(if is_live { Pace::Realtime } else { Pace::Asap });
     let look = source.fitting_look(&look, &options)?;
     let adaptive = pace == Pace::Realtime;
-    unused::warn(
-        &given.settings,
-        &unused::Run {
-            source: unused::From::Source(command.source.kind()),
-            depth: source.depth_from,
-            uses_depth: look.effect.follows_depth(),
-            effect: look.effect,
-            lens: matches!(look.strength, Strength::Lens(_)),
-            realtime: adaptive,
-            cpu_only: parts.computing.backend == Backend::Cpu,
-            window: false,
-        },
-    );
+    let unused = unused::Run {
+        source: unused::From::Source(command.source.kind()),
+        depth: source.depth_from,
+        uses_depth: look.effect.follows_depth(),
+        effect: look.effect,
+        lens: matches!(look.strength, Strength::Lens(_)),
+        realtime: adaptive,
+        cpu_only: parts.computing.backend == Backend::Cpu,
+        window: false,
+    };
+    unused::warn(&given.settings, &unused);
     if let Some(map) = source.first_depth.as_ref() {
         focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
     }
     let settings = look.settings(info.size, adaptive);
     let bokeh = settings.map(|settings| options.computing.blur(&settings, info.size)).transpose()?;
     // Outputs are opened last, so that none is begun where the run cannot start.
-    let demand = stream.on_demand.then(Demand::new);
+    let demand = Demand::new();
+    // Where nobody notices who watches, somebody may at any time.
+    let _watch = (!stream.on_demand).then(|| demand.watch());
+    let noticed = stream.on_demand.then(|| demand.clone());
     let stop = terminal::stop_flag()?;
     let sink_options = sink::Options {
         frames: info.frames,
         force: output.force,
         out_size: stream.out_size.map(|size| (size.width, size.height)),
-        demand: demand.clone(),
+        demand: noticed.clone(),
         stop: Arc::clone(&stop),
         ..sink::Options::new(info.size, info.period_ns)
     };
@@ -133,6 +158,31 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     }
     let guidance = terminal::Guidance::new(source.guide, global);
     let bar = terminal::Progress::new(info.frames, global);
+    let period = Duration::from_nanos(info.period_ns);
+    let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), Arc::default());
+    let (changes, to_come) = Changes::new(look.clone(), info.size, adaptive);
+    let beat = Arc::new(Beat::default());
+    let facts = |name: &Name| Facts {
+        status: Status {
+            name: name.to_string(),
+            pid: std::process::id(),
+            command: "stream".into(),
+            source: command.source.to_string(),
+            size: Some(info.size),
+            sinks: command.to.iter().map(Target::to_string).collect(),
+            ..Status::default()
+        },
+        size: info.size,
+        depth_choice: options.depth_choice.clone(),
+        has_depth,
+        unused,
+        config: global.config.clone(),
+        demand: noticed,
+        release,
+        beat: Arc::clone(&beat),
+    };
+    let looks = Looks { look: look.clone(), adaptive, changes, executors: Executors::new(options.computing.clone()) };
+    let server = claim.map(|claim| control::serve(claim, facts, looks)).transpose()?;
     let ended = pipeline::run(Run {
         camera: source.camera,
         depth: source.depth,
@@ -140,12 +190,12 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         look,
         adaptive,
         measured,
-        changes: None,
-        sink,
+        changes: server.is_some().then_some(to_come),
+        sink: Box::new(sink),
         pace,
         budget_ns: stream.budget_ms.map_or(info.period_ns, |ms| (f64::from(ms) * 1e6) as u64),
         keep_going: stream.keep_going,
-        demand,
+        demand: Some(demand),
         mirror: stream.mirror,
         wanted: None,
         view: None,
@@ -153,10 +203,11 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         stop: &stop,
         progress: &|progress| {
             bar.delivered(progress.delivered);
+            beat.note(&progress);
             guidance.tell();
         },
     });
-    drop(bar);
+    drop((server, bar));
     let (report, ended) = match ended {
         Ok(report) => (Box::new(report), Ok(())),
         Err(failed) => (failed.report, Err(failed.fault.into())),

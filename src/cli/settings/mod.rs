@@ -2,6 +2,7 @@
 //! holds ([`layers`]), and how they are printed and saved.
 
 pub mod arguments;
+pub mod changes;
 #[cfg(feature = "window")]
 pub mod command_line;
 pub mod dump;

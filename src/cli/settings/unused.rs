@@ -5,7 +5,7 @@
 use super::layers::Setting;
 use super::table::{GIVEN_TO_WINDOW, STATED_BY_WINDOW, variable};
 use crate::cli::log;
-use crate::look::Effect;
+use crate::look::{Effect, Value};
 use crate::source::{DepthFrom, Kind};
 
 /// What decides in a run which settings have an effect.
@@ -128,7 +128,21 @@ fn windowless(run: &Run) -> Option<&'static str> {
 
 /// Warns of the given settings that have no effect in this run.
 pub fn warn(given: &[Setting], run: &Run) {
-    warn_of(unused(given, run));
+    line_of(unused(given, run)).iter().for_each(|line| log::warn(line));
+}
+
+/// The warning of settings that were changed in this run to no effect.
+pub fn note(changed: &[Value], run: &Run) -> Option<String> {
+    let given: Vec<Setting> = changed
+        .iter()
+        .map(|(name, value)| Setting {
+            name: (*name).into(),
+            value: Some(value.clone()),
+            origin: "flag",
+            help: String::new(),
+        })
+        .collect();
+    line_of(unused(&given, run))
 }
 
 /// Warns of the given settings that have no effect with this kind of source; all else can be changed in the window.
@@ -146,7 +160,8 @@ pub fn warn_by_source(given: &[Setting], source: Kind) {
     };
     let of_source = NEEDS[..2].iter().flat_map(|(names, _)| *names);
     let names: Vec<&str> = of_source.copied().collect();
-    warn_of(unused(given, &run).into_iter().filter(|(setting, _)| names.contains(&setting.name.as_str())).collect());
+    let of_source = |(setting, _): &(&Setting, &str)| names.contains(&setting.name.as_str());
+    line_of(unused(given, &run).into_iter().filter(of_source).collect()).iter().for_each(|line| log::warn(line));
 }
 
 fn unused<'a>(given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str)> {
@@ -158,8 +173,8 @@ fn unused<'a>(given: &'a [Setting], run: &Run) -> Vec<(&'a Setting, &'static str
     given.iter().filter_map(|setting| Some((setting, why(setting)?))).collect()
 }
 
-/// Warns in one line, with the settings of one reason together.
-fn warn_of(unused: Vec<(&Setting, &str)>) {
+/// The warning in one line, with the settings of one reason together.
+fn line_of(unused: Vec<(&Setting, &str)>) -> Option<String> {
     let mut reasons: Vec<&str> = Vec::new();
     for (_, why) in &unused {
         if !reasons.contains(why) {
@@ -170,9 +185,8 @@ fn warn_of(unused: Vec<(&Setting, &str)>) {
         let names: Vec<String> = unused.iter().filter(|(_, other)| other == why).map(|(s, _)| as_given(s)).collect();
         format!("{} ({why})", names.join(", "))
     };
-    if !reasons.is_empty() {
-        log::warn(&format!("without effect here: {}", reasons.iter().map(grouped).collect::<Vec<_>>().join("; ")));
-    }
+    let text = || format!("without effect here: {}", reasons.iter().map(grouped).collect::<Vec<_>>().join("; "));
+    (!reasons.is_empty()).then(text)
 }
 
 /// A setting as the user wrote it, and where.

@@ -46,6 +46,7 @@ impl Badges {
         let all = [
             (recording.map(sized), LIVE),
             (text("Virtual camera", state.virtual_camera().is_some(), &mut self.camera_s), LIVE),
+            (state.off.then(|| tr("Off: a still card is shown").to_owned()), ON_PICTURE),
             (frozen(state).map(|text| tr(text).to_owned()), ON_PICTURE),
             (is_late.then(|| tr("Working…").to_owned()), ON_PICTURE),
         ];

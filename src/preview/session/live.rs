@@ -3,22 +3,20 @@
 use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::super::services::{Opened, Services};
 use super::super::state::{Output, Running, Source};
 use super::{News, SessionEvent, Start};
-use crate::bokeh;
 use crate::clock::Clock;
 use crate::depth::plate::Guide;
 use crate::link;
 use crate::look::Look;
-use crate::pipeline::{self, Change, Executor, Pace, PipelineError, Run};
+use crate::pipeline::{self, Changes, Pace, PipelineError, Run};
 use crate::sink::Sink;
 use crate::sink::switch::Notice;
-use crate::sink::{Switch, Switchboard};
+use crate::sink::{Shutter, Switch, Switchboard};
 use crate::source::{Kind, SourceName};
 use crate::stats::Report;
 
@@ -27,9 +25,7 @@ pub(super) struct Live {
     pub size: (u32, u32),
     pub period_ns: u64,
     has_depth: bool,
-    /// The settings that the executor was made for; `None` if nothing is blurred.
-    made_for: Option<bokeh::Settings>,
-    changes: mpsc::Sender<Change>,
+    changes: Changes,
     board: Switchboard,
     pub stop: Arc<AtomicBool>,
     /// How far the plate is, where that makes the depth.
@@ -62,8 +58,11 @@ impl Live {
         let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
         let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
         let budget_ns = start.budget_ns.unwrap_or(info.period_ns);
-        let (sink, board) = Switch::new("window", wrote);
-        let (changes, to_come) = mpsc::channel();
+        let (switch, board) = Switch::new("window", wrote);
+        let period = Duration::from_nanos(info.period_ns);
+        let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
+        let (sink, _) = Shutter::new(Box::new(switch), info.size, period, demand, Clock::system(), off);
+        let (changes, to_come) = Changes::new(look.clone(), info.size, ADAPTIVE);
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, wake, keep_going) = (Arc::clone(&stop), Arc::clone(&news.wake), start.keep_going);
@@ -113,17 +112,7 @@ impl Live {
             executor,
             budget_ns,
         });
-        let live = Self {
-            size: info.size,
-            period_ns: info.period_ns,
-            has_depth,
-            made_for,
-            changes,
-            board,
-            stop,
-            guide,
-            thread,
-        };
+        let live = Self { size: info.size, period_ns: info.period_ns, has_depth, changes, board, stop, guide, thread };
         Ok((live, source))
     }
 
@@ -137,26 +126,13 @@ impl Live {
     /// # Errors
     /// Its executor cannot be made: one line. The one before goes on.
     pub(super) fn adopt(&mut self, look: &Look, number: u64, services: &mut dyn Services) -> Result<(), String> {
-        let look = self.effective(look);
-        let made_for = look.settings(self.size, ADAPTIVE);
-        let change = |number, bokeh| Change { number, look: look.clone(), bokeh };
-        let kind = |settings: &Option<bokeh::Settings>| settings.as_ref().map(|settings| settings.coc);
-        // Sending fails only if the run has ended; then nothing is to be done.
-        if kind(&self.made_for) == kind(&made_for) {
-            // The same kind of CoC takes effect at once: the present executor does what it can until the new one is
-            // made, and such frames keep the number before.
-            let (number, executor) =
-                if made_for == self.made_for { (number, Executor::Keep) } else { (number - 1, Executor::Meanwhile) };
-            let _ = self.changes.send(change(number, executor));
-        }
-        if made_for != self.made_for {
+        let (look, size) = (self.effective(look), self.size);
+        self.changes.adopt(look, number, |settings| {
             let began = Instant::now();
-            let bokeh = made_for.as_ref().map(|made_for| services.executor(made_for, self.size)).transpose()?;
+            let bokeh = services.executor(settings, size)?;
             tracing::debug!("an executor was made in {:?}", began.elapsed());
-            let _ = self.changes.send(change(number, Executor::To(bokeh)));
-            self.made_for = made_for;
-        }
-        Ok(())
+            Ok(bokeh)
+        })
     }
 
     /// Adds a sink to the run.

@@ -7,7 +7,8 @@ mod live;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc;
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{self, SyncSender};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -19,6 +20,7 @@ use super::services::{Services, Switch};
 use super::state::{Output, Request, Update};
 use crate::budget::Quality;
 use crate::capture::Seeker;
+use crate::control::Answer;
 use crate::depth::plate::Guide;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::Receiver;
@@ -54,6 +56,8 @@ pub struct Start {
     pub wanted: Arc<Wanted>,
     /// Whether anybody watches: sources rest while nobody does.
     pub demand: Demand,
+    /// Whether outputs have the still card in place of pictures.
+    pub off: Arc<AtomicBool>,
 }
 
 /// What comes from a session.
@@ -82,6 +86,15 @@ pub struct Still {
     pub change: u64,
     /// The rung that it was blurred at.
     pub quality: Option<Quality>,
+    /// Who asked for it from outside.
+    pub order: Option<StillOrder>,
+}
+
+/// A frame that somebody else asked for.
+pub struct StillOrder {
+    /// The file; `None` is where snapshots usually go.
+    pub to: Option<PathBuf>,
+    pub answer: SyncSender<Answer>,
 }
 
 /// What is left of a session.

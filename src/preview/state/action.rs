@@ -41,6 +41,8 @@ pub enum Action {
     Mirror(bool),
     /// Keeps the picture, or lets the next ones come.
     Freeze(bool),
+    /// Shows a still card in place of pictures, here and outside, and lets the camera rest; or shows them again.
+    Off(bool),
     /// Shows the picture so many times as large (0: as large as fits), around a point of it or what was in the middle.
     Zoom(u32, Option<[f32; 2]>),
     /// This point of an enlarged picture comes to the window's middle.
@@ -136,6 +138,8 @@ pub enum Request {
     CopyCommand,
     /// Fill the screen, or not.
     FullScreen(bool),
+    /// Let no picture pass, or let them again.
+    Off(bool),
     Close,
 }
 

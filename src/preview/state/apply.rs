@@ -1,7 +1,7 @@
 //! How actions change the state.
 
 use super::{Action, Output, Request, Shown, Source, State};
-use crate::look::{Effect, Look, Strength};
+use crate::look::{Effect, Look, Patch, Strength};
 
 /// Shown when a look or a view needs depth and there is none: what to do.
 pub const NO_DEPTH: &str =
@@ -51,6 +51,10 @@ impl State {
             Action::Split(at) => self.split = at.filter(|at| at.is_finite()).map(|at| at.clamp(0.0, 1.0)),
             Action::Mirror(on) => (self.mirror, self.mirror_chosen) = (on, true),
             Action::Freeze(on) => self.freeze(on),
+            Action::Off(off) => {
+                self.off = off;
+                return vec![Request::Off(off)];
+            }
             Action::Zoom(factor, at) => self.set_zoom(factor, at),
             Action::Pan(center) => self.zoom.center = center,
             Action::Seek(place) => return self.seek(place),
@@ -146,21 +150,28 @@ impl State {
             self.note(format!("There is no preset '{name}'."));
             return Vec::new();
         };
-        if preset.patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
-            self.note(self.no_depth());
-            return Vec::new();
-        }
-        match preset.patch.on(&self.look) {
+        match self.patched(&preset.patch) {
             Ok(look) => {
                 self.chosen_preset = Some(name.to_owned());
                 self.set_look(look, None)
             }
-            Err(error) => {
-                let line = format!("preset {name}: {error}");
+            Err(line) => {
+                let line = if line == self.no_depth() { line } else { format!("preset {name}: {line}") };
                 self.note(line);
                 Vec::new()
             }
         }
+    }
+
+    /// The look after a change.
+    ///
+    /// # Errors
+    /// It needs depth that there is not, or settings that do not go together: one line.
+    pub fn patched(&self, patch: &Patch) -> Result<Look, String> {
+        if patch.effect.is_some_and(Effect::follows_depth) && !self.may_have_depth() {
+            return Err(self.no_depth().to_owned());
+        }
+        patch.on(&self.look).map_err(|error| error.to_string())
     }
 
     fn record(&mut self, on: bool) -> Vec<Request> {

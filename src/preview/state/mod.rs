@@ -130,6 +130,8 @@ pub struct State {
     pub frozen: bool,
     /// Whether the picture of a photo is there: all that follow would be the same.
     pub settled: bool,
+    /// Whether outputs have the still card in place of pictures, and the camera rests.
+    pub off: bool,
     /// Where the recording is, if the source is one.
     pub transport: Option<Transport>,
     pub zoom: Zoom,

@@ -18,6 +18,7 @@ use winit::event_loop::EventLoop;
 use app::App;
 pub use memory::{Memory, Size};
 
+use super::control::Control;
 use super::session;
 use super::state::State;
 use crate::compute::device::Device;
@@ -46,6 +47,8 @@ enum Call {
     Theme(egui::Theme),
     /// The system has a font for a text.
     Fonts,
+    /// Somebody asks for something from outside.
+    Control,
 }
 
 impl From<accesskit_winit::Event> for Call {
@@ -69,6 +72,8 @@ pub struct Preview {
     /// What is remembered of the preview before, and where.
     pub memory: Memory,
     pub memory_file: Option<PathBuf>,
+    /// By what others control it, if they can.
+    pub control: Option<Control>,
     /// Once set, the window closes.
     pub stop: Arc<AtomicBool>,
 }

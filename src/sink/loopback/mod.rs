@@ -36,6 +36,8 @@ pub struct Loopback {
     bytes: Vec<u8>,
     /// Whether that is the still card.
     shows_card: bool,
+    /// When the card was written last in the place of a picture.
+    covered_ns: u64,
     hold: Duration,
     demand: Option<Demand>,
     _watcher: Option<Watcher>,
@@ -64,6 +66,7 @@ impl Loopback {
             fitted: ColorImage::new(output.size().0, output.size().1),
             bytes: Vec::new(),
             shows_card: true,
+            covered_ns: 0,
             hold: (2 * Duration::from_nanos(options.period_ns)).clamp(SHORTEST_HOLD, IDLE_HOLD),
             demand: options.demand.clone(),
             _watcher,
@@ -114,6 +117,18 @@ impl Sink for Loopback {
         }
         self.shows_card = false;
         self.output.write(&self.bytes)?;
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// The driver keeps the card: it is written again only as often as any last picture is.
+    fn cover(&mut self, _: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        if !self.shows_card {
+            self.show_card()?;
+            self.covered_ns = time_ns;
+        } else if u128::from(time_ns.saturating_sub(self.covered_ns)) >= self.hold.as_nanos() {
+            self.output.write(&self.bytes)?;
+            self.covered_ns = time_ns;
+        }
         Ok(ControlFlow::Continue(()))
     }
 

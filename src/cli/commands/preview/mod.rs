@@ -2,23 +2,28 @@
 
 mod store;
 
+use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use clap::Args;
 
+use crate::cli::controlled::{self, refused};
 use crate::cli::error::CliError;
 use crate::cli::files::{check_report, write_report};
 use crate::cli::options::{Global, Streaming, Window};
+use crate::cli::settings::changes;
 use crate::cli::settings::file;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
 use crate::cli::sinks;
 use crate::cli::terminal;
+use crate::control::{Name, Request};
 use crate::link::demand::Demand;
 use crate::look::{Effect, Look};
 use crate::pipeline::Pace;
+use crate::preview::control::{Control, Wish};
 use crate::preview::folders::Folders;
 use crate::preview::session::Start;
 use crate::preview::state::{Output, State};
@@ -52,6 +57,9 @@ pub struct PreviewCommand {
     /// may be given more than once
     #[arg(long, value_name = "SINK")]
     to: Vec<Target>,
+    /// What `bokehcam ctl` knows this run by [default: preview, or preview-2 and so on]
+    #[arg(long, value_name = "NAME")]
+    name: Option<Name>,
     #[command(flatten)]
     window: Window,
     #[command(flatten)]
@@ -66,10 +74,11 @@ pub fn run(command: &PreviewCommand, global: &Global, given: Given) -> Result<()
     let mut parts = command.parts.clone();
     // Finding a look takes longer than most recordings last.
     parts.frames.repeat = true;
-    show(command.source.as_deref().unwrap_or_default(), &command.to, &command.window, &parts, (global, given))
+    let source = command.source.as_deref().unwrap_or_default();
+    show(source, &command.to, &command.window, &parts, (global, given), command.name.as_ref())
 }
 
-/// Shows a source in a window, and writes it to `to`.
+/// Shows a source in a window, and writes it to `to`. `called` is what it is called by those who control it.
 ///
 /// # Errors
 /// As for [`run`].
@@ -79,6 +88,7 @@ pub fn show(
     window: &Window,
     parts: &Streaming,
     (global, given): (&Global, Given),
+    called: Option<&Name>,
 ) -> Result<(), CliError> {
     let Streaming { frames, stream, output, computing, .. } = parts;
     check_report(stream.report.as_deref(), output.force, to)?;
@@ -123,6 +133,12 @@ pub fn show(
         state.look = before;
         state.note(AS_IT_WAS);
     }
+    let wish = controlled::Wish { name: called, command: "preview", is_live: true };
+    let config = global.config.clone();
+    let control = controlled::claim(&wish, global)?.map(|claim| Control {
+        claim,
+        understand: Box::new(move |request| understand(request, config.as_deref()).map_err(|error| refused(&error))),
+    });
     let look = state.look.clone();
     let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
     system.device.clone_from(&device);
@@ -142,6 +158,7 @@ pub fn show(
             budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
             wanted: Arc::default(),
             demand: Demand::default(),
+            off: Arc::default(),
             folders: window.save_to.clone().map_or_else(Folders::of_user, Folders::at),
         },
         theme: window.theme,
@@ -149,6 +166,7 @@ pub fn show(
         close_at_end,
         memory,
         memory_file,
+        control,
         stop,
     })?;
     let written = match (&stream.report, &ended.report) {
@@ -162,6 +180,19 @@ pub fn show(
         Some(why) if ended.report.is_none() || close_at_end => Err(CliError::NoFrames(why)),
         _ => ended.unwritten.map_or(written, |why| Err(CliError::OutputFailed(why))),
     }
+}
+
+/// What is asked of the window by others.
+fn understand(request: Request, config: Option<&Path>) -> Result<Wish, CliError> {
+    Ok(match request {
+        Request::Status => Wish::Status,
+        Request::On => Wish::On(true),
+        Request::Off => Wish::On(false),
+        Request::Toggle => Wish::Toggle,
+        Request::Preset { name } => Wish::Look(changes::preset(config, &name)?),
+        Request::Set { settings } => Wish::Look(changes::patch(&settings)?),
+        Request::Snapshot { to } => Wish::Snapshot(to),
+    })
 }
 
 /// Shown where the look is not the usual one from the start.

@@ -32,6 +32,14 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         let hint = "The command line that does the same, to the clipboard (K)";
         button("Copy command", hint, false, half, Action::CopyCommand);
     });
+    let off = egui::Button::new(tr("Off: a still card")).selected(state.off).min_size(vec2(ui.available_width(), 28.0));
+    if ui
+        .add(off)
+        .on_hover_text(tr("No picture leaves this program, and the camera rests, until it is on again"))
+        .clicked()
+    {
+        sheet.act(Action::Off(!state.off));
+    }
     if let Some(folder) = &state.kept_in {
         let open = Button::new(tr("Open folder")).min_size(vec2(ui.available_width(), 28.0));
         if ui.add(open).on_hover_text(folder.display().to_string()).clicked() {

@@ -2,9 +2,11 @@
 
 use super::super::{SessionEvent, Still, held};
 use super::Host;
+use crate::control::Answer;
 use crate::look::{Look, Patch};
 use crate::preview::folders;
 use crate::recording::snapshot::{self, Snapshot};
+use crate::recording::still::write_color;
 
 /// Looks that are kept for snapshots: frames that come are of one of the last few.
 const KEPT_LOOKS: usize = 512;
@@ -56,14 +58,24 @@ impl Host {
         let its_look = self.looks.iter().rev().find(|(number, _)| *number <= still.change);
         let look = its_look.map_or(&self.start.look, |(_, look)| look);
         let settings = Patch::of(&look.of_frame(&still.coc, still.quality)).values();
-        let Still { picture, color, depth, .. } = still;
+        let Still { picture, color, depth, order, .. } = still;
         let snapshot = Snapshot { picture, color, depth: depth.as_ref(), settings: &settings };
-        match snapshot::save(&self.start.folders.pictures, &folders::stem(), &snapshot) {
+        let saved = match order.as_ref().and_then(|order| order.to.as_deref()) {
+            Some(path) => write_color(path, picture, false).map(|()| path.to_owned()),
+            None => snapshot::save(&self.start.folders.pictures, &folders::stem(), &snapshot),
+        };
+        let answer = match saved {
             Ok(path) => {
                 self.news.note(format!("Saved {}", path.display()));
                 self.news.kept(&path);
+                Answer::Saved { saved: path }
             }
-            Err(error) => self.news.note(error.to_string()),
-        }
+            Err(error) => {
+                self.news.note(error.to_string());
+                Answer::failed(error.to_string())
+            }
+        };
+        // Who gave up waiting sees the note.
+        order.iter().for_each(|order| drop(order.answer.try_send(answer.clone())));
     }
 }

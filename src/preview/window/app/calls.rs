@@ -39,6 +39,7 @@ impl App {
     pub(super) fn answer(&mut self, call: Call, events: &ActiveEventLoop) {
         match call {
             Call::Session => return self.receive(events),
+            Call::Control => self.listen(events),
             Call::Access(event) => match (event.window_event, &mut self.gfx) {
                 (Access::InitialTreeRequested, _) => {
                     self.panel.stays = true;

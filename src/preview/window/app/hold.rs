@@ -71,7 +71,7 @@ impl App {
     /// Updates how long a running source has been silent. A camera that is gone reports no error, as it may come back.
     pub(super) fn check_silence(&mut self) {
         let silent = match &self.state.source {
-            Source::Running(running) if self.watch.is_some() => {
+            Source::Running(running) if self.watch.is_some() && !self.state.off => {
                 let patience = SILENCE.max(Duration::from_nanos(running.period_ns) * SILENT_PERIODS);
                 Some(self.heard_at.elapsed()).filter(|silent| *silent > patience)
             }

@@ -1,6 +1,7 @@
 //! The window's events.
 
 mod calls;
+mod control;
 mod drop;
 mod hold;
 mod receive;
@@ -92,6 +93,10 @@ pub(super) struct App {
     memory: Memory,
     memory_file: Option<PathBuf>,
     close_at_end: bool,
+    /// Those who ask from outside, if they can.
+    controlled: Option<control::Controlled>,
+    /// Whether outputs have the still card: for who hands pictures to them.
+    off: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
     failed: Option<WindowError>,
 }
@@ -99,7 +104,7 @@ pub(super) struct App {
 impl App {
     /// Starts the session at once, so that the source opens while the window does.
     pub fn new(preview: Preview, proxy: EventLoopProxy<Call>) -> Result<Self, WindowError> {
-        let Preview { mut state, session, theme, device, close_at_end, memory, memory_file, stop } = preview;
+        let Preview { mut state, session, theme, device, close_at_end, memory, memory_file, control, stop } = preview;
         let wake_pending = Arc::new(AtomicBool::new(false));
         let pending = Arc::clone(&wake_pending);
         // An event loop that is gone needs no waking.
@@ -109,6 +114,8 @@ impl App {
                 let _ = to_wake.send_event(Call::Session);
             }
         });
+        let controlled = control.map(|control| control::Controlled::begin(control, &proxy)).transpose()?;
+        let off = Arc::clone(&session.off);
         let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
         let clock = Clock::system();
         state.meters.begin(clock.now_ns());
@@ -151,6 +158,8 @@ impl App {
             memory,
             memory_file,
             close_at_end,
+            controlled,
+            off,
             stop,
             failed: None,
         })
@@ -158,7 +167,9 @@ impl App {
 
     /// Closes the window, then the session, and adds what was shown to the report.
     pub fn end(self) -> Result<Ended, WindowError> {
-        let Self { gfx, view, frames, session, state, failed, .. } = self;
+        let Self { gfx, view, frames, session, state, failed, controlled, .. } = self;
+        // Nobody can ask any more.
+        drop(controlled);
         // The window goes at once; outputs may take a while to be completed.
         drop((gfx, view));
         let Closed { mut report, failed: unwritten } = session.close();

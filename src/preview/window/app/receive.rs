@@ -52,7 +52,8 @@ impl App {
                 events.exit();
             }
         }
-        let newest = self.frames.as_mut().and_then(Receiver::try_recv);
+        // What was on its way when it was switched off is not for the screen either.
+        let newest = self.frames.as_mut().and_then(Receiver::try_recv).filter(|_| !self.state.off);
         if newest.is_some() {
             self.heard_at = Instant::now();
             self.check_silence();

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Fullscreen;
 
-use super::App;
+use super::{App, control};
 use crate::compute::Place;
 use crate::pipeline::Trace;
 use crate::preview::panel::Canvas;
@@ -84,6 +84,7 @@ impl App {
                     }
                 }
                 Request::Seek(place) => self.seek(place),
+                Request::Off(off) => self.switch_off(off),
                 Request::Close => events.exit(),
                 Request::Look(look) => {
                     // Before the look, so that nobody tries it on a photo's picture without depth.
@@ -134,6 +135,7 @@ impl App {
             coc: view.coc,
             change: view.trace.change,
             quality: view.trace.quality,
+            order: self.controlled.as_mut().and_then(control::Controlled::take_order),
         });
     }
 

@@ -1,0 +1,162 @@
+//! `ctl`: asks a stream or a preview that runs for something.
+
+use std::fmt::Write;
+use std::path::{self, Path, PathBuf};
+
+use clap::{Args, Subcommand};
+
+use crate::cli::error::CliError;
+use crate::cli::log;
+use crate::cli::options::Global;
+use crate::cli::terminal::{print, say};
+use crate::control::client::ask;
+use crate::control::{Answer, ControlError, Name, Request, Status};
+
+/// Control a stream or a preview while it runs: off and on, another look, a picture
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  bokehcam ctl toggle
+  bokehcam ctl preset dreamy
+  bokehcam ctl set blur=3% focus=auto
+  bokehcam ctl --name stream-2 status --json
+  bokehcam ctl snapshot --to me.png
+
+Off shows a still card in place of the picture, and the camera rests. The picture without blur is `set effect=none`.
+docs/ctl.md has recipes for keys and bars, and the protocol.")]
+pub struct CtlCommand {
+    /// Which run, where there are several: its --name, or as `bokehcam ctl` lists them
+    #[arg(long, global = true, value_name = "NAME")]
+    name: Option<Name>,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand, Debug)]
+enum Verb {
+    /// Show pictures again, as before
+    On,
+    /// Show a still card in place of the picture; the camera rests
+    Off,
+    /// Off if it is on, else on
+    Toggle,
+    /// Take the look of a preset, built in or your own
+    Preset {
+        /// Its name
+        #[arg(id = "look", value_name = "PRESET")]
+        preset: String,
+    },
+    /// Change settings of the look: all of them, or none if one cannot be
+    Set {
+        /// Settings as on the command line without the dashes; blur is coc-at-infinity
+        #[arg(id = "settings", value_name = "NAME=VALUE", required = true)]
+        settings: Vec<String>,
+    },
+    /// Say how it is
+    Status {
+        /// As a line of JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Save the next picture
+    Snapshot {
+        /// The file (PNG or JPEG), which must not exist [default: by date, in your folder of pictures]
+        #[arg(id = "file", long = "to", value_name = "FILE")]
+        to: Option<PathBuf>,
+    },
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// There is no such run, or several; or it refuses.
+pub fn run(command: CtlCommand, global: &Global) -> Result<(), CliError> {
+    let as_json = matches!(command.verb, Verb::Status { json: true });
+    let is_status = matches!(command.verb, Verb::Status { .. });
+    let request = match command.verb {
+        Verb::On => Request::On,
+        Verb::Off => Request::Off,
+        Verb::Toggle => Request::Toggle,
+        Verb::Preset { preset } => Request::Preset { name: preset },
+        Verb::Set { settings } => Request::Set { settings: settings.into_iter().map(here).collect::<Result<_, _>>()? },
+        Verb::Status { .. } => Request::Status,
+        Verb::Snapshot { to } => Request::Snapshot { to: to.map(|to| absolute(&to)).transpose()? },
+    };
+    match ask(command.name.as_ref(), &request)? {
+        Answer::Done { status, note } => {
+            note.iter().for_each(|note| log::warn(note));
+            match (is_status, as_json) {
+                (_, true) => print(format!("{}\n", json(&status)?).as_bytes()),
+                (true, false) => print(lines(&status).as_bytes()),
+                // A key has no terminal: this is for people.
+                (false, false) if global.quiet => Ok(()),
+                (false, false) => {
+                    say(&format!("{} is {}", status.name, state(&status)));
+                    Ok(())
+                }
+            }
+        }
+        Answer::Saved { saved } => print(format!("{}\n", saved.display()).as_bytes()),
+        Answer::Refused { error, usage: true } => Err(CliError::Usage(error)),
+        Answer::Refused { error, usage: false } => Err(CliError::Control(error)),
+    }
+}
+
+impl From<ControlError> for CliError {
+    fn from(error: ControlError) -> Self {
+        match error {
+            ControlError::Several(_) => Self::Usage(error.to_string()),
+            error => Self::Control(error.to_string()),
+        }
+    }
+}
+
+/// A setting as the run understands it, which is in another folder.
+fn here(setting: String) -> Result<String, CliError> {
+    const IMAGE: &str = "aperture=image:";
+    match setting.strip_prefix(IMAGE) {
+        Some(file) if !file.is_empty() => Ok(format!("{IMAGE}{}", absolute(Path::new(file))?.display())),
+        _ => Ok(setting),
+    }
+}
+
+fn absolute(path: &Path) -> Result<PathBuf, CliError> {
+    let whole = path::absolute(path).map_err(CliError::io(path))?;
+    match whole.to_str() {
+        Some(_) => Ok(whole),
+        None => Err(CliError::Usage(format!("{}: use a name that is text in UTF-8", whole.display()))),
+    }
+}
+
+fn json(status: &Status) -> Result<String, CliError> {
+    serde_json::to_string(status).map_err(|error| CliError::Control(error.to_string()))
+}
+
+fn state(status: &Status) -> &'static str {
+    if status.on { "on" } else { "off: a still card is shown in place of the picture" }
+}
+
+/// The status for people.
+fn lines(status: &Status) -> String {
+    let Status { name, pid, command, source, size, sinks, watched, quality, fps, look, uptime_s, .. } = status;
+    let size = size.map_or_else(String::new, |(width, height)| format!(", {width}x{height}"));
+    let watched = match watched {
+        Some(true) => "; watched",
+        Some(false) => "; nobody watches",
+        None => "",
+    };
+    let sinks = if sinks.is_empty() { "nowhere else".to_owned() } else { sinks.join(", ") };
+    let quality = quality.as_ref().map_or("not blurred".to_owned(), |quality| format!("quality {quality}"));
+    let look: Vec<String> = look.iter().map(|(name, value)| format!("{name}={value}")).collect();
+    let whole_s = *uptime_s as u64;
+    let (hours, minutes, seconds) = (whole_s / 3600, whole_s / 60 % 60, whole_s % 60);
+    let mut text = format!("{name} is {}\n", state(status));
+    // Writing to a String cannot fail.
+    let _ = write!(
+        text,
+        "  run      {command}, process {pid}, since {hours}:{minutes:02}:{seconds:02}\n  source   {source}{size}\n  \
+         to       {sinks}{watched}\n  frames   {fps:.1} a second, {quality}\n  look     {}\n",
+        look.join(" ")
+    );
+    text
+}

@@ -1,0 +1,82 @@
+//! Changes of the look of a run, as others ask for them: parsed and refused like the command line.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use clap::{Args, Command};
+
+use super::file::SettingsFile;
+use crate::cli::error::CliError;
+use crate::cli::log;
+use crate::cli::options::LookSettings;
+use crate::look::Patch;
+
+/// What the strength of the blur is called here, too.
+const SHORT: (&str, &str) = ("blur", "coc-at-infinity");
+
+/// The changes that settings make, each written `NAME=VALUE`.
+///
+/// # Errors
+/// One is no setting of a look, or has no such value; one excludes another, or is there twice; the picture of an aperture
+/// cannot be read.
+pub fn patch(settings: &[String]) -> Result<Patch, CliError> {
+    let pairs = settings.iter().map(|setting| {
+        let pair = setting.split_once('=').filter(|(name, _)| !name.is_empty());
+        let (name, value) = pair
+            .ok_or_else(|| CliError::Usage(format!("'{setting}': write NAME=VALUE, such as blur=3% or focus=auto")))?;
+        Ok((if name == SHORT.0 { SHORT.1 } else { name }, value))
+    });
+    let pairs = pairs.collect::<Result<Vec<_>, CliError>>()?;
+    let command = Command::new("settings").disable_help_flag(true).no_binary_name(true);
+    let command = LookSettings::<true>::augment_args(LookSettings::<false>::augment_args(command));
+    let flags = pairs.iter().map(|(name, value)| OsString::from(format!("--{name}={value}")));
+    command.try_get_matches_from(flags).map_err(|error| CliError::Usage(log::one_line(&error)))?;
+    loaded(Patch::parse(pairs))
+}
+
+/// The changes that a preset makes, built in or of the settings file, as that is now.
+///
+/// # Errors
+/// There is no such preset; the settings file, or the picture of an aperture, cannot be read.
+pub fn preset(chosen: Option<&Path>, name: &str) -> Result<Patch, CliError> {
+    let file = SettingsFile::load(chosen)?;
+    let values = file.preset(name).ok_or_else(|| CliError::Usage(file.no_preset(name)))?;
+    loaded(Patch::parse(values.iter().map(|(name, value)| (name.as_str(), value.as_str()))))
+}
+
+fn loaded(patch: Result<Patch, (String, String)>) -> Result<Patch, CliError> {
+    let mut patch = patch.map_err(|(name, what)| CliError::Usage(format!("--{name}: {what}")))?;
+    patch.load()?;
+    Ok(patch)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn changed(settings: &[&str]) -> Result<Vec<(&'static str, String)>, String> {
+        let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+        patch(&settings).map(|patch| patch.values()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn settings_are_those_of_the_command_line() {
+        let values = changed(&["blur=3%", "focus=auto", "quality=fast"]).unwrap();
+        let text = |value: &str| value.to_string();
+        assert_eq!(values, [("focus", text("auto")), ("coc-at-infinity", text("3%")), ("quality", text("fast"))]);
+        for (bad, said) in [
+            (&["rim"][..], "write NAME=VALUE"),
+            (&["=3"], "write NAME=VALUE"),
+            (&["rim=2"], "invalid value '2' for '--rim <W>': use a number from 0 to 1"),
+            (&["rimm=1"], "similar argument exists: '--rim'"),
+            (&["mirror=true"], "unexpected argument '--mirror'"),
+            (&["effect=big"], "possible values"),
+            (&["blur=3%", "f-number=2"], "cannot be used with"),
+            (&["rim=0.1", "rim=0.2"], "cannot be used multiple times"),
+            (&["aperture=image:/nowhere.png"], "/nowhere.png"),
+        ] {
+            let refused = changed(bad).unwrap_err();
+            assert!(refused.contains(said) && !refused.contains('\n'), "{bad:?}: {refused}");
+        }
+    }
+}

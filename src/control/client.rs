@@ -1,0 +1,77 @@
+//! Asks a run.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use super::{Answer, ControlError, Name, Request, folder, socket};
+
+/// How long an answer may take: longer than any that a run gives itself.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// The longest answer.
+const MOST_ANSWER_BYTES: u64 = 1 << 20;
+
+/// Asks the run of this name, or the only one, and waits for its answer.
+///
+/// # Errors
+/// There is no such run, there are several, or it does not answer.
+pub fn ask(name: Option<&Name>, request: &Request) -> Result<Answer, ControlError> {
+    let folder = folder::path()?;
+    let there: Vec<Name> = folder::names(&folder).into_iter().filter(|name| is_alive(&folder, name)).collect();
+    let texts = |names: &[Name]| names.iter().map(Name::to_string).collect();
+    let name = match (name, there.as_slice()) {
+        (Some(name), there) if there.contains(name) => name,
+        (Some(name), there) => return Err(ControlError::NoSuch { name: name.clone(), there: texts(there) }),
+        (None, [only]) => only,
+        (None, []) => return Err(ControlError::Nothing),
+        (None, several) => return Err(ControlError::Several(texts(several))),
+    };
+    let silent = |why: String| ControlError::Silent { name: name.to_string(), why };
+    let answer = exchange(&folder::socket_of(&folder, name), request).map_err(|error| {
+        silent(match error.kind() {
+            ErrorKind::WouldBlock | ErrorKind::TimedOut => "it hangs, or is still beginning".into(),
+            _ => error.to_string(),
+        })
+    })?;
+    if answer.is_empty() {
+        return Err(silent("it ended just now".into()));
+    }
+    serde_json::from_slice(&answer).map_err(|error| silent(format!("it may be of another version: {error}")))
+}
+
+/// Whether a run listens; one that has too much to do is alive, too.
+fn is_alive(folder: &Path, name: &Name) -> bool {
+    match socket::connect(&folder::socket_of(folder, name)) {
+        Ok(_) => true,
+        Err(error) => !matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::NotFound),
+    }
+}
+
+/// Sends a request and reads what comes until the end.
+fn exchange(path: &Path, request: &Request) -> io::Result<Vec<u8>> {
+    let mut stream = socket::connect(path)?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let mut line = serde_json::to_vec(request)?;
+    line.push(b'\n');
+    match stream.write_all(&line) {
+        // Refused before it was read: the answer says why.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => {}
+        sent => sent?,
+    }
+    let until = Instant::now() + PATIENCE;
+    let (mut answer, mut some) = (Vec::new(), [0; 4096]);
+    loop {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        stream.set_read_timeout(Some(left))?;
+        match stream.read(&mut some)? {
+            0 => return Ok(answer),
+            read => answer.extend_from_slice(&some[..read]),
+        }
+        if answer.len() as u64 > MOST_ANSWER_BYTES {
+            return Err(io::Error::other("its answer is too long"));
+        }
+    }
+}

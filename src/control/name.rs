@@ -1,0 +1,60 @@
+//! Names of runs.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// What a run is called. As it is part of a file's name, it has letters, digits, `-`, `_` and `.` alone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Name(String);
+
+/// The longest name: a socket's path has 107 bytes.
+const MOST_BYTES: usize = 32;
+
+impl Name {
+    /// The names that a run may have which was given none: `base`, `base-2` and so on.
+    pub(super) fn numbered(base: &'static str) -> impl Iterator<Item = Self> {
+        (1..=u16::MAX).map(move |number| Self(if number == 1 { base.into() } else { format!("{base}-{number}") }))
+    }
+
+    /// As text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl FromStr for Name {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let fits = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+        match text.as_bytes() {
+            [first, ..] if *first != b'.' && *first != b'-' && text.len() <= MOST_BYTES && text.bytes().all(fits) => {
+                Ok(Self(text.to_owned()))
+            }
+            _ => Err(format!("use up to {MOST_BYTES} letters, digits, - _ and ., a letter or digit first")),
+        }
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_a_plain_file_name() {
+        for good in ["stream", "stream-2", "Desk_cam.1", "7"] {
+            assert_eq!(good.parse::<Name>().unwrap().as_str(), good);
+        }
+        for bad in ["", ".", "..", ".hidden", "-n", "a/b", "a b", "café", "x\n", &"x".repeat(33)] {
+            assert!(bad.parse::<Name>().unwrap_err().contains("letters"), "{bad:?}");
+        }
+        let names: Vec<String> = Name::numbered("stream").take(3).map(|name| name.to_string()).collect();
+        assert_eq!(names, ["stream", "stream-2", "stream-3"]);
+    }
+}

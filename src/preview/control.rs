@@ -1,0 +1,69 @@
+//! Control of a preview by others: what they ask goes to the window's thread, which answers.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::time::Duration;
+
+use crate::control::{Answer, Claim, Request, Server};
+use crate::look::Patch;
+
+/// How long the window, and who saves pictures, may take to answer.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// What the window is asked for.
+pub enum Wish {
+    /// How it is.
+    Status,
+    /// Show pictures, or the still card in their place.
+    On(bool),
+    /// One or the other.
+    Toggle,
+    /// Another look.
+    Look(Patch),
+    /// A snapshot, in this file or where they usually go.
+    Snapshot(Option<PathBuf>),
+}
+
+/// What a request means; an error is its answer.
+pub type Understand = dyn Fn(Request) -> Result<Wish, Answer> + Send + Sync;
+
+/// The name of a preview, and what it understands.
+pub struct Control {
+    /// Its name.
+    pub claim: Claim,
+    /// What requests mean: parsed as the command line is.
+    pub understand: Box<Understand>,
+}
+
+/// Somebody who waits for an answer.
+pub struct Asked {
+    /// What for.
+    pub wish: Wish,
+    /// Takes the answer; whoever gave up waiting takes none.
+    pub answer: SyncSender<Answer>,
+}
+
+impl Control {
+    /// Listens from now on. `wake` is called when somebody asks.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn begin(self, wake: impl Fn() + Send + Sync + 'static) -> std::io::Result<(Server, Receiver<Asked>)> {
+        let (ask, asked) = mpsc::channel();
+        let understand = self.understand;
+        let server = self.claim.serve(Arc::new(move |request| {
+            let wish = match understand(request) {
+                Ok(wish) => wish,
+                Err(answer) => return answer,
+            };
+            let (answer, answered) = mpsc::sync_channel(1);
+            if ask.send(Asked { wish, answer }).is_err() {
+                return Answer::failed("the window is closed");
+            }
+            wake();
+            answered.recv_timeout(PATIENCE).unwrap_or_else(|_| Answer::failed("the window does not answer in time"))
+        }))?;
+        Ok((server, asked))
+    }
+}

@@ -1,0 +1,305 @@
+//! A shutter before a sink: while it is closed, the sink is given the still card, and nothing of the pictures.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
+use std::time::Duration;
+
+use super::{Ending, Sink, SinkError, card};
+use crate::clock::Clock;
+use crate::frame::ColorImage;
+use crate::link::demand::Demand;
+
+/// A sink that others can keep the pictures from, by its [`Release`]. The card comes at once, also between two frames;
+/// from then on the camera rests: nobody counts as watching. The card goes on, as often as frames came, until there is a
+/// picture again after it was opened.
+pub struct Shutter {
+    sink: Box<dyn Sink>,
+    closed: Arc<AtomicBool>,
+    /// Who wants a copy of the next picture.
+    asked: Receiver<SyncSender<ColorImage>>,
+    demand: Demand,
+    /// Whether the demand is withheld.
+    rests: bool,
+    /// Whether the sink was given the card last.
+    shows_card: bool,
+    card: ColorImage,
+    period: Duration,
+    clock: Clock,
+    /// The time of the last picture, as the sink was told it.
+    last_ns: Option<u64>,
+    /// When the sink was given something last.
+    given_ns: u64,
+    /// By how much the sink's time is ahead of the source's, which stands still while that rests.
+    ahead_ns: u64,
+}
+
+/// How soon the card comes, whenever the next frame would; and while there are no pictures that it would replace.
+const TICK: Duration = Duration::from_millis(20);
+const IDLE_TICK: Duration = Duration::from_millis(100);
+
+/// Closes and opens a [`Shutter`], and takes pictures behind it, from any thread.
+#[derive(Clone)]
+pub struct Release {
+    closed: Arc<AtomicBool>,
+    ask: Sender<SyncSender<ColorImage>>,
+}
+
+impl Shutter {
+    /// A shutter before `sink`, for pictures of `size` pixels every `period`. It is closed while `closed` says so; `demand` is
+    /// what the camera rests by.
+    pub fn new(
+        sink: Box<dyn Sink>,
+        size: (u32, u32),
+        period: Duration,
+        demand: Demand,
+        clock: Clock,
+        closed: Arc<AtomicBool>,
+    ) -> (Self, Release) {
+        let mut still = ColorImage::new(size.0, size.1);
+        card::draw(&mut still);
+        let (ask, asked) = mpsc::channel();
+        let shutter = Self {
+            sink,
+            closed: Arc::clone(&closed),
+            asked,
+            demand,
+            rests: false,
+            shows_card: false,
+            card: still,
+            period,
+            clock,
+            last_ns: None,
+            given_ns: 0,
+            ahead_ns: 0,
+        };
+        (shutter, Release { closed, ask })
+    }
+
+    /// Whether it is closed. Once the card is there, the camera follows.
+    fn is_closed(&mut self) -> bool {
+        let closed = self.closed.load(Ordering::Acquire);
+        let rests = closed && self.shows_card;
+        if rests != self.rests {
+            self.rests = rests;
+            self.demand.withhold(rests);
+        }
+        closed
+    }
+
+    /// Gives the sink the card.
+    fn give_card(&mut self, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.note(time_ns, true);
+        let given = self.sink.cover(&self.card, time_ns);
+        self.is_closed();
+        given
+    }
+
+    fn note(&mut self, time_ns: u64, shows_card: bool) {
+        (self.last_ns, self.given_ns, self.shows_card) = (Some(time_ns), self.clock.now_ns(), shows_card);
+    }
+
+    /// How long ago the sink was given something.
+    fn silent(&self) -> Duration {
+        Duration::from_nanos(self.clock.now_ns().saturating_sub(self.given_ns))
+    }
+
+    /// A time of the source's as the sink is told it: later than the one before.
+    fn time_ns(&mut self, time_ns: u64) -> u64 {
+        let period_ns = self.period.as_nanos() as u64;
+        match self.last_ns {
+            Some(last_ns) if self.shows_card && time_ns + self.ahead_ns <= last_ns => {
+                self.ahead_ns = last_ns + period_ns - time_ns;
+            }
+            _ => {}
+        }
+        time_ns + self.ahead_ns
+    }
+}
+
+impl Sink for Shutter {
+    fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        let closed = self.is_closed();
+        let time_ns = self.time_ns(time_ns);
+        if closed {
+            return self.give_card(time_ns);
+        }
+        while let Ok(ask) = self.asked.try_recv() {
+            // Who gave up waiting misses nothing.
+            let _ = ask.try_send(frame.clone());
+        }
+        self.note(time_ns, false);
+        self.sink.put(frame, time_ns)
+    }
+
+    fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.sink.cover(card, time_ns)
+    }
+
+    /// Until the sink or the card is due, but never longer than a tick: it may be closed meanwhile.
+    fn hold(&self) -> Option<Duration> {
+        let due = if self.shows_card { Some(self.period) } else { self.sink.hold() };
+        let tick = if self.shows_card || !self.demand.is_watched() { IDLE_TICK } else { TICK };
+        Some(due.map_or(tick, |due| due.saturating_sub(self.silent()).min(tick)))
+    }
+
+    fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
+        let (closed, silent) = (self.is_closed(), self.silent());
+        if closed || self.shows_card && self.demand.is_watched() {
+            if self.shows_card && silent < self.period {
+                return Ok(ControlFlow::Continue(false));
+            }
+            let time_ns = self.last_ns.map_or(0, |last_ns| last_ns + (silent.as_nanos() as u64).max(1));
+            return Ok(self.give_card(time_ns)?.map_continue(|()| true));
+        }
+        if self.sink.hold().is_none_or(|due| silent < due) {
+            return Ok(ControlFlow::Continue(false));
+        }
+        self.given_ns = self.clock.now_ns();
+        self.sink.repeat()
+    }
+
+    fn pass_by(&mut self) {
+        // The sink is given nothing, so there is no card to wait for.
+        self.shows_card = self.closed.load(Ordering::Acquire);
+        self.is_closed();
+        self.sink.pass_by();
+    }
+
+    fn keeps(&self) -> bool {
+        self.sink.keeps()
+    }
+
+    fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
+        self.sink.finish(ending)
+    }
+
+    fn describe(&self) -> String {
+        self.sink.describe()
+    }
+}
+
+impl Release {
+    /// No picture passes from now on, or pictures do again.
+    pub fn close(&self, closed: bool) {
+        self.closed.store(closed, Ordering::Release);
+    }
+
+    /// Whether it is closed.
+    pub fn is_closed(&self) -> bool {
+        self.closed.load(Ordering::Acquire)
+    }
+
+    /// A copy of the next picture that passes; `None` where none does in time.
+    pub fn picture(&self, patience: Duration) -> Option<ColorImage> {
+        let (give, take) = mpsc::sync_channel(1);
+        self.ask.send(give).ok()?;
+        take.recv_timeout(patience).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+
+    const PERIOD: Duration = Duration::from_millis(40);
+    const PERIOD_NS: u64 = PERIOD.as_nanos() as u64;
+
+    /// What a sink was given: whether that is the card, and when.
+    type Got = Arc<Mutex<Vec<(bool, u64)>>>;
+
+    struct Witness(Got);
+
+    impl Sink for Witness {
+        fn put(&mut self, _: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+            self.0.lock().unwrap().push((false, time_ns));
+            Ok(ControlFlow::Continue(()))
+        }
+
+        fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+            assert!(card.rgb.iter().any(|&value| value > 0), "the card is drawn");
+            self.0.lock().unwrap().push((true, time_ns));
+            Ok(ControlFlow::Continue(()))
+        }
+    }
+
+    fn shutter() -> (Shutter, Release, Demand, Clock, Got) {
+        let (demand, clock, got) = (Demand::new(), Clock::manual(), Got::default());
+        let sink = Box::new(Witness(Arc::clone(&got)));
+        let (shutter, release) = Shutter::new(sink, (32, 18), PERIOD, demand.clone(), clock.clone(), Arc::default());
+        (shutter, release, demand, clock, got)
+    }
+
+    #[test]
+    fn a_closed_shutter_lets_nothing_pass_and_the_camera_rests() {
+        let (mut shutter, release, demand, clock, got) = shutter();
+        let _watch = demand.watch();
+        let picture = ColorImage::new(32, 18);
+        assert!(shutter.put(&picture, 0).unwrap().is_continue());
+        assert_eq!(shutter.hold(), Some(TICK));
+        clock.advance_ns(PERIOD_NS);
+        assert_eq!(shutter.repeat().unwrap(), ControlFlow::Continue(false), "open, it is as its sink");
+        release.close(true);
+        assert!(demand.is_watched(), "a camera that rested before the card is there would leave the last picture");
+        assert_eq!(shutter.repeat().unwrap(), ControlFlow::Continue(true), "nobody waits for a frame");
+        assert!(!demand.is_watched() && demand.has_watchers());
+        assert_eq!(shutter.repeat().unwrap(), ControlFlow::Continue(false), "not more often than frames");
+        // One that was on its way.
+        assert!(shutter.put(&picture, PERIOD_NS).unwrap().is_continue());
+        for _ in 0..2 {
+            clock.advance_ns(PERIOD_NS);
+            assert_eq!(shutter.hold(), Some(Duration::ZERO));
+            assert_eq!(shutter.repeat().unwrap(), ControlFlow::Continue(true));
+        }
+        release.close(false);
+        clock.advance_ns(PERIOD_NS);
+        assert_eq!(shutter.repeat().unwrap(), ControlFlow::Continue(true), "the card stays until there is a picture");
+        assert!(demand.is_watched());
+        // The source stood still meanwhile; a sink's time goes on, whatever comes.
+        for time in [2, 3] {
+            assert!(shutter.put(&picture, time * PERIOD_NS).unwrap().is_continue());
+        }
+        let got = got.lock().unwrap().clone();
+        let cards: Vec<bool> = got.iter().map(|got| got.0).collect();
+        assert_eq!(cards, [false, true, true, true, true, true, false, false]);
+        assert!(got.windows(2).all(|pair| pair[0].1 < pair[1].1), "{got:?}");
+        assert_eq!(got[7].1 - got[6].1, PERIOD_NS);
+    }
+
+    #[test]
+    fn time_goes_on_as_the_source_says_where_that_did_not_rest() {
+        let (mut shutter, release, _, clock, got) = shutter();
+        let picture = ColorImage::new(32, 18);
+        for (frame, closed) in [false, true, true, false, false].into_iter().enumerate() {
+            release.close(closed);
+            let _ = shutter.put(&picture, frame as u64 * PERIOD_NS).unwrap();
+            clock.advance_ns(PERIOD_NS);
+        }
+        let times: Vec<u64> = got.lock().unwrap().iter().map(|got| got.1 / PERIOD_NS).collect();
+        assert_eq!(times, [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn a_copy_is_of_a_picture_that_passed() {
+        let (mut shutter, release, _, _, _) = shutter();
+        let asking = release.clone();
+        let asks = std::thread::spawn(move || asking.picture(Duration::from_secs(60)));
+        let mut picture = ColorImage::new(32, 18);
+        picture.rgb.fill(77);
+        let mut time_ns = 0;
+        while !asks.is_finished() {
+            time_ns += PERIOD_NS;
+            let _ = shutter.put(&picture, time_ns).unwrap();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!(asks.join().unwrap().unwrap().rgb, picture.rgb);
+        release.close(true);
+        assert!(release.picture(Duration::from_millis(20)).is_none());
+        let _ = shutter.put(&picture, time_ns + 1).unwrap();
+        drop(shutter);
+        assert!(release.picture(Duration::from_secs(60)).is_none(), "nobody is waited for who is gone");
+    }
+}

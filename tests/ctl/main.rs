@@ -1,0 +1,179 @@
+//! `bokehcam ctl` against streams that run: what goes out changes, nobody else is listened to, and nobody holds it up.
+#![allow(missing_docs)]
+
+mod refusals;
+mod runs;
+mod world;
+
+use std::time::{Duration, Instant};
+
+use bokehcam::recording::still::read_color;
+use serde_json::json;
+use world::{Pictures, World};
+
+#[test]
+fn off_shows_the_card_and_nothing_else_until_it_is_on_again() {
+    let world = World::new();
+    let mut stream = world.stream("stream", &["--to", "-", "--effect", "blur"]);
+    let pictures = stream.watch();
+    pictures.wait_for("the person", |picture| !picture.is_card());
+    assert_eq!(world.status(&[])["on"], true);
+
+    assert!(world.ctl(&["off"]).done().stderr.contains("stream is off"));
+    pictures.wait_for("the card", |picture| picture.is_card());
+    let covered = pictures.cards().len();
+    assert_eq!(world.status(&[])["on"], false);
+    // It goes on, though the camera rests: no frames, and yet pictures.
+    std::thread::sleep(Duration::from_secs(2));
+    assert_eq!(world.status(&[])["fps"], 0.0);
+    let cards = pictures.cards();
+    assert!(cards.len() > covered + 10, "a viewer goes on to be given pictures: {} then {}", covered, cards.len());
+    assert!(cards[covered..].iter().all(|(_, is_card)| *is_card), "nothing of the person is shown");
+    // Another look changes nothing about that; twice off is off.
+    world.ctl(&["set", "effect=none"]).done();
+    world.ctl(&["off"]).done();
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(pictures.cards()[covered..].iter().all(|(_, is_card)| *is_card));
+
+    world.ctl(&["on"]).done();
+    pictures.wait_for("the person again", |picture| !picture.is_card());
+    world.ctl(&["toggle"]).done();
+    pictures.wait_for("the card again", |picture| picture.is_card());
+    assert!(world.ctl(&["toggle"]).done().stderr.contains("stream is on"));
+    pictures.wait_for("the person at last", |picture| !picture.is_card());
+    assert_eq!(stream.interrupt(), 0);
+}
+
+/// The mean detail of the next pictures: of a loop that all of them see.
+fn detail(pictures: &Pictures) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    pictures.wait_for("a second of them", |picture| {
+        (sum, count) = (sum + picture.detail(), count + 1);
+        count > 12
+    });
+    sum / f64::from(count)
+}
+
+#[test]
+fn presets_and_settings_change_the_blur_of_what_goes_out() {
+    let world = World::new();
+    let settings = "[presets.\"my own\"]\neffect = \"blur\"\ncoc-at-infinity = \"4%\"\n";
+    std::fs::write(world.path("config/bokehcam/config.toml"), settings).unwrap();
+    let mut stream = world.stream("stream", &["--to", "-", "--effect", "none"]);
+    let pictures = stream.watch();
+    let sharp = detail(&pictures);
+    world.ctl(&["set", "effect=blur", "blur=1%"]).done();
+    let little = detail(&pictures);
+    world.ctl(&["preset", "my own"]).done();
+    let much = detail(&pictures);
+    println!("detail {sharp:.2} without blur, {little:.2} with little, {much:.2} with much");
+    assert!(sharp > 1.2 * little && little > 1.2 * much);
+    let status = world.status(&[]);
+    let look = &status["look"];
+    assert_eq!(json!([look["coc-at-infinity"], look["effect"]]), json!(["4%", "blur"]));
+    assert_eq!(status["quality"], "balanced");
+    world.ctl(&["set", "effect=none"]).done();
+    assert!(detail(&pictures) > 1.2 * little);
+    // What has no effect is said.
+    let ran = world.ctl(&["set", "tilt=0.5"]).done();
+    assert!(ran.stderr.starts_with("warning: without effect here: --tilt 0.5"), "{}", ran.stderr);
+}
+
+#[test]
+fn what_follows_depth_is_refused_where_there_is_none() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null", "--effect", "tilt-shift", "--depth", "none"]);
+    let refused = world.ctl(&["preset", "dreamy"]).refused(2);
+    assert!(refused.contains("--effect auto follows depth") && refused.contains("tilt-shift"), "{refused}");
+    assert_eq!(world.status(&[])["look"]["rim"], "0.2", "nothing of it is done");
+    world.ctl(&["preset", "miniature"]).done();
+}
+
+#[test]
+fn depth_is_followed_in_any_look() {
+    let world = World::new();
+    let mut stream = world.stream("stream", &["--to", "-", "--coc-at-infinity", "0"]);
+    let pictures = stream.watch();
+    let sharp = detail(&pictures);
+    world.ctl(&["preset", "dreamy"]).done();
+    let dreamy = detail(&pictures);
+    assert!(sharp > 1.2 * dreamy, "{sharp} {dreamy}");
+    for args in [&["set", "f-number=2", "focal-length=50", "sensor-width=36"][..], &["set", "blur=2%", "focus=0.5,0.5"]]
+    {
+        world.ctl(args).done();
+    }
+    let look = &world.status(&[])["look"];
+    assert_eq!(json!([look["coc-at-infinity"], look["focus"], look["f-number"]]), json!(["2%", "0.5,0.5", null]));
+}
+
+#[test]
+fn the_status_says_how_it_is() {
+    let world = World::new();
+    let stream = world.stream("desk", &["--to", "null", "--to", "out.y4m", "--name", "desk"]);
+    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait");
+    std::thread::sleep(Duration::from_secs(1));
+    let status = world.status(&[]);
+    let told = json!({
+        "name": "desk", "pid": stream.0.id(), "command": "stream", "on": true, "source": recording, "size": [640, 360],
+        "sinks": ["null", "out.y4m"], "watched": null,
+    });
+    for (name, value) in told.as_object().unwrap() {
+        assert_eq!(status[name], *value, "{name}");
+    }
+    let fps = status["fps"].as_f64().unwrap();
+    assert!((1.0..40.0).contains(&fps), "{fps}");
+    assert!(status["uptime_s"].as_f64().unwrap() >= 1.0);
+    assert_eq!(status["look"]["effect"], "auto");
+    let text = world.ctl(&["status"]).done().stdout;
+    for part in ["desk is on\n", "640x360", "null, out.y4m", "a second, quality", "rim=0.2"] {
+        assert!(text.contains(part), "{text}");
+    }
+}
+
+#[test]
+fn a_picture_is_saved_where_it_was_asked_for() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null", "--effect", "blur"]);
+    let saved = world.ctl(&["snapshot", "--to", "me.png"]).done().stdout;
+    assert_eq!(saved.trim_end(), world.path("here/me.png").to_str().unwrap());
+    let picture = read_color(&world.path("here/me.png")).unwrap();
+    assert_eq!(picture.size(), (640, 360));
+    assert!(picture.rgb.iter().any(|&value| value > 100), "not the card");
+    let before = std::fs::read(world.path("here/me.png")).unwrap();
+    assert!(world.ctl(&["snapshot", "--to", "me.png"]).refused(1).contains("me.png exists: choose another name"));
+    assert_eq!(std::fs::read(world.path("here/me.png")).unwrap(), before);
+    assert!(world.ctl(&["snapshot", "--to", "me.txt"]).refused(1).contains("me.txt"));
+    if cfg!(feature = "window") {
+        let by_date = world.ctl(&["snapshot"]).done().stdout;
+        assert!(by_date.starts_with(world.path("pictures/bokehcam ").to_str().unwrap()), "{by_date}");
+    }
+    world.ctl(&["off"]).done();
+    assert!(world.ctl(&["snapshot", "--to", "no.png"]).refused(1).contains("it is off"));
+    assert!(!world.path("here/no.png").exists());
+}
+
+#[test]
+fn it_reacts_at_once() {
+    let world = World::new();
+    let mut stream = world.stream("stream", &["--to", "-", "--effect", "blur"]);
+    let pictures = stream.watch();
+    let (mut answers, mut commands, mut cards) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..10 {
+        pictures.wait_for("the person", |picture| !picture.is_card());
+        let began = Instant::now();
+        world.ctl(&["off"]).done();
+        commands.push(began.elapsed());
+        let card = pictures.wait_for("the card", |picture| picture.is_card());
+        cards.push(card.at.saturating_duration_since(began));
+        let began = Instant::now();
+        let answer = world.tell("stream", b"{\"do\":\"set\",\"settings\":[\"blur=3%\",\"rim=0.3\"]}\n");
+        answers.push(began.elapsed());
+        assert!(answer.contains("\"status\""), "{answer}");
+        world.tell("stream", b"{\"do\":\"on\"}\n");
+    }
+    for (what, mut times) in [("an answer", answers), ("the command", commands), ("to the card", cards)] {
+        times.sort();
+        println!("{what}: median {:.1?}, longest {:.1?}", times[5], times[9]);
+        assert!(times[5] < Duration::from_secs(1), "{what}: {times:?}");
+    }
+}

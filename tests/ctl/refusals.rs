@@ -1,0 +1,142 @@
+//! What is refused: nothing is changed by it, and nothing else waits for it.
+
+use std::io::Write;
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use crate::world::{World, answer};
+
+#[test]
+fn a_setting_that_cannot_be_changes_none() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    let before = world.status(&[])["look"].clone();
+    for (args, said) in [
+        (&["set", "rim=0.5", "highlights=-1"][..], "invalid value '-1' for '--highlights <M>'"),
+        (&["set", "rim=0.5", "rimm=1"], "unexpected argument '--rimm' found; tip: a similar argument exists: '--rim'"),
+        (&["set", "rim=0.5", "out-size=1x1"], "unexpected argument '--out-size'"),
+        (&["set", "rim=0.5", "f-number=2"], "a lens needs all of"),
+        (&["set", "blur=3%", "f-number=2"], "cannot be used with"),
+        (&["set", "rim=0.5", "blur=90000"], "use pixels from 0 to 20000"),
+        (&["set", "rim=0.5", "blur=19000"], "a blur radius of 19000 px is too large"),
+        (&["set", "rim=0.5", "aperture=image:no.png"], "here/no.png"),
+        (&["set", "rim"], "write NAME=VALUE"),
+        (&["preset", "nice"], "there is no preset 'nice': use portrait"),
+    ] {
+        let ran = world.ctl(args);
+        let code = if said.contains("no.png") { 1 } else { 2 };
+        let refused = ran.refused(code);
+        assert!(refused.contains(said), "{args:?}: {refused}");
+        assert_eq!(world.status(&[])["look"], before, "{args:?}");
+    }
+    // The same words as those of the command line.
+    let flag = world.run(&["stream", "demo", "--to", "null", "--rim", "2"]).refused(2);
+    assert_eq!(world.ctl(&["set", "rim=2"]).refused(2), flag);
+    for args in [&[][..], &["dance"], &["set"], &["status", "--name", "../x"]] {
+        assert_eq!(world.ctl(args).code, 2, "{args:?}");
+    }
+}
+
+#[test]
+fn what_is_no_request_is_answered_so() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    for (request, said) in [
+        (&b"on\n"[..], "this is no request"),
+        (b"{\"do\":\"dance\"}\n", "unknown variant `dance`"),
+        (b"{\"do\":\"set\",\"settings\":[\"rim=0.1\"],\"force\":true}\n", "unknown field `force`"),
+        (b"{\"do\":\"set\",\"settings\":{}}\n", "this is no request"),
+        (b"\xff\xfe\n", "this is no request"),
+        (b"\n", "this is no request"),
+        (b"{\"do\":\"snapshot\",\"to\":\"x.png\"}\n", "say the whole path"),
+        (&[b' '; 20_000], "too long: 16384 bytes"),
+        (&[b"{\"do\":\"preset\",\"name\":\"".as_slice(), &[b'x'; 60_000], b"\"}\n"].concat(), "too long"),
+    ] {
+        let answer = world.tell("stream", request);
+        let value: serde_json::Value = serde_json::from_str(&answer).unwrap_or_else(|_| panic!("{answer:?}"));
+        assert_eq!(value["usage"], true, "{answer}");
+        assert!(value["error"].as_str().unwrap().contains(said), "{answer}");
+    }
+    // An end without a line.
+    let mut stream = UnixStream::connect(world.socket("stream")).unwrap();
+    stream.write_all(b"{\"do\":\"off\"}").unwrap();
+    stream.shutdown(std::net::Shutdown::Write).unwrap();
+    assert!(answer(&stream).contains("the request has no end"));
+    assert_eq!(world.status(&[])["on"], true);
+}
+
+#[test]
+fn who_says_nothing_holds_nobody_up() {
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    let connect = || UnixStream::connect(world.socket("stream")).unwrap();
+    let began = Instant::now();
+    let silent: Vec<UnixStream> = (0..7).map(|_| connect()).collect();
+    // Seven say nothing, and an eighth is served all the same.
+    assert!(world.tell("stream", b"{\"do\":\"status\"}\n").contains("\"on\":true"));
+    let took = began.elapsed();
+    assert!(took < Duration::from_secs(1), "{took:?}");
+    for stream in &silent {
+        assert!(answer(stream).contains("did not come within 1 s"));
+    }
+    // More than there is room for are told so at once, and served once there is.
+    let silent: Vec<UnixStream> = (0..20).map(|_| connect()).collect();
+    let answers: Vec<String> = silent.iter().map(answer).collect();
+    let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
+    let late = answers.iter().filter(|answer| answer.contains("did not come within 1 s")).count();
+    // One of the eight places may be held for a moment by somebody of before.
+    assert!(refused >= 12 && late >= 7 && refused + late == 20, "{answers:?}");
+    assert_eq!(world.status(&[])["on"], true);
+    // A request in pieces comes in time, or does not.
+    let mut slow = connect();
+    let began = Instant::now();
+    for byte in b"{\"do\":\"off\"}            " {
+        std::thread::sleep(Duration::from_millis(100));
+        if slow.write_all(&[*byte]).is_err() {
+            break;
+        }
+    }
+    assert!(answer(&slow).contains("did not come within 1 s") && began.elapsed() >= Duration::from_secs(1));
+    assert_eq!(world.status(&[])["on"], true);
+}
+
+#[test]
+fn a_run_that_ends_waits_for_no_client() {
+    let world = World::new();
+    let stream = world.stream("stream", &["--to", "null"]);
+    let _silent: Vec<UnixStream> = (0..4).map(|_| UnixStream::connect(world.socket("stream")).unwrap()).collect();
+    let began = Instant::now();
+    assert_eq!(stream.interrupt(), 0);
+    assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+    assert!(!world.socket("stream").exists());
+}
+
+#[test]
+#[ignore = "needs root: only root can be somebody else"]
+fn another_user_is_refused_even_where_the_folder_is_open() {
+    use std::fs::{Permissions, set_permissions};
+    use std::os::unix::fs::PermissionsExt;
+    let world = World::new();
+    let _stream = world.stream("stream", &["--to", "null"]);
+    let nobody = rustix::process::Uid::from_raw(65534);
+    let socket = world.socket("stream");
+    // The identity of one thread alone changes.
+    let ask = move || {
+        std::thread::spawn(move || {
+            rustix::thread::set_thread_res_uid(nobody, nobody, nobody).unwrap();
+            let mut stream = UnixStream::connect(&socket)?;
+            let _ = stream.write_all(b"{\"do\":\"off\"}\n");
+            Ok::<String, std::io::Error>(answer(&stream))
+        })
+        .join()
+        .unwrap()
+    };
+    let denied = ask.clone()().unwrap_err();
+    assert_eq!(denied.kind(), std::io::ErrorKind::PermissionDenied, "the folder keeps others out");
+    for (path, mode) in [("", 0o755), ("run", 0o755), ("run/bokehcam", 0o755), ("run/bokehcam/stream.sock", 0o777)] {
+        set_permissions(world.path(path), Permissions::from_mode(mode)).unwrap();
+    }
+    assert!(ask().unwrap().contains("this run is another user's"));
+    set_permissions(world.path("run/bokehcam"), Permissions::from_mode(0o700)).unwrap();
+    assert_eq!(world.status(&[])["on"], true);
+}

@@ -1,0 +1,74 @@
+//! Others ask the window from outside: what they change shows in it, and what the person changes shows to them.
+
+use std::fs;
+use std::process::Command;
+
+use bokehcam::recording::still::read_color;
+use serde_json::Value;
+
+use super::picture::{distance, is_photograph};
+use super::program::{PORTRAIT, Program};
+use super::screen::{Screen, until};
+use super::window::PATIENCE;
+
+/// What `bokehcam ctl` says: its exit code, and what it prints.
+fn ctl(program: &Program, args: &[&str]) -> (i32, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+    command.arg("ctl").args(args).env("XDG_RUNTIME_DIR", program.home().join("run")).current_dir(program.home());
+    let output = command.env("XDG_CONFIG_HOME", program.home().join("config")).output().unwrap();
+    let said = if output.status.success() { output.stdout } else { output.stderr };
+    (output.status.code().unwrap(), String::from_utf8(said).unwrap())
+}
+
+fn status(program: &Program) -> Value {
+    let (code, said) = ctl(program, &["status", "--json"]);
+    assert_eq!(code, 0, "{said}");
+    serde_json::from_str(&said).unwrap()
+}
+
+#[test]
+#[ignore = "needs an X server"]
+fn what_is_asked_from_outside_shows_here_and_what_is_done_here_shows_there() {
+    let screen = Screen::new();
+    let still = ["--start", "0", "--end", "0.05", "--panel=false", "--quality", "balanced", "--to", "out.y4m"];
+    let mut program = Program::start(&screen, &[&[PORTRAIT], &still[..]].concat());
+    let window = program.window();
+    let before = window.until("the first picture", is_photograph);
+    let told = status(&program);
+    assert_eq!((&told["command"], &told["on"], &told["name"]), (&"preview".into(), &true.into(), &"preview".into()));
+    assert_eq!(told["sinks"][0], "window");
+    assert_eq!(told["look"]["coc-at-infinity"], "auto");
+
+    assert_eq!(ctl(&program, &["set", "effect=none"]).0, 0);
+    let sharp = window.until("no blur", |image| distance(image, &before) > 1.0);
+    assert_eq!(ctl(&program, &["preset", "dreamy"]).0, 0);
+    window.until("another look", |image| distance(image, &sharp) > 1.0 && distance(image, &before) > 0.5);
+    let (code, said) = ctl(&program, &["set", "rim=0.7", "highlights=-1"]);
+    assert!(code == 2 && said.contains("--highlights"), "{said}");
+    assert_eq!(status(&program)["look"]["rim"], "0.5");
+    // The person turns the wheel here, and undoes what came from there.
+    window.wheel((0.5, 0.5), -3);
+    until("the wheel shows outside", PATIENCE, || status(&program)["look"]["coc-at-infinity"] != "4.5%");
+
+    assert_eq!(ctl(&program, &["snapshot", "--to", "me.png"]).0, 0);
+    assert_eq!(read_color(&program.home().join("me.png")).unwrap().size(), (640, 360));
+
+    assert_eq!(ctl(&program, &["off"]).0, 0);
+    window.until("nothing of the person", |image| !is_photograph(image));
+    assert_eq!(status(&program)["on"], false);
+    assert!(ctl(&program, &["snapshot", "--to", "no.png"]).1.contains("it is off"));
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    window.until("still nothing", |image| !is_photograph(image));
+    assert_eq!(ctl(&program, &["toggle"]).0, 0);
+    window.until("the person again", is_photograph);
+    assert_eq!(ctl(&program, &["off"]).0, 0);
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    program.interrupt();
+    let ended = program.end();
+    ended.succeeded();
+    // What was recorded ends with the card: dark, the same from side to side.
+    let video = fs::read(ended.home.path().join("out.y4m")).unwrap();
+    let luma = &video[video.len() - 640 * 360 * 3 / 2..][..640 * 360];
+    assert!(luma[0].abs_diff(57) <= 3 && luma[640 * 359].abs_diff(38) <= 3, "{} {}", luma[0], luma[640 * 359]);
+    assert!(!ended.home.path().join("run/bokehcam/preview.sock").exists());
+}
