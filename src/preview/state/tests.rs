@@ -210,7 +210,7 @@ fn controls_of_the_camera_stay_in_their_range() {
 }
 
 #[test]
-fn notes_are_few_and_numbered() {
+fn notes_are_few_and_numbered_and_none_is_there_twice() {
     let mut state = state();
     for k in 0..20 {
         state.hear(Update::Note(format!("note {k}")));
@@ -218,6 +218,9 @@ fn notes_are_few_and_numbered() {
     let numbers: Vec<u64> = state.notes.iter().map(|note| note.number).collect();
     assert_eq!(numbers, [15, 16, 17, 18, 19, 20]);
     assert_eq!(state.notes.last().unwrap().text, "note 19");
+    // What is said twice is shown once.
+    ["a", "b", "a"].iter().for_each(|line| state.note(*line));
+    assert_eq!(state.notes[4..].iter().map(|note| note.text.as_str()).collect::<Vec<_>>(), ["b", "a"]);
 }
 
 #[test]
@@ -341,11 +344,4 @@ fn a_source_without_depth_changes_no_look_for_the_next_time() {
     let tilted = Look { effect: Effect::Blur, ..state.look.clone() };
     state.apply(Action::Look { look: Box::new(tilted.clone()), stroke: None });
     assert_eq!(state.chosen_look(), tilted, "that was chosen");
-}
-
-#[test]
-fn what_is_said_twice_is_shown_once() {
-    let mut state = state();
-    ["a", "b", "a"].iter().for_each(|line| state.note(*line));
-    assert_eq!(state.notes.iter().map(|note| note.text.as_str()).collect::<Vec<_>>(), ["b", "a"]);
 }
