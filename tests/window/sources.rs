@@ -113,14 +113,16 @@ fn a_recording_is_stepped_through_and_its_pixels_are_shown_as_they_are() {
         let file = format!("{PORTRAIT}/rgb/{name}.png");
         bokehcam::recording::still::read_color(file.as_ref()).unwrap()
     };
-    // At 100 % the recording's own pixels are in the window's middle.
+    // In a window that shows it smaller, the recording's own pixels are in the middle at 100 %.
+    window.resize(600, 400);
+    until("another size", PATIENCE, || window.size() == (600, 400));
+    window.point((0.5, 0.5));
     window.key(&[], u32::from('x'));
     let shows = |picture: &ColorImage| {
-        let picture = part(picture, (160, 90), (320, 160));
+        let picture = part(picture, (220, 130), (200, 100));
         let seen = window.until("the very pixels of the frame", |image| {
             let (width, height) = image.size();
-            let at = ((width - 640) / 2 + 160, (height - 360) / 2 + 90);
-            distance(&part(image, at, (320, 160)), &picture) < 0.5
+            distance(&part(image, (width / 2 - 100, height / 2 - 50), (200, 100)), &picture) < 0.5
         });
         keep(&seen, "at 100 percent")
     };
