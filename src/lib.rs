@@ -29,7 +29,7 @@
 //! | 6 | [`computing`]: CPU or GPU, for blur and matching |
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
-//! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `scene`, `v4l2`, `control` |
+//! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `scene`, `v4l2`, `pipewire`, `control` |
 //! | 2 | `compute`, [`calibration`] |
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
@@ -38,8 +38,8 @@
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in
 //! nanoseconds of a monotonic clock; blurring happens in linear light.
 //!
-//! `unsafe` is allowed in `compute/thread_pool.rs`, `link/slot.rs`, `link/pool.rs` and under `v4l2`, where each block carries
-//! its argument (and in `link/bell.rs` under Miri alone). `scripts/prove-link` runs what can be proved of it.
+//! `unsafe` is allowed in `compute/thread_pool.rs`, `link/slot.rs`, `link/pool.rs`, `pipewire/buffer.rs` and under `v4l2`, where
+//! each block carries its argument (and in `link/bell.rs` under Miri alone). `scripts/prove-link` runs what can be proved of it.
 
 pub mod bokeh;
 pub mod budget;
@@ -67,6 +67,9 @@ mod names;
 pub mod network;
 pub mod optics;
 pub mod pipeline;
+#[cfg(feature = "pipewire")]
+#[doc(hidden)]
+pub mod pipewire;
 #[cfg(feature = "window")]
 #[doc(hidden)]
 pub mod preview;

@@ -168,8 +168,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         source: info.name.clone(),
         sink: sink.describe(),
         budget_ns: run.budget_ns,
-        elapsed_ns: 0,
-        cpu_ns: 0,
+        ..About::default()
     };
     let tally = Tally::new();
     let mut timings = Timings::default();
@@ -284,6 +283,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     // A source that has an end of its own was broken off before it.
     let is_cut = run.stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
+    about.pipewire = sink.nodes();
     let finished = guard("sink", &over, move || Ok(sink.finish(ending)?));
     // What came first is the cause.
     let ended = ended.and(finished);

@@ -3,13 +3,17 @@
 //! Memory is fixed, however long the run, and counting a frame allocates nothing.
 
 mod histogram;
+mod node_use;
 mod pulse;
 mod report;
+mod rungs;
 mod tally;
 
 pub use histogram::{Histogram, PassHistograms};
+pub use node_use::NodeUse;
 pub use pulse::Pulse;
-pub use report::{About, QualityUse, Report, RungCounts, Spread, StageMs, StagesMs, Versions, WindowUse};
+pub use report::{About, QualityUse, Report, Spread, StageMs, StagesMs, Versions, WindowUse};
+pub use rungs::RungCounts;
 pub use tally::{Cause, Dropped, Frames, Tally, Ticket};
 
 /// What the stages measure while they run; each stage fills its own fields.

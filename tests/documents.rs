@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// What no test can run: a part of the command, and why.
-const LEFT_OUT: [(&str, &str); 16] = [
+const LEFT_OUT: [(&str, &str); 17] = [
     ("sudo ", "needs root"),
     ("pip install", "needs a network"),
     ("cargo install", "needs a network, and installs"),
@@ -16,6 +16,7 @@ const LEFT_OUT: [(&str, &str); 16] = [
     ("bokehcam plate", "needs a camera"),
     ("bokehcam preview", "needs a screen"),
     ("/dev/video", "needs a camera"),
+    ("pipewire", "needs PipeWire's daemons"),
     ("bokehcam devices", "says what this machine has"),
     ("bokehcam doctor", "judges this machine"),
     ("bokehcam ctl", "needs a stream that runs"),

@@ -8,7 +8,7 @@ const LAYERS: [&[&str]; 12] = [
     &["names"],
     &["color", "frame", "optics", "clock", "files", "knob"],
     &["compute", "calibration"],
-    &["link", "budget", "network", "stats", "recording", "scene", "v4l2", "control"],
+    &["link", "budget", "network", "stats", "recording", "scene", "v4l2", "pipewire", "control"],
     &["capture", "depth", "bokeh", "sink"],
     &["look"],
     &["computing"],
@@ -20,7 +20,7 @@ const LAYERS: [&[&str]; 12] = [
 ];
 
 /// Crates, and the only places under `src/` that may name them.
-const DOORS: [(&str, &[&str]); 28] = [
+const DOORS: [(&str, &[&str]); 29] = [
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
     ("crossbeam_channel", &["link"]),
@@ -32,9 +32,13 @@ const DOORS: [(&str, &[&str]); 28] = [
     ("indicatif", &["cli"]),
     ("jiff", &["preview/folders"]),
     ("ort", &["network/onnx_runtime"]),
+    ("pipewire", &["pipewire"]),
     ("plotters", &["cli"]),
     ("png", &["recording", "sink"]),
-    ("rustix", &["compute/memory", "clock", "control", "files", "link/bell", "sink/ffmpeg", "sink/pipe", "v4l2"]),
+    (
+        "rustix",
+        &["compute/memory", "clock", "control", "files", "link/bell", "pipewire", "sink/ffmpeg", "sink/pipe", "v4l2"],
+    ),
     ("rfd", &["preview/dialog"]),
     ("rten", &["network/built_in"]),
     ("rten_tensor", &["network/built_in"]),

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "camera")]
 use super::pixels::NoColor;
+#[cfg(all(feature = "camera", feature = "pipewire"))]
+use crate::pipewire::PipeWireError;
 use crate::recording::RecordingError;
 #[cfg(feature = "camera")]
 use crate::v4l2::live::OpenError;
@@ -58,6 +60,10 @@ pub enum CaptureError {
     #[cfg(feature = "camera")]
     #[error(transparent)]
     Camera(#[from] OpenError),
+    /// The camera of PipeWire's cannot be opened.
+    #[cfg(all(feature = "camera", feature = "pipewire"))]
+    #[error(transparent)]
+    PipeWire(#[from] PipeWireError),
     /// The camera gives no colours.
     #[cfg(feature = "camera")]
     #[error("{camera}: {source}")]

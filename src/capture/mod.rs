@@ -3,6 +3,8 @@
 pub mod demo;
 mod error;
 pub mod photo;
+#[cfg(all(feature = "camera", feature = "pipewire"))]
+pub mod pipewire;
 #[cfg(feature = "camera")]
 pub mod pixels;
 pub mod replay;

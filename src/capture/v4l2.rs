@@ -176,14 +176,14 @@ impl Eye for V4l2Camera {
 
 /// Media time from times of capture.
 #[derive(Debug, Default)]
-struct MediaTime {
+pub(super) struct MediaTime {
     first_ns: Option<u64>,
     last_ns: Option<u64>,
 }
 
 impl MediaTime {
     /// Time since the first frame; always later than the frame before, also where a driver's times step back.
-    fn since_first_ns(&mut self, captured_ns: u64) -> u64 {
+    pub(super) fn since_first_ns(&mut self, captured_ns: u64) -> u64 {
         let first_ns = *self.first_ns.get_or_insert(captured_ns);
         let since_ns = captured_ns.saturating_sub(first_ns);
         let time_ns = self.last_ns.map_or(since_ns, |last_ns| since_ns.max(last_ns + 1));

@@ -75,6 +75,10 @@ pub enum CliError {
     #[error("{}: this is no video device", .0.display())]
     #[cfg(feature = "camera")]
     NotVideo(PathBuf),
+    /// A name means no camera of PipeWire's.
+    #[error("there is no camera '{0}' in PipeWire; `bokehcam devices` lists what there is")]
+    #[cfg(feature = "camera")]
+    NoShared(String),
     /// `doctor` found something to be missing.
     #[error("there is no {0} to work with: see above for what to do")]
     #[cfg(feature = "camera")]

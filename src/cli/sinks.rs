@@ -49,10 +49,15 @@ pub fn check(targets: &[Target], parts: &Streaming, source: &SourceName) -> Resu
     }
     let has_camera = targets.iter().any(Target::is_camera);
     if stream.on_demand && !has_camera {
-        return usage("--on-demand needs a virtual camera, to be told who watches: add --to /dev/videoN".to_string());
+        return usage(
+            "--on-demand needs a virtual camera, to be told who watches: add --to pipewire or --to /dev/videoN"
+                .to_string(),
+        );
     }
     match stream.out_size {
-        Some(_) if !has_camera => usage("--out-size is for a virtual camera: add --to /dev/videoN".to_string()),
+        Some(_) if !has_camera => {
+            usage("--out-size is for a virtual camera: add --to pipewire or --to /dev/videoN".to_string())
+        }
         Some(size) if !size.width.is_multiple_of(2) => usage(format!(
             "--out-size {}x{}: a virtual camera needs an even width, such as {}",
             size.width,

@@ -76,6 +76,7 @@ impl Stage<'_> {
             let began_ns = ready_ns + trace.playout_ns;
             trace.age_ns = began_ns.saturating_sub(ticket.captured_ns);
             if let Some(whole) = frame.picture.memory() {
+                self.sink.captured(ticket.captured_ns);
                 match self.sink.put(if is_cropped { &self.cropped } else { whole }, stamp.time_ns) {
                     Ok(flow) if flow.is_break() => break,
                     Ok(_) => {}

@@ -2,6 +2,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::files::folder::FolderError;
+#[cfg(feature = "pipewire")]
+use crate::pipewire::PipeWireError;
 #[cfg(feature = "camera")]
 use crate::v4l2::loopback::LoopbackError;
 
@@ -16,7 +18,7 @@ const NOT_BUILT: &str = "this program was built without a window; build it with 
 pub enum SinkError {
     /// Not the name of a sink.
     #[error(
-        "no sink '{name}': use /dev/videoN (a virtual camera), {}DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm, \
+        "no sink '{name}': use /dev/videoN or pipewire[:NAME] (a virtual camera), {}DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm, \
          - (y4m on standard output) or null",
         if cfg!(feature = "window") { "window, " } else { "" }
     )]
@@ -76,6 +78,22 @@ pub enum SinkError {
     #[cfg(feature = "camera")]
     #[error(transparent)]
     Loopback(#[from] LoopbackError),
+    /// The virtual camera cannot be given to PipeWire.
+    #[cfg(feature = "pipewire")]
+    #[error(transparent)]
+    PipeWire(#[from] PipeWireError),
+    /// Built without PipeWire.
+    #[cfg(not(feature = "pipewire"))]
+    #[error(
+        "--to pipewire: this program was built without PipeWire; build it with the feature pipewire. For a folder of this \
+         name, ./pipewire"
+    )]
+    NoPipeWire,
+    /// A camera of PipeWire's without the name that it should have.
+    #[error(
+        "pipewire:NAME needs a name that people can read, such as pipewire:'My camera'; without one, it is pipewire"
+    )]
+    NoLabel,
     /// Built without virtual cameras.
     #[cfg(not(feature = "camera"))]
     #[error("{}: this program was built without cameras; build it with the feature camera", path.display())]

@@ -11,6 +11,8 @@ mod ffmpeg;
 mod loopback;
 mod output;
 mod pipe;
+#[cfg(feature = "pipewire")]
+mod pipewire;
 mod png;
 mod rate;
 mod shutter;
@@ -20,12 +22,16 @@ mod target;
 mod tee;
 mod y4m;
 pub mod yuv;
+#[cfg(any(feature = "camera", feature = "pipewire"))]
+mod yuyv;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+#[cfg(feature = "pipewire")]
+pub use self::pipewire::PipeWire;
 pub use error::SinkError;
 pub use ffmpeg::Ffmpeg;
 #[cfg(feature = "camera")]
@@ -41,6 +47,7 @@ pub use y4m::{Y4m, Y4mFile};
 
 use crate::frame::ColorImage;
 use crate::link::demand::Demand;
+use crate::stats::NodeUse;
 
 /// Whether all frames came that were to come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +69,11 @@ pub trait Sink: Send {
     /// # Errors
     /// The frame could not be written. A file then takes no more; what it had is kept, and the error says where.
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError>;
+
+    /// Told before [`Sink::put`] when that frame was captured, by the clock of the run: for outputs that hand it on.
+    fn captured(&mut self, captured_ns: u64) {
+        let _ = captured_ns;
+    }
 
     /// How long a live output may go without a picture from now on; whenever that has passed, [`Sink::repeat`] is
     /// called. `None` for everything that stores frames.
@@ -94,6 +106,11 @@ pub trait Sink: Send {
     /// it.
     fn keeps(&self) -> bool {
         true
+    }
+
+    /// What became of the frames that were put, of cameras that were given to PipeWire.
+    fn nodes(&self) -> Vec<NodeUse> {
+        Vec::new()
     }
 
     /// Completes the output after the last frame. One that was cut short replaces nothing.

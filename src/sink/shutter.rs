@@ -10,6 +10,7 @@ use super::{Ending, Sink, SinkError, card};
 use crate::clock::Clock;
 use crate::frame::ColorImage;
 use crate::link::demand::Demand;
+use crate::stats::NodeUse;
 
 /// A sink that others can keep the pictures from, by its [`Release`]. The card comes at once, also between two frames;
 /// from then on the camera rests: nobody counts as watching. The card goes on, as often as frames came, until there is a
@@ -135,6 +136,14 @@ impl Sink for Shutter {
 
     fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.sink.cover(card, time_ns)
+    }
+
+    fn captured(&mut self, captured_ns: u64) {
+        self.sink.captured(captured_ns);
+    }
+
+    fn nodes(&self) -> Vec<NodeUse> {
+        self.sink.nodes()
     }
 
     /// Until the sink or the card is due, but never longer than a tick: it may be closed meanwhile.

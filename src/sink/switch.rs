@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use super::{Ending, Sink, SinkError};
 use crate::frame::ColorImage;
+use crate::stats::NodeUse;
 
 /// A sink of members that others add and remove by its [`Switchboard`]. One that fails, or whose reader has gone, is
 /// taken out, and the others go on.
@@ -159,6 +160,15 @@ impl Sink for Switch {
     fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.give(|sink| sink.cover(card, time_ns));
         Ok(ControlFlow::Continue(()))
+    }
+
+    fn captured(&mut self, captured_ns: u64) {
+        self.members.iter_mut().for_each(|member| member.sink.captured(captured_ns));
+    }
+
+    /// Of the members that there are now.
+    fn nodes(&self) -> Vec<NodeUse> {
+        self.members.iter().flat_map(|member| member.sink.nodes()).collect()
     }
 
     /// Until the first member is due, but never longer than a tick: requests must be seen.

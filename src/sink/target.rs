@@ -8,8 +8,13 @@ use std::str::FromStr;
 
 #[cfg(feature = "camera")]
 use super::Loopback;
+#[cfg(feature = "pipewire")]
+use super::PipeWire;
 use super::{Ffmpeg, Null, Options, PngFolder, Sink, SinkError, Y4m, Y4mFile};
 use crate::files::place;
+
+/// How the name of a camera of PipeWire's begins.
+const PIPEWIRE: &str = "pipewire";
 
 /// A sink as named on the command line (`--to`).
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,6 +29,8 @@ pub enum Target {
     Video(PathBuf),
     /// `/dev/videoN`, or another name of a device: a virtual camera.
     Device(PathBuf),
+    /// `pipewire` or `pipewire:NAME`: a camera of PipeWire's, with the name that people see.
+    PipeWire(Option<String>),
     /// `window`: seen on the screen.
     Window,
     /// `DIR/`, or any other name without an extension: numbered PNG files.
@@ -41,6 +48,11 @@ impl FromStr for Target {
             ("null", _) => Ok(Self::Null),
             ("-", _) => Ok(Self::Stdout),
             ("window", _) => Ok(Self::Window),
+            (PIPEWIRE, _) => Ok(Self::PipeWire(None)),
+            _ if let Some(label) = name.strip_prefix(PIPEWIRE).and_then(|rest| rest.strip_prefix(':')) => {
+                let is_label = !label.trim().is_empty() && !label.contains(char::is_control);
+                is_label.then(|| Self::PipeWire(Some(label.to_owned()))).ok_or(SinkError::NoLabel)
+            }
             _ if is_device(&path) => Ok(Self::Device(path)),
             _ if name.ends_with('/') => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
@@ -65,6 +77,8 @@ impl fmt::Display for Target {
             Self::Null => f.write_str("null"),
             Self::Stdout => f.write_str("-"),
             Self::Window => f.write_str("window"),
+            Self::PipeWire(None) => f.write_str(PIPEWIRE),
+            Self::PipeWire(Some(label)) => write!(f, "{PIPEWIRE}:{label}"),
             Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => path.display().fmt(f),
         }
     }
@@ -86,6 +100,10 @@ impl Target {
             Self::Device(path) => Box::new(Loopback::open(path, options)?),
             #[cfg(not(feature = "camera"))]
             Self::Device(path) => return Err(SinkError::NoCamera { path: path.clone() }),
+            #[cfg(feature = "pipewire")]
+            Self::PipeWire(label) => Box::new(PipeWire::open(label.as_deref(), options)?),
+            #[cfg(not(feature = "pipewire"))]
+            Self::PipeWire(_) => return Err(SinkError::NoPipeWire),
             Self::Window => return Err(SinkError::Window),
             Self::Folder(path) => Box::new(PngFolder::create(path, options)?),
         })
@@ -93,12 +111,12 @@ impl Target {
 
     /// Whether frames are seen as they come, and none later.
     pub fn is_live(&self) -> bool {
-        matches!(self, Self::Device(_) | Self::Window)
+        self.is_camera() || *self == Self::Window
     }
 
-    /// Whether this is a device: a virtual camera.
+    /// Whether this is a virtual camera.
     pub fn is_camera(&self) -> bool {
-        matches!(self, Self::Device(_))
+        matches!(self, Self::Device(_) | Self::PipeWire(_))
     }
 
     /// Whether both write to the same place.
@@ -106,6 +124,7 @@ impl Target {
         match (self, other) {
             (Self::Null, Self::Null) => false,
             (Self::Stdout, Self::Stdout) | (Self::Window, Self::Window) => true,
+            (Self::PipeWire(own), Self::PipeWire(others)) => own == others,
             _ => match (self.path(), other.path()) {
                 (Some(own), Some(others)) => same_place(own, others),
                 _ => false,
@@ -121,7 +140,7 @@ impl Target {
     /// The file, folder or device that this writes to, if it is one.
     pub fn path(&self) -> Option<&Path> {
         match self {
-            Self::Null | Self::Stdout | Self::Window => None,
+            Self::Null | Self::Stdout | Self::Window | Self::PipeWire(_) => None,
             Self::Y4m(path) | Self::Video(path) | Self::Device(path) | Self::Folder(path) => Some(path),
         }
     }

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::{Ending, Sink, SinkError};
 use crate::frame::ColorImage;
+use crate::stats::NodeUse;
 
 /// Gives every frame to each of its sinks, in turn. One whose reader has gone is completed and removed; once all are,
 /// [`Sink::put`] says `Break`. One that fails is removed, too, which is logged, and its error is returned at the end;
@@ -94,6 +95,14 @@ impl Sink for Tee {
     fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         let flow = self.each(|sink| Ok(sink.cover(card, time_ns)?.map_continue(|()| true)))?;
         Ok(flow.map_continue(|_| ()))
+    }
+
+    fn captured(&mut self, captured_ns: u64) {
+        self.sinks.iter_mut().for_each(|(_, sink)| sink.captured(captured_ns));
+    }
+
+    fn nodes(&self) -> Vec<NodeUse> {
+        self.sinks.iter().flat_map(|(_, sink)| sink.nodes()).collect()
     }
 
     fn hold(&self) -> Option<Duration> {

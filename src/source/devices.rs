@@ -45,9 +45,20 @@ pub fn cameras() -> Vec<Choice> {
 /// Virtual cameras that could be written to.
 pub fn virtual_cameras() -> Vec<Choice> {
     #[cfg(feature = "camera")]
-    return choices(Kind::Virtual);
+    let mut found = choices(Kind::Virtual);
     #[cfg(not(feature = "camera"))]
-    return Vec::new();
+    let mut found = Vec::new();
+    found.extend(pipewire());
+    found
+}
+
+/// The camera that PipeWire can be given, where it is there.
+fn pipewire() -> Option<Choice> {
+    #[cfg(feature = "pipewire")]
+    return crate::pipewire::is_there()
+        .then(|| Choice { name: "pipewire".to_owned(), label: "bokehcam (PipeWire)".to_owned() });
+    #[cfg(not(feature = "pipewire"))]
+    return None;
 }
 
 #[cfg(feature = "camera")]

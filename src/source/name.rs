@@ -11,6 +11,9 @@ use crate::capture::demo;
 /// What the synthetic scene is called.
 const SYNTHETIC: &str = "synthetic";
 
+/// How the name of a camera of PipeWire's begins.
+const PIPEWIRE: &str = "pipewire:";
+
 /// What kind of source frames come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -49,6 +52,9 @@ pub enum SourceName {
     /// A camera.
     #[cfg(feature = "camera")]
     Camera(Named),
+    /// A camera of PipeWire's, by what follows `pipewire:`.
+    #[cfg(all(feature = "camera", feature = "pipewire"))]
+    PipeWire(String),
     /// Two cameras, the left one first.
     #[cfg(feature = "camera")]
     Cameras([Named; 2]),
@@ -75,6 +81,8 @@ impl fmt::Display for SourceName {
             SourceName::Folder(path) | SourceName::Photo(path) => path.display().fmt(f),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => f.write_str(&camera.name),
+            #[cfg(all(feature = "camera", feature = "pipewire"))]
+            SourceName::PipeWire(name) => write!(f, "{PIPEWIRE}{name}"),
             #[cfg(feature = "camera")]
             SourceName::Cameras([left, right]) => write!(f, "{},{}", left.name, right.name),
         }
@@ -84,6 +92,9 @@ impl fmt::Display for SourceName {
 /// What can be a source.
 fn sources() -> &'static str {
     match cfg!(feature = "camera") {
+        true if cfg!(feature = "pipewire") => {
+            "a camera, pipewire:NAME, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic"
+        }
         true => "a camera, two cameras LEFT,RIGHT, a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
         false => "a photo (PNG or JPEG), a folder with a recording, demo or synthetic",
     }
@@ -131,6 +142,19 @@ fn parse_cameras(text: &str) -> Result<SourceName, String> {
     }
 }
 
+/// Parses what follows `pipewire:`; whether there is such a camera is seen when it is opened.
+fn parse_pipewire(name: &str) -> Result<SourceName, String> {
+    #[cfg(all(feature = "camera", feature = "pipewire"))]
+    return match name.is_empty() {
+        true => Err("pipewire:NAME needs the name of a camera; `bokehcam devices` lists them".to_owned()),
+        false => Ok(SourceName::PipeWire(name.to_owned())),
+    };
+    #[cfg(not(all(feature = "camera", feature = "pipewire")))]
+    return Err(format!(
+        "this build leaves PipeWire's cameras out (features `camera` and `pipewire`): {name} cannot be read"
+    ));
+}
+
 #[cfg(not(feature = "camera"))]
 fn parse_cameras(text: &str) -> Result<SourceName, String> {
     let what = if text.starts_with("/dev/") || text.parse::<u32>().is_ok() {
@@ -156,6 +180,7 @@ impl SourceName {
     pub fn from_os(name: &OsStr) -> Result<Self, String> {
         let path = Path::new(name);
         match name.to_str() {
+            Some(text) if text.starts_with(PIPEWIRE) => parse_pipewire(&text[PIPEWIRE.len()..]),
             Some(SYNTHETIC) => Ok(SourceName::Synthetic),
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
@@ -174,6 +199,8 @@ impl SourceName {
             SourceName::Demo => Kind::Demo,
             SourceName::Folder(_) => Kind::Recording,
             SourceName::Photo(_) => Kind::Photo,
+            #[cfg(all(feature = "camera", feature = "pipewire"))]
+            SourceName::PipeWire(_) => Kind::Camera,
             #[cfg(feature = "camera")]
             SourceName::Camera(_) | SourceName::Cameras(_) => Kind::Camera,
         }
@@ -193,6 +220,8 @@ impl SourceName {
             }
             SourceName::Synthetic => SYNTHETIC,
             SourceName::Demo => demo::NAME,
+            #[cfg(all(feature = "camera", feature = "pipewire"))]
+            SourceName::PipeWire(_) => "a camera",
             #[cfg(feature = "camera")]
             SourceName::Camera(_) | SourceName::Cameras(_) => "a camera",
         };
@@ -227,6 +256,8 @@ impl SourceName {
     pub fn devices(&self) -> Vec<&Path> {
         match self {
             SourceName::Synthetic | SourceName::Demo | SourceName::Folder(_) | SourceName::Photo(_) => Vec::new(),
+            #[cfg(all(feature = "camera", feature = "pipewire"))]
+            SourceName::PipeWire(_) => Vec::new(),
             #[cfg(feature = "camera")]
             SourceName::Camera(camera) => vec![&camera.node],
             #[cfg(feature = "camera")]

@@ -8,6 +8,8 @@ use super::{Frames, name};
 use crate::capture::Camera;
 use crate::capture::demo::Demo;
 use crate::capture::photo::Photo;
+#[cfg(all(feature = "camera", feature = "pipewire"))]
+use crate::capture::pipewire::PipeWireCamera;
 use crate::capture::replay::{Part, Replay};
 use crate::capture::synthetic::{Format, Synthetic};
 #[cfg(feature = "camera")]
@@ -104,6 +106,16 @@ impl Opened {
             SourceName::Camera(camera) => {
                 let camera = V4l2Camera::open(&camera.name, wish(frames), frames.control.clone(), frames.frames)?;
                 Ok(without_depth(Box::new(camera)))
+            }
+            #[cfg(all(feature = "camera", feature = "pipewire"))]
+            SourceName::PipeWire(name) => {
+                if let Some((control, value)) = frames.control.first() {
+                    let what = format!(
+                        "--control {control}={value}: a camera of PipeWire's has no controls here; use its /dev/videoN"
+                    );
+                    return SourceError::usage(what);
+                }
+                Ok(without_depth(Box::new(PipeWireCamera::open(name, wish(frames), frames.frames)?)))
             }
             #[cfg(feature = "camera")]
             SourceName::Cameras([left, right]) => {

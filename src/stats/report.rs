@@ -5,7 +5,7 @@ use std::io;
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::{Frames, Histogram, Timings};
+use super::{Frames, Histogram, NodeUse, Timings};
 
 /// What a run was made of, after all defaults were resolved.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +24,8 @@ pub struct About {
     pub elapsed_ns: u64,
     /// Processor time that the program used meanwhile.
     pub cpu_ns: u64,
+    /// Cameras that were given to PipeWire.
+    pub pipewire: Vec<NodeUse>,
 }
 
 /// The report (`--report`). Times are in milliseconds.
@@ -59,6 +61,9 @@ pub struct Report {
     pub elapsed_s: f64,
     /// Processor time that the program used meanwhile, all threads together, in seconds.
     pub cpu_s: f64,
+    /// What became of the pictures in cameras that were given to PipeWire.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pipewire: Vec<NodeUse>,
     /// What the window showed, where there was one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<WindowUse>,
@@ -174,6 +179,7 @@ impl Report {
             sink: about.sink,
             elapsed_s: ms(about.elapsed_ns) / 1000.0,
             cpu_s: ms(about.cpu_ns) / 1000.0,
+            pipewire: about.pipewire,
             window: None,
             versions: Versions {
                 bokehcam: env!("CARGO_PKG_VERSION"),
@@ -201,31 +207,6 @@ impl Spread {
     fn of(times: &Histogram) -> Option<Self> {
         let p = |p| ms(times.percentile_ns(p));
         (times.samples() > 0).then(|| Self { p50: p(0.5), p95: p(0.95), p99: p(0.99), max: ms(times.max_ns()) })
-    }
-}
-
-/// Frames per rung of the quality ladder, by the rungs' names.
-#[derive(Clone, Debug, Default)]
-pub struct RungCounts {
-    frames: Vec<(&'static str, u64)>,
-    last: Option<&'static str>,
-    switches: u64,
-}
-
-impl RungCounts {
-    /// Counts one frame at `rung`. Memory is taken only when a rung is seen for the first time.
-    pub fn add(&mut self, rung: &'static str) {
-        match self.frames.iter_mut().find(|seen| seen.0 == rung) {
-            Some(seen) => seen.1 += 1,
-            None => self.frames.push((rung, 1)),
-        }
-        self.switches += u64::from(self.last.replace(rung).is_some_and(|last| last != rung));
-    }
-
-    fn shares(&self) -> QualityUse {
-        let all: u64 = self.frames.iter().map(|rung| rung.1).sum();
-        let share = self.frames.iter().map(|&(rung, frames)| (rung, frames as f64 / all as f64));
-        QualityUse { share: share.collect(), switches: self.switches }
     }
 }
 
@@ -275,6 +256,9 @@ impl fmt::Display for Report {
         }
         if self.depth_held > 0 {
             write!(f, "\ndepth: {} frames took over that of an earlier one, to save time", self.depth_held)?;
+        }
+        for node in &self.pipewire {
+            write!(f, "\n{node}")?;
         }
         Ok(())
     }

@@ -36,6 +36,7 @@ use crate::source::{DepthChoice, DepthFrom, Source, SourceName};
 #[command(after_help = "\
 Examples:
   bokehcam stream /dev/video0 --to /dev/video10
+  bokehcam stream 0 --to pipewire --on-demand
   bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
   bokehcam stream 0,2 --calib stereo.yml --to /dev/video10
   bokehcam stream /dev/video4 --side-by-side --rectified --to /dev/video10
@@ -47,8 +48,8 @@ Examples:
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
-    /// folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or `synthetic` (a scene, rendered frame by
-    /// frame)
+    /// camera of PipeWire's (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or
+    /// `synthetic` (a scene, rendered frame by frame)
     #[arg(value_parser = options::source_name())]
     source: SourceName,
     #[arg(long, value_name = "SINK", required = true, help = TO)]
@@ -64,11 +65,11 @@ pub struct StreamCommand {
 }
 
 #[cfg(feature = "window")]
-const TO: &str = "/dev/videoN (virtual camera), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), \
-                  FILE.mp4, .mkv or .webm (ffmpeg), or null; may be given more than once";
+const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), window, DIR/ (numbered PNG), FILE.y4m, - (y4m on \
+                  standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null; may be given more than once";
 #[cfg(not(feature = "window"))]
-const TO: &str = "/dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on standard output), FILE.mp4, \
-                  .mkv or .webm (ffmpeg), or null; may be given more than once";
+const TO: &str = "pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, - (y4m on \
+                  standard output), FILE.mp4, .mkv or .webm (ffmpeg), or null; may be given more than once";
 
 /// Runs the command; `given` is for warnings and for the window. The report is written whenever the pipeline ran,
 /// however it ended.

@@ -157,9 +157,17 @@ impl Layout {
     /// # Errors
     /// Such pictures cannot be read.
     pub fn packed(fourcc: FourCc, width: u32, height: u32) -> Result<Self, LayoutError> {
+        Self::strided(fourcc, width, height, 0)
+    }
+
+    /// The same with `stride_bytes` from row to row of each plane's first component; 0 is without padding.
+    ///
+    /// # Errors
+    /// Such pictures cannot be read.
+    pub fn strided(fourcc: FourCc, width: u32, height: u32, stride_bytes: usize) -> Result<Self, LayoutError> {
         let plane_count = fourcc.family().map_or(1, |family| family.memory_planes());
         // Strides and sizes of 0 are computed, colour codes of 0 stand for V4L2's defaults.
-        let (planes, defaults) = ([Plane::default(); MAX_PLANES], 0);
+        let (planes, defaults) = ([Plane { stride_bytes, size_bytes: 0 }; MAX_PLANES], 0);
         Raw {
             fourcc,
             width,

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::shared::{self, SharedCamera};
 use super::{CliError, DevicesCommand};
 use crate::cli::terminal;
 use crate::cli::terminal::print;
@@ -25,10 +26,13 @@ struct DeviceInfo {
 }
 
 /// All devices shown, in groups.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct List {
     cameras: Vec<DeviceInfo>,
     virtual_cameras: Vec<DeviceInfo>,
+    /// Cameras of PipeWire's; among them may be those above.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pipewire: Vec<SharedCamera>,
     /// Neither of both: shown only when asked for by name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     others: Vec<DeviceInfo>,
@@ -40,14 +44,17 @@ struct List {
 /// There is no such device.
 pub fn run(command: &DevicesCommand) -> Result<(), CliError> {
     let list = match &command.device {
-        None => List::of(node::nodes(), false, command.controls),
-        Some(name) => List::of(find(name)?, true, command.controls),
+        None => List { pipewire: shared::all(), ..List::of(node::nodes(), false, command.controls) },
+        Some(name) => match name.strip_prefix("pipewire:") {
+            Some(name) => List { pipewire: shared::named(name)?, ..List::default() },
+            None => List::of(find(name)?, true, command.controls),
+        },
     };
     if command.json {
         // Numbers and texts always have a form in JSON.
         return print((serde_json::to_string_pretty(&list).unwrap_or_default() + "\n").as_bytes());
     }
-    if list.cameras.is_empty() && list.virtual_cameras.is_empty() && list.others.is_empty() {
+    if list.to_string().is_empty() {
         terminal::say("no camera and no virtual camera is here; `bokehcam doctor` says what to do");
         return Ok(());
     }
@@ -76,7 +83,7 @@ fn find(name: &str) -> Result<Vec<Node>, CliError> {
 impl List {
     /// Sorts nodes into groups; `asked_for` by name are even those that are no cameras.
     fn of(nodes: Vec<Node>, asked_for: bool, with_controls: bool) -> Self {
-        let mut list = Self { cameras: Vec::new(), virtual_cameras: Vec::new(), others: Vec::new() };
+        let mut list = Self::default();
         for node in nodes {
             let group = match node.kind {
                 Kind::Capture => &mut list.cameras,
@@ -115,7 +122,10 @@ impl std::fmt::Display for List {
                 f.write_str(&device.lines())?;
             }
         }
-        Ok(())
+        if !self.pipewire.is_empty() {
+            writeln!(f, "{}cameras of PipeWire", if first { "" } else { "\n" })?;
+        }
+        self.pipewire.iter().try_for_each(|camera| f.write_str(&camera.lines()))
     }
 }
 

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "camera")]
 mod list;
+#[cfg(feature = "camera")]
+mod shared;
 
 use clap::Args;
 
@@ -9,7 +11,7 @@ use crate::cli::error::CliError;
 
 /// List cameras and virtual cameras
 ///
-/// Cameras with their formats, sizes and rates, and who has them open; virtual cameras apart. Nodes that give no
+/// Cameras with their formats, sizes and rates, and who has them open; virtual cameras and cameras of PipeWire's apart. Nodes that give no
 /// pictures, such as those for metadata, are left out.
 #[derive(Args, Debug)]
 #[command(after_help = "\
@@ -19,7 +21,7 @@ Examples:
   bokehcam devices --json /dev/video0")]
 #[cfg_attr(not(feature = "camera"), allow(dead_code))]
 pub struct DevicesCommand {
-    /// One device only: its path, number, by-id name, or a part of its card's name
+    /// One device only: its path, number, by-id name, or a part of its card's name; pipewire:NAME for a camera of PipeWire's
     #[arg(value_name = "DEVICE")]
     device: Option<String>,
     /// Also the settings that the device itself has, such as exposure

@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::finding::{Finding, Level};
+#[cfg(feature = "pipewire")]
+use super::pipewire_camera;
 use super::system::System;
 use super::{CliError, cameras, computing, loopback};
 use crate::cli::terminal::print;
@@ -27,6 +29,18 @@ pub fn run(json: bool) -> Result<(), CliError> {
     let nodes = nodes();
     let mut findings = cameras::findings(&nodes, &system);
     findings.extend(loopback::findings(&nodes, &system));
+    #[cfg(feature = "pipewire")]
+    {
+        let verdict = pipewire_camera::check(&system);
+        // One way to a camera will do, and one way to be one.
+        for finding in findings.iter_mut().filter(|finding| finding.level == Level::Missing) {
+            let will_do = if finding.about == cameras::ABOUT { verdict.has_cameras } else { verdict.takes_cameras };
+            finding.level = if will_do { Level::Note } else { Level::Missing };
+        }
+        findings.extend(verdict.findings);
+    }
+    #[cfg(not(feature = "pipewire"))]
+    findings.push(Finding::note("PipeWire", "this program was built without it", "build it with the feature pipewire"));
     findings.extend(computing::findings());
     let missing: Vec<&str> = [cameras::ABOUT, loopback::ABOUT]
         .into_iter()

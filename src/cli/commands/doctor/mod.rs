@@ -10,6 +10,8 @@ mod finding;
 mod findings;
 #[cfg(feature = "camera")]
 mod loopback;
+#[cfg(all(feature = "camera", feature = "pipewire"))]
+mod pipewire_camera;
 #[cfg(feature = "camera")]
 mod system;
 
@@ -20,7 +22,7 @@ use crate::cli::error::CliError;
 /// Check this machine: cameras, virtual camera, permissions, GPU, programs
 ///
 /// Every finding comes with what to do about it. Good to have in a request for help. The exit code is 0 when there are
-/// a camera and a virtual camera to work with, else 1.
+/// a camera and a way to give others one (the module v4l2loopback, or PipeWire), else 1.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:

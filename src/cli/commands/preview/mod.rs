@@ -50,11 +50,11 @@ In the window, F1 shows all keys. Click to focus there, double-click to follow t
 copied as a command (K). A recording is played in a loop.")]
 pub struct PreviewCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
-    /// folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or `synthetic` (rendered while it plays)
-    /// [default: the first camera there is, else `demo`]
+    /// camera of PipeWire's (pipewire:NAME), a folder with a recording, a photo (PNG or JPEG), `demo` (the demonstration) or
+    /// `synthetic` (rendered while it plays) [default: the first camera there is, else `demo`]
     source: Option<String>,
-    /// Also write to /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or .webm from the start;
-    /// may be given more than once
+    /// Also write to pipewire, pipewire:NAME or /dev/videoN (virtual camera), DIR/ (numbered PNG), FILE.y4m, FILE.mp4, .mkv or
+    /// .webm from the start; may be given more than once
     #[arg(long, value_name = "SINK")]
     to: Vec<Target>,
     /// What `bokehcam ctl` knows this run by [default: preview, or preview-2 and so on]
@@ -105,9 +105,11 @@ pub fn show(
         sinks::check(to, parts, &source)?;
         unused::warn_by_source(&given.settings, source.kind());
     }
-    let outputs = to.iter().map(|target| match target.path() {
-        Some(path) => Ok(Output { name: path.display().to_string(), is_camera: target.is_live() }),
-        None => Err(usage("--to: beside a window, use a virtual camera, a folder or a file")),
+    let outputs = to.iter().map(|target| match target {
+        Target::Null | Target::Stdout | Target::Window => {
+            Err(usage("--to: beside a window, use a virtual camera, a folder or a file"))
+        }
+        target => Ok(Output { name: target.to_string(), is_camera: target.is_camera() }),
     });
     let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
     sinks::try_report(stream.report.as_deref())?;

@@ -1,0 +1,58 @@
+//! Frames in the buffers of a stream. PipeWire's bindings give their memory, but neither its header nor where it ends, so
+//! that this is done by hand.
+
+use std::slice;
+
+use pipewire::spa::sys;
+use pipewire::stream::Stream;
+
+/// When a picture was taken, by the system's monotonic clock, and its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    pub captured_ns: u64,
+    pub sequence: u64,
+}
+
+/// Has `fill` write a frame of `frame_bytes` bytes into a free buffer of `stream`, with `stride` bytes from row to row,
+/// and hands it to the readers. Returns whether there was one: readers may hold them all.
+///
+/// Only for the thread of the stream's loop.
+pub fn give(stream: &Stream, frame_bytes: usize, stride: i32, fill: impl FnOnce(&mut [u8]) -> Header) -> bool {
+    // SAFETY: the buffer, if it is not null, and all that it points to belong to this program from here to
+    // `queue_raw_buffer`: buffers are removed by the stream's loop alone, which is busy with this call. PipeWire has
+    // mapped `maxsize` bytes at `data` (flag MAP_BUFFERS) or left `data` null, and `chunk` and the header lie in memory
+    // that it shares with the readers, who do not write to it. `find_meta_data` returns null or a header of at least the
+    // size asked for. `fill` returns, or the program ends: this is called from C, through which nothing unwinds.
+    #[allow(unsafe_code)]
+    unsafe {
+        let handle = stream.dequeue_raw_buffer();
+        if handle.is_null() {
+            return false;
+        }
+        let buffer = (*handle).buffer;
+        let data = if (*buffer).n_datas == 0 { std::ptr::null_mut() } else { (*buffer).datas };
+        let has_room = !data.is_null() && !(*data).data.is_null() && (*data).maxsize as usize >= frame_bytes;
+        if has_room {
+            let header = fill(slice::from_raw_parts_mut((*data).data.cast::<u8>(), frame_bytes));
+            let chunk = (*data).chunk;
+            (*chunk).offset = 0;
+            (*chunk).size = frame_bytes as u32;
+            (*chunk).stride = stride;
+            (*chunk).flags = 0;
+            let size = size_of::<sys::spa_meta_header>();
+            let meta = sys::spa_buffer_find_meta_data(buffer, sys::SPA_META_Header, size);
+            if let Some(meta) = meta.cast::<sys::spa_meta_header>().as_mut() {
+                meta.flags = 0;
+                meta.offset = 0;
+                meta.pts = header.captured_ns as i64;
+                meta.dts_offset = 0;
+                meta.seq = header.sequence;
+            }
+        } else if !data.is_null() {
+            // A buffer that is too small goes out empty: there is no other way to give it back.
+            (*(*data).chunk).size = 0;
+        }
+        stream.queue_raw_buffer(handle);
+        has_room
+    }
+}

@@ -1,0 +1,152 @@
+//! What a camera of PipeWire's offers, read from its own notation.
+
+use pipewire::spa::param::format::{FormatProperties, MediaSubtype, MediaType};
+use pipewire::spa::param::video::VideoFormat;
+use pipewire::spa::pod::deserialize::PodDeserializer;
+use pipewire::spa::pod::{CanonicalFixedSizedPod, ChoiceValue, Object, Value};
+use pipewire::spa::utils::{Choice, ChoiceEnum, Fraction, Id, Rectangle};
+
+/// A picture format, by the name that the kernel has for it.
+pub type FourCc = [u8; 4];
+
+/// Formats that are known, and what PipeWire calls them.
+const FORMATS: [(FourCc, VideoFormat); 11] = [
+    (*b"YUYV", VideoFormat::YUY2),
+    (*b"UYVY", VideoFormat::UYVY),
+    (*b"YVYU", VideoFormat::YVYU),
+    (*b"NV12", VideoFormat::NV12),
+    (*b"NV21", VideoFormat::NV21),
+    (*b"YU12", VideoFormat::I420),
+    (*b"YV12", VideoFormat::YV12),
+    (*b"RGB3", VideoFormat::RGB),
+    (*b"BGR3", VideoFormat::BGR),
+    (*b"GREY", VideoFormat::GRAY8),
+    MOTION_JPEG,
+];
+/// Pictures by themselves have a place of their own in PipeWire's notation.
+const MOTION_JPEG: (FourCc, VideoFormat) = (*b"MJPG", VideoFormat::Encoded);
+
+/// What PipeWire calls a format; `None` where that is compressed.
+pub(super) fn video_format(fourcc: FourCc) -> Option<VideoFormat> {
+    let found = FORMATS.iter().find(|(known, _)| *known == fourcc)?.1;
+    (found != VideoFormat::Encoded).then_some(found)
+}
+
+/// Values that a camera offers of something.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Offer<T> {
+    /// It does not tell.
+    Unknown,
+    /// These and no others.
+    These(Vec<T>),
+    /// Every one between two.
+    Range { min: T, max: T },
+}
+
+impl<T> Offer<T> {
+    fn map<U>(self, change: impl Fn(T) -> U) -> Offer<U> {
+        match self {
+            Self::Unknown => Offer::Unknown,
+            Self::These(values) => Offer::These(values.into_iter().map(change).collect()),
+            Self::Range { min, max } => Offer::Range { min: change(min), max: change(max) },
+        }
+    }
+}
+
+/// A format with its sizes and rates.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mode {
+    pub fourcc: FourCc,
+    /// Columns and rows.
+    pub sizes: Offer<(u32, u32)>,
+    /// Pictures per second, as fractions.
+    pub rates: Offer<(u32, u32)>,
+}
+
+/// The modes in one entry of a camera's list: none where its formats are not known here.
+pub(super) fn read(pod: &[u8]) -> Vec<Mode> {
+    let Ok((_, Value::Object(object))) = PodDeserializer::deserialize_any_from(pod) else { return Vec::new() };
+    let id = |key: FormatProperties| match ids(value(&object, key)) {
+        Offer::These(values) => values,
+        _ => Vec::new(),
+    };
+    if id(FormatProperties::MediaType) != [MediaType::Video.as_raw()] {
+        return Vec::new();
+    }
+    let raw = id(FormatProperties::VideoFormat);
+    let is_known = |(fourcc, format): &(FourCc, VideoFormat)| match id(FormatProperties::MediaSubtype)[..] {
+        [subtype] if subtype == MediaSubtype::Raw.as_raw() => {
+            *fourcc != MOTION_JPEG.0 && raw.contains(&format.as_raw())
+        }
+        [subtype] if subtype == MediaSubtype::Mjpg.as_raw() => *fourcc == MOTION_JPEG.0,
+        _ => false,
+    };
+    let sizes = match value(&object, FormatProperties::VideoSize) {
+        Some(Value::Rectangle(size)) => Offer::These(vec![*size]),
+        Some(Value::Choice(ChoiceValue::Rectangle(choice))) => offer(choice),
+        _ => Offer::Unknown,
+    };
+    let rates = match value(&object, FormatProperties::VideoFramerate) {
+        Some(Value::Fraction(rate)) => Offer::These(vec![*rate]),
+        Some(Value::Choice(ChoiceValue::Fraction(choice))) => offer(choice),
+        _ => Offer::Unknown,
+    };
+    let sizes = sizes.map(|Rectangle { width, height }| (width, height));
+    let rates = rates.map(|Fraction { num, denom }| (num, denom));
+    let mode =
+        |(fourcc, _): &(FourCc, VideoFormat)| Mode { fourcc: *fourcc, sizes: sizes.clone(), rates: rates.clone() };
+    FORMATS.iter().filter(|known| is_known(known)).map(mode).collect()
+}
+
+fn value(object: &Object, key: FormatProperties) -> Option<&Value> {
+    object.properties.iter().find(|property| property.key == key.as_raw()).map(|property| &property.value)
+}
+
+fn ids(value: Option<&Value>) -> Offer<u32> {
+    match value {
+        Some(Value::Id(id)) => Offer::These(vec![id.0]),
+        Some(Value::Choice(ChoiceValue::Id(choice))) => offer(choice).map(|Id(id)| id),
+        _ => Offer::Unknown,
+    }
+}
+
+/// Without repetitions: the one that the camera prefers is mostly among the others as well.
+fn offer<T: CanonicalFixedSizedPod + Copy + PartialEq>(Choice(_, choice): &Choice<T>) -> Offer<T> {
+    match choice {
+        ChoiceEnum::None(value) => Offer::These(vec![*value]),
+        ChoiceEnum::Range { min, max, .. } | ChoiceEnum::Step { min, max, .. } => Offer::Range { min: *min, max: *max },
+        ChoiceEnum::Enum { default, alternatives } => {
+            let mut values = Vec::new();
+            for value in std::iter::once(default).chain(alternatives) {
+                if !values.contains(value) {
+                    values.push(*value);
+                }
+            }
+            Offer::These(values)
+        }
+        ChoiceEnum::Flags { .. } => Offer::Unknown,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipewire::param;
+
+    #[test]
+    fn what_is_written_is_read() {
+        for (fourcc, _) in FORMATS {
+            let pod = param::format(fourcc, (1280, 720), (30_000, 1001));
+            let mode =
+                Mode { fourcc, sizes: Offer::These(vec![(1280, 720)]), rates: Offer::These(vec![(30_000, 1001)]) };
+            assert_eq!(read(&pod), [mode]);
+        }
+    }
+
+    #[test]
+    fn what_is_no_list_of_formats_has_none() {
+        assert_eq!(read(&param::header()), []);
+        assert_eq!(read(&[]), []);
+        assert_eq!(read(&[8, 0, 0, 0, 15]), []);
+    }
+}

@@ -1,0 +1,132 @@
+//! Pictures as YUYV: Y Cb Y Cr, two pixels sharing their colour; BT.601, limited range, as readers of cameras assume.
+
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::frame::ColorImage;
+
+/// Encodes pictures of an even number of pixels.
+pub(super) struct Encoder {
+    arch: Arch,
+}
+
+impl Encoder {
+    pub(super) fn new() -> Self {
+        Self { arch: Arch::new() }
+    }
+
+    /// Encodes `picture` into `yuyv`, which has two bytes for each of its pixels.
+    pub(super) fn encode(&self, picture: &ColorImage, yuyv: &mut [u8]) {
+        self.arch.dispatch(Yuyv { rgb: &picture.rgb, yuyv });
+    }
+}
+
+/// Pixels that are converted together: whole vectors of every width.
+const BLOCK: usize = 64;
+
+/// Converts an even number of pixels, all rows as one: every pair from the first pixel on shares its chroma.
+struct Yuyv<'a> {
+    rgb: &'a [u8],
+    yuyv: &'a mut [u8],
+}
+
+impl WithSimd for Yuyv<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (blocks, rest) = self.rgb.as_chunks::<{ 3 * BLOCK }>();
+        let (to_blocks, to_rest) = self.yuyv.as_chunks_mut::<{ 2 * BLOCK }>();
+        for (rgb, yuyv) in blocks.iter().zip(to_blocks.iter_mut()) {
+            rgb_to_yuyv(rgb, yuyv);
+        }
+        if !rest.is_empty() {
+            // Padded to a block.
+            let (mut rgb, mut yuyv) = ([0; 3 * BLOCK], [0; 2 * BLOCK]);
+            rgb[..rest.len()].copy_from_slice(rest);
+            rgb_to_yuyv(&rgb, &mut yuyv);
+            let len = to_rest.len();
+            to_rest.copy_from_slice(&yuyv[..len]);
+        }
+    }
+}
+
+/// Converts pixels to YUYV (BT.601, limited range), within one code of the exact value. 16-bit integers with
+/// coefficients of 8 bits fit the most pixels into a vector.
+#[inline(always)]
+fn rgb_to_yuyv(rgb: &[u8; 3 * BLOCK], yuyv: &mut [u8; 2 * BLOCK]) {
+    let (mut r, mut g, mut b) = ([0_u16; BLOCK], [0_u16; BLOCK], [0_u16; BLOCK]);
+    for at in 0..BLOCK {
+        r[at] = u16::from(rgb[3 * at]);
+        g[at] = u16::from(rgb[3 * at + 1]);
+        b[at] = u16::from(rgb[3 * at + 2]);
+    }
+    let mut luma = [0_u8; BLOCK];
+    for at in 0..BLOCK {
+        // At most 56 228: no overflow.
+        luma[at] = (((66 * r[at] + 129 * g[at] + 25 * b[at] + 128) >> 8) + 16) as u8;
+    }
+    let mut chroma = [0_u8; BLOCK];
+    for pair in 0..BLOCK / 2 {
+        let sum = |values: &[u16; BLOCK]| (values[2 * pair] + values[2 * pair + 1]) as i16;
+        let (r, g, b) = (sum(&r), sum(&g), sum(&b));
+        // Coefficients are halved, since these are sums of two pixels: at most 28 560 to either side.
+        chroma[2 * pair] = (((56 * b - 19 * r - 37 * g + 128) >> 8) + 128) as u8;
+        chroma[2 * pair + 1] = (((56 * r - 47 * g - 9 * b + 128) >> 8) + 128) as u8;
+    }
+    for at in 0..BLOCK {
+        yuyv[2 * at] = luma[at];
+        yuyv[2 * at + 1] = chroma[at];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Y'CbCr of BT.601 in limited range, not rounded.
+    fn exact([r, g, b]: [f64; 3]) -> [f64; 3] {
+        let luma = 0.299 * r + 0.587 * g + 0.114 * b;
+        [
+            16.0 + 219.0 / 255.0 * luma,
+            128.0 + 224.0 / 255.0 * (b - luma) / (2.0 * (1.0 - 0.114)),
+            128.0 + 224.0 / 255.0 * (r - luma) / (2.0 * (1.0 - 0.299)),
+        ]
+    }
+
+    /// Every 5th value of each channel in pairs of unequal pixels; the count is no multiple of a block.
+    fn colors() -> ColorImage {
+        let values = || (0..=255).step_by(5).map(|value| value as u8);
+        let all = values().flat_map(|r| values().flat_map(move |g| values().map(move |b| [r, g, b])));
+        let rgb: Vec<u8> = all.skip(1).flat_map(|[r, g, b]| [r, g, b, g, 255 - r, b]).collect();
+        ColorImage { width: rgb.len() as u32 / 3, height: 1, rgb }
+    }
+
+    #[test]
+    fn every_colour_is_within_one_code_of_bt601() {
+        let picture = colors();
+        assert_ne!(picture.width as usize % BLOCK, 0);
+        for arch in [Arch::new(), Arch::Scalar] {
+            let mut bytes = vec![9; 2 * picture.width as usize];
+            Encoder { arch }.encode(&picture, &mut bytes);
+            for (pair, &[y0, cb, y1, cr]) in picture.rgb.as_chunks::<6>().0.iter().zip(bytes.as_chunks::<4>().0) {
+                let [left, right] =
+                    [[pair[0], pair[1], pair[2]], [pair[3], pair[4], pair[5]]].map(|rgb| rgb.map(f64::from));
+                let mean = [0, 1, 2].map(|channel| (left[channel] + right[channel]) / 2.0);
+                let wanted = [exact(left)[0], exact(mean)[1], exact(right)[0], exact(mean)[2]];
+                for (got, wanted) in [y0, cb, y1, cr].into_iter().zip(wanted) {
+                    assert!((f64::from(got) - wanted).abs() < 1.0, "{pair:?}: {got} not {wanted}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn grey_has_no_colour_and_the_whole_range() {
+        let grey = ColorImage { width: 256, height: 1, rgb: (0..=255).flat_map(|value| [value; 3]).collect() };
+        let mut bytes = vec![9; 512];
+        Encoder::new().encode(&grey, &mut bytes);
+        assert_eq!((bytes[0], bytes[510]), (16, 235));
+        assert!(bytes.as_chunks::<2>().0.iter().all(|&[_, chroma]| chroma == 128));
+        assert!(bytes.as_chunks::<2>().0.windows(2).all(|pair| pair[0][0] <= pair[1][0]));
+    }
+}

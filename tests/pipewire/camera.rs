@@ -1,0 +1,190 @@
+//! This program as a camera.
+
+use std::collections::HashMap;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use rustix::fs::inotify;
+
+use super::readers::GStreamer;
+use super::session::{FPS, PICTURES, Player, SIZE, folder, kill, node, picture, state, until, yuyv};
+
+/// The numbers of the pictures that readers got; before the first one there may be the still card.
+fn numbers(frames: &[Vec<u8>]) -> Vec<usize> {
+    let known: HashMap<Vec<u8>, usize> = (0..PICTURES).map(|number| (yuyv(&picture(number)), number)).collect();
+    let is_card = |frame: &&Vec<u8>| !known.contains_key(*frame);
+    let cards = frames.iter().take_while(is_card).count();
+    // One is shown in each tenth of a second at most, and the first picture comes within half a second.
+    assert!(cards <= 4, "{cards} cards");
+    assert!(frames[..cards].iter().all(|frame| *frame == frames[0] && frame.len() == frames[cards].len()));
+    let number = |frame: &Vec<u8>| *known.get(frame).expect("no picture of ours, byte by byte");
+    frames[cards..].iter().map(number).collect()
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn the_node_is_what_browsers_and_obs_list() {
+    folder();
+    let player = Player::start("desk-left", &["--to", "pipewire:Desk, left"]);
+    let info = &node("desk-left").unwrap()["info"];
+    for (key, value) in [("media.class", "Video/Source"), ("media.role", "Camera"), ("node.description", "Desk, left")]
+    {
+        assert_eq!(info["props"][key], value, "{key}");
+    }
+    let formats = info["params"]["EnumFormat"].as_array().unwrap();
+    assert_eq!(formats.len(), 1, "{formats:?}");
+    let format = &formats[0];
+    assert_eq!((&format["mediaSubtype"], &format["format"]), (&"raw".into(), &"YUY2".into()));
+    assert_eq!(format["size"], serde_json::json!({ "width": SIZE.0, "height": SIZE.1 }), "one size, and no choice");
+    assert_eq!(format["framerate"], serde_json::json!({ "num": FPS, "denom": 1 }));
+    assert_eq!(state("desk-left").as_deref(), Some("suspended"));
+    // Another one of that name is told apart, and both go when their programs do.
+    let other = Player::start("desk-left-2", &["--to", "pipewire:Desk, left"]);
+    assert_eq!(other.end()["pipewire"][0]["node"], "desk-left-2");
+    let report = player.end();
+    assert!(report["sink"].as_str().unwrap().starts_with("PipeWire camera desk-left (Desk, left)"), "{report}");
+    assert_eq!(report["pipewire"][0]["shown"], 0, "nobody watched");
+    until("the nodes to go", || (node("desk-left").is_none() && node("desk-left-2").is_none()).then_some(()));
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn readers_get_each_picture_as_it_is_in_order_and_in_time() {
+    folder();
+    let player = Player::start("bokehcam", &["--to", "pipewire"]);
+    let got = GStreamer::start("bokehcam", 60).end();
+    assert_eq!(got.frames.len(), 60);
+    assert!(got.sequence.windows(2).all(|pair| pair[1] == pair[0] + 1), "{:?}", got.sequence);
+    let numbers = numbers(&got.frames);
+    let steps: Vec<usize> = numbers.windows(2).map(|pair| (pair[1] + PICTURES - pair[0]) % PICTURES).collect();
+    // A busy machine may lose some on the way to the node, which the report counts.
+    assert!(steps.iter().filter(|step| **step == 1).count() >= 50 && !steps.contains(&0), "{steps:?}");
+    let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
+    for (pair, step) in times_ns.windows(2).zip(&steps) {
+        let due_ns = *step as u64 * 1_000_000_000 / u64::from(FPS);
+        let (since_ns, off_ns) = (pair[1] - pair[0], (pair[1] - pair[0]).abs_diff(due_ns));
+        assert!(off_ns < 5_000_000, "{since_ns} ns after {step} pictures");
+    }
+    let report = player.end();
+    assert!(report["pipewire"][0]["shown"].as_u64() >= Some(numbers.len() as u64), "{}", report["pipewire"]);
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn two_readers_at_once_get_the_full_rate() {
+    folder();
+    let player = Player::start("bokehcam", &["--to", "pipewire"]);
+    let mut first = GStreamer::start("bokehcam", 150);
+    std::thread::sleep(Duration::from_millis(700));
+    let second = GStreamer::start("bokehcam", 90).end();
+    assert!(first.is_reading(), "they read at the same time");
+    for got in [first.end(), second] {
+        let numbers = numbers(&got.frames);
+        let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
+        let seconds = (times_ns[times_ns.len() - 1] - times_ns[0]) as f64 / 1e9;
+        let rate = (times_ns.len() - 1) as f64 / seconds;
+        assert!(rate > 28.0, "{rate} pictures a second");
+    }
+    player.end();
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn a_reader_comes_after_the_session_manager_has_suspended_the_node() {
+    folder();
+    let player = Player::start("bokehcam", &["--to", "pipewire"]);
+    numbers(&GStreamer::start("bokehcam", 20).end().frames);
+    std::thread::sleep(Duration::from_secs(7));
+    assert_eq!(state("bokehcam").as_deref(), Some("suspended"));
+    numbers(&GStreamer::start("bokehcam", 20).end().frames);
+    player.end();
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn a_program_of_before_pipewire_reads_by_pw_v4l2() {
+    let player = Player::start("bokehcam", &["--to", "pipewire"]);
+    let to = folder().join("old.yuv");
+    let size = format!("{}x{}", SIZE.0, SIZE.1);
+    let read = Command::new("timeout")
+        .args(["20", "pw-v4l2", "ffmpeg", "-loglevel", "error", "-y", "-f", "v4l2", "-input_format", "yuyv422"])
+        .args(["-video_size", &size, "-i", "/dev/video0", "-frames:v", "20", "-f", "rawvideo"])
+        .arg(&to)
+        .output()
+        .unwrap();
+    assert!(read.status.success(), "{}", String::from_utf8_lossy(&read.stderr));
+    let frames: Vec<Vec<u8>> =
+        std::fs::read(&to).unwrap().chunks(2 * (SIZE.0 * SIZE.1) as usize).map(<[u8]>::to_vec).collect();
+    assert_eq!(frames.len(), 20);
+    numbers(&frames);
+    player.end();
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn the_camera_outlives_the_daemon() {
+    folder();
+    let player = Player::start("bokehcam", &["--to", "pipewire"]);
+    // This reader waits for ever when the daemon goes, and is ended.
+    let reader = GStreamer::start("bokehcam", 1000);
+    until("a reader", || (state("bokehcam")? == "running").then_some(()));
+    kill("pipewire");
+    drop(reader);
+    until("the node again", || node("bokehcam"));
+    // Who connects readers has to be back as well.
+    until("the session manager", || {
+        let told = Command::new("pw-cli").args(["ls", "Client"]).output().unwrap();
+        String::from_utf8_lossy(&told.stdout).contains("WirePlumber").then_some(())
+    });
+    numbers(&GStreamer::start("bokehcam", 30).end().frames);
+    let report = player.end();
+    assert_eq!(report["pipewire"][0]["returns"], 1, "{}", report["pipewire"]);
+}
+
+/// Tells when pictures of a recording are opened.
+struct Openings(std::os::fd::OwnedFd);
+
+impl Openings {
+    fn of(folder: &std::path::Path) -> Self {
+        let watch = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC).unwrap();
+        inotify::add_watch(&watch, folder, inotify::WatchFlags::OPEN).unwrap();
+        Self(watch)
+    }
+
+    /// Whether any was opened since the last question.
+    fn any(&self) -> bool {
+        let mut events = [0; 4096];
+        let mut any = false;
+        while rustix::io::read(&self.0, &mut events).is_ok_and(|bytes| bytes > 0) {
+            any = true;
+        }
+        any
+    }
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn the_source_is_read_only_while_somebody_watches() {
+    folder();
+    let player = Player::start("bokehcam", &["--to", "pipewire", "--on-demand"]);
+    let opened = Openings::of(&player.pictures());
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(!opened.any(), "nobody watches");
+    for _ in 0..2 {
+        let reader = GStreamer::start("bokehcam", 45);
+        let streams = until("a reader", || (state("bokehcam")? == "running").then(Instant::now));
+        until("a picture", || opened.any().then_some(()));
+        assert!(streams.elapsed() < Duration::from_millis(500), "{:?}", streams.elapsed());
+        numbers(&reader.end().frames);
+        let left = Instant::now();
+        // Off within a second of the last reader's leaving.
+        std::thread::sleep(Duration::from_secs(1).saturating_sub(left.elapsed()));
+        opened.any();
+        std::thread::sleep(Duration::from_secs(2));
+        assert!(!opened.any(), "nobody watches any more");
+    }
+    let report = player.end();
+    let captured = report["frames"]["captured"].as_u64().unwrap();
+    // 45 pictures and half a second, twice; a card or two among them.
+    assert!((80..=150).contains(&captured), "{captured} captured");
+}

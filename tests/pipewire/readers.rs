@@ -1,0 +1,72 @@
+//! Programs that read from a camera of PipeWire's.
+
+use std::process::{Child, Command, Stdio};
+
+use super::session::{SIZE, until};
+
+/// What GStreamer got.
+pub struct Got {
+    /// Pictures, encoded as they came.
+    pub frames: Vec<Vec<u8>>,
+    /// Their numbers.
+    pub sequence: Vec<u64>,
+    /// Their times.
+    pub times_ns: Vec<u64>,
+}
+
+/// GStreamer, which reads some pictures and ends.
+pub struct GStreamer {
+    child: Child,
+    folder: tempfile::TempDir,
+}
+
+impl GStreamer {
+    /// Starts to read so many pictures of a node.
+    pub fn start(node: &str, pictures: usize) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let caps = format!("video/x-raw,format=YUY2,width={},height={}", SIZE.0, SIZE.1);
+        let child = Command::new("gst-launch-1.0")
+            .args(["-v", "pipewiresrc", &format!("target-object={node}"), &format!("num-buffers={pictures}")])
+            .args(["!", &caps, "!", "identity", "silent=false", "!", "filesink"])
+            .arg(format!("location={}", folder.path().join("frames").display()))
+            .stdout(std::fs::File::create(folder.path().join("said")).unwrap())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        Self { child, folder }
+    }
+
+    pub fn is_reading(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_none()
+    }
+
+    /// Waits for its end.
+    pub fn end(mut self) -> Got {
+        until("the reader's end", || (!self.is_reading()).then_some(()));
+        let bytes = std::fs::read(self.folder.path().join("frames")).unwrap();
+        let said = std::fs::read_to_string(self.folder.path().join("said")).unwrap();
+        let chained: Vec<&str> = said.lines().filter(|line| line.contains("chain   *")).collect();
+        let field = |line: &str, name: &str| {
+            let value = line.split_once(name).unwrap().1;
+            value.split([',', ' ']).next().unwrap().to_owned()
+        };
+        Got {
+            frames: bytes.chunks(2 * (SIZE.0 * SIZE.1) as usize).map(<[u8]>::to_vec).collect(),
+            sequence: chained.iter().map(|line| field(line, "offset: ").parse().unwrap()).collect(),
+            times_ns: chained.iter().map(|line| nanoseconds(&field(line, "pts: "))).collect(),
+        }
+    }
+}
+
+impl Drop for GStreamer {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A time as GStreamer prints it: hours, minutes and seconds with nine decimals.
+fn nanoseconds(text: &str) -> u64 {
+    let seconds = text.split(':').fold(0.0, |sum, part| 60.0 * sum + part.parse::<f64>().unwrap());
+    (seconds * 1e9).round() as u64
+}

@@ -1,0 +1,189 @@
+//! The session, what is in it, and this program in it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use bokehcam::frame::ColorImage;
+use serde_json::Value;
+
+/// Longer than anything takes on a busy machine.
+pub const PATIENCE: Duration = Duration::from_secs(20);
+pub const SIZE: (u32, u32) = (320, 180);
+pub const FPS: u32 = 30;
+/// Pictures of the recording, which is played round and round.
+pub const PICTURES: usize = 40;
+
+/// The folder of the session that `tests/pipewire/session` made.
+pub fn folder() -> PathBuf {
+    assert!(std::env::var_os("PIPEWIRE_TEST_SESSION").is_some(), "not in a session of tests/pipewire/session");
+    PathBuf::from(std::env::var_os("XDG_RUNTIME_DIR").unwrap())
+}
+
+/// Waits until `is` gives something.
+pub fn until<T>(what: &str, mut is: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(found) = is() {
+            return found;
+        }
+        assert!(began.elapsed() < PATIENCE, "this took too long: {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Everything in the graph, as PipeWire's own program tells it.
+pub fn graph() -> Vec<Value> {
+    let told = Command::new("pw-dump").output().unwrap();
+    // While the daemon is away it says nothing, or half of it.
+    serde_json::from_slice(&told.stdout).unwrap_or_default()
+}
+
+/// The node of this name.
+pub fn node(name: &str) -> Option<Value> {
+    graph()
+        .into_iter()
+        .find(|object| object["info"]["props"]["node.name"] == name && object["info"]["state"].is_string())
+}
+
+/// The state of a node, such as `suspended`.
+pub fn state(name: &str) -> Option<String> {
+    node(name)?["info"]["state"].as_str().map(str::to_owned)
+}
+
+/// Picture number `number` of the recording: no two are alike.
+pub fn picture(number: usize) -> ColorImage {
+    let mut picture = ColorImage::new(SIZE.0, SIZE.1);
+    for (at, pixel) in picture.rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+        let (x, y) = (at % SIZE.0 as usize, at / SIZE.0 as usize);
+        *pixel = [(x + 5 * number) as u8, (2 * y) as u8, (6 * number) as u8];
+    }
+    picture
+}
+
+/// A picture as readers are to get it, by the formula of BT.601 in limited range with 8 bits.
+pub fn yuyv(picture: &ColorImage) -> Vec<u8> {
+    let codes = |pair: &[u8; 6]| {
+        let [left, right] = [[pair[0], pair[1], pair[2]], [pair[3], pair[4], pair[5]]].map(|rgb| rgb.map(i32::from));
+        let luma = |[r, g, b]: [i32; 3]| (((66 * r + 129 * g + 25 * b + 128) >> 8) + 16) as u8;
+        let [r, g, b] = [0, 1, 2].map(|channel| left[channel] + right[channel]);
+        let cb = (((56 * b - 19 * r - 37 * g + 128) >> 8) + 128) as u8;
+        let cr = (((56 * r - 47 * g - 9 * b + 128) >> 8) + 128) as u8;
+        [luma(left), cb, luma(right), cr]
+    };
+    picture.rgb.as_chunks::<6>().0.iter().flat_map(codes).collect()
+}
+
+/// A recording of [`PICTURES`] pictures, 30 a second.
+pub fn recording(folder: &Path) -> PathBuf {
+    let folder = folder.join("recording");
+    fs::create_dir_all(folder.join("rgb")).unwrap();
+    let mut list = String::new();
+    for number in 0..PICTURES {
+        let file = fs::File::create(folder.join(format!("rgb/{number}.png"))).unwrap();
+        let mut encoder = png::Encoder::new(file, SIZE.0, SIZE.1);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.write_header().unwrap().write_image_data(&picture(number).rgb).unwrap();
+        list += &format!("{:.6} rgb/{number}.png\n", number as f64 / f64::from(FPS));
+    }
+    fs::write(folder.join("rgb.txt"), list).unwrap();
+    folder
+}
+
+/// This program at work.
+pub struct Run {
+    child: Child,
+    folder: tempfile::TempDir,
+}
+
+impl Run {
+    pub fn start(arguments: &[&str]) -> Self {
+        Self::start_in(tempfile::tempdir().unwrap(), arguments)
+    }
+
+    fn start_in(folder: tempfile::TempDir, arguments: &[&str]) -> Self {
+        let child = Command::new(env!("CARGO_BIN_EXE_bokehcam"))
+            .args(arguments)
+            .args(["--quiet", "--report"])
+            .arg(folder.path().join("report.json"))
+            .stdout(Stdio::null())
+            .stderr(fs::File::create(folder.path().join("said")).unwrap())
+            .spawn()
+            .unwrap();
+        Self { child, folder }
+    }
+
+    fn said(&self) -> String {
+        fs::read_to_string(self.folder.path().join("said")).unwrap()
+    }
+
+    /// Waits for its end by an error of run time or of usage; returns what it said.
+    pub fn refused(mut self) -> String {
+        let ended = until("the refusal", || self.child.try_wait().unwrap());
+        assert!(matches!(ended.code(), Some(1 | 2)), "{ended}");
+        self.said()
+    }
+
+    /// Waits for its own end; returns its report.
+    pub fn ended(mut self) -> Value {
+        let ended = until("the end of the run", || self.child.try_wait().unwrap());
+        assert!(ended.success(), "{ended}: {}", self.said());
+        let report: Value = serde_json::from_slice(&fs::read(self.folder.path().join("report.json")).unwrap()).unwrap();
+        let frames = &report["frames"];
+        let number = |value: &Value| value.as_u64().unwrap();
+        let dropped: u64 = frames["dropped"].as_object().unwrap().values().map(number).sum();
+        let balanced = number(&frames["delivered"]) + dropped + number(&frames["in_flight"]);
+        assert_eq!(number(&frames["captured"]), balanced, "{frames}");
+        for node in report["pipewire"].as_array().into_iter().flatten() {
+            let put: u64 = ["shown", "unwatched", "overtaken", "no_buffer"].iter().map(|key| number(&node[key])).sum();
+            // The last one may be on its way.
+            assert!(put.abs_diff(number(&frames["delivered"])) <= 1, "{node} of {frames}");
+        }
+        report
+    }
+
+    /// Ends it as Ctrl-C does; returns its report.
+    pub fn end(self) -> Value {
+        assert!(Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap().success());
+        self.ended()
+    }
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// This program, which plays the recording into something.
+pub struct Player(Run);
+
+impl Player {
+    /// Starts it with more arguments, and waits until the node `name` is there.
+    pub fn start(name: &str, arguments: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let recording = recording(folder.path());
+        let all = ["stream", recording.to_str().unwrap(), "--loop", "--effect", "none", "--pace", "realtime"];
+        let player = Self(Run::start_in(folder, &[&all, arguments].concat()));
+        until("the node", || node(name));
+        player
+    }
+
+    /// Where the recording lies.
+    pub fn pictures(&self) -> PathBuf {
+        self.0.folder.path().join("recording/rgb")
+    }
+
+    /// Ends it as Ctrl-C does; returns its report.
+    pub fn end(self) -> Value {
+        self.0.end()
+    }
+}
+
+/// Kills a daemon of the session at once; it comes back after a second.
+pub fn kill(daemon: &str) {
+    let process = fs::read_to_string(folder().join(format!("{daemon}.pid"))).unwrap();
+    assert!(Command::new("kill").args(["-KILL", process.trim()]).status().unwrap().success());
+}
