@@ -58,6 +58,7 @@ const COMMANDS: [&[&str]; 13] = [
     &["devices"],
     &["doctor"],
     &["completions"],
+    &["manual"],
     &["config"],
     &["config", "dump"],
     &["config", "save"],

@@ -23,6 +23,7 @@ const LAYERS: [&[&str]; 12] = [
 const DOORS: [(&str, &[&str]); 29] = [
     ("clap", &["cli", "source/options"]),
     ("clap_complete", &["cli"]),
+    ("clap_mangen", &["cli"]),
     ("crossbeam_channel", &["link"]),
     ("ctrlc", &["cli"]),
     ("egui", &["preview"]),

@@ -6,6 +6,7 @@ mod ctl;
 mod depth;
 mod devices;
 mod doctor;
+mod manual;
 #[cfg(feature = "networks")]
 mod models;
 mod plate;
@@ -70,6 +71,8 @@ Examples:
         #[arg(value_enum)]
         shell: clap_complete::Shell,
     },
+    #[command(hide = true)]
+    Manual(manual::ManualCommand),
     /// Show the settings
     #[command(subcommand, after_help = "Examples:\n  bokehcam config dump\n  bokehcam config save --rim 0.1")]
     Config(ConfigCommand),
@@ -124,6 +127,7 @@ pub fn perform(cli: Cli, matches: &ArgMatches, file: &SettingsFile, layers: &Lay
             clap_complete::generate(shell, &mut Cli::command(), "bokehcam", &mut script);
             print(&script)
         }
+        Command::Manual(command) => manual::run(&command, Cli::command()),
         Command::Config(ConfigCommand::Dump { .. }) => {
             print(dump::as_toml(&layers.resolved(matches), &file.presets).as_bytes())
         }

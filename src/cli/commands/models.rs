@@ -26,6 +26,7 @@ pub struct ModelsCommand {
 #[derive(Subcommand, Debug)]
 enum What {
     /// Check that a file is a network that is known, and copy it to where it is looked for
+    #[command(after_help = "Example:\n  bokehcam models add selfie_segmentation_landscape.onnx")]
     Add {
         /// The file, .onnx
         file: PathBuf,
