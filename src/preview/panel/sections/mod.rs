@@ -1,6 +1,7 @@
 //! The panel's sections, top to bottom.
 
 mod aperture;
+mod backdrop;
 mod blur;
 mod effect;
 mod focus;
@@ -111,6 +112,9 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet, editing: &mut Editing, thumbs: &mut 
     if blurs {
         part(ui, sheet, "Blur", true, blur::show);
         part(ui, sheet, "Aperture", true, |ui, sheet| aperture::show(ui, sheet, thumbs));
+    }
+    if sheet.follows_depth() {
+        part(ui, sheet, "Backdrop", false, backdrop::show);
     }
     part(ui, sheet, "View", true, view::show);
     if !sheet.state.controls.is_empty() {

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use super::{Window, sample};
+use crate::depth::backdrop::Behind;
 use crate::depth::plate::Step;
-use crate::look::{Effect, Strength};
+use crate::look::{Effect, Follow, Strength};
 use crate::preview::keys::GROUPS;
 use crate::preview::state::{Action, Output, Source, State, Transport, tweak};
 use crate::preview::texts::{self, tests as table};
@@ -12,7 +13,7 @@ use crate::preview::views::Legend;
 
 /// Windows that together show about all that can be shown.
 fn windows() -> Vec<Window> {
-    let changes: [&dyn Fn(&mut State); 13] = [
+    let changes: [&dyn Fn(&mut State); 14] = [
         &|_| {},
         &|state| {
             state.transport = Some(Transport { place: 3, frames: 24, time_ns: 1, length_ns: 9 });
@@ -29,6 +30,9 @@ fn windows() -> Vec<Window> {
             state.look.aperture.shape =
                 crate::bokeh::aperture::Shape::Polygon { blades: 6, rotation_deg: 0.0, curvature: 0.1 };
             state.split = Some(0.5);
+        },
+        &|state| {
+            (state.look.behind, state.look.follow) = (Behind::Color([1, 2, 3]), Follow::to(2.0));
         },
         &|state| state.help = true,
         &|state| {
@@ -54,7 +58,7 @@ fn windows() -> Vec<Window> {
     for change in changes {
         let mut state = sample::state();
         state.outputs = vec![Output { name: "clip.mp4".into(), is_camera: false }];
-        for section in ["Camera", "For experts"] {
+        for section in ["Camera", "For experts", "Backdrop"] {
             state.apply(Action::Section(section, true));
         }
         change(&mut state);
