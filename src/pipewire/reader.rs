@@ -290,7 +290,8 @@ impl Listener {
         }
         let header = buffer.find_meta::<MetaHeader>().cloned();
         let sequence = header.as_ref().map_or(0, MetaHeader::seq);
-        let gap = self.sequence.replace(Some(sequence)).map_or(0, |last| sequence.saturating_sub(last + 1));
+        let gap =
+            self.sequence.replace(Some(sequence)).map_or(0, |last| sequence.saturating_sub(last.saturating_add(1)));
         let missed = if gap > MOST_MISSED { 0 } else { gap.saturating_sub(stale) };
         let mut is_corrupt = header.as_ref().is_some_and(|header| header.flags().contains(MetaHeaderFlags::CORRUPTED));
         let told_ns = header.as_ref().and_then(|header| u64::try_from(header.pts()).ok());

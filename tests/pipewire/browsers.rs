@@ -87,10 +87,14 @@ impl Desktop {
         );
         let desktop = Self { display, _screen: screen, _portal: portal };
         until("the portal to see the camera", || {
-            let asked = ["--user", "get-property", "org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop"];
-            let camera = ["org.freedesktop.portal.Camera", "IsCameraPresent"];
-            let told = Command::new("busctl").args(asked).args(camera).output().unwrap();
-            told.stdout.starts_with(b"b true").then_some(())
+            let told = Command::new("gdbus")
+                .args(["call", "--session", "--dest", "org.freedesktop.portal.Desktop"])
+                .args(["--object-path", "/org/freedesktop/portal/desktop"])
+                .args(["--method", "org.freedesktop.DBus.Properties.Get"])
+                .args(["org.freedesktop.portal.Camera", "IsCameraPresent"])
+                .output()
+                .unwrap();
+            told.stdout.starts_with(b"(<true>").then_some(())
         });
         desktop
     }
@@ -211,6 +215,11 @@ fn firefox_shows_the_camera_as_it_is() {
             ("media.autoplay.default", "0"),
             ("datareporting.policy.dataSubmissionEnabled", "false"),
             ("browser.shell.checkDefaultBrowser", "false"),
+            // No page of its own before ours: what is not seen is not shown.
+            ("browser.aboutwelcome.enabled", "false"),
+            ("browser.startup.homepage_override.mstone", "\"ignore\""),
+            ("datareporting.policy.firstRunURL", "\"\""),
+            ("startup.homepage_welcome_url", "\"\""),
             // Else what a canvas tells is noise.
             ("privacy.resistFingerprinting", "false"),
         ];

@@ -7,14 +7,15 @@ use std::time::{Duration, Instant};
 use rustix::fs::inotify;
 
 use super::readers::GStreamer;
-use super::session::{FPS, PICTURES, Player, SIZE, folder, kill, node, picture, state, until, yuyv};
+use super::session::{FPS, PICTURES, Player, SIZE, folder, in_a_calm_moment, kill, node, picture, state, until, yuyv};
 
 /// The numbers of the pictures that readers got; before the first one there may be the still card.
 fn numbers(frames: &[Vec<u8>]) -> Vec<usize> {
     let known: HashMap<Vec<u8>, usize> = (0..PICTURES).map(|number| (yuyv(&picture(number)), number)).collect();
     let is_card = |frame: &&Vec<u8>| !known.contains_key(*frame);
     let cards = frames.iter().take_while(is_card).count();
-    // One is shown in each tenth of a second at most, and the first picture comes within half a second.
+    // One is shown in each tenth of a second at most, and the first picture comes within half a second, also on a machine
+    // that is busy.
     assert!(cards <= 4, "{cards} cards");
     assert!(frames[..cards].iter().all(|frame| *frame == frames[0] && frame.len() == frames[cards].len()));
     let number = |frame: &Vec<u8>| *known.get(frame).expect("no picture of ours, byte by byte");
@@ -52,21 +53,24 @@ fn the_node_is_what_browsers_and_obs_list() {
 fn readers_get_each_picture_as_it_is_in_order_and_in_time() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
-    let got = GStreamer::start("bokehcam", 60).end();
-    assert_eq!(got.frames.len(), 60);
-    assert!(got.sequence.windows(2).all(|pair| pair[1] == pair[0] + 1), "{:?}", got.sequence);
-    let numbers = numbers(&got.frames);
-    let steps: Vec<usize> = numbers.windows(2).map(|pair| (pair[1] + PICTURES - pair[0]) % PICTURES).collect();
-    // A busy machine may lose some on the way to the node, which the report counts.
-    assert!(steps.iter().filter(|step| **step == 1).count() >= 50 && !steps.contains(&0), "{steps:?}");
-    let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
-    for (pair, step) in times_ns.windows(2).zip(&steps) {
-        let due_ns = *step as u64 * 1_000_000_000 / u64::from(FPS);
-        let (since_ns, off_ns) = (pair[1] - pair[0], (pair[1] - pair[0]).abs_diff(due_ns));
-        assert!(off_ns < 5_000_000, "{since_ns} ns after {step} pictures");
-    }
+    let mut read = 0;
+    in_a_calm_moment(|| {
+        let got = GStreamer::start("bokehcam", 60).end();
+        assert_eq!(got.frames.len(), 60);
+        assert!(got.sequence.windows(2).all(|pair| pair[1] == pair[0] + 1), "{:?}", got.sequence);
+        let numbers = numbers(&got.frames);
+        read += numbers.len();
+        let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
+        assert!(times_ns.windows(2).all(|pair| pair[0] < pair[1]), "{times_ns:?}");
+        let steps: Vec<usize> = numbers.windows(2).map(|pair| (pair[1] + PICTURES - pair[0]) % PICTURES).collect();
+        let off_ns = times_ns.windows(2).map(|pair| (pair[1] - pair[0]).abs_diff(1_000_000_000 / u64::from(FPS)));
+        match off_ns.max() {
+            Some(off_ns) if off_ns < 5_000_000 && steps.iter().all(|step| *step == 1) => Ok(()),
+            off_ns => Err(format!("{off_ns:?} ns off, {steps:?}")),
+        }
+    });
     let report = player.end();
-    assert!(report["pipewire"][0]["shown"].as_u64() >= Some(numbers.len() as u64), "{}", report["pipewire"]);
+    assert!(report["pipewire"][0]["shown"].as_u64() >= Some(read as u64), "{}", report["pipewire"]);
 }
 
 #[test]
@@ -74,17 +78,18 @@ fn readers_get_each_picture_as_it_is_in_order_and_in_time() {
 fn two_readers_at_once_get_the_full_rate() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
-    let mut first = GStreamer::start("bokehcam", 150);
-    std::thread::sleep(Duration::from_millis(700));
-    let second = GStreamer::start("bokehcam", 90).end();
-    assert!(first.is_reading(), "they read at the same time");
-    for got in [first.end(), second] {
-        let numbers = numbers(&got.frames);
-        let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
-        let seconds = (times_ns[times_ns.len() - 1] - times_ns[0]) as f64 / 1e9;
-        let rate = (times_ns.len() - 1) as f64 / seconds;
-        assert!(rate > 28.0, "{rate} pictures a second");
-    }
+    in_a_calm_moment(|| {
+        let mut first = GStreamer::start("bokehcam", 150);
+        std::thread::sleep(Duration::from_millis(700));
+        let second = GStreamer::start("bokehcam", 90).end();
+        assert!(first.is_reading(), "they read at the same time");
+        let rates = [first.end(), second].map(|got| {
+            let numbers = numbers(&got.frames);
+            let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
+            (times_ns.len() - 1) as f64 * 1e9 / (times_ns[times_ns.len() - 1] - times_ns[0]) as f64
+        });
+        if rates.iter().all(|rate| *rate > 28.0) { Ok(()) } else { Err(format!("{rates:?} pictures a second")) }
+    });
     player.end();
 }
 

@@ -33,6 +33,18 @@ pub fn until<T>(what: &str, mut is: impl FnMut() -> Option<T>) -> T {
     }
 }
 
+/// Tries what takes a machine with time to spare, which a busy one may have for a moment only: six times at most.
+pub fn in_a_calm_moment(mut attempt: impl FnMut() -> Result<(), String>) {
+    let mut failed = Vec::new();
+    for _ in 0..6 {
+        match attempt() {
+            Ok(()) => return,
+            Err(why) => failed.push(why),
+        }
+    }
+    panic!("{}", failed.join("\n"));
+}
+
 /// Everything in the graph, as PipeWire's own program tells it.
 pub fn graph() -> Vec<Value> {
     let told = Command::new("pw-dump").output().unwrap();

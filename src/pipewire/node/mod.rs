@@ -15,6 +15,9 @@ use self::provider::Provider;
 use super::PipeWireError;
 use super::wake::Waker;
 
+/// How long the daemon may take to have the node in its graph.
+const PATIENCE: Duration = Duration::from_secs(10);
+
 /// What a node is called, and what it shows.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -95,8 +98,7 @@ impl Node {
         let thread = thread::Builder::new().name("pipewire".into()).spawn(move || provider.run(&bell, &end, &ready));
         let thread = Some(thread.map_err(PipeWireError::Thread)?);
         let mut node = Self { name: String::new(), waker, stop, counts, thread };
-        // Without an answer the thread has ended, and said why as it did.
-        node.name = is_ready.recv().map_err(|_| PipeWireError::Silent)??;
+        node.name = is_ready.recv_timeout(PATIENCE).map_err(|_| PipeWireError::Silent)??;
         Ok(node)
     }
 

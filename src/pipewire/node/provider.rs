@@ -189,6 +189,7 @@ impl Provider {
                 if self.is_streaming.get() {
                     // Pictures are given by the loop alone, which has to be woken for that.
                     self.is_again.set(true);
+                    self.since_ns.set(self.clock.now_ns());
                     waker.wake();
                 } else {
                     self.tell(false);
