@@ -1,8 +1,9 @@
 //! PipeWire: cameras that the programs of a session share, without a kernel module.
 //!
 //! A camera is a node of the class `Video/Source` with the role `Camera`; [`node`] makes one, [`graph`] lists those that
-//! there are, and [`reader`] reads from one. Everything of PipeWire's belongs to the thread that made it, so each node has a thread of its own,
-//! which is woken by a counter of the kernel's ([`wake`]): its loop takes no lock on a frame's way.
+//! there are, and [`reader`] reads from one. Everything of PipeWire's belongs to the thread that made it, so each node and
+//! each reader has a thread of its own, which is woken by a counter of the kernel's (`wake`): no lock is taken on a frame's
+//! way.
 
 mod buffer;
 mod error;

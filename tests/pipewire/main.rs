@@ -1,7 +1,8 @@
 //! Cameras of PipeWire, with its daemons in a session of their own, and other programs as readers.
 //!
 //! `scripts/test` runs them where there are such daemons. By hand:
-//! `tests/pipewire/session cargo test --test pipewire -- --include-ignored --test-threads=1`
+//! `tests/pipewire/session cargo test --test pipewire -- --include-ignored --test-threads=1`, with `--skip browsers::` where
+//! there are none.
 #![cfg(feature = "pipewire")]
 #![allow(missing_docs)]
 
