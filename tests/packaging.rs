@@ -54,7 +54,8 @@ fn there_is_a_manual_page_of_every_command_with_every_flag() {
         let name = [&["bokehcam".to_owned()], command.as_slice()].concat().join("-");
         let page = fs::read_to_string(out.join(format!("{name}.1"))).unwrap_or_else(|error| panic!("{name}: {error}"));
         let page = page.replace("\\-", "-");
-        assert!(page.contains(".SH EXAMPLES"), "{name} has no examples");
+        // What lies below a command may leave them to it.
+        assert!(command.len() > 1 || page.contains(".SH EXAMPLES"), "{name} has no examples");
         assert!(page.contains(env!("CARGO_PKG_VERSION")), "{name} does not say its version");
         let flags = flags(help);
         assert!(flags.len() >= 4, "{name}: {flags:?}");
