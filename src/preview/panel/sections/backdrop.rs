@@ -49,7 +49,7 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         ui.horizontal(|ui| {
             ui.label(tr("Colour"));
             let picker = ui.color_edit_button_srgb(&mut color);
-            picker.widget_info(|| WidgetInfo::labeled(Role::ColorInput, true, tr("Colour")));
+            picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
             if picker.hint("Another colour").changed() {
                 sheet.look.behind = Behind::Color(color);
                 sheet.changed(true, "colour behind");
