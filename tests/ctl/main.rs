@@ -171,7 +171,16 @@ fn it_reacts_at_once() {
         assert!(answer.contains("\"status\""), "{answer}");
         world.tell("stream", b"{\"do\":\"on\"}\n");
     }
-    for (what, mut times) in [("an answer", answers), ("the command", commands), ("to the card", cards)] {
+    let looks = (0..10).map(|_| {
+        world.tell("stream", b"{\"do\":\"set\",\"settings\":[\"blur=0.5%\"]}\n");
+        pictures.wait_for("little blur", |picture| picture.detail() > 2.0);
+        let began = Instant::now();
+        world.tell("stream", b"{\"do\":\"set\",\"settings\":[\"blur=8%\"]}\n");
+        pictures.wait_for("much blur", |picture| picture.detail() < 1.2).at.saturating_duration_since(began)
+    });
+    let looks = looks.collect();
+    let all = [("an answer", answers), ("the command", commands), ("to the card", cards), ("to another look", looks)];
+    for (what, mut times) in all {
         times.sort();
         println!("{what}: median {:.1?}, longest {:.1?}", times[5], times[9]);
         assert!(times[5] < Duration::from_secs(1), "{what}: {times:?}");

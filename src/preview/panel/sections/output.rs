@@ -1,6 +1,6 @@
 //! Where pictures go besides the window.
 
-use egui::{Align2, Button, CornerRadius, Role, Sense, Stroke, TextStyle, Ui, Vec2, WidgetInfo, vec2};
+use egui::{Align, Align2, Button, CornerRadius, Layout, Role, Sense, Stroke, TextStyle, Ui, Vec2, WidgetInfo, vec2};
 
 use super::Sheet;
 use crate::preview::panel::parts::{Hinted, list, path, remark};
@@ -32,21 +32,17 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         let hint = "The command line that does the same, to the clipboard (K)";
         button("Copy command", hint, false, half, Action::CopyCommand);
     });
-    let off = egui::Button::new(tr("Off: a still card")).selected(state.off).min_size(vec2(ui.available_width(), 28.0));
-    if ui
-        .add(off)
-        .on_hover_text(tr("No picture leaves this program, and the camera rests, until it is on again"))
-        .clicked()
-    {
-        sheet.act(Action::Off(!state.off));
-    }
     if let Some(folder) = &state.kept_in {
         let open = Button::new(tr("Open folder")).min_size(vec2(ui.available_width(), 28.0));
         if ui.add(open).on_hover_text(folder.display().to_string()).clicked() {
             sheet.act(Action::OpenFolder);
         }
     }
-    ui.label(tr("Virtual camera")).hint("For calls: other programs see the picture as a camera's (O)");
+    ui.scope(|ui| {
+        // The button takes no more room than the name beside it.
+        ui.spacing_mut().interact_size.y = 0.0;
+        name_and_off(ui, sheet);
+    });
     if state.virtual_cameras.is_empty() {
         remark(ui, NO_VIRTUAL_CAMERA);
         return;
@@ -63,6 +59,20 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     if let Some(camera) = list(ui, "Virtual camera", &shown, all, &current) {
         sheet.act(Action::VirtualCamera(camera.map(str::to_owned)));
     }
+}
+
+/// What the virtual camera is called, and the button that keeps pictures from all outputs.
+fn name_and_off(ui: &mut Ui, sheet: &mut Sheet) {
+    let is_off = sheet.state.off;
+    ui.horizontal(|ui| {
+        ui.label(tr("Virtual camera")).hint("For calls: other programs see the picture as a camera's (O)");
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let off = ui.add(Button::new(tr("Still card")).small().selected(is_off));
+            if off.hint("No picture leaves this program, and the camera rests, until it is on again").clicked() {
+                sheet.act(Action::Off(!is_off));
+            }
+        });
+    });
 }
 
 /// Draws the button that starts and stops a recording. Whether it was clicked.
