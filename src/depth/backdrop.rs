@@ -154,14 +154,14 @@ impl Backdrop {
             return true;
         }
         let mut rgb = [0; 3];
-        for p in 0..3 {
+        for (p, code) in rgb.iter_mut().enumerate() {
             let (light, behind) =
                 (self.light[usize::from(color.rgb[3 * at + p])], self.light[usize::from(self.scaled.rgb[3 * at + p])]);
             let surfaces =
                 [light + (1.0 - pixel.share) * pixel.difference[p], light - pixel.share * pixel.difference[p]];
             let [near, far] = [0, 1].map(|k| surfaces[k] + shares[k] * (behind - surfaces[k]));
             pixel.difference[p] = near - far;
-            rgb[p] = self.encode(far + pixel.share * (near - far));
+            *code = self.encode(far + pixel.share * (near - far));
         }
         pixel.behind = 1.0;
         let [near_m, far_m] = [(pixel.near_m, shares[0]), (pixel.far_m, shares[1])].map(|(m, s)| pulled(m, s, lens));

@@ -180,7 +180,7 @@ mod tests {
             assert!((part.center[0] - 0.4).abs() < 0.02 || part.zoom < 1.3, "{part:?}");
             assert!(part.zoom <= most + 1e-5 && part.zoom > 1.1);
             let top = part.center[1] - 0.5 / part.zoom;
-            assert!(top < 0.3 && top >= 0.0, "the head is in it: {part:?}");
+            assert!((0.0..0.3).contains(&top), "the head is in it: {part:?}");
             assert_eq!(part, part.inside());
         }
     }

@@ -39,7 +39,7 @@ pub struct CocMaker {
 
 enum Finisher {
     Keep,
-    Fill(Filler),
+    Fill(Box<Filler>),
     Refine(Box<Refiner>),
 }
 
@@ -47,7 +47,7 @@ impl Finisher {
     fn new(finish: Finish, mending: Mending) -> Self {
         match finish {
             Finish::Keep => Self::Keep,
-            Finish::Fill => Self::Fill(Filler::new()),
+            Finish::Fill => Self::Fill(Box::default()),
             Finish::Refine => Self::Refine(Box::new(Refiner::mending(mending))),
         }
     }
