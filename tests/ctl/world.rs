@@ -164,7 +164,9 @@ impl Picture {
 
 /// The pictures of a y4m stream, of which the last is kept, and for each whether it was the card.
 #[derive(Clone)]
-pub struct Pictures(Arc<Mutex<(Vec<(Instant, bool)>, Option<Picture>)>>);
+pub struct Pictures(Arc<Mutex<Seen>>);
+
+type Seen = (Vec<(Instant, bool)>, Option<Picture>);
 
 impl Pictures {
     fn of(from: ChildStdout) -> Self {
