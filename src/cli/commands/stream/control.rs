@@ -1,6 +1,6 @@
 //! A stream, as others control it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -254,7 +254,7 @@ fn free_name() -> Result<PathBuf, CliError> {
         1 => folder.join(format!("{stem}.png")),
         number => folder.join(format!("{stem}-{number}.png")),
     };
-    let is_free = |path: &PathBuf| Path::symlink_metadata(path).is_err();
+    let is_free = |path: &PathBuf| path.symlink_metadata().is_err();
     (1..1000).map(path).find(is_free).ok_or_else(|| CliError::Exists(path(1)))
 }
 
