@@ -97,11 +97,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         let what = "--pace asap: a camera gives its frames when it takes them; leave --pace out";
         return Err(CliError::Usage(what.to_string()));
     }
-    let is_live = stream.pace == Some(Pace::Realtime)
-        || !command.source.devices().is_empty()
-        || command.to.iter().any(Target::is_live);
-    let wish = controlled::Wish { name: command.name.as_ref(), command: "stream", is_live };
-    let claim = controlled::claim(&wish, global)?;
+    let claim = controlled::claim(command.name.as_ref(), "stream")?;
     let look = look::look(&parts.blur, &parts.computing.quality)?;
     let options = parts.source_options();
     let source = Source::open(&command.source, &options, Some(&look))?;
@@ -162,6 +158,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     let period = Duration::from_nanos(info.period_ns);
     let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), Arc::default());
     let (changes, to_come) = Changes::new(look.clone(), info.size, adaptive);
+    if let Some(why) = claim.as_ref().err().filter(|_| is_live || adaptive || command.name.is_some()) {
+        tracing::warn!("{why}");
+    }
     let beat = Arc::new(Beat::default());
     let facts = |name: &Name| Facts {
         status: Status {
@@ -183,7 +182,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         beat: Arc::clone(&beat),
     };
     let looks = Looks { look: look.clone(), adaptive, changes, executors: Executors::new(options.computing.clone()) };
-    let server = claim.map(|claim| control::serve(claim, facts, looks)).transpose()?;
+    let server = claim.ok().map(|claim| control::serve(claim, facts, looks)).transpose()?;
     let ended = pipeline::run(Run {
         camera: source.camera,
         depth: source.depth,

@@ -72,8 +72,8 @@ pub struct Preview {
     /// What is remembered of the preview before, and where.
     pub memory: Memory,
     pub memory_file: Option<PathBuf>,
-    /// By what others control it, if they can.
-    pub control: Option<Control>,
+    /// By what others control it, or the line that says why they cannot.
+    pub control: Result<Control, String>,
     /// Once set, the window closes.
     pub stop: Arc<AtomicBool>,
 }

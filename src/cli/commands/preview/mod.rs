@@ -135,9 +135,8 @@ pub fn show(
         state.look = before;
         state.note(AS_IT_WAS);
     }
-    let wish = controlled::Wish { name: called, command: "preview", is_live: true };
     let config = global.config.clone();
-    let control = controlled::claim(&wish, global)?.map(|claim| Control {
+    let control = controlled::claim(called, "preview")?.map(|claim| Control {
         claim,
         understand: Box::new(move |request| understand(request, config.as_deref()).map_err(|error| refused(&error))),
     });

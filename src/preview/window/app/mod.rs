@@ -114,6 +114,7 @@ impl App {
                 let _ = to_wake.send_event(Call::Session);
             }
         });
+        let control = control.inspect_err(|why| tracing::warn!("{why}")).ok();
         let controlled = control.map(|control| control::Controlled::begin(control, &proxy)).transpose()?;
         let off = Arc::clone(&session.off);
         let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
