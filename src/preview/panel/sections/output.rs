@@ -20,17 +20,19 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     }
     let half = vec2((ui.available_width() - 6.0) / 2.0, 28.0);
     ui.horizontal(|ui| {
-        let mut button = |text: &str, hint: &str, is_on: bool, size: Vec2, action: Action| {
-            if ui.add(Button::new(tr(text)).selected(is_on).min_size(size)).hint(hint).clicked() {
+        // What is neither on nor off is no switch to a screen reader.
+        let mut button = |text: &str, hint: &str, is_on: Option<bool>, size: Vec2, action: Action| {
+            let button = is_on.into_iter().fold(Button::new(tr(text)).min_size(size), Button::selected);
+            if ui.add(button).hint(hint).clicked() {
                 sheet.act(action);
             }
         };
         let hint = "Save this picture, with all that is needed to make it again (S)";
-        button("Snapshot", hint, false, half - vec2(40.0, 0.0), Action::Snapshot);
+        button("Snapshot", hint, None, half - vec2(40.0, 0.0), Action::Snapshot);
         let timer = Action::SelfTimer(!state.self_timer);
-        button("3 s", "A snapshot in three seconds (Shift+S)", state.self_timer, vec2(34.0, 28.0), timer);
+        button("3 s", "A snapshot in three seconds (Shift+S)", Some(state.self_timer), vec2(34.0, 28.0), timer);
         let hint = "The command line that does the same, to the clipboard (K)";
-        button("Copy command", hint, false, half, Action::CopyCommand);
+        button("Copy command", hint, None, half, Action::CopyCommand);
     });
     if let Some(folder) = &state.kept_in {
         let open = Button::new(tr("Open folder")).min_size(vec2(ui.available_width(), 28.0));
