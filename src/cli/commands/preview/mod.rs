@@ -122,7 +122,9 @@ pub fn show(
     // What begins afresh leaves alone what was there.
     let memory_file = memory_file.filter(|_| !window.fresh);
     let memory = memory_file.as_deref().and_then(Memory::read).unwrap_or_default();
-    let before = memory.look().filter(|before| !given.has_look() && *before != look);
+    let mut gone = Vec::new();
+    let before = Some(&memory).filter(|_| !given.has_look()).and_then(|memory| memory.look(|line| gone.push(line)));
+    let before = before.filter(|before| *before != look);
     let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
     let texts =
         texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
@@ -135,6 +137,7 @@ pub fn show(
         state.look = before;
         state.note(AS_IT_WAS);
     }
+    gone.into_iter().for_each(|line| state.note(line));
     let config = global.config.clone();
     let control = controlled::claim(called, "preview")?.map(|claim| Control {
         claim,
