@@ -136,7 +136,8 @@ fn who_looks_on_sees_what_was_taken_beside_what_became_of_it() {
             while let Some(view) = views.recv() {
                 let (color, map) = Walk::taken(view.stamp.index as u32);
                 assert!(view.color.as_deref() == Some(&color) && view.depth.as_ref().unwrap().metres == map.metres);
-                assert_eq!(view.picture.memory().unwrap().rgb[..3], green, "of which this is made");
+                let corner = &view.picture.memory().unwrap().rgb[..3];
+                assert!(corner.iter().zip(green).all(|(code, green)| code.abs_diff(green) <= 1), "{corner:?}");
                 count += 1;
             }
             count
