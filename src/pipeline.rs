@@ -201,6 +201,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let colors = Pool::new(places.colors(), || ColorImage::new(info.size.0, info.size.1));
     let depths = Pool::new(places.depths(), DepthMap::default);
     let rights = Pool::new(if info.brings == Brings::RightEye { places.rights() } else { 0 }, GrayImage::default);
+    let taken = Pool::new(places.taken(), staging::Taken::default);
     let outs = Pool::new(places.outs(), || ColorImage::new(info.size.0, info.size.1));
 
     let (to_depth, from_capture) = link(pace);
@@ -236,6 +237,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         source_name: &info.name,
         keep_going: run.keep_going,
         depths: &depths,
+        taken: Some(&taken).filter(|_| places.viewed),
         tally: &tally,
         clock: &clock,
         times: depth_times,

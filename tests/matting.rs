@@ -131,6 +131,28 @@ fn hair_is_followed_where_the_depth_map_has_none_of_it() {
     assert!(beside.clone().all(|pixel| pixel.share < 0.1), "the wall beside a hair is no hair");
 }
 
+/// A bar on the wall has the colour of a hair's pixels, and goes on from the outline.
+#[test]
+fn what_is_wider_than_hair_and_far_is_none() {
+    let bar = |x: u32, y: u32| (40..45).contains(&y) && (60..84).contains(&x);
+    let (near, far) = (light(RED), light(BLUE));
+    let picture = color(SIZE.0, SIZE.1, |x, y| {
+        let share = match x {
+            0..60 => 1.0,
+            60 => 0.5,
+            _ => f32::from(u8::from(bar(x, y))) / 3.0,
+        };
+        codes(std::array::from_fn(|p| share * near[p] + (1.0 - share) * far[p]))
+    });
+    let mut map = depth(SIZE.0, SIZE.1, |x, _| if x < 60 { NEAR_M } else { FAR_M });
+    Matting::default().find(&mut map, &picture, JUMP);
+    let on_outline = map.matte.pixels.iter().filter(|pixel| place(pixel).0 == 60).count();
+    assert_eq!(on_outline, SIZE.1 as usize);
+    for pixel in map.matte.pixels.iter().filter(|pixel| place(pixel).0 > 61) {
+        assert!(pixel.share < 0.1, "{pixel:?} at {:?}", place(pixel));
+    }
+}
+
 #[test]
 fn what_cannot_have_a_matte_has_none() {
     let picture = noise(SIZE.0, SIZE.1);

@@ -11,6 +11,7 @@ use bokehcam::capture::{Brings, Camera, CaptureError, Captured, Shot, SourceInfo
 use bokehcam::depth::backdrop::Behind;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
+use bokehcam::link;
 use bokehcam::look::{Effect, Follow, Look, Strength};
 use bokehcam::pipeline::{Run, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
@@ -121,6 +122,30 @@ fn the_wall_is_gone_to_the_last_trace_and_the_person_is_as_they_were() {
             }
         }
     }
+}
+
+#[test]
+fn who_looks_on_sees_what_was_taken_beside_what_became_of_it() {
+    let (green, stop) = ([0, 177, 64], AtomicBool::new(false));
+    let (sender, mut views) = link::lossless();
+    let look = Look { behind: Behind::Color(green), ..dof() };
+    let made = Run::new(Box::new(Walk { next: 0 }), None, look, Box::new(Kept::default()), &stop).unwrap();
+    let seen = std::thread::scope(|scope| {
+        let seen = scope.spawn(move || {
+            let mut count = 0;
+            while let Some(view) = views.recv() {
+                let (color, map) = Walk::taken(view.stamp.index as u32);
+                assert!(view.color.as_deref() == Some(&color) && view.depth.as_ref().unwrap().metres == map.metres);
+                let corner = &view.picture.memory().unwrap().rgb[..3];
+                assert!(corner.iter().zip(green).all(|(code, green)| code.abs_diff(green) <= 1), "{corner:?}");
+                count += 1;
+            }
+            count
+        });
+        run(Run { view: Some(sender), ..made }).unwrap();
+        seen.join().unwrap()
+    });
+    assert_eq!(seen, FRAMES);
 }
 
 /// The middle of what has the person's colour, as a fraction of the width, and how much of the picture that is.

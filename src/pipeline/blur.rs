@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::depth::Ready;
 use super::quality::{LateRule, Picker};
 use super::rate::Order;
+use super::staging::Taken;
 use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, MOST_IN_FLIGHT, Trace, hand_on};
 use crate::bokeh::{Bokeh, Finished, Job, PassTimes, Picture};
@@ -64,6 +65,7 @@ struct Pending {
     stamp: Stamp,
     trace: Trace,
     coc: CocField,
+    taken: Option<Pooled<Taken>>,
     began_ns: u64,
     quality: Quality,
 }
@@ -148,7 +150,8 @@ impl Stage<'_> {
         frame: Frame<Ready>,
         pending: &mut VecDeque<Pending>,
     ) -> Result<bool, Fault> {
-        let Frame { ticket, stamp, mut trace, since_ns, item: Ready { color, depth, coc, times, .. } } = frame;
+        let Frame { ticket, stamp, mut trace, since_ns, item } = frame;
+        let Ready { color, depth, coc, taken, times, .. } = item;
         let began_ns = self.clock.now_ns();
         trace.between_ns += began_ns.saturating_sub(since_ns);
         times.into_iter().for_each(|times| self.picker.note_depth(times));
@@ -163,7 +166,7 @@ impl Stage<'_> {
         let quality = self.picker.quality();
         let place = self.wanted.as_ref().map_or(Place::Memory, |wanted| wanted.place());
         let job = Job { ticket: ticket.id.0, color, depth, coc, quality, place, out: self.outs.take() };
-        pending.push_back(Pending { ticket, stamp, trace, coc, began_ns, quality });
+        pending.push_back(Pending { ticket, stamp, trace, coc, taken, began_ns, quality });
         match executor.submit(job) {
             Ok(()) => Ok(true),
             Err(error) => Err(self.failed(pending.pop_back(), error.into())),
@@ -188,10 +191,13 @@ impl Stage<'_> {
         let Some(done) = pending.pop_front().filter(|oldest| oldest.ticket.id.0 == finished.ticket) else {
             return Err(Fault::LostFrame);
         };
-        let Finished { picture, color, depth, times, .. } = finished;
+        let Finished { picture, mut color, mut depth, times, .. } = finished;
         let since_ns = self.clock.now_ns();
         let blur_ns = self.measure(&done, &times, executor.capacity(), since_ns);
-        let Pending { ticket, stamp, trace, coc, quality, began_ns } = done;
+        let Pending { ticket, stamp, trace, coc, taken, quality, began_ns } = done;
+        if let (Some(mut taken), Some(map)) = (taken, &mut depth) {
+            taken.restore(&mut color, map);
+        }
         let item =
             Blurred { picture, color: Some(color).filter(|_| self.viewed), depth: depth.filter(|_| self.viewed), coc };
         let between_ns = trace.between_ns + (since_ns - began_ns).saturating_sub(blur_ns);

@@ -8,7 +8,7 @@ use super::change::{Change, Executor, Swap};
 use super::coc::{CocMaker, Finish};
 use super::fit_check::{FitCheck, Verdict};
 use super::rate::Rate;
-use super::staging::Staging;
+use super::staging::{Staging, Taken};
 use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, hand_on};
 use crate::budget::DepthTimes;
@@ -29,6 +29,8 @@ pub(super) struct Ready {
     pub color: Pooled<ColorImage>,
     pub depth: Option<Pooled<DepthMap>>,
     pub coc: CocField,
+    /// The picture and its depth before something else stood behind the subject, where that is so and somebody looks at them.
+    pub taken: Option<Pooled<Taken>>,
     /// What its depth took; `None` where it has none.
     pub times: Option<DepthTimes>,
     /// The last change of what blurs, if there was one: every frame since then brings it.
@@ -48,6 +50,8 @@ pub(super) struct Stage<'a> {
     pub source_name: &'a str,
     pub keep_going: bool,
     pub depths: &'a Pool<DepthMap>,
+    /// Where frames are kept as they were taken, if somebody looks at them.
+    pub taken: Option<&'a Pool<Taken>>,
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     /// How well and how often depth is made; `None` makes it as well as can be, for every frame.
@@ -130,6 +134,11 @@ impl Stage<'_> {
                 }
             };
             (trace.change, trace.between) = (change, between);
+            let taken = depth.as_deref().zip(self.taken.filter(|_| staging.replaces(&coc))).map(|(map, pool)| {
+                let mut taken = pool.take();
+                taken.keep(&color, map);
+                taken
+            });
             trace.part = depth.as_mut().and_then(|map| staging.stage(&mut color, map, &coc, stamp.time_ns));
             let since_ns = self.clock.now_ns();
             (trace.depth_ns, trace.depth_held) = (since_ns - began_ns, *self.held > held_before);
@@ -137,7 +146,7 @@ impl Stage<'_> {
             let age_ns = began_ns.saturating_sub(ticket.captured_ns);
             let times = DepthTimes { effort, took_ns: trace.depth_ns, age_ns, at_ns: since_ns };
             let times = depth.is_some().then_some(times);
-            let item = Ready { color, depth, coc, times, swap: swap.clone() };
+            let item = Ready { color, depth, coc, taken, times, swap: swap.clone() };
             let frame = Frame { ticket, stamp, trace, since_ns, item };
             if !hand_on(&mut to, frame, self.tally) {
                 break;

@@ -34,6 +34,11 @@ impl Places {
         self.colors()
     }
 
+    /// Frames as they were taken, from before something else stood behind the subject until they are blurred.
+    pub fn taken(&self) -> usize {
+        2 * Self::HAND + Self::LINK + self.in_blur
+    }
+
     /// The right eye's picture goes no further than its depth.
     pub fn rights(&self) -> usize {
         2 * Self::HAND + Self::LINK

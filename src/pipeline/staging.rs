@@ -7,6 +7,31 @@ use crate::frame::{ColorImage, DepthMap};
 use crate::look::Look;
 use crate::optics::CocField;
 
+/// A picture and its depth as they were before something else stood behind the subject.
+#[derive(Default)]
+pub(super) struct Taken {
+    color: ColorImage,
+    map: DepthMap,
+}
+
+impl Taken {
+    /// Keeps a frame, which is staged next.
+    pub fn keep(&mut self, color: &ColorImage, map: &DepthMap) {
+        self.color.resize(color.width, color.height);
+        self.color.rgb.copy_from_slice(&color.rgb);
+        self.map.resize(map.width, map.height);
+        self.map.metres.copy_from_slice(&map.metres);
+        self.map.matte.pixels.clone_from(&map.matte.pixels);
+        (self.map.subject_m, self.map.is_smooth) = (map.subject_m, map.is_smooth);
+    }
+
+    /// Puts it in the place of what was made of it.
+    pub fn restore(&mut self, color: &mut ColorImage, map: &mut DepthMap) {
+        std::mem::swap(&mut self.color, color);
+        std::mem::swap(&mut self.map, map);
+    }
+}
+
 /// Stages the subject of frame after frame.
 #[derive(Default)]
 pub(super) struct Staging {
@@ -30,6 +55,11 @@ impl Staging {
             (Some(follower), Some(zoom)) => follower.limit(zoom),
             (follower, zoom) => *follower = zoom.map(Follower::new),
         }
+    }
+
+    /// Whether it changes pictures of this CoC.
+    pub fn replaces(&self, field: &CocField) -> bool {
+        self.backdrop.is_some() && matches!(field, CocField::Depth(_))
     }
 
     /// Puts what was chosen behind the subject of a picture at `time_ns` of media time, whose depth is finished; returns the part

@@ -27,9 +27,9 @@ pub struct Progress {
 pub struct View {
     /// The picture; in memory where the sink was given it.
     pub picture: Picture,
-    /// The picture before the blur; `None` where nothing was blurred.
+    /// The picture as it was taken; `None` where nothing was blurred.
     pub color: Option<Pooled<ColorImage>>,
-    /// The depth that it was blurred by, holes filled.
+    /// Its depth, holes filled, as it was before something else stood behind the subject.
     pub depth: Option<Pooled<DepthMap>>,
     /// The radius of every pixel.
     pub coc: CocField,

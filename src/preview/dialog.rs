@@ -24,9 +24,10 @@ pub fn pick(what: Browse) -> Result<Option<String>, String> {
     let began = Instant::now();
     let picked = match what {
         Browse::Folder => FileDialog::new().set_title("Open a recording: its folder").pick_folder(),
-        Browse::Photo => {
+        Browse::Photo | Browse::Behind => {
+            let title = if what == Browse::Photo { "Open a photo" } else { "A picture behind the subject" };
             let photos = ["png", "jpg", "jpeg", "PNG", "JPG", "JPEG"];
-            FileDialog::new().set_title("Open a photo").add_filter("Photos", &photos).pick_file()
+            FileDialog::new().set_title(title).add_filter("Photos", &photos).pick_file()
         }
     };
     match picked {

@@ -166,7 +166,7 @@ pub const GROUPS: [Group; 5] = [
         name: "Focus",
         bindings: &[
             once(&[key(Key::T)], "T", "take a plate of what is behind you", |_, _| Some(Action::TakePlate)),
-            once(&[key(Key::A)], "A", "follow the subject", |state, _| {
+            once(&[key(Key::A)], "A", "focus on the subject", |state, _| {
                 look(state, "key auto", |look| look.focus = FocusRule::Auto)
             }),
             held(

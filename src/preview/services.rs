@@ -20,9 +20,11 @@ pub enum Browse {
     Folder,
     /// The file of a photo.
     Photo,
+    /// The file of a picture to stand behind the subject.
+    Behind,
 }
 
-/// Asks the person and waits for the answer: the name of a source, or nothing. An error is one line.
+/// Asks the person and waits for the answer: the name of a source, or of a file; or nothing. An error is one line.
 pub type Pick = Box<dyn FnOnce() -> Result<Option<String>, String> + Send>;
 
 /// A source that was opened.
@@ -72,7 +74,7 @@ pub trait Services: Send {
         Ok(())
     }
 
-    /// A way to ask the person for a source.
+    /// A way to ask the person for a source, or a file.
     fn browse(&self, what: Browse) -> Pick {
         let _ = what;
         Box::new(|| Err("there is no file dialog".to_owned()))

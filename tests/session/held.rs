@@ -3,7 +3,9 @@
 use std::time::{Duration, Instant};
 
 use bokehcam::computing::Computing;
+use bokehcam::depth::backdrop::Behind;
 use bokehcam::depth::focus::FocusRule;
+use bokehcam::frame::ColorImage;
 use bokehcam::look::{Effect, Look, Strength};
 use bokehcam::optics::CocField;
 use bokehcam::pipeline::View;
@@ -14,11 +16,18 @@ use bokehcam::preview::state::{Output, Request, Update};
 use super::heard::{PATIENCE, look};
 use super::watched::{Watched, is_running};
 
+const GREEN: [u8; 3] = [0, 177, 64];
+
 /// A session whose first frame stays.
 fn holding(source: &str) -> (Watched, View) {
     let mut watched = Watched::begin(source);
     watched.until("it runs", |told| is_running(told, 32));
     let view = watched.frame("a frame", |_| true);
+    hold(&watched, &view);
+    (watched, view)
+}
+
+fn hold(watched: &Watched, view: &View) {
     watched.session.hold(Some(Held {
         number: 7,
         color: view.color.as_deref().unwrap().clone(),
@@ -26,7 +35,6 @@ fn holding(source: &str) -> (Watched, View) {
         coc: view.coc,
         is_behind: false,
     }));
-    (watched, view)
 }
 
 /// The frame in another look.
@@ -51,6 +59,7 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
     let looks = [
         Look { strength: Strength::AtInfinity(4.0), ..look() },
         Look { strength: Strength::AtInfinity(4.0), focus: FocusRule::Metres(0.9), ..look() },
+        Look { behind: Behind::Color(GREEN), ..look() },
         Look { effect: Effect::Blur, ..look() },
     ];
     let mut last = 0;
@@ -72,6 +81,21 @@ fn a_frame_that_stays_is_blurred_as_each_look_says() {
     watched.session.order(Request::Look(Box::new(look())));
     watched.frame("the next frames come in the look", |view| matches!(view.coc, CocField::Depth(_)));
     assert!(watched.blurred.is_empty());
+}
+
+#[test]
+fn what_stood_behind_a_frame_that_stays_is_taken_away_again() {
+    let mut watched = Watched::begin("32");
+    watched.until("it runs", |told| is_running(told, 32));
+    watched.session.order(Request::Look(Box::new(Look { behind: Behind::Color(GREEN), ..look() })));
+    let is_green = |picture: &ColorImage| picture.rgb.as_chunks().0.contains(&GREEN);
+    let view = watched.frame("a green one", |view| is_green(view.picture.memory().unwrap()));
+    assert!(!is_green(view.color.as_deref().unwrap()), "the picture as the camera gave it");
+    hold(&watched, &view);
+    assert!(!is_green(&in_look(&mut watched, &look()).picture));
+    let other = [200, 0, 99];
+    let blurred = in_look(&mut watched, &Look { behind: Behind::Color(other), ..look() });
+    assert!(blurred.picture.rgb.as_chunks().0.contains(&other) && !is_green(&blurred.picture));
 }
 
 #[test]

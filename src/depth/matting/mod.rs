@@ -29,6 +29,16 @@ const TRACED: Labels = Labels { is_near: false, borders: false, is_thin: false }
 /// So many pixels away from an edge, at most.
 const MOST_STEPS: usize = 16;
 
+/// What is known of a pixel that was traced: it has nothing of what is near, it has some, it is part of something wide.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+enum Trail {
+    #[default]
+    None,
+    Faint,
+    Seen,
+    Wide,
+}
+
 /// Estimates mattes; owns the memory for it.
 #[derive(Debug)]
 pub struct Matting {
@@ -42,6 +52,8 @@ pub struct Matting {
     edges: Vec<EdgePixel>,
     clusters: Clusters,
     evidence: Vec<Evidence>,
+    /// What is known of pixels that were traced, while they are.
+    trails: Vec<Trail>,
 }
 
 /// A pixel beside a jump of depth.
@@ -71,6 +83,7 @@ impl Default for Matting {
             edges: Vec::new(),
             clusters: Clusters::default(),
             evidence: Vec::new(),
+            trails: Vec::new(),
         }
     }
 }
@@ -114,6 +127,7 @@ impl Matting {
         let prior = Prior::of(&self.evidence);
         let on_edges = self.evidence.len();
         self.trace((size, most), jump, &prior, (&color.rgb, &behind));
+        self.drop_wide(size, on_edges, &prior);
         let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
         let view = View { size, inverse, jump, at_edge, rgb: &color.rgb, light };
         map.matte.pixels.extend(evidence.iter().filter_map(|evidence| {
@@ -154,7 +168,7 @@ impl Matting {
                 if labels.is_near || prior.share(&evidence[k]) < TRACED_FROM {
                     continue;
                 }
-                let (xs, ys) = neighbours(&edge, size);
+                let (xs, ys) = around(&edge, 1, size);
                 for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
                     let (at, next) = (y * size.0 + x, EdgePixel { x: x as u32, y: y as u32, ..edge });
                     let is_far = (inverse[at] - edge.far).abs() <= jump;
@@ -171,13 +185,39 @@ impl Matting {
             (from, steps) = (end, steps + 1);
         }
     }
+
+    /// Lets go of what was traced, those after the first `on_edges`, into something far that looks like what is near: a hair
+    /// nowhere fills a square of three pixels, as a picture's frame does.
+    fn drop_wide(&mut self, size: (usize, usize), on_edges: usize, prior: &Prior) {
+        let Self { evidence, trails, .. } = self;
+        let at = |x: usize, y: usize| y * size.0 + x;
+        let place = |one: &Evidence| at(one.edge.x as usize, one.edge.y as usize);
+        trails.resize(size.0 * size.1, Trail::None);
+        for one in &evidence[on_edges..] {
+            trails[place(one)] = if prior.share(one) < TRACED_FROM { Trail::Faint } else { Trail::Seen };
+        }
+        for one in &evidence[on_edges..] {
+            let (xs, ys) = around(&one.edge, 1, size);
+            if !ys.flat_map(|y| xs.clone().map(move |x| at(x, y))).all(|at| trails[at] >= Trail::Seen) {
+                continue;
+            }
+            // The outline of what is wide is part of it.
+            let (xs, ys) = around(&one.edge, 2, size);
+            for at in ys.flat_map(|y| xs.clone().map(move |x| at(x, y))) {
+                if trails[at] != Trail::None {
+                    trails[at] = Trail::Wide;
+                }
+            }
+        }
+        evidence.retain(|one| std::mem::take(&mut trails[place(one)]) != Trail::Wide);
+    }
 }
 
 /// What the map says of the edge pixel `at` and its neighbours.
 fn labels(view: &View, edge: &EdgePixel, at: usize) -> Labels {
     let is_near = edge.is_near(view.inverse[at]);
     let (mut borders, mut alike) = (false, 0);
-    let (xs, ys) = neighbours(edge, view.size);
+    let (xs, ys) = around(edge, 1, view.size);
     for y in ys {
         for x in xs.clone() {
             let is_alike = edge.is_near(view.inverse[y * view.size.0 + x]) == is_near;
@@ -189,10 +229,10 @@ fn labels(view: &View, edge: &EdgePixel, at: usize) -> Labels {
     Labels { is_near, borders, is_thin: is_near && alike <= 3 }
 }
 
-/// The columns and rows of a pixel and those around it, as far as the picture has them.
-fn neighbours(edge: &EdgePixel, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
+/// The columns and rows of a pixel and those around it, `by` pixels to each side, as far as the picture has them.
+fn around(edge: &EdgePixel, by: usize, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
     let (x, y) = (edge.x as usize, edge.y as usize);
-    (x.saturating_sub(1)..(x + 2).min(width), y.saturating_sub(1)..(y + 2).min(height))
+    (x.saturating_sub(by)..(x + by + 1).min(width), y.saturating_sub(by)..(y + by + 1).min(height))
 }
 
 /// Finds the pixels beside jumps of depth.

@@ -118,6 +118,9 @@ impl Gestures {
         if state.bare {
             return;
         }
+        if let Some(part) = state.part.filter(|_| state.look.follow.zoom().is_some()) {
+            marks::part(&painter, place, &part);
+        }
         if let Some(at) = state.split {
             marks::split(&painter, place, at, line_held);
         }

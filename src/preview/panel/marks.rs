@@ -7,6 +7,7 @@ use egui::{Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Shape, St
 use super::place::Place;
 use super::state::tweak::turned;
 use super::theme::{ON_PICTURE, SHADE, medium};
+use crate::frame::crop::Crop;
 use crate::look::Tilt;
 use crate::preview::texts::tr;
 
@@ -62,6 +63,16 @@ pub fn point(painter: &Painter, at: Pos2) {
             let points = vec![tip - vec2(corner.x * 6.0, 0.0), tip, tip - vec2(0.0, corner.y * 6.0)];
             painter.add(Shape::line(points, Stroke::new(width, color)));
         }
+    }
+}
+
+/// The part of the picture that goes out, within a dashed line.
+pub fn part(painter: &Painter, place: &Place, part: &Crop) {
+    let size = place.rect.size() / part.zoom;
+    let rect = Rect::from_center_size(place.point(part.center), size).shrink(1.0);
+    let corners = [rect.left_top(), rect.right_top(), rect.right_bottom(), rect.left_bottom(), rect.left_top()];
+    for (width, color) in [(3.5, SHADE), (1.5, ON_PICTURE)] {
+        painter.extend(Shape::dashed_line(&corners, Stroke::new(width, color), 10.0, 7.0));
     }
 }
 

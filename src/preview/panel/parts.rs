@@ -275,12 +275,15 @@ pub fn remark(ui: &mut Ui, text: &str) {
 
 /// A path, of which the end says which file it is: a long one is cut at its beginning.
 pub fn path(ui: &mut Ui, path: &str) {
-    const MOST: usize = 38;
-    let over = path.chars().count().saturating_sub(MOST);
-    let cut = path.chars().skip(over + 1).collect::<String>();
-    ui.scope(|ui| remark(ui, &if over == 0 { path.to_owned() } else { format!("…{cut}") }))
-        .response
-        .on_hover_text(path);
+    ui.scope(|ui| remark(ui, &end_of(path, 38))).response.on_hover_text(path);
+}
+
+/// The last of at most so many signs of a text, after dots if there are more.
+pub fn end_of(text: &str, most: usize) -> String {
+    match text.chars().count().checked_sub(most) {
+        None | Some(0) => text.to_owned(),
+        Some(over) => ['…'].into_iter().chain(text.chars().skip(over + 1)).collect(),
+    }
 }
 
 /// Draws a part of the panel, unless it is folded. Whether its title was clicked.

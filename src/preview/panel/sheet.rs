@@ -4,6 +4,7 @@ use egui::{Area, Context, Id, Order, Rect, ScrollArea, Ui, pos2, vec2};
 
 use super::cards;
 use super::icons::{self, Icon};
+use super::parts::end_of;
 use super::sections::{self, Editing, Sheet, Thumbs};
 use super::state::{Action, Source, State};
 use super::theme::{self, Colors, GAP, PAD, WIDTH};
@@ -118,7 +119,8 @@ fn status(ui: &mut Ui, state: &State) {
     let colors = Colors::here(ui);
     let mut parts: Vec<String> = Vec::new();
     if let Source::Running(running) = &state.source {
-        parts.push(running.label.clone());
+        // What comes after it has to be seen, too.
+        parts.push(end_of(&running.label, 24));
     }
     let focused = state.look.effect.follows_depth();
     if let Some(metres) = state.focus_m.filter(|metres| focused && metres.is_finite()) {

@@ -12,6 +12,9 @@ const HEIGHT: f32 = 44.0;
 /// Less room shows the line alone, without the time.
 const LEAST_WIDTH: f32 = 330.0;
 
+/// With less there is no line to drag: the bar is there again once the panel is closed.
+const TOO_NARROW: f32 = 170.0;
+
 /// What the bar remembers.
 #[derive(Debug, Default)]
 pub struct Bar {
@@ -25,9 +28,9 @@ impl Bar {
         let running = matches!(state.source, Source::Running(_));
         let Some(transport) = state.transport.filter(|_| running) else { return 0.0 };
         let window = ctx.content_rect();
-        let right = panel.map_or(window.right(), |panel| panel.left().max(window.left() + 200.0));
+        let right = panel.map_or(window.right(), |panel| panel.left());
         let (left, width) = (window.left() + GAP, right - window.left() - 2.0 * GAP);
-        if width < 120.0 {
+        if width < TOO_NARROW {
             return 0.0;
         }
         let corner = pos2(left, window.bottom() - GAP - HEIGHT);

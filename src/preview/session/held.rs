@@ -13,9 +13,9 @@ use crate::pipeline::still::{self, Depth};
 pub struct Held {
     /// Different for each frame that stayed.
     pub number: u64,
-    /// Before the blur.
+    /// As it was taken.
     pub color: ColorImage,
-    /// The depth that it was blurred by.
+    /// Its depth, holes filled.
     pub depth: Option<DepthMap>,
     /// The radius of every pixel.
     pub coc: CocField,
@@ -29,7 +29,7 @@ pub struct Blurred {
     /// Of [`Held::number`].
     pub number: u64,
     pub picture: ColorImage,
-    /// The depth that it was blurred by, where the look follows depth.
+    /// Its depth, where the look follows depth.
     pub depth: Option<DepthMap>,
     pub coc: CocField,
     /// The number of the change of look.
@@ -70,13 +70,14 @@ impl HeldBlur {
             error => error.to_string(),
         };
         let mut color = color.clone();
-        let (coc, depth) = still::coc_and_depth(&fixed, &mut color, depth.clone().map(Depth::Final)).map_err(plain)?;
+        let (coc, staged) = still::coc_and_depth(&fixed, &mut color, depth.clone().map(Depth::Final)).map_err(plain)?;
+        let depth = depth.clone().filter(|_| staged.is_some());
         if self.executor.as_ref().is_none_or(|(made_for, _)| *made_for != settings) {
             let executor = services.executor(&settings, color.size())?;
             self.executor = Some((settings.clone(), executor));
         }
         let Some((_, executor)) = &mut self.executor else { return Err(BokehError::Lost.to_string()) };
-        let blurred = still::blur_with(&mut **executor, settings.quality, color, depth.clone(), coc);
+        let blurred = still::blur_with(&mut **executor, settings.quality, color, staged, coc);
         match blurred {
             Ok(picture) => {
                 Ok(Blurred { number: *number, picture, depth, coc, change, quality: Some(settings.quality) })

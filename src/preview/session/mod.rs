@@ -76,9 +76,9 @@ pub enum SessionEvent {
 pub struct Still {
     /// After the blur.
     pub picture: ColorImage,
-    /// Before the blur.
+    /// As it was taken.
     pub color: ColorImage,
-    /// The depth that it was blurred by.
+    /// Its depth, holes filled.
     pub depth: Option<DepthMap>,
     /// The radius of every pixel.
     pub coc: CocField,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Camera, Output, Shown, Source};
+use crate::depth::backdrop::Behind;
 use crate::knob::Knob;
 use crate::look::Look;
 use crate::look::presets::Preset;
@@ -82,7 +83,7 @@ pub enum Action {
     /// Writes to this virtual camera, or to none.
     VirtualCamera(Option<String>),
     Open(String),
-    /// Asks for a source by a dialog.
+    /// Asks for a source, or a picture, by a dialog.
     Browse(Browse),
     /// Other pictures of the camera: their columns and rows, and frames per second.
     Mode((u32, u32), f64),
@@ -159,6 +160,8 @@ pub enum Update {
     Camera(Camera),
     /// What somebody offered can be a source.
     Offered(String),
+    /// Somebody chose what is to stand behind the subject.
+    Behind(Behind),
     /// The outputs that are written to now: after each that was begun or ended, also where that failed.
     Outputs(Vec<Output>),
     /// Bytes of the recording so far.

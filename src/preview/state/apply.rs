@@ -118,7 +118,7 @@ impl State {
     }
 
     /// Changes the look as far as the source allows it; the one before can be undone.
-    fn set_look(&mut self, look: Look, stroke: Option<&'static str>) -> Vec<Request> {
+    pub(super) fn set_look(&mut self, look: Look, stroke: Option<&'static str>) -> Vec<Request> {
         let look = self.fitting(look);
         if look == self.look {
             return Vec::new();

@@ -15,6 +15,7 @@ impl State {
             Update::Controls(controls) => self.controls = controls,
             Update::Camera(camera) => self.set_camera(camera),
             Update::Offered(name) => return self.open(name).pop(),
+            Update::Behind(behind) => return self.set_look(Look { behind, ..self.look.clone() }, None).pop(),
             Update::Outputs(outputs) => {
                 self.outputs = outputs;
                 self.recorded_bytes = self.recorded_bytes.filter(|_| self.recording().is_some());

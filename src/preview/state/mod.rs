@@ -32,6 +32,7 @@ pub use super::views::Shown;
 use super::views::{Legend, Probe};
 use crate::capture::demo;
 use crate::depth::plate::Step;
+use crate::frame::crop::Crop;
 use crate::knob::Knob;
 use crate::look::Look;
 use crate::look::presets::Preset;
@@ -124,6 +125,8 @@ pub struct State {
     pub mirror: bool,
     /// Whether frames are still blurred for the look before, as their own kernels are being made.
     pub between: bool,
+    /// What of the picture goes out; `None` is all.
+    pub part: Option<Crop>,
     /// Whether somebody said so; otherwise it depends on the camera.
     pub mirror_chosen: bool,
     /// Whether the window keeps the picture it has.

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::files::{input, whole};
 use crate::look::{Look, Patch};
 use crate::preview::state::Habits;
+use crate::recording::RecordingError;
 use crate::source::SourceName;
 
 /// What a preview ended with.
@@ -61,21 +62,28 @@ impl Memory {
 
     /// Remembers a source, by a name that holds wherever the next preview is started.
     pub fn set_source(&mut self, name: &str) {
-        let is_here = Path::new(name).is_relative() && Path::new(name).is_dir();
-        let absolute = std::path::absolute(name).ok().filter(|_| is_here);
-        let name = absolute.map_or_else(|| name.to_owned(), |path| path.display().to_string());
-        self.source = Some(name).filter(|name| !name.is_empty());
+        self.source = Some(anywhere(name)).filter(|name| !name.is_empty());
     }
 
-    /// The look; `None` where none is remembered, or one that cannot be any more.
-    pub fn look(&self) -> Option<Look> {
-        let patch = Patch::parse(self.look.iter().map(|(name, value)| (name.as_str(), value.as_str()))).ok()?;
-        patch.on(&Look::default()).ok().filter(|_| !self.look.is_empty())
+    /// The look, without pictures that cannot be read any more, of which `gone` is told; `None` where none is remembered, or
+    /// one that cannot be any more.
+    pub fn look(&self, mut gone: impl FnMut(String)) -> Option<Look> {
+        let settings = self.look.iter().map(|(name, value)| (name.as_str(), value.as_str()));
+        let mut patch = Patch::parse(settings).ok().filter(|_| !self.look.is_empty())?;
+        let mut is_gone = |read: Result<(), RecordingError>| read.map_err(|error| gone(error.to_string())).is_err();
+        patch.behind = patch.behind.filter(|name| !is_gone(name.load().map(drop)));
+        patch.aperture = patch.aperture.filter(|name| !is_gone(name.load().map(drop)));
+        patch.on(&Look::default()).ok()
     }
 
     /// Remembers a look.
     pub fn set_look(&mut self, look: &Look) {
-        self.look = Patch::of(look).values().into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        let kept = |value: String| match value.strip_prefix("image:") {
+            Some(file) => format!("image:{}", anywhere(file)),
+            None => value,
+        };
+        let values = Patch::of(look).values().into_iter();
+        self.look = values.map(|(name, value)| (name.to_owned(), kept(value))).collect();
     }
 
     /// Writes the file, whole or not at all. If that fails, the next window is as if it were the first.
@@ -87,6 +95,13 @@ impl Memory {
             tracing::info!("the window is not remembered: {}: {error}", path.display());
         }
     }
+}
+
+/// A name that holds wherever the next preview is started: of a file or folder that is here, its whole path.
+fn anywhere(name: &str) -> String {
+    let is_here = Path::new(name).is_relative() && Path::new(name).exists();
+    let absolute = std::path::absolute(name).ok().filter(|_| is_here);
+    absolute.map_or_else(|| name.to_owned(), |path| path.display().to_string())
 }
 
 #[cfg(test)]
@@ -103,11 +118,12 @@ mod tests {
         habits.sections.insert("For experts".into(), true);
         let size = Some(Size { width: 1280.0, height: 720.5, maximized: true });
         let mut memory = Memory { source: Some("0".into()), habits, size, ..Memory::default() };
-        assert_eq!(memory.look(), None);
+        let never = |line: String| panic!("{line}");
+        assert_eq!(memory.look(never), None);
         memory.set_look(&look);
         memory.write(&path);
         let read = Memory::read(&path).unwrap();
-        assert_eq!((read.look(), &read), (Some(look), &memory));
+        assert_eq!((read.look(never), &read), (Some(look.clone()), &memory));
         for text in ["width", "[size]\nwidth = 3\n", "[habits]\ntext-scale = \"big\"\n"] {
             fs::write(&path, text).unwrap();
             assert_eq!(Memory::read(&path), None, "{text}");
@@ -119,8 +135,12 @@ mod tests {
         )
         .unwrap();
         let read = Memory::read(&path).unwrap();
-        assert_eq!((read.source.as_deref(), read.size, read.look()), (Some("1"), None, None));
+        assert_eq!((read.source.as_deref(), read.size, read.look(never)), (Some("1"), None, None));
         assert_eq!(read.habits.text_scale, 3.0);
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1, "nothing is left beside it");
+        memory.look.insert("behind".into(), "image:/no/such/wall.jpg".into());
+        let mut gone = Vec::new();
+        assert_eq!(memory.look(|line| gone.push(line)), Some(look), "without the picture that is gone");
+        assert!(gone.len() == 1 && gone[0].contains("/no/such/wall.jpg"), "{gone:?}");
     }
 }

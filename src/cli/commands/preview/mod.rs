@@ -46,7 +46,7 @@ Examples:
   bokehcam preview recordings/portrait --split 0.5 --highlights 12
   bokehcam preview demo --full-screen
 
-In the window, F1 shows all keys. Click to focus there, double-click to follow the subject. What the window sets can be
+In the window, F1 shows all keys. Click to focus there, double-click to focus on the subject. What the window sets can be
 copied as a command (K). A recording is played in a loop.")]
 pub struct PreviewCommand {
     /// A camera (/dev/videoN, N, a name under /dev/v4l/by-id, or part of what it is called), two of them as LEFT,RIGHT, a
@@ -122,7 +122,9 @@ pub fn show(
     // What begins afresh leaves alone what was there.
     let memory_file = memory_file.filter(|_| !window.fresh);
     let memory = memory_file.as_deref().and_then(Memory::read).unwrap_or_default();
-    let before = memory.look().filter(|before| !given.has_look() && *before != look);
+    let mut gone = Vec::new();
+    let before = Some(&memory).filter(|_| !given.has_look()).and_then(|memory| memory.look(|line| gone.push(line)));
+    let before = before.filter(|before| *before != look);
     let source = if name.is_empty() { memory.source().unwrap_or_default() } else { name.to_owned() };
     let texts =
         texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
@@ -135,6 +137,7 @@ pub fn show(
         state.look = before;
         state.note(AS_IT_WAS);
     }
+    gone.into_iter().for_each(|line| state.note(line));
     let config = global.config.clone();
     let control = controlled::claim(called, "preview")?.map(|claim| Control {
         claim,

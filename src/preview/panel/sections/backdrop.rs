@@ -5,7 +5,9 @@ use egui::{Role, Ui, WidgetInfo};
 use super::Sheet;
 use crate::depth::backdrop::Behind;
 use crate::look::Follow;
-use crate::preview::panel::parts::{Hinted, choose, remark, switch};
+use crate::preview::panel::parts::{Hinted, Number, choose, path, remark, switch};
+use crate::preview::services::Browse;
+use crate::preview::state::Action;
 use crate::preview::texts::tr;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -18,12 +20,14 @@ enum Kind {
 const KINDS: [(&str, &str, Kind); 3] = [
     ("Room", "The room, blurred", Kind::Room),
     ("Colour", "One colour, for a page of your own, or for programs that put something in its place", Kind::Color),
-    ("Picture", "The picture that --behind image:FILE or a preset names", Kind::Picture),
+    ("Picture", "A picture of yours, as large as the frame", Kind::Picture),
 ];
 /// The green of screens that are replaced later.
 const GREEN: [u8; 3] = [0, 177, 64];
 /// Room to move, and little loss of detail.
 const ZOOM: f32 = 1.5;
+/// Below, there is none.
+const LEAST_ZOOM: f32 = 1.1;
 
 /// What is behind, and whether the picture follows.
 pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
@@ -36,17 +40,22 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
         Behind::Picture(picture) => Some(Behind::Picture(picture.clone())),
         _ => None,
     };
-    let can = |other| other != Kind::Picture || kind == Kind::Picture || named.is_some();
-    if let Some(chosen) = choose(ui, "Behind the subject", &KINDS, kind, can).filter(|chosen| *chosen != kind) {
-        sheet.look.behind = match chosen {
-            Kind::Room => Behind::Blur,
-            Kind::Color => Behind::Color(GREEN),
-            Kind::Picture => named.unwrap_or_default(),
-        };
+    if let Some(chosen) = choose(ui, "Behind the subject", &KINDS, kind, |_| true).filter(|chosen| *chosen != kind) {
+        match (chosen, named) {
+            (Kind::Room, _) => sheet.look.behind = Behind::Blur,
+            (Kind::Color, _) => sheet.look.behind = Behind::Color(GREEN),
+            (Kind::Picture, Some(named)) => sheet.look.behind = named,
+            (Kind::Picture, None) => sheet.act(Action::Browse(Browse::Behind)),
+        }
         sheet.changed(true, "behind");
     }
-    if let Behind::Color(mut color) = sheet.look.behind {
-        ui.horizontal(|ui| {
+    match sheet.look.behind.clone() {
+        Behind::Blur => {}
+        Behind::Picture(picture) => {
+            picture.file.iter().for_each(|file| path(ui, &file.display().to_string()));
+            sheet.button(ui, "Choose picture…", "Another picture of yours", Action::Browse(Browse::Behind));
+        }
+        Behind::Color(mut color) => drop(ui.horizontal(|ui| {
             ui.label(tr("Colour"));
             let picker = ui.color_edit_button_srgb(&mut color);
             picker.widget_info(|| WidgetInfo::labeled(Role::ColorWell, true, tr("Colour")));
@@ -54,19 +63,18 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
                 sheet.look.behind = Behind::Color(color);
                 sheet.changed(true, "colour behind");
             }
-        });
+        })),
     }
-    let follows = sheet.look.follow.zoom().is_some();
-    if switch(
-        ui,
-        "Follow the subject",
-        "What goes out is a part of the picture, with the subject in its middle",
-        follows,
-    ) {
-        sheet.look.follow = if follows { Follow::OFF } else { Follow::to(ZOOM) };
+    let zoom = sheet.look.follow.zoom();
+    let hint = "What goes out is a part of the picture, with the subject in its middle";
+    if switch(ui, "Follow the subject", hint, zoom.is_some()) {
+        sheet.look.follow = if zoom.is_some() { Follow::OFF } else { Follow::to(ZOOM) };
         sheet.changed(true, "follow");
     }
-    if follows {
-        remark(ui, "In what goes out; this window shows the whole picture.");
+    if let Some(zoom) = zoom {
+        let how =
+            Number::new("Largest zoom", "So much larger the subject becomes, at most", LEAST_ZOOM..=Follow::MOST, 1);
+        sheet.number(ui, &how.unit("", "×"), zoom, |look, zoom| look.follow = Follow::to(zoom));
+        remark(ui, "In what goes out, within the dashed line; this window shows the whole picture.");
     }
 }

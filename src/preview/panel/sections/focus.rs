@@ -37,6 +37,6 @@ pub fn show(ui: &mut Ui, sheet: &mut Sheet) {
     let how = Number::new("Focal range", hint, half_m, 2).unit("±", " m");
     sheet.number(ui, &how, sheet.look.focus_range_m / 2.0, |look, half_m| look.focus_range_m = half_m * 2.0);
     if is_point {
-        remark(ui, "Click on the picture to focus elsewhere; double-click to follow the subject.");
+        remark(ui, "Click on the picture to focus elsewhere; double-click to focus on the subject.");
     }
 }

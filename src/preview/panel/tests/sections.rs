@@ -1,9 +1,14 @@
 //! The panel's sections: their order, what is folded, the way back, and one ring for the focus.
 
+use std::sync::Arc;
+
 use egui::{Key, Modifiers, pos2};
 
 use super::{Action, Window, sample};
-use crate::preview::state::{Shown, Source, State};
+use crate::depth::backdrop::{Behind, BehindPicture};
+use crate::frame::ColorImage;
+use crate::preview::services::Browse;
+use crate::preview::state::{Request, Shown, Source, State, Update};
 
 #[test]
 fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {
@@ -28,6 +33,28 @@ fn what_is_needed_first_is_on_top_and_experts_parts_are_folded() {
     assert_eq!(window.click_on("View"), [Action::Section("View", true)]);
     window.wait(0.5);
     assert!(window.place_of("Mirror").is_some());
+}
+
+#[test]
+fn what_is_behind_is_a_colour_or_a_picture_that_is_asked_for() {
+    let mut window = Window::of(sample::state(), (1280, 2000));
+    window.state.apply(Action::Section("Backdrop", true));
+    window.wait(0.5);
+    // The aperture's own is a thumbnail; the view's is further down.
+    let picture = window.places().into_iter().find(|(text, _)| text == "Picture").unwrap().1;
+    assert_eq!(window.click(picture), [Action::Browse(Browse::Behind)]);
+    assert_eq!(window.state.look, sample::look(), "nothing changes until there is one");
+    window.click_on("Colour");
+    assert!(matches!(window.state.look.behind, Behind::Color(_)));
+    let wall = Behind::Picture(Arc::new(BehindPicture { file: Some("wall.jpg".into()), image: ColorImage::new(2, 2) }));
+    assert!(
+        matches!(window.state.hear(Update::Behind(wall.clone())), Some(Request::Look(look)) if look.behind == wall)
+    );
+    window.wait(0.1);
+    assert!(window.place_of("wall.jpg").is_some());
+    assert_eq!(window.click_on("Choose picture…"), [Action::Browse(Browse::Behind)]);
+    window.state.apply(Action::Undo);
+    assert!(matches!(window.state.look.behind, Behind::Color(_)), "as every other change");
 }
 
 #[test]

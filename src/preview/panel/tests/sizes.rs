@@ -95,6 +95,17 @@ fn the_largest_text_in_a_small_window_cuts_nothing_off() {
 }
 
 #[test]
+fn a_long_name_leaves_room_for_the_distance_of_focus() {
+    let mut state = sample::state();
+    let Source::Running(running) = &mut state.source else { unreachable!() };
+    running.label = "/home/somebody/recordings/of a day/in the garden".into();
+    let mut window = Window::of(state, (1280, 720));
+    window.wait(0.3);
+    let is_whole = |text: &String| text.starts_with('…') && text.ends_with("in the garden, focused at 1.24 m");
+    assert!(window.texts().iter().any(is_whole), "{:?}", window.texts());
+}
+
+#[test]
 fn the_scroll_bar_covers_no_control() {
     let mut window = Window::new();
     window.wait(0.3);

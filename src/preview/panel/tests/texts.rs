@@ -13,7 +13,7 @@ use crate::preview::views::Legend;
 
 /// Windows that together show about all that can be shown.
 fn windows() -> Vec<Window> {
-    let changes: [&dyn Fn(&mut State); 14] = [
+    let changes: [&dyn Fn(&mut State); 15] = [
         &|_| {},
         &|state| {
             state.transport = Some(Transport { place: 3, frames: 24, time_ns: 1, length_ns: 9 });
@@ -21,6 +21,7 @@ fn windows() -> Vec<Window> {
             (state.mirror, state.between) = (true, true);
         },
         &|state| state.look.effect = Effect::TiltShift,
+        &|state| (state.look.focus, state.look.strength) = (tweak::point(0.5, 0.5), Strength::Percent(0.0)),
         &|state| {
             state.look.strength = Strength::Lens(tweak::LENS);
             state.look.max_coc_px = Some(30.0);

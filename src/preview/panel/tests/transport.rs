@@ -32,6 +32,20 @@ fn a_recording_has_a_bar_that_goes_with_the_panel_and_a_camera_has_none() {
 }
 
 #[test]
+fn in_a_small_window_the_bar_makes_room_for_the_panel() {
+    for width in [400, 500, 640, 800] {
+        let mut state = super::sample::state();
+        state.transport = Some(TRANSPORT);
+        let mut window = Window::of(state, (width, 420));
+        window.wait(0.5);
+        let panel = window.panel.sheet.rect().unwrap();
+        let bar = window.ctx.memory(|memory| memory.area_rect(egui::Id::unique("transport")));
+        assert!(bar.is_none_or(|bar| !bar.intersects(panel)), "{width}: {bar:?} over {panel}");
+        assert_eq!(bar.is_some(), width >= 640);
+    }
+}
+
+#[test]
 fn keys_step_pause_and_go_to_the_start() {
     let mut window = of_a_recording();
     assert_eq!(window.press(Key::PageDown, Modifiers::NONE), [Action::Step(1)]);

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::Host;
 use crate::files::whole;
+use crate::look::BehindName;
 use crate::preview::services::Browse;
 use crate::preview::session::Order;
 use crate::preview::state::{Request, Update};
@@ -66,6 +67,10 @@ impl Host {
         let (orders, news) = (self.orders.clone(), self.news.clone());
         let pick = self.start.services.browse(what);
         let asked = std::thread::Builder::new().name("dialog".into()).spawn(move || match pick() {
+            Ok(Some(file)) if what == Browse::Behind => match BehindName::Image(file.into()).load() {
+                Ok(behind) => news.tell(Update::Behind(behind)),
+                Err(error) => news.note(error.to_string()),
+            },
             Ok(Some(name)) => drop(orders.send(Order::Do(Request::Offer(name)))),
             Ok(None) => {}
             Err(line) => news.note(line),
