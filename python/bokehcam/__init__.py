@@ -1,0 +1,1 @@
+"""Depth-aware background blur."""
