@@ -14,6 +14,7 @@ again for every batch. Nodes need this package; ``ray`` itself is not imported h
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
@@ -29,9 +30,10 @@ MOST_RENDERERS = 4
 
 
 @lru_cache(maxsize=MOST_RENDERERS)
-def renderer(size: tuple[int, int], settings: tuple[tuple[str, Any], ...]) -> Callable:
-    """The worker's renderer for pictures of `size` (width, height)."""
-    return bokehcam.Renderer(size=size, **dict(settings))
+def renderer(size: tuple[int, int], settings: bytes) -> bokehcam.Renderer:
+    """The worker's renderer for pictures of `size` (width, height). Its other settings are pickled: what a worker gets anew
+    with each task is then seen to be the same."""
+    return bokehcam.Renderer(size, **pickle.loads(settings))
 
 
 class Blur:
@@ -40,11 +42,11 @@ class Blur:
 
     Args:
         coc: how much is blurred: the name of a column with maps, each ``(H, W)`` float32; or a function of a row (a
-            dictionary of its values) that gives such a map; or a number, for all pixels alike.
+            dictionary of its values) that gives such a map; or a number >= 0, for all pixels alike.
         image: the column with the pictures, each ``(H, W, 3)`` uint8 (sRGB) or float32 (linear), of one size or of several.
         out: the column for the results; other columns stay as they are.
         threads: threads of a picture; one by default, as Ray starts a worker for each CPU.
-        settings: what else :class:`bokehcam.Renderer` takes, such as ``aperture`` and ``quality``.
+        settings: what else :class:`bokehcam.Renderer` takes: ``aperture``, ``quality``, ``max_coc_px`` and others.
 
     Raises:
         KeyError: a batch has no such column.
@@ -61,7 +63,7 @@ class Blur:
         **settings: Any,
     ):
         self.coc, self.image, self.out = coc, image, out
-        self.settings = tuple(sorted({"threads": threads, **settings}.items()))
+        self.settings = pickle.dumps({"threads": threads, **settings})
 
     def __call__(self, batch: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """A batch as Ray Data has it in numpy format: columns of equal length."""
@@ -76,12 +78,7 @@ class Blur:
         if picture.ndim != 3:
             raise ValueError(f"a picture has the shape {picture.shape}, where (height, width, 3) is needed")
         height, width = picture.shape[:2]
-        if callable(self.coc):
-            coc = self.coc(row)
-        elif isinstance(self.coc, str):
-            coc = row[self.coc]
-        else:
-            coc = np.full((height, width), self.coc, np.float32)
+        coc = row[self.coc] if isinstance(self.coc, str) else self.coc(row) if callable(self.coc) else self.coc
         return renderer((width, height), self.settings)(picture, coc)
 
 

@@ -207,7 +207,9 @@ def arguments(job: Job, unit: Unit, part: Path, report: Path) -> list[str]:
 
 def run(job: Job, program: str, given: list[str]) -> tuple[int, list[tuple[str, str]]]:
     """Runs the program to its end; its exit code, and what it said: levels and texts."""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("BOKEHCAM_") and name != "RUST_LOG"}
+    # Settings of the node do not count, and without a runtime folder no `bokehcam ctl` that is meant for a camera finds it.
+    left_out = ("BOKEHCAM_", "RUST_LOG", "XDG_RUNTIME_DIR")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(left_out)}
     child = subprocess.run(
         [sys.executable, "-I", "-S", "-c", PRELUDE, str(os.getpid()), program, *given],
         stdin=subprocess.DEVNULL,
