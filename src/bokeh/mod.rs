@@ -25,6 +25,7 @@ pub mod plan;
 pub mod rung;
 #[doc(hidden)]
 pub mod share;
+pub mod slices;
 #[doc(hidden)]
 pub mod split;
 
@@ -222,6 +223,14 @@ pub enum BokehError {
         needed_mb: u64,
         /// What this process can still take.
         free_mb: u64,
+    },
+    /// Slices have other lengths than a picture's.
+    #[error("slices of {lengths:?} values for pixels, result and radii are not those of a picture of {size:?}")]
+    Lengths {
+        /// Width and height in pixels.
+        size: (u32, u32),
+        /// Of the pixels, the result and the radii.
+        lengths: [usize; 3],
     },
     /// The executor took a picture and gave none back.
     #[error("the blur gave no picture back: please report this")]

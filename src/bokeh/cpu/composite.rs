@@ -1,4 +1,4 @@
-//! Pass `composite`: the blurred bins, front to back, become one picture; back to 8-bit sRGB.
+//! Pass `composite`: the blurred bins, front to back, become one picture; back to its pixels' kind.
 //!
 //! The pixels of one view tile the picture, so the coverages of two bins are disjoint, not independent: among the near
 //! bins, and among the others, a bin fills what is left. The near ones lie over the others; what stays open takes the
@@ -8,6 +8,7 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::pixels::Sample;
 use super::rows::{STRIP, Slot};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress};
@@ -39,23 +40,45 @@ impl EncodeTable {
         }
         Self(codes)
     }
+
+    /// Looks up the 8-bit sRGB of a chunk.
+    #[inline(always)]
+    pub fn encode(&self, color: &[[f32; CHUNK]; 3], out: &mut [u8]) {
+        let mut index = [[0u32; CHUNK]; 3];
+        for (index, color) in index.iter_mut().zip(color) {
+            for (index, &light) in index.iter_mut().zip(color) {
+                let light = if light > 0.0 { light } else { 0.0 };
+                let light = if light < 1.0 { light } else { 1.0 };
+                let steps = ENCODE_STEPS as f32;
+                let (scale, first) = if light < DARK { (steps / DARK, 0.0) } else { (steps, steps + 1.0) };
+                // Beyond 2^23 a float has no fraction, and its lowest bits are the integer.
+                *index = (light * scale + first + 8_388_608.0).to_bits();
+            }
+        }
+        for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            for (p, byte) in pixel.iter_mut().enumerate() {
+                *byte = self.0[index[p][x] as usize % ENCODE_SIZE];
+            }
+        }
+    }
 }
 
 /// Makes rows `y0..` of the result: a row of tiles.
-pub struct Composite<'a> {
+pub struct Composite<'a, T> {
     pub plan: &'a Plan,
     pub slots: &'a [Slot],
     /// Tells which tiles stay as they are.
     pub tiles: &'a Tiles,
-    /// The frame as it came.
+    /// The frame as it came, and its pixels.
     pub frame: &'a Source<'a>,
+    pub pixels: &'a [T],
     /// `[row][3][width]`, from the gather.
     pub gathered: &'a [f32],
     /// Back to 8 bits.
     pub encode: &'a EncodeTable,
     pub y0: usize,
     /// Whole rows of RGB.
-    pub out: &'a mut [u8],
+    pub out: &'a mut [T],
 }
 
 /// Bins composited front to back at some pixels: each covers what is still open.
@@ -141,7 +164,7 @@ impl Layers {
 /// Linear light of a chunk.
 type Color = Line<[[f32; CHUNK]; 3]>;
 
-impl WithSimd for Composite<'_> {
+impl<T: Sample> WithSimd for Composite<'_, T> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
@@ -160,7 +183,7 @@ impl WithSimd for Composite<'_> {
                 match self.plan.compositing {
                     Compositing::Layers => {
                         if !self.read_layers::<S>(y, x0, still, &mut layers) {
-                            row.copy_from_slice(&self.frame.color.rgb[(y * width + x0) * 3..][..take * 3]);
+                            row.copy_from_slice(&self.pixels[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
                         layers.flatten(simd, &mut color);
@@ -168,13 +191,14 @@ impl WithSimd for Composite<'_> {
                     Compositing::Select => self.select::<S>(y, x0, take, &mut layers.planes.0[0], &mut color.0),
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
                 }
-                encode(&mut color.0, self.plan.expansion, self.encode, row);
+                compress_highlights(&mut color.0, self.frame.expansion);
+                T::write(&color.0, self.encode, row);
             }
         }
     }
 }
 
-impl Composite<'_> {
+impl<T> Composite<'_, T> {
     /// Reads the bins that hold anything in a chunk; false where it is `still` and nothing near reaches it: it stays.
     #[inline(always)]
     fn read_layers<S: Simd>(&self, y: usize, x0: usize, still: bool, layers: &mut Layers) -> bool {
@@ -303,31 +327,15 @@ fn upsample<V: Simd, const S: usize>(
     }
 }
 
-/// Compresses the highlights of a chunk and looks up its 8-bit sRGB.
+/// Undoes the expansion of a chunk's highlights.
 #[inline(always)]
-fn encode(color: &mut [[f32; CHUNK]; 3], expansion: f32, table: &EncodeTable, out: &mut [u8]) {
+fn compress_highlights(color: &mut [[f32; CHUNK]; 3], expansion: f32) {
     if expansion.is_finite() {
         for x in 0..CHUNK {
             let factor = compress(luminance(color[0][x], color[1][x], color[2][x]), expansion);
             for p in 0..3 {
                 color[p][x] *= factor;
             }
-        }
-    }
-    let mut index = [[0u32; CHUNK]; 3];
-    for (index, color) in index.iter_mut().zip(&*color) {
-        for (index, &light) in index.iter_mut().zip(color) {
-            let light = if light > 0.0 { light } else { 0.0 };
-            let light = if light < 1.0 { light } else { 1.0 };
-            let steps = ENCODE_STEPS as f32;
-            let (scale, first) = if light < DARK { (steps / DARK, 0.0) } else { (steps, steps + 1.0) };
-            // Beyond 2^23 a float has no fraction, and its lowest bits are the integer.
-            *index = (light * scale + first + 8_388_608.0).to_bits();
-        }
-    }
-    for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-        for (p, byte) in pixel.iter_mut().enumerate() {
-            *byte = table.0[index[p][x] as usize % ENCODE_SIZE];
         }
     }
 }
@@ -342,7 +350,7 @@ mod tests {
         let table = EncodeTable::new();
         for code in 0..=255u8 {
             let mut out = [0u8; 6];
-            encode(&mut [[decode::<pulp::Scalar>(code); CHUNK]; 3], f32::INFINITY, &table, &mut out);
+            table.encode(&[[decode::<pulp::Scalar>(code); CHUNK]; 3], &mut out);
             assert_eq!(out, [code; 6]);
         }
     }

@@ -7,6 +7,7 @@ mod composite;
 mod fill;
 mod filter;
 mod gather;
+mod pixels;
 mod probe;
 mod reach;
 mod rows;
@@ -15,7 +16,7 @@ mod tent;
 mod tiles;
 mod unpack;
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -39,6 +40,7 @@ use crate::compute::{Backend, simd};
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
+pub use pixels::{Pixels, Radii, Sample};
 pub use unpack::{compress, expand};
 
 /// Runs a plan on the CPU.
@@ -127,46 +129,62 @@ impl CpuBokeh {
         }
         out.resize(color.width, color.height);
         let mut times = PassTimes::new();
-        if out.rgb.is_empty() {
-            return Ok(times);
-        }
         let mut clock = Instant::now();
-        let mut lap = |name| {
+        let lap = |name| {
             let now = Instant::now();
             times.add(name, now - clock);
             clock = now;
+            ControlFlow::Continue(())
         };
-        let frame = Source { color, depth, coc, matte: self.plan.matte(depth, coc), expansion: self.plan.expansion };
+        let _never_stopped = self.blur_pixels(&color.rgb, Radii::Field(coc, depth), &mut out.rgb, lap);
+        Ok(times)
+    }
+
+    /// Blurs the `pixels` of one picture into `out`, which has the length of it; `lap` is called after each pass with its
+    /// name, and may stop the rest. A frame that was stopped leaves nothing behind that another could be made from.
+    pub(super) fn blur_pixels<T: Sample>(
+        &mut self,
+        pixels: &[T],
+        coc: Radii<'_>,
+        out: &mut [T],
+        mut lap: impl FnMut(&'static str) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        if out.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let frame = Source::new(&self.plan, T::pixels(pixels), coc);
         self.split(&frame);
-        lap("split");
+        lap("split")?;
         // With something in front, blocks in which it hides anything get their bins behind after the fill.
         self.bin(&frame, None);
-        lap("bin");
+        lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
                 pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers);
             }
-            lap("fill");
+            lap("fill")?;
             self.bin(&frame, Some(layer));
-            lap("bin");
+            lap("bin")?;
         }
         if let Some(gather) = &mut self.gather {
             gather.run((&mut self.workers, self.arch), &self.plan, &frame, &self.slots[0].source, &mut self.taken);
-            lap("gather");
+            lap("gather")?;
         } else {
             self.reach();
-            lap("reach");
+            lap("reach")?;
             self.blur_bins();
-            lap("blur");
+            lap("blur")?;
         }
-        self.composite(&frame, out);
-        lap("composite");
-        Ok(times)
+        self.composite(&frame, pixels, out);
+        lap("composite")
     }
 
     /// Splits the frame's CoC into bins, finds the tiles that stay as they are, and which bins hold anything.
     fn split(&mut self, frame: &Source<'_>) {
-        self.plan.split(frame.depth, frame.coc);
+        match frame.coc {
+            Radii::Field(field, depth) => self.plan.split(depth, field),
+            Radii::Each(coc_px) => self.plan.split_radii(coc_px),
+        }
         let across = self.tiles.across;
         let layered = self.plan.compositing == Compositing::Layers;
         if layered {
@@ -290,16 +308,16 @@ impl CpuBokeh {
     }
 
     /// Pass `composite`: each part is a row of tiles.
-    fn composite(&mut self, frame: &Source<'_>, out: &mut ColorImage) {
+    fn composite<T: Sample>(&mut self, frame: &Source<'_>, pixels: &[T], out: &mut [T]) {
         let width = self.plan.width;
-        let out = DisjointParts::new(&mut out.rgb, TILE_H * width * 3, &mut self.taken);
+        let out = DisjointParts::new(out, TILE_H * width * 3, &mut self.taken);
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
         let (plan, slots, tiles) = (&self.plan, &self.slots, &self.tiles);
         let (arch, encode) = (self.arch, &self.encode);
         self.workers.run(self.plan.height.div_ceil(TILE_H), &|part| {
             let y0 = part * TILE_H;
             let out = out.part(part);
-            arch.dispatch(composite::Composite { plan, slots, tiles, frame, gathered, encode, y0, out });
+            arch.dispatch(composite::Composite { plan, slots, tiles, frame, pixels, gathered, encode, y0, out });
         });
     }
 }
