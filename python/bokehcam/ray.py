@@ -3,10 +3,13 @@
 ::
 
     import ray, bokehcam.ray
+    from ray.data import ActorPoolStrategy
 
-    pictures = ray.data.read_images("photos/", include_paths=True)
+    pictures = ray.data.read_images("photos/")
     pictures.map_batches(bokehcam.ray.Blur(coc=12.0), batch_size=8).write_images("blurred/", column="image")
-    pictures.map_batches(bokehcam.ray.Blur, fn_constructor_kwargs={"coc": "coc"}, batch_size=8, compute=ray.data.ActorPoolStrategy(size=4))
+    pictures.map_batches(
+        bokehcam.ray.Blur, fn_constructor_kwargs={"coc": 12.0}, batch_size=8, compute=ActorPoolStrategy(size=4)
+    )
 
 The first form runs as tasks, the second as actors; either way a worker has one renderer for each size of picture and uses it
 again for every batch. Nodes need this package; ``ray`` itself is not imported here.

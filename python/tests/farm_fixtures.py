@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import secrets
 import shutil
 import signal
 import socket
@@ -18,10 +19,11 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PORTRAIT = REPOSITORY / "recordings" / "portrait"
-# Fixed focus would do for equal bytes as well; with it off, frames depend on those before, as they mostly do.
+# With autofocus and memory each frame depends on those before, as is usual.
 FLAGS = ["--loop", "--frames", "48", "--quality", "draft"]
 FORMAT = ["--format", "y4m"]
 PATIENCE_S = 60.0
+TOKEN = secrets.token_hex(32)
 
 
 def program() -> Path | None:
@@ -44,7 +46,7 @@ def recording(folder: Path, first: int) -> Path:
     """A recording of 24 frames that begins with frame `first` of the bundled one, and so has bytes of its own."""
     folder.mkdir(parents=True)
     for kind in ("rgb", "depth"):
-        (folder / kind).symlink_to(PORTRAIT / kind)
+        shutil.copytree(PORTRAIT / kind, folder / kind)
     line = "{0:.6f} rgb/{1:06}.png {0:.6f} depth/{1:06}.png\n"
     (folder / "associations.txt").write_text("".join(line.format(k / 12, (first + k) % 24) for k in range(24)))
     return folder
@@ -53,7 +55,12 @@ def recording(folder: Path, first: int) -> Path:
 def environment() -> dict[str, str]:
     """That of the tests, without settings of whoever runs them."""
     others = {name: value for name, value in os.environ.items() if not name.startswith(("BOKEHCAM", "RAY_"))}
-    return {**others, "BOKEHCAM": str(PROGRAM), "PYTHONPATH": str(REPOSITORY / "python"), "XDG_CONFIG_HOME": "/nonexistent"}
+    return {
+        **others,
+        "BOKEHCAM": str(PROGRAM),
+        "PYTHONPATH": str(REPOSITORY / "python"),
+        "XDG_CONFIG_HOME": "/nonexistent",
+    }
 
 
 def farm_command(*arguments: str | Path) -> list[str]:
@@ -63,7 +70,12 @@ def farm_command(*arguments: str | Path) -> list[str]:
 def farm(*arguments: str | Path, expect: int = 0, **changes: str) -> str:
     """Runs a farm to its end; what it says."""
     run = subprocess.run(
-        farm_command(*arguments), env={**environment(), **changes}, capture_output=True, text=True, timeout=180, stdin=subprocess.DEVNULL
+        farm_command(*arguments),
+        env={**environment(), **changes},
+        capture_output=True,
+        text=True,
+        timeout=180,
+        stdin=subprocess.DEVNULL,
     )
     assert run.returncode == expect, f"{run.returncode}: {run.stderr}"
     assert "Traceback" not in run.stderr, run.stderr
@@ -72,7 +84,19 @@ def farm(*arguments: str | Path, expect: int = 0, **changes: str) -> str:
 
 def alone(source: Path, out: Path, flags: list[str], threads: int = 2) -> bytes:
     """What the program makes of a recording without a farm."""
-    command = [str(PROGRAM), "-q", "stream", str(source), "--to", str(out), "--threads", str(threads), "--backend", "cpu", *flags]
+    command = [
+        str(PROGRAM),
+        "-q",
+        "stream",
+        str(source),
+        "--to",
+        str(out),
+        "--threads",
+        str(threads),
+        "--backend",
+        "cpu",
+        *flags,
+    ]
     subprocess.run(command, check=True, env=environment(), stdin=subprocess.DEVNULL, timeout=120)
     return out.read_bytes()
 
@@ -139,7 +163,12 @@ class Cluster:
         self.folder = tempfile.mkdtemp(prefix="farm-", dir="/tmp")
         self.address = f"127.0.0.1:{free_port()}"
         self.nodes: list[subprocess.Popen] = []
-        head = ["--head", f"--port={self.address.rsplit(':', 1)[1]}", "--include-dashboard=false", f"--temp-dir={self.folder}"]
+        head = [
+            "--head",
+            f"--port={self.address.rsplit(':', 1)[1]}",
+            "--include-dashboard=false",
+            f"--temp-dir={self.folder}",
+        ]
         self.raylets: list[int] = []
         self.start(*head)
 
@@ -148,7 +177,9 @@ class Cluster:
         common = ["--num-cpus=1", "--object-store-memory=100000000", "--disable-usage-stats", "--block"]
         ray = str(Path(sys.executable).with_name("ray"))
         log = open(f"{self.folder}/node{len(self.nodes)}.log", "wb")
-        node = subprocess.Popen([ray, "start", *arguments, *common], stdout=log, stderr=log, stdin=subprocess.DEVNULL, env=environment())
+        node = subprocess.Popen(
+            [ray, "start", *arguments, *common], stdout=log, stderr=log, stdin=subprocess.DEVNULL, env=environment()
+        )
         self.nodes.append(node)
         said = Path(log.name)
         until(lambda: b"Ray runtime started" in said.read_bytes() or node.poll() is not None, "a node of Ray's")

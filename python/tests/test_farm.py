@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import signal
 from pathlib import Path
 
 import pytest
@@ -67,7 +66,9 @@ def test_two_sources_with_results_of_one_name_are_refused(tmp_path):
 
 
 def test_a_missing_program_is_no_usage_error(take, tmp_path):
-    assert "there is no program nowhere/bokehcam" in farm(take, "--out", tmp_path / "out", "--bokehcam", "nowhere/bokehcam", expect=1)
+    assert "there is no program nowhere/bokehcam" in farm(
+        take, "--out", tmp_path / "out", "--bokehcam", "nowhere/bokehcam", expect=1
+    )
     assert "is no bokehcam" in farm(take, "--out", tmp_path / "out", "--bokehcam", "/bin/true", expect=1)
 
 
@@ -146,7 +147,12 @@ def test_foreign_files_stay(job, take):
 def test_only_our_own_older_parts_are_swept(job):
     from bokehcam.farm import plan
 
-    names = {"0" * 16 + "-0123456789ab": False, job.id + "-0123456789ab": True, "f" * 16 + "-0123456789ab": True, "notes-1": True}
+    names = {
+        "0" * 16 + "-0123456789ab": False,
+        job.id + "-0123456789ab": True,
+        "f" * 16 + "-0123456789ab": True,
+        "notes-1": True,
+    }
     for name in names:
         (job.hidden / name).mkdir()
         (job.hidden / name / "part").touch()
@@ -194,7 +200,9 @@ def test_settings_of_the_start_hold_and_those_of_the_node_do_not(job, take, monk
     job.settings_file.write_text("frames = 3\n")
     assert work.make(replace(job, flags=("--effect", "none")), unit, job.program).frames == 3
     unit = work.Unit(str(take), "other.y4m")
-    assert work.make(replace(job, flags=("--effect", "none"), environment={"BOKEHCAM_FRAMES": "4"}), unit, job.program).frames == 4
+    assert (
+        work.make(replace(job, flags=("--effect", "none"), environment={"BOKEHCAM_FRAMES": "4"}), unit, job.program).frames == 4
+    )
 
 
 def test_threads_change_no_byte(take, tmp_path):
@@ -226,7 +234,17 @@ def test_pictures_in_shards_with_their_depth_maps(tmp_path):
     import subprocess
 
     subprocess.run(
-        [PROGRAM, "-q", "render", pictures / "p3.png", "--depth-map", depths / "p3.png", "--out", tmp_path / "alone.png", *flags[2:]],
+        [
+            PROGRAM,
+            "-q",
+            "render",
+            pictures / "p3.png",
+            "--depth-map",
+            depths / "p3.png",
+            "--out",
+            tmp_path / "alone.png",
+            *flags[2:],
+        ],
         check=True,
     )
     assert (out / "p3.png").read_bytes() == (tmp_path / "alone.png").read_bytes()
@@ -234,8 +252,8 @@ def test_pictures_in_shards_with_their_depth_maps(tmp_path):
 
 
 @needs_ray
-def test_flags_that_the_program_refuses_for_all_end_the_farm(tmp_path):
+def test_flags_that_the_program_refuses_for_all_end_the_farm(cluster, tmp_path):
     """What only the program can judge: a lens without its focal length."""
     takes = [recording(tmp_path / f"take{k}", k) for k in range(4)]
-    said = farm(*takes, "--out", tmp_path / "out", "--address", "local", "--", "--f-number", "1.8", expect=2)
+    said = farm(*takes, "--out", tmp_path / "out", "--address", cluster.address, "--", "--f-number", "1.8", expect=2)
     assert "error: the program refused the first " in said and "focal" in said, said

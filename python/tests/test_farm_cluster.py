@@ -28,17 +28,7 @@ from farm_fixtures import (
 )
 
 pytestmark = [needs_program, needs_ray]
-RECORDINGS = 6
-
-
-@pytest.fixture(scope="module")
-def cluster():
-    made = Cluster()
-    try:
-        made.add()
-        yield made
-    finally:
-        made.stop()
+RECORDINGS = 5
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +87,9 @@ def test_a_worker_and_a_child_are_killed(cluster, sources, expected, tmp_path):
     other = until(lambda: [process for process in children_at_work(out) if process != child], "another recording")[0]
     os.kill(other, signal.SIGTERM)
     # The program alone, without its worker.
-    third = until(lambda: [process for process in children_at_work(out) if process not in (child, other)], "a third recording")[0]
+    third = until(lambda: [process for process in children_at_work(out) if process not in (child, other)], "a third recording")[
+        0
+    ]
     os.kill(third, signal.SIGKILL)
     ended(driver)
     check(out, expected)
@@ -106,7 +98,10 @@ def test_a_worker_and_a_child_are_killed(cluster, sources, expected, tmp_path):
 def test_a_node_is_killed(cluster, sources, expected, tmp_path):
     out = tmp_path / "out"
     driver = start(out, sources, cluster)
-    on_last = lambda: [child for child in children_at_work(out) if parent_of(parent_of(child)) == cluster.raylets[-1]]
+
+    def on_last() -> list[int]:
+        return [child for child in children_at_work(out) if parent_of(parent_of(child)) == cluster.raylets[-1]]
+
     child = until(on_last, "a recording on the second node")[0]
     cluster.kill_last()
     until(lambda: not is_alive(child), "the death of the program with its node")
@@ -136,12 +131,10 @@ def test_the_driver_is_killed_and_a_second_start_does_the_rest(cluster, sources,
 
 def test_what_fails_for_good_is_listed_and_the_rest_is_made(cluster, sources, expected, tmp_path):
     broken = recording(tmp_path / "broken", 0)
-    (broken / "rgb").unlink()
-    (broken / "rgb").mkdir()
-    (broken / "rgb" / "000000.png").write_bytes(b"no picture")
+    (broken / "rgb" / "000007.png").write_bytes(b"no picture")
     said = farm(broken, *sources[:2], "--out", tmp_path / "out", *FORMAT, "--address", cluster.address, "--", *FLAGS, expect=1)
     assert "2 of 3 recordings" in said and "1 failed for good" in said, said
-    assert f"  {broken}: {broken}/rgb/000000.png: " in said, said
+    assert f"  {broken}: {broken}/rgb/000007.png: " in said, said
     check(tmp_path / "out", {name: expected[name] for name in ("take0.y4m", "take1.y4m")})
 
 

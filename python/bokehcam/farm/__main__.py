@@ -37,17 +37,48 @@ def parser() -> Parser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("sources", nargs="*", metavar="SOURCE", help="stream: a recording; render: a picture, or a folder of pictures")
-    parser.add_argument("--out", required=True, metavar="DIR", help="where results go, and their reports (DIR/reports); all nodes see it")
+    parser.add_argument(
+        "sources", nargs="*", metavar="SOURCE", help="stream: a recording; render: a picture or a folder of them"
+    )
+    parser.add_argument(
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="where results go, and their reports (DIR/reports); all nodes see it",
+    )
     parser.add_argument("--list", metavar="FILE", help="more sources, one a line; - is standard input")
-    parser.add_argument("--format", metavar="EXT", help="stream: mp4 (default), mkv, webm, y4m or png (folders); render: png (default) or jpg")
-    parser.add_argument("--depth-maps", metavar="DIR", help="render: depth maps by the names of the pictures [default: NAME-depth beside them]")
-    parser.add_argument("--address", metavar="ADDR", help="Ray cluster: auto, HOST:PORT, or local [default: one that runs here, else local]")
+    parser.add_argument(
+        "--format",
+        metavar="EXT",
+        help="stream: mp4 (default), mkv, webm, y4m or png (folders); render: png (default) or jpg",
+    )
+    parser.add_argument(
+        "--depth-maps",
+        metavar="DIR",
+        help="render: depth maps by the names of the pictures [default: NAME-depth beside them]",
+    )
+    parser.add_argument(
+        "--address",
+        metavar="ADDR",
+        help="Ray cluster: auto, HOST:PORT, or local [default: one that runs here, else local]",
+    )
     parser.add_argument("--cpus", type=number(int, 1), default=1, metavar="N", help="CPUs and threads of a task [default: 1]")
-    parser.add_argument("--gpus", type=number(float, 0), default=0.0, metavar="N", help="GPUs of a task, which then blur [default: 0]")
-    parser.add_argument("--shard", type=number(int, 1), default=32, metavar="N", help="render: pictures of a task [default: 32]")
-    parser.add_argument("--retries", type=number(int, 0), default=3, metavar="N", help="how often what failed is tried again [default: 3]")
-    parser.add_argument("--bokehcam", metavar="FILE", help="the program, the same on all nodes [default: BOKEHCAM, else in their path]")
+    parser.add_argument(
+        "--gpus", type=number(float, 0), default=0.0, metavar="N", help="GPUs of a task, which then blur [default: 0]"
+    )
+    parser.add_argument(
+        "--shard", type=number(int, 1), default=32, metavar="N", help="render: pictures of a task [default: 32]"
+    )
+    parser.add_argument(
+        "--retries",
+        type=number(int, 0),
+        default=3,
+        metavar="N",
+        help="how often what failed is tried again [default: 3]",
+    )
+    parser.add_argument(
+        "--bokehcam", metavar="FILE", help="the program, the same on all nodes [default: BOKEHCAM, else in their path]"
+    )
     return parser
 
 
@@ -123,12 +154,19 @@ def run(arguments: list[str]) -> int:
     options = drive.Options(given.address, given.cpus, given.gpus, given.shard, given.retries)
     with plan.at_work(job):
         drive.connect(options)
+        # Ray has set a handler of its own.
+        signal.signal(signal.SIGTERM, stop)
         try:
             farm = drive.Farm(job, options)
             tally = farm.run(left)
         finally:
             drive.ray.shutdown()
     return summed_up(tally, len(units), len(units) - len(left), noun, given.out)
+
+
+def stop(signal_number, _frame):
+    """Ends as Ctrl-C does."""
+    raise KeyboardInterrupt(signal_number)
 
 
 def summed_up(tally, all_units: int, there_before: int, noun: str, out: str) -> int:
@@ -153,10 +191,6 @@ def say(line: str) -> None:
 
 
 def main() -> int:
-    def stop(signal_number, _frame):
-        raise SystemExit(128 + signal_number)
-
-    signal.signal(signal.SIGTERM, stop)
     try:
         return run(sys.argv[1:])
     except UsageError as error:
@@ -165,9 +199,9 @@ def main() -> int:
     except FarmError as error:
         say(f"error: {error}")
         return 1
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stopped:
         say("stopped: what was finished stays; the same command does the rest")
-        return 128 + signal.SIGINT
+        return 128 + (stopped.args[0] if stopped.args else signal.SIGINT)
 
 
 if __name__ == "__main__":

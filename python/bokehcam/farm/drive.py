@@ -21,9 +21,9 @@ from .work import Job, Outcome, Result, Unit, finished, frames_of
 
 # Where the program calls its arguments wrong for so many sources, before any result, it is not for the sources.
 REFUSED_AT_MOST = 3
-# Tasks that wait for a free place on the nodes, as a share of those that run.
-WAITING = 1.0
+# So many tasks at least wait for a free place on the nodes, else as many as run.
 LEAST_WAITING = 8
+LOOK_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,13 @@ class Options:
 
 @dataclass
 class Task:
-    """Results that are made together, how often that failed, and what the program said of each the last time."""
+    """Results that are made together, how often that failed, and what the program said of the one that is tried again."""
 
     units: list[Unit]
     failed: int = 0
-    causes: dict[str, str] = field(default_factory=dict)
+    cause: str = ""
+    # The node where that was.
+    avoid: str = ""
 
 
 @dataclass
@@ -92,15 +94,21 @@ def tell(line: str) -> None:
     tqdm.write(line, file=sys.stderr)
 
 
+def apart_from(nodes) -> dict[str, str]:
+    """Selects nodes, all but some."""
+    return {"ray.io/node-id": f"!in({','.join(nodes)})"} if nodes else {}
+
+
 class Farm:
     """A job at work."""
 
     def __init__(self, job: Job, options: Options):
         self.job, self.options, self.tally = job, options, Tally()
-        self.perform = ray.remote(work.perform).options(num_cpus=options.cpus, num_gpus=options.gpus, max_retries=0)
+        self.perform = ray.remote(num_cpus=options.cpus, num_gpus=options.gpus, max_retries=0)(work.perform)
         self.running: dict[ray.ObjectRef, Task] = {}
         self.unfit: dict[str, str] = {}
-        self.looked_s, self.places = -60.0, 1
+        self.alive: set[str] = set()
+        self.looked_s, self.places = -LOOK_S, 1
 
     def run(self, units: list[Unit]) -> Tally:
         """Makes all results that can be made. Interrupted, it stops what runs."""
@@ -108,12 +116,16 @@ class Farm:
         waiting = deque(Task(units[start : start + size]) for start in range(0, len(units), size))
         job = ray.put(self.job)
         # Rewritten at most ten times a second, and only on a terminal.
-        with tqdm(total=len(units), unit="", disable=None, bar_format="{n_fmt}/{total_fmt} |{bar}| {elapsed}, {postfix}") as bar:
+        with tqdm(
+            total=len(units), unit="", disable=None, bar_format="{n_fmt}/{total_fmt} |{bar}| {elapsed}, {postfix}"
+        ) as bar:
             try:
                 while waiting or self.running:
-                    while waiting and len(self.running) < self.most():
+                    self.look_around()
+                    most = self.places + max(LEAST_WAITING, self.places)
+                    while waiting and len(self.running) < most:
                         task = waiting.popleft()
-                        self.running[self.placed().remote(job, task.units)] = task
+                        self.running[self.placed(task).remote(job, task.units)] = task
                     for ref in ray.wait(list(self.running), num_returns=1, timeout=1.0)[0]:
                         waiting.extend(self.note(self.running.pop(ref), ref))
                     self.end_early(waiting)
@@ -124,18 +136,24 @@ class Farm:
                     ray.cancel(ref, force=True)
         return self.tally
 
-    def most(self) -> int:
-        """How many tasks are handed out at most: those that find a place, and some that wait for one."""
-        if time.monotonic() - self.looked_s > 5.0:
-            self.looked_s = time.monotonic()
-            self.places = max(1, int(ray.cluster_resources().get("CPU", 0) // self.options.cpus))
-        return self.places + max(LEAST_WAITING, int(WAITING * self.places))
+    def look_around(self) -> None:
+        """Notes, every few seconds, which nodes there are."""
+        if time.monotonic() - self.looked_s < LOOK_S:
+            return
+        self.looked_s = time.monotonic()
+        alive = [node for node in ray.nodes() if node["Alive"]]
+        self.alive = {node["NodeID"] for node in alive}
+        self.places = max(1, sum(int(node["Resources"].get("CPU", 0) // self.options.cpus) for node in alive))
+        if self.alive and self.alive <= self.unfit.keys():
+            self.tally.ended = f"no node is left that can do it: {'; '.join(set(self.unfit.values()))}"
 
-    def placed(self):
-        """The task for nodes that are fit for it."""
-        if not self.unfit:
-            return self.perform
-        return self.perform.options(label_selector={"ray.io/node-id": f"!in({','.join(self.unfit)})"})
+    def placed(self, task: Task):
+        """The task for nodes that are fit for it; rather not for the one where it failed, while there are others."""
+        fit = apart_from(self.unfit)
+        if not task.avoid or self.alive <= {*self.unfit, task.avoid}:
+            return self.perform.options(label_selector=fit)
+        others = apart_from([*self.unfit, task.avoid])
+        return self.perform.options(label_selector=others, fallback_strategy=[{"label_selector": fit}])
 
     def note(self, task: Task, ref: ray.ObjectRef) -> list[Task]:
         """Takes note of what a task did; what is to be done again."""
@@ -151,10 +169,10 @@ class Farm:
             if not result.cause:
                 self.tally.add(result.frames)
             # What is said twice in the same words will be said again.
-            elif result.refused or task.failed >= self.options.retries or task.causes.get(result.unit.output) == result.cause:
+            elif result.refused or task.failed >= self.options.retries or task.cause == result.cause:
                 self.give_up(result)
             else:
-                again.append(Task([result.unit], task.failed + 1, {result.unit.output: result.cause}))
+                again.append(Task([result.unit], task.failed + 1, result.cause, outcome.node))
                 continue
             self.warn(result)
         return again
@@ -168,7 +186,7 @@ class Farm:
             else:
                 left.append(unit)
         if task.failed < self.options.retries:
-            return [Task(left, task.failed + 1, task.causes)] if left else []
+            return [Task(left, task.failed + 1, task.cause, task.avoid)] if left else []
         what = type(error).__name__
         cause = next((line.strip() for line in str(error).splitlines() if line.strip()), what)
         for unit in left:
@@ -180,8 +198,7 @@ class Farm:
         if outcome.node not in self.unfit:
             self.unfit[outcome.node] = outcome.unfit
             tell(f"warning: {outcome.host} gets no tasks: {outcome.unfit}")
-        if all(node["NodeID"] in self.unfit for node in ray.nodes() if node["Alive"]):
-            self.tally.ended = f"no node can do it: {outcome.host}: {outcome.unfit}"
+        self.looked_s = -LOOK_S
         return [task]
 
     def give_up(self, result: Result) -> None:
@@ -200,7 +217,9 @@ class Farm:
         """Ends where it can come to nothing."""
         refused = [result for result in self.tally.failed.values() if result.refused]
         if not self.tally.made and len(refused) >= REFUSED_AT_MOST:
-            self.tally.ended = f"the program refused the first {len(refused)} sources, so the flags are wrong: {refused[0].cause}"
+            self.tally.ended = (
+                f"the program refused the first {len(refused)} sources, so the flags are wrong: {refused[0].cause}"
+            )
         if self.tally.ended:
             for ref in self.running:
                 ray.cancel(ref, force=True)

@@ -23,7 +23,17 @@ DEPTH_SUFFIX = "-depth"
 FORMATS = {"stream": ("mp4", "mkv", "webm", "y4m", "png"), "render": ("png", "jpg")}
 # Flags of the program that the farm gives itself, or that make no sense with it.
 OWN_FLAGS = {
-    "stream": ("--to", "--report", "--name", "--pace", "--force", "--on-demand", "--out-size", "--config", "--log-format"),
+    "stream": (
+        "--to",
+        "--report",
+        "--name",
+        "--pace",
+        "--force",
+        "--on-demand",
+        "--out-size",
+        "--config",
+        "--log-format",
+    ),
     "render": ("--out", "--depth-map", "--mask", "--like", "--debug-dir", "--force", "--config", "--log-format"),
 }
 MOST_NAME_BYTES = 255
@@ -66,9 +76,12 @@ def split_flags(rest: list[str]) -> tuple[str, tuple[str, ...]]:
 
 def refuse_bad_flags(program: str, command: str, flags: tuple[str, ...]) -> None:
     """Lets the program read its flags, without doing anything."""
-    output = ["--to", "null"] if command == "stream" else ["--out", "a.png"]
+    needed = ["demo", "--to", "null"] if command == "stream" else ["a.png", "--out", "b.png"]
     asked = subprocess.run(
-        [located(program) or program, command, "a", *output, *flags, "--help"], stdin=subprocess.DEVNULL, capture_output=True, text=True
+        [located(program) or program, command, *needed, *flags, "--help"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
     )
     if asked.returncode:
         said = " ".join(asked.stderr.split())
@@ -109,7 +122,9 @@ def units(command: str, sources: Iterable[str], extension: str, depth_maps: str 
         output = stem if (command, extension) == ("stream", "png") else f"{stem}.{extension}"
         other = made.setdefault(output, path)
         if other is not path:
-            raise UsageError(f"{other} and {path}: the result of both would be {output}; give them to two farms with an --out each")
+            raise UsageError(
+                f"{other} and {path}: the result of both would be {output}; give them to two farms with an --out each"
+            )
         if output in (REPORTS, HIDDEN) or len(os.fsencode(f"{output}.json")) > MOST_NAME_BYTES:
             raise UsageError(f"{path}: its result cannot be called {output}; give the source another name")
         planned.append(Unit(str(path), output, depth_of(path, depth_maps) if command == "render" else ()))

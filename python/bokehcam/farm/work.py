@@ -147,7 +147,8 @@ def version_of(program: str) -> str:
         asked = subprocess.run([program, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60)
     except (OSError, subprocess.SubprocessError):
         return ""
-    return asked.stdout.strip() if asked.returncode == 0 else ""
+    said = asked.stdout.strip()
+    return said if said.startswith("bokehcam ") else ""
 
 
 def make(job: Job, unit: Unit, program: str) -> Result:
@@ -182,23 +183,32 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
     }
     if not complete(report, job.command):
         return Result(unit, "its report does not account for all frames", warnings=warnings)
-    with open(report_part, "w", encoding="utf-8") as file:
-        json.dump(report, file, indent=2)
-        file.flush()
-        os.fsync(file.fileno())
     final = job.folder / unit.output
     # A report that is there is that of an attempt which did not come further, or of the one that is first; then it stays.
     if not os.path.lexists(final):
-        os.replace(report_part, report_of(job.folder, unit))
-        sync(job.folder / REPORTS)
-    if publish(part, final) or finished(job, unit):
+        put_report(job, unit, report, report_part)
+    if publish(part, final):
+        # Another attempt may have put its own there meanwhile.
+        if read_report(report_of(job.folder, unit)) != report:
+            put_report(job, unit, report, report_part)
+        return Result(unit, frames=frames_of(report), warnings=warnings)
+    if finished(job, unit):
         return Result(unit, frames=frames_of(report), warnings=warnings)
     return Result(unit, f"{final} has appeared meanwhile, and is not of this job", warnings=warnings)
 
 
 def arguments(job: Job, unit: Unit, part: Path, report: Path) -> list[str]:
     """The program's arguments."""
-    common = ["--log-format", "json", "--config", str(job.settings_file), job.command, unit.source, *job.flags, *unit.extra]
+    common = [
+        "--log-format",
+        "json",
+        "--config",
+        str(job.settings_file),
+        job.command,
+        unit.source,
+        *job.flags,
+        *unit.extra,
+    ]
     if job.command == "render":
         return [*common, "--out", str(part)]
     # In real time frames may be dropped, and a second run would give another result.
@@ -261,6 +271,16 @@ def publish(part: Path, final: Path) -> bool:
         # A network file system may repeat what it has done already, when the answer was lost.
         return os.stat(part).st_nlink == 2
     return True
+
+
+def put_report(job: Job, unit: Unit, report: dict, part: Path) -> None:
+    """Gives a report its place, by way of the file `part`."""
+    with open(part, "w", encoding="utf-8") as file:
+        json.dump(report, file, indent=2)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(part, report_of(job.folder, unit))
+    sync(job.folder / REPORTS)
 
 
 def sync(folder: Path) -> None:
