@@ -20,7 +20,8 @@ import pytest
 REPOSITORY = Path(__file__).resolve().parents[2]
 PORTRAIT = REPOSITORY / "recordings" / "portrait"
 # With autofocus and memory each frame depends on those before, as is usual.
-FLAGS = ["--loop", "--frames", "48", "--quality", "draft"]
+FRAMES = 36
+FLAGS = ["--loop", "--frames", str(FRAMES), "--quality", "draft"]
 FORMAT = ["--format", "y4m"]
 PATIENCE_S = 60.0
 TOKEN = secrets.token_hex(32)
@@ -60,6 +61,9 @@ def environment() -> dict[str, str]:
         "BOKEHCAM": str(PROGRAM),
         "PYTHONPATH": str(REPOSITORY / "python"),
         "XDG_CONFIG_HOME": "/nonexistent",
+        # Only these tests may join their clusters; and Ray makes no token in the user's home.
+        "RAY_AUTH_MODE": "token",
+        "RAY_AUTH_TOKEN": TOKEN,
     }
 
 

@@ -13,6 +13,8 @@ import pytest
 from farm_fixtures import (
     FLAGS,
     FORMAT,
+    FRAMES,
+    PROGRAM,
     Cluster,
     alone,
     children_at_work,
@@ -54,7 +56,7 @@ def check(out: Path, expected: dict[str, bytes]) -> None:
         assert (out / name).read_bytes() == bytes_alone, name
         assert os.stat(out / name).st_nlink == 1
         report = json.loads((out / "reports" / f"{name}.json").read_text())
-        assert report["frames"]["delivered"] == 48 and report["farm"]["output"] == {"bytes": len(bytes_alone)}
+        assert report["frames"]["delivered"] == FRAMES and report["farm"]["output"] == {"bytes": len(bytes_alone)}
 
 
 def start(out: Path, sources: list[Path], cluster: Cluster) -> subprocess.Popen:
@@ -134,7 +136,7 @@ def test_what_fails_for_good_is_listed_and_the_rest_is_made(cluster, sources, ex
     (broken / "rgb" / "000007.png").write_bytes(b"no picture")
     said = farm(broken, *sources[:2], "--out", tmp_path / "out", *FORMAT, "--address", cluster.address, "--", *FLAGS, expect=1)
     assert "2 of 3 recordings" in said and "1 failed for good" in said, said
-    assert f"  {broken}: {broken}/rgb/000007.png: " in said, said
+    assert f"  {broken}: {broken}/associations.txt:8: rgb/000007.png: not a PNG or JPEG file" in said, said
     check(tmp_path / "out", {name: expected[name] for name in ("take0.y4m", "take1.y4m")})
 
 
@@ -148,3 +150,18 @@ def test_a_stopped_farm_leaves_nothing_behind(cluster, sources, expected, tmp_pa
     until(lambda: not is_alive(child), "the end of the program")
     assert "made now" in ended(start(out, sources, cluster))
     check(out, expected)
+
+
+@pytest.mark.parametrize(
+    ("asked", "answer", "said"),
+    [("--version", "echo bokehcam 99", "gets no tasks: "), ("stream", "exit 1", "")],
+    ids=["another version", "always fails"],
+)
+def test_a_node_that_cannot_do_it_costs_no_result(cluster, sources, expected, tmp_path, asked, answer, said):
+    program, out = tmp_path / "bokehcam", tmp_path / "out"
+    on_last = f'[ "$RAY_RAYLET_PID" = {cluster.raylets[-1]} ] && case "$*" in *{asked}*) {answer}; exit;; esac'
+    program.write_text(f'#!/bin/sh\n{on_last}\nexec {PROGRAM} "$@"\n')
+    program.chmod(0o755)
+    words = farm(*sources[:3], "--out", out, *FORMAT, "--address", cluster.address, "--bokehcam", program, "--", *FLAGS)
+    assert "3 of 3 recordings" in words and said in words, words
+    check(out, {name: expected[name] for name in ("take0.y4m", "take1.y4m", "take2.y4m")})

@@ -94,11 +94,6 @@ def tell(line: str) -> None:
     tqdm.write(line, file=sys.stderr)
 
 
-def apart_from(nodes) -> dict[str, str]:
-    """Selects nodes, all but some."""
-    return {"ray.io/node-id": f"!in({','.join(nodes)})"} if nodes else {}
-
-
 class Farm:
     """A job at work."""
 
@@ -146,19 +141,24 @@ class Farm:
         self.places = max(1, sum(int(node["Resources"].get("CPU", 0) // self.options.cpus) for node in alive))
         if self.alive and self.alive <= self.unfit.keys():
             self.tally.ended = f"no node is left that can do it: {'; '.join(set(self.unfit.values()))}"
+        for ref, task in self.running.items():
+            # It waits for a node that is gone.
+            if task.avoid and self.alive <= {*self.unfit, task.avoid}:
+                ray.cancel(ref)
 
     def placed(self, task: Task):
         """The task for nodes that are fit for it; rather not for the one where it failed, while there are others."""
-        fit = apart_from(self.unfit)
-        if not task.avoid or self.alive <= {*self.unfit, task.avoid}:
-            return self.perform.options(label_selector=fit)
-        others = apart_from([*self.unfit, task.avoid])
-        return self.perform.options(label_selector=others, fallback_strategy=[{"label_selector": fit}])
+        if self.alive <= {*self.unfit, task.avoid}:
+            task.avoid = ""
+        nodes = [*self.unfit, *([task.avoid] if task.avoid else [])]
+        return self.perform.options(label_selector={"ray.io/node-id": f"!in({','.join(nodes)})"} if nodes else {})
 
     def note(self, task: Task, ref: ray.ObjectRef) -> list[Task]:
         """Takes note of what a task did; what is to be done again."""
         try:
             outcome: Outcome = ray.get(ref)
+        except ray.exceptions.TaskCancelledError:
+            return [task]
         except ray.exceptions.RayError as error:
             return self.after_death(task, error)
         if outcome.unfit:
