@@ -16,7 +16,9 @@ from ._blur import Renderer, blur
 from ._coc import coc_from_depth, coc_from_disparity
 from ._core import __version__
 from ._depth import match, refine
+from ._files import read_depth, read_image, write_image
 from ._recording import Frame, Recording
+from ._scene import Scene, psnr, thin_lens_scene, to_linear, to_srgb
 from ._still import render
 
 __all__ = [
@@ -25,6 +27,7 @@ __all__ = [
     "LowRank",
     "Recording",
     "Renderer",
+    "Scene",
     "__version__",
     "aperture",
     "blur",
@@ -34,8 +37,15 @@ __all__ = [
     "heart",
     "match",
     "polygon",
+    "psnr",
+    "read_depth",
+    "read_image",
     "refine",
     "render",
     "ring",
     "star",
+    "thin_lens_scene",
+    "to_linear",
+    "to_srgb",
+    "write_image",
 ]
