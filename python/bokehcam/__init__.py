@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from ._coc import coc_from_depth, coc_from_disparity
     from ._core import __version__
     from ._depth import match, refine
+    from ._files import read_depth, read_image, write_image
     from ._recording import Frame, Recording
+    from ._scene import Scene, psnr, thin_lens_scene, to_linear, to_srgb
     from ._still import render
 
 __all__ = [
@@ -29,6 +31,7 @@ __all__ = [
     "LowRank",
     "Recording",
     "Renderer",
+    "Scene",
     "__version__",
     "aperture",
     "blur",
@@ -38,13 +41,20 @@ __all__ = [
     "heart",
     "match",
     "polygon",
+    "psnr",
+    "read_depth",
+    "read_image",
     "refine",
     "render",
     "ring",
     "star",
+    "thin_lens_scene",
+    "to_linear",
+    "to_srgb",
+    "write_image",
 ]
 
-_MODULES = ("_aperture", "_blur", "_coc", "_core", "_depth", "_recording", "_still")
+_MODULES = ("_aperture", "_blur", "_coc", "_core", "_depth", "_files", "_recording", "_scene", "_still")
 
 
 def __getattr__(name: str) -> Any:

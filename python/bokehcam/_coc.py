@@ -48,8 +48,6 @@ def coc_from_depth(
     focus_m = _positive("focus_m", focus_m)
     lens = {"f-number": f_number, "focal-length": focal_length_mm, "sensor-width": sensor_width_mm}
     settings = [(name, str(value)) for name, value in lens.items() if value is not None]
-    if settings and at_infinity_px is not None:
-        raise ValueError("at_infinity_px or a lens (f_number, focal_length_mm, sensor_width_mm), not both")
     if at_infinity_px is not None:
         settings.append(("coc-at-infinity", str(at_infinity_px)))
     if max_coc_px is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any, Optional, Union
 
 import numpy as np
@@ -89,6 +90,8 @@ def render(
         settings["aperture"] = aperture
     if array.dtype == np.float32 and highlights:
         raise ValueError("highlights: is for uint8 pictures, which are clipped at white; float32 has its own: use 0")
+    if depth_m is not None and effect not in (None, "auto", "dof"):
+        warnings.warn(f"depth_m has no effect: the effect {effect} does not use depth", stacklevel=2)
     depth = None if depth_m is None else maps("depth_m", depth_m, array)
     size = (array.shape[-2], array.shape[-3])
     core = opening._core if opening else None

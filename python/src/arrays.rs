@@ -64,7 +64,8 @@ pub fn survey(py: Python<'_>, array: PyReadonlyArrayDyn<'_, f32>) -> PyResult<(O
         if odd.iter().sum::<f32>() != 0.0 {
             return Ok((values.iter().position(|value| !value.is_finite()), 0.0, 0.0));
         }
-        let (low, high) = (low.into_iter().fold(f32::INFINITY, f32::min), high.into_iter().fold(f32::NEG_INFINITY, f32::max));
+        let (low, high) =
+            (low.into_iter().fold(f32::INFINITY, f32::min), high.into_iter().fold(f32::NEG_INFINITY, f32::max));
         Ok(if values.is_empty() { (None, 0.0, 0.0) } else { (None, low, high) })
     })
 }

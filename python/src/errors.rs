@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+use bokehcam::look::settings::setting;
 use bokehcam::look::{Look, Patch};
 use pyo3::PyErr;
 use pyo3::exceptions::{PyOSError, PyValueError};
@@ -31,6 +32,12 @@ fn as_arguments(text: &str) -> String {
 /// The default look with some settings, by the names that the command line has for them.
 pub fn look(settings: &[(String, String)]) -> Result<Look, PyErr> {
     let pairs = settings.iter().map(|(name, text)| (name.as_str(), text.as_str()));
+    for (name, _) in settings {
+        let excluded = setting(name).map_or(&[][..], |setting| setting.excludes());
+        if let Some((other, _)) = settings.iter().find(|(other, _)| excluded.contains(&other.as_str())) {
+            return Err(value(format!("--{name} and --{other} exclude each other: leave one of them out")));
+        }
+    }
     let patch = Patch::parse(pairs).map_err(|(name, what)| value(format!("--{name}: {what}")))?;
     patch.on(&Look::default()).map_err(value)
 }

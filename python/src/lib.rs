@@ -6,6 +6,7 @@ mod arrays;
 mod blur;
 mod coc;
 mod errors;
+mod files;
 mod pictures;
 mod recording;
 mod signals;
@@ -25,6 +26,8 @@ mod _core {
     use crate::blur::Blur;
     #[pymodule_export]
     use crate::coc::coc_from_depth;
+    #[pymodule_export]
+    use crate::files::{read_depth, read_image, write_image};
     #[pymodule_export]
     use crate::recording::Recording;
     #[pymodule_export]

@@ -26,13 +26,7 @@ pub struct Matcher {
 impl Matcher {
     /// For pictures of `size` (width, height), a multiple of 16 `disparities` from 0 on.
     #[new]
-    fn new(
-        py: Python<'_>,
-        size: (u32, u32),
-        disparities: u32,
-        effort: &str,
-        threads: Option<usize>,
-    ) -> PyResult<Self> {
+    fn new(py: Python<'_>, size: (u32, u32), disparities: u32, effort: &str, threads: Option<usize>) -> PyResult<Self> {
         let effort: Effort = effort.parse().map_err(|what| errors::value(format!("effort: {what}")))?;
         let computing = Computing { threads, ..Computing::default() };
         let matching = py.detach(|| computing.matcher(disparities, effort, size)).map_err(errors::value)?;
@@ -64,7 +58,9 @@ impl Matcher {
         *self.matching.lock().map_err(errors::value)? = Some(matching);
         let (disparity, verdict) = found.map_err(errors::value)?;
         let odd = match verdict {
-            Some(verdict @ Verdict::RowsOff { .. }) => Some(format!("{verdict}, and the disparity is wrong; rectify it")),
+            Some(verdict @ Verdict::RowsOff { .. }) => {
+                Some(format!("{verdict}, and the disparity is wrong; rectify it"))
+            }
             Some(Verdict::Swapped) => Some(Verdict::Swapped.to_string()),
             _ => None,
         };

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import bokehcam
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -28,8 +29,8 @@ TOKEN = secrets.token_hex(32)
 
 
 def program() -> Path | None:
-    """The program: BOKEHCAM, else what was built last here, else that in the path."""
-    if given := os.environ.get("BOKEHCAM"):
+    """The program: as python/test names it, else BOKEHCAM, else what was built last here, else that in the path."""
+    if given := os.environ.get("BOKEHCAM_PROGRAM") or os.environ.get("BOKEHCAM"):
         return Path(given)
     built = [path for path in REPOSITORY.glob("target/*/bokehcam") if path.is_file() and os.access(path, os.X_OK)]
     newest = max(built, key=lambda path: path.stat().st_mtime, default=None)
@@ -59,7 +60,7 @@ def environment() -> dict[str, str]:
     return {
         **others,
         "BOKEHCAM": str(PROGRAM),
-        "PYTHONPATH": str(REPOSITORY / "python"),
+        "PYTHONPATH": str(Path(bokehcam.__file__).parents[1]),
         "XDG_CONFIG_HOME": "/nonexistent",
         # Only these tests may join their clusters; and Ray makes no token in the user's home.
         "RAY_AUTH_MODE": "token",

@@ -7,7 +7,7 @@ use super::cpu::CpuBokeh;
 pub use super::cpu::{Pixels, Radii, Sample};
 use super::plan::Plan;
 use super::{BokehError, Settings};
-use crate::optics::{CocField, CocKind};
+use crate::optics::CocField;
 
 /// The CPU executor for such pictures of one size; nothing is allocated per picture.
 pub struct SliceBlur {
@@ -39,7 +39,8 @@ impl SliceBlur {
     }
 
     /// Blurs a picture into `out`: both `height * width * 3` samples, 8-bit sRGB or linear light as [`Pixels`] has them.
-    /// Highlights are recovered in 8-bit pictures alone. `go_on` is asked after each pass, a few times per picture;
+    /// Highlights are recovered in 8-bit pictures alone. [`Radii::Each`] is for settings whose
+    /// [`CocKind`](crate::optics::CocKind) is `Depth`. `go_on` is asked after each pass, a few times per picture;
     /// `Break` stops the work, and then `out` holds nothing of use.
     ///
     /// # Errors
@@ -67,10 +68,5 @@ impl SliceBlur {
             self.cpu = CpuBokeh::new(Plan::new(&self.settings, self.size.0, self.size.1), self.threads);
         }
         Ok(flow)
-    }
-
-    /// Whether the radii that it is made for may be given pixel by pixel.
-    pub fn takes_radii(&self) -> bool {
-        self.settings.coc == CocKind::Depth
     }
 }

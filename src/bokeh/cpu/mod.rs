@@ -4,8 +4,10 @@ mod band;
 mod bin;
 mod blur;
 mod composite;
+mod encode;
 mod fill;
 mod filter;
+mod frames;
 mod gather;
 mod pixels;
 mod probe;
@@ -18,7 +20,6 @@ mod unpack;
 
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 use band::{Band, BandSums, Hidden, Layer, NONE};
 use blur::{Scratch, Strip};
@@ -29,16 +30,13 @@ use shelves::{BinShelves, StripShelves};
 use tiles::{BLOCK, Survey, TILE_H, Tiles};
 use unpack::Source;
 
+use super::Finished;
 use super::ladder::Compositing;
 use super::occlusion::MOST_LAYERS;
 use super::plan::{CELL, MAX_BINS, Plan};
 use super::rung::SCALES;
-use super::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use crate::budget::Quality;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool, cores};
-use crate::compute::{Backend, simd};
-use crate::frame::{ColorImage, DepthMap};
-use crate::optics::CocField;
 
 pub use pixels::{Pixels, Radii, Sample};
 pub use unpack::{compress, expand};
@@ -48,7 +46,7 @@ pub struct CpuBokeh {
     plan: Plan,
     arch: Arch,
     workers: ThreadPool,
-    encode: composite::EncodeTable,
+    encode: encode::EncodeTable,
     tiles: Tiles,
     slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
@@ -89,7 +87,7 @@ impl CpuBokeh {
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
         let gather = (plan.compositing == Compositing::Gather).then(|| Gather::new(&plan));
         Self {
-            encode: composite::EncodeTable::new(),
+            encode: encode::EncodeTable::new(),
             tiles: Tiles::new(width, height),
             pyramid: (plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
             waits: vec![NONE; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
@@ -107,37 +105,6 @@ impl CpuBokeh {
     /// Changes the quality of the frames to come, where the plan has others.
     pub fn set_quality(&mut self, quality: Quality) {
         self.plan.set_quality(quality);
-    }
-
-    /// Blurs one picture.
-    ///
-    /// # Errors
-    /// The picture has another size than the plan, or `coc` needs depth and there is none.
-    pub fn blur(
-        &mut self,
-        color: &ColorImage,
-        depth: Option<&DepthMap>,
-        coc: &CocField,
-        out: &mut ColorImage,
-    ) -> Result<PassTimes, BokehError> {
-        let made_for = (self.plan.width as u32, self.plan.height as u32);
-        if color.size() != made_for {
-            return Err(BokehError::Size { made_for, got: color.size() });
-        }
-        if matches!(coc, CocField::Depth(_)) && depth.is_none() {
-            return Err(BokehError::NoDepth);
-        }
-        out.resize(color.width, color.height);
-        let mut times = PassTimes::new();
-        let mut clock = Instant::now();
-        let lap = |name| {
-            let now = Instant::now();
-            times.add(name, now - clock);
-            clock = now;
-            ControlFlow::Continue(())
-        };
-        let _never_stopped = self.blur_pixels(&color.rgb, Radii::Field(coc, depth), &mut out.rgb, lap);
-        Ok(times)
     }
 
     /// Blurs the `pixels` of one picture into `out`, which has the length of it; `lap` is called after each pass with its
@@ -167,7 +134,9 @@ impl CpuBokeh {
             lap("bin")?;
         }
         if let Some(gather) = &mut self.gather {
-            gather.run((&mut self.workers, self.arch), &self.plan, &frame, &self.slots[0].source, &mut self.taken);
+            let workers = (&mut self.workers, self.arch);
+            let bin = &self.slots[0].source;
+            gather.run(workers, &self.plan, &frame, bin, &mut self.taken, || lap("gather"))?;
             lap("gather")?;
         } else {
             self.reach();
@@ -319,35 +288,5 @@ impl CpuBokeh {
             let out = out.part(part);
             arch.dispatch(composite::Composite { plan, slots, tiles, frame, pixels, gathered, encode, y0, out });
         });
-    }
-}
-
-impl Bokeh for CpuBokeh {
-    fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
-        self.plan.set_quality(job.quality);
-        let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
-        let Job { ticket, color, depth, out, .. } = job;
-        self.done = Some(Finished { ticket, picture: Picture::in_memory(out), color, depth, times });
-        Ok(())
-    }
-
-    fn collect(&mut self, _wait: bool) -> Result<Option<Finished>, BokehError> {
-        Ok(self.done.take())
-    }
-
-    fn in_flight(&self) -> usize {
-        usize::from(self.done.is_some())
-    }
-
-    fn capacity(&self) -> usize {
-        1
-    }
-
-    fn backend(&self) -> Backend {
-        Backend::Cpu
-    }
-
-    fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.workers.thread_count(), simd::name(self.arch))
     }
 }

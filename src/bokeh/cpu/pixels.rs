@@ -1,6 +1,6 @@
 //! What pictures are made of, and their circles of confusion, as they lie in memory.
 
-use super::composite::{CHUNK, EncodeTable};
+use super::encode::{CHUNK, EncodeTable};
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
