@@ -17,6 +17,7 @@ again for every batch. Nodes need this package; ``ray`` itself is not imported h
 
 from __future__ import annotations
 
+import inspect
 import pickle
 from collections.abc import Callable, Mapping
 from functools import lru_cache
@@ -66,6 +67,8 @@ class Blur:
         **settings: Any,
     ):
         self.coc, self.image, self.out = coc, image, out
+        # A setting that there is not is found here, not on a node.
+        inspect.signature(bokehcam.Renderer).bind((1, 1), **settings)
         self.settings = pickle.dumps({"threads": threads, **settings})
 
     def __call__(self, batch: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -41,7 +41,7 @@ def program() -> Path | None:
 PROGRAM = program()
 needs_program = pytest.mark.skipif(PROGRAM is None, reason="needs the program: build it, or name it by BOKEHCAM")
 has_ray = importlib.util.find_spec("ray") is not None and importlib.util.find_spec("tqdm") is not None
-needs_ray = pytest.mark.skipif(not has_ray, reason="needs Ray and tqdm: pip install 'bokehcam[farm]'")
+needs_ray = pytest.mark.skipif(not has_ray, reason="needs Ray and tqdm: pip install 'bokehcam[ray]'")
 
 
 def recording(folder: Path, first: int) -> Path:

@@ -150,7 +150,7 @@ def run(arguments: list[str]) -> int:
     try:
         from . import drive
     except ImportError as error:
-        raise FarmError(f"{error}: pip install 'bokehcam[farm]'") from error
+        raise FarmError(f"{error}: pip install 'bokehcam[ray]'") from error
     options = drive.Options(given.address, given.cpus, given.gpus, given.shard, given.retries)
     with plan.at_work(job):
         drive.connect(options)

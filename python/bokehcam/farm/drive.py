@@ -121,8 +121,11 @@ class Farm:
                     while waiting and len(self.running) < most:
                         task = waiting.popleft()
                         self.running[self.placed(task).remote(job, task.units)] = task
-                    for ref in ray.wait(list(self.running), num_returns=1, timeout=1.0)[0]:
-                        waiting.extend(self.note(self.running.pop(ref), ref))
+                    refs = list(self.running)
+                    if ray.wait(refs, num_returns=1, timeout=1.0)[0]:
+                        # All that have ended meanwhile, as to look takes longer the more there are.
+                        for ref in ray.wait(refs, num_returns=len(refs), timeout=0)[0]:
+                            waiting.extend(self.note(self.running.pop(ref), ref))
                     self.end_early(waiting)
                     bar.n = self.tally.made + len(self.tally.failed)
                     bar.set_postfix_str(self.tally.rate())
