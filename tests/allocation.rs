@@ -4,6 +4,7 @@
 mod common;
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
@@ -11,6 +12,7 @@ use std::time::Duration;
 use bokehcam::bokeh::Settings;
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
+use bokehcam::bokeh::slices::{Radii, SliceBlur};
 use bokehcam::budget::{Governor, Quality, Sample};
 use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
@@ -22,6 +24,7 @@ use bokehcam::depth::{DepthSource, Seen};
 use bokehcam::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use bokehcam::link::live;
 use bokehcam::link::pool::{Pool, Pooled};
+use bokehcam::optics::CocKind;
 use common::{COC_KINDS, coc, noise, settings, three_depths};
 use glam::{DMat3, DVec2, DVec3};
 
@@ -50,6 +53,7 @@ static COUNTING: Counting = Counting;
 #[test]
 fn a_frame_allocates_nothing() {
     blur();
+    slices();
     levels();
     refinement();
     two_eyes();
@@ -255,6 +259,25 @@ fn blur() {
             assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before, "{effect:?} {quality}");
         }
     }
+}
+
+/// Nor do pictures in memory of somebody else's, of either kind.
+fn slices() {
+    let size = (160, 120);
+    let map = three_depths(size.0, size.1);
+    let (codes, light) = (noise(size.0, size.1).rgb, vec![0.5f32; map.metres.len() * 3]);
+    let radii: Vec<f32> = (0..map.metres.len()).map(|k| (k % 160) as f32 * 0.1 - 6.0).collect();
+    let mut slices = SliceBlur::new(&settings(CocKind::Depth), size, Some(2)).expect("radii that are possible");
+    let (mut blurred, mut brighter) = (codes.clone(), light.clone());
+    let mut frame = || {
+        let go_on = || ControlFlow::Continue(());
+        slices.blur(&codes, Radii::Each(&radii), &mut blurred, go_on).expect("a frame");
+        slices.blur(&light, Radii::Each(&radii), &mut brighter, go_on).expect("a frame");
+    };
+    frame();
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    (0..5).for_each(|_| frame());
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
 }
 
 /// Nor does a change of the quality level, not even the first one.

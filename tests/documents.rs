@@ -6,13 +6,17 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// What no test can run: a part of the command, and why.
-const LEFT_OUT: [(&str, &str); 19] = [
+const LEFT_OUT: [(&str, &str); 23] = [
     ("sudo ", "needs root"),
     ("systemctl ", "needs a session, and starts something in it"),
     ("journalctl ", "needs a session"),
     ("pip install", "needs a network"),
     ("cargo install", "needs a network, and installs"),
     ("scripts/", "builds everything, or needs pictures of a chessboard"),
+    ("python/test", "builds everything, and needs a network"),
+    ("bokehcam.farm", "needs Ray"),
+    ("parallel --joblog", "needs GNU parallel"),
+    ("sbatch ", "needs Slurm"),
     ("bokehcam models add", "needs a file from elsewhere"),
     ("--depth matte", "needs a network that is installed"),
     ("bokehcam plate", "needs a camera"),

@@ -8,6 +8,7 @@ pub mod aperture;
 pub mod bank;
 #[doc(hidden)]
 pub mod cpu;
+mod error;
 #[doc(hidden)]
 pub mod fallback;
 #[cfg(feature = "gpu")]
@@ -25,6 +26,7 @@ pub mod plan;
 pub mod rung;
 #[doc(hidden)]
 pub mod share;
+pub mod slices;
 #[doc(hidden)]
 pub mod split;
 
@@ -35,6 +37,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::budget::Quality;
+pub use error::BokehError;
 pub use picture::Picture;
 
 pub use crate::compute::Backend;
@@ -178,57 +181,6 @@ impl Default for PassTimes {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// Why a frame could not be blurred.
-#[derive(Debug, thiserror::Error)]
-pub enum BokehError {
-    /// The effect needs a depth map and the frame has none.
-    #[error("the effect dof needs depth, and the frame has none")]
-    NoDepth,
-    /// The picture has another size than the executor was made for.
-    #[error("the executor was made for {made_for:?} pixels, the frame has {got:?}")]
-    Size {
-        /// Width and height the executor was made for.
-        made_for: (u32, u32),
-        /// Width and height of the frame.
-        got: (u32, u32),
-    },
-    /// The blur is wider than the pictures, or than the method bears.
-    #[error(
-        "a blur radius of {radius_px} px is too large: {} at most {most_px} px; lower --max-coc or --coc-at-infinity",
-        if *by_method { "--method gather bears".to_owned() } else { format!("for pictures of {}x{}, use", size.0, size.1) }
-    )]
-    TooWide {
-        /// Largest radius of the settings, in pixels.
-        radius_px: f32,
-        /// [`Settings::most_radius_px`].
-        most_px: f32,
-        /// Width and height of the pictures.
-        size: (u32, u32),
-        /// Whether the method is what sets the limit.
-        by_method: bool,
-    },
-    /// A picture needs more memory than there is.
-    #[error(
-        "a picture of {}x{} pixels takes about {needed_mb} MB to blur, and {free_mb} MB are free: make it smaller, or close \
-         other programs",
-        size.0, size.1
-    )]
-    Memory {
-        /// Width and height in pixels.
-        size: (u32, u32),
-        /// What the blur is estimated to take.
-        needed_mb: u64,
-        /// What this process can still take.
-        free_mb: u64,
-    },
-    /// The executor took a picture and gave none back.
-    #[error("the blur gave no picture back: please report this")]
-    Lost,
-    /// No GPU, or it refused or was lost.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
 }
 
 /// Which intermediate result of the last frame to read, as vectors of four values.

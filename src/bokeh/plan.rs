@@ -179,6 +179,18 @@ impl Plan {
             (CocField::Depth(lens), Some(depth)) => self.counts.count(depth, lens),
             _ => self.counts = Counts::default(),
         }
+        self.lay_out_layers();
+    }
+
+    /// As [`Plan::split`], by the radius of every pixel.
+    pub fn split_radii(&mut self, coc_px: &[f32]) {
+        if self.compositing == Compositing::Layers {
+            self.counts.count_radii(coc_px, self.width);
+            self.lay_out_layers();
+        }
+    }
+
+    fn lay_out_layers(&mut self) {
         let near_from_px = self.rung.near_from_px.max(self.rung.near_from_share * self.max_px[0]);
         let sides = [false, true].into_iter().zip(&mut self.pieces);
         let inner_px = sides.map(|(near, pieces)| self.counts.pieces(near, &self.rung, near_from_px, pieces));

@@ -49,12 +49,21 @@ impl Default for Counts {
 impl Counts {
     /// Counts the pixels of a frame, on a grid that is fine enough for the statistics.
     pub fn count(&mut self, depth: &DepthMap, lens: &DepthCoc) {
+        self.count_values(&depth.metres, depth.width as usize, |metres| lens.coc_px(metres));
+    }
+
+    /// As [`Counts::count`], of `width` radii a row.
+    pub fn count_radii(&mut self, coc_px: &[f32], width: usize) {
+        self.count_values(coc_px, width, |coc_px| coc_px);
+    }
+
+    #[inline(always)]
+    fn count_values(&mut self, values: &[f32], width: usize, coc_px_of: impl Fn(f32) -> f32) {
         *self = Self::default();
-        let (width, height) = (depth.width as usize, depth.height as usize);
         let step = (width / SAMPLES_ACROSS).max(1);
-        for row in depth.metres.chunks_exact(width.max(1)).take(height).step_by(step) {
-            for &metres in row.iter().step_by(step) {
-                let coc_px = lens.coc_px(metres);
+        for row in values.chunks_exact(width.max(1)).step_by(step) {
+            for &value in row.iter().step_by(step) {
+                let coc_px = coc_px_of(value);
                 let bucket = (coc_px.abs().to_bits() >> BUCKET_SHIFT).wrapping_sub(FIRST);
                 // In focus, below bucket 0, the difference wraps.
                 if bucket < 1 << 16 {

@@ -110,8 +110,8 @@ impl Band<'_> {
             return;
         }
         let mut surfaces: Surfaces<WIDE> = Surfaces::new();
-        let columns = columns_of(block, self.source.color.width as usize);
-        let height = self.source.color.height as isize;
+        let columns = columns_of(block, self.source.size.0);
+        let height = self.source.size.1 as isize;
         let (first, end) = (self.rows.start as isize, self.rows.end as isize);
         let last = end.min((height as usize).next_multiple_of(CELL) as isize);
         for y in first - reach..last + reach {
@@ -130,7 +130,7 @@ impl Band<'_> {
                     }
                 }
                 Hidden::Filled { behind, .. } => {
-                    let width = self.source.color.width as usize;
+                    let width = self.source.size.0;
                     behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
                 }
             }

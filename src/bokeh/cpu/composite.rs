@@ -1,4 +1,4 @@
-//! Pass `composite`: the blurred bins, front to back, become one picture; back to 8-bit sRGB.
+//! Pass `composite`: the blurred bins, front to back, become one picture; back to its pixels' kind.
 //!
 //! The pixels of one view tile the picture, so the coverages of two bins are disjoint, not independent: among the near
 //! bins, and among the others, a bin fills what is left. The near ones lie over the others; what stays open takes the
@@ -8,54 +8,33 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::encode::{CHUNK, EncodeTable};
+use super::pixels::Sample;
 use super::rows::{STRIP, Slot};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, CELL, HINDMOST_COVERAGE, MAX_BINS, Plan};
-use crate::color::{encode_srgb, luminance};
+use crate::color::luminance;
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, madd, store};
 
-/// Pixels composited at once.
-pub const CHUNK: usize = 128;
-/// Entries of one half of the table back to 8 bits: small enough for the nearest cache, fine enough that decoding and
-/// encoding is the identity.
-const ENCODE_STEPS: usize = 1 << 12;
-/// Light below this has a half of its own, with finer steps, as the curve is steep there.
-const DARK: f32 = 1.0 / 16.0;
-/// Entries of the table: two halves of `ENCODE_STEPS + 1`, and up to a power of two, so that an index is masked.
-const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
-
-/// Linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then all of it.
-pub struct EncodeTable(Box<[u8; ENCODE_SIZE]>);
-
-impl EncodeTable {
-    pub fn new() -> Self {
-        let mut codes = Box::new([255; ENCODE_SIZE]);
-        let half = |most: f32| (0..=ENCODE_STEPS).map(move |k| k as f32 / ENCODE_STEPS as f32 * most);
-        for (code, light) in codes.iter_mut().zip(half(DARK).chain(half(1.0))) {
-            *code = encode_srgb(light);
-        }
-        Self(codes)
-    }
-}
-
 /// Makes rows `y0..` of the result: a row of tiles.
-pub struct Composite<'a> {
+pub struct Composite<'a, T> {
     pub plan: &'a Plan,
     pub slots: &'a [Slot],
     /// Tells which tiles stay as they are.
     pub tiles: &'a Tiles,
-    /// The frame as it came.
+    /// The frame as it came, and its pixels.
     pub frame: &'a Source<'a>,
+    pub pixels: &'a [T],
     /// `[row][3][width]`, from the gather.
     pub gathered: &'a [f32],
     /// Back to 8 bits.
     pub encode: &'a EncodeTable,
     pub y0: usize,
     /// Whole rows of RGB.
-    pub out: &'a mut [u8],
+    pub out: &'a mut [T],
 }
 
 /// Bins composited front to back at some pixels: each covers what is still open.
@@ -141,7 +120,7 @@ impl Layers {
 /// Linear light of a chunk.
 type Color = Line<[[f32; CHUNK]; 3]>;
 
-impl WithSimd for Composite<'_> {
+impl<T: Sample> WithSimd for Composite<'_, T> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
@@ -160,7 +139,7 @@ impl WithSimd for Composite<'_> {
                 match self.plan.compositing {
                     Compositing::Layers => {
                         if !self.read_layers::<S>(y, x0, still, &mut layers) {
-                            row.copy_from_slice(&self.frame.color.rgb[(y * width + x0) * 3..][..take * 3]);
+                            row.copy_from_slice(&self.pixels[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
                         layers.flatten(simd, &mut color);
@@ -168,13 +147,14 @@ impl WithSimd for Composite<'_> {
                     Compositing::Select => self.select::<S>(y, x0, take, &mut layers.planes.0[0], &mut color.0),
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
                 }
-                encode(&mut color.0, self.plan.expansion, self.encode, row);
+                compress_highlights(&mut color.0, self.frame.expansion);
+                T::write(&color.0, self.encode, row);
             }
         }
     }
 }
 
-impl Composite<'_> {
+impl<T> Composite<'_, T> {
     /// Reads the bins that hold anything in a chunk; false where it is `still` and nothing near reaches it: it stays.
     #[inline(always)]
     fn read_layers<S: Simd>(&self, y: usize, x0: usize, still: bool, layers: &mut Layers) -> bool {
@@ -303,47 +283,15 @@ fn upsample<V: Simd, const S: usize>(
     }
 }
 
-/// Compresses the highlights of a chunk and looks up its 8-bit sRGB.
+/// Undoes the expansion of a chunk's highlights.
 #[inline(always)]
-fn encode(color: &mut [[f32; CHUNK]; 3], expansion: f32, table: &EncodeTable, out: &mut [u8]) {
+fn compress_highlights(color: &mut [[f32; CHUNK]; 3], expansion: f32) {
     if expansion.is_finite() {
         for x in 0..CHUNK {
             let factor = compress(luminance(color[0][x], color[1][x], color[2][x]), expansion);
             for p in 0..3 {
                 color[p][x] *= factor;
             }
-        }
-    }
-    let mut index = [[0u32; CHUNK]; 3];
-    for (index, color) in index.iter_mut().zip(&*color) {
-        for (index, &light) in index.iter_mut().zip(color) {
-            let light = if light > 0.0 { light } else { 0.0 };
-            let light = if light < 1.0 { light } else { 1.0 };
-            let steps = ENCODE_STEPS as f32;
-            let (scale, first) = if light < DARK { (steps / DARK, 0.0) } else { (steps, steps + 1.0) };
-            // Beyond 2^23 a float has no fraction, and its lowest bits are the integer.
-            *index = (light * scale + first + 8_388_608.0).to_bits();
-        }
-    }
-    for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-        for (p, byte) in pixel.iter_mut().enumerate() {
-            *byte = table.0[index[p][x] as usize % ENCODE_SIZE];
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::unpack::decode;
-    use super::*;
-
-    #[test]
-    fn decoding_and_encoding_is_the_identity() {
-        let table = EncodeTable::new();
-        for code in 0..=255u8 {
-            let mut out = [0u8; 6];
-            encode(&mut [[decode::<pulp::Scalar>(code); CHUNK]; 3], f32::INFINITY, &table, &mut out);
-            assert_eq!(out, [code; 6]);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The paper's plain forms, for comparison: every pixel gathers with exactly its own radius, from all around it,
 //! with no regard to depth edges. Separable (passes `blur`), or exact in two dimensions (pass `gather`).
 
+use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 
 use pulp::{Arch, Simd, WithSimd};
@@ -11,6 +12,9 @@ use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::Plan;
 use crate::compute::simd::madd;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
+
+/// Rows that are gathered in two dimensions before anybody is asked whether to go on.
+const ROWS_AT_ONCE: usize = 64;
 
 /// Runs both forms of the gather, and has their memory.
 pub struct Gather {
@@ -48,7 +52,7 @@ impl Gather {
     }
 
     /// Blurs a frame whose one bin is in `strips`: copies that to padded rows, finds the CoC of every pixel, and
-    /// gathers with the full kernels or with the separable ones.
+    /// gathers with the full kernels, which takes long and so asks `go_on` now and then, or with the separable ones.
     pub fn run(
         &mut self,
         (workers, arch): (&mut ThreadPool, Arch),
@@ -56,7 +60,8 @@ impl Gather {
         frame: &Source<'_>,
         strips: &Strips,
         taken: &mut [AtomicBool],
-    ) {
+        mut go_on: impl FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let (size, bank) = ((plan.width, plan.height), &*plan.bank);
         let (stride, pad, row_len) = (self.source.stride, self.source.pad, self.source.row_len());
         let rows = DisjointParts::new(&mut self.source.data, row_len, taken);
@@ -75,10 +80,14 @@ impl Gather {
         if plan.exact {
             let out = DisjointParts::new(&mut self.result, 3 * size.0, taken);
             let kernels = &self.kernels;
-            workers.run(size.1, &|y| {
-                arch.dispatch(Exact { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
-            });
-            return;
+            for first in (0..size.1).step_by(ROWS_AT_ONCE) {
+                workers.run(ROWS_AT_ONCE.min(size.1 - first), &|row| {
+                    let y = first + row;
+                    arch.dispatch(Exact { source, size, kernels, bank, coc: coc(y), y, out: out.part(y) });
+                });
+                go_on()?;
+            }
+            return ControlFlow::Continue(());
         }
         let rows = &mut self.rows[..bank.terms * 3 * size.0 * size.1];
         let rows = DisjointParts::new(rows, bank.terms * 3 * size.0, taken);
@@ -90,6 +99,7 @@ impl Gather {
         workers.run(size.1, &|y| {
             arch.dispatch(GatherColumn { rows, size, bank, coc: coc(y), y, out: out.part(y) });
         });
+        ControlFlow::Continue(())
     }
 }
 

@@ -4,9 +4,12 @@ mod band;
 mod bin;
 mod blur;
 mod composite;
+mod encode;
 mod fill;
 mod filter;
+mod frames;
 mod gather;
+mod pixels;
 mod probe;
 mod reach;
 mod rows;
@@ -15,9 +18,8 @@ mod tent;
 mod tiles;
 mod unpack;
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 use band::{Band, BandSums, Hidden, Layer, NONE};
 use blur::{Scratch, Strip};
@@ -28,17 +30,15 @@ use shelves::{BinShelves, StripShelves};
 use tiles::{BLOCK, Survey, TILE_H, Tiles};
 use unpack::Source;
 
+use super::Finished;
 use super::ladder::Compositing;
 use super::occlusion::MOST_LAYERS;
 use super::plan::{CELL, MAX_BINS, Plan};
 use super::rung::SCALES;
-use super::{Bokeh, BokehError, Finished, Job, PassTimes, Picture};
 use crate::budget::Quality;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool, cores};
-use crate::compute::{Backend, simd};
-use crate::frame::{ColorImage, DepthMap};
-use crate::optics::CocField;
 
+pub use pixels::{Pixels, Radii, Sample};
 pub use unpack::{compress, expand};
 
 /// Runs a plan on the CPU.
@@ -46,7 +46,7 @@ pub struct CpuBokeh {
     plan: Plan,
     arch: Arch,
     workers: ThreadPool,
-    encode: composite::EncodeTable,
+    encode: encode::EncodeTable,
     tiles: Tiles,
     slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
@@ -87,7 +87,7 @@ impl CpuBokeh {
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
         let gather = (plan.compositing == Compositing::Gather).then(|| Gather::new(&plan));
         Self {
-            encode: composite::EncodeTable::new(),
+            encode: encode::EncodeTable::new(),
             tiles: Tiles::new(width, height),
             pyramid: (plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
             waits: vec![NONE; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
@@ -107,66 +107,53 @@ impl CpuBokeh {
         self.plan.set_quality(quality);
     }
 
-    /// Blurs one picture.
-    ///
-    /// # Errors
-    /// The picture has another size than the plan, or `coc` needs depth and there is none.
-    pub fn blur(
+    /// Blurs the `pixels` of one picture into `out`, which has the length of it; `lap` is called after each pass with its
+    /// name, and may stop the rest. A frame that was stopped leaves nothing behind that another could be made from.
+    pub(super) fn blur_pixels<T: Sample>(
         &mut self,
-        color: &ColorImage,
-        depth: Option<&DepthMap>,
-        coc: &CocField,
-        out: &mut ColorImage,
-    ) -> Result<PassTimes, BokehError> {
-        let made_for = (self.plan.width as u32, self.plan.height as u32);
-        if color.size() != made_for {
-            return Err(BokehError::Size { made_for, got: color.size() });
+        pixels: &[T],
+        coc: Radii<'_>,
+        out: &mut [T],
+        mut lap: impl FnMut(&'static str) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        if out.is_empty() {
+            return ControlFlow::Continue(());
         }
-        if matches!(coc, CocField::Depth(_)) && depth.is_none() {
-            return Err(BokehError::NoDepth);
-        }
-        out.resize(color.width, color.height);
-        let mut times = PassTimes::new();
-        if out.rgb.is_empty() {
-            return Ok(times);
-        }
-        let mut clock = Instant::now();
-        let mut lap = |name| {
-            let now = Instant::now();
-            times.add(name, now - clock);
-            clock = now;
-        };
-        let frame = Source { color, depth, coc, matte: self.plan.matte(depth, coc), expansion: self.plan.expansion };
+        let frame = Source::new(&self.plan, T::pixels(pixels), coc);
         self.split(&frame);
-        lap("split");
+        lap("split")?;
         // With something in front, blocks in which it hides anything get their bins behind after the fill.
         self.bin(&frame, None);
-        lap("bin");
+        lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
                 pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers);
             }
-            lap("fill");
+            lap("fill")?;
             self.bin(&frame, Some(layer));
-            lap("bin");
+            lap("bin")?;
         }
         if let Some(gather) = &mut self.gather {
-            gather.run((&mut self.workers, self.arch), &self.plan, &frame, &self.slots[0].source, &mut self.taken);
-            lap("gather");
+            let workers = (&mut self.workers, self.arch);
+            let bin = &self.slots[0].source;
+            gather.run(workers, &self.plan, &frame, bin, &mut self.taken, || lap("gather"))?;
+            lap("gather")?;
         } else {
             self.reach();
-            lap("reach");
+            lap("reach")?;
             self.blur_bins();
-            lap("blur");
+            lap("blur")?;
         }
-        self.composite(&frame, out);
-        lap("composite");
-        Ok(times)
+        self.composite(&frame, pixels, out);
+        lap("composite")
     }
 
     /// Splits the frame's CoC into bins, finds the tiles that stay as they are, and which bins hold anything.
     fn split(&mut self, frame: &Source<'_>) {
-        self.plan.split(frame.depth, frame.coc);
+        match frame.coc {
+            Radii::Field(field, depth) => self.plan.split(depth, field),
+            Radii::Each(coc_px) => self.plan.split_radii(coc_px),
+        }
         let across = self.tiles.across;
         let layered = self.plan.compositing == Compositing::Layers;
         if layered {
@@ -290,46 +277,16 @@ impl CpuBokeh {
     }
 
     /// Pass `composite`: each part is a row of tiles.
-    fn composite(&mut self, frame: &Source<'_>, out: &mut ColorImage) {
+    fn composite<T: Sample>(&mut self, frame: &Source<'_>, pixels: &[T], out: &mut [T]) {
         let width = self.plan.width;
-        let out = DisjointParts::new(&mut out.rgb, TILE_H * width * 3, &mut self.taken);
+        let out = DisjointParts::new(out, TILE_H * width * 3, &mut self.taken);
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
         let (plan, slots, tiles) = (&self.plan, &self.slots, &self.tiles);
         let (arch, encode) = (self.arch, &self.encode);
         self.workers.run(self.plan.height.div_ceil(TILE_H), &|part| {
             let y0 = part * TILE_H;
             let out = out.part(part);
-            arch.dispatch(composite::Composite { plan, slots, tiles, frame, gathered, encode, y0, out });
+            arch.dispatch(composite::Composite { plan, slots, tiles, frame, pixels, gathered, encode, y0, out });
         });
-    }
-}
-
-impl Bokeh for CpuBokeh {
-    fn submit(&mut self, mut job: Job) -> Result<(), BokehError> {
-        self.plan.set_quality(job.quality);
-        let times = self.blur(&job.color, job.depth.as_deref(), &job.coc, &mut job.out)?;
-        let Job { ticket, color, depth, out, .. } = job;
-        self.done = Some(Finished { ticket, picture: Picture::in_memory(out), color, depth, times });
-        Ok(())
-    }
-
-    fn collect(&mut self, _wait: bool) -> Result<Option<Finished>, BokehError> {
-        Ok(self.done.take())
-    }
-
-    fn in_flight(&self) -> usize {
-        usize::from(self.done.is_some())
-    }
-
-    fn capacity(&self) -> usize {
-        1
-    }
-
-    fn backend(&self) -> Backend {
-        Backend::Cpu
-    }
-
-    fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.workers.thread_count(), simd::name(self.arch))
     }
 }

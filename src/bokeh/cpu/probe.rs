@@ -1,6 +1,7 @@
 //! What the passes leave behind, for comparing the executors pass by pass and for looking at a blur from within.
 
 use super::CpuBokeh;
+use super::pixels::{Pixels, Radii};
 use super::rows::STRIP;
 use super::tiles::{TILE_H, TILE_W};
 use super::unpack::{Source, Surfaces};
@@ -63,7 +64,7 @@ impl CpuBokeh {
     /// are put together again, and the CoC is the nearer one's.
     pub fn scene(&self, color: &ColorImage, depth: Option<&DepthMap>, coc: &CocField, filled: bool) -> Vec<[f32; 4]> {
         let (width, height) = (color.width as usize, color.height as usize);
-        let source = Source { color, depth, coc, matte: self.plan.matte(depth, coc), expansion: self.plan.expansion };
+        let source = Source::new(&self.plan, Pixels::Srgb(&color.rgb), Radii::Field(coc, depth));
         let pyramid = self.pyramid.as_ref().filter(|_| filled && self.filled());
         let last = self.last_layer();
         let behind = pyramid.map(|pyramid| pyramid.behind(self.plan.unhidden(last), self.plan.nearest_behind_px(last)));

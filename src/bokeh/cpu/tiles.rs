@@ -1,6 +1,7 @@
 //! Tile classification: what is where, before any colour is read: the range of CoC of every tile, and the tiles that
 //! stay as they are.
 
+use super::pixels::Radii;
 use super::unpack::{Source, coc_row};
 use crate::bokeh::plan::Share;
 use crate::optics::CocField;
@@ -88,10 +89,12 @@ impl pulp::WithSimd for Survey<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let (width, height) = (self.source.color.width as usize, self.source.color.height as usize);
+        let (width, height) = self.source.size;
         // CoC grows with depth: where the two pictures have the same size, the range of depth tells that of CoC.
-        let direct = match (self.source.coc, self.source.depth) {
-            (CocField::Depth(lens), Some(map)) if map.size() == self.source.color.size() => Some((lens, map)),
+        let direct = match self.source.coc {
+            Radii::Field(CocField::Depth(lens), Some(map)) if map.size() == (width as u32, height as u32) => {
+                Some((lens, map))
+            }
             _ => None,
         };
         self.ranges.fill((f32::INFINITY, f32::NEG_INFINITY));

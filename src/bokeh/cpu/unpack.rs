@@ -1,13 +1,15 @@
-//! Pass `unpack`: 8-bit sRGB to linear light with highlights expanded, and depth to signed CoC.
+//! Pass `unpack`: pixels to linear light with highlights expanded, and depth to signed CoC.
 
 use std::ops::Range;
 
 use pulp::Simd;
 
+use super::pixels::{Pixels, Radii};
+use crate::bokeh::plan::Plan;
 use crate::color::luminance;
 use crate::compute::aligned::Line;
 use crate::compute::simd::madd;
-use crate::frame::{ColorImage, DepthMap, Matte};
+use crate::frame::Matte;
 use crate::optics::CocField;
 
 /// [`srgb_to_linear`](crate::color::srgb_to_linear) of an 8-bit value as a polynomial, which vectors can evaluate: off by less than 3e-5, or 0.004
@@ -41,11 +43,10 @@ pub fn compress(luminance: f32, expansion: f32) -> f32 {
 /// A frame as it came.
 #[derive(Clone, Copy)]
 pub struct Source<'a> {
-    pub color: &'a ColorImage,
-    /// Its depth, of any size.
-    pub depth: Option<&'a DepthMap>,
-    /// The rule of the CoC.
-    pub coc: &'a CocField,
+    /// Columns and rows.
+    pub size: (usize, usize),
+    pub pixels: Pixels<'a>,
+    pub coc: Radii<'a>,
     /// Its mixed pixels, where they are taken apart.
     pub matte: Option<&'a Matte>,
     /// Highlight recovery, infinite when off.
@@ -87,27 +88,49 @@ impl<const W: usize> Surfaces<W> {
     }
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
+    /// A frame of `plan`.
+    pub fn new(plan: &Plan, pixels: Pixels<'a>, coc: Radii<'a>) -> Self {
+        let matte = match coc {
+            Radii::Field(field, depth) => plan.matte(depth, field),
+            Radii::Each(_) => None,
+        };
+        // Only codes are clipped at white.
+        let expansion = if matches!(pixels, Pixels::Srgb(_)) { plan.expansion } else { f32::INFINITY };
+        Self { size: (plan.width, plan.height), pixels, coc, matte, expansion }
+    }
+
     /// Some pixels of row `y` from column `x0` on; outside, the outermost pixels repeat.
     #[inline(always)]
     pub fn unpack<S: Simd, const W: usize>(&self, y: usize, x0: isize, columns: usize, surfaces: &mut Surfaces<W>) {
-        let width = self.color.width as usize;
-        let row = &self.color.rgb[y * width * 3..][..width * 3];
+        let width = self.size.0;
+        let row = y * width * 3..(y + 1) * width * 3;
         let before = (-x0).clamp(0, columns as isize) as usize;
         let first = x0.max(0) as usize;
         let end = before + width.saturating_sub(first).min(columns - before);
         let [red, green, blue, coc] = &mut surfaces.back.0;
         let count = end - before;
-        // Channel by channel first, as bytes: vectors take three apart at once.
-        let mut codes = [[0u8; W]; 3];
-        let [r, g, b] = &mut codes;
-        let pixels = row[first * 3..].as_chunks::<3>().0;
-        for (((pixel, r), g), b) in pixels[..count].iter().zip(r).zip(g).zip(b) {
-            (*r, *g, *b) = (pixel[0], pixel[1], pixel[2]);
-        }
-        for (plane, codes) in [red, green, blue].into_iter().zip(&codes) {
-            for (light, &code) in plane[before..end].iter_mut().zip(codes) {
-                *light = decode::<S>(code);
+        match self.pixels {
+            Pixels::Srgb(rgb) => {
+                // Channel by channel first, as bytes: vectors take three apart at once.
+                let mut codes = [[0u8; W]; 3];
+                let [r, g, b] = &mut codes;
+                let pixels = rgb[row][first * 3..].as_chunks::<3>().0;
+                for (((pixel, r), g), b) in pixels[..count].iter().zip(r).zip(g).zip(b) {
+                    (*r, *g, *b) = (pixel[0], pixel[1], pixel[2]);
+                }
+                for (plane, codes) in [red, green, blue].into_iter().zip(&codes) {
+                    for (light, &code) in plane[before..end].iter_mut().zip(codes) {
+                        *light = decode::<S>(code);
+                    }
+                }
+            }
+            Pixels::Linear(rgb) => {
+                let pixels = rgb[row][first * 3..].as_chunks::<3>().0[..count].iter();
+                let planes = red[before..].iter_mut().zip(&mut green[before..]).zip(&mut blue[before..]);
+                for (pixel, ((r, g), b)) in pixels.zip(planes) {
+                    (*r, *g, *b) = (Pixels::light(pixel[0]), Pixels::light(pixel[1]), Pixels::light(pixel[2]));
+                }
             }
         }
         coc_row(self, y, first, &mut coc[before..end]);
@@ -134,7 +157,7 @@ impl Source<'_> {
     #[inline(always)]
     fn unmix<const W: usize>(&self, range: Range<usize>, at: usize, surfaces: &mut Surfaces<W>) {
         surfaces.mixed = false;
-        let (CocField::Depth(lens), Some(matte)) = (self.coc, self.matte) else { return };
+        let (Radii::Field(CocField::Depth(lens), _), Some(matte)) = (self.coc, self.matte) else { return };
         let start = range.start;
         let Surfaces { back, front, share, behind, mixed } = surfaces;
         for pixel in matte.within(range) {
@@ -165,8 +188,12 @@ impl Source<'_> {
 /// The CoC of the pixels of row `y` from column `x0` on.
 #[inline(always)]
 pub fn coc_row(source: &Source<'_>, y: usize, x0: usize, coc: &mut [f32]) {
-    let (width, height) = (source.color.width as usize, source.color.height as usize);
-    match (source.coc, source.depth) {
+    let (width, height) = source.size;
+    let (field, depth) = match source.coc {
+        Radii::Field(field, depth) => (field, depth),
+        Radii::Each(coc_px) => return coc.copy_from_slice(&coc_px[y * width + x0..][..coc.len()]),
+    };
+    match (field, depth) {
         (CocField::Depth(lens), Some(map)) if !map.metres.is_empty() => {
             let (w, h) = (map.width as usize, map.height as usize);
             let row = &map.metres[nearest(y, height, h) * w..][..w];

@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""How a farm scales on this machine, from one node of one core to two, and what a task costs beside its frames.
+
+    benches/farm.py --runs 5
+
+Needs Ray (pip install 'bokehcam[ray]') and the program, built here or named by BOKEHCAM. Each run does the same work on one
+node and on two, in turn. With other work on the machine only the ratio means something.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(REPOSITORY / "python" / "tests"), str(REPOSITORY / "python")]
+
+from farm_fixtures import PROGRAM, Cluster, farm, recording  # noqa: E402
+
+RECORDINGS = 12
+FRAMES = 36
+SMALL = 60
+
+
+def timed(cluster: Cluster, sources: list[Path], out: Path, flags: list[str]) -> float:
+    """Seconds of all, with the start of the driver and of Ray's workers."""
+    began = time.monotonic()
+    farm(*sources, "--out", out, "--format", "y4m", "--address", cluster.address, "--", *flags)
+    return time.monotonic() - began
+
+
+def results_per_s(out: Path, nodes: int) -> float:
+    """How fast results came once each node had made its first one: workers are then started."""
+    ends_s = sorted(path.stat().st_mtime for path in out.glob("*.y4m"))[nodes - 1 :]
+    return (len(ends_s) - 1) / (ends_s[-1] - ends_s[0])
+
+
+def cpu_s(out: Path) -> float:
+    """Processor time of the program for all results."""
+    return sum(json.loads(path.read_text())["cpu_s"] for path in (out / "reports").iterdir())
+
+
+def links(folder: Path, takes: list[Path]) -> list[Path]:
+    """Many recordings that take no room."""
+    small = [folder / f"small{k}" for k in range(SMALL)]
+    for k, link in enumerate(small):
+        link.symlink_to(takes[k % len(takes)])
+    return small
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=5)
+    runs = parser.parse_args().runs
+    print(f"{PROGRAM}, {RECORDINGS} recordings of {FRAMES} frames, 640x360, one thread each")
+    clusters = {1: Cluster(), 2: Cluster()}
+    try:
+        clusters[2].add()
+        with tempfile.TemporaryDirectory() as folder:
+            measure(clusters, Path(folder), runs)
+    finally:
+        for cluster in clusters.values():
+            cluster.stop()
+
+
+def measure(clusters: dict[int, Cluster], folder: Path, runs: int) -> None:
+    takes = [recording(folder / f"take{first}", first) for first in range(RECORDINGS)]
+    flags = ["--loop", "--frames", str(FRAMES)]
+    seconds: dict[int, list[float]] = {1: [], 2: []}
+    rates: dict[int, list[float]] = {1: [], 2: []}
+    for run in range(runs):
+        for nodes, cluster in clusters.items():
+            out = folder / f"out{nodes}-{run}"
+            seconds[nodes].append(timed(cluster, takes, out, flags))
+            rates[nodes].append(FRAMES * results_per_s(out, nodes))
+            rate, all_s = rates[nodes][-1], seconds[nodes][-1]
+            print(
+                f"run {run + 1}, nodes: {nodes}: {rate:.1f} frames/s, {all_s:.1f} s in all, {cpu_s(out):.1f} s of processor time",
+                flush=True,
+            )
+    for what, of in (("frames/s", rates), ("s in all", seconds)):
+        print(f"median: {statistics.median(of[1]):.1f} {what} on one node, {statistics.median(of[2]):.1f} on two")
+    ratios = sorted(two / one for one, two in zip(rates[1], rates[2]))
+    print(
+        f"frames/s, two nodes by one, of each pair: median {statistics.median(ratios):.2f}, from {ratios[0]:.2f} to {ratios[-1]:.2f}"
+    )
+    out = folder / "small-out"
+    timed(clusters[2], links(folder, takes), out, ["--frames", "1", "--effect", "none"])
+    print(
+        f"a task of one frame, not blurred: {2000 / results_per_s(out, 2):.0f} ms of a node, {1000 * cpu_s(out) / SMALL:.0f} ms of it the program's"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""Depth from two eyes, and depth fitted to its picture."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _arrays, _core
+from ._blur import check_threads
+from ._still import as_texts, maps
+
+#: Disparities are tried in multiples of this, up to the most.
+STEP, MOST = 16, 256
+
+
+def match(
+    left: Any,
+    right: Any,
+    *,
+    max_disparity: int = 64,
+    effort: str = "full",
+    threads: Optional[int] = None,
+    check: bool = True,
+) -> npt.NDArray[np.float32]:
+    """The disparity of rectified pairs (the same point is in the same row), as ``bokehcam depth`` finds it, to the bit.
+
+    Args:
+        left: What the left eye saw: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light, which is
+            matched as 8-bit sRGB; or luma ``(H, W)``, ``uint8``.
+        right: What the right eye saw, of the same shape.
+        max_disparity: Disparities that are tried, from 0, in pixels; rounded up to a multiple of 16, at most 256 and less than
+            the width.
+        effort: ``full``, or ``fast``: half the columns and rows.
+        threads: Threads to work on; all cores unless given.
+        check: Warns (``RuntimeWarning``) where the first pair looks as if it were not rectified, or its eyes were swapped.
+
+    Returns:
+        ``(H, W)`` or ``(N, H, W)``, float32: pixels of the left picture; its column ``x`` is seen by the right eye in column
+        ``x - disparity``. 0 is unknown. With a focal length in pixels and a baseline in metres, depth in metres is
+        ``focal_px * baseline_m / disparity``.
+
+    Raises:
+        ValueError: Shapes that do not fit (both are said), a number out of its range.
+        TypeError: Another dtype, or an array on a GPU.
+    """
+    eyes = [_eye(left, "left"), _eye(right, "right")]
+    shapes = [_arrays.shape_of(eye) for eye in eyes]
+    if shapes[0] != shapes[1]:
+        raise ValueError(f"right: shape {shapes[1]}, wanted {shapes[0]}, as left has")
+    array = eyes[0]
+    height, width = array.shape[-3:-1] if array.ndim > 2 else array.shape
+    limit = min((width - 1) // STEP * STEP, MOST)
+    if limit < STEP:
+        raise ValueError(f"left: {width} px wide, and matching needs {STEP + 1} or more")
+    disparities = -(-max_disparity // STEP) * STEP
+    if not STEP <= disparities <= limit:
+        raise ValueError(f"max_disparity: {max_disparity}, wanted 1 to {limit} for pictures {width} px wide")
+    matcher = _core.Matcher((width, height), disparities, effort, check_threads(threads))
+
+    def pair(left: Any, right: Any, check: bool) -> npt.NDArray[np.float32]:
+        disparity, odd = matcher.disparity(left, right, check)
+        if odd is not None:
+            warnings.warn(odd, RuntimeWarning, stacklevel=3)
+        return disparity
+
+    if array.ndim < 4:
+        return pair(*eyes, check)
+    out = np.empty(array.shape[:3], np.float32)
+    for k in range(len(out)):
+        out[k] = pair(eyes[0][k], eyes[1][k], check and k == 0)
+    return out
+
+
+def refine(
+    depth_m: Any, image: Any, *, focus: Union[float, str, tuple[float, float]] = "auto"
+) -> npt.NDArray[np.float32]:
+    """Measured depth made fit for a blur: as large as its picture, without holes, calm, its edges on those of the colours.
+
+    Args:
+        depth_m: ``(h, w)`` or ``(N, h, w)``, float32 metres, 0 or not finite = unknown; of the picture's size, or smaller with
+            the same aspect.
+        image: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` sRGB or ``float32`` linear light, which is looked at as 8-bit sRGB.
+        focus: What will be in focus: metres, ``"auto"`` or a point ``(x, y)`` as fractions of width and height. Steps of depth
+            count as much as they change the blur, so that it matters which.
+
+    Returns:
+        ``(H, W)`` or ``(N, H, W)``, float32 metres, each map refined by itself. 0 everywhere where no depth was known.
+
+    Raises:
+        ValueError: Shapes that do not fit (both are said), or a focus that is none.
+        TypeError: Another dtype, or an array on a GPU.
+    """
+    array = _arrays.image(image)
+    depth = maps("depth_m", depth_m, array)
+    settings = as_texts({"effect": "dof", "focus": focus})
+    if array.ndim == 3:
+        return _core.refine(depth, array, settings)
+    out = np.empty(array.shape[:3], np.float32)
+    for k in range(len(out)):
+        out[k] = _core.refine(depth[k], array[k], settings)
+    return out
+
+
+def _eye(value: Any, name: str) -> npt.NDArray[Any]:
+    array = _arrays.as_array(value, name)
+    if array.ndim == 2 and array.dtype == np.uint8 and 0 not in array.shape:
+        return np.ascontiguousarray(array)
+    return _arrays.image(array, name)

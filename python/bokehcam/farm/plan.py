@@ -1,0 +1,244 @@
+"""What is to be made of which sources, and what of it is there; all that can be wrong is found before anything starts."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .work import HIDDEN, OURS, REPORTS, Job, Unit, finished, located, read_report, report_of, version_of
+
+PICTURES = (".png", ".jpg", ".jpeg")
+DEPTH_MAPS = (".png", ".pfm")
+# As the program names the depth map beside a photo.
+DEPTH_SUFFIX = "-depth"
+# What each command can write; the first is the default.
+FORMATS = {"stream": ("mp4", "mkv", "webm", "y4m", "png"), "render": ("png", "jpg")}
+# Flags of the program that the farm gives itself, or that make no sense with it.
+OWN_FLAGS = {
+    "stream": (
+        "--to",
+        "--report",
+        "--name",
+        "--pace",
+        "--force",
+        "--on-demand",
+        "--out-size",
+        "--config",
+        "--log-format",
+    ),
+    "render": ("--out", "--depth-map", "--mask", "--like", "--debug-dir", "--force", "--config", "--log-format"),
+}
+MOST_NAME_BYTES = 255
+
+
+class UsageError(Exception):
+    """The caller has to write something differently."""
+
+
+class FarmError(Exception):
+    """Something is missing, or another farm is at work."""
+
+
+def program_at(given: str) -> tuple[str, str]:
+    """The program for the nodes, and what it says of its version. A name without a folder is looked up on each node."""
+    found = located(given)
+    if not found:
+        raise FarmError(f"there is no program {given}: install bokehcam, or name its file with --bokehcam or BOKEHCAM")
+    version = version_of(found)
+    if not version:
+        raise FarmError(f"{found} is no bokehcam: name its file with --bokehcam or BOKEHCAM")
+    return (found if "/" in given else given), version
+
+
+def split_flags(rest: list[str]) -> tuple[str, tuple[str, ...]]:
+    """The command of the program, and its flags."""
+    command = "stream"
+    if rest and not rest[0].startswith("-"):
+        command, rest = rest[0], rest[1:]
+    if command not in FORMATS:
+        raise UsageError(f"{command}: after -- come `stream` or `render` and their flags")
+    names = [flag.split("=", 1)[0] for flag in rest]
+    for name in names:
+        if name in OWN_FLAGS[command]:
+            raise UsageError(f"{name}: the farm sees to this itself; leave it out")
+    if "--loop" in names and "--frames" not in names:
+        raise UsageError("--loop: it would never end; add --frames N")
+    return command, tuple(rest)
+
+
+def refuse_bad_flags(program: str, command: str, flags: tuple[str, ...]) -> None:
+    """Lets the program read its flags, without doing anything."""
+    needed = ["demo", "--to", "null"] if command == "stream" else ["a.png", "--out", "b.png"]
+    asked = subprocess.run(
+        [located(program) or program, command, *needed, *flags, "--help"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    if asked.returncode:
+        said = " ".join(asked.stderr.split())
+        raise UsageError(f"bokehcam {command} does not take these flags: {said.removeprefix('error: ')}")
+
+
+def settings() -> tuple[dict[str, str], str]:
+    """The program's settings here: from the environment, and the text of the settings file. They hold on all nodes."""
+    environment = {name: value for name, value in os.environ.items() if name.startswith("BOKEHCAM_")}
+    given = environment.pop("BOKEHCAM_CONFIG", None)
+    folder = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
+    file = Path(given) if given else folder / "bokehcam" / "config.toml"
+    if not given and not file.exists():
+        return environment, ""
+    try:
+        return environment, file.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise UsageError(f"the settings file {file}: {error}") from error
+
+
+def with_defaults(environment: dict[str, str], text: str, cpus: int, gpus: float) -> dict[str, str]:
+    """Settings for tasks that share a node, where neither the environment nor the file (`text`) has them. Without a GPU of
+    its own a task looks for none: results are the same to the bit on all nodes."""
+    defaults = {"threads": str(cpus), "backend": "gpu" if gpus else "cpu"}
+    free = {name: value for name, value in defaults.items() if not re.search(rf"(?m)^\s*{name}\s*=", text)}
+    return {**{f"BOKEHCAM_{name.upper()}": value for name, value in free.items()}, **environment}
+
+
+def units(command: str, sources: Iterable[str], extension: str, depth_maps: str | None) -> list[Unit]:
+    """What is to be made, in the order of the sources, each with a name that no other one has."""
+    paths = [path for source in sources for path in expanded(command, Path(source))]
+    if not paths:
+        raise UsageError("there are no sources")
+    made: dict[str, Path] = {}
+    planned = []
+    for path in paths:
+        stem = path.stem if command == "render" or path.is_file() else path.name
+        output = stem if (command, extension) == ("stream", "png") else f"{stem}.{extension}"
+        other = made.setdefault(output, path)
+        if other is not path:
+            raise UsageError(
+                f"{other} and {path}: the result of both would be {output}; give them to two farms with an --out each"
+            )
+        if output in (REPORTS, HIDDEN) or len(os.fsencode(f"{output}.json")) > MOST_NAME_BYTES:
+            raise UsageError(f"{path}: its result cannot be called {output}; give the source another name")
+        planned.append(Unit(str(path), output, depth_of(path, depth_maps) if command == "render" else ()))
+    return planned
+
+
+def expanded(command: str, source: Path) -> list[Path]:
+    """One recording; or one picture, or the pictures of a folder."""
+    path = Path(os.path.abspath(source))
+    if not path.exists():
+        raise UsageError(f"{source}: there is no such file or folder")
+    if command == "stream":
+        return [path]
+    if not path.is_dir():
+        if path.suffix.lower() not in PICTURES:
+            raise UsageError(f"{source}: no PNG or JPEG; recordings are for `stream`")
+        return [path]
+    pictures = [
+        entry
+        for entry in sorted(path.iterdir())
+        if entry.suffix.lower() in PICTURES and not entry.name.startswith(".") and not entry.stem.endswith(DEPTH_SUFFIX)
+    ]
+    if not pictures:
+        raise UsageError(f"{source}: there are no pictures (PNG or JPEG) in it; recordings are for `stream`")
+    return pictures
+
+
+def depth_of(picture: Path, folder: str | None) -> tuple[str, ...]:
+    """Arguments for a picture's depth map: of the same name in `folder`, else NAME-depth beside it, if there is one."""
+    if folder is not None:
+        there = [Path(os.path.abspath(folder)) / f"{picture.stem}{end}" for end in DEPTH_MAPS]
+        found = next((path for path in there if path.exists()), None)
+        if found is None:
+            raise UsageError(f"{picture}: its depth map {picture.stem}.png or .pfm is not in {folder}")
+        return "--depth-map", str(found)
+    beside = [picture.with_name(f"{picture.stem}{DEPTH_SUFFIX}{end}") for end in DEPTH_MAPS]
+    found = next((path for path in beside if path.exists()), None)
+    return ("--depth-map", str(found)) if found else ()
+
+
+def to_do(job: Job, planned: list[Unit]) -> list[Unit]:
+    """What is not finished. Whatever else is in the place of a result stays, and is an error."""
+    return [unit for unit in planned if not finished(job, unit) and may_be_made(job, unit)]
+
+
+def may_be_made(job: Job, unit: Unit) -> bool:
+    final, report = job.folder / unit.output, read_report(report_of(job.folder, unit))
+    ours = (report or {}).get("farm")
+    if report is not None and not isinstance(ours, dict):
+        raise UsageError(f"{report_of(job.folder, unit)} is no report of a farm, and stays: choose another --out")
+    if not os.path.lexists(final):
+        return True
+    if not ours:
+        raise UsageError(f"{final} is there without a report of a farm, and stays: move it away, or choose another --out")
+    asked = job.asked(unit)
+    if ours.get("source") != asked["source"]:
+        raise UsageError(f"{final} is there, and was made of {ours.get('source')}: choose another --out")
+    if ours.get("arguments") != asked["arguments"]:
+        flags = " ".join(map(str, ours.get("arguments") or []))
+        raise UsageError(f"{final} is there, and was made by `{flags}`: choose another --out, or give these flags again")
+    if ours.get("settings_sha256") != asked["settings_sha256"]:
+        raise UsageError(f"{final} is there, and was made with other settings (file or environment): choose another --out")
+    raise UsageError(f"{final} has changed since a farm made it, or its report has: move it away, or choose another --out")
+
+
+@contextmanager
+def at_work(job: Job) -> Iterator[None]:
+    """Makes the folder ready for a job, keeps other farms out of it, and leaves nothing hidden but the lock."""
+    try:
+        for folder in (job.folder, job.folder / REPORTS, job.hidden):
+            folder.mkdir(parents=True, exist_ok=True)
+        with open(job.hidden / "lock", "a", encoding="utf-8") as lock:
+            take(lock, job)
+            sweep(job.hidden, lambda of: of < job.id)
+            try:
+                job.settings_file.write_text(job.settings, encoding="utf-8")
+                try_link(job)
+                yield
+            finally:
+                sweep(job.hidden, lambda of: of == job.id)
+    except OSError as error:
+        raise FarmError(str(error)) from error
+
+
+def take(lock, job: Job) -> None:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise FarmError(f"another farm is at work in {job.folder}: wait for it, or choose another --out") from error
+    except OSError as error:
+        print(f"warning: {job.folder} cannot be locked ({error}): start no other farm on it meanwhile", file=sys.stderr)
+
+
+def try_link(job: Job) -> None:
+    """Results get their names by links."""
+    link = job.hidden / f"{job.id}-{0:012x}"
+    try:
+        os.link(job.settings_file, link)
+        os.unlink(link)
+    except OSError as error:
+        raise FarmError(f"{job.folder}: its file system has no hard links ({error}); choose another --out") from error
+
+
+def sweep(hidden: Path, of_job) -> None:
+    """Removes what jobs have left, if `of_job` says so of them: attempts that were killed, and settings."""
+    for entry in os.scandir(hidden):
+        ours = OURS.fullmatch(entry.name)
+        if ours and of_job(ours[1]):
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            else:
+                Path(entry.path).unlink(missing_ok=True)
+
+
+def new_id() -> str:
+    """Names a job by its time of start, so that older ones come first."""
+    return f"{time.time_ns():016x}"

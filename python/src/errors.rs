@@ -1,0 +1,43 @@
+//! What is wrong, in Python's terms.
+
+use std::fmt::Display;
+
+use bokehcam::look::settings::setting;
+use bokehcam::look::{Look, Patch};
+use pyo3::PyErr;
+use pyo3::exceptions::{PyOSError, PyValueError};
+
+/// An error of the library as a `ValueError`. Its messages name flags of the command line; here these are arguments.
+pub fn value(error: impl Display) -> PyErr {
+    PyValueError::new_err(as_arguments(&error.to_string()))
+}
+
+/// An error of files as an `OSError`.
+pub fn os(error: impl Display) -> PyErr {
+    PyOSError::new_err(as_arguments(&error.to_string()))
+}
+
+/// `--max-coc` as `max_coc`.
+fn as_arguments(text: &str) -> String {
+    let mut parts = text.split("--");
+    let mut out = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        let end = part.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(part.len());
+        out += &part[..end].replace('-', "_");
+        out += &part[end..];
+    }
+    out
+}
+
+/// The default look with some settings, by the names that the command line has for them.
+pub fn look(settings: &[(String, String)]) -> Result<Look, PyErr> {
+    let pairs = settings.iter().map(|(name, text)| (name.as_str(), text.as_str()));
+    for (name, _) in settings {
+        let excluded = setting(name).map_or(&[][..], |setting| setting.excludes());
+        if let Some((other, _)) = settings.iter().find(|(other, _)| excluded.contains(&other.as_str())) {
+            return Err(value(format!("--{name} and --{other} exclude each other: leave one of them out")));
+        }
+    }
+    let patch = Patch::parse(pairs).map_err(|(name, what)| value(format!("--{name}: {what}")))?;
+    patch.on(&Look::default()).map_err(value)
+}

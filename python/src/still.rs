@@ -1,0 +1,108 @@
+//! Pictures with depth, blurred as the command `render` blurs them.
+
+use std::path::Path;
+use std::sync::Mutex;
+
+use bokehcam::bokeh::slices::{Radii, SliceBlur};
+use bokehcam::depth::backdrop::Behind;
+use bokehcam::look::{Look, Refine};
+use bokehcam::pipeline::still::{Depth, coc_and_depth};
+use bokehcam::recording::still::check_depth_size;
+use bokehcam::source::{DepthChoice, fitting_look};
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArrayDyn, ToPyArray};
+use pyo3::prelude::*;
+
+use crate::aperture::Aperture;
+use crate::arrays::Image;
+use crate::blur::blur;
+use crate::signals::wait_for;
+use crate::{errors, pictures};
+
+/// A look for pictures of one size, with what blurs them.
+#[pyclass(frozen, module = "bokehcam._core")]
+pub struct Still {
+    look: Look,
+    /// None where pictures pass through.
+    executor: Option<Mutex<SliceBlur>>,
+}
+
+#[pymethods]
+impl Still {
+    /// For pictures of `size` (width, height), with depth or without; `aperture` replaces the settings' one.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        size: (u32, u32),
+        has_depth: bool,
+        settings: Vec<(String, String)>,
+        aperture: Option<&Aperture>,
+        threads: Option<usize>,
+    ) -> PyResult<Self> {
+        let mut look = errors::look(&settings)?;
+        if let Some(Aperture { shape, rim }) = aperture {
+            (look.aperture, look.rim) = (shape.clone(), *rim);
+        }
+        let look = fitting_look(&look, &DepthChoice::Auto, has_depth).map_err(errors::value)?;
+        let executor = look.settings(size, false).map(|settings| SliceBlur::new(&settings, size, threads));
+        let executor = py.detach(|| executor.transpose()).map_err(errors::value)?.map(Mutex::new);
+        Ok(Self { look, executor })
+    }
+
+    /// Blurs `image` (height, width, 3), whose `depth` in metres has holes and noise, into `out`.
+    fn render(
+        &self,
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        depth: Option<PyReadonlyArrayDyn<'_, f32>>,
+        out: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let Some(executor) = &self.executor else {
+            match Image::of(image, out)? {
+                Image::Srgb(image, mut out) => out.as_slice_mut()?.copy_from_slice(image.as_slice()?),
+                Image::Linear(image, mut out) => out.as_slice_mut()?.copy_from_slice(image.as_slice()?),
+            }
+            return Ok(());
+        };
+        let arrays = Image::of(image, out)?;
+        if matches!(arrays, Image::Linear(..)) && self.look.behind != Behind::Blur {
+            return Err(errors::value("behind: what is put behind the subject is 8-bit sRGB: give a uint8 image"));
+        }
+        let mut color = match &arrays {
+            Image::Srgb(image, _) => pictures::color(image.as_any())?,
+            Image::Linear(image, _) => pictures::color(image.as_any())?,
+        };
+        let map = depth.as_ref().map(pictures::depth).transpose()?;
+        if let Some(map) = &map {
+            check_depth_size(Path::new("depth"), map.size(), color.size()).map_err(errors::value)?;
+        }
+        let look = self.look.clone();
+        let (color, made) = wait_for(py, move || {
+            let made = coc_and_depth(&look, &mut color, map.map(Depth::Measured));
+            (color, made)
+        })?;
+        let (field, map) = made.map_err(errors::value)?;
+        let radii = Radii::Field(&field, map.as_ref());
+        match arrays {
+            // What is behind the subject may have been put into the picture.
+            Image::Srgb(_, mut out) => blur(py, executor, &color.rgb, radii, out.as_slice_mut()?),
+            Image::Linear(image, mut out) => blur(py, executor, image.as_slice()?, radii, out.as_slice_mut()?),
+        }
+    }
+}
+
+/// Depth in metres (height, width) fitted to its picture, with what is in focus by the settings.
+#[pyfunction]
+pub fn refine<'py>(
+    py: Python<'py>,
+    depth: PyReadonlyArrayDyn<'py, f32>,
+    image: &Bound<'py, PyAny>,
+    settings: Vec<(String, String)>,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let look = Look { refine: Refine::On, ..errors::look(&settings)? };
+    let (map, mut color) = (pictures::depth(&depth)?, pictures::color(image)?);
+    check_depth_size(Path::new("depth"), map.size(), color.size()).map_err(errors::value)?;
+    let made = wait_for(py, move || coc_and_depth(&look, &mut color, Some(Depth::Measured(map))))?;
+    let (_, map) = made.map_err(errors::value)?;
+    let map = map.ok_or_else(|| errors::value("refine: the settings are of a blur without depth"))?;
+    map.metres.to_pyarray(py).reshape([map.height as usize, map.width as usize])
+}

@@ -1,0 +1,72 @@
+//! Pictures in memory of somebody else's, such as arrays of other languages: blurred on the CPU from slice to slice,
+//! without a copy, and with the radius of every pixel given where it is known.
+
+use std::ops::ControlFlow;
+
+use super::cpu::CpuBokeh;
+pub use super::cpu::{Pixels, Radii, Sample};
+use super::plan::Plan;
+use super::{BokehError, Settings};
+use crate::optics::CocField;
+
+/// The CPU executor for such pictures of one size; nothing is allocated per picture.
+pub struct SliceBlur {
+    settings: Settings,
+    size: (u32, u32),
+    threads: Option<usize>,
+    cpu: CpuBokeh,
+}
+
+impl SliceBlur {
+    /// An executor for pictures of `size` (width, height) on `threads` threads, all cores when `None`.
+    ///
+    /// # Errors
+    /// The blur is too wide, or the picture too large ([`Settings::check`]).
+    pub fn new(settings: &Settings, size: (u32, u32), threads: Option<usize>) -> Result<Self, BokehError> {
+        settings.check(size)?;
+        let cpu = CpuBokeh::new(Plan::new(settings, size.0, size.1), threads);
+        Ok(Self { settings: settings.clone(), size, threads, cpu })
+    }
+
+    /// What it was made for.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Columns and rows of its pictures.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// Blurs a picture into `out`: both `height * width * 3` samples, 8-bit sRGB or linear light as [`Pixels`] has them.
+    /// Highlights are recovered in 8-bit pictures alone. [`Radii::Each`] is for settings whose
+    /// [`CocKind`](crate::optics::CocKind) is `Depth`. `go_on` is asked after each pass, a few times per picture;
+    /// `Break` stops the work, and then `out` holds nothing of use.
+    ///
+    /// # Errors
+    /// [`BokehError::NoDepth`], or [`BokehError::Lengths`] when slices have other lengths than the picture.
+    pub fn blur<T: Sample>(
+        &mut self,
+        pixels: &[T],
+        coc: Radii<'_>,
+        out: &mut [T],
+        mut go_on: impl FnMut() -> ControlFlow<()>,
+    ) -> Result<ControlFlow<()>, BokehError> {
+        let count = self.size.0 as usize * self.size.1 as usize;
+        let radii = match coc {
+            Radii::Field(CocField::Depth(_), None) => return Err(BokehError::NoDepth),
+            Radii::Field(..) => count,
+            Radii::Each(coc_px) => coc_px.len(),
+        };
+        let lengths = [pixels.len(), out.len(), radii];
+        if lengths != [count * 3, count * 3, count] {
+            return Err(BokehError::Lengths { size: self.size, lengths });
+        }
+        let flow = self.cpu.blur_pixels(pixels, coc, out, |_| go_on());
+        if flow.is_break() {
+            // What the passes left is half of one frame and half of another.
+            self.cpu = CpuBokeh::new(Plan::new(&self.settings, self.size.0, self.size.1), self.threads);
+        }
+        Ok(flow)
+    }
+}
