@@ -30,7 +30,7 @@
 //! | 5 | [`look`]: everything about the blur, for pictures of any size |
 //! | 4 | [`capture`], [`depth`], [`bokeh`], [`sink`] |
 //! | 3 | `link`, [`budget`], [`network`], [`stats`], [`recording`], `scene`, `v4l2`, `pipewire`, `control` |
-//! | 2 | `compute`, [`calibration`] |
+//! | 2 | `compute`, [`calibration`], [`layout`] |
 //! | 1 | [`color`], [`frame`], [`optics`], [`clock`], [`knob`], `files` |
 //! | 0 | `names` |
 //!
@@ -59,6 +59,7 @@ pub mod depth;
 pub mod files;
 pub mod frame;
 pub mod knob;
+pub mod layout;
 #[doc(hidden)]
 pub mod link;
 pub mod look;

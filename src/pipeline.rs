@@ -17,9 +17,11 @@ mod held;
 mod pacer;
 mod places;
 mod playout;
+mod prepare;
 mod quality;
 mod rate;
 mod staging;
+mod stepper;
 pub mod still;
 mod view;
 mod wanted;
@@ -33,6 +35,7 @@ pub use coc::{CocMaker, Finish};
 use places::{MOST_IN_FLIGHT, Places};
 
 pub use error::{Fault, PipelineError};
+pub use stepper::Stepper;
 pub use view::{Progress, Trace, View};
 pub use wanted::Wanted;
 
@@ -241,7 +244,6 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         tally: &tally,
         clock: &clock,
         times: depth_times,
-        check: fit_check::FitCheck::default(),
         held,
     };
     let blur = blur::Stage {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&[&str]; 12] = [
     &["names"],
     &["color", "frame", "optics", "clock", "files", "knob"],
-    &["compute", "calibration"],
+    &["compute", "calibration", "layout"],
     &["link", "budget", "network", "stats", "recording", "scene", "v4l2", "pipewire", "control"],
     &["capture", "depth", "bokeh", "sink"],
     &["look"],

@@ -106,3 +106,9 @@ fn dependencies_are_under_licences_and_from_sources_that_are_allowed() {
 fn dependencies_of_the_python_package_are_allowed_too() {
     check("python", 50);
 }
+
+#[test]
+#[ignore = "needs the crates of gst"]
+fn dependencies_of_the_gstreamer_element_are_allowed_too() {
+    check("gst", 50);
+}

@@ -128,6 +128,11 @@ impl Planner {
         Self { ages: self.ages, held: self.held, begun: self.begun, ..planner }
     }
 
+    /// The blur of a frame may take so long from now on.
+    pub fn allow(&mut self, budget_ns: u64) {
+        self.budget_ns = budget_ns;
+    }
+
     /// The plan for the next frame.
     pub fn plan(&self) -> Plan {
         self.plans[self.governor.plan()]

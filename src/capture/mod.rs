@@ -5,7 +5,6 @@ mod error;
 pub mod photo;
 #[cfg(all(feature = "camera", feature = "pipewire"))]
 pub mod pipewire;
-#[cfg(feature = "camera")]
 pub mod pixels;
 pub mod replay;
 mod seek;

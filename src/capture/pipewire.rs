@@ -294,7 +294,7 @@ mod tests {
             let Agreed { fourcc, size, rate } = taker.choose(&modes).unwrap();
             format!("{} {size:?} {}/{}", FourCc(fourcc), rate.0, rate.1)
         };
-        let any = Wish::any(crate::v4l2::layout::Content::Color);
+        let any = Wish::any(crate::layout::Content::Color);
         let format = |fourcc: &str| Wish { fourcc: Some(fourcc.parse().unwrap()), ..any };
         assert_eq!(chosen(format("YUYV")), "YUYV (1280, 720) 30/1");
         assert_eq!(chosen(format("NV12")), "NV12 (1280, 720) 30/1");

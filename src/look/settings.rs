@@ -43,6 +43,8 @@ pub struct Setting {
     pub help: &'static str,
     /// Its values by name, and what each does, where it has but a few.
     pub choices: fn() -> Vec<Choice>,
+    /// The numbers that it takes, ends included, where it takes nothing else.
+    pub range: fn() -> Option<RangeInclusive<f32>>,
     /// Whether its default is worked out from the picture or the quality level, and has no value of its own.
     pub computed: bool,
     pub(super) set: fn(&mut Patch, &str) -> Result<(), String>,
@@ -53,7 +55,7 @@ pub struct Setting {
 macro_rules! settings {
     ($(
         $(#[doc = $help:literal])+
-        $field:ident: $type:ty = $name:literal $value:literal $group:ident $parse:expr $(, one of $choices:expr)? $(, is $computed:ident)*;
+        $field:ident: $type:ty = $name:literal $value:literal $group:ident $parse:expr $(, one of $choices:expr)? $(, in $range:expr)? $(, is $computed:ident)*;
     )+) => {
         /// Some settings of a look: what a preset, a snapshot, the settings file or flags say. `None` says nothing.
         #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,6 +69,7 @@ macro_rules! settings {
             group: Group::$group,
             help: concat!($($help),+),
             choices: || <[Vec<Choice>]>::concat(&[$($choices)?]),
+            range: || <[RangeInclusive<f32>]>::first(&[$($range)?]).cloned(),
             computed: !<[&str]>::is_empty(&[$(stringify!($computed)),*]),
             set: |patch, text| {
                 patch.$field = Some(($parse)(text)?);
@@ -98,16 +101,16 @@ settings! {
     /// Distance of the focal plane: METRES, auto, or X,Y as fractions of width and height
     focus: FocusRule = "focus" "WHERE" Blur FocusRule::from_str;
     /// Distances that are sharp as a whole, in metres: half of it on either side of the focal plane
-    focus_range_m: f32 = "focus-range" "METRES" Blur not_negative;
+    focus_range_m: f32 = "focus-range" "METRES" Blur not_negative, in 0.0..=f32::MAX;
     /// Blur radius of a point at infinity: the strength of the blur, in pixels, or as a share of the height such as 3%
     /// [default: auto, which is height / 45]
     coc_at_infinity: Strength = "coc-at-infinity" "PX" Blur Strength::from_str, is computed;
     /// The strength by a lens instead: its f-number, with --focal-length and --sensor-width
-    f_number: f32 = "f-number" "N" Blur above_zero, is computed;
+    f_number: f32 = "f-number" "N" Blur above_zero, in f32::MIN_POSITIVE..=f32::MAX, is computed;
     /// Focal length of that lens, in millimetres
-    focal_length_mm: f32 = "focal-length" "MM" Blur above_zero, is computed;
+    focal_length_mm: f32 = "focal-length" "MM" Blur above_zero, in f32::MIN_POSITIVE..=f32::MAX, is computed;
     /// Width of the sensor behind that lens, in millimetres
-    sensor_width_mm: f32 = "sensor-width" "MM" Blur above_zero, is computed;
+    sensor_width_mm: f32 = "sensor-width" "MM" Blur above_zero, in f32::MIN_POSITIVE..=f32::MAX, is computed;
     /// Largest blur radius, in pixels [default: auto, which is 0.06 x height]
     max_coc_px: OrAuto<f32> = "max-coc" "PX" Blur OrAuto::parser(within(0.0..=MOST_RADIUS_PX)), is computed;
     /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker
@@ -123,13 +126,13 @@ settings! {
     /// disc, ring:INNER, polygon:N[:ROTATION_DEG[:CURVATURE]], heart, star:N or image:FILE
     aperture: ApertureName = "aperture" "SHAPE" Aperture ApertureName::from_str;
     /// Radial intensity: -1 soap bubbles, 0 flat, 1 bright in the middle
-    intensity: f32 = "intensity" "I" Aperture within(INTENSITIES);
+    intensity: f32 = "intensity" "I" Aperture within(INTENSITIES), in INTENSITIES;
     /// Width of the soft rim, as a fraction of the radius
-    rim: f32 = "rim" "W" Aperture within(RIMS);
+    rim: f32 = "rim" "W" Aperture within(RIMS), in RIMS;
     /// Separable terms, 1 to 16 or full [default: auto, which is the quality level's]
     rank: OrAuto<Rank> = "rank" "TERMS" Aperture OrAuto::from_str, is computed;
     /// Take clipped white as this many times as bright; 0 is off
-    highlights: f32 = "highlights" "M" Aperture within(HIGHLIGHTS);
+    highlights: f32 = "highlights" "M" Aperture within(HIGHLIGHTS), in HIGHLIGHTS;
     /// Quality level: changes fidelity, never the amount of blur. auto follows the time there is (--budget-ms) where
     /// frames come in real time, up to balanced on the CPU and best on a GPU; elsewhere it is balanced
     quality: OrAuto<Quality> = "quality" "LEVEL" Computing OrAuto::from_str, one of auto_or::<Quality>();
@@ -171,5 +174,24 @@ impl Setting {
     /// It has no such value: what is accepted.
     pub fn set(&self, patch: &mut Patch, text: &str) -> Result<(), String> {
         (self.set)(patch, text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_what_is_accepted() {
+        let mut ranged = 0;
+        for setting in &SETTINGS {
+            let accepts = |number: f32| setting.set(&mut Patch::default(), &number.to_string()).is_ok();
+            let Some(range) = (setting.range)() else { continue };
+            ranged += 1;
+            let (low, high) = range.into_inner();
+            assert!(accepts(low) && accepts(high), "{}", setting.name);
+            assert!(!accepts(low.next_down()) && !accepts(high.next_up()), "{}", setting.name);
+        }
+        assert_eq!(ranged, 7);
     }
 }

@@ -5,10 +5,9 @@ use std::time::Duration;
 
 use super::capture::Shot;
 use super::change::{Change, Executor, Swap};
-use super::coc::{CocMaker, Finish};
-use super::fit_check::{FitCheck, Verdict};
+use super::prepare::Preparation;
 use super::rate::Rate;
-use super::staging::{Staging, Taken};
+use super::staging::Taken;
 use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, hand_on};
 use crate::budget::DepthTimes;
@@ -17,7 +16,7 @@ use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Received, Receiver, Sender};
-use crate::look::{BackgroundMemory, Look};
+use crate::look::Look;
 use crate::optics::CocField;
 use crate::stats::{Cause, Histogram, Tally};
 
@@ -57,8 +56,6 @@ pub(super) struct Stage<'a> {
     /// How well and how often depth is made; `None` makes it as well as can be, for every frame.
     pub rate: Option<Rate<'a>>,
     pub times: &'a mut Histogram,
-    /// Notices depth that does not fit the pictures.
-    pub check: FitCheck,
     /// Whether frames are wanted with depth of their own.
     pub wanted: Option<Arc<Wanted>>,
     /// Counts frames that took over the depth of the one before.
@@ -68,9 +65,7 @@ pub(super) struct Stage<'a> {
 impl Stage<'_> {
     /// Runs until the frames end or nobody takes the results. Changes of the blur take effect between frames.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
-        let mut coc = CocMaker::new(self.look.coc_rule(self.size), self.finish(&self.look));
-        coc.remember(self.remembers(&self.look));
-        let mut staging = Staging::new(&self.look);
+        let mut preparation = Preparation::new(&self.look, self.size, self.measured, self.knows_background());
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
         let (mut change, mut between) = (0, false);
@@ -88,9 +83,7 @@ impl Stage<'_> {
                     }
                 };
             for Change { number, look, bokeh } in self.changes.iter().flat_map(mpsc::Receiver::try_iter) {
-                coc.follow(look.coc_rule(self.size), self.finish(&look));
-                coc.remember(self.remembers(&look));
-                staging.follow(&look);
+                preparation.follow(&look, self.knows_background());
                 (change, between) = (number, matches!(bokeh, Executor::Meanwhile));
                 self.rate.iter_mut().for_each(Rate::forget);
                 if let Executor::To(executor) = bokeh {
@@ -99,7 +92,7 @@ impl Stage<'_> {
                 }
             }
             if std::mem::replace(&mut seek, trace.seek) != trace.seek {
-                coc.forget();
+                preparation.forget();
                 self.rate.iter_mut().for_each(Rate::forget);
                 self.source.iter_mut().for_each(|source| source.jump(ahead_ns));
             }
@@ -107,10 +100,10 @@ impl Stage<'_> {
             trace.between_ns += began_ns.saturating_sub(since_ns);
             let held_before = *self.held;
             // A CoC that is the same for every frame needs no depth.
-            let made = match coc.fixed() {
+            let made = match preparation.fixed() {
                 Some(field) => Ok((None, field)),
                 None => self
-                    .depth_and_coc(&mut coc, (depth, right), &mut color, stamp)
+                    .depth_and_coc(&mut preparation, (depth, right), &mut color, stamp)
                     .map(|(map, field)| (Some(map), field)),
             };
             let (mut depth, coc) = match made {
@@ -134,12 +127,12 @@ impl Stage<'_> {
                 }
             };
             (trace.change, trace.between) = (change, between);
-            let taken = depth.as_deref().zip(self.taken.filter(|_| staging.replaces(&coc))).map(|(map, pool)| {
+            let taken = depth.as_deref().zip(self.taken.filter(|_| preparation.replaces(&coc))).map(|(map, pool)| {
                 let mut taken = pool.take();
                 taken.keep(&color, map);
                 taken
             });
-            trace.part = depth.as_mut().and_then(|map| staging.stage(&mut color, map, &coc, stamp.time_ns));
+            trace.part = depth.as_mut().and_then(|map| preparation.stage(&mut color, map, &coc, stamp.time_ns));
             let since_ns = self.clock.now_ns();
             (trace.depth_ns, trace.depth_held) = (since_ns - began_ns, *self.held > held_before);
             let effort = (!trace.depth_held).then(|| self.rate.as_ref().map_or(0, Rate::effort));
@@ -155,19 +148,14 @@ impl Stage<'_> {
         Ok(())
     }
 
-    fn finish(&self, look: &Look) -> Finish {
-        Finish::measured(look.refines(self.measured))
-    }
-
-    fn remembers(&self, look: &Look) -> bool {
-        let is_known = self.source.as_ref().is_some_and(|source| source.knows_background());
-        look.background_memory == BackgroundMemory::On && !is_known
+    fn knows_background(&self) -> bool {
+        self.source.as_ref().is_some_and(|source| source.knows_background())
     }
 
     /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more.
     fn depth_and_coc(
         &mut self,
-        coc: &mut CocMaker,
+        preparation: &mut Preparation,
         (brought, right): (Option<Pooled<DepthMap>>, Option<Pooled<GrayImage>>),
         color: &mut ColorImage,
         stamp: Stamp,
@@ -182,30 +170,14 @@ impl Stage<'_> {
         if let Some((field, rate)) = self.rate.as_mut().and_then(|rate| Some((rate.holds()?, rate))) {
             let mut map = brought.unwrap_or_else(|| self.depths.take());
             rate.give_held(&mut map, color);
-            coc.share(&mut map, color, &field);
+            preparation.share(&mut map, color, &field);
             *self.held += 1;
             return Ok((map, field));
         }
         let seen = Seen { stamp, color, right: right.as_deref() };
         let mut map = brought.map_or_else(|| self.read(seen), Ok)?;
-        match self.check.look(&map, color) {
-            None => {}
-            Some(Verdict::Unrelated) => tracing::warn!(
-                "{}: nowhere do the outlines of its depth meet those of its pictures: the depth may be of another camera, not \
-                 registered to the colours (--depth-calibration), or of another time",
-                self.source_name
-            ),
-            Some(Verdict::Mend(misfit, mending)) => {
-                let is_refined = coc.mend(mending);
-                if is_refined {
-                    tracing::warn!(
-                        "{}: depth is brought to the pictures, as {misfit}; --refine off takes it as it is",
-                        self.source_name
-                    );
-                }
-            }
-        }
-        let field = coc.make(&mut map, color, stamp.time_ns);
+        let (field, remark) = preparation.make(&mut map, color, stamp.time_ns);
+        remark.into_iter().for_each(|remark| tracing::warn!("{}: {remark}", self.source_name));
         let now_ns = self.clock.now_ns();
         self.times.add(now_ns - began_ns);
         if let Some(rate) = &mut self.rate {

@@ -43,6 +43,11 @@ impl Picker {
         }
     }
 
+    /// A blur may take so long from now on.
+    pub(super) fn allow(&mut self, budget_ns: u64) {
+        self.planner.allow(budget_ns);
+    }
+
     /// What the next frame gets.
     pub(super) fn plan(&self) -> Plan {
         self.planner.plan()

@@ -2,7 +2,7 @@
 
 use super::staging::Staging;
 use super::{CocMaker, Finish};
-use crate::bokeh::{Bokeh, BokehError, Job};
+use crate::bokeh::{Bokeh, BokehError, Finished, Job};
 use crate::budget::Quality;
 use crate::compute::Place;
 use crate::computing::Computing;
@@ -81,6 +81,24 @@ pub fn blur_with(
     depth: Option<DepthMap>,
     coc: CocField,
 ) -> Result<ColorImage, BokehError> {
+    Ok(blur_into(bokeh, quality, (color, ColorImage::default()), depth, coc)?.blurred)
+}
+
+/// What comes back from an executor.
+pub(super) struct Blurred {
+    pub color: ColorImage,
+    pub blurred: ColorImage,
+    pub depth: Option<DepthMap>,
+}
+
+/// The same in memory that comes back: of the picture, of what it becomes, and of its depth.
+pub(super) fn blur_into(
+    bokeh: &mut dyn Bokeh,
+    quality: Quality,
+    (color, out): (ColorImage, ColorImage),
+    depth: Option<DepthMap>,
+    coc: CocField,
+) -> Result<Blurred, BokehError> {
     bokeh.submit(Job {
         ticket: 0,
         color: Pooled::detached(color),
@@ -88,9 +106,10 @@ pub fn blur_with(
         coc,
         quality,
         place: Place::Memory,
-        out: Pooled::detached(ColorImage::default()),
+        out: Pooled::detached(out),
     })?;
-    let mut finished = bokeh.collect(true)?.ok_or(BokehError::Lost)?;
-    let picture = finished.picture.memory_mut().ok_or(BokehError::Lost)?;
-    Ok(std::mem::take(picture))
+    let Finished { mut picture, mut color, depth, .. } = bokeh.collect(true)?.ok_or(BokehError::Lost)?;
+    let blurred = std::mem::take(picture.memory_mut().ok_or(BokehError::Lost)?);
+    let depth = depth.map(|mut depth| std::mem::take(&mut *depth));
+    Ok(Blurred { color: std::mem::take(&mut *color), blurred, depth })
 }

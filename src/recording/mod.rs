@@ -318,8 +318,9 @@ fn first_size<'a>(folder: &Folder, colors: impl Iterator<Item = &'a Source>) -> 
     Err(first_error.unwrap_or_else(|| RecordingError::EmptyList { list: folder.dir.clone() }))
 }
 
-/// A depth map covers the view of its colour picture when it is not larger and has the same aspect, within a pixel.
-fn depth_covers(depth: (u32, u32), color: (u32, u32)) -> bool {
+/// Whether a depth map of these columns and rows covers the view of a colour picture of these: it is not larger and has the
+/// same aspect, within a pixel.
+pub fn depth_covers(depth: (u32, u32), color: (u32, u32)) -> bool {
     let (depth_width, depth_height) = (u64::from(depth.0), u64::from(depth.1));
     let (width, height) = (u64::from(color.0), u64::from(color.1));
     // Cross-multiplied aspect ratios: one pixel of the depth map changes them by at most the longer colour side.

@@ -15,6 +15,7 @@ mod pipe;
 mod pipewire;
 mod png;
 mod rate;
+pub mod raw;
 mod shutter;
 mod steady;
 pub mod switch;

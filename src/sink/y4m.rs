@@ -14,6 +14,7 @@ use super::yuv::Converter;
 use super::{Ending, Options, Sink, SinkError, check_size};
 use crate::color::Matrix;
 use crate::frame::ColorImage;
+use crate::layout::Range;
 
 /// Longest gap between frames that a file fills by repeating the last picture; longer ones are cut to this.
 const LONGEST_STILL: Duration = Duration::from_secs(10);
@@ -49,7 +50,7 @@ impl<W: Write> Y4m<W> {
             to,
             name: name.to_owned(),
             size: options.size,
-            converter: Converter::new(Matrix::for_height(height)),
+            converter: Converter::new(Matrix::for_height(height), Range::Limited),
             steady: Steady::new((rate, scale), longest_still),
             header: header.into_bytes(),
             picture: Vec::new(),

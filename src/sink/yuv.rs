@@ -1,38 +1,60 @@
-//! 8-bit RGB to planar Y'CbCr 4:2:0 in limited range (Y 16..235, Cb and Cr 16..240), chroma sited in the middle of its
-//! 2 x 2 pixels, as the y4m tag `C420jpeg` says.
+//! 8-bit RGB to Y'CbCr: in planes of 4:2:0, and in every raw format that cameras give ([`raw`](super::raw)).
 
 use crate::color::Matrix;
 use crate::frame::ColorImage;
+use crate::layout::Range;
 
-/// Fixed-point fractional bits of the coefficients; luma keeps within 32 bits, chroma sums four pixels and has two
-/// more.
+/// Fixed-point fractional bits of the coefficients; luma keeps within 32 bits, and so does chroma, which sums up to eight
+/// pixels and has three more.
 const BITS: u32 = 16;
 
-/// Converts pictures of one matrix.
+/// Converts pictures of one matrix and range.
+#[derive(Clone, Copy, Debug)]
 pub struct Converter {
     luma: [i32; 3],
+    black: i32,
     cb: [i32; 3],
     cr: [i32; 3],
 }
 
 impl Converter {
-    /// Coefficients of `matrix`.
-    pub fn new(matrix: Matrix) -> Self {
+    /// Coefficients of `matrix`: limited is Y 16..235, Cb and Cr 16..240, full is 0..255.
+    pub fn new(matrix: Matrix, range: Range) -> Self {
         let [red, green, blue] = matrix.weights();
+        let (black, white, most_chroma) = match range {
+            Range::Limited => (16, 219.0, 112.0),
+            Range::Full => (0, 255.0, 127.5),
+        };
         let fixed = |weights: [f64; 3], scale: f64| {
             weights.map(|weight| (weight * scale / 255.0 * f64::from(1 << BITS)).round() as i32)
         };
         // Greens make up the sum, so that grey stays grey whatever the rounding.
         let grey = |[r, _, b]: [i32; 3]| [r, -r - b, b];
         Self {
-            luma: fixed([red, green, blue], 219.0),
-            cb: grey(fixed([-red, 0.0, 1.0 - blue], 112.0 / (1.0 - blue))),
-            cr: grey(fixed([1.0 - red, 0.0, -blue], 112.0 / (1.0 - red))),
+            luma: fixed([red, green, blue], white),
+            black,
+            cb: grey(fixed([-red, 0.0, 1.0 - blue], most_chroma / (1.0 - blue))),
+            cr: grey(fixed([1.0 - red, 0.0, -blue], most_chroma / (1.0 - red))),
         }
     }
 
+    /// Luma of a pixel.
+    #[inline(always)]
+    pub(super) fn luma(&self, rgb: [i32; 3]) -> u8 {
+        (self.black + ((dot(&self.luma, rgb) + (1 << (BITS - 1))) >> BITS)) as u8
+    }
+
+    /// Cb and Cr of the mean of `2^shift` pixels, at most eight, given by its sum.
+    #[inline(always)]
+    pub(super) fn chroma(&self, sum: [i32; 3], shift: u32) -> [u8; 2] {
+        // The most of a full range is half a code more than there is.
+        [&self.cb, &self.cr]
+            .map(|weights| (128 + ((dot(weights, sum) + (1 << (BITS + shift - 1))) >> (BITS + shift))).min(255) as u8)
+    }
+
     /// Appends the planes of `image` to `planes`: Y of `height * width` bytes, then Cb and Cr of
-    /// `ceil(height / 2) * ceil(width / 2)` each. At an odd edge the last column or row counts twice.
+    /// `ceil(height / 2) * ceil(width / 2)` each, sited in the middle of its 2 x 2 pixels, as the y4m tag `C420jpeg` says. At an
+    /// odd edge the last column or row counts twice.
     pub fn append(&self, image: &ColorImage, planes: &mut Vec<u8>) {
         let (width, height) = (image.width as usize, image.height as usize);
         let (half_width, half_height) = (width.div_ceil(2), height.div_ceil(2));
@@ -42,8 +64,7 @@ impl Converter {
         let (cb, cr) = chroma.split_at_mut(half_width * half_height);
 
         for (y, pixel) in luma.iter_mut().zip(image.rgb.as_chunks::<3>().0) {
-            let sum = dot(&self.luma, pixel.map(i32::from));
-            *y = (16 + ((sum + (1 << (BITS - 1))) >> BITS)) as u8;
+            *y = self.luma(pixel.map(i32::from));
         }
         if width == 0 {
             return;
@@ -61,14 +82,13 @@ impl Converter {
                         .iter()
                         .sum()
                 };
-                let four = [sum(0), sum(1), sum(2)];
-                let mean = |weights| (128 + ((dot(weights, four) + (1 << (BITS + 1))) >> (BITS + 2))) as u8;
-                (*cb, *cr) = (mean(&self.cb), mean(&self.cr));
+                [*cb, *cr] = self.chroma([sum(0), sum(1), sum(2)], 2);
             }
         }
     }
 }
 
+#[inline(always)]
 fn dot(weights: &[i32; 3], rgb: [i32; 3]) -> i32 {
     weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
 }

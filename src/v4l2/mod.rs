@@ -5,12 +5,12 @@ pub mod controls;
 pub mod device;
 pub mod events;
 pub mod holders;
-pub mod layout;
+mod layout;
 pub mod live;
 pub mod loopback;
 pub mod modes;
 pub mod node;
 pub mod queue;
 
+pub use crate::layout::{FourCc, Layout};
 pub use device::Device;
-pub use layout::{FourCc, Layout};

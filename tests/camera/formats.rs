@@ -1,6 +1,6 @@
 //! Each format of the camera, and its picture.
 
-use bokehcam::v4l2::layout::Content;
+use bokehcam::layout::Content;
 use bokehcam::v4l2::modes::{QueueKind, modes};
 use bokehcam::v4l2::{Device, FourCc};
 

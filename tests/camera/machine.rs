@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use bokehcam::capture::v4l2::V4l2Camera;
 use bokehcam::capture::{Captured, PATIENCE};
 use bokehcam::frame::ColorImage;
-use bokehcam::v4l2::layout::Content;
+use bokehcam::layout::Content;
 use bokehcam::v4l2::live::Wish;
 use bokehcam::v4l2::node::nodes;
 use bokehcam::v4l2::{Device, FourCc, controls};

@@ -13,4 +13,5 @@ mod planes;
 mod replay;
 mod seek;
 mod setup;
+mod stepper;
 mod stereo;

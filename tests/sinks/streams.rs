@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use bokehcam::color::Matrix;
+use bokehcam::layout::Range;
 use bokehcam::sink::yuv::Converter;
 use bokehcam::sink::{Ending, Sink, Y4m};
 
@@ -60,7 +61,7 @@ fn a_grey_picture_is_this_y4m_to_the_byte() {
 #[test]
 fn colours_survive_within_two_levels() {
     for matrix in [Matrix::Bt601, Matrix::Bt709] {
-        let converter = Converter::new(matrix);
+        let converter = Converter::new(matrix, Range::Limited);
         for (width, height) in [(4, 2), (5, 3), (1, 1), (1, 6)] {
             for code in 0..125u32 {
                 let rgb = [code % 5, code / 5 % 5, code / 25].map(|step| (step * 255 / 4) as u8);
@@ -81,9 +82,9 @@ fn chroma_is_the_mean_of_its_four_pixels() {
     image.rgb[..3].copy_from_slice(&[255, 0, 0]);
     image.rgb[9..].copy_from_slice(&[255, 0, 0]);
     let mut mixed = Vec::new();
-    Converter::new(Matrix::Bt709).append(&image, &mut mixed);
+    Converter::new(Matrix::Bt709, Range::Limited).append(&image, &mut mixed);
     let mut mean = Vec::new();
-    Converter::new(Matrix::Bt709).append(&flat(2, 2, [127, 0, 0]), &mut mean);
+    Converter::new(Matrix::Bt709, Range::Limited).append(&flat(2, 2, [127, 0, 0]), &mut mean);
     assert!(mixed[4].abs_diff(mean[4]) <= 1 && mixed[5].abs_diff(mean[5]) <= 1);
     assert_eq!((mixed[0], mixed[1]), (63, 16));
 }

@@ -16,8 +16,7 @@ mod transfer;
 mod ycc;
 
 use crate::frame::ColorImage;
-use crate::v4l2::layout::{Content, Family, Transfer};
-use crate::v4l2::{FourCc, Layout};
+use crate::layout::{Content, Family, FourCc, Layout, Transfer};
 
 /// Decodes the pictures of one layout. Owns the memory for it.
 #[derive(Debug)]

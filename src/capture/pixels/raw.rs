@@ -6,8 +6,7 @@ use super::PixelError;
 use super::transfer::{self, Table};
 use super::ycc::{self, Coefficients};
 use crate::frame::ColorImage;
-use crate::v4l2::Layout;
-use crate::v4l2::layout::{Component, Family, Range};
+use crate::layout::{Component, Family, Layout, Range};
 
 /// Decodes raw pictures row by row; the rows in between stay in the cache.
 #[derive(Debug)]

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::color::Matrix;
-use crate::v4l2::layout::Range;
+use crate::layout::Range;
 
 /// Numbers that look random: the same everywhere.
 pub(super) struct Random(pub u64);

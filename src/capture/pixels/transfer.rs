@@ -1,7 +1,7 @@
 //! Tables that turn a camera's RGB codes into sRGB, by its transfer curve and range.
 
 use crate::color::linear_to_srgb;
-use crate::v4l2::layout::{Range, Transfer};
+use crate::layout::{Range, Transfer};
 
 /// A new byte for each byte.
 pub(super) type Table = [u8; 256];

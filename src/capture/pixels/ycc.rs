@@ -4,7 +4,7 @@
 //! code of the exact one.
 
 use crate::color::Matrix;
-use crate::v4l2::layout::Range;
+use crate::layout::Range;
 
 /// Fractional bits of colours before they are rounded.
 const COLOR_BITS: u32 = 5;

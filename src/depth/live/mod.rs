@@ -16,7 +16,7 @@ use super::registration::Registration;
 use super::{DepthError, DepthSource, Seen};
 use crate::clock::Clock;
 use crate::frame::DepthMap;
-use crate::v4l2::layout::Content;
+use crate::layout::Content;
 use crate::v4l2::live::{Live, Next, OpenError, Wish};
 use pairing::Pairing;
 

@@ -1,8 +1,8 @@
 //! From 16-bit numbers to metres.
 
 use crate::frame::DepthMap;
+use crate::layout::Family;
 use crate::v4l2::Layout;
-use crate::v4l2::layout::Family;
 
 /// What a depth camera's numbers mean. 0 and the largest number, where sensors clip, are unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]

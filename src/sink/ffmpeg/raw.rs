@@ -6,6 +6,7 @@ use std::io::{self, Write};
 
 use crate::color::Matrix;
 use crate::frame::ColorImage;
+use crate::layout::Range;
 use crate::sink::yuv::Converter;
 
 /// Times are in microseconds.
@@ -30,7 +31,13 @@ impl<W: Write> RawVideo<W> {
     pub(super) fn new(mut to: W, size: (u32, u32), period_ns: u64) -> io::Result<Self> {
         let matrix = Matrix::for_height(size.1);
         to.write_all(&header(size, period_ns, matrix))?;
-        Ok(Self { to, converter: Converter::new(matrix), first_ns: None, last_ticks: None, bytes: Vec::new() })
+        Ok(Self {
+            to,
+            converter: Converter::new(matrix, Range::Limited),
+            first_ns: None,
+            last_ticks: None,
+            bytes: Vec::new(),
+        })
     }
 
     /// Writes a frame that was captured at `time_ns`, as a cluster of its own.

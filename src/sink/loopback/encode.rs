@@ -2,6 +2,7 @@
 
 use crate::color::Matrix;
 use crate::frame::ColorImage;
+use crate::layout::Range;
 use crate::sink::yuv::Converter;
 use crate::sink::yuyv;
 use crate::v4l2::loopback::Layout;
@@ -17,7 +18,12 @@ pub(super) struct Encoder {
 
 impl Encoder {
     pub(super) fn new(layout: Layout) -> Self {
-        Self { layout, yuyv: yuyv::Encoder::new(), planar: Converter::new(Matrix::Bt601), planes: Vec::new() }
+        Self {
+            layout,
+            yuyv: yuyv::Encoder::new(),
+            planar: Converter::new(Matrix::Bt601, Range::Limited),
+            planes: Vec::new(),
+        }
     }
 
     /// Encodes `picture` into `bytes`, which are resized to a frame of the layout.

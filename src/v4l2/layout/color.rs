@@ -2,32 +2,8 @@
 
 use v4l::v4l_sys as sys;
 
-use super::Family;
 use crate::color::Matrix;
-
-/// Which numbers stand for black and white.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Range {
-    /// Luma from 16 to 235, chroma from 16 to 240.
-    #[default]
-    Limited,
-    /// From 0 to 255.
-    Full,
-}
-
-/// How numbers grow with light.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Transfer {
-    /// Made to be shown on a screen: the curves of sRGB and BT.709, and all that is close to them.
-    #[default]
-    Display,
-    /// In proportion to the light.
-    Linear,
-    /// A power of 2.2 (opRGB) or 2.6 (DCI-P3); in tenths.
-    Gamma(u8),
-    /// High dynamic range (SMPTE 2084), of which no faithful 8-bit sRGB picture can be made.
-    Pq,
-}
+use crate::layout::{Colors, Family, Range, Transfer};
 
 /// What the codes of a format say of its colours; a code that is 0 or unknown has V4L2's default for the colour space.
 /// SMPTE 240M, an early standard of high definition, counts as BT.709.
@@ -37,7 +13,7 @@ pub(super) fn resolve(
     ycbcr_encoding: u32,
     quantization: u32,
     transfer: u32,
-) -> (Matrix, Range, Transfer) {
+) -> Colors {
     // JPEG files define their colours themselves.
     if family == Family::Jpeg {
         return (Matrix::Bt601, Range::Full, Transfer::Display);

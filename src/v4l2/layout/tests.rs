@@ -1,4 +1,6 @@
 use super::*;
+use crate::color::Matrix;
+use crate::layout::{FourCcError, Range, Transfer};
 use crate::v4l2::device::zeroed;
 
 /// A single-planar format as a driver fills it in.

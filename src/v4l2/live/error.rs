@@ -4,9 +4,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::negotiate::NoMode;
+use crate::layout::LayoutError;
 use crate::v4l2::controls::ControlError;
 use crate::v4l2::holders::{Holder, holders};
-use crate::v4l2::layout::LayoutError;
 use crate::v4l2::node::NodeError;
 use crate::v4l2::queue::QueueError;
 

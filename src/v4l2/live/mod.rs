@@ -23,8 +23,8 @@ use session::Session;
 use watchdog::Watchdog;
 
 use crate::clock::Clock;
+use crate::layout::Layout;
 use crate::v4l2::controls;
-use crate::v4l2::layout::Layout;
 use crate::v4l2::node;
 use crate::v4l2::queue::{Losses, Planes};
 

@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
+use crate::layout::{Content, Family};
 use crate::v4l2::FourCc;
-use crate::v4l2::layout::{Content, Family};
 use crate::v4l2::modes::{FormatModes, Interval, QueueKind, Rates, SizeModes, Sizes};
 
 /// What is wanted of a camera. What is not said is chosen.

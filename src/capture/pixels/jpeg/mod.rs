@@ -16,7 +16,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::PixelError;
 use crate::frame::ColorImage;
-use crate::v4l2::Layout;
+use crate::layout::Layout;
 
 /// Decodes JPEGs; keeps the memory for the repaired file.
 #[derive(Debug, Default)]

@@ -4,7 +4,7 @@
 use super::super::tests::Random;
 use super::super::{Decoder, PixelError};
 use crate::frame::ColorImage;
-use crate::v4l2::{FourCc, Layout};
+use crate::layout::{FourCc, Layout};
 
 const FILES: [(&str, &[u8]); 5] = [
     ("4:2:0", include_bytes!("testdata/420.jpg")),

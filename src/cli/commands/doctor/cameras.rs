@@ -2,9 +2,9 @@
 
 use super::finding::Finding;
 use super::system::System;
+use crate::layout::Content;
 use crate::v4l2::controls::{self, LOW_LIGHT, Value};
 use crate::v4l2::holders::holders;
-use crate::v4l2::layout::Content;
 use crate::v4l2::modes::{FormatModes, Interval, Rates, SizeModes, Sizes, modes};
 use crate::v4l2::node::{Kind, Node};
 use crate::v4l2::{Device, controls::Control};

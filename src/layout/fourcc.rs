@@ -10,7 +10,9 @@ pub struct FourCc(pub [u8; 4]);
 /// What a format's pictures are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
+    /// Colours, or brightness.
     Color,
+    /// Distances.
     Depth,
 }
 
@@ -21,7 +23,9 @@ pub enum Family {
     Packed422 {
         /// Place of the first luma, 0 or 1; the second is two bytes further.
         luma: usize,
+        /// Place of Cb.
         cb: usize,
+        /// Place of Cr.
         cr: usize,
     },
     /// A plane of luma, then one with a pair of chroma samples for each 2 x 2 pixels.
@@ -39,7 +43,10 @@ pub enum Family {
         apart: bool,
     },
     /// Three bytes a pixel.
-    Rgb24 { swapped: bool },
+    Rgb24 {
+        /// Blue comes first.
+        swapped: bool,
+    },
     /// A byte of luma a pixel.
     Grey,
     /// 16 bits a pixel, low byte first.
@@ -72,17 +79,25 @@ const TABLE: [(FourCc, Family); 19] = [
 ];
 
 impl FourCc {
+    /// A JPEG for each picture, as cameras give it: without its usual tables.
     pub const MJPG: Self = Self(*b"MJPG");
+    /// A JPEG for each picture.
     pub const JPEG: Self = Self(*b"JPEG");
+    /// Packed 4:2:2, luma first.
     pub const YUYV: Self = Self(*b"YUYV");
     /// Packed 4:2:2, chroma first.
     pub const UYVY: Self = Self(*b"UYVY");
     /// 4:2:0 with paired chroma.
     pub const NV12: Self = Self(*b"NV12");
+    /// 4:2:0 in three planes.
     pub const YU12: Self = Self(*b"YU12");
+    /// Red, green, blue.
     pub const RGB3: Self = Self(*b"RGB3");
+    /// Blue, green, red.
     pub const BGR3: Self = Self(*b"BGR3");
+    /// Luma alone.
     pub const GREY: Self = Self(*b"GREY");
+    /// 16-bit depth.
     pub const Z16: Self = Self(*b"Z16 ");
     /// 16-bit brightness, in which some cameras give depth.
     pub const Y16: Self = Self(*b"Y16 ");

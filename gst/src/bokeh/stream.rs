@@ -1,0 +1,298 @@
+//! One picture after the other: finds its depth, blurs it, and hands it on.
+
+use std::time::Instant;
+
+use bokehcam::look::{Effect, Look};
+use bokehcam::pipeline::Stepper;
+use bokehcam::recording::depth_covers;
+use bokehcam::source::{DepthChoice, fitting_look};
+use gst::subclass::prelude::*;
+use gst_base::prelude::*;
+
+use super::imp::{CATEGORY, Imp, USUAL_PERIOD, lock};
+use crate::maps::{Found, MapFormat, Maps, Units, running_time};
+use crate::pictures::Pictures;
+use crate::settings::as_properties;
+
+/// What is known of the stream.
+#[derive(Default)]
+pub struct Stream {
+    depth_pad: Option<gst_base::AggregatorPad>,
+    pictures: Option<Pictures>,
+    maps: Maps,
+    stepper: Option<Stepper>,
+    /// What the stepper was made for: the settings, their version, and whether there is depth.
+    look: Look,
+    version: u64,
+    has_depth: bool,
+    time: MediaTime,
+    /// Whether it was said that pictures wait for the first map.
+    has_said: bool,
+}
+
+impl Stream {
+    pub fn depth_pad(&self) -> Option<&gst_base::AggregatorPad> {
+        self.depth_pad.as_ref()
+    }
+
+    pub fn set_depth_pad(&mut self, pad: Option<gst_base::AggregatorPad>) {
+        (self.depth_pad, self.maps) = (pad, Maps::default());
+    }
+
+    pub fn set_pictures(&mut self, pictures: Pictures) {
+        if self.pictures.as_ref().is_none_or(|before| before.size() != pictures.size()) {
+            self.stepper = None;
+        }
+        self.pictures = Some(pictures);
+    }
+
+    pub fn set_map_format(&mut self, format: Option<MapFormat>) {
+        self.maps.format = format;
+    }
+
+    /// The caps of what goes out: those of what comes in.
+    pub fn caps(&self) -> Option<gst::Caps> {
+        self.pictures.as_ref().map(Pictures::caps)
+    }
+
+    /// Another scene comes.
+    pub fn forget(&mut self) {
+        self.stepper.iter_mut().for_each(Stepper::forget);
+        self.forget_maps();
+        self.time.forget();
+    }
+
+    pub fn forget_maps(&mut self) {
+        self.maps.forget();
+    }
+
+    /// Nothing comes any more.
+    pub fn close(&mut self) {
+        *self = Self { depth_pad: self.depth_pad.take(), ..Self::default() };
+    }
+
+    fn period(&self) -> gst::ClockTime {
+        self.pictures.as_ref().and_then(Pictures::period).unwrap_or(USUAL_PERIOD)
+    }
+
+    fn find_map(&mut self, due: Option<gst::ClockTime>, is_late: bool) -> Found {
+        let period = self.period();
+        match &self.depth_pad {
+            Some(pad) => self.maps.find(pad, due, period, is_late),
+            None => Found::Nothing,
+        }
+    }
+}
+
+/// Time since the first picture, strictly increasing, whatever seeks do to running time.
+#[derive(Debug, Default)]
+struct MediaTime {
+    /// Running time less this is media time.
+    ahead_ns: Option<i128>,
+    last_ns: Option<u64>,
+}
+
+impl MediaTime {
+    fn at(&mut self, due: Option<gst::ClockTime>, period: gst::ClockTime) -> u64 {
+        let next_ns = self.last_ns.map_or(0, |last_ns| last_ns + period.nseconds());
+        let time_ns = due.map_or(next_ns, |due| {
+            let due_ns = i128::from(due.nseconds());
+            let ahead_ns = *self.ahead_ns.get_or_insert(due_ns - i128::from(next_ns));
+            let later = u64::try_from(due_ns - ahead_ns).ok().filter(|&ns| self.last_ns.is_none_or(|last| ns > last));
+            later.unwrap_or_else(|| {
+                self.ahead_ns = Some(due_ns - i128::from(next_ns));
+                next_ns
+            })
+        });
+        self.last_ns = Some(time_ns);
+        time_ns
+    }
+
+    fn forget(&mut self) {
+        self.ahead_ns = None;
+    }
+}
+
+impl Imp {
+    /// The next picture to hand on; `None` where one is left out. `is_late` says that nothing is waited for any more.
+    ///
+    /// # Errors
+    /// There will be no more, one is not there yet, or it failed, which is then said.
+    pub(super) fn next_picture(&self, is_late: bool) -> Result<Option<gst::Buffer>, gst::FlowError> {
+        let Some(input) = self.sink.peek_buffer() else {
+            return Err(match self.sink.is_eos() {
+                true => gst::FlowError::Eos,
+                false => gst_base::AGGREGATOR_FLOW_NEED_DATA,
+            });
+        };
+        let stream = &mut *lock(&self.stream);
+        let (due, period) = (running_time(&self.sink, &input), stream.period());
+        let found = stream.find_map(due, is_late);
+        if found == Found::Wait {
+            return Err(gst_base::AGGREGATOR_FLOW_NEED_DATA);
+        }
+        self.sink.drop_buffer();
+        if let Some(position) = input.pts() {
+            self.obj().set_position(position);
+        }
+        self.count(found);
+        // An end before any map is as if there were no pad.
+        if found == Found::Nothing && stream.depth_pad.as_ref().is_some_and(|pad| !pad.is_eos()) {
+            lock(&self.counts).without_map += 1;
+            if !std::mem::replace(&mut stream.has_said, true) {
+                const WHY: &str = "pictures are left out until the first depth map comes through the pad depth";
+                gst::element_imp_warning!(self, gst::StreamError::Failed, ("{WHY}"));
+            }
+            return Ok(None);
+        }
+        if lock(&self.lateness).is_too_late(due, Instant::now()) {
+            self.leave_out(&input, due);
+            return Ok(None);
+        }
+        self.control(&input);
+        self.adopt(stream, found != Found::Nothing)?;
+        self.blur(stream, input, due, period).map_err(|fault| {
+            gst::element_imp_error!(self, gst::StreamError::Failed, ("{}", as_properties(&fault)));
+            gst::FlowError::Error
+        })
+    }
+
+    fn count(&self, found: Found) {
+        let mut counts = lock(&self.counts);
+        counts.pictures += 1;
+        match found {
+            Found::Map { is_new: true } => counts.maps += 1,
+            Found::Map { is_new: false } => counts.shared += 1,
+            Found::Nothing | Found::Wait => {}
+        }
+    }
+
+    /// Sets the properties that controllers move.
+    fn control(&self, input: &gst::BufferRef) {
+        if self.obj().has_active_control_bindings() {
+            let segment = self.sink.segment();
+            let time = segment.downcast_ref::<gst::ClockTime>().and_then(|segment| segment.to_stream_time(input.pts()));
+            if let Some(time) = time {
+                // Fails only where a binding is broken, which its owner is told.
+                let _ = self.obj().sync_values(time);
+            }
+        }
+    }
+
+    /// Makes the stepper follow the settings, and whether there is depth.
+    fn adopt(&self, stream: &mut Stream, has_depth: bool) -> Result<(), gst::FlowError> {
+        let values = {
+            let values = lock(&self.values);
+            if stream.stepper.is_some() && (stream.version, stream.has_depth) == (values.version, has_depth) {
+                return Ok(());
+            }
+            values.clone()
+        };
+        if stream.has_depth != has_depth {
+            stream.stepper = None;
+        }
+        (stream.version, stream.has_depth) = (values.version, has_depth);
+        let size = stream.pictures.as_ref().map(Pictures::size).ok_or(gst::FlowError::NotNegotiated)?;
+        let followed = values.look(&stream.look).and_then(|look| {
+            let fitting = fitting_look(&look, &DepthChoice::Auto, has_depth).map_err(|error| error.to_string())?;
+            let done = match &mut stream.stepper {
+                Some(stepper) => stepper.follow(&fitting),
+                None => {
+                    if look.effect == Effect::Auto && !has_depth {
+                        const WHY: &str = "without depth, all but a band of the picture is blurred: link a depth map to the \
+                                           pad depth, or choose with effect";
+                        gst::element_imp_info!(self, gst::StreamError::Failed, ("{WHY}"));
+                    }
+                    let made = Stepper::new(&fitting, size, has_depth, true, values.computing());
+                    made.map(|stepper| stream.stepper = Some(stepper))
+                }
+            };
+            stream.look = look;
+            done.map_err(|error| error.to_string())
+        });
+        match followed {
+            Ok(()) => Ok(()),
+            // What was before goes on.
+            Err(fault) if stream.stepper.is_some() => {
+                gst::element_imp_warning!(self, gst::LibraryError::Settings, ("{}", as_properties(&fault)));
+                Ok(())
+            }
+            Err(fault) => {
+                gst::element_imp_error!(self, gst::LibraryError::Settings, ("{}", as_properties(&fault)));
+                Err(gst::FlowError::Error)
+            }
+        }
+    }
+
+    /// Blurs a picture by the map that was found for it.
+    fn blur(
+        &self,
+        stream: &mut Stream,
+        input: gst::Buffer,
+        due: Option<gst::ClockTime>,
+        period: gst::ClockTime,
+    ) -> Result<Option<gst::Buffer>, String> {
+        let Stream { stepper: Some(stepper), pictures: Some(pictures), maps, time, .. } = stream else {
+            return Err("a picture came before its format".to_owned());
+        };
+        if let Some(budget_ns) = lock(&self.lateness).budget_ns(stepper.expected_ns()) {
+            stepper.allow(budget_ns);
+        }
+        let Some(quality) = stepper.quality() else { return Ok(Some(input)) };
+        let needs_depth = stepper.needs_depth();
+        let (color, depth) = stepper.frame();
+        pictures.read(&input, color)?;
+        if needs_depth {
+            let (found, size) = (maps.size().unwrap_or_default(), pictures.size());
+            if !depth_covers(found, size) {
+                return Err(format!(
+                    "a depth map of {}x{} pixels does not cover pictures of {}x{}: it has to show the same view, with as many \
+                     pixels or fewer",
+                    found.0, found.1, size.0, size.1
+                ));
+            }
+            let units = {
+                let values = lock(&self.values);
+                Units { per_m: values.depth_scale, invalid: values.depth_invalid }
+            };
+            maps.read(units, depth)?;
+        }
+        let blurred = stepper.step(time.at(due, period)).map_err(|error| error.to_string())?;
+        let pool = self.obj().buffer_pool().ok_or("there is no pool of buffers")?;
+        // The base class leaves that to who uses it.
+        if !pool.is_active() {
+            pool.set_active(true).map_err(|error| error.to_string())?;
+        }
+        let mut output = pool.acquire_buffer(None).map_err(|error| format!("no buffer: {error}"))?;
+        {
+            let output = output.get_mut().ok_or("a new buffer is in use")?;
+            pictures.write(blurred, output)?;
+            let copied = input.copy_into(output, gst::BufferCopyFlags::FLAGS | gst::BufferCopyFlags::TIMESTAMPS, ..);
+            copied.map_err(|error| error.to_string())?;
+        }
+        lock(&self.counts).quality = quality.name();
+        if let Some(remark) = stepper.remark() {
+            gst::element_imp_warning!(self, gst::StreamError::Failed, ("{}", as_properties(&remark)));
+        }
+        Ok(Some(output))
+    }
+
+    /// Counts a picture that comes too late, and says so as elements do.
+    fn leave_out(&self, input: &gst::BufferRef, due: Option<gst::ClockTime>) {
+        let (done, late) = {
+            let mut counts = lock(&self.counts);
+            counts.late += 1;
+            (counts.pictures - counts.late - counts.without_map, counts.late)
+        };
+        gst::debug!(CATEGORY, imp = self, "left out, as it is late: {due:?}");
+        let message = gst::message::Qos::builder(false)
+            .running_time(due)
+            .timestamp(input.pts())
+            .duration(input.duration())
+            .stats(gst::format::Buffers::from_u64(done), gst::format::Buffers::from_u64(late))
+            .src(&*self.obj())
+            .build();
+        // Nobody listens where there is no bus.
+        let _ = self.obj().post_message(message);
+    }
+}

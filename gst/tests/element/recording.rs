@@ -1,0 +1,94 @@
+//! A recording through `gst-launch-1.0` is what `bokehcam stream` makes of it, to the bit.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use bokehcam::recording::still::read_color;
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+/// A folder with the plugin alone.
+fn plugins(home: &Path) -> PathBuf {
+    let (name, folder) = ("libgstbokehcam.so", home.join("plugins"));
+    // It is built beside this program.
+    let built = std::env::current_exe().unwrap().with_file_name(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::copy(built, folder.join(name)).unwrap();
+    folder
+}
+
+/// Runs `gst-launch-1.0` on a pipeline, as one writes it.
+pub fn launch(line: &str, home: &Path) {
+    let mut words = Command::new("bash");
+    words.arg("-c").arg(format!("exec gst-launch-1.0 -q {line}"));
+    let output = words
+        .env("GST_PLUGIN_PATH", plugins(home))
+        .env("GST_REGISTRY", home.join("registry.bin"))
+        .current_dir(repository())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !said.contains("ERROR"), "{line}: {said}");
+}
+
+#[test]
+fn a_recording_is_what_stream_makes_of_it() {
+    let (dir, recording) = (tempfile::tempdir().unwrap(), repository().join("recordings/portrait"));
+    let (streamed, launched) = (dir.path().join("streamed"), dir.path().join("launched"));
+    // What the user has set up is none of the test's.
+    let settings = dir.path().join("config.toml");
+    std::fs::write(&settings, "").unwrap();
+    let mut arguments: Vec<OsString> =
+        ["bokehcam", "stream", "--quiet", "--pace", "asap", "--highlights", "12"].map(Into::into).into();
+    arguments.extend(["--coc-at-infinity", "14", "--to"].map(OsString::from));
+    arguments.extend([format!("{}/", streamed.display()).into(), recording.clone().into()]);
+    arguments.extend(["--config".into(), settings.into()]);
+    let code = bokehcam::cli::run(arguments);
+    assert_eq!(format!("{code:?}"), format!("{:?}", ExitCode::SUCCESS));
+
+    std::fs::create_dir(&launched).unwrap();
+    let source = |folder: &str| {
+        format!(
+            "multifilesrc location={}/{folder}/%06d.png caps=image/png,framerate=12/1 ! pngdec",
+            recording.display()
+        )
+    };
+    launch(
+        &format!(
+            "bokeh name=b highlights=12 coc-at-infinity=14 depth-scale=5000 \
+             ! videoconvert ! pngenc ! multifilesink location={}/%06d.png \
+             {} ! videoconvert ! video/x-raw,format=RGB ! queue ! b.sink \
+             {} ! videoconvert ! video/x-raw,format=GRAY16_LE ! queue ! b.depth",
+            launched.display(),
+            source("rgb"),
+            source("depth")
+        ),
+        dir.path(),
+    );
+    let mut names: Vec<_> = std::fs::read_dir(&launched).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names.len(), std::fs::read_dir(recording.join("rgb")).unwrap().count());
+    for name in names {
+        let [theirs, ours] = [&launched, &streamed].map(|folder| read_color(&folder.join(&name)).unwrap());
+        let off = theirs.rgb.iter().zip(&ours.rgb).filter(|(theirs, ours)| theirs != ours).count();
+        assert_eq!((theirs.size(), off), (ours.size(), 0), "{}", name.display());
+    }
+}
+
+#[test]
+fn the_element_is_described() {
+    let home = tempfile::tempdir().unwrap();
+    let output = Command::new("gst-inspect-1.0")
+        .arg("bokeh")
+        .env("GST_PLUGIN_PATH", plugins(home.path()))
+        .env("GST_REGISTRY", home.path().join("registry.bin"))
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in ["Background blur", "'depth'", "On request", "Distance of the focal plane", "tilt-shift", "MIT/X11"] {
+        assert!(text.contains(part), "{part} is not in {text}");
+    }
+}

@@ -1,0 +1,104 @@
+//! What the element allocates: nothing of its own for a picture, and nothing that stays from one start to the next.
+#![allow(missing_docs)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use gst::prelude::*;
+
+/// Counts allocations of a picture's size or more: GStreamer's own bookkeeping has small ones for each buffer and event.
+struct Counting;
+
+static LARGE: AtomicU64 = AtomicU64::new(0);
+const LARGE_BYTES: usize = 4096;
+
+// SAFETY: everything is left to the system's allocator.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        LARGE.fetch_add(u64::from(layout.size() >= LARGE_BYTES), Ordering::Relaxed);
+        // SAFETY: as the caller has it.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as the caller has it.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// One test at a time: they look at the whole process.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn pipeline(line: &str) -> gst::Pipeline {
+    gst::init().unwrap();
+    let _ = gstbokehcam::plugin_register_static();
+    gst::parse::launch(line).unwrap().downcast().unwrap()
+}
+
+fn wait_for(pipeline: &gst::Pipeline, kind: gst::MessageType) {
+    let bus = pipeline.bus().unwrap();
+    let message = bus.timed_pop_filtered(gst::ClockTime::from_seconds(60), &[kind, gst::MessageType::Error]).unwrap();
+    assert_eq!(message.type_(), kind, "{message:?}");
+}
+
+const RAW: &str = "width=160,height=120,framerate=25/1";
+
+#[test]
+fn a_picture_allocates_nothing_of_its_size() {
+    let _alone = ALONE.lock().unwrap();
+    for format in ["RGB", "RGBx", "NV12", "I420", "YUY2"] {
+        let pipeline = pipeline(&format!(
+            "bokeh name=b ! fakesink name=end \
+             videotestsrc num-buffers=60 ! video/x-raw,format={format},{RAW} ! queue ! b.sink \
+             videotestsrc num-buffers=60 pattern=gradient ! video/x-raw,format=GRAY16_LE,{RAW} ! queue ! b.depth"
+        ));
+        let counts = std::sync::Arc::new(Mutex::new(Vec::with_capacity(100)));
+        let noted = counts.clone();
+        let pad = pipeline.by_name("end").unwrap().static_pad("sink").unwrap();
+        pad.add_probe(gst::PadProbeType::BUFFER, move |_, _| {
+            noted.lock().unwrap().push(LARGE.load(Ordering::Relaxed));
+            gst::PadProbeReturn::Ok
+        });
+        pipeline.set_state(gst::State::Playing).unwrap();
+        wait_for(&pipeline, gst::MessageType::Eos);
+        pipeline.set_state(gst::State::Null).unwrap();
+        let counts = counts.lock().unwrap();
+        assert_eq!(counts.len(), 60);
+        assert_eq!(counts[59] - counts[29], 0, "{format}: {counts:?}");
+    }
+}
+
+/// Memory of this process that is in use, in kB.
+fn resident_kb() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+    line.trim().trim_end_matches(" kB").parse().unwrap()
+}
+
+#[test]
+fn a_thousand_starts_leave_nothing_behind() {
+    let _alone = ALONE.lock().unwrap();
+    let pipeline = pipeline(&format!(
+        "bokeh name=b ! fakesink async=true \
+         videotestsrc ! video/x-raw,format=RGB,{RAW} ! queue ! b.sink \
+         videotestsrc pattern=gradient ! video/x-raw,format=GRAY16_LE,{RAW} ! queue ! b.depth"
+    ));
+    let mut before_kb = 0;
+    for round in 0..500 {
+        // To a first picture and back: two changes.
+        pipeline.set_state(gst::State::Paused).unwrap();
+        wait_for(&pipeline, gst::MessageType::AsyncDone);
+        pipeline.set_state(gst::State::Null).unwrap();
+        if round == 99 {
+            before_kb = resident_kb();
+        }
+    }
+    let grown_kb = resident_kb().saturating_sub(before_kb);
+    // A picture of each round alone would be 23 MB.
+    assert!(grown_kb < 4000, "400 starts left {grown_kb} kB");
+}

@@ -1,0 +1,73 @@
+//! A stepper makes, on its caller's thread, what a run makes with its own.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
+
+use bokehcam::computing::Computing;
+use bokehcam::frame::ColorImage;
+use bokehcam::look::{Effect, Look};
+use bokehcam::pipeline::{self, Run, Stepper};
+use bokehcam::recording::{Options, Recording, Scratch};
+use bokehcam::sink::{Sink, SinkError};
+use bokehcam::source::{self, Source};
+
+struct Kept(Arc<Mutex<Vec<ColorImage>>>);
+
+impl Sink for Kept {
+    fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        self.0.lock().unwrap().push(frame.clone());
+        Ok(ControlFlow::Continue(()))
+    }
+}
+
+#[test]
+fn every_frame_is_that_of_a_run() {
+    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let recording = Recording::open(&dir, &Options::default()).unwrap();
+    let followed = Look {
+        follow: "1.5".parse().unwrap(),
+        behind: bokehcam::depth::backdrop::Behind::Color([0, 99, 9]),
+        ..Look::default()
+    };
+    for look in [Look::default(), followed, Look::plain(Effect::TiltShift), Look::plain(Effect::None)] {
+        let source =
+            Source::open(&dir.to_str().unwrap().parse().unwrap(), &source::Options::default(), Some(&look)).unwrap();
+        let (kept, stop) = (Arc::default(), AtomicBool::new(false));
+        let run =
+            Run::new(source.camera, source.depth, look.clone(), Box::new(Kept(Arc::clone(&kept))), &stop).unwrap();
+        pipeline::run(run).unwrap();
+        let kept = kept.lock().unwrap();
+        assert_eq!(kept.len(), recording.len());
+        let mut stepper = Stepper::new(&look, recording.size(), true, true, Computing::default()).unwrap();
+        let mut scratch = Scratch::default();
+        for (index, wanted) in kept.iter().enumerate() {
+            let needs_depth = stepper.needs_depth();
+            let (color, depth) = stepper.frame();
+            recording.read_color(index, &mut scratch, color).unwrap();
+            if needs_depth {
+                recording.read_depth(index, &mut scratch, depth).unwrap();
+            }
+            assert!(stepper.step(recording.time_ns(index)).unwrap() == wanted, "{:?} frame {index}", look.effect);
+        }
+    }
+}
+
+#[test]
+fn quality_follows_the_time_only_once_that_is_said_and_where_it_may() {
+    let size = (320, 240);
+    let last = |look: &Look, budget_ns: Option<u64>| {
+        let mut stepper = Stepper::new(look, size, false, true, Computing::default()).unwrap();
+        budget_ns.into_iter().for_each(|budget_ns| stepper.allow(budget_ns));
+        for frame in 0..20 {
+            stepper.frame().0.rgb.fill(90);
+            stepper.step(frame).unwrap();
+        }
+        stepper.quality().unwrap().name()
+    };
+    let look = Look::plain(Effect::Blur);
+    assert_eq!(last(&look, None), "balanced");
+    assert_eq!(last(&look, Some(1)), "draft");
+    assert_eq!(last(&Look { quality: Some(bokehcam::budget::Quality::High), ..look }, Some(1)), "high");
+}
