@@ -8,39 +8,18 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::encode::{EncodeTable, encode};
 use super::rows::{STRIP, Slot};
 use super::tiles::{TILE_H, TILE_W, Tiles};
-use super::unpack::{Source, coc_row, compress};
+use super::unpack::{Source, coc_row};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, CELL, HINDMOST_COVERAGE, MAX_BINS, Plan};
-use crate::color::{encode_srgb, luminance};
 use crate::compute::aligned::Line;
+use crate::compute::half::{from_half, load_halves};
 use crate::compute::simd::{fma, load, madd, store};
 
 /// Pixels composited at once.
 pub const CHUNK: usize = 128;
-/// Entries of one half of the table back to 8 bits: small enough for the nearest cache, fine enough that decoding and
-/// encoding is the identity.
-const ENCODE_STEPS: usize = 1 << 12;
-/// Light below this has a half of its own, with finer steps, as the curve is steep there.
-const DARK: f32 = 1.0 / 16.0;
-/// Entries of the table: two halves of `ENCODE_STEPS + 1`, and up to a power of two, so that an index is masked.
-const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
-
-/// Linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then all of it.
-pub struct EncodeTable(Box<[u8; ENCODE_SIZE]>);
-
-impl EncodeTable {
-    pub fn new() -> Self {
-        let mut codes = Box::new([255; ENCODE_SIZE]);
-        let half = |most: f32| (0..=ENCODE_STEPS).map(move |k| k as f32 / ENCODE_STEPS as f32 * most);
-        for (code, light) in codes.iter_mut().zip(half(DARK).chain(half(1.0))) {
-            *code = encode_srgb(light);
-        }
-        Self(codes)
-    }
-}
-
 /// Makes rows `y0..` of the result: a row of tiles.
 pub struct Composite<'a> {
     pub plan: &'a Plan,
@@ -115,6 +94,15 @@ impl Layers {
         let zero = simd.splat_f32s(0.0);
         for x in (0..CHUNK).step_by(S::F32_LANES) {
             let layer = |planes: &[[f32; CHUNK]; 4]| planes.each_ref().map(|plane| load::<S>(plane, x));
+            if let ([], [only]) = (near, rest) {
+                // What one bin leaves open takes its colour, so that there is nothing to weigh.
+                let [red, green, blue, coverage] = layer(only);
+                let inverse = simd.div_f32s(simd.splat_f32s(1.0), simd.max_f32s(coverage, simd.splat_f32s(1e-6)));
+                for (p, light) in [red, green, blue].into_iter().enumerate() {
+                    store::<S>(&mut color.0[p], x, simd.max_f32s(simd.mul_f32s(light, inverse), zero));
+                }
+                continue;
+            }
             let mut back = Pile::new(simd);
             rest.iter().for_each(|planes| back.add(simd, layer(planes)));
             let mut light = back.with_rest_filled(simd);
@@ -268,9 +256,19 @@ fn upsample<V: Simd, const S: usize>(
     let strip_row = |strip: usize, y: usize, p: usize| &slot.out[((strip * height + y) * 4 + p) * STRIP..][..STRIP];
     let mix = |a: f32, b: f32| madd::<V>(b - a, share, a);
     for (p, out) in out.iter_mut().enumerate() {
-        let value =
-            |x: usize| mix(strip_row(x / STRIP, above, p)[x % STRIP], strip_row(x / STRIP, below, p)[x % STRIP]);
         let first = x0 / S;
+        if S == 1 {
+            // Rows of the bin are those of the picture.
+            for (k, out) in out.as_chunks_mut::<STRIP>().0.iter_mut().enumerate().take((width - first).div_ceil(STRIP))
+            {
+                load_halves(out, strip_row(first / STRIP + k, above, p));
+            }
+            continue;
+        }
+        let value = |x: usize| {
+            let at = |y: usize| from_half(strip_row(x / STRIP, y, p)[x % STRIP]);
+            mix(at(above), at(below))
+        };
         // One column more on both sides than the chunk covers.
         let mut line = [0.0; CHUNK + 2];
         let mut x = first;
@@ -279,13 +277,9 @@ fn upsample<V: Simd, const S: usize>(
             let (a, b) = (strip_row(x / STRIP, above, p), strip_row(x / STRIP, below, p));
             let (a, b) = (&a[x % STRIP..][..count], &b[x % STRIP..][..count]);
             for ((out, &a), &b) in line[1 + x - first..][..count].iter_mut().zip(a).zip(b) {
-                *out = mix(a, b);
+                *out = mix(from_half(a), from_half(b));
             }
             x += count;
-        }
-        if S == 1 {
-            out.copy_from_slice(&line[1..1 + CHUNK]);
-            continue;
         }
         line[0] = if first > 0 { value(first - 1) } else { line[1] };
         line[1 + x - first] = if x < width { value(x) } else { line[x - first] };
@@ -299,51 +293,6 @@ fn upsample<V: Simd, const S: usize>(
                     madd::<V>(after - here, offset, here)
                 };
             }
-        }
-    }
-}
-
-/// Compresses the highlights of a chunk and looks up its 8-bit sRGB.
-#[inline(always)]
-fn encode(color: &mut [[f32; CHUNK]; 3], expansion: f32, table: &EncodeTable, out: &mut [u8]) {
-    if expansion.is_finite() {
-        for x in 0..CHUNK {
-            let factor = compress(luminance(color[0][x], color[1][x], color[2][x]), expansion);
-            for p in 0..3 {
-                color[p][x] *= factor;
-            }
-        }
-    }
-    let mut index = [[0u32; CHUNK]; 3];
-    for (index, color) in index.iter_mut().zip(&*color) {
-        for (index, &light) in index.iter_mut().zip(color) {
-            let light = if light > 0.0 { light } else { 0.0 };
-            let light = if light < 1.0 { light } else { 1.0 };
-            let steps = ENCODE_STEPS as f32;
-            let (scale, first) = if light < DARK { (steps / DARK, 0.0) } else { (steps, steps + 1.0) };
-            // Beyond 2^23 a float has no fraction, and its lowest bits are the integer.
-            *index = (light * scale + first + 8_388_608.0).to_bits();
-        }
-    }
-    for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-        for (p, byte) in pixel.iter_mut().enumerate() {
-            *byte = table.0[index[p][x] as usize % ENCODE_SIZE];
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::unpack::decode;
-    use super::*;
-
-    #[test]
-    fn decoding_and_encoding_is_the_identity() {
-        let table = EncodeTable::new();
-        for code in 0..=255u8 {
-            let mut out = [0u8; 6];
-            encode(&mut [[decode::<pulp::Scalar>(code); CHUNK]; 3], f32::INFINITY, &table, &mut out);
-            assert_eq!(out, [code; 6]);
         }
     }
 }

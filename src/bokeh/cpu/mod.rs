@@ -4,6 +4,7 @@ mod band;
 mod bin;
 mod blur;
 mod composite;
+mod encode;
 mod fill;
 mod filter;
 mod gather;
@@ -46,7 +47,7 @@ pub struct CpuBokeh {
     plan: Plan,
     arch: Arch,
     workers: ThreadPool,
-    encode: composite::EncodeTable,
+    encode: encode::EncodeTable,
     tiles: Tiles,
     slots: Vec<Slot>,
     pyramid: Option<fill::Pyramid>,
@@ -87,7 +88,7 @@ impl CpuBokeh {
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
         let gather = (plan.compositing == Compositing::Gather).then(|| Gather::new(&plan));
         Self {
-            encode: composite::EncodeTable::new(),
+            encode: encode::EncodeTable::new(),
             tiles: Tiles::new(width, height),
             pyramid: (plan.compositing == Compositing::Layers).then(|| fill::Pyramid::new(width, height)),
             waits: vec![NONE; width.div_ceil(BLOCK) * height.div_ceil(CELL)],
@@ -144,7 +145,7 @@ impl CpuBokeh {
         lap("bin");
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
-                pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers);
+                pyramid.fill(&self.plan.unhidden(layer.start), (&mut self.workers, self.arch));
             }
             lap("fill");
             self.bin(&frame, Some(layer));
@@ -244,11 +245,13 @@ impl CpuBokeh {
     /// Pass `reach`: each part is a bin.
     fn reach(&mut self) {
         let plan = &self.plan;
+        let arch = self.arch;
         let parts = DisjointParts::new(&mut self.slots, 1, &mut self.taken);
         self.workers.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
             let bin = &plan.bins[part];
             for slot in parts.part(bin.slot).iter_mut().filter(|slot| slot.present) {
-                reach::reach(plan, bin, &slot.cells, &mut slot.edges, &mut member.reach);
+                let Slot { cells, edges, .. } = slot;
+                arch.dispatch(|| reach::reach(plan, bin, cells, edges, &mut member.reach));
             }
         });
     }

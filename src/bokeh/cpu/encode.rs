@@ -1,0 +1,74 @@
+//! From linear light back to 8-bit sRGB.
+
+#![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
+
+use super::composite::CHUNK;
+use super::unpack::compress;
+use crate::color::{encode_srgb, luminance};
+
+/// Entries of one half of the table back to 8 bits: small enough for the nearest cache, fine enough that decoding and
+/// encoding is the identity.
+const ENCODE_STEPS: usize = 1 << 12;
+/// Light below this has a half of its own, with finer steps, as the curve is steep there.
+const DARK: f32 = 1.0 / 16.0;
+/// Entries of the table: two halves of `ENCODE_STEPS + 1`, and up to a power of two, so that an index is masked.
+const ENCODE_SIZE: usize = 4 * ENCODE_STEPS;
+
+/// Linear light to 8-bit sRGB: light up to [`DARK`] in `ENCODE_STEPS` steps, then all of it.
+pub struct EncodeTable(Box<[u8; ENCODE_SIZE]>);
+
+impl EncodeTable {
+    pub fn new() -> Self {
+        let mut codes = Box::new([255; ENCODE_SIZE]);
+        let half = |most: f32| (0..=ENCODE_STEPS).map(move |k| k as f32 / ENCODE_STEPS as f32 * most);
+        for (code, light) in codes.iter_mut().zip(half(DARK).chain(half(1.0))) {
+            *code = encode_srgb(light);
+        }
+        Self(codes)
+    }
+}
+
+/// Compresses the highlights of a chunk and looks up its 8-bit sRGB.
+#[inline(always)]
+pub fn encode(color: &mut [[f32; CHUNK]; 3], expansion: f32, table: &EncodeTable, out: &mut [u8]) {
+    if expansion.is_finite() {
+        for x in 0..CHUNK {
+            let factor = compress(luminance(color[0][x], color[1][x], color[2][x]), expansion);
+            for p in 0..3 {
+                color[p][x] *= factor;
+            }
+        }
+    }
+    let mut index = [[0u32; CHUNK]; 3];
+    for (index, color) in index.iter_mut().zip(&*color) {
+        for (index, &light) in index.iter_mut().zip(color) {
+            let light = if light > 0.0 { light } else { 0.0 };
+            let light = if light < 1.0 { light } else { 1.0 };
+            let steps = ENCODE_STEPS as f32;
+            let (scale, first) = if light < DARK { (steps / DARK, 0.0) } else { (steps, steps + 1.0) };
+            // Beyond 2^23 a float has no fraction, and its lowest bits are the integer.
+            *index = (light * scale + first + 8_388_608.0).to_bits();
+        }
+    }
+    let code = |index: u32| table.0[index as usize % ENCODE_SIZE];
+    let [red, green, blue] = &index;
+    for (((pixel, &r), &g), &b) in out.as_chunks_mut::<3>().0.iter_mut().zip(red).zip(green).zip(blue) {
+        *pixel = [code(r), code(g), code(b)];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::unpack::decode;
+    use super::*;
+
+    #[test]
+    fn decoding_and_encoding_is_the_identity() {
+        let table = EncodeTable::new();
+        for code in 0..=255u8 {
+            let mut out = [0u8; 6];
+            encode(&mut [[decode::<pulp::Scalar>(code); CHUNK]; 3], f32::INFINITY, &table, &mut out);
+            assert_eq!(out, [code; 6]);
+        }
+    }
+}
