@@ -3,7 +3,7 @@
 
 use pulp::Simd;
 
-use super::tiles::BLOCK;
+use super::tiles::{BLOCK, Pieces};
 use super::unpack::{Piece, Surfaces};
 use crate::bokeh::plan::{HIDING_SHARE, Share};
 use crate::compute::aligned::Line;
@@ -28,18 +28,20 @@ pub fn sum_row<S: Simd>(
     simd: S,
     share: &ShareAt<S>,
     surfaces: &Surfaces<WIDE>,
-    columns: usize,
+    (pieces, columns): (Pieces, usize),
     weights: [f32; 2],
     above: &mut [[f32; WIDE]; SUMS],
     below: &mut [[f32; WIDE]; SUMS],
 ) {
     let weights = weights.map(|weight| simd.splat_f32s(weight));
-    for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
-        let values = share.of(simd, surfaces, x);
-        for p in 0..SUMS {
-            let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
-            store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
-            store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], sums[1]));
+    for k in 0..Pieces::COUNT {
+        for x in pieces.columns(k, columns + 2 * MARGIN).step_by(S::F32_LANES) {
+            let values = share.of(simd, surfaces, x);
+            for p in 0..SUMS {
+                let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
+                store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
+                store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], sums[1]));
+            }
         }
     }
 }
