@@ -3,6 +3,8 @@
 //! A hole beside a person is a depth shadow: the wall that one of the sensor's two eyes could not see. A hole inside
 //! the person is the person. Both come out right when a hole takes the farthest of the nearest known depths to its
 //! left, right, above and below. The empty frame around a registered depth picture is continued the same way.
+//!
+//! Holes are found once, as runs of pixels along rows; whatever follows looks at their pixels and at those beside them alone.
 
 use std::ops::Range;
 use std::{iter, mem};
@@ -16,8 +18,9 @@ use crate::frame::{ColorImage, DepthMap};
 #[derive(Debug, Default)]
 pub struct Filler {
     arch: Arch,
-    /// The holes, row by row, and the depths for them.
+    /// The holes, row by row, what is left of them after a pass, and the depths for those that a pass fills.
     holes: Vec<Run>,
+    left: Vec<Run>,
     filled_m: Vec<f32>,
     /// Nearest known depth above, then below, per column.
     column_m: Vec<f32>,
@@ -42,17 +45,37 @@ impl Filler {
     /// As [`Filler::fill`], then corrected by `color`, the picture of the map: a filled pixel that took the
     /// background's depth but looks like the near object beside it takes the object's depth.
     pub fn fill_guided(&mut self, map: &mut DepthMap, color: &ColorImage) {
-        if self.fill_all(map) {
-            self.guided.claim(map, &self.holes, color);
+        if self.fill_once(map, color) {
             self.keep(map);
         }
     }
 
-    /// Fills the holes, and tells them apart; returns whether anything was known.
+    /// The same without keeping the map: returns whether it is to be kept, by [`Filler::take`].
+    pub(super) fn fill_once(&mut self, map: &mut DepthMap, color: &ColorImage) -> bool {
+        let is_good = self.fill_all(map);
+        if is_good {
+            self.guided.claim(map, &self.holes, color);
+        }
+        is_good
+    }
+
+    /// What was unknown of the last map, row by row.
+    pub(super) fn holes(&self) -> &[Run] {
+        &self.holes
+    }
+
+    /// Takes a map to keep it. What `map` has after is of an earlier one.
+    pub(super) fn take(&mut self, map: &mut DepthMap) {
+        self.last_good.resize(map.width, map.height);
+        mem::swap(&mut self.last_good.metres, &mut map.metres);
+    }
+
+    /// Fills the holes; returns whether anything was known.
     fn fill_all(&mut self, map: &mut DepthMap) -> bool {
-        let is_full = self.fill_pass(map);
-        let hole_pixels = self.filled_m.len();
-        if hole_pixels == map.metres.len() {
+        let Self { arch, holes, left, filled_m, column_m, .. } = self;
+        holes.clear();
+        arch.dispatch(FindHoles { map, holes });
+        if holes.iter().map(|hole| hole.range().len()).sum::<usize>() == map.metres.len() {
             if self.last_good.size() == map.size() {
                 map.metres.copy_from_slice(&self.last_good.metres);
             } else {
@@ -60,12 +83,20 @@ impl Filler {
             }
             return false;
         }
+        let is_full = arch.dispatch(FillPass { map, holes, filled_m, column_m });
         // Every row and column that had a known depth is full now. What is left crosses such a row, so that one more pass
         // fills it.
         if !is_full {
-            let holes = mem::take(&mut self.holes);
-            self.fill_pass(map);
-            self.holes = holes;
+            let width = map.width as usize;
+            left.clear();
+            for &hole in &*holes {
+                left.extend(self::holes(&map.metres[hole.of_row(width)]).map(|of_hole| Run {
+                    start: hole.start + of_hole.start as u32,
+                    end: hole.start + of_hole.end as u32,
+                    ..hole
+                }));
+            }
+            arch.dispatch(FillPass { map, holes: left, filled_m, column_m });
         }
         true
     }
@@ -74,19 +105,31 @@ impl Filler {
         self.last_good.resize(map.width, map.height);
         self.last_good.metres.copy_from_slice(&map.metres);
     }
+}
 
-    /// Gives each hole the farthest of the nearest known depths above, below, left and right. Returns whether the map
-    /// is full now: a pixel whose row and column hold no known depth stays unknown.
-    fn fill_pass(&mut self, map: &mut DepthMap) -> bool {
-        let Self { arch, holes, filled_m, column_m, .. } = self;
-        arch.dispatch(FillPass { map, holes, filled_m, column_m })
+/// Finds the holes of a map, row by row.
+struct FindHoles<'a> {
+    map: &'a DepthMap,
+    holes: &'a mut Vec<Run>,
+}
+
+impl WithSimd for FindHoles<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { map, holes } = self;
+        for (line, row) in map.metres.chunks_exact((map.width as usize).max(1)).enumerate() {
+            let run = |Range { start, end }| Run { line: line as u32, start: start as u32, end: end as u32 };
+            holes.extend(self::holes(row).map(run));
+        }
     }
 }
 
-/// See [`Filler::fill_pass`].
+/// Gives each of the `holes`, which are all that is unknown of a map, the farthest of the nearest known depths above, below,
+/// left and right. Returns whether the map is full now: a pixel whose row and column hold no known depth stays unknown.
 struct FillPass<'a> {
     map: &'a mut DepthMap,
-    holes: &'a mut Vec<Run>,
+    holes: &'a [Run],
     filled_m: &'a mut Vec<f32>,
     column_m: &'a mut Vec<f32>,
 }
@@ -96,40 +139,43 @@ impl WithSimd for FillPass<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> bool {
         let Self { map, holes, filled_m, column_m } = self;
-        let width = map.width as usize;
-        holes.clear();
+        let (width, height) = (map.width as usize, map.height as usize);
+        let row = |y: usize| &map.metres[y * width..][..width];
         filled_m.clear();
-        // Down: in the holes, the farthest one of above, left and right.
+        // Down: the farthest one of above, left and right. What is nearest above a hole is right above it, or is what was
+        // nearest above the hole that is there.
         column_m.clear();
         column_m.resize(width, 0.0);
-        for (y, row) in map.metres.chunks_exact(width.max(1)).enumerate() {
-            for hole in self::holes(row) {
-                let left_m = hole.start.checked_sub(1).map_or(0.0, |x| row[x]);
-                let right_m = row.get(hole.end).copied().unwrap_or(0.0);
-                let beside_m = left_m.max(right_m);
-                filled_m.extend(column_m[hole.clone()].iter().map(|&above_m| farther(above_m, beside_m)));
-                holes.push(Run { line: y as u32, start: hole.start as u32, end: hole.end as u32 });
+        for hole in holes {
+            let (y, columns) = (hole.line as usize, hole.range());
+            let above_m = &mut column_m[columns.clone()];
+            if y > 0 {
+                take_known(above_m, &row(y - 1)[columns.clone()]);
             }
-            take_known(column_m, row);
+            let left_m = columns.start.checked_sub(1).map_or(0.0, |x| row(y)[x]);
+            let right_m = row(y).get(columns.end).copied().unwrap_or(0.0);
+            let beside_m = left_m.max(right_m);
+            filled_m.extend(above_m.iter().map(|&above_m| farther(above_m, beside_m)));
         }
         // Up: the farther one of that and below.
         column_m.fill(0.0);
         let mut is_full = true;
-        let (mut left, mut rest) = (&holes[..], &mut filled_m[..]);
-        for (y, row) in map.metres.chunks_exact_mut(width.max(1)).enumerate().rev() {
-            while let Some((hole, before)) = left.split_last().filter(|(hole, _)| hole.line as usize == y) {
-                let filled_m;
-                (rest, filled_m) = rest.split_at_mut(rest.len() - hole.range().len());
-                left = before;
-                for (filled_m, &below_m) in filled_m.iter_mut().zip(&column_m[hole.range()]) {
-                    *filled_m = farther(*filled_m, below_m);
-                    is_full &= *filled_m > 0.0;
-                }
+        let (mut end, mut rest) = (filled_m.len(), &mut filled_m[..]);
+        for hole in holes.iter().rev() {
+            let (y, columns) = (hole.line as usize, hole.range());
+            let below_m = &mut column_m[columns.clone()];
+            if y + 1 < height {
+                take_known(below_m, &row(y + 1)[columns.clone()]);
             }
-            take_known(column_m, row);
+            let (before, filled_m) = mem::take(&mut rest).split_at_mut(end - columns.len());
+            (rest, end) = (before, end - columns.len());
+            for (filled_m, &below_m) in filled_m.iter_mut().zip(&*below_m) {
+                *filled_m = farther(*filled_m, below_m);
+                is_full &= *filled_m > 0.0;
+            }
         }
         let mut filled_m = &filled_m[..];
-        for hole in &*holes {
+        for hole in holes {
             let row = &mut map.metres[hole.of_row(width)];
             row.copy_from_slice(&filled_m[..row.len()]);
             filled_m = &filled_m[row.len()..];

@@ -25,26 +25,28 @@ pub struct GuidedHoleFill {
     /// Per pixel the depth of the near side that claims it, and whether it is a hole still. Nothing between two frames.
     claims_m: Vec<f32>,
     is_hole: Vec<bool>,
-    columns: Columns,
+    /// Where there are claims, and where columns enter a hole.
+    claimed: Vec<Line>,
+    entries: Vec<usize>,
 }
 
-/// Pixels of a row or a column, one after the other.
+/// Pixels of a row, one after the other.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
-    /// The number of the row or column.
+    /// The number of the row.
     pub line: u32,
     pub start: u32,
     pub end: u32,
 }
 
 impl Run {
-    /// The pixels of its line.
+    /// Its columns.
     #[inline(always)]
     pub fn range(self) -> Range<usize> {
         self.start as usize..self.end as usize
     }
 
-    /// The same, of a row, in a map of so many columns.
+    /// Its pixels in a map of so many columns.
     #[inline(always)]
     pub fn of_row(self, width: usize) -> Range<usize> {
         let first = self.line as usize * width;
@@ -52,8 +54,8 @@ impl Run {
     }
 }
 
-/// A row or a column: its pixels are `first`, `first + step`, and so on.
-#[derive(Clone, Copy)]
+/// A row or a column, or a part of one: its pixels are `first`, `first + step`, and so on.
+#[derive(Clone, Copy, Debug)]
 struct Line {
     first: usize,
     step: usize,
@@ -63,6 +65,14 @@ struct Line {
 impl Line {
     fn at(self, k: usize) -> usize {
         self.first + k * self.step
+    }
+
+    fn part(self, Range { start, end }: Range<usize>) -> Self {
+        Self { first: self.at(start), length: end - start, ..self }
+    }
+
+    fn places(self) -> impl Iterator<Item = usize> {
+        (0..self.length).map(move |k| self.at(k))
     }
 }
 
@@ -76,35 +86,35 @@ impl GuidedHoleFill {
         }
         self.claims_m.resize(width * height, 0.0);
         self.is_hole.resize(width * height, false);
-        let in_map = |hole: &Run| hole.of_row(width);
-        holes.iter().for_each(|hole| self.is_hole[in_map(hole)].fill(true));
+        holes.iter().for_each(|hole| self.is_hole[hole.of_row(width)].fill(true));
         let longest = ((width as f32 * LONGEST) as usize).max(4);
         for &hole in holes {
             let line = Line { first: hole.line as usize * width, step: 1, length: width };
-            claim_run(line, hole.range(), longest, &map.metres, &color.rgb, &mut self.claims_m);
+            let claimed = claim_run(line, hole.range(), longest, &map.metres, &color.rgb, &mut self.claims_m);
+            self.claimed.extend(claimed);
         }
-        let places = || holes.iter().flat_map(in_map);
-        self.agree(places(), width, map);
-        holes.iter().for_each(|hole| self.claims_m[in_map(hole)].fill(0.0));
-        let Self { claims_m, is_hole, columns, .. } = self;
-        columns.collect(places().filter(|&k| is_hole[k]), width);
-        for &hole in &columns.runs {
-            let line = Line { first: hole.line as usize, step: width, length: height };
-            claim_run(line, hole.range(), longest, &map.metres, &color.rgb, claims_m);
+        self.agree(width, map);
+        self.find_entries(holes, width);
+        for entry in self.entries.drain(..) {
+            let (column, start) = (entry % width, entry / width);
+            let is_hole = |&y: &usize| self.is_hole[y * width + column];
+            // One row more than is looked at tells that it is too long.
+            let end = (start..height.min(start + longest + 1)).take_while(is_hole).count() + start;
+            let line = Line { first: column, step: width, length: height };
+            let claimed = claim_run(line, start..end, longest, &map.metres, &color.rgb, &mut self.claims_m);
+            self.claimed.extend(claimed);
         }
-        self.agree(places(), 1, map);
-        for hole in holes {
-            self.claims_m[in_map(hole)].fill(0.0);
-            self.is_hole[in_map(hole)].fill(false);
-        }
+        self.agree(1, map);
+        holes.iter().for_each(|hole| self.is_hole[hole.of_row(width)].fill(false));
     }
 
     /// Lets two of three neighbours across the lines, `across` apart, agree on the claims of holes; what was claimed is none any
-    /// more.
-    fn agree(&mut self, places: impl Iterator<Item = usize>, across: usize, map: &mut DepthMap) {
-        let Self { claims_m, is_hole, .. } = self;
-        for k in places {
-            if !is_hole[k] {
+    /// more, and no claim is left.
+    fn agree(&mut self, across: usize, map: &mut DepthMap) {
+        let Self { claims_m, is_hole, claimed, .. } = self;
+        // Where two agree, the pixel itself claims or the one before it does.
+        for k in claimed.iter().flat_map(|line| line.places()).flat_map(|k| [k, k + across]) {
+            if !is_hole.get(k).is_some_and(|is_hole| *is_hole) {
                 continue;
             }
             let claim_m = |k: Option<usize>| k.and_then(|k| claims_m.get(k)).copied().unwrap_or(0.0);
@@ -114,57 +124,62 @@ impl GuidedHoleFill {
                 is_hole[k] = false;
             }
         }
+        claimed.drain(..).flat_map(Line::places).for_each(|k| claims_m[k] = 0.0);
     }
-}
 
-/// The holes of a map, column by column.
-#[derive(Debug, Default)]
-struct Columns {
-    runs: Vec<Run>,
-    /// Per column, the place of its last run plus one.
-    last: Vec<u32>,
-}
-
-impl Columns {
-    /// Takes the `places` of holes, in order.
-    fn collect(&mut self, places: impl Iterator<Item = usize>, width: usize) {
-        let Self { runs, last } = self;
-        runs.clear();
-        last.clear();
-        last.resize(width, 0);
-        for k in places {
-            let (x, y) = (k % width, (k / width) as u32);
-            match runs.get_mut((last[x] as usize).wrapping_sub(1)) {
-                Some(run) if run.end == y => run.end += 1,
-                _ => {
-                    runs.push(Run { line: x as u32, start: y, end: y + 1 });
-                    last[x] = runs.len() as u32;
+    /// Finds the pixels of holes below one that is none.
+    fn find_entries(&mut self, holes: &[Run], width: usize) {
+        let Self { is_hole, entries, .. } = self;
+        for hole in holes.iter().filter(|hole| hole.line > 0) {
+            let here = hole.of_row(width);
+            let above = &is_hole[here.start - width..here.end - width];
+            let enters = |k: usize| is_hole[here.start + k] & !above[k];
+            for block in (0..here.len()).step_by(BLOCK) {
+                let block = block..(block + BLOCK).min(here.len());
+                // Most are inside: `|` instead of an early exit makes vector code of it.
+                if block.clone().fold(false, |any, k| any | enters(k)) {
+                    entries.extend(block.filter(|&k| enters(k)).map(|k| here.start + k));
                 }
             }
         }
     }
 }
 
-/// Claims for the near side in a hole of a line.
-fn claim_run(line: Line, hole: Range<usize>, longest: usize, metres: &[f32], rgb: &[u8], claims_m: &mut [f32]) {
+/// Pixels that are looked at at once.
+const BLOCK: usize = 32;
+
+/// Claims for the near side in a hole of a line; returns the part that it claims.
+fn claim_run(
+    line: Line,
+    hole: Range<usize>,
+    longest: usize,
+    metres: &[f32],
+    rgb: &[u8],
+    claims_m: &mut [f32],
+) -> Option<Line> {
     let Range { start, end } = hole;
     if start == 0 || end == line.length || end - start > longest {
-        return;
+        return None;
     }
     let (before_m, after_m) = (metres[line.at(start - 1)], metres[line.at(end)]);
     let colors = || {
         let before = mean_color(rgb, line, start.saturating_sub(SAMPLE_PX)..start);
         (before, mean_color(rgb, line, end..(end + SAMPLE_PX).min(line.length)))
     };
-    if before_m * SAME_SURFACE < after_m {
-        grow(line, hole, before_m, colors(), rgb, claims_m);
+    let claimed = if before_m * SAME_SURFACE < after_m {
+        let count = grow(line, hole, before_m, colors(), rgb, claims_m);
+        start..start + count
     } else if after_m * SAME_SURFACE < before_m {
         let (before, after) = colors();
-        grow(line, hole.rev(), after_m, (after, before), rgb, claims_m);
-    }
+        let count = grow(line, hole.rev(), after_m, (after, before), rgb, claims_m);
+        end - count..end
+    } else {
+        return None;
+    };
+    Some(line.part(claimed))
 }
 
-/// Takes pixels in order for the near side while they have its colour rather than the far side's.
+/// Takes pixels in order for the near side while they have its colour rather than the far side's; returns how many.
 fn grow(
     line: Line,
     pixels: impl Iterator<Item = usize>,
@@ -172,7 +187,8 @@ fn grow(
     (mut near, far): ([f32; 3], [f32; 3]),
     rgb: &[u8],
     claims_m: &mut [f32],
-) {
+) -> usize {
+    let mut count = 0;
     for k in pixels {
         let own = mean_color(rgb, line, k..k + 1);
         if distance(own, near) * PREFERENCE >= distance(own, far) {
@@ -180,7 +196,9 @@ fn grow(
         }
         claims_m[line.at(k)] = near_m;
         near = std::array::from_fn(|p| near[p] + FOLLOW * (own[p] - near[p]));
+        count += 1;
     }
+    count
 }
 
 fn mean_color(rgb: &[u8], line: Line, pixels: Range<usize>) -> [f32; 3] {

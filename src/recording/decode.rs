@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use pulp::{Arch, WithSimd};
+
 use super::coded::{self, Coded};
 use super::depth_covers;
 use super::extras::Extras;
@@ -133,15 +135,46 @@ pub(super) fn depth(
         return Err(PictureFault::DepthSize { found, color });
     }
     into.resize(found.0, found.1);
+    let arch = Arch::new();
     coded.runs(&mut scratch.pixels, |run, row| {
-        let pixels = into.metres[run.first..].iter_mut().step_by(run.step);
-        for (metres, bytes) in pixels.zip(row.as_chunks().0) {
-            let value = u16::from_be_bytes(*bytes);
-            let depth_m = f32::from(value) / units.scale;
-            *metres = if Some(value) == units.invalid || !DepthMap::is_known(depth_m) { 0.0 } else { depth_m };
+        let (values, metres) = (row.as_chunks().0, &mut into.metres[run.first..]);
+        if run.step == 1 {
+            arch.dispatch(InMetres { values, units, metres });
+        } else {
+            let pixels = metres.iter_mut().step_by(run.step).zip(values);
+            pixels.for_each(|(metres, value)| *metres = units.metres(*value));
         }
     })?;
     Ok(())
+}
+
+impl DepthUnits {
+    /// The distance that the bytes of a number stand for; 0 where it is none.
+    #[inline(always)]
+    fn metres(self, value: [u8; 2]) -> f32 {
+        // 0 is invalid anyhow.
+        let (value, invalid) = (u16::from_be_bytes(value), self.invalid.unwrap_or(0));
+        let depth_m = f32::from(value) / self.scale;
+        if (value != invalid) & DepthMap::is_known(depth_m) { depth_m } else { 0.0 }
+    }
+}
+
+/// Numbers side by side, made distances.
+struct InMetres<'a> {
+    values: &'a [[u8; 2]],
+    units: DepthUnits,
+    metres: &'a mut [f32],
+}
+
+impl WithSimd for InMetres<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { values, units, metres } = self;
+        for (metres, &value) in metres.iter_mut().zip(values) {
+            *metres = units.metres(value);
+        }
+    }
 }
 
 /// Decodes relative inverse depth, 8 or 16 bits, grey or of colours that are grey, to metres in units of the nearest. A map

@@ -41,6 +41,8 @@ const UNLIKE_SHARE: f32 = 0.25;
 const UNLIKE: f32 = 24.0;
 /// Nothing is learned from one for so long after.
 const REST_NS: u64 = 500_000_000;
+/// Pixels of a row that are looked at at once.
+const BLOCK: usize = 32;
 /// Frames further apart in time are of another place.
 const LONGEST_GAP_NS: u64 = 2_000_000_000;
 
@@ -129,7 +131,7 @@ impl Background {
             return;
         }
         for y in (self.frame / LESSONS % ROWS..size.1).step_by(ROWS) {
-            self.learn_row(map, color, other, y);
+            pulp::Arch::new().dispatch(LearnRow { background: self, map, color, other, y });
         }
     }
 
@@ -252,6 +254,7 @@ impl Background {
     }
 
     /// Learns from a row.
+    #[inline(always)]
     fn learn_row(&mut self, map: &DepthMap, color: &ColorImage, other: f32, y: usize) {
         let (width, height) = self.size;
         let ys = [y.saturating_sub(CLEAR_PX), y, (y + CLEAR_PX).min(height - 1)];
@@ -271,33 +274,48 @@ impl Background {
         let (fades, refreshes) = (round.is_multiple_of(FADES), (round + y).is_multiple_of(REFRESH));
         let turn = round as i16 % MEMORY;
         let [above, here, below] = &self.rows;
-        for x in 0..width {
-            let (at, own) = (y * width + x, here[x]);
-            let seen = &mut self.rounds[at];
-            let step = own - self.inverse[at];
-            if step > other && *seen > 0 {
-                *seen -= u8::from(fades);
-                continue;
-            }
-            if *seen >= SURE && step >= -other && !refreshes {
-                continue;
-            }
-            let around = [above[x], below[x], here[x.saturating_sub(CLEAR_PX)], here[(x + CLEAR_PX).min(width - 1)]];
-            if self.mixed[x] || around.iter().any(|next| (next - own).abs() > other) {
-                continue;
-            }
-            let kept = &mut self.rgb[3 * at..3 * at + 3];
-            let apart: [i16; 3] = std::array::from_fn(|p| {
-                i16::from(self.codes[p][usize::from(color.rgb[3 * at + p])]) - i16::from(kept[p])
+        let row = y * width;
+        for columns in (0..width).step_by(BLOCK).map(|x| x..(x + BLOCK).min(width)) {
+            // Most of a picture is known, or hides it: nothing to do, and `&` makes vector code of finding that out.
+            let there = row + columns.start..row + columns.end;
+            let before = self.rounds[there.clone()].iter().zip(&self.inverse[there]);
+            let is_idle = here[columns.clone()].iter().zip(before).fold(true, |all, (own, (&seen, inverse))| {
+                let step = own - inverse;
+                let hides = (step > other) & (seen > 0);
+                all & if hides { !fades } else { (seen >= SURE) & (step >= -other) & !refreshes }
             });
-            let is_same = *seen > 0 && step.abs() <= other && apart.iter().all(|apart| apart.abs() <= CHANGED);
-            // Rounding takes turns, so that it evens out.
-            let (of, turn) = if is_same { (MEMORY, turn) } else { (1, 0) };
-            for (kept, apart) in kept.iter_mut().zip(apart) {
-                *kept = (i16::from(*kept) + (apart + turn).div_euclid(of)) as u8;
+            if is_idle {
+                continue;
             }
-            self.inverse[at] = if is_same { self.inverse[at] + step / f32::from(of) } else { own };
-            *seen = if is_same { (*seen + 1).min(SUREST) } else { 1 };
+            for x in columns {
+                let (at, own) = (row + x, here[x]);
+                let seen = &mut self.rounds[at];
+                let step = own - self.inverse[at];
+                if step > other && *seen > 0 {
+                    *seen -= u8::from(fades);
+                    continue;
+                }
+                if *seen >= SURE && step >= -other && !refreshes {
+                    continue;
+                }
+                let around =
+                    [above[x], below[x], here[x.saturating_sub(CLEAR_PX)], here[(x + CLEAR_PX).min(width - 1)]];
+                if self.mixed[x] || around.iter().any(|next| (next - own).abs() > other) {
+                    continue;
+                }
+                let kept = &mut self.rgb[3 * at..3 * at + 3];
+                let apart: [i16; 3] = std::array::from_fn(|p| {
+                    i16::from(self.codes[p][usize::from(color.rgb[3 * at + p])]) - i16::from(kept[p])
+                });
+                let is_same = *seen > 0 && step.abs() <= other && apart.iter().all(|apart| apart.abs() <= CHANGED);
+                // Rounding takes turns, so that it evens out.
+                let moved = |apart: i16| if is_same { (apart + turn).div_euclid(MEMORY) } else { apart };
+                for (kept, apart) in kept.iter_mut().zip(apart) {
+                    *kept = (i16::from(*kept) + moved(apart)) as u8;
+                }
+                self.inverse[at] = if is_same { self.inverse[at] + step / f32::from(MEMORY) } else { own };
+                *seen = if is_same { (*seen + 1).min(SUREST) } else { 1 };
+            }
         }
     }
 
@@ -307,5 +325,22 @@ impl Background {
         let difference = std::array::from_fn(|p| self.own_light[usize::from(rgb[3 * at + p])] - light[p]);
         let far_m = self.inverse[at].recip();
         Some(MixedPixel { at: at as u32, near_m: metres, far_m, share: 1.0, behind: 1.0, difference })
+    }
+}
+
+/// See [`Background::learn_row`].
+struct LearnRow<'a> {
+    background: &'a mut Background,
+    map: &'a DepthMap,
+    color: &'a ColorImage,
+    other: f32,
+    y: usize,
+}
+
+impl pulp::WithSimd for LearnRow<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.background.learn_row(self.map, self.color, self.other, self.y);
     }
 }

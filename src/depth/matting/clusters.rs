@@ -3,8 +3,9 @@
 //! What is wanted around a mixed pixel are means and covariances of both surfaces, close by where there are pure pixels
 //! and from some way off where there are none, as in hair. Cells have both for a tenth of the time that pixels need.
 
-use super::EdgePixel;
 use super::share::Contrast;
+use super::{EdgePixel, larger, smaller};
+use crate::frame::DepthMap;
 
 /// Side of a cell, in pixels.
 const CELL_PX: usize = 8;
@@ -57,6 +58,7 @@ pub struct Color {
 
 impl Color {
     /// Of pixels of this total weight, and the weighted sums of their light and of the products of that.
+    #[inline(always)]
     pub(super) fn of_sums(weight: f32, light: [f32; 3], squares: Symmetric) -> Self {
         let mean = light.map(|light| light / weight);
         let of_mean = outer(mean);
@@ -76,8 +78,8 @@ struct Surfaces {
 pub(super) struct View<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
-    /// Inverse depth of all pixels, in 1/m; one surface's differ by no more than `jump`.
-    pub inverse: &'a [f32],
+    /// Depth of all pixels, in metres; one surface's inverse depths differ by no more than `jump`, in 1/m.
+    pub metres: &'a [f32],
     pub jump: f32,
     /// Pixels that may be mixed.
     pub at_edge: &'a [bool],
@@ -87,6 +89,12 @@ pub(super) struct View<'a> {
 }
 
 impl View<'_> {
+    /// Inverse depth of a pixel, in 1/m; 0 where it is unknown.
+    #[inline(always)]
+    pub fn inverse(&self, at: usize) -> f32 {
+        DepthMap::inverse_of(self.metres[at])
+    }
+
     /// The colour of a pixel in linear light.
     #[inline(always)]
     pub fn light(&self, at: usize) -> [f32; 3] {
@@ -132,6 +140,7 @@ impl Clusters {
 
     /// The place of the contrast between the near and the far surface around the cell of an edge pixel, for [`Self::at`];
     /// `None` where one has no pixels, not even further away.
+    #[inline(always)]
     pub(super) fn around(&mut self, view: &View, edge: &EdgePixel) -> Option<u32> {
         let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
         let cell = row * self.across + column;
@@ -142,22 +151,29 @@ impl Clusters {
         if let Some(answer) = last.map(|last| &self.answers[last as usize]).filter(same) {
             return answer.contrast;
         }
-        let colors = REACHES_CELLS.into_iter().find_map(|reach| self.within(view, reach, edge));
-        let contrast = colors.map(|colors| {
-            self.contrasts.push(contrast(colors));
-            self.contrasts.len() as u32 - 1
-        });
+        // A closure would not have the vectors of what calls it.
+        let mut found = None;
+        for reach in REACHES_CELLS {
+            if let Some(colors) = self.within(view, reach, edge) {
+                found = Some(self.contrasts.len() as u32);
+                self.contrasts.push(contrast(colors));
+                break;
+            }
+        }
+        let contrast = found;
         self.answers.push(Answer { near: edge.near, far: edge.far, contrast });
         self.answered[cell] = self.answers.len() as u32;
         contrast
     }
 
     /// A contrast that was found.
+    #[inline(always)]
     pub(super) fn at(&self, place: u32) -> &Contrast {
         &self.contrasts[place as usize]
     }
 
     /// The same of so many cells in every direction.
+    #[inline(always)]
     fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<Surfaces> {
         // A surface's inverse depth may change on the way, but by less than would make it the other one.
         let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
@@ -166,7 +182,8 @@ impl Clusters {
         let mut sums = [Cluster::default(); 3];
         for row in row.saturating_sub(reach)..(row + reach + 1).min(self.down) {
             for column in column.saturating_sub(reach)..(column + reach + 1).min(self.across) {
-                for (k, cluster) in self.of_cell(view, (column, row)).into_iter().enumerate() {
+                let place = self.of_cell(view, (column, row));
+                for (k, cluster) in self.clusters[place].iter().enumerate() {
                     let is_near = edge.is_near(cluster.inverse);
                     let is_fringe = k == FRINGE;
                     let surface = if is_near { edge.near } else { edge.far };
@@ -194,17 +211,20 @@ impl Clusters {
         Some(Surfaces { near: near?, far: far?, fringe: fringe.zip(Some(weight)) })
     }
 
-    fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> [Cluster; 3] {
+    /// The place of the clusters of a cell.
+    #[inline(always)]
+    fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> usize {
         let place = &mut self.place[row * self.across + column];
         if *place == 0 {
             self.clusters.push(split(view, column, row));
             *place = self.clusters.len() as u32;
         }
-        self.clusters[*place as usize - 1]
+        *place as usize - 1
     }
 }
 
 impl Cluster {
+    #[inline(always)]
     fn add(&mut self, weight: f32, (x, y): (usize, usize), inverse: f32, light: [f32; 3]) {
         self.weight += weight;
         self.x += weight * x as f32;
@@ -218,6 +238,7 @@ impl Cluster {
         }
     }
 
+    #[inline(always)]
     fn color(&self) -> Color {
         Color::of_sums(self.weight, self.light, self.squares)
     }
@@ -226,6 +247,7 @@ impl Cluster {
 /// The contrast of the colours of two surfaces. What `fringe` has, the pixels at edges that the map gives to the near one, is
 /// mostly that surface. If its colour says otherwise, the near surface has other colours here than where its pixels are
 /// pure, as hair beside a face has: then it has those of the fringe, less the far surface that is mixed in.
+#[inline(always)]
 fn contrast(Surfaces { near, far, fringe }: Surfaces) -> Contrast {
     let pure = Contrast::of([near, far]);
     let Some((fringe, weight)) = fringe else { return pure };
@@ -242,20 +264,23 @@ fn contrast(Surfaces { near, far, fringe }: Surfaces) -> Contrast {
 
 /// The clusters of a cell: one where inverse depths differ by no more than `jump`, or else those of its nearest and of its
 /// farthest surface.
+#[inline(always)]
 fn split(view: &View, column: usize, row: usize) -> [Cluster; 3] {
-    let View { size: (width, height), inverse, jump, at_edge, .. } = *view;
+    let View { size: (width, height), jump, at_edge, .. } = *view;
     let (xs, ys) =
         (column * CELL_PX..((column + 1) * CELL_PX).min(width), row * CELL_PX..((row + 1) * CELL_PX).min(height));
     let [mut pure, mut all] = [(0.0f32, f32::INFINITY); 2];
-    for y in ys.clone() {
-        for at in y * width + xs.start..y * width + xs.end {
-            let value = inverse[at];
-            all = (all.0.max(value), all.1.min(value));
-            if !at_edge[at] {
-                pure = (pure.0.max(value), pure.1.min(value));
-            }
+    let mut values = [[0.0; CELL_PX]; CELL_PX];
+    for (values, y) in values.iter_mut().zip(ys.clone()) {
+        let row = y * width + xs.start..y * width + xs.end;
+        for ((value, &metres), &at_edge) in values.iter_mut().zip(&view.metres[row.clone()]).zip(&at_edge[row]) {
+            *value = DepthMap::inverse_of(metres);
+            all = (larger(all.0, *value), smaller(all.1, *value));
+            let (most, least) = (larger(pure.0, *value), smaller(pure.1, *value));
+            pure = if at_edge { pure } else { (most, least) };
         }
     }
+    let value_at = |x: usize, y: usize| values[y - ys.start][x - xs.start];
     let (high, low) = if pure.0 >= pure.1 { pure } else { all };
     let one = high - low <= jump;
     let tolerance = if one { 2.0 * jump } else { jump };
@@ -264,8 +289,7 @@ fn split(view: &View, column: usize, row: usize) -> [Cluster; 3] {
     for (y, close) in ys.clone().zip(close) {
         // Every other pixel, as on a chessboard, tells enough.
         for x in (xs.start + y % 2..xs.end).step_by(2) {
-            let at = y * width + x;
-            let value = inverse[at];
+            let (at, value) = (y * width + x, value_at(x, y));
             let far = usize::from(!one && value <= 0.5 * (high + low));
             if (value - [high, low][far]).abs() > tolerance {
                 continue;
@@ -279,10 +303,10 @@ fn split(view: &View, column: usize, row: usize) -> [Cluster; 3] {
         }
     }
     if all.0 - all.1 > jump {
-        for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
+        for (x, y) in ys.clone().flat_map(|y| xs.clone().map(move |x| (x, y))) {
             let at = y * width + x;
-            if at_edge[at] && inverse[at] > 0.5 * (all.0 + all.1) {
-                clusters[FRINGE].add(1.0, (x, y), inverse[at], view.light(at));
+            if at_edge[at] && value_at(x, y) > 0.5 * (all.0 + all.1) {
+                clusters[FRINGE].add(1.0, (x, y), value_at(x, y), view.light(at));
             }
         }
     }
@@ -294,6 +318,7 @@ fn split(view: &View, column: usize, row: usize) -> [Cluster; 3] {
 }
 
 /// Which pixels of the rows of a cell are at an edge or close to one, a bit for each.
+#[inline(always)]
 fn close_to_edge(view: &View, left: usize, top: usize) -> [u32; CELL_PX] {
     let (width, height) = view.size;
     let mut rows = [0u32; CELL_PX + 2 * CLOSE_PX];

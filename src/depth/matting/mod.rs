@@ -11,6 +11,8 @@ mod share;
 
 use std::ops::Range;
 
+use pulp::WithSimd;
+
 use crate::color::light_of_codes;
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
@@ -43,11 +45,10 @@ enum Trail {
 #[derive(Debug)]
 pub struct Matting {
     light: Box<[f32; 256]>,
-    /// Inverse depth of all pixels, in 1/m; 0 where it is unknown.
-    inverse: Vec<f32>,
     /// Whether pixels differ in depth from one of their eight neighbours: the others are pure.
     at_edge: Vec<bool>,
-    /// Highest and lowest inverse depth of three rows, with a column more on either side.
+    /// Inverse depth of three rows, in 1/m, 0 where it is unknown; their highest and lowest, with a column more on either side.
+    rows: [Vec<f32>; 3],
     ranges: [Vec<f32>; 2],
     edges: Vec<EdgePixel>,
     clusters: Clusters,
@@ -68,6 +69,7 @@ struct EdgePixel {
 
 impl EdgePixel {
     /// Whether an inverse depth is closer to that of the near surface.
+    #[inline(always)]
     fn is_near(&self, inverse: f32) -> bool {
         inverse > 0.5 * (self.near + self.far)
     }
@@ -77,8 +79,8 @@ impl Default for Matting {
     fn default() -> Self {
         Self {
             light: light_of_codes(),
-            inverse: Vec::new(),
             at_edge: Vec::new(),
+            rows: Default::default(),
             ranges: [Vec::new(), Vec::new()],
             edges: Vec::new(),
             clusters: Clusters::default(),
@@ -103,11 +105,22 @@ impl Matting {
         jump: f32,
         behind: impl Fn(usize, f32) -> Option<[f32; 3]>,
     ) {
+        pulp::Arch::new().dispatch(Find { matting: self, map, color, jump, behind });
+    }
+
+    #[inline(always)]
+    fn find_now<S: pulp::Simd>(
+        &mut self,
+        simd: S,
+        (map, color): (&mut DepthMap, &ColorImage),
+        jump: f32,
+        behind: impl Fn(usize, f32) -> Option<[f32; 3]>,
+    ) {
         map.matte.pixels.clear();
         if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
             return;
         }
-        pulp::Arch::new().dispatch(Survey { matting: self, map, jump });
+        Survey { matting: self, map, jump }.with_simd(simd);
         let size = (map.width as usize, map.height as usize);
         let most = Matte::most(size.0, size.1);
         if self.edges.len() > most {
@@ -116,34 +129,36 @@ impl Matting {
         }
         self.clusters.clear(size);
         self.evidence.clear();
-        let Self { light, inverse, at_edge, edges, clusters, evidence, .. } = self;
-        let view = View { size, inverse, jump, at_edge, rgb: &color.rgb, light };
-        evidence.extend(edges.iter().filter_map(|edge| {
-            let place = clusters.around(&view, edge)?;
+        let Self { light, at_edge, edges, clusters, evidence, .. } = self;
+        let view = View { size, metres: &map.metres, jump, at_edge, rgb: &color.rgb, light };
+        // Loops, not closures for iterators, which would not have the vectors of this function.
+        for edge in &*edges {
+            let Some(place) = clusters.around(&view, edge) else { continue };
             let at = edge.y as usize * size.0 + edge.x as usize;
             let lights = (view.light(at), behind(at, edge.near));
-            Some(Evidence::new(edge, labels(&view, edge, at), lights, (place, clusters.at(place))))
-        }));
+            evidence.push(Evidence::new(edge, labels(&view, edge, at), lights, (place, clusters.at(place))));
+        }
         let prior = Prior::of(&self.evidence);
         let on_edges = self.evidence.len();
-        self.trace((size, most), jump, &prior, (&color.rgb, &behind));
+        self.trace((size, most), jump, &prior, (&map.metres, &color.rgb, &behind));
         self.drop_wide(size, on_edges, &prior);
-        let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
-        let view = View { size, inverse, jump, at_edge, rgb: &color.rgb, light };
-        map.matte.pixels.extend(evidence.iter().filter_map(|evidence| {
+        let Self { light, at_edge, clusters, evidence, .. } = self;
+        let view = View { size, metres: &map.metres, jump, at_edge, rgb: &color.rgb, light };
+        for evidence in &*evidence {
             let share = prior.share(evidence);
             let pure = if evidence.labels.is_near { share > NEARLY_PURE } else { share < 1.0 - NEARLY_PURE };
+            if pure {
+                continue;
+            }
             let at = evidence.edge.y as usize * size.0 + evidence.edge.x as usize;
-            (!pure).then(|| {
-                let (contrast, own) = (clusters.at(evidence.contrast), view.light(at));
-                let (behind, difference) = match evidence.behind {
-                    Some(light) => (1.0, contrast.difference_before(light, own, share)),
-                    None => (1.0 - share, contrast.difference(own, share)),
-                };
-                let (near_m, far_m) = (evidence.edge.near.recip(), evidence.edge.far.recip());
-                MixedPixel { at: at as u32, near_m, far_m, share, behind, difference }
-            })
-        }));
+            let (contrast, own) = (clusters.at(evidence.contrast), view.light(at));
+            let (behind, difference) = match evidence.behind {
+                Some(light) => (1.0, contrast.difference_before(light, own, share)),
+                None => (1.0 - share, contrast.difference(own, share)),
+            };
+            let (near_m, far_m) = (evidence.edge.near.recip(), evidence.edge.far.recip());
+            map.matte.pixels.push(MixedPixel { at: at as u32, near_m, far_m, share, behind, difference });
+        }
         if self.evidence.len() > on_edges {
             map.matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
         }
@@ -152,14 +167,15 @@ impl Matting {
     /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near
     /// though the map has none there, to neighbours that do so, too (hysteresis, as edges are traced); no further where there
     /// are `most` pixels already.
+    #[inline(always)]
     fn trace(
         &mut self,
         (size, most): ((usize, usize), usize),
         jump: f32,
         prior: &Prior,
-        (rgb, behind): (&[u8], &impl Fn(usize, f32) -> Option<[f32; 3]>),
+        (metres, rgb, behind): (&[f32], &[u8], &impl Fn(usize, f32) -> Option<[f32; 3]>),
     ) {
-        let Self { light, inverse, at_edge, clusters, evidence, .. } = self;
+        let Self { light, at_edge, clusters, evidence, .. } = self;
         let (mut from, mut steps) = (0, 0);
         while from < evidence.len() && evidence.len() < most && steps < MOST_STEPS {
             let end = evidence.len();
@@ -169,16 +185,18 @@ impl Matting {
                     continue;
                 }
                 let (xs, ys) = around(&edge, 1, size);
-                for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
-                    let (at, next) = (y * size.0 + x, EdgePixel { x: x as u32, y: y as u32, ..edge });
-                    let is_far = (inverse[at] - edge.far).abs() <= jump;
-                    if !is_far || std::mem::replace(&mut at_edge[at], true) {
-                        continue;
-                    }
-                    let view = View { size, inverse, jump, at_edge, rgb, light };
-                    if let Some(place) = clusters.around(&view, &next) {
-                        let lights = (view.light(at), behind(at, next.near));
-                        evidence.push(Evidence::new(&next, TRACED, lights, (place, clusters.at(place))));
+                for y in ys {
+                    for x in xs.clone() {
+                        let (at, next) = (y * size.0 + x, EdgePixel { x: x as u32, y: y as u32, ..edge });
+                        let is_far = (DepthMap::inverse_of(metres[at]) - edge.far).abs() <= jump;
+                        if !is_far || std::mem::replace(&mut at_edge[at], true) {
+                            continue;
+                        }
+                        let view = View { size, metres, jump, at_edge, rgb, light };
+                        if let Some(place) = clusters.around(&view, &next) {
+                            let lights = (view.light(at), behind(at, next.near));
+                            evidence.push(Evidence::new(&next, TRACED, lights, (place, clusters.at(place))));
+                        }
                     }
                 }
             }
@@ -214,13 +232,14 @@ impl Matting {
 }
 
 /// What the map says of the edge pixel `at` and its neighbours.
+#[inline(always)]
 fn labels(view: &View, edge: &EdgePixel, at: usize) -> Labels {
-    let is_near = edge.is_near(view.inverse[at]);
+    let is_near = edge.is_near(view.inverse(at));
     let (mut borders, mut alike) = (false, 0);
     let (xs, ys) = around(edge, 1, view.size);
     for y in ys {
         for x in xs.clone() {
-            let is_alike = edge.is_near(view.inverse[y * view.size.0 + x]) == is_near;
+            let is_alike = edge.is_near(view.inverse(y * view.size.0 + x)) == is_near;
             alike += u32::from(is_alike);
             borders |= !is_alike && (x == edge.x as usize || y == edge.y as usize);
         }
@@ -230,9 +249,29 @@ fn labels(view: &View, edge: &EdgePixel, at: usize) -> Labels {
 }
 
 /// The columns and rows of a pixel and those around it, `by` pixels to each side, as far as the picture has them.
+#[inline(always)]
 fn around(edge: &EdgePixel, by: usize, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
     let (x, y) = (edge.x as usize, edge.y as usize);
     (x.saturating_sub(by)..(x + by + 1).min(width), y.saturating_sub(by)..(y + by + 1).min(height))
+}
+
+/// See [`Matting::find_before`].
+struct Find<'a, B> {
+    matting: &'a mut Matting,
+    map: &'a mut DepthMap,
+    color: &'a ColorImage,
+    jump: f32,
+    behind: B,
+}
+
+impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Find<'_, B> {
+    type Output = ();
+    // No vectors by hand: the call has the compiler use what the processor has, in all that it takes in.
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Self { matting, map, color, jump, behind } = self;
+        matting.find_now(simd, (map, color), jump, behind);
+    }
 }
 
 /// Finds the pixels beside jumps of depth.
@@ -242,24 +281,26 @@ struct Survey<'a> {
     jump: f32,
 }
 
-impl pulp::WithSimd for Survey<'_> {
+impl WithSimd for Survey<'_> {
     type Output = ();
-    // No vectors by hand: the call lets the compiler make them of these loops, as wide as the processor has them.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { matting: Matting { inverse, at_edge, ranges: [high, low], edges, .. }, map, jump } = self;
+        let Self { matting: Matting { at_edge, rows, ranges: [high, low], edges, .. }, map, jump } = self;
         let (width, height) = (map.width as usize, map.height as usize);
-        inverse.resize(width * height, 0.0);
-        for (inverse, &metres) in inverse.iter_mut().zip(&map.metres) {
-            *inverse = DepthMap::inverse_of(metres);
-        }
         at_edge.resize(width * height, false);
         edges.clear();
+        rows.iter_mut().for_each(|row| row.resize(width, 0.0));
         for range in [&mut *high, &mut *low] {
             range.resize(width + 2, 0.0);
         }
         for y in 0..height {
-            let row = |y: usize| &inverse[y * width..][..width];
+            // The row below is new; before the first one, that itself is, too.
+            for y in (if y == 0 { 0 } else { y + 1 })..(y + 2).min(height) {
+                for (inverse, &metres) in rows[y % 3].iter_mut().zip(&map.metres[y * width..][..width]) {
+                    *inverse = DepthMap::inverse_of(metres);
+                }
+            }
+            let row = |y: usize| &rows[y % 3][..width];
             let (above, here, below) = (row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1)));
             let (most, least) = (&mut high[1..=width], &mut low[1..=width]);
             for x in 0..width {

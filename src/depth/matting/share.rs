@@ -73,6 +73,7 @@ pub(super) fn share_by([x, y, z, offset]: [f32; LINE], color: [f32; 3]) -> f32 {
 
 impl Contrast {
     /// Of the colours of the near and of the far surface.
+    #[inline(always)]
     pub(super) fn of(surfaces: [Color; 2]) -> Self {
         let [near, far] = &surfaces;
         let mut spread: Symmetric = std::array::from_fn(|k| near.covariance[k] + far.covariance[k]);
@@ -101,16 +102,19 @@ impl Contrast {
     }
 
     /// See [`Discriminant::share`].
+    #[inline(always)]
     pub(super) fn share(&self, color: [f32; 3]) -> f32 {
         self.discriminant.share(color)
     }
 
     /// See [`Discriminant`].
+    #[inline(always)]
     pub(super) fn precision(&self) -> f32 {
         self.discriminant.precision
     }
 
     /// Whether the far surface may have this light here.
+    #[inline(always)]
     pub(super) fn is_like_far(&self, light: [f32; 3]) -> bool {
         let Color { mean, covariance } = self.surfaces[1];
         let off = std::array::from_fn(|p| light[p] - mean[p]);
@@ -119,6 +123,7 @@ impl Contrast {
 
     /// How likely it is that a colour which is a `share` of the near surface before this light is off the line between both by
     /// as much as it is; at most 1.
+    #[inline(always)]
     fn off_line(&self, light: [f32; 3], own: [f32; 3], share: f32) -> f32 {
         let near = &self.surfaces[0].mean;
         let share = share.clamp(0.0, 1.0);
@@ -129,18 +134,21 @@ impl Contrast {
     /// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
     /// ones of those that add up to the pixel's `own` (Chuang et al. 2001, equation 9, with the pixel as exact). None is
     /// darker than black, or brighter than white.
+    #[inline(always)]
     pub(super) fn difference(&self, own: [f32; 3], share: f32) -> [f32; 3] {
         let [near, far] = &self.surfaces;
         difference(near, far, own, share)
     }
 
     /// The same where the light behind is known but for noise.
+    #[inline(always)]
     pub(super) fn difference_before(&self, light: [f32; 3], own: [f32; 3], share: f32) -> [f32; 3] {
         let [near, far] = &self.surfaces;
         difference(near, &Color { mean: light, ..*far }, own, share)
     }
 }
 
+#[inline(always)]
 fn difference(near: &Color, far: &Color, own: [f32; 3], share: f32) -> [f32; 3] {
     let rest = 1.0 - share;
     let spread = std::array::from_fn(|k| share * share * near.covariance[k] + rest * rest * far.covariance[k]);
@@ -188,6 +196,7 @@ pub struct Evidence {
 impl Evidence {
     /// Compares a pixel's colour `own` with those of both surfaces, the farther one's being `behind` where that is known and
     /// like that surface.
+    #[inline(always)]
     pub(super) fn new(
         edge: &EdgePixel,
         labels: Labels,
@@ -208,12 +217,18 @@ impl Evidence {
         }
         let (mut half, mut any) = ([0.0; 2], [0.0; 2]);
         let middle = STEPS / 2;
-        for (step, &value) in likelihoods.iter().enumerate() {
-            let weighed = [value, value * STEP * step as f32];
-            let on_side = if is_near { step >= middle } else { step <= middle };
+        let side = if is_near { middle..STEPS } else { 0..middle + 1 };
+        let mut means = [[[0.0; STEPS]; 2]; 2];
+        for step in 0..STEPS {
+            let weighed = [likelihoods[step], likelihoods[step] * STEP * step as f32];
             for k in 0..2 {
-                any[k] += weighed[k] / STEPS as f32;
-                half[k] += if on_side { weighed[k] / (middle + 1) as f32 } else { 0.0 };
+                (means[0][k][step], means[1][k][step]) = (weighed[k] / STEPS as f32, weighed[k] / (middle + 1) as f32);
+            }
+        }
+        for k in 0..2 {
+            for step in 0..STEPS {
+                any[k] += means[0][k][step];
+                half[k] += if side.contains(&step) { means[1][k][step] } else { 0.0 };
             }
         }
         if is_thin {
@@ -236,6 +251,7 @@ pub struct Prior {
 
 impl Prior {
     /// What makes all that is known of a frame's pixels most likely.
+    #[inline(always)]
     pub fn of(evidence: &[Evidence]) -> Self {
         const FLOOR: f32 = 0.002;
         let mut prior = Self { mixed: 0.3, wrong: 0.01 };
@@ -260,12 +276,14 @@ impl Prior {
     }
 
     /// How likely a pixel is pure, mixed and mostly what the map says, or anything.
+    #[inline(always)]
     fn weights(&self, evidence: &Evidence) -> [f32; 3] {
         let mixed = if evidence.labels.borders { self.mixed } else { AT_CORNER * self.mixed };
         [(1.0 - mixed - self.wrong).max(0.0), mixed, self.wrong]
     }
 
     /// The expected share of the near surface, 0 to 1.
+    #[inline(always)]
     pub fn share(&self, evidence: &Evidence) -> f32 {
         let is_near = f32::from(u8::from(evidence.labels.is_near));
         let [pure, half, any] = self.weights(evidence);
@@ -280,6 +298,7 @@ impl Prior {
 
 /// exp(-precision (share - mean)^2 / 2) at all shares that are tried. From one to the next it changes by a factor that itself
 /// changes by a constant factor: four exponentials are enough.
+#[inline(always)]
 fn gaussian(precision: f32, mean: f32) -> [f32; STEPS] {
     // As good as nothing. Smaller numbers soon have less precision, and processors take a hundred times as long for them.
     const LEAST: f32 = 1e-18;
@@ -301,16 +320,19 @@ fn gaussian(precision: f32, mean: f32) -> [f32; STEPS] {
     values
 }
 
+#[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// `matrix` times `vector`.
+#[inline(always)]
 fn times(&[xx, xy, xz, yy, yz, zz]: &Symmetric, vector: [f32; 3]) -> [f32; 3] {
     [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| dot(row, vector))
 }
 
 /// A covariance of few pixels with what goes evenly into all directions.
+#[inline(always)]
 fn widened(mut spread: Symmetric) -> Symmetric {
     let floor = SHRINKAGE / 3.0 * (spread[0] + spread[3] + spread[5]) + QUANTISATION;
     for k in [0, 3, 5] {
@@ -320,6 +342,7 @@ fn widened(mut spread: Symmetric) -> Symmetric {
 }
 
 /// The inverse, by the adjugate; of a matrix that has none, zeros.
+#[inline(always)]
 fn inverse(&[xx, xy, xz, yy, yz, zz]: &Symmetric) -> Symmetric {
     let (a, b, c) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
     let (d, e, f) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);

@@ -20,7 +20,7 @@ use pulp::Arch;
 pub use self::outlines::Outlines;
 
 use self::align::Aligner;
-use self::smooth::Smoother;
+use self::smooth::{Over, Smoother};
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
@@ -129,30 +129,29 @@ impl Refiner {
     /// only at the picture's scale a frame is compared with earlier ones.
     fn refine_at(&mut self, map: &mut DepthMap, color: &ColorImage, distance_px: i32, time_ns: Option<u64>) {
         self.upsampler.resize(map, color.size());
-        self.unknown.clear();
-        self.unknown.extend(map.metres.iter().map(|&z_m| !DepthMap::is_known(z_m)));
-        self.filler.fill_guided(map, color);
+        let is_good = self.filler.fill_once(map, color);
         // The filler leaves either nothing unknown or everything: one pixel tells which.
         if !map.metres.first().is_some_and(|&z_m| DepthMap::is_known(z_m)) {
             return self.temporal.forget();
         }
-        let Self { arch, unknown, inverse, smoother, outlines, aligner, temporal, focus: Focus(focus_m), .. } = self;
-        let focus_m = *focus_m;
-        let (arch, width) = (*arch, map.width as usize);
-        inverse.clear();
-        inverse.extend(map.metres.iter().map(|&z_m| focus_m / z_m));
-        let measured_noise = smoother.noise(inverse, unknown, width);
-        smoother.smooth(arch, inverse, width, measured_noise);
-        let noise = smoother.noise(inverse, unknown, width);
+        let Self { arch, unknown, inverse, filler, smoother, outlines, aligner, temporal, focus, .. } = self;
+        let (arch, width, focus_m) = (*arch, map.width as usize, focus.0);
+        unknown.clear();
+        unknown.resize(map.metres.len(), false);
+        filler.holes().iter().for_each(|hole| unknown[hole.of_row(width)].fill(true));
+        let measured_noise = smoother.noise(|at| focus_m / map.metres[at], unknown, width);
+        smoother.smooth(arch, (&map.metres, focus_m), inverse, width, measured_noise);
+        if is_good {
+            filler.take(map);
+        }
+        let noise = smoother.noise(|at| inverse[at], unknown, width);
         let jump = JUMP.max(JUMP_SIGMAS * noise);
         outlines.shift(inverse, unknown, width, distance_px, jump);
         aligner.align(arch, inverse, unknown, &color.rgb, width, jump);
-        if let Some(time_ns) = time_ns {
-            let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
-            temporal.steady(arch, inverse, &color.rgb, width, time_ns, limits);
-        }
-        for (z_m, &v) in map.metres.iter_mut().zip(&*inverse) {
-            *z_m = focus_m / v;
-        }
+        let Some(time_ns) = time_ns else {
+            return arch.dispatch(Over { focus_m, values: inverse, out: &mut map.metres });
+        };
+        let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
+        temporal.steady(arch, inverse, (&color.rgb, width, time_ns), limits, (&mut map.metres, focus_m));
     }
 }

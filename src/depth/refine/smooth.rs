@@ -26,23 +26,28 @@ const NO_NOISE: f32 = 5e-4;
 #[derive(Debug, Default)]
 pub struct Smoother {
     differences: Vec<f32>,
-    /// The map after the pass along the rows.
+    /// Some rows of the map after the pass along them, which take turns, and one before it.
     along_rows: Vec<f32>,
+    row: Vec<f32>,
 }
 
+/// How far the pairs reach, in pixels, and the rows that a pass along columns looks at.
+const REACH_PX: usize = PAIRS_PX[PAIRS_PX.len() - 1];
+const ROWS: usize = 2 * REACH_PX + 1;
+
 impl Smoother {
-    /// The noise of a map, as a standard deviation: a low quantile of second differences, which slanted planes
-    /// do not raise, and edges only where they are everywhere. Unknown depths are left out.
-    pub fn noise(&mut self, inverse: &[f32], unknown: &[bool], width: usize) -> f32 {
+    /// The noise of a map of so many columns, as a standard deviation: a low quantile of second differences, which slanted
+    /// planes do not raise, and edges only where they are everywhere. Unknown depths are left out. `inverse` gives the inverse
+    /// depth of a pixel.
+    pub fn noise(&mut self, inverse: impl Fn(usize) -> f32, unknown: &[bool], width: usize) -> f32 {
         self.differences.clear();
-        let height = inverse.len().checked_div(width).unwrap_or(0);
+        let height = unknown.len().checked_div(width).unwrap_or(0);
         for y in (0..height).step_by(height.div_ceil(LOOKS).max(1)) {
-            let row = y * width..(y + 1) * width;
-            let (row, unknown) = (&inverse[row.clone()], &unknown[row]);
+            let row = y * width;
             for x in (LAG_PX..width.saturating_sub(LAG_PX)).step_by(width.div_ceil(LOOKS).max(1)) {
-                let three = [x - LAG_PX, x, x + LAG_PX];
-                if three.iter().all(|&x| !unknown[x]) {
-                    let [before, here, after] = three.map(|x| row[x]);
+                let three = [x - LAG_PX, x, x + LAG_PX].map(|x| row + x);
+                if three.iter().all(|&at| !unknown[at]) {
+                    let [before, here, after] = three.map(&inverse);
                     self.differences.push((before - 2.0 * here + after).abs());
                 }
             }
@@ -56,82 +61,145 @@ impl Smoother {
         quantile / SMOOTH_QUANTILE / 6.0_f32.sqrt()
     }
 
-    /// Averages `inverse`, whose noise has the standard deviation `noise`, within its surfaces.
-    pub fn smooth(&mut self, arch: Arch, inverse: &mut Vec<f32>, width: usize, noise: f32) {
+    /// Makes inverse depth, `focus_m` over `metres`, whose noise has the standard deviation `noise`, averaged within its
+    /// surfaces.
+    pub fn smooth(
+        &mut self,
+        arch: Arch,
+        (metres, focus_m): (&[f32], f32),
+        inverse: &mut Vec<f32>,
+        width: usize,
+        noise: f32,
+    ) {
+        inverse.resize(metres.len(), 0.0);
         if noise < NO_NOISE || width == 0 {
-            return;
+            return arch.dispatch(Over { focus_m, values: metres, out: inverse });
         }
-        self.along_rows.resize(inverse.len(), 0.0);
-        let limit = SAME_SURFACE * noise;
-        arch.dispatch(Rows { from: inverse, to: &mut self.along_rows, width, limit });
-        arch.dispatch(Columns { from: &self.along_rows, to: inverse, width, limit });
+        let Self { along_rows, row, .. } = self;
+        along_rows.resize(ROWS * width, 0.0);
+        row.resize(width, 0.0);
+        arch.dispatch(Smooth { metres, focus_m, inverse, width, limit: SAME_SURFACE * noise, along_rows, row });
     }
 }
 
-/// The sigma filter along rows. Ends of a pair within `limit` of its middle lie on the middle's surface.
-struct Rows<'a> {
-    from: &'a [f32],
-    to: &'a mut [f32],
-    width: usize,
-    limit: f32,
+/// The distance in focus over values: inverse depth of depth in metres, and the other way round.
+pub struct Over<'a> {
+    pub focus_m: f32,
+    pub values: &'a [f32],
+    pub out: &'a mut [f32],
 }
 
-impl WithSimd for Rows<'_> {
+impl WithSimd for Over<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { from, to, width, limit } = self;
-        for (row, out) in from.chunks_exact(width).zip(to.chunks_exact_mut(width)) {
-            out.fill(0.0);
-            for px in PAIRS_PX.into_iter().filter(|px| 2 * px < width) {
-                add_pair(&row[..width - 2 * px], &row[px..width - px], &row[2 * px..], &mut out[px..width - px], limit);
-            }
-            finish_mean(row, out);
+        let Self { focus_m, values, out } = self;
+        for (out, &value) in out.iter_mut().zip(values) {
+            *out = focus_m / value;
         }
     }
 }
 
-/// As [`Rows`], along columns.
-struct Columns<'a> {
-    from: &'a [f32],
-    to: &'a mut [f32],
+/// The sigma filter along rows and then along columns, as soon as a row has all that it needs: so its rows are in a near cache.
+/// Ends of a pair within `limit` of its middle lie on the middle's surface.
+struct Smooth<'a> {
+    metres: &'a [f32],
+    focus_m: f32,
+    inverse: &'a mut [f32],
     width: usize,
     limit: f32,
+    along_rows: &'a mut [f32],
+    row: &'a mut [f32],
 }
 
-impl WithSimd for Columns<'_> {
+impl WithSimd for Smooth<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { from, to, width, limit } = self;
-        let height = from.len() / width;
-        let row = |y: usize| &from[y * width..(y + 1) * width];
-        for (y, out) in to.chunks_exact_mut(width).enumerate() {
-            out.fill(0.0);
-            for px in PAIRS_PX.into_iter().filter(|&px| px <= y && y + px < height) {
-                add_pair(row(y - px), row(y), row(y + px), out, limit);
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Self { metres, focus_m, inverse, width, limit, along_rows, row } = self;
+        let height = metres.len() / width;
+        for y in 0..height + REACH_PX {
+            if y < height {
+                Over { focus_m, values: &metres[y * width..][..width], out: row }.with_simd(simd);
+                smooth_row(row, &mut along_rows[y % ROWS * width..][..width], limit);
             }
-            finish_mean(row(y), out);
+            let Some(y) = y.checked_sub(REACH_PX) else { continue };
+            let row = |y: usize| &along_rows[y % ROWS * width..][..width];
+            let (here, out) = (row(y), &mut inverse[y * width..][..width]);
+            if y >= REACH_PX && y + REACH_PX < height {
+                average(PAIRS_PX.map(|px| [row(y - px), row(y + px)]), here, out, limit);
+            } else {
+                out.fill(0.0);
+                for px in PAIRS_PX.into_iter().filter(|&px| px <= y && y + px < height) {
+                    add_pair(row(y - px), here, row(y + px), out, limit);
+                }
+                finish_mean(here, out);
+            }
         }
     }
 }
 
-/// Adds the differences of both ends of a pair from its middle to `out`, where both lie on the middle's surface.
+/// The filter along a row.
+#[inline(always)]
+fn smooth_row(row: &[f32], out: &mut [f32], limit: f32) {
+    let width = row.len();
+    let inside = width.saturating_sub(2 * REACH_PX);
+    // Beside the borders, where some pairs lack an end; all of a row that has nothing else.
+    let ends = if inside == 0 { [0..width, width..width] } else { [0..REACH_PX, width - REACH_PX..width] };
+    for x in ends.into_iter().flatten() {
+        let here = row[x];
+        let mut sum = 0.0;
+        for px in PAIRS_PX.into_iter().filter(|&px| px <= x && x + px < width) {
+            sum += pair(row[x - px], here, row[x + px], limit);
+        }
+        out[x] = mean(here, sum);
+    }
+    if inside > 0 {
+        let part = |from: usize| &row[from..][..inside];
+        let pairs = PAIRS_PX.map(|px| [part(REACH_PX - px), part(REACH_PX + px)]);
+        average(pairs, part(REACH_PX), &mut out[REACH_PX..][..inside], limit);
+    }
+}
+
+/// The mean of pixels and their pairs, of which none lacks an end.
+#[inline(always)]
+fn average(pairs: [[&[f32]; 2]; PAIRS_PX.len()], here: &[f32], out: &mut [f32], limit: f32) {
+    let count = out.len();
+    let (pairs, here) = (pairs.map(|ends| ends.map(|end| &end[..count])), &here[..count]);
+    for (x, out) in out.iter_mut().enumerate() {
+        let sum = pairs.iter().fold(0.0, |sum, [before, after]| sum + pair(before[x], here[x], after[x], limit));
+        *out = mean(here[x], sum);
+    }
+}
+
+/// The differences of both ends of a pair from its middle, where both lie on the middle's surface.
+#[inline(always)]
+fn pair(before: f32, here: f32, after: f32, limit: f32) -> f32 {
+    let (before, after) = (before - here, after - here);
+    let same = (before.abs() < limit) & (after.abs() < limit);
+    if same { before + after } else { 0.0 }
+}
+
+/// The mean over all taps, of the sum of the pairs' differences. A pair that was left out counts as two taps equal to the
+/// middle.
+#[inline(always)]
+fn mean(here: f32, sum: f32) -> f32 {
+    const SHARE: f32 = 1.0 / (2 * PAIRS_PX.len() + 1) as f32;
+    here + sum * SHARE
+}
+
+/// Adds the differences of pairs to `out`.
 #[inline(always)]
 fn add_pair(before: &[f32], here: &[f32], after: &[f32], out: &mut [f32], limit: f32) {
     for (((&before, &here), &after), out) in before.iter().zip(here).zip(after).zip(out) {
-        let (before, after) = (before - here, after - here);
-        let same = (before.abs() < limit) & (after.abs() < limit);
-        *out += if same { before + after } else { 0.0 };
+        *out += pair(before, here, after, limit);
     }
 }
 
-/// Turns the summed differences in `out` into the mean over all taps. A pair that was left out counts as two taps equal
-/// to the middle.
+/// Turns the summed differences in `out` into the mean.
 #[inline(always)]
 fn finish_mean(row: &[f32], out: &mut [f32]) {
-    const SHARE: f32 = 1.0 / (2 * PAIRS_PX.len() + 1) as f32;
     for (&here, out) in row.iter().zip(out) {
-        *out = here + *out * SHARE;
+        *out = mean(here, *out);
     }
 }

@@ -7,10 +7,12 @@
 
 use pulp::{Arch, WithSimd};
 
+use super::smooth::Over;
+
 /// Frames that the average spans, at most: the variance of still noise falls to 1/15.
 const LONGEST: f32 = 8.0;
 /// Frames for which a jump under resting colours is held back: a tenth of a second at 30 per second.
-const HOLD: f32 = 2.0;
+const HOLD: u8 = 2;
 /// A pixel rests up to a change of colour (of red, green and blue together, in steps of 8-bit sRGB, averaged over 3x3
 /// pixels) of this many times the median change, which is mostly camera noise, within these bounds; at twice that it
 /// has moved.
@@ -40,7 +42,7 @@ pub struct TemporalFilter {
     /// Frames in the mean.
     count: Vec<f32>,
     /// Frames for which a jump was held back.
-    held: Vec<f32>,
+    held: Vec<u8>,
     /// The last picture.
     rgb: Vec<u8>,
     /// Change of colour since the last frame, summed up over 3x3 pixels.
@@ -63,8 +65,15 @@ impl TemporalFilter {
         self.mean.clear();
     }
 
-    /// Steadies `inverse` of the frame at `time_ns`, with the picture `rgb`.
-    pub fn steady(&mut self, arch: Arch, inverse: &mut [f32], rgb: &[u8], width: usize, time_ns: u64, limits: Limits) {
+    /// Steadies `inverse` of the frame at `time_ns`, with the picture `rgb`; gives it out as `metres`, `focus_m` over it.
+    pub fn steady(
+        &mut self,
+        arch: Arch,
+        inverse: &[f32],
+        (rgb, width, time_ns): (&[u8], usize, u64),
+        limits: Limits,
+        (metres, focus_m): (&mut [f32], f32),
+    ) {
         let same_size = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
         let in_order = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
         if same_size && in_order {
@@ -73,17 +82,17 @@ impl TemporalFilter {
             arch.dispatch(Change { rgb, before, width, rows, single, change });
             let moved = (MOVED * self.median_change()).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
             let Self { mean, count, held, change, .. } = self;
-            arch.dispatch(Average { inverse, mean, count, held, change, moved, limits });
+            arch.dispatch(Average { inverse, mean, count, held, change, moved, limits, metres, focus_m });
         } else {
             self.mean.clear();
             self.mean.extend_from_slice(inverse);
-            for state in [&mut self.count, &mut self.held] {
-                state.clear();
-                state.resize(inverse.len(), 0.0);
-            }
-            self.count.fill(1.0);
+            self.count.clear();
+            self.count.resize(inverse.len(), 1.0);
+            self.held.clear();
+            self.held.resize(inverse.len(), 0);
             self.rgb.clear();
             self.rgb.extend_from_slice(rgb);
+            arch.dispatch(Over { focus_m, values: inverse, out: metres });
         }
         (self.width, self.time_ns) = (width, time_ns);
     }
@@ -153,29 +162,31 @@ impl WithSimd for Change<'_> {
     }
 }
 
-/// Moves the average of each pixel towards the new inverse depth, and gives it out in `inverse`.
+/// Moves the average of each pixel towards the new inverse depth, and gives it out.
 struct Average<'a> {
-    inverse: &'a mut [f32],
+    inverse: &'a [f32],
     mean: &'a mut [f32],
     count: &'a mut [f32],
-    held: &'a mut [f32],
+    held: &'a mut [u8],
     change: &'a [u16],
     /// Up to this change of colour a pixel rests.
     moved: f32,
     limits: Limits,
+    metres: &'a mut [f32],
+    focus_m: f32,
 }
 
 impl WithSimd for Average<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { inverse, mean, count, held, change, moved, limits } = self;
+        let Self { inverse, mean, count, held, change, moved, limits, metres, focus_m } = self;
         let (per_moved, per_noise) = (1.0 / moved, 1.0 / limits.noise);
         let state = mean.iter_mut().zip(count).zip(held).zip(change);
-        for (inverse, (((mean, count), held), &change)) in inverse.iter_mut().zip(state) {
+        for ((&inverse, metres), (((mean, count), held), &change)) in inverse.iter().zip(metres).zip(state) {
             // From 1 up to the bound to 0 at twice the bound: the weight of the past.
             let rest = unit(2.0 - per_pixel(change) * per_moved);
-            let step = *inverse - *mean;
+            let step = inverse - *mean;
             let noise_share = unit(step.abs() * per_noise);
             let changed = noise_share >= 1.0;
             let hold = (step.abs() > limits.jump) & (rest >= 1.0) & (*held < HOLD);
@@ -194,8 +205,8 @@ impl WithSimd for Average<'_> {
             } else {
                 longer
             };
-            *held = if hold { *held + 1.0 } else { 0.0 };
-            (*mean, *inverse) = (v, v);
+            *held = if hold { *held + 1 } else { 0 };
+            (*mean, *metres) = (v, focus_m / v);
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-/// Columns and rows of a tile: more than an edge moves in all rounds, and what a window reaches from there.
-const COLUMNS: usize = 32;
-const ROWS: usize = 24;
+/// Columns and rows of a tile: as far as edges move in the rounds before the last, and what a band and then a window reach
+/// from there. More would be laid out in vain.
+const COLUMNS: usize = 20;
+const ROWS: usize = 20;
 
 /// The tiles of a picture that have an edge, and those around them.
 #[derive(Debug, Default)]
