@@ -67,7 +67,7 @@ def match(
         return disparity
 
     if array.ndim < 4:
-        return pair(*eyes, check)
+        return pair(eyes[0], eyes[1], check)
     out = np.empty(array.shape[:3], np.float32)
     for k in range(len(out)):
         out[k] = pair(eyes[0][k], eyes[1][k], check and k == 0)
