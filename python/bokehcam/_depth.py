@@ -24,6 +24,7 @@ def match(
     effort: str = "full",
     threads: Optional[int] = None,
     check: bool = True,
+    sequence: bool = False,
 ) -> npt.NDArray[np.float32]:
     """The disparity of rectified pairs (the same point is in the same row), as ``bokehcam depth`` finds it, to the bit.
 
@@ -35,6 +36,8 @@ def match(
             the width.
         effort: ``full``, or ``fast``: half the columns and rows.
         threads: Threads to work on; all cores unless given.
+        sequence: Whether the pairs of a batch follow each other in time: what was found in one then helps the next, and the
+            results are steadier. Otherwise each is matched by itself.
         check: Warns (``RuntimeWarning``) where the first pair looks as if it were not rectified, or its eyes were swapped.
 
     Returns:
@@ -58,20 +61,16 @@ def match(
     disparities = -(-max_disparity // STEP) * STEP
     if not STEP <= disparities <= limit:
         raise ValueError(f"max_disparity: {max_disparity}, wanted 1 to {limit} for pictures {width} px wide")
-    matcher = _core.Matcher((width, height), disparities, effort, check_threads(threads))
-
-    def pair(left: Any, right: Any, check: bool) -> npt.NDArray[np.float32]:
-        disparity, odd = matcher.disparity(left, right, check)
-        if odd is not None:
-            warnings.warn(odd, RuntimeWarning, stacklevel=3)
-        return disparity
-
-    if array.ndim < 4:
-        return pair(*eyes, check)
-    out = np.empty(array.shape[:3], np.float32)
+    lefts, rights = (eye if eye.ndim == 4 else eye[None] for eye in eyes)
+    out = np.empty((len(lefts), height, width), np.float32)
+    matcher: Optional[_core.Matcher] = None
     for k in range(len(out)):
-        out[k] = pair(eyes[0][k], eyes[1][k], check and k == 0)
-    return out
+        if matcher is None or not sequence:
+            matcher = _core.Matcher((width, height), disparities, effort, check_threads(threads))
+        out[k], odd = matcher.disparity(lefts[k], rights[k], check and k == 0)
+        if odd is not None:
+            warnings.warn(odd, RuntimeWarning, stacklevel=2)
+    return out if array.ndim == 4 else out[0]
 
 
 def refine(

@@ -62,7 +62,8 @@ def to_linear(srgb: npt.ArrayLike) -> _F32:
     array = np.asarray(srgb)
     if array.dtype != np.uint8:
         raise TypeError(f"srgb: dtype {array.dtype}, wanted uint8")
-    return light[array]
+    found: _F32 = light[array]
+    return found
 
 
 def psnr(a: npt.ArrayLike, b: npt.ArrayLike) -> float:
@@ -159,7 +160,8 @@ class _Layer:
         (x, y), (fx, fy) = np.floor(place).astype(int), (place - np.floor(place)).astype(np.float32)
         part = self.padded[y : y + height + 1, x : x + width + 1]
         rows = part[:-1] + fy * (part[1:] - part[:-1])
-        return rows[:, :-1] + fx * (rows[:, 1:] - rows[:, :-1])
+        light: _F32 = rows[:, :-1] + fx * (rows[:, 1:] - rows[:, :-1])
+        return light
 
 
 class _Room:
@@ -182,7 +184,8 @@ class _Room:
         columns, along = _between(np.arange(width) + (coc_px * u[0])[:, None], width)
         down = np.arange(height)[:, None]
         here = color[down, columns]
-        return here + along[..., None] * (color[down, np.minimum(columns + 1, width - 1)] - here)
+        light: _F32 = here + along[..., None] * (color[down, np.minimum(columns + 1, width - 1)] - here)
+        return light
 
 
 def _between(place: npt.NDArray[np.float64], count: int) -> tuple[npt.NDArray[np.intp], _F32]:
@@ -197,7 +200,8 @@ def _spread(grid: _F32, count: int, axis: int) -> _F32:
     before, along = _between(np.linspace(0, grid.shape[axis] - 1, count), grid.shape[axis])
     first = np.take(grid, before, axis)
     second = np.take(grid, np.minimum(before + 1, grid.shape[axis] - 1), axis)
-    return first + np.expand_dims(along, tuple(k for k in range(grid.ndim) if k != axis)) * (second - first)
+    larger: _F32 = first + np.expand_dims(along, tuple(k for k in range(grid.ndim) if k != axis)) * (second - first)
+    return larger
 
 
 def _texture(rng: np.random.Generator, size: tuple[int, int], kind: str) -> _F32:
@@ -219,23 +223,27 @@ def _texture(rng: np.random.Generator, size: tuple[int, int], kind: str) -> _F32
     if kind == "lights":
         color *= 0.35
         for _ in range(60):
-            light = _disc(x, y, rng.uniform(0, width), rng.uniform(0, height), *([rng.uniform(1, 1 + height / 90)] * 2))
-            color += light[..., None] * (rng.uniform(0.6, 1, 3) - color)
-    return color.astype(np.float32)
+            middle, radius = (rng.uniform(0, width), rng.uniform(0, height)), rng.uniform(1, 1 + height / 90)
+            color += _disc(x, y, *middle, radius, radius)[..., None] * (rng.uniform(0.6, 1, 3) - color)
+    light: _F32 = color.astype(np.float32)
+    return light
 
 
 def _disc(x: npt.ArrayLike, y: npt.ArrayLike, cx: float, cy: float, rx: float, ry: float) -> _F32:
     """How far an ellipse covers each pixel, with edges of one pixel."""
     distance = np.hypot((np.asarray(x) - cx) / rx, (np.asarray(y) - cy) / ry)
-    return np.clip((1 - distance) * min(rx, ry) + 0.5, 0, 1).astype(np.float32)
+    cover: _F32 = np.clip((1 - distance) * min(rx, ry) + 0.5, 0, 1).astype(np.float32)
+    return cover
 
 
 def _blobs(rng: np.random.Generator, size: tuple[int, int], count: int) -> _F32:
     width, height = size
     y, x = np.mgrid[:height, :width]
-    radii = lambda: rng.uniform(height / 20, height / 6)  # noqa: E731
-    discs = [_disc(x, y, rng.uniform(0, width), rng.uniform(0, height), radii(), radii()) for _ in range(count)]
-    return np.maximum.reduce(discs)
+    cover = np.zeros((height, width), np.float32)
+    for _ in range(count):
+        middle = rng.uniform(0, width), rng.uniform(0, height)
+        np.maximum(cover, _disc(x, y, *middle, *rng.uniform(height / 20, height / 6, 2)), out=cover)
+    return cover
 
 
 def _bust(rng: np.random.Generator, size: tuple[int, int]) -> _F32:
@@ -243,7 +251,8 @@ def _bust(rng: np.random.Generator, size: tuple[int, int]) -> _F32:
     y, x = np.mgrid[:height, :width]
     middle = width * rng.uniform(0.4, 0.6)
     head = _disc(x, y, middle, height * 0.42, height * 0.17, height * 0.23)
-    return np.maximum(head, _disc(x, y, middle, height * 1.05, height * 0.45, height * 0.42))
+    bust: _F32 = np.maximum(head, _disc(x, y, middle, height * 1.05, height * 0.45, height * 0.42))
+    return bust
 
 
 def _fence(size: tuple[int, int]) -> _F32:

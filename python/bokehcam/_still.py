@@ -65,7 +65,7 @@ def render(
         ValueError: Shapes that do not fit (both are said), a setting out of its range, settings that do not go together.
         TypeError: Another dtype, or an array on a GPU.
     """
-    settings = dict(
+    settings: dict[str, Any] = dict(
         effect=effect,
         method=method,
         focus=focus,

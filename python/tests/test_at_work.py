@@ -159,7 +159,8 @@ COUNTER = r"""
 static long large;
 long large_allocations(void) { return large; }
 static void count(size_t size) { if (size >= 2048) __atomic_add_fetch(&large, 1, __ATOMIC_RELAXED); }
-extern void *__libc_malloc(size_t), *__libc_calloc(size_t, size_t), *__libc_realloc(void *, size_t), *__libc_memalign(size_t, size_t);
+extern void *__libc_malloc(size_t), *__libc_calloc(size_t, size_t), *__libc_realloc(void *, size_t);
+extern void *__libc_memalign(size_t, size_t);
 void *malloc(size_t size) { count(size); return __libc_malloc(size); }
 void *calloc(size_t n, size_t size) { count(n * size); return __libc_calloc(n, size); }
 void *realloc(void *old, size_t size) { count(size); return __libc_realloc(old, size); }

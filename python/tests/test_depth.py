@@ -67,6 +67,9 @@ def test_a_shift_is_found():
     np.testing.assert_allclose(np.median(luma[luma > 0]), 12, atol=0.1)
     batch = bc.match(np.stack([left, left]), np.stack([right, right]), max_disparity=32)
     np.testing.assert_array_equal(batch[1], disparity)
+    steady = bc.match(np.stack([left, left]), np.stack([right, right]), max_disparity=32, sequence=True)
+    np.testing.assert_array_equal(steady[0], disparity)
+    assert (steady[1] != disparity).any()
     np.testing.assert_array_equal(bc.match(bc.to_linear(left), bc.to_linear(right), max_disparity=32), disparity)
 
 

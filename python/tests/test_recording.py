@@ -39,7 +39,7 @@ def test_two_eyes_are_read(recordings):
 def test_what_is_wrong_with_a_recording_is_said(recordings, tmp_path):
     with pytest.raises(OSError, match="not a recording"):
         bc.Recording(tmp_path)
-    with pytest.raises(ValueError, match="depth_scale"):
+    with pytest.raises(ValueError, match="depth scale is 0"):
         bc.Recording(recordings / "portrait", depth_scale=0)
     copy = tmp_path / "copy"
     shutil.copytree(recordings / "portrait", copy)

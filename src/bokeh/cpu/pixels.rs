@@ -63,7 +63,8 @@ impl Sample for f32 {
     #[inline(always)]
     fn write(color: &[[f32; CHUNK]; 3], _: &EncodeTable, out: &mut [f32]) {
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            *pixel = [color[0][x], color[1][x], color[2][x]];
+            // Filters that are cut to a few terms may go below 0 beside a light.
+            *pixel = [color[0][x], color[1][x], color[2][x]].map(|light| if light > 0.0 { light } else { 0.0 });
         }
     }
 }
