@@ -178,7 +178,7 @@ def summed_up(tally, all_units: int, there_before: int, noun: str, out: str) -> 
     say(f"{there_before + tally.made} of {all_units} {noun} are in {out}: {made}")
     if tally.ended:
         say(f"error: {tally.ended}")
-        return 2 if tally.failed else 1
+        return 2 if tally.refused else 1
     if tally.failed:
         say(f"error: {len(tally.failed)} failed for good:")
         for result in tally.failed.values():

@@ -54,18 +54,18 @@ class Tally:
 
     made: int = 0
     frames: int = 0
-    started_s: float = field(default_factory=time.monotonic)
+    elapsed_s: float = 0.0
     nodes: set[str] = field(default_factory=set)
     failed: dict[str, Result] = field(default_factory=dict)
     # What was said, of which source first, and how often.
     warnings: dict[str, list] = field(default_factory=dict)
-    # Why it was ended before everything had been tried.
+    # Why it was ended before everything had been tried, and whether for wrong arguments.
     ended: str = ""
+    refused: bool = False
 
     def rate(self) -> str:
         """How fast frames come from all nodes together."""
-        elapsed_s = max(time.monotonic() - self.started_s, 1e-3)
-        return f"{self.frames / elapsed_s:.1f} frames/s over {len(self.nodes)} node{'s' * (len(self.nodes) != 1)}"
+        return f"{self.frames / max(self.elapsed_s, 1e-3):.1f} frames/s over {len(self.nodes)} node{'s' * (len(self.nodes) != 1)}"
 
     def add(self, frames: int) -> None:
         """A result is there that has so many frames."""
@@ -109,7 +109,7 @@ class Farm:
         """Makes all results that can be made. Interrupted, it stops what runs."""
         size = self.options.shard if self.job.command == "render" else 1
         waiting = deque(Task(units[start : start + size]) for start in range(0, len(units), size))
-        job = ray.put(self.job)
+        job, started_s = ray.put(self.job), time.monotonic()
         # Rewritten at most ten times a second, and only on a terminal.
         with tqdm(
             total=len(units), unit="", disable=None, bar_format="{n_fmt}/{total_fmt} |{bar}| {elapsed}, {postfix}"
@@ -127,6 +127,7 @@ class Farm:
                         for ref in ray.wait(refs, num_returns=len(refs), timeout=0)[0]:
                             waiting.extend(self.note(self.running.pop(ref), ref))
                     self.end_early(waiting)
+                    self.tally.elapsed_s = time.monotonic() - started_s
                     bar.n = self.tally.made + len(self.tally.failed)
                     bar.set_postfix_str(self.tally.rate())
             finally:
@@ -171,8 +172,8 @@ class Farm:
         for result in outcome.results:
             if not result.cause:
                 self.tally.add(result.frames)
-            # What is said twice in the same words will be said again.
-            elif result.refused or task.failed >= self.options.retries or task.cause == result.cause:
+            # What is said twice in the same words, of two nodes where there are two, will be said again.
+            elif task.failed >= self.options.retries or task.cause == result.cause:
                 self.give_up(result)
             else:
                 again.append(Task([result.unit], task.failed + 1, result.cause, outcome.node))
@@ -189,7 +190,8 @@ class Farm:
             else:
                 left.append(unit)
         if task.failed < self.options.retries:
-            return [Task(left, task.failed + 1, task.cause, task.avoid)] if left else []
+            # Apart from each other, so that one that is to blame takes none with it again.
+            return [Task([unit], task.failed + 1, task.cause, task.avoid) for unit in left]
         what = type(error).__name__
         cause = next((line.strip() for line in str(error).splitlines() if line.strip()), what)
         for unit in left:
@@ -220,6 +222,7 @@ class Farm:
         """Ends where it can come to nothing."""
         refused = [result for result in self.tally.failed.values() if result.refused]
         if not self.tally.made and len(refused) >= REFUSED_AT_MOST:
+            self.tally.refused = True
             self.tally.ended = (
                 f"the program refused the first {len(refused)} sources, so the flags are wrong: {refused[0].cause}"
             )
