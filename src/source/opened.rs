@@ -23,9 +23,11 @@ use crate::depth::DepthSource;
 use crate::depth::kept::Kept;
 use crate::depth::recorded::Recorded;
 use crate::frame::DepthMap;
+#[cfg(feature = "camera")]
+use crate::layout::Content;
 use crate::recording::{Pair, Recording};
 #[cfg(feature = "camera")]
-use crate::v4l2::{layout::Content, live::Wish};
+use crate::v4l2::live::Wish;
 
 /// Picture size of the synthetic scene.
 const SYNTHETIC_SIZE: (u32, u32) = (640, 480);
