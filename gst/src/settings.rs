@@ -98,7 +98,7 @@ fn param_spec(property: Property) -> glib::ParamSpec {
 }
 
 fn of_setting(setting: &Setting) -> glib::ParamSpec {
-    let (nick, blurb) = (nick(setting.name), as_properties(setting.help));
+    let (nick, blurb) = (nick(setting.name), as_properties(setting.help.trim()));
     let choices = (setting.choices)();
     if !choices.is_empty() {
         let default = setting.default().and_then(|name| choices.iter().position(|choice| choice.0 == name));

@@ -20,18 +20,15 @@ fn plugins(home: &Path) -> PathBuf {
     folder
 }
 
-/// Runs `gst-launch-1.0` on a pipeline, as one writes it.
-pub fn launch(line: &str, home: &Path) {
-    let mut words = Command::new("bash");
-    words.arg("-c").arg(format!("exec gst-launch-1.0 -q {line}"));
-    let output = words
-        .env("GST_PLUGIN_PATH", plugins(home))
-        .env("GST_REGISTRY", home.join("registry.bin"))
-        .current_dir(repository())
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && !said.contains("ERROR"), "{line}: {said}");
+/// Runs a command of GStreamer's in the folder `home`, as one writes it, and returns what it says.
+fn run(command: &str, home: &Path) -> String {
+    let mut shell = Command::new("bash");
+    shell.args(["-c", command]).current_dir(home);
+    shell.env("GST_PLUGIN_PATH", plugins(home)).env("GST_REGISTRY", home.join("registry.bin"));
+    let output = shell.output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !errors.contains("ERROR"), "{command}: {errors}");
+    String::from_utf8(output.stdout).unwrap()
 }
 
 #[test]
@@ -56,9 +53,9 @@ fn a_recording_is_what_stream_makes_of_it() {
             recording.display()
         )
     };
-    launch(
+    run(
         &format!(
-            "bokeh name=b highlights=12 coc-at-infinity=14 depth-scale=5000 \
+            "gst-launch-1.0 -q bokeh name=b highlights=12 coc-at-infinity=14 depth-scale=5000 \
              ! videoconvert ! pngenc ! multifilesink location={}/%06d.png \
              {} ! videoconvert ! video/x-raw,format=RGB ! queue ! b.sink \
              {} ! videoconvert ! video/x-raw,format=GRAY16_LE ! queue ! b.depth",
@@ -81,14 +78,24 @@ fn a_recording_is_what_stream_makes_of_it() {
 #[test]
 fn the_element_is_described() {
     let home = tempfile::tempdir().unwrap();
-    let output = Command::new("gst-inspect-1.0")
-        .arg("bokeh")
-        .env("GST_PLUGIN_PATH", plugins(home.path()))
-        .env("GST_REGISTRY", home.path().join("registry.bin"))
-        .output()
-        .unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
+    let text = run("gst-inspect-1.0 bokeh", home.path());
     for part in ["Background blur", "'depth'", "On request", "Distance of the focal plane", "tilt-shift", "MIT/X11"] {
         assert!(text.contains(part), "{part} is not in {text}");
     }
+}
+
+#[test]
+fn the_pipelines_of_the_pages_run() {
+    let home = tempfile::tempdir().unwrap();
+    std::os::unix::fs::symlink(repository().join("recordings"), home.path().join("recordings")).unwrap();
+    std::fs::create_dir(home.path().join("blurred")).unwrap();
+    let pages =
+        ["docs/gstreamer.md", "README.md"].map(|page| std::fs::read_to_string(repository().join(page)).unwrap());
+    let text = pages.join("\n").replace("\\\n", " ");
+    let commands = text.lines().filter(|line| line.starts_with("gst-launch-1.0 "));
+    // Cameras and screens are not everywhere.
+    let (left_out, ran): (Vec<&str>, Vec<&str>) =
+        commands.partition(|line| ["/dev/video", "autovideosink"].iter().any(|part| line.contains(part)));
+    ran.iter().for_each(|command| drop(run(command, home.path())));
+    assert_eq!((left_out.len(), ran.len()), (2, 4), "{text}");
 }
