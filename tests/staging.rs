@@ -13,7 +13,7 @@ use bokehcam::depth::focus::FocusRule;
 use bokehcam::frame::{ColorImage, DepthMap, Stamp};
 use bokehcam::link;
 use bokehcam::look::{Effect, Follow, Look, Strength};
-use bokehcam::pipeline::{Run, run};
+use bokehcam::pipeline::{Run, View, run};
 use bokehcam::sink::{Ending, Sink, SinkError};
 use common::{color, depth};
 
@@ -127,7 +127,7 @@ fn the_wall_is_gone_to_the_last_trace_and_the_person_is_as_they_were() {
 #[test]
 fn who_looks_on_sees_what_was_taken_beside_what_became_of_it() {
     let (green, stop) = ([0, 177, 64], AtomicBool::new(false));
-    let (sender, mut views) = link::lossless();
+    let (sender, mut views) = link::lossless::<View>();
     let look = Look { behind: Behind::Color(green), ..dof() };
     let made = Run::new(Box::new(Walk { next: 0 }), None, look, Box::new(Kept::default()), &stop).unwrap();
     let seen = std::thread::scope(|scope| {
