@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import secrets
@@ -15,8 +16,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import bokehcam
 import pytest
+
+import bokehcam
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PORTRAIT = REPOSITORY / "recordings" / "portrait"
@@ -212,11 +214,17 @@ class Cluster:
         os.kill(self.raylets[-1], signal.SIGKILL)
 
     def stop(self) -> None:
+        """Ends all processes of all nodes."""
         for node in reversed(self.nodes):
-            node.terminate()
-        for node in self.nodes:
-            try:
-                node.wait(20)
-            except subprocess.TimeoutExpired:
-                node.kill()
+            for process in [node.pid, *descendants(node.pid)]:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
+            node.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def descendants(process: int) -> list[int]:
+    """The children of a process, theirs, and so on."""
+    children = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+    children = [child for child in children if parent_of(child) == process]
+    return children + [deeper for child in children for deeper in descendants(child)]

@@ -8,7 +8,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-
 from farm_fixtures import PORTRAIT, PROGRAM, alone, farm, needs_program, needs_ray, recording
 
 pytestmark = needs_program

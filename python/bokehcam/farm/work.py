@@ -24,6 +24,9 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+Report = dict[str, Any]
 
 # Within the folder of the results: their reports, and what is ours alone.
 REPORTS = "reports"
@@ -76,7 +79,7 @@ class Job:
     def settings_file(self) -> Path:
         return self.hidden / f"{self.id}.toml"
 
-    def asked(self, unit: Unit) -> dict:
+    def asked(self, unit: Unit) -> dict[str, Any]:
         """All that decides what the result looks like. Threads do not."""
         environment = {name: value for name, value in self.environment.items() if name != "BOKEHCAM_THREADS"}
         given = json.dumps([environment, self.settings], sort_keys=True)
@@ -174,7 +177,7 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
     if code:
         cause = in_words(job, place, cause_of(code, said))
         return Result(unit, cause, refused=code == 2, warnings=warnings)
-    report = read_report(report_part) or {} if job.command == "stream" else {"elapsed_s": time.monotonic() - started}
+    report: Report = read_report(report_part) or {} if job.command == "stream" else {"elapsed_s": time.monotonic() - started}
     report["farm"] = {
         **job.asked(unit),
         "output": measure(part),
@@ -273,7 +276,7 @@ def publish(part: Path, final: Path) -> bool:
     return True
 
 
-def put_report(job: Job, unit: Unit, report: dict, part: Path) -> None:
+def put_report(job: Job, unit: Unit, report: Report, part: Path) -> None:
     """Gives a report its place, by way of the file `part`."""
     with open(part, "w", encoding="utf-8") as file:
         json.dump(report, file, indent=2)
@@ -297,7 +300,7 @@ def report_of(folder: Path, unit: Unit) -> Path:
     return folder / REPORTS / f"{unit.output}.json"
 
 
-def read_report(path: Path) -> dict | None:
+def read_report(path: Path) -> Report | None:
     """A report; `None` where there is no file, and an empty one where it holds something else."""
     try:
         report = json.loads(path.read_bytes())
@@ -308,7 +311,7 @@ def read_report(path: Path) -> dict | None:
     return report if isinstance(report, dict) else {}
 
 
-def complete(report: dict, command: str) -> bool:
+def complete(report: Report, command: str) -> bool:
     """Whether a report was written to its end by a farm, and knows of every frame what became of it."""
     if not isinstance(report.get("farm"), dict):
         return False
@@ -317,24 +320,24 @@ def complete(report: dict, command: str) -> bool:
     try:
         frames = report["frames"]
         known = frames["delivered"] + sum(frames["dropped"].values())
-        return frames["in_flight"] == 0 and frames["captured"] == known and frames["delivered"] > 0
+        return bool(frames["in_flight"] == 0 and frames["captured"] == known and frames["delivered"] > 0)
     except (KeyError, TypeError, AttributeError):
         return False
 
 
-def frames_of(report: dict) -> int:
+def frames_of(report: Report) -> int:
     """The frames of a result; a picture is one."""
-    return report["frames"]["delivered"] if "frames" in report else 1
+    return int(report["frames"]["delivered"]) if "frames" in report else 1
 
 
-def measure(output: Path) -> dict:
+def measure(output: Path) -> dict[str, int]:
     """How large a result is: a file's bytes, or the number of files in a folder."""
     if output.is_dir():
         return {"files": len(os.listdir(output))}
     return {"bytes": output.stat().st_size}
 
 
-def finished(job: Job, unit: Unit) -> dict | None:
+def finished(job: Job, unit: Unit) -> Report | None:
     """The whole report of a result that is there, and was made of the same source by the same flags and settings."""
     report = read_report(report_of(job.folder, unit))
     if not report or not complete(report, job.command):
