@@ -128,6 +128,7 @@ def planned(given: argparse.Namespace, rest: list[str]) -> tuple[Job, list[Unit]
         id=plan.new_id(),
         folder=Path(os.path.abspath(given.out)),
         command=command,
+        format=extension,
         flags=flags,
         environment=plan.with_defaults(environment, settings, given.cpus, given.gpus),
         settings=settings,
@@ -170,9 +171,9 @@ def run(arguments: list[str]) -> int:
     return summed_up(tally, len(units), len(units) - len(left), noun, given.out)
 
 
-def stop(signal_number: int, _frame: FrameType | None) -> NoReturn:
+def stop(_signal: int, _frame: FrameType | None) -> NoReturn:
     """Ends as Ctrl-C does."""
-    raise KeyboardInterrupt(signal_number)
+    raise KeyboardInterrupt
 
 
 def summed_up(tally: Tally, all_units: int, there_before: int, noun: str, out: str) -> int:
@@ -205,9 +206,9 @@ def main() -> int:
     except FarmError as error:
         say(f"error: {error}")
         return 1
-    except KeyboardInterrupt as stopped:
+    except KeyboardInterrupt:
         say("stopped: what was finished stays; the same command does the rest")
-        return 128 + (stopped.args[0] if stopped.args else signal.SIGINT)
+        return 128 + signal.SIGINT
 
 
 if __name__ == "__main__":

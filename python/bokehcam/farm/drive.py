@@ -120,9 +120,7 @@ class Farm:
         waiting = deque(Task(units[start : start + size]) for start in range(0, len(units), size))
         job, started_s = ray.put(self.job), time.monotonic()
         # Rewritten at most ten times a second, and only on a terminal.
-        with tqdm(
-            total=len(units), unit="", disable=None, bar_format="{n_fmt}/{total_fmt} |{bar}| {elapsed}, {postfix}"
-        ) as bar:
+        with tqdm(total=len(units), unit="", disable=None, bar_format="{n_fmt}/{total_fmt} |{bar}| {elapsed}{postfix}") as bar:
             try:
                 while waiting or self.running:
                     self.look_around()

@@ -59,11 +59,13 @@ class Unit:
 
 @dataclass(frozen=True)
 class Job:
-    """What all results have in common. `command` is ``stream`` or ``render``, `environment` that of the program's settings."""
+    """What all results have in common. `command` is ``stream`` or ``render``, `format` an extension, `environment` that of the
+    program's settings."""
 
     id: str
     folder: Path
     command: str
+    format: str
     flags: tuple[str, ...]
     environment: dict[str, str]
     settings: str
@@ -178,12 +180,8 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
         cause = in_words(job, place, cause_of(code, said))
         return Result(unit, cause, refused=code == 2, warnings=warnings)
     report: Report = read_report(report_part) or {} if job.command == "stream" else {"elapsed_s": time.monotonic() - started}
-    report["farm"] = {
-        **job.asked(unit),
-        "output": measure(part),
-        "version": job.version,
-        "host": socket.gethostname(),
-    }
+    made = {"output": measure(part), "version": job.version, "host": socket.gethostname()}
+    report["farm"] = {**job.asked(unit), **made}
     if not complete(report, job.command):
         return Result(unit, "its report does not account for all frames", warnings=warnings)
     final = job.folder / unit.output
@@ -194,28 +192,20 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
         # Another attempt may have put its own there meanwhile.
         if read_report(report_of(job.folder, unit)) != report:
             put_report(job, unit, report, report_part)
-        return Result(unit, frames=frames_of(report), warnings=warnings)
-    if finished(job, unit):
-        return Result(unit, frames=frames_of(report), warnings=warnings)
-    return Result(unit, f"{final} has appeared meanwhile, and is not of this job", warnings=warnings)
+    elif not finished(job, unit):
+        return Result(unit, f"{final} has appeared meanwhile, and is not of this job", warnings=warnings)
+    return Result(unit, frames=frames_of(report), warnings=warnings)
 
 
 def arguments(job: Job, unit: Unit, part: Path, report: Path) -> list[str]:
     """The program's arguments."""
-    common = [
-        "--log-format",
-        "json",
-        "--config",
-        str(job.settings_file),
-        job.command,
-        unit.source,
-        *job.flags,
-        *unit.extra,
-    ]
+    own = ["--log-format", "json", "--config", str(job.settings_file)]
+    common = [*own, job.command, unit.source, *job.flags, *unit.extra]
     if job.command == "render":
         return [*common, "--out", str(part)]
     # In real time frames may be dropped, and a second run would give another result.
-    return [*common, "--to", str(part), "--report", str(report), "--pace", "asap"]
+    to = f"{part}/" if job.format == "png" else str(part)
+    return [*common, "--to", to, "--report", str(report), "--pace", "asap"]
 
 
 def run(job: Job, program: str, given: list[str]) -> tuple[int, list[tuple[str, str]]]:
