@@ -16,9 +16,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
 import bokehcam
+import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PORTRAIT = REPOSITORY / "recordings" / "portrait"
