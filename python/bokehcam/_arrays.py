@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Optional
 
 import numpy as np
@@ -36,7 +37,7 @@ def shape_of(array: npt.NDArray[Any]) -> str:
 
 
 def image(value: Any, name: str = "image", size: Optional[tuple[int, int]] = None) -> Image:
-    """A picture or a batch of them: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` or ``float32``, contiguous."""
+    """A picture or a batch of them: ``(H, W, 3)`` or ``(N, H, W, 3)``, ``uint8`` or ``float32``."""
     array = as_array(value, name)
     if array.dtype not in (np.uint8, np.float32):
         raise TypeError(
@@ -51,10 +52,16 @@ def image(value: Any, name: str = "image", size: Optional[tuple[int, int]] = Non
         raise ValueError(f"{name}: shape {shape_of(array)}, wanted {wanted}{hint}")
     if 0 in array.shape[-3:]:
         raise ValueError(f"{name}: shape {shape_of(array)} has no pixels")
-    array = np.ascontiguousarray(array)
-    if array.dtype == np.float32:
-        refuse_odd(array, name)
     return array
+
+
+def pictures(images: Image, name: str = "image") -> Iterator[Image]:
+    """The pictures of :func:`image` one by one, contiguous: a large batch is not copied as a whole."""
+    for k, picture in enumerate(images if images.ndim == 4 else images[None]):
+        picture = np.ascontiguousarray(picture)
+        if picture.dtype == np.float32:
+            refuse_odd(picture, f"{name}[{k}]" if images.ndim == 4 else name)
+        yield picture
 
 
 def refuse_odd(array: npt.NDArray[np.float32], name: str) -> tuple[float, float]:
@@ -79,7 +86,7 @@ def plane(value: Any, name: str, of: tuple[int, ...]) -> npt.NDArray[np.float32]
 def result(out: Any, like: Image) -> Image:
     """The array for a result: ``out`` if that fits, else a new one."""
     if out is None:
-        return np.empty_like(like)
+        return np.empty(like.shape, like.dtype)
     if not isinstance(out, np.ndarray):
         raise TypeError(f"out: {type(out).__name__}, wanted a numpy array")
     if out.dtype != like.dtype:

@@ -147,11 +147,9 @@ class Renderer:
             self._refuse_beyond(low, high)
             executor = self._of_map()
         result = _arrays.result(out, image)
-        if image.ndim == 3:
-            executor.blur(image, radii, result)
-            return result
-        for k in range(len(image)):
-            executor.blur(image[k], radii if radii is None or radii.ndim == 2 else radii[k], result[k])
+        places = result if image.ndim == 4 else result[None]
+        for k, picture in enumerate(_arrays.pictures(image)):
+            executor.blur(picture, radii if radii is None or radii.ndim == 2 else radii[k], places[k])
         return result
 
     def _refuse_beyond(self, low: float, high: float) -> None:

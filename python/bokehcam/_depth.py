@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from typing import Any, Optional, Union
 
 import numpy as np
@@ -61,13 +62,13 @@ def match(
     disparities = -(-max_disparity // STEP) * STEP
     if not STEP <= disparities <= limit:
         raise ValueError(f"max_disparity: {max_disparity}, wanted 1 to {limit} for pictures {width} px wide")
-    lefts, rights = (eye if eye.ndim == 4 else eye[None] for eye in eyes)
-    out = np.empty((len(lefts), height, width), np.float32)
+    out = np.empty((len(array) if array.ndim == 4 else 1, height, width), np.float32)
     matcher: Optional[_core.Matcher] = None
-    for k in range(len(out)):
+    pairs = zip(_pictures(eyes[0], "left"), _pictures(eyes[1], "right"))
+    for k, (of_left, of_right) in enumerate(pairs):
         if matcher is None or not sequence:
             matcher = _core.Matcher((width, height), disparities, effort, check_threads(threads))
-        out[k], odd = matcher.disparity(lefts[k], rights[k], check and k == 0)
+        out[k], odd = matcher.disparity(of_left, of_right, check and k == 0)
         if odd is not None:
             warnings.warn(odd, RuntimeWarning, stacklevel=2)
     return out if array.ndim == 4 else out[0]
@@ -96,11 +97,16 @@ def refine(
     depth = maps("depth_m", depth_m, array)
     settings = as_texts({"effect": "dof", "focus": focus})
     if array.ndim == 3:
-        return _core.refine(depth, array, settings)
+        return _core.refine(depth, next(_arrays.pictures(array)), settings)
     out = np.empty(array.shape[:3], np.float32)
-    for k in range(len(out)):
-        out[k] = _core.refine(depth[k], array[k], settings)
+    for k, picture in enumerate(_arrays.pictures(array)):
+        out[k] = _core.refine(depth[k], picture, settings)
     return out
+
+
+def _pictures(eye: npt.NDArray[Any], name: str) -> Iterator[npt.NDArray[Any]]:
+    """Luma has no batches."""
+    return iter([eye]) if eye.ndim == 2 else _arrays.pictures(eye, name)
 
 
 def _eye(value: Any, name: str) -> npt.NDArray[Any]:

@@ -48,4 +48,4 @@ def write_image(path: Path, image: Any, *, overwrite: bool = False) -> None:
     array = _arrays.image(image)
     if array.ndim != 3:
         raise ValueError(f"image: shape {_arrays.shape_of(array)}, wanted (H, W, 3)")
-    _core.write_image(os.fspath(path), array, overwrite)
+    _core.write_image(os.fspath(path), next(_arrays.pictures(array)), overwrite)

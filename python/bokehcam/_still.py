@@ -97,11 +97,9 @@ def render(
     core = opening._core if opening else None
     still = _core.Still(size, depth is not None, as_texts(settings), core, check_threads(threads))
     result = _arrays.result(out, array)
-    if array.ndim == 3:
-        still.render(array, depth, result)
-        return result
-    for k in range(len(array)):
-        still.render(array[k], None if depth is None else depth[k], result[k])
+    places = result if array.ndim == 4 else result[None]
+    for k, picture in enumerate(_arrays.pictures(array)):
+        still.render(picture, depth if depth is None or array.ndim == 3 else depth[k], places[k])
     return result
 
 

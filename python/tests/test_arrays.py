@@ -40,6 +40,12 @@ def test_a_batch_is_its_pictures(image, coc):
     shared = bc.blur(batch, coc)
     np.testing.assert_array_equal(shared[1], bc.blur(batch[1], coc))
     assert bc.blur(batch[:0], maps[:0]).shape == (0, HEIGHT, WIDTH, 3)
+    same = bc.blur(np.broadcast_to(image, (2, HEIGHT, WIDTH, 3)), coc)
+    np.testing.assert_array_equal(same, np.stack([bc.blur(image, coc)] * 2))
+    light = np.zeros((2, 5, 6, 3), np.float32)
+    light[1, 2, 3, 0] = np.inf
+    with pytest.raises(ValueError, match=r"image\[1\]: inf at \(2, 3, 0\)"):
+        bc.blur(light, 1.0)
 
 
 def test_others_arrays_are_taken(image, coc):
