@@ -79,21 +79,16 @@ def measure(clusters: dict[int, Cluster], folder: Path, runs: int) -> None:
             seconds[nodes].append(timed(cluster, takes, out, flags))
             rates[nodes].append(FRAMES * results_per_s(out, nodes))
             rate, all_s = rates[nodes][-1], seconds[nodes][-1]
-            print(
-                f"run {run + 1}, nodes: {nodes}: {rate:.1f} frames/s, {all_s:.1f} s in all, {cpu_s(out):.1f} s of processor time",
-                flush=True,
-            )
+            times = f"{all_s:.1f} s in all, {cpu_s(out):.1f} s of processor time"
+            print(f"run {run + 1}, nodes: {nodes}: {rate:.1f} frames/s, {times}", flush=True)
     for what, of in (("frames/s", rates), ("s in all", seconds)):
         print(f"median: {statistics.median(of[1]):.1f} {what} on one node, {statistics.median(of[2]):.1f} on two")
     ratios = sorted(two / one for one, two in zip(rates[1], rates[2]))
-    print(
-        f"frames/s, two nodes by one, of each pair: median {statistics.median(ratios):.2f}, from {ratios[0]:.2f} to {ratios[-1]:.2f}"
-    )
+    spread = f"from {ratios[0]:.2f} to {ratios[-1]:.2f}"
+    print(f"frames/s, two nodes by one, of each pair: median {statistics.median(ratios):.2f}, {spread}")
     out = folder / "small-out"
     timed(clusters[2], links(folder, takes), out, ["--frames", "1", "--effect", "none"])
-    print(
-        f"a task of one frame, not blurred: {2000 / results_per_s(out, 2):.0f} ms of a node, {1000 * cpu_s(out) / SMALL:.0f} ms of it the program's"
-    )
+    print(f"a task of one frame, not blurred: {2000 / results_per_s(out, 2):.0f} ms of a node")
 
 
 if __name__ == "__main__":

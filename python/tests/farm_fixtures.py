@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import secrets
@@ -212,11 +213,17 @@ class Cluster:
         os.kill(self.raylets[-1], signal.SIGKILL)
 
     def stop(self) -> None:
+        """Ends all processes of all nodes."""
         for node in reversed(self.nodes):
-            node.terminate()
-        for node in self.nodes:
-            try:
-                node.wait(20)
-            except subprocess.TimeoutExpired:
-                node.kill()
+            for process in [node.pid, *descendants(node.pid)]:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
+            node.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def descendants(process: int) -> list[int]:
+    """The children of a process, theirs, and so on."""
+    children = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+    children = [child for child in children if parent_of(child) == process]
+    return children + [deeper for child in children for deeper in descendants(child)]

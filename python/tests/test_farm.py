@@ -8,7 +8,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-
 from farm_fixtures import PORTRAIT, PROGRAM, alone, farm, needs_program, needs_ray, recording
 
 pytestmark = needs_program
@@ -26,7 +25,7 @@ def job(tmp_path):
     folder = tmp_path / "out"
     program = str(PROGRAM)
     flags = ("--frames", "2", "--effect", "blur")
-    job = work.Job(plan.new_id(), folder, "stream", flags, {}, "", program, work.version_of(program), tmp_path)
+    job = work.Job(plan.new_id(), folder, "stream", "y4m", flags, {}, "", program, work.version_of(program), tmp_path)
     with plan.at_work(job):
         yield job
 
@@ -87,6 +86,20 @@ def test_a_result_appears_with_its_report_and_once(job, take):
     assert (again.cause, again.frames) == ("", 2), "what is there is not made again"
     assert output.stat().st_mtime_ns == state.st_mtime_ns and state.st_nlink == 1
     assert not list(job.hidden.glob("*-*"))
+
+
+def test_a_folder_of_pictures_appears_whole(job, take):
+    from dataclasses import replace
+
+    from bokehcam.farm import plan, work
+
+    pictures, unit = replace(job, format="png"), plan.units("stream", [str(take)], "png", None)[0]
+    assert work.make(pictures, unit, job.program).frames == 2
+    assert sorted(os.listdir(job.folder / "take")) == [".bokehcam", "000000.png", "000001.png"]
+    assert plan.to_do(pictures, [unit]) == []
+    (job.folder / "take" / "000001.png").unlink()
+    with pytest.raises(plan.UsageError, match="has changed since"):
+        plan.to_do(pictures, [unit])
 
 
 def test_of_two_attempts_one_gives_the_result(tmp_path):

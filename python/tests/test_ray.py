@@ -8,12 +8,11 @@ import pickle
 import subprocess
 import sys
 
+import bokehcam as bc
 import numpy as np
 import pytest
-from farm_fixtures import environment
-
-import bokehcam as bc
 from bokehcam import ray as steps
+from farm_fixtures import environment
 
 SIZE = (40, 30)
 has_ray_data = all(importlib.util.find_spec(name) for name in ("ray", "pyarrow", "pandas"))

@@ -6,11 +6,17 @@ import argparse
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, NoReturn
 
 from . import plan
 from .plan import FarmError, UsageError
-from .work import Job
+from .work import Job, Unit
+
+if TYPE_CHECKING:
+    from .drive import Tally
 
 EXAMPLES = """examples:
   python -m bokehcam.farm recordings/* --out out -- --aperture polygon:6 --quality best
@@ -23,7 +29,7 @@ EXAMPLES = """examples:
 class Parser(argparse.ArgumentParser):
     """Errors are one line, as the program has them."""
 
-    def error(self, message: str):
+    def error(self, message: str) -> NoReturn:
         raise UsageError(message)
 
 
@@ -31,8 +37,8 @@ def parser() -> Parser:
     parser = Parser(
         prog="python -m bokehcam.farm",
         usage="python -m bokehcam.farm [options] SOURCE... --out DIR [-- [stream|render] FLAGS]",
-        description="Blur many recordings (stream) or still pictures (render) on the machines of a Ray cluster, each once. Started "
-        "again, it does what is left.",
+        description="Blur many recordings (stream) or still pictures (render) on the machines of a Ray cluster, each once. "
+        "Started again, it does what is left.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -82,10 +88,10 @@ def parser() -> Parser:
     return parser
 
 
-def number(kind, least):
+def number(kind: Callable[[str], float], least: float) -> Callable[[str], float]:
     """A parser of numbers from `least` on."""
 
-    def parse(text: str):
+    def parse(text: str) -> float:
         value = kind(text)
         if value < least:
             raise argparse.ArgumentTypeError(f"{text}: at least {least}")
@@ -98,16 +104,16 @@ def number(kind, least):
 def sources_of(given: argparse.Namespace) -> list[str]:
     """The sources by name, and those of the list."""
     if given.list is None:
-        return given.sources
+        return list(given.sources)
     try:
         text = sys.stdin.read() if given.list == "-" else Path(given.list).read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         raise UsageError(f"--list {given.list}: {error}") from error
-    return given.sources + [line for line in text.splitlines() if line.strip()]
+    return [*given.sources] + [line for line in text.splitlines() if line.strip()]
 
 
-def planned(given: argparse.Namespace, rest: list[str]):
-    """The job, what belongs to it, and what of it is to be done."""
+def planned(given: argparse.Namespace, rest: list[str]) -> tuple[Job, list[Unit], list[Unit]]:
+    """The job, all that belongs to it, and what of it is to be done."""
     command, flags = plan.split_flags(rest)
     formats = plan.FORMATS[command]
     extension = given.format or formats[0]
@@ -122,6 +128,7 @@ def planned(given: argparse.Namespace, rest: list[str]):
         id=plan.new_id(),
         folder=Path(os.path.abspath(given.out)),
         command=command,
+        format=extension,
         flags=flags,
         environment=plan.with_defaults(environment, settings, given.cpus, given.gpus),
         settings=settings,
@@ -160,16 +167,16 @@ def run(arguments: list[str]) -> int:
             farm = drive.Farm(job, options)
             tally = farm.run(left)
         finally:
-            drive.ray.shutdown()
+            drive.leave()
     return summed_up(tally, len(units), len(units) - len(left), noun, given.out)
 
 
-def stop(signal_number, _frame):
+def stop(_signal: int, _frame: FrameType | None) -> NoReturn:
     """Ends as Ctrl-C does."""
-    raise KeyboardInterrupt(signal_number)
+    raise KeyboardInterrupt
 
 
-def summed_up(tally, all_units: int, there_before: int, noun: str, out: str) -> int:
+def summed_up(tally: Tally, all_units: int, there_before: int, noun: str, out: str) -> int:
     """Says what became of all; the exit code."""
     for text, (source, times) in tally.warnings.items():
         if times > 1:
@@ -199,9 +206,9 @@ def main() -> int:
     except FarmError as error:
         say(f"error: {error}")
         return 1
-    except KeyboardInterrupt as stopped:
+    except KeyboardInterrupt:
         say("stopped: what was finished stays; the same command does the rest")
-        return 128 + (stopped.args[0] if stopped.args else signal.SIGINT)
+        return 128 + signal.SIGINT
 
 
 if __name__ == "__main__":

@@ -5,11 +5,13 @@ Ray is not asked to try again: here it is known which results of a task are ther
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import time
 from collections import deque
 from dataclasses import dataclass, field
+from typing import Any
 
 import ray
 from ray import cloudpickle
@@ -58,14 +60,16 @@ class Tally:
     nodes: set[str] = field(default_factory=set)
     failed: dict[str, Result] = field(default_factory=dict)
     # What was said, of which source first, and how often.
-    warnings: dict[str, list] = field(default_factory=dict)
+    warnings: dict[str, tuple[str, int]] = field(default_factory=dict)
     # Why it was ended before everything had been tried, and whether for wrong arguments.
     ended: str = ""
     refused: bool = False
 
     def rate(self) -> str:
         """How fast frames come from all nodes together."""
-        return f"{self.frames / max(self.elapsed_s, 1e-3):.1f} frames/s over {len(self.nodes)} node{'s' * (len(self.nodes) != 1)}"
+        return (
+            f"{self.frames / max(self.elapsed_s, 1e-3):.1f} frames/s over {len(self.nodes)} node{'s' * (len(self.nodes) != 1)}"
+        )
 
     def add(self, frames: int) -> None:
         """A result is there that has so many frames."""
@@ -81,7 +85,7 @@ def connect(options: Options) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     cloudpickle.register_pickle_by_value(work)
     try:
-        ray.init(address=options.address, logging_level="ERROR", log_to_driver=False)
+        ray.init(address=options.address, logging_level=logging.ERROR, log_to_driver=False)
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise FarmError(f"no Ray cluster: {' '.join(str(error).split())}") from error
     largest = max((node["Resources"].get("CPU", 0) for node in ray.nodes() if node["Alive"]), default=0)
@@ -94,13 +98,18 @@ def tell(line: str) -> None:
     tqdm.write(line, file=sys.stderr)
 
 
+def leave() -> None:
+    """Leaves the cluster, and ends it if it was started here. What still runs is killed."""
+    ray.shutdown()
+
+
 class Farm:
     """A job at work."""
 
     def __init__(self, job: Job, options: Options):
         self.job, self.options, self.tally = job, options, Tally()
         self.perform = ray.remote(num_cpus=options.cpus, num_gpus=options.gpus, max_retries=0)(work.perform)
-        self.running: dict[ray.ObjectRef, Task] = {}
+        self.running: dict[ray.ObjectRef[Outcome], Task] = {}
         self.unfit: dict[str, str] = {}
         self.alive: set[str] = set()
         self.looked_s, self.places = -LOOK_S, 1
@@ -111,9 +120,7 @@ class Farm:
         waiting = deque(Task(units[start : start + size]) for start in range(0, len(units), size))
         job, started_s = ray.put(self.job), time.monotonic()
         # Rewritten at most ten times a second, and only on a terminal.
-        with tqdm(
-            total=len(units), unit="", disable=None, bar_format="{n_fmt}/{total_fmt} |{bar}| {elapsed}, {postfix}"
-        ) as bar:
+        with tqdm(total=len(units), unit="", disable=None, bar_format="{n_fmt}/{total_fmt} |{bar}| {elapsed}{postfix}") as bar:
             try:
                 while waiting or self.running:
                     self.look_around()
@@ -150,14 +157,14 @@ class Farm:
             if task.avoid and self.alive <= {*self.unfit, task.avoid}:
                 ray.cancel(ref)
 
-    def placed(self, task: Task):
+    def placed(self, task: Task) -> Any:
         """The task for nodes that are fit for it; rather not for the one where it failed, while there are others."""
         if self.alive <= {*self.unfit, task.avoid}:
             task.avoid = ""
         nodes = [*self.unfit, *([task.avoid] if task.avoid else [])]
         return self.perform.options(label_selector={"ray.io/node-id": f"!in({','.join(nodes)})"} if nodes else {})
 
-    def note(self, task: Task, ref: ray.ObjectRef) -> list[Task]:
+    def note(self, task: Task, ref: ray.ObjectRef[Outcome]) -> list[Task]:
         """Takes note of what a task did; what is to be done again."""
         try:
             outcome: Outcome = ray.get(ref)
@@ -213,10 +220,11 @@ class Farm:
     def warn(self, result: Result) -> None:
         """Tells a warning of the program once, and counts it."""
         for text in dict.fromkeys(result.warnings):
-            known = self.tally.warnings.setdefault(text.replace(result.unit.source, "it"), [result.unit.source, 0])
-            known[1] += 1
-            if known[1] == 1:
-                tell(f"warning: {result.unit.source}: {text}")
+            general = text.replace(result.unit.source, "it")
+            source, times = self.tally.warnings.get(general, (result.unit.source, 0))
+            self.tally.warnings[general] = source, times + 1
+            if not times:
+                tell(f"warning: {source}: {text}")
 
     def end_early(self, waiting: deque[Task]) -> None:
         """Ends where it can come to nothing."""

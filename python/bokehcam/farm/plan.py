@@ -9,9 +9,10 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from .work import HIDDEN, OURS, REPORTS, Job, Unit, finished, located, read_report, report_of, version_of
 
@@ -209,7 +210,7 @@ def at_work(job: Job) -> Iterator[None]:
         raise FarmError(str(error)) from error
 
 
-def take(lock, job: Job) -> None:
+def take(lock: IO[str], job: Job) -> None:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
@@ -228,7 +229,7 @@ def try_link(job: Job) -> None:
         raise FarmError(f"{job.folder}: its file system has no hard links ({error}); choose another --out") from error
 
 
-def sweep(hidden: Path, of_job) -> None:
+def sweep(hidden: Path, of_job: Callable[[str], bool]) -> None:
     """Removes what jobs have left, if `of_job` says so of them: attempts that were killed, and settings."""
     for entry in os.scandir(hidden):
         ours = OURS.fullmatch(entry.name)

@@ -24,6 +24,9 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+Report = dict[str, Any]
 
 # Within the folder of the results: their reports, and what is ours alone.
 REPORTS = "reports"
@@ -56,11 +59,13 @@ class Unit:
 
 @dataclass(frozen=True)
 class Job:
-    """What all results have in common. `command` is ``stream`` or ``render``, `environment` that of the program's settings."""
+    """What all results have in common. `command` is ``stream`` or ``render``, `format` an extension, `environment` that of the
+    program's settings."""
 
     id: str
     folder: Path
     command: str
+    format: str
     flags: tuple[str, ...]
     environment: dict[str, str]
     settings: str
@@ -76,7 +81,7 @@ class Job:
     def settings_file(self) -> Path:
         return self.hidden / f"{self.id}.toml"
 
-    def asked(self, unit: Unit) -> dict:
+    def asked(self, unit: Unit) -> dict[str, Any]:
         """All that decides what the result looks like. Threads do not."""
         environment = {name: value for name, value in self.environment.items() if name != "BOKEHCAM_THREADS"}
         given = json.dumps([environment, self.settings], sort_keys=True)
@@ -174,13 +179,9 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
     if code:
         cause = in_words(job, place, cause_of(code, said))
         return Result(unit, cause, refused=code == 2, warnings=warnings)
-    report = read_report(report_part) or {} if job.command == "stream" else {"elapsed_s": time.monotonic() - started}
-    report["farm"] = {
-        **job.asked(unit),
-        "output": measure(part),
-        "version": job.version,
-        "host": socket.gethostname(),
-    }
+    report: Report = read_report(report_part) or {} if job.command == "stream" else {"elapsed_s": time.monotonic() - started}
+    made = {"output": measure(part), "version": job.version, "host": socket.gethostname()}
+    report["farm"] = {**job.asked(unit), **made}
     if not complete(report, job.command):
         return Result(unit, "its report does not account for all frames", warnings=warnings)
     final = job.folder / unit.output
@@ -191,28 +192,20 @@ def attempt(job: Job, unit: Unit, program: str, place: Path) -> Result:
         # Another attempt may have put its own there meanwhile.
         if read_report(report_of(job.folder, unit)) != report:
             put_report(job, unit, report, report_part)
-        return Result(unit, frames=frames_of(report), warnings=warnings)
-    if finished(job, unit):
-        return Result(unit, frames=frames_of(report), warnings=warnings)
-    return Result(unit, f"{final} has appeared meanwhile, and is not of this job", warnings=warnings)
+    elif not finished(job, unit):
+        return Result(unit, f"{final} has appeared meanwhile, and is not of this job", warnings=warnings)
+    return Result(unit, frames=frames_of(report), warnings=warnings)
 
 
 def arguments(job: Job, unit: Unit, part: Path, report: Path) -> list[str]:
     """The program's arguments."""
-    common = [
-        "--log-format",
-        "json",
-        "--config",
-        str(job.settings_file),
-        job.command,
-        unit.source,
-        *job.flags,
-        *unit.extra,
-    ]
+    own = ["--log-format", "json", "--config", str(job.settings_file)]
+    common = [*own, job.command, unit.source, *job.flags, *unit.extra]
     if job.command == "render":
         return [*common, "--out", str(part)]
     # In real time frames may be dropped, and a second run would give another result.
-    return [*common, "--to", str(part), "--report", str(report), "--pace", "asap"]
+    to = f"{part}/" if job.format == "png" else str(part)
+    return [*common, "--to", to, "--report", str(report), "--pace", "asap"]
 
 
 def run(job: Job, program: str, given: list[str]) -> tuple[int, list[tuple[str, str]]]:
@@ -273,7 +266,7 @@ def publish(part: Path, final: Path) -> bool:
     return True
 
 
-def put_report(job: Job, unit: Unit, report: dict, part: Path) -> None:
+def put_report(job: Job, unit: Unit, report: Report, part: Path) -> None:
     """Gives a report its place, by way of the file `part`."""
     with open(part, "w", encoding="utf-8") as file:
         json.dump(report, file, indent=2)
@@ -297,7 +290,7 @@ def report_of(folder: Path, unit: Unit) -> Path:
     return folder / REPORTS / f"{unit.output}.json"
 
 
-def read_report(path: Path) -> dict | None:
+def read_report(path: Path) -> Report | None:
     """A report; `None` where there is no file, and an empty one where it holds something else."""
     try:
         report = json.loads(path.read_bytes())
@@ -308,7 +301,7 @@ def read_report(path: Path) -> dict | None:
     return report if isinstance(report, dict) else {}
 
 
-def complete(report: dict, command: str) -> bool:
+def complete(report: Report, command: str) -> bool:
     """Whether a report was written to its end by a farm, and knows of every frame what became of it."""
     if not isinstance(report.get("farm"), dict):
         return False
@@ -317,24 +310,24 @@ def complete(report: dict, command: str) -> bool:
     try:
         frames = report["frames"]
         known = frames["delivered"] + sum(frames["dropped"].values())
-        return frames["in_flight"] == 0 and frames["captured"] == known and frames["delivered"] > 0
+        return bool(frames["in_flight"] == 0 and frames["captured"] == known and frames["delivered"] > 0)
     except (KeyError, TypeError, AttributeError):
         return False
 
 
-def frames_of(report: dict) -> int:
+def frames_of(report: Report) -> int:
     """The frames of a result; a picture is one."""
-    return report["frames"]["delivered"] if "frames" in report else 1
+    return int(report["frames"]["delivered"]) if "frames" in report else 1
 
 
-def measure(output: Path) -> dict:
+def measure(output: Path) -> dict[str, int]:
     """How large a result is: a file's bytes, or the number of files in a folder."""
     if output.is_dir():
         return {"files": len(os.listdir(output))}
     return {"bytes": output.stat().st_size}
 
 
-def finished(job: Job, unit: Unit) -> dict | None:
+def finished(job: Job, unit: Unit) -> Report | None:
     """The whole report of a result that is there, and was made of the same source by the same flags and settings."""
     report = read_report(report_of(job.folder, unit))
     if not report or not complete(report, job.command):
