@@ -1,5 +1,4 @@
 //! What the element allocates: nothing of its own for a picture, and nothing that stays from one start to the next.
-#![allow(missing_docs)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};

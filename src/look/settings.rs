@@ -18,6 +18,9 @@ pub const RIMS: RangeInclusive<f32> = 0.0..=1.0;
 /// Highlight recovery that can be chosen.
 pub const HIGHLIGHTS: RangeInclusive<f32> = 0.0..=1000.0;
 
+/// What [`above_zero`] takes.
+const ABOVE_ZERO: RangeInclusive<f32> = f32::from_bits(1)..=f32::MAX;
+
 /// What settings are about: the headings of the help.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
@@ -106,11 +109,11 @@ settings! {
     /// [default: auto, which is height / 45]
     coc_at_infinity: Strength = "coc-at-infinity" "PX" Blur Strength::from_str, is computed;
     /// The strength by a lens instead: its f-number, with --focal-length and --sensor-width
-    f_number: f32 = "f-number" "N" Blur above_zero, in f32::MIN_POSITIVE..=f32::MAX, is computed;
+    f_number: f32 = "f-number" "N" Blur above_zero, in ABOVE_ZERO, is computed;
     /// Focal length of that lens, in millimetres
-    focal_length_mm: f32 = "focal-length" "MM" Blur above_zero, in f32::MIN_POSITIVE..=f32::MAX, is computed;
+    focal_length_mm: f32 = "focal-length" "MM" Blur above_zero, in ABOVE_ZERO, is computed;
     /// Width of the sensor behind that lens, in millimetres
-    sensor_width_mm: f32 = "sensor-width" "MM" Blur above_zero, in f32::MIN_POSITIVE..=f32::MAX, is computed;
+    sensor_width_mm: f32 = "sensor-width" "MM" Blur above_zero, in ABOVE_ZERO, is computed;
     /// Largest blur radius, in pixels [default: auto, which is 0.06 x height]
     max_coc_px: OrAuto<f32> = "max-coc" "PX" Blur OrAuto::parser(within(0.0..=MOST_RADIUS_PX)), is computed;
     /// Whether depth is fitted to the picture: edges onto colour edges, less noise and flicker

@@ -51,7 +51,7 @@ pub fn stripes((width, height): (u32, u32), index: u64) -> Vec<u8> {
     assert_eq!(width % 4, 0);
     let pixel = |at: u32| {
         let (x, y) = (u64::from(at % width), u64::from(at / width));
-        [if (x + index) / 3 % 2 == 0 { 230 } else { 20 }, (x * 5) as u8, (y * 4) as u8]
+        [if ((x + index) / 3).is_multiple_of(2) { 230 } else { 20 }, (x * 5) as u8, (y * 4) as u8]
     };
     (0..width * height).flat_map(pixel).collect()
 }

@@ -1,5 +1,4 @@
 //! The element as GStreamer and its users meet it.
-#![allow(missing_docs)]
 
 mod common;
 mod formats;

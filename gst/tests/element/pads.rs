@@ -165,3 +165,23 @@ fn there_is_one_pad_depth_and_it_can_be_given_back() {
     element.release_request_pad(&pad);
     assert!(element.request_pad_simple("depth").is_some());
 }
+
+#[test]
+fn a_map_means_the_same_in_every_format() {
+    let numbers: Vec<u16> = map(SIZE).as_chunks().0.iter().map(|bytes| u16::from_le_bytes(*bytes)).collect();
+    let through = |format: &str, scale: f32, bytes_of_map: Vec<u8>| {
+        let mut harness = harness();
+        harness.element().unwrap().set_property("depth-scale", scale);
+        harness.set_src_caps(caps("RGB", SIZE));
+        let mut depth = depth_of(&harness, SIZE);
+        depth.set_src_caps(caps(format, SIZE));
+        depth.push(timed(bytes_of_map, 0, 1)).unwrap();
+        harness.push(timed(stripes(SIZE, 0), 0, 1)).unwrap();
+        bytes(&harness.pull().unwrap())
+    };
+    let usual = through("GRAY16_LE", 1000.0, map(SIZE));
+    let swapped = numbers.iter().flat_map(|number| (5 * number).to_be_bytes()).collect();
+    assert!(through("GRAY16_BE", 5000.0, swapped) == usual);
+    let metres = numbers.iter().flat_map(|&number| (f32::from(number) / 1000.0).to_le_bytes()).collect();
+    assert!(through("GRAY_F32LE", 1.0, metres) == usual);
+}

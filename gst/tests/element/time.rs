@@ -169,7 +169,8 @@ fn pictures_that_come_too_late_are_left_out_and_said_to_be() {
     harness.set_src_caps(caps("RGB", SIZE));
     harness.push(timed(stripes(SIZE, 0), 0, 1)).unwrap();
     harness.pull().unwrap();
-    let late = gst::event::Qos::builder(gst::QOSType::Underflow, 2.0, 60_000_000).timestamp(0 * PERIOD).build();
+    let late =
+        gst::event::Qos::builder(gst::QOSType::Underflow, 2.0, 60_000_000).timestamp(gst::ClockTime::ZERO).build();
     harness.push_upstream_event(late);
     // Two times 60 ms and a period: 160 ms, which is the time of the fifth picture.
     for index in 1..5 {
