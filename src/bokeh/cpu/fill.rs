@@ -229,9 +229,9 @@ fn lay_row(halves: &Rows<PLANES>, unhidden: &Share, y: usize, row: &mut [f32], (
         if below[x] < least { below[x] } else { least }
     };
     let least = |a: f32, b: f32| if a < b { a } else { b };
-    for x in 0..w {
+    for (x, known) in known[..w].iter_mut().enumerate() {
         let (left, right) = (column(x.saturating_sub(1)), column((x + 1).min(w - 1)));
-        known[x] = unhidden.at(least(least(left, right), column(x)));
+        *known = unhidden.at(least(least(left, right), column(x)));
     }
     for (plane, own) in planes.chunks_exact_mut(stride).zip(halves.row(y).chunks_exact(stride)) {
         for ((value, own), known) in plane[..w].iter_mut().zip(own).zip(&*known) {
