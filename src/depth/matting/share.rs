@@ -225,10 +225,11 @@ impl Evidence {
                 (means[0][k][step], means[1][k][step]) = (weighed[k] / STEPS as f32, weighed[k] / (middle + 1) as f32);
             }
         }
-        for k in 0..2 {
-            for step in 0..STEPS {
-                any[k] += means[0][k][step];
-                half[k] += if side.contains(&step) { means[1][k][step] } else { 0.0 };
+        let [wholes, sides] = &means;
+        for (k, (wholes, sides)) in wholes.iter().zip(sides).enumerate() {
+            for (step, (whole, part)) in wholes.iter().zip(sides).enumerate() {
+                any[k] += whole;
+                half[k] += if side.contains(&step) { *part } else { 0.0 };
             }
         }
         if is_thin {
