@@ -24,8 +24,7 @@ def write_pfm(path, values):
 
 
 def flags(settings):
-    text = {True: "on"}
-    return [f"--{name.replace('_', '-')}={text.get(value, value)}" for name, value in settings.items()]
+    return [f"--{name.replace('_', '-')}={value}" for name, value in settings.items()]
 
 
 @pytest.mark.parametrize("settings", [
