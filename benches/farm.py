@@ -2,9 +2,11 @@
 """How a farm scales on this machine, from one node of one core to two, and what a task costs beside its frames.
 
     benches/farm.py --runs 5
+    benches/farm.py --runs 5 --wait 3
 
 Needs Ray (pip install 'bokehcam[ray]') and the program, built here or named by BOKEHCAM. Each run does the same work on one
-node and on two, in turn. With other work on the machine only the ratio means something.
+node and on two, in turn. With other work on the machine only the ratio means something; with --wait each recording is one
+frame and so many seconds of sleep, so that the farm alone is measured.
 """
 
 from __future__ import annotations
@@ -27,10 +29,10 @@ FRAMES = 36
 SMALL = 60
 
 
-def timed(cluster: Cluster, sources: list[Path], out: Path, flags: list[str]) -> float:
+def timed(cluster: Cluster, sources: list[Path], out: Path, flags: list[str], program: Path) -> float:
     """Seconds of all, with the start of the driver and of Ray's workers."""
     began = time.monotonic()
-    farm(*sources, "--out", out, "--format", "y4m", "--address", cluster.address, "--", *flags)
+    farm(*sources, "--out", out, "--format", "y4m", "--address", cluster.address, "--bokehcam", program, "--", *flags)
     return time.monotonic() - began
 
 
@@ -56,38 +58,48 @@ def links(folder: Path, takes: list[Path]) -> list[Path]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=5)
-    runs = parser.parse_args().runs
+    parser.add_argument("--wait", type=float, metavar="SECONDS")
+    given = parser.parse_args()
     print(f"{PROGRAM}, {RECORDINGS} recordings of {FRAMES} frames, 640x360, one thread each")
     clusters = {1: Cluster(), 2: Cluster()}
     try:
         clusters[2].add()
         with tempfile.TemporaryDirectory() as folder:
-            measure(clusters, Path(folder), runs)
+            measure(clusters, Path(folder), given.runs, given.wait)
     finally:
         for cluster in clusters.values():
             cluster.stop()
 
 
-def measure(clusters: dict[int, Cluster], folder: Path, runs: int) -> None:
+def sleeper(folder: Path, wait_s: float) -> Path:
+    """The program, late."""
+    late = folder / "bokehcam"
+    late.write_text(f'#!/bin/sh\ncase "$*" in *" stream "*) sleep {wait_s};; esac\nexec {PROGRAM} "$@"\n')
+    late.chmod(0o755)
+    return late
+
+
+def measure(clusters: dict[int, Cluster], folder: Path, runs: int, wait_s: float | None) -> None:
     takes = [recording(folder / f"take{first}", first) for first in range(RECORDINGS)]
-    flags = ["--loop", "--frames", str(FRAMES)]
+    flags = ["--loop", "--frames", str(1 if wait_s else FRAMES)]
+    program = sleeper(folder, wait_s) if wait_s else PROGRAM
     seconds: dict[int, list[float]] = {1: [], 2: []}
     rates: dict[int, list[float]] = {1: [], 2: []}
     for run in range(runs):
         for nodes, cluster in clusters.items():
             out = folder / f"out{nodes}-{run}"
-            seconds[nodes].append(timed(cluster, takes, out, flags))
-            rates[nodes].append(FRAMES * results_per_s(out, nodes))
+            seconds[nodes].append(timed(cluster, takes, out, flags, program))
+            rates[nodes].append(results_per_s(out, nodes) * (1 if wait_s else FRAMES))
             rate, all_s = rates[nodes][-1], seconds[nodes][-1]
             times = f"{all_s:.1f} s in all, {cpu_s(out):.1f} s of processor time"
-            print(f"run {run + 1}, nodes: {nodes}: {rate:.1f} frames/s, {times}", flush=True)
+            print(f"run {run + 1}, nodes: {nodes}: {rate:.2f} frames/s, {times}", flush=True)
     for what, of in (("frames/s", rates), ("s in all", seconds)):
-        print(f"median: {statistics.median(of[1]):.1f} {what} on one node, {statistics.median(of[2]):.1f} on two")
+        print(f"median: {statistics.median(of[1]):.2f} {what} on one node, {statistics.median(of[2]):.2f} on two")
     ratios = sorted(two / one for one, two in zip(rates[1], rates[2]))
     spread = f"from {ratios[0]:.2f} to {ratios[-1]:.2f}"
     print(f"frames/s, two nodes by one, of each pair: median {statistics.median(ratios):.2f}, {spread}")
     out = folder / "small-out"
-    timed(clusters[2], links(folder, takes), out, ["--frames", "1", "--effect", "none"])
+    timed(clusters[2], links(folder, takes), out, ["--frames", "1", "--effect", "none"], PROGRAM)
     print(f"a task of one frame, not blurred: {2000 / results_per_s(out, 2):.0f} ms of a node")
 
 
