@@ -3,7 +3,6 @@
 
 use std::ops::Range;
 
-use super::tent::MARGIN;
 use super::unpack::{Source, coc_row};
 use crate::bokeh::plan::Share;
 use crate::optics::CocField;
@@ -12,6 +11,8 @@ use crate::optics::CocField;
 pub const TILE_W: usize = 64;
 /// Columns of the picture that are read at once.
 pub const BLOCK: usize = 4 * TILE_W;
+/// Columns beyond a block on both sides that averages of it reach.
+pub const MARGIN: usize = 16;
 /// Rows of a tile.
 pub const TILE_H: usize = 8;
 /// The picture around a tile that can change it, in tiles: the widest filter at full scale in a bin that is in focus,
@@ -21,7 +22,7 @@ const AROUND: (usize, usize) = (1, 3);
 const SHARP_PX: f32 = 0.4;
 
 /// Which columns of a block and its margins a bin takes anything of: a bit for each tile from the one before the block on.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pieces(u8);
 
 impl Pieces {
@@ -192,8 +193,9 @@ fn erode(from: &[bool], scratch: &mut [bool], to: &mut [bool], (across, down): (
 
 #[cfg(test)]
 mod tests {
-    use super::super::tent::WIDE;
     use super::*;
+
+    const WIDE: usize = BLOCK + 2 * MARGIN;
 
     #[test]
     fn the_pieces_of_a_block_are_all_its_columns_and_margins() {
