@@ -5,8 +5,8 @@ use pulp::{Simd, WithSimd};
 
 use super::bin::{BinRows, BinSums};
 use super::fill::{Behind, HalfRows};
-use super::tent::{MARGIN, WIDE};
-use super::tiles::{BLOCK, Pieces, TILE_H, TILE_W, Tiles, widen};
+use super::tent::WIDE;
+use super::tiles::{BLOCK, MARGIN, Pieces, TILE_H, TILE_W, Tiles, widen};
 use super::unpack::{Source, Surfaces};
 use crate::bokeh::plan::{CELL, MAX_BINS, Share};
 

@@ -5,8 +5,8 @@
 use pulp::Simd;
 
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, reduce, sum_row};
-use super::tiles::{BLOCK, Pieces};
+use super::tent::{Means, PLANE, SUMS, ShareAt, WIDE, reduce, sum_row};
+use super::tiles::{BLOCK, MARGIN, Pieces};
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
 use crate::compute::aligned::Line;

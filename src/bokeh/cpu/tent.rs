@@ -3,14 +3,12 @@
 
 use pulp::Simd;
 
-use super::tiles::{BLOCK, Pieces};
+use super::tiles::{BLOCK, MARGIN, Pieces};
 use super::unpack::{Piece, Surfaces};
 use crate::bokeh::plan::{HIDING_SHARE, Share};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, store};
 
-/// Columns beyond a block on both sides that its averages reach.
-pub const MARGIN: usize = 16;
 /// Columns of a block and its margins.
 pub const WIDE: usize = BLOCK + 2 * MARGIN;
 /// Values of a plane of a block: a line more than needed, as planes at multiples of 4096 bytes hinder each other.

@@ -4,7 +4,6 @@
 use std::ops::Range;
 
 use super::pixels::Radii;
-use super::tent::MARGIN;
 use super::unpack::{Source, coc_row};
 use crate::bokeh::plan::Share;
 use crate::optics::CocField;
@@ -13,6 +12,8 @@ use crate::optics::CocField;
 pub const TILE_W: usize = 64;
 /// Columns of the picture that are read at once.
 pub const BLOCK: usize = 4 * TILE_W;
+/// Columns beyond a block on both sides that averages of it reach.
+pub const MARGIN: usize = 16;
 /// Rows of a tile.
 pub const TILE_H: usize = 8;
 /// The picture around a tile that can change it, in tiles: the widest filter at full scale in a bin that is in focus,
@@ -195,8 +196,9 @@ fn erode(from: &[bool], scratch: &mut [bool], to: &mut [bool], (across, down): (
 
 #[cfg(test)]
 mod tests {
-    use super::super::tent::WIDE;
     use super::*;
+
+    const WIDE: usize = BLOCK + 2 * MARGIN;
 
     #[test]
     fn the_pieces_of_a_block_are_all_its_columns_and_margins() {
