@@ -24,7 +24,8 @@ mod tee;
 mod y4m;
 pub mod yuv;
 #[cfg(any(feature = "camera", feature = "pipewire"))]
-mod yuyv;
+#[doc(hidden)]
+pub mod yuyv;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;

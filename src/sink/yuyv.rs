@@ -5,18 +5,25 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::frame::ColorImage;
 
 /// Encodes pictures of an even number of pixels.
-pub(super) struct Encoder {
+pub struct Encoder {
     arch: Arch,
 }
 
 impl Encoder {
-    pub(super) fn new() -> Self {
+    /// For this processor.
+    pub fn new() -> Self {
         Self { arch: Arch::new() }
     }
 
     /// Encodes `picture` into `yuyv`, which has two bytes for each of its pixels.
-    pub(super) fn encode(&self, picture: &ColorImage, yuyv: &mut [u8]) {
+    pub fn encode(&self, picture: &ColorImage, yuyv: &mut [u8]) {
         self.arch.dispatch(Yuyv { rgb: &picture.rgb, yuyv });
+    }
+}
+
+impl Default for Encoder {
+    fn default() -> Self {
+        Self::new()
     }
 }
 

@@ -136,6 +136,32 @@ fn bench_measures_every_combination() {
 }
 
 #[test]
+fn bench_measures_each_stage_of_the_chain() {
+    let home = tempfile::tempdir().unwrap();
+    let recording = recording(home.path());
+    let args = ["bench", "--chain", &recording, "--quality", "draft,balanced", "--frames", "3", "--backend", "cpu"];
+    let ran = run(&[&args[..], &["--json"]].concat());
+    assert_eq!((ran.code, ran.stderr.as_str(), ran.stdout.lines().count()), (0, "", 1));
+    let chain: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    assert_eq!((&chain["size_px"], &chain["frames"]), (&serde_json::json!([64, 48]), &serde_json::json!(3)));
+    let stages = chain["stages"].as_array().unwrap();
+    let names: Vec<&str> = stages.iter().map(|stage| stage["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["decode", "read depth", "focus", "refine", "matte", "memory", "encode"]);
+    let sum_ms: f64 = stages.iter().map(|stage| stage["cpu_ms"].as_f64().unwrap()).sum();
+    let levels = chain["levels"].as_array().unwrap();
+    assert_eq!((&levels[0]["quality"], &levels[1]["quality"], levels.len()), (&"draft".into(), &"balanced".into(), 2));
+    for level in levels {
+        let [cpu_ms, blur_ms] = [&level["cpu_ms"], &level["blur"]["cpu_ms"]].map(|ms| ms.as_f64().unwrap());
+        assert!(blur_ms > 0.0 && (cpu_ms - blur_ms - sum_ms).abs() < 1e-6, "{level}: {sum_ms}");
+        assert!(level["frames_per_s"].as_f64().unwrap() <= 1e3 * chain["cores"].as_f64().unwrap() / cpu_ms + 1e-6);
+    }
+    let table = run(&args);
+    assert_eq!((table.code, table.stdout.matches(" frames a second: ").count()), (0, 2), "{}", table.stdout);
+    let refused = run(&["bench", "--chain", &recording, "--sizes", "64x48"]);
+    assert_eq!((refused.code, refused.stdout.as_str()), (2, ""), "{}", refused.stderr);
+}
+
+#[test]
 fn y4m_on_standard_output_is_nothing_but_y4m() {
     let home = tempfile::tempdir().unwrap();
     let recording = recording(home.path());

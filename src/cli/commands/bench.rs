@@ -1,4 +1,6 @@
-//! `bench`: how fast the blur is on this machine.
+//! `bench`: how fast the blur is on this machine, and the whole chain of a stream.
+
+mod chain;
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -24,7 +26,7 @@ use crate::names::named;
 use crate::optics::CocField;
 use crate::pipeline::still::{Depth, coc_and_depth};
 use crate::scene::{Scene, View};
-use crate::source::{self, DepthChoice, Size};
+use crate::source::{self, DepthChoice, Size, SourceName};
 
 /// Frames before those that are measured: caches fill, and the processor's clock rises.
 const WARM_UP_FRAMES: usize = 2;
@@ -33,12 +35,15 @@ const WARM_UP_FRAMES: usize = 2;
 ///
 /// Blurs one frame of the synthetic scene again and again, one at a time, for every combination of the lists given.
 /// The time is that of one frame, in milliseconds, from handing it over until it is back.
+/// With --chain: the frames of a source go through all that a stream does, one at a time, and each stage is measured.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
   bokehcam bench
   bokehcam bench --sizes 1280x720 --quality draft,fast,balanced --threads 1,2,4
-  bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl")]
+  bokehcam bench --sizes 1920x1080 --coc 10,20,40 --frames 100 --json > bench.jsonl
+  bokehcam bench --chain
+  bokehcam bench --chain recordings/portrait --refine on --quality draft,balanced")]
 pub struct BenchCommand {
     /// Picture sizes
     #[arg(long, value_name = "WxH", value_delimiter = ',', default_value = "640x480,1280x720,1920x1080")]
@@ -46,9 +51,9 @@ pub struct BenchCommand {
     /// Blur radii at infinity, in pixels [default: height / 45]
     #[arg(long, value_name = "PX", value_delimiter = ',', value_parser = within(0.0..=MOST_RADIUS_PX))]
     coc: Vec<f32>,
-    /// Quality levels
+    /// Quality levels [default: balanced; with --chain all]
     #[arg(id = "benched_quality", long = "quality", value_name = "LEVELS", value_delimiter = ',',
-          default_value = Quality::default().name(), value_parser = options::named::<Quality>())]
+          value_parser = options::named::<Quality>())]
     quality: Vec<Quality>,
     /// Numbers of threads of the CPU backend [default: one per core]
     #[arg(id = "benched_threads", long = "threads", value_name = "N", value_delimiter = ',',
@@ -73,6 +78,13 @@ pub struct BenchCommand {
     /// Also the median of each pass, in milliseconds
     #[arg(long)]
     passes: bool,
+    /// Measure all that a stream does instead: reading, depth, blur at each quality, and writing for a virtual camera; from a
+    /// recording, a photo, `demo` or `synthetic`
+    #[arg(long, value_name = "SOURCE", num_args = 0..=1, default_missing_value = "demo", value_parser = options::source_name(),
+          conflicts_with_all = ["sizes", "coc", "scene", "passes"])]
+    chain: Option<SourceName>,
+    #[command(flatten)]
+    depth: options::Depth,
     #[command(flatten)]
     blur: options::Blur,
 }
@@ -107,6 +119,9 @@ struct Measured {
 /// # Errors
 /// The options do not fit each other, there is no such executor, or it failed.
 pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
+    if let Some(source) = &command.chain {
+        return chain::run(command, source, given);
+    }
     if command.blur.depth.is_elsewhere() || command.blur.depth == DepthChoice::Stereo {
         let what = "--depth is for `stream`: the scene that is measured has its own depth; leave it out, or use none";
         return Err(CliError::Usage(what.to_string()));
@@ -129,18 +144,14 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
     if !command.json {
         print(b"size        coc px  quality    p50 ms   p95 ms   max ms     fps  executor\n")?;
     }
-    let threads: Vec<Option<usize>> = match &command.threads[..] {
-        [] => vec![None],
-        list => list.iter().map(|&threads| Some(usize::from(threads))).collect(),
-    };
+    let levels = if command.quality.is_empty() { &[Quality::default()][..] } else { &command.quality };
     for size in &command.sizes {
         let (color, depth) = synthetic_frame(command.scene, (size.width, size.height));
         let default_coc_px = [size.height as f32 * COC_AT_INFINITY_PER_HEIGHT];
         let radii_px = if command.coc.is_empty() { &default_coc_px[..] } else { &command.coc };
         for &coc_px in radii_px {
-            for &quality in &command.quality {
-                for &threads in &threads {
-                    let computing = Computing { backend: command.backend, adapter: command.adapter.clone(), threads };
+            for &quality in levels {
+                for computing in command.computings() {
                     let measured = measure(command, &look, (&color, &depth), coc_px, quality, &computing)?;
                     print(measured.line(command.json, command.passes).as_bytes())?;
                 }
@@ -148,6 +159,17 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
         }
     }
     Ok(())
+}
+
+impl BenchCommand {
+    /// What runs the blur, for each number of threads that was asked for.
+    fn computings(&self) -> Vec<Computing> {
+        let of = |threads| Computing { backend: self.backend, adapter: self.adapter.clone(), threads };
+        match &self.threads[..] {
+            [] => vec![of(None)],
+            list => list.iter().map(|&threads| of(Some(usize::from(threads)))).collect(),
+        }
+    }
 }
 
 /// Measures one combination of settings: blurs the same picture `command.frames` times after a warm-up.

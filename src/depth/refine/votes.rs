@@ -107,8 +107,7 @@ impl Votes {
     #[inline(always)]
     pub fn surface(&self, current: f32, jump: f32) -> f32 {
         let (mut low, mut high) = self.range;
-        // Of what is left; none before anything is split.
-        let mut sum = None;
+        let mut mean = current;
         while high - low > jump_at(jump, high) {
             let middle = 0.5 * (low + high);
             let halves = self.split(low, middle, high);
@@ -118,19 +117,15 @@ impl Votes {
             let far = halves.far * if is_far { self.loyalty } else { 1.0 };
             let before = (low, high);
             if near > far {
-                (low, sum) = (halves.near_low, Some(halves.near));
+                (low, mean) = (halves.near_low, halves.near_moment / halves.near);
             } else {
-                (high, sum) = (halves.far_high, Some(halves.far));
+                (high, mean) = (halves.far_high, halves.far_moment / halves.far);
             }
             // Rounding may leave nothing to split.
             if (low, high) == before {
                 break;
             }
         }
-        let mean = match sum {
-            Some(sum) => self.moment(low, high) / sum,
-            None => current,
-        };
         let slack = 0.5 * jump_at(jump, current);
         let is_on_it = (current >= low - slack) & (current <= high + slack) & ((current - mean).abs() < slack);
         if is_on_it { current } else { mean }
@@ -141,6 +136,7 @@ impl Votes {
     #[inline(always)]
     fn split(&self, low: f32, middle: f32, high: f32) -> Halves {
         let (mut near, mut far) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+        let (mut near_moment, mut far_moment) = ([0.0_f32; LANES], [0.0_f32; LANES]);
         let (mut near_low, mut far_high) = ([high; LANES], [low; LANES]);
         // Selections instead of branches, and a sum per lane: so the loop becomes vector code.
         for k in 0..ROWS {
@@ -149,27 +145,23 @@ impl Votes {
                 let (v, w) = (depth[lane], weight[lane]);
                 let is_near = (v > middle) & (v <= high) & (w > 0.0);
                 let is_far = (v <= middle) & (v >= low) & (w > 0.0);
-                near[lane] += if is_near { w } else { 0.0 };
-                far[lane] += if is_far { w } else { 0.0 };
+                let (w_near, w_far) = (if is_near { w } else { 0.0 }, if is_far { w } else { 0.0 });
+                near[lane] += w_near;
+                far[lane] += w_far;
+                near_moment[lane] += w_near * v;
+                far_moment[lane] += w_far * v;
                 near_low[lane] = if is_near & (v < near_low[lane]) { v } else { near_low[lane] };
                 far_high[lane] = if is_far & (v > far_high[lane]) { v } else { far_high[lane] };
             }
         }
-        Halves { near: sum(near), far: sum(far), near_low: least(near_low), far_high: largest(far_high) }
-    }
-
-    /// The sum of weight times inverse depth from `low` to `high`.
-    #[inline(always)]
-    fn moment(&self, low: f32, high: f32) -> f32 {
-        let mut moment = [0.0_f32; LANES];
-        for (depth, weight) in self.depth.iter().zip(&self.weight) {
-            for lane in 0..LANES {
-                let (v, w) = (depth[lane], weight[lane]);
-                let w = if (v >= low) & (v <= high) { w } else { 0.0 };
-                moment[lane] += w * v;
-            }
+        Halves {
+            near: sum(near),
+            far: sum(far),
+            near_moment: sum(near_moment),
+            far_moment: sum(far_moment),
+            near_low: least(near_low),
+            far_high: largest(far_high),
         }
-        sum(moment)
     }
 }
 
@@ -178,6 +170,9 @@ struct Halves {
     /// Sums of the weights.
     near: f32,
     far: f32,
+    /// Sums of weight times inverse depth.
+    near_moment: f32,
+    far_moment: f32,
     /// The votes nearest to the middle on either side.
     near_low: f32,
     far_high: f32,
