@@ -271,8 +271,8 @@ fn slices() {
     let (mut blurred, mut brighter) = (codes.clone(), light.clone());
     let mut frame = || {
         let go_on = || ControlFlow::Continue(());
-        slices.blur(&codes, Radii::Each(&radii), &mut blurred, go_on).expect("a frame");
-        slices.blur(&light, Radii::Each(&radii), &mut brighter, go_on).expect("a frame");
+        assert!(slices.blur(&codes, Radii::Each(&radii), &mut blurred, go_on).expect("a frame").is_continue());
+        assert!(slices.blur(&light, Radii::Each(&radii), &mut brighter, go_on).expect("a frame").is_continue());
     };
     frame();
     let before = ALLOCATIONS.load(Ordering::Relaxed);
