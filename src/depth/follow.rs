@@ -13,8 +13,8 @@ const IN_FOCUS: std::ops::RangeInclusive<f32> = 0.8..=1.25;
 const LOOKS: usize = 160;
 /// Less of a picture is no subject.
 const LEAST_SHARE: f32 = 0.005;
-/// The subject reaches from here to there: what is beyond is hands, chairs and noise.
-const REACHES: [f32; 2] = [0.04, 0.96];
+/// The subject reaches from here to there, across and down: what is beyond is hands, chairs and noise; but hair is on top.
+const REACHES: [[f32; 2]; 2] = [[0.04, 0.96], [0.01, 0.96]];
 /// Its width and height are at most this of the part shown, and so much is left above it.
 const FILLS: [f32; 2] = [0.75, 0.8];
 const HEADROOM: f32 = 0.09;
@@ -129,8 +129,8 @@ impl Follower {
             });
             (at.unwrap_or_default() as f32 + 0.5) / counts.len() as f32
         };
-        let [left, right] = REACHES.map(|share| place(&self.columns, share));
-        let [top, bottom] = REACHES.map(|share| place(&self.rows, share));
+        let [left, right] = REACHES[0].map(|share| place(&self.columns, share));
+        let [top, bottom] = REACHES[1].map(|share| place(&self.rows, share));
         let zoom = (FILLS[0] / (right - left).max(1e-3)).min(FILLS[1] / (bottom - top).max(1e-3));
         let zoom = zoom.clamp(1.0, self.most_zoom);
         let middle = 0.5 * (top + bottom);
