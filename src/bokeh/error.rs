@@ -24,7 +24,7 @@ pub enum BokehError {
     TooWide {
         /// Largest radius of the settings, in pixels.
         radius_px: f32,
-        /// [`Settings::most_radius_px`].
+        /// [`most_radius_px`](super::Settings::most_radius_px).
         most_px: f32,
         /// Width and height of the pictures.
         size: (u32, u32),
