@@ -96,8 +96,11 @@ impl Tiles {
         Pieces::of(|k| {
             // Beyond the picture its outermost columns repeat.
             let column = (block * (BLOCK / TILE_W) + k).saturating_sub(1).min(self.across - 1);
-            let tile = row * self.across + column;
-            !self.idle[tile] && share.meets(self.ranges[tile])
+            // Averages reach into the tiles beside one that a bin needs.
+            let columns = column.saturating_sub(1)..(column + 2).min(self.across);
+            let mut rows = row.saturating_sub(1)..(row + 2).min(self.down);
+            let is_idle = |at: usize| self.idle[at * self.across..][columns.clone()].iter().all(|&idle| idle);
+            share.meets(self.ranges[row * self.across + column]) && !rows.all(is_idle)
         })
     }
 
