@@ -226,9 +226,11 @@ impl Evidence {
             }
         }
         for k in 0..2 {
-            for step in 0..STEPS {
-                any[k] += means[0][k][step];
-                half[k] += if side.contains(&step) { means[1][k][step] } else { 0.0 };
+            for mean in means[0][k] {
+                any[k] += mean;
+            }
+            for mean in &means[1][k][side.clone()] {
+                half[k] += mean;
             }
         }
         if is_thin {
