@@ -157,6 +157,8 @@ fn bench_measures_each_stage_of_the_chain() {
     }
     let table = run(&args);
     assert_eq!((table.code, table.stdout.matches(" frames a second: ").count()), (0, 2), "{}", table.stdout);
+    let demonstration = run(&["bench", "--chain", "--quality", "draft", "--frames", "1", "--backend", "cpu"]);
+    assert!(demonstration.code == 0 && demonstration.stdout.contains("640x360"), "{}", demonstration.stderr);
     let refused = run(&["bench", "--chain", &recording, "--sizes", "64x48"]);
     assert_eq!((refused.code, refused.stdout.as_str()), (2, ""), "{}", refused.stderr);
 }

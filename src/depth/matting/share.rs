@@ -225,11 +225,12 @@ impl Evidence {
                 (means[0][k][step], means[1][k][step]) = (weighed[k] / STEPS as f32, weighed[k] / (middle + 1) as f32);
             }
         }
-        let [wholes, sides] = &means;
-        for (k, (wholes, sides)) in wholes.iter().zip(sides).enumerate() {
-            for (step, (whole, part)) in wholes.iter().zip(sides).enumerate() {
-                any[k] += whole;
-                half[k] += if side.contains(&step) { *part } else { 0.0 };
+        for k in 0..2 {
+            for mean in means[0][k] {
+                any[k] += mean;
+            }
+            for mean in &means[1][k][side.clone()] {
+                half[k] += mean;
             }
         }
         if is_thin {

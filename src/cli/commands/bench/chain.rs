@@ -23,7 +23,7 @@ use crate::link::pool::Pooled;
 use crate::look::{BackgroundMemory, Look, Strength};
 use crate::pipeline::{CocMaker, Finish};
 use crate::sink::yuyv::Encoder;
-use crate::source::{self, DepthFrom, Frames, Source, SourceName};
+use crate::source::{self, DepthFrom, Frames, Kind, Source, SourceName};
 
 /// Frames before those that are measured: caches fill, and what lies behind begins to be known.
 const WARM_UP_FRAMES: u64 = 8;
@@ -77,7 +77,7 @@ struct Chain {
 /// # Errors
 /// The source cannot be read or is a camera, or a stage failed.
 pub(super) fn run(command: &BenchCommand, name: &SourceName, given: &Given) -> Result<(), CliError> {
-    if !name.devices().is_empty() || matches!(name.kind(), source::Kind::Camera) {
+    if !name.devices().is_empty() || matches!(name.kind(), Kind::Camera) {
         let what =
             "--chain: a camera gives frames when it takes them; use a recording of it (bokehcam record), or demo";
         return Err(CliError::Usage(what.to_string()));
@@ -151,7 +151,12 @@ fn measure(
     let look = look::look(&command.blur, &options::LookSettings::default())?;
     let frames = WARM_UP_FRAMES + u64::from(command.frames);
     let options = source::Options {
-        frames: Frames { repeat: true, frames: Some(frames), ..Frames::default() },
+        // The demonstration and the synthetic scene have no end of their own.
+        frames: Frames {
+            repeat: !matches!(name.kind(), Kind::Demo | Kind::Synthetic),
+            frames: Some(frames),
+            ..Frames::default()
+        },
         depth: command.depth.clone(),
         depth_choice: command.blur.depth.clone(),
         computing: computing.clone(),
@@ -312,10 +317,9 @@ impl Chain {
         for (rate, level) in affords {
             let _ = match level {
                 Some(level) => writeln!(text, "{rate} frames a second: --quality {level}"),
-                None => writeln!(
-                    text,
-                    "{rate} frames a second: not at any of these; try smaller pictures, --refine off, or --quality draft"
-                ),
+                None => {
+                    writeln!(text, "{rate} frames a second: not at any of these; try smaller pictures, or --refine off")
+                }
             };
         }
         text
