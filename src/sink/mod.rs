@@ -23,7 +23,6 @@ mod target;
 mod tee;
 mod y4m;
 pub mod yuv;
-#[cfg(any(feature = "camera", feature = "pipewire"))]
 #[doc(hidden)]
 pub mod yuyv;
 

@@ -26,6 +26,7 @@ use crate::frame::DepthMap;
 #[cfg(feature = "camera")]
 use crate::layout::Content;
 use crate::recording::{Pair, Recording};
+#[cfg(feature = "camera")]
 use crate::v4l2::live::Wish;
 
 /// Picture size of the synthetic scene.
