@@ -13,7 +13,7 @@ const HEIGHT: f32 = 44.0;
 const LEAST_WIDTH: f32 = 330.0;
 
 /// With less there is no line to drag: the bar is there again once the panel is closed.
-const TOO_NARROW: f32 = 170.0;
+const TOO_NARROW: f32 = 200.0;
 
 /// What the bar remembers.
 #[derive(Debug, Default)]

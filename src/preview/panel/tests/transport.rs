@@ -41,7 +41,7 @@ fn in_a_small_window_the_bar_makes_room_for_the_panel() {
         let panel = window.panel.sheet.rect().unwrap();
         let bar = window.ctx.memory(|memory| memory.area_rect(egui::Id::unique("transport")));
         assert!(bar.is_none_or(|bar| !bar.intersects(panel)), "{width}: {bar:?} over {panel}");
-        assert_eq!(bar.is_some(), width >= 640);
+        assert_eq!(bar.is_some(), width >= 640, "{width}: {bar:?} beside {panel}");
     }
 }
 
