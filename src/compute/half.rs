@@ -12,9 +12,10 @@ const DROPPED: u32 = 12;
 /// 2^-105 takes the exponents that matter to the lowest that a float has.
 const DOWN: f32 = f32::from_bits((127 - 105) << 23);
 const UP: f32 = f32::from_bits((127 + 105) << 23);
-/// The smallest number that is not 0, and the largest.
+/// The smallest number that is not 0.
 const LEAST: f32 = 1.0 / (1 << 21) as f32;
-const MOST: f32 = 1023.0;
+/// The largest number.
+pub const MOST: f32 = 1023.0;
 
 /// The number nearest to `value`.
 #[inline(always)]

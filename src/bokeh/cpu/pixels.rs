@@ -1,6 +1,7 @@
 //! What pictures are made of, and their circles of confusion, as they lie in memory.
 
 use super::encode::{CHUNK, EncodeTable};
+use crate::compute::half;
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
@@ -15,8 +16,8 @@ pub enum Pixels<'a> {
 }
 
 impl Pixels<'_> {
-    /// The brightest light: the largest half float. Filters sum products, which stay finite.
-    pub const MOST_LIGHT: f32 = 65_504.0;
+    /// The brightest light, as bins have no larger number.
+    pub const MOST_LIGHT: f32 = half::MOST;
 
     /// Linear light as it is blurred.
     #[inline(always)]
