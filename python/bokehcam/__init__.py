@@ -54,7 +54,8 @@ __all__ = [
     "write_image",
 ]
 
-_MODULES = ("_aperture", "_blur", "_coc", "_core", "_depth", "_files", "_recording", "_scene", "_still")
+# The native half comes last: what others wrap has the same name there.
+_MODULES = ("_aperture", "_blur", "_coc", "_depth", "_files", "_recording", "_scene", "_still", "_core")
 
 
 def __getattr__(name: str) -> Any:

@@ -37,7 +37,7 @@ def blur(
 
     Args:
         image: ``(H, W, 3)`` or a batch ``(N, H, W, 3)``; ``uint8`` is sRGB, ``float32`` linear light (1 = white, more is
-            brighter; below 0 counts as 0, above 1023 as that).
+            brighter; below 0 counts as 0, above 65504 as that).
         coc: ``(H, W)`` or ``(N, H, W)``, ``float32``: the circle of confusion of every pixel as a signed radius in pixels,
             positive behind the focal plane, negative in front of it. One map may serve a whole batch. A number >= 0 blurs all
             alike.

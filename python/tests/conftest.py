@@ -1,6 +1,7 @@
 """What the tests stand on: the repository's recordings, the built program, and a scene with its truth."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,9 @@ import bokehcam as bc
 sys.path.insert(0, str(Path(__file__).parent))
 
 from farm_fixtures import Cluster  # noqa: E402
+
+# A job in the background of a script is started deaf to Ctrl-C, and so would be what tests interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 

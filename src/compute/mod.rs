@@ -3,7 +3,6 @@
 pub mod aligned;
 #[cfg(feature = "gpu")]
 pub mod device;
-pub mod half;
 pub mod memory;
 pub mod simd;
 pub mod thread_pool;

@@ -5,8 +5,9 @@ use pulp::{Simd, WithSimd};
 
 use super::bin::{BinRows, BinSums};
 use super::fill::{Behind, HalfRows};
-use super::tent::WIDE;
-use super::tiles::{BLOCK, MARGIN, Pieces, TILE_H, TILE_W, Tiles, widen};
+use super::tent::{MARGIN, WIDE};
+use super::tiles::BLOCK;
+use super::tiles::{TILE_H, TILE_W, Tiles, widen};
 use super::unpack::{Source, Surfaces};
 use crate::bokeh::plan::{CELL, MAX_BINS, Share};
 
@@ -109,7 +110,6 @@ impl Band<'_> {
             return;
         }
         let mut surfaces: Surfaces<WIDE> = Surfaces::new();
-        let (mut tile_row, mut pieces) = (usize::MAX, [Pieces::NONE; MAX_BINS]);
         let columns = columns_of(block, self.source.size.0);
         let height = self.source.size.1 as isize;
         let (first, end) = (self.rows.start as isize, self.rows.end as isize);
@@ -134,33 +134,19 @@ impl Band<'_> {
                     behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
                 }
             }
-            if is_filled {
-                // What was filled in is not what its tile says.
-                let mut range = (f32::INFINITY, f32::NEG_INFINITY);
-                widen(&mut range, &surfaces.back.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
-                if surfaces.mixed {
-                    widen(&mut range, &surfaces.front.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
-                }
-                for (pieces, bin) in pieces.iter_mut().zip(&self.bins) {
-                    let meets = |bin: &BinRows<'_>| bin.share.is_none_or(|share| share.meets(range));
-                    *pieces = if bin.as_ref().is_some_and(meets) { Pieces::ALL } else { Pieces::NONE };
-                }
-            } else if inside / TILE_H != tile_row {
-                tile_row = inside / TILE_H;
-                for (pieces, bin) in pieces.iter_mut().zip(&self.bins) {
-                    let of_share = |share: &Share| self.tiles.pieces(share, block, tile_row);
-                    let of_bin = |bin: &BinRows<'_>| bin.share.as_ref().map_or(Pieces::ALL, of_share);
-                    *pieces = bin.as_ref().map_or(Pieces::NONE, of_bin);
-                }
+            let mut range = (f32::INFINITY, f32::NEG_INFINITY);
+            widen(&mut range, &surfaces.back.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
+            if surfaces.mixed {
+                widen(&mut range, &surfaces.front.0[3][..columns + 2 * MARGIN], |coc_px| coc_px);
             }
-            let of_bins = self.bins.iter_mut().zip(&mut self.sums.0).zip(pieces);
-            for ((bin, sums), pieces) in of_bins.zip(active).filter_map(|(of_bin, active)| active.then_some(of_bin)) {
+            for ((bin, sums), _) in self.bins.iter_mut().zip(&mut self.sums.0).zip(active).filter(|(_, active)| *active)
+            {
                 let Some(bin) = bin else { continue };
                 match bin.scale {
-                    1 => bin.add::<V, 1>(simd, sums, (block, columns), first, y, &surfaces, pieces),
-                    2 => bin.add::<V, 2>(simd, sums, (block, columns), first, y, &surfaces, pieces),
-                    4 => bin.add::<V, 4>(simd, sums, (block, columns), first, y, &surfaces, pieces),
-                    _ => bin.add::<V, 8>(simd, sums, (block, columns), first, y, &surfaces, pieces),
+                    1 => bin.add::<V, 1>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    2 => bin.add::<V, 2>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    4 => bin.add::<V, 4>(simd, sums, (block, columns), first, y, &surfaces, range),
+                    _ => bin.add::<V, 8>(simd, sums, (block, columns), first, y, &surfaces, range),
                 }
             }
         }

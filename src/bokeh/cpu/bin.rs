@@ -5,12 +5,11 @@
 use pulp::Simd;
 
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::tent::{Means, PLANE, SUMS, ShareAt, WIDE, reduce, sum_row};
-use super::tiles::{BLOCK, MARGIN, Pieces};
+use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, reduce, sum_row};
+use super::tiles::BLOCK;
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
 use crate::compute::aligned::Line;
-use crate::compute::half::{Half, store_halves};
 use crate::compute::simd::{load, store};
 
 /// One bin's memory of a band.
@@ -26,7 +25,7 @@ pub struct BinRows<'a> {
     /// Rows of the bin in this band.
     pub rows: usize,
     /// As [`Strips`](super::rows::Strips) has it.
-    pub out: &'a mut [Half],
+    pub out: &'a mut [f32],
     pub across: usize,
     /// `[row of cells][CELL_PLANES][across]`.
     pub cells: &'a mut [f32],
@@ -37,8 +36,6 @@ pub struct BinRows<'a> {
 /// Sums of a bin: two of its rows that are being filled, the last one done, and the row of cells.
 #[derive(Clone)]
 pub struct BinSums {
-    /// Whether anything was added to each of the rows.
-    touched: [bool; 2],
     rows: Line<[[[f32; WIDE]; SUMS]; 2]>,
     cells: CellSums,
     means: Means,
@@ -50,7 +47,6 @@ type CellSums = Line<[[f32; PLANE]; CELL_PLANES]>;
 impl BinSums {
     pub fn new() -> Self {
         let mut empty = Self {
-            touched: [false; 2],
             rows: Line([[[0.0; WIDE]; SUMS]; 2]),
             cells: Line([[0.0; PLANE]; CELL_PLANES]),
             means: Line([[0.0; PLANE]; SUMS]),
@@ -103,7 +99,7 @@ impl BinRows<'_> {
             if std::mem::take(&mut self.filled[row * blocks + block]) {
                 let first = row * self.across + x0 / STRIP;
                 let count = (width / STRIP).min(self.across - x0 / STRIP);
-                self.out[first * STRIP_CELLS..][..count * STRIP_CELLS].fill(0);
+                self.out[first * STRIP_CELLS..][..count * STRIP_CELLS].fill(0.0);
             }
         }
         let across = self.size.0.div_ceil(CELL);
@@ -116,7 +112,7 @@ impl BinRows<'_> {
 
     /// Row `row` of the strip at column `x`.
     #[inline(always)]
-    fn strip_row(&mut self, x: usize, row: usize) -> &mut [Half] {
+    fn strip_row(&mut self, x: usize, row: usize) -> &mut [f32] {
         &mut self.out[strip_row(self.across, x, row)..][..STRIP_ROW]
     }
 
@@ -150,12 +146,13 @@ impl BinRows<'_> {
         first: isize,
         y: isize,
         surfaces: &Surfaces<WIDE>,
-        pieces: Pieces,
+        range: (f32, f32),
     ) {
         let rows = self.rows as isize;
+        let meets = self.share.is_none_or(|share| share.meets(range));
         if S == 1 {
             if (0..rows).contains(&(y - first)) {
-                self.whole_row(simd, (block, columns), (y - first) as usize, sums, surfaces, pieces);
+                self.whole_row(simd, (block, columns), (y - first) as usize, sums, meets.then_some(surfaces));
             }
             return;
         }
@@ -167,36 +164,30 @@ impl BinRows<'_> {
         if from < 0 || upper >= rows {
             return;
         }
-        let upper_is = usize::from(upper.rem_euclid(2) != 0);
         let [even, odd] = &mut sums.rows.0;
-        let (above, below) = if upper_is == 0 { (even, odd) } else { (odd, even) };
-        if pieces != Pieces::NONE {
-            sums.touched = [true; 2];
+        let (above, below) = if upper.rem_euclid(2) == 0 { (even, odd) } else { (odd, even) };
+        if meets {
             let rise = (k as f32 + 0.5) / (S * S) as f32;
             sum_row(
                 simd,
                 &ShareAt::new(simd, &self.share),
                 surfaces,
-                (pieces, columns),
+                columns,
                 [1.0 / S as f32 - rise, rise],
                 above,
                 below,
             );
         }
         if k == s - 1 {
-            let touched = std::mem::take(&mut sums.touched[upper_is]);
-            if upper >= 0 && touched {
+            if upper >= 0 {
                 reduce::<V, S>(simd, above, columns, &mut sums.means);
             }
-            if touched {
-                above.as_flattened_mut().fill(0.0);
-            }
+            above.as_flattened_mut().fill(0.0);
             if upper == rows - 1 {
                 below.as_flattened_mut().fill(0.0);
-                sums.touched = [false; 2];
             }
             if upper >= 0 {
-                self.finish_row::<V, S>(simd, (block, columns), upper as usize, sums, touched);
+                self.finish_row::<V, S>(simd, (block, columns), upper as usize, sums);
             }
         }
     }
@@ -209,58 +200,39 @@ impl BinRows<'_> {
         (block, columns): (usize, usize),
         row: usize,
         sums: &mut BinSums,
-        surfaces: &Surfaces<WIDE>,
-        pieces: Pieces,
+        surfaces: Option<&Surfaces<WIDE>>,
     ) {
         let columns = columns.min(self.across * STRIP - block * BLOCK);
-        match pieces {
-            Pieces::NONE => (0..columns).step_by(STRIP).for_each(|x| self.strip_row(block * BLOCK + x, row).fill(0)),
-            _ => {
+        match surfaces {
+            None => (0..columns).step_by(STRIP).for_each(|x| self.strip_row(block * BLOCK + x, row).fill(0.0)),
+            Some(surfaces) => {
                 let share = ShareAt::new(simd, &self.share);
-                if pieces != Pieces::ALL {
-                    sums.means.0[..4].as_flattened_mut().fill(0.0);
-                }
-                // The tiles beside the block are for those who average.
-                for k in 1..Pieces::COUNT - 1 {
-                    for at in pieces.columns(k, MARGIN + columns).step_by(V::F32_LANES) {
-                        let x = at - MARGIN;
-                        let values = share.of(simd, surfaces, MARGIN + x);
-                        for p in 0..4 {
-                            store::<V>(&mut sums.means.0[p], x, values[p]);
-                        }
-                        // At full scale a pixel is its own mean: its colour counts whatever its share. Of two surfaces that is
-                        // the colour of what the bin takes of both.
-                        let own = self.ranged.then(|| {
-                            let inverse = surfaces.mixed.then(|| {
-                                let floor = simd.splat_f32s(COVERAGE_FLOOR);
-                                simd.div_f32s(simd.splat_f32s(1.0), simd.max_f32s(values[3], floor))
-                            });
-                            let of_plane = |p: usize| match inverse {
-                                Some(inverse) => simd.mul_f32s(values[p], inverse),
-                                None => load::<V>(&surfaces.back.0[p], MARGIN + x),
-                            };
-                            [of_plane(0), of_plane(1), of_plane(2)]
-                        });
-                        accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
+                for x in (0..columns).step_by(V::F32_LANES) {
+                    let values = share.of(simd, surfaces, MARGIN + x);
+                    let out = self.strip_row(block * BLOCK + x, row);
+                    for p in 0..4 {
+                        store::<V>(out, p * STRIP + x % STRIP, values[p]);
                     }
+                    // At full scale a pixel is its own mean: its colour counts whatever its share. Of two surfaces that is
+                    // the colour of what the bin takes of both.
+                    let own = self.ranged.then(|| {
+                        let inverse = surfaces.mixed.then(|| {
+                            let floor = simd.splat_f32s(COVERAGE_FLOOR);
+                            simd.div_f32s(simd.splat_f32s(1.0), simd.max_f32s(values[3], floor))
+                        });
+                        let of_plane = |p: usize| match inverse {
+                            Some(inverse) => simd.mul_f32s(values[p], inverse),
+                            None => load::<V>(&surfaces.back.0[p], MARGIN + x),
+                        };
+                        [of_plane(0), of_plane(1), of_plane(2)]
+                    });
+                    accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
                 }
-                self.store_row(block * BLOCK, columns, row, &sums.means);
                 let blocks = self.blocks();
                 self.filled[row / CELL * blocks + block] = true;
             }
         }
         self.close_cells::<1>((block, columns), row, sums);
-    }
-
-    /// Stores `columns` values of a row from column `x0` of the bin on.
-    #[inline(always)]
-    fn store_row(&mut self, x0: usize, columns: usize, row: usize, means: &Means) {
-        for x in (0..columns).step_by(STRIP) {
-            let out = self.strip_row(x0 + x, row).as_chunks_mut::<STRIP>().0;
-            for (out, plane) in out.iter_mut().zip(&means.0) {
-                store_halves(out, &plane[x..x + STRIP]);
-            }
-        }
     }
 
     /// Stores the row of cells when its last row is done.
@@ -280,16 +252,15 @@ impl BinRows<'_> {
         (block, columns): (usize, usize),
         row: usize,
         sums: &mut BinSums,
-        touched: bool,
     ) {
         let (x0, width) = (block * BLOCK / S, columns / S);
-        if !touched {
-            let columns = width.min(self.across * STRIP - x0);
-            (0..columns).step_by(STRIP).for_each(|x| self.strip_row(x0 + x, row).fill(0));
-            return self.close_cells::<S>((block, columns), row, sums);
-        }
         let means = &sums.means.0;
-        self.store_row(x0, width.min(self.across * STRIP - x0), row, &sums.means);
+        for x in (0..width.min(self.across * STRIP - x0)).step_by(STRIP) {
+            let out = &mut self.out[strip_row(self.across, x0 + x, row)..][..STRIP_ROW];
+            for p in 0..4 {
+                out[p * STRIP..][..STRIP].copy_from_slice(&means[p][x..x + STRIP]);
+            }
+        }
         let blocks = self.blocks();
         self.filled[row / CELL * blocks + block] = true;
         let [floor, one] = [COVERAGE_FLOOR, 1.0].map(|value| simd.splat_f32s(value));

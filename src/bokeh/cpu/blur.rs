@@ -14,7 +14,6 @@ use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_RO
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
-use crate::compute::half::{Half, store_halves};
 use crate::compute::simd::{load, store};
 
 /// Terms filtered at once; more are done in groups.
@@ -39,7 +38,7 @@ pub struct Strip<'a> {
     pub reach: usize,
     pub strip: usize,
     /// `[row][4][STRIP]`: the result.
-    pub out: &'a mut [Half],
+    pub out: &'a mut [f32],
     /// Per row of cells, whether the result holds anything: of the last frame before, of this one after.
     pub active: &'a mut [bool],
     /// Memory of the thread.
@@ -56,17 +55,10 @@ fn ring_rows(reach: usize) -> usize {
 pub struct Scratch {
     /// `[row % ring][term][4][STRIP]`.
     rows: Aligned,
-    /// A row of cells of a strip and what the filters reach on both sides: `[CELL][4][STRIP + 2 pad]`.
-    lines: Aligned,
-    /// Which row of cells that is.
-    lines_of: Option<usize>,
-    /// Sums of rows of the result, `[row][4][STRIP]`: of a block, or of all rows where terms come in several groups.
-    sums: Aligned,
+    /// A row of a strip and what the filters reach on both sides: `[4][STRIP + 2 pad]`.
+    line: Aligned,
     /// Rows of cells whose rows are filtered.
     filtered: Vec<bool>,
-    /// Rows of cells where the bin covers all that the filters along rows read, then all that those along columns do, and
-    /// then all that those rows' results are read for.
-    covered: [Vec<bool>; 3],
 }
 
 impl Scratch {
@@ -75,11 +67,8 @@ impl Scratch {
         let reach = plan.ladder.most_reach();
         Self {
             rows: Aligned::zeros(ring_rows(reach) * GROUP.min(plan.ladder.most_terms()) * STRIP_ROW),
-            lines: Aligned::zeros(CELL * 4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
-            lines_of: None,
-            sums: Aligned::zeros(STRIP_ROW * if plan.ladder.most_terms() > GROUP { plan.height } else { BLOCK_ROWS }),
+            line: Aligned::zeros(4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
-            covered: std::array::from_fn(|_| Vec::with_capacity(plan.height.div_ceil(CELL))),
         }
     }
 }
@@ -88,28 +77,33 @@ impl WithSimd for Strip<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        if self.mark_active() {
-            self.mark_covered();
-            self.filter_groups(simd);
+        if !self.mark_active() {
+            return;
+        }
+        // A whole bin covers every pixel, and that needs no filter.
+        if self.whole {
+            self.filter_groups::<S, 3>(simd);
+        } else {
+            self.filter_groups::<S, 4>(simd);
         }
     }
 }
 
 impl Strip<'_> {
-    /// Filters a group of terms at a time.
+    /// Filters `P` planes, a group of terms at a time.
     #[inline(always)]
-    fn filter_groups<S: Simd>(&mut self, simd: S) {
+    fn filter_groups<S: Simd, const P: usize>(&mut self, simd: S) {
         let terms = self.bank.terms;
         for first in (0..terms).step_by(GROUP) {
             match ((terms - first).min(GROUP), self.bank.even) {
-                (1, true) => self.filter_group::<S, 1, true>(simd, first),
-                (2, true) => self.filter_group::<S, 2, true>(simd, first),
-                (3, true) => self.filter_group::<S, 3, true>(simd, first),
-                (_, true) => self.filter_group::<S, 4, true>(simd, first),
-                (1, false) => self.filter_group::<S, 1, false>(simd, first),
-                (2, false) => self.filter_group::<S, 2, false>(simd, first),
-                (3, false) => self.filter_group::<S, 3, false>(simd, first),
-                (_, false) => self.filter_group::<S, 4, false>(simd, first),
+                (1, true) => self.filter_group::<S, 1, true, P>(simd, first),
+                (2, true) => self.filter_group::<S, 2, true, P>(simd, first),
+                (3, true) => self.filter_group::<S, 3, true, P>(simd, first),
+                (_, true) => self.filter_group::<S, 4, true, P>(simd, first),
+                (1, false) => self.filter_group::<S, 1, false, P>(simd, first),
+                (2, false) => self.filter_group::<S, 2, false, P>(simd, first),
+                (3, false) => self.filter_group::<S, 3, false, P>(simd, first),
+                (_, false) => self.filter_group::<S, 4, false, P>(simd, first),
             }
         }
     }
@@ -118,8 +112,10 @@ impl Strip<'_> {
     /// bin is empty, as its surface covers part of the picture. False when nothing reaches the strip.
     #[inline(always)]
     fn mark_active(&mut self) -> bool {
-        let (columns, down) = self.cells_in_reach();
+        let (across, down) = (self.reach.div_ceil(CELL), self.reach.div_ceil(CELL));
         let rows = self.active.len();
+        let first = self.strip * STRIP / CELL;
+        let columns = first.saturating_sub(across)..(first + STRIP / CELL + across).min(self.cells.width);
         let filtered = &mut self.scratch.filtered;
         filtered.clear();
         filtered.extend((0..rows).map(|y| self.cells.plane(y, 0)[columns.clone()].iter().any(|&c| c > 0.0)));
@@ -130,45 +126,16 @@ impl Strip<'_> {
             // Clears what the previous frame left there; elsewhere there are zeros already.
             if was && !active {
                 let end = ((y + 1) * CELL).min(self.size.1);
-                self.out[y * CELL * STRIP_ROW..end * STRIP_ROW].fill(0);
+                self.out[y * CELL * 4 * STRIP..end * 4 * STRIP].fill(0.0);
             }
         }
         self.active.iter().any(|&a| a)
     }
 
-    /// The columns of cells that the strip's filters read, and how many rows of cells they reach up and down.
-    #[inline(always)]
-    fn cells_in_reach(&self) -> (Range<usize>, usize) {
-        let (first, reach) = (self.strip * STRIP / CELL, self.reach.div_ceil(CELL));
-        (first.saturating_sub(reach)..(first + STRIP / CELL + reach).min(self.cells.width), reach)
-    }
-
-    /// Finds the rows of cells where coverage is 1 wherever a filter reaches, so that it need not be filtered.
-    #[inline(always)]
-    fn mark_covered(&mut self) {
-        let (columns, down) = self.cells_in_reach();
-        let rows = self.active.len();
-        let [along_rows, along_columns, narrow] = &mut self.scratch.covered;
-        along_rows.clear();
-        along_rows.extend((0..rows).map(|y| {
-            // As many pixels as a cell has; its sum is exact.
-            let pixels = |x: usize| CELL.min(self.size.0.saturating_sub(x * CELL)) * CELL.min(self.size.1 - y * CELL);
-            let mut cells = self.cells.plane(y, 0)[columns.clone()].iter().zip(columns.clone());
-            self.whole || cells.all(|(&coverage, x)| coverage >= pixels(x) as f32)
-        }));
-        let erode = |from: &[bool], to: &mut Vec<bool>| {
-            to.clear();
-            to.extend((0..rows).map(|y| from[y.saturating_sub(down)..(y + down + 1).min(rows)].iter().all(|&all| all)));
-        };
-        erode(along_rows, along_columns);
-        erode(along_columns, narrow);
-    }
-
     /// Filters `R` terms from `first` on: all rows, then all columns.
     #[inline(always)]
-    fn filter_group<S: Simd, const R: usize, const EVEN: bool>(&mut self, simd: S, first: usize) {
+    fn filter_group<S: Simd, const R: usize, const EVEN: bool, const P: usize>(&mut self, simd: S, first: usize) {
         let mut scratch = std::mem::take(&mut self.scratch.rows);
-        self.scratch.lines_of = None;
         let (row_len, ring) = (R * STRIP_ROW, ring_rows(self.reach));
         let mut next_y = 0;
         for y in (0..self.size.1).step_by(BLOCK_ROWS) {
@@ -178,22 +145,15 @@ impl Strip<'_> {
             // A ring of rows, no more than the columns reach, stays in the nearest caches.
             for source_y in next_y.max(y.saturating_sub(self.reach))..(y + self.reach + BLOCK_ROWS).min(self.size.1) {
                 let row = &mut scratch[source_y % ring * row_len..][..row_len];
-                if !self.scratch.filtered[source_y / CELL] {
-                    row.fill(0.0);
-                } else if self.scratch.covered[2][source_y / CELL] {
-                    self.filter_row::<S, R, EVEN, 3>(simd, first, source_y, row);
+                if self.scratch.filtered[source_y / CELL] {
+                    self.filter_row::<S, R, EVEN, P>(simd, first, source_y, row);
                 } else {
-                    self.filter_row::<S, R, EVEN, 4>(simd, first, source_y, row);
+                    row.fill(0.0);
                 }
                 next_y = source_y + 1;
             }
             let rows = y..(y + BLOCK_ROWS).min(self.size.1);
-            let ring_rows = &scratch[..ring * row_len];
-            if self.scratch.covered[1][y / CELL] {
-                self.filter_columns::<S, R, EVEN, 3>(simd, first, rows, ring_rows);
-            } else {
-                self.filter_columns::<S, R, EVEN, 4>(simd, first, rows, ring_rows);
-            }
+            self.filter_columns::<S, R, EVEN, P>(simd, first, rows, &scratch[..ring * row_len]);
         }
         self.scratch.rows = scratch;
     }
@@ -207,18 +167,11 @@ impl Strip<'_> {
         y: usize,
         out: &mut [f32],
     ) {
-        let mut lines = std::mem::take(&mut self.scratch.lines);
+        let mut line = std::mem::take(&mut self.scratch.line);
         // The source's rows are copied `PIECE` columns at a time.
         let pad = self.reach.next_multiple_of(PIECE);
         let span = STRIP + 2 * pad;
-        // A whole row of cells at once, so that its rows come from far caches together.
-        if self.scratch.lines_of.replace(y / CELL) != Some(y / CELL) {
-            let rows = y / CELL * CELL..(y / CELL * CELL + CELL).min(self.size.1);
-            for (y, line) in rows.zip(lines.chunks_exact_mut(4 * span)) {
-                self.source.copy_line::<P>(self.strip, y, self.size.0, pad, line);
-            }
-        }
-        let line = &lines[y % CELL * 4 * span..];
+        self.source.copy_line(self.strip, y, self.size.0, pad, &mut line);
         let plane = |p: usize| &line[p * span..][..span];
         let planes = [plane(0), plane(1), plane(2), plane(3)];
         let edges = self.edges.at(self.strip, y);
@@ -239,7 +192,7 @@ impl Strip<'_> {
             }
             x += S::F32_LANES;
         }
-        self.scratch.lines = lines;
+        self.scratch.line = line;
     }
 
     /// The vertical pass for the rows `ys` of the result, from the ring of filtered `rows`.
@@ -251,49 +204,39 @@ impl Strip<'_> {
         ys: Range<usize>,
         rows: &[f32],
     ) {
-        let (table, height) = (&self.bank.vertical, self.size.1);
-        let mut edges = [[[0.0; EDGE_VALUES]; STRIP_EDGES]; BLOCK_ROWS];
-        for (k, edges) in edges.iter_mut().enumerate() {
-            *edges = self.edges.at(self.strip, (ys.start + k).min(height - 1));
-        }
         for x in (0..STRIP).step_by(S::F32_LANES) {
-            let mut taps = [self.taps::<R>(table, first, &edges[0], x); BLOCK_ROWS];
-            for k in 1..BLOCK_ROWS {
-                taps[k] = self.taps::<R>(table, first, &edges[k], x);
-            }
+            let (table, edges, strip) = (&self.bank.vertical, self.edges, self.strip);
             // With one radius for the whole picture, the rows of a block have the same taps and share what they read.
-            let same = |of_row: &Taps<'_, R>| of_row.steady && of_row.left == taps[0].left;
-            if P == 3 && self.whole && ys.len() == BLOCK_ROWS && taps.iter().all(same) {
-                let sums = along_column_block::<S, R, P>(simd, &taps[0], rows, ys.start, x, height);
-                for (k, sums) in sums.into_iter().enumerate() {
-                    self.add_to_result::<S, R, P>(simd, first, (x, ys.start + k), sums, &edges[k]);
+            if P == 3 && ys.len() == BLOCK_ROWS {
+                let shared = self.taps::<R>(table, first, &edges.at(strip, ys.start), x);
+                let mut same = true;
+                for y in ys.clone() {
+                    let taps = self.taps::<R>(table, first, &edges.at(strip, y), x);
+                    same &= taps.steady && taps.left == shared.left;
                 }
-                continue;
+                if same {
+                    let sums = along_column_block::<S, R, P>(simd, &shared, rows, ys.start, x, self.size.1);
+                    for k in 0..BLOCK_ROWS {
+                        let y = ys.start + k;
+                        self.add_to_result::<S, R, P>(simd, first, (x, y), sums[k], &edges.at(strip, y));
+                    }
+                    continue;
+                }
             }
-            for (y, (taps, edges)) in ys.clone().zip(taps.iter().zip(&edges)) {
+            for y in ys.clone() {
+                let edges = edges.at(strip, y);
+                let taps = self.taps::<R>(table, first, &edges, x);
                 let sums = if taps.steady {
-                    along_column::<S, R, EVEN, false, P>(simd, taps, rows, y, x, height)
+                    along_column::<S, R, EVEN, false, P>(simd, &taps, rows, y, x, self.size.1)
                 } else {
-                    along_column::<S, R, EVEN, true, P>(simd, taps, rows, y, x, height)
+                    along_column::<S, R, EVEN, true, P>(simd, &taps, rows, y, x, self.size.1)
                 };
-                self.add_to_result::<S, R, P>(simd, first, (x, y), sums, edges);
-            }
-        }
-        if first + R >= self.bank.terms {
-            for y in ys {
-                let at = self.sums_at(y);
-                store_halves(&mut self.out[y * STRIP_ROW..][..STRIP_ROW], &self.scratch.sums[at..]);
+                self.add_to_result::<S, R, P>(simd, first, (x, y), sums, &edges);
             }
         }
     }
 
-    /// Where the sums of row `y` begin.
-    #[inline(always)]
-    fn sums_at(&self, y: usize) -> usize {
-        STRIP_ROW * if self.bank.terms > GROUP { y } else { y % BLOCK_ROWS }
-    }
-
-    /// Adds the sums of a group to those before; after the last group, clamps it.
+    /// Adds the sums of a group to the result; after the last group, clamps it.
     #[inline(always)]
     fn add_to_result<S: Simd, const R: usize, const P: usize>(
         &mut self,
@@ -303,15 +246,14 @@ impl Strip<'_> {
         mut sums: [S::f32s; 4],
         edges: &[[f32; EDGE_VALUES]; STRIP_EDGES],
     ) {
-        let at = self.sums_at(y);
-        let out = &mut self.scratch.sums[at..][..STRIP_ROW];
+        let out = &mut self.out[y * 4 * STRIP..][..4 * STRIP];
         if first > 0 {
             for p in 0..P {
                 sums[p] = simd.add_f32s(sums[p], load::<S>(out, p * STRIP + x));
             }
         }
         if first + R >= self.bank.terms {
-            // What is covered wholly was filtered without its coverage, which is 1.
+            // A whole bin was filtered without its coverage, which is 1.
             if P == 3 {
                 sums[3] = simd.splat_f32s(1.0);
             }

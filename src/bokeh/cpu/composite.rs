@@ -17,7 +17,6 @@ use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, CELL, HINDMOST_COVERAGE, MAX_BINS, Plan};
 use crate::color::luminance;
 use crate::compute::aligned::Line;
-use crate::compute::half::{from_half, load_halves};
 use crate::compute::simd::{fma, load, madd, store};
 
 /// Makes rows `y0..` of the result: a row of tiles.
@@ -95,15 +94,6 @@ impl Layers {
         let zero = simd.splat_f32s(0.0);
         for x in (0..CHUNK).step_by(S::F32_LANES) {
             let layer = |planes: &[[f32; CHUNK]; 4]| planes.each_ref().map(|plane| load::<S>(plane, x));
-            if let ([], [only]) = (near, rest) {
-                // What one bin leaves open takes its colour, so that there is nothing to weigh.
-                let [red, green, blue, coverage] = layer(only);
-                let inverse = simd.div_f32s(simd.splat_f32s(1.0), simd.max_f32s(coverage, simd.splat_f32s(1e-6)));
-                for (p, light) in [red, green, blue].into_iter().enumerate() {
-                    store::<S>(&mut color.0[p], x, simd.max_f32s(simd.mul_f32s(light, inverse), zero));
-                }
-                continue;
-            }
             let mut back = Pile::new(simd);
             rest.iter().for_each(|planes| back.add(simd, layer(planes)));
             let mut light = back.with_rest_filled(simd);
@@ -258,19 +248,9 @@ fn upsample<V: Simd, const S: usize>(
     let strip_row = |strip: usize, y: usize, p: usize| &slot.out[((strip * height + y) * 4 + p) * STRIP..][..STRIP];
     let mix = |a: f32, b: f32| madd::<V>(b - a, share, a);
     for (p, out) in out.iter_mut().enumerate() {
+        let value =
+            |x: usize| mix(strip_row(x / STRIP, above, p)[x % STRIP], strip_row(x / STRIP, below, p)[x % STRIP]);
         let first = x0 / S;
-        if S == 1 {
-            // Rows of the bin are those of the picture.
-            for (k, out) in out.as_chunks_mut::<STRIP>().0.iter_mut().enumerate().take((width - first).div_ceil(STRIP))
-            {
-                load_halves(out, strip_row(first / STRIP + k, above, p));
-            }
-            continue;
-        }
-        let value = |x: usize| {
-            let at = |y: usize| from_half(strip_row(x / STRIP, y, p)[x % STRIP]);
-            mix(at(above), at(below))
-        };
         // One column more on both sides than the chunk covers.
         let mut line = [0.0; CHUNK + 2];
         let mut x = first;
@@ -279,9 +259,13 @@ fn upsample<V: Simd, const S: usize>(
             let (a, b) = (strip_row(x / STRIP, above, p), strip_row(x / STRIP, below, p));
             let (a, b) = (&a[x % STRIP..][..count], &b[x % STRIP..][..count]);
             for ((out, &a), &b) in line[1 + x - first..][..count].iter_mut().zip(a).zip(b) {
-                *out = mix(from_half(a), from_half(b));
+                *out = mix(a, b);
             }
             x += count;
+        }
+        if S == 1 {
+            out.copy_from_slice(&line[1..1 + CHUNK]);
+            continue;
         }
         line[0] = if first > 0 { value(first - 1) } else { line[1] };
         line[1 + x - first] = if x < width { value(x) } else { line[x - first] };

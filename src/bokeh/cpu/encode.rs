@@ -1,5 +1,7 @@
 //! Linear light back to 8-bit sRGB.
 
+#![allow(clippy::needless_range_loop)] // Columns index several arrays at once.
+
 use crate::color::encode_srgb;
 
 /// Pixels composited at once.
@@ -39,10 +41,10 @@ impl EncodeTable {
                 *index = (light * scale + first + 8_388_608.0).to_bits();
             }
         }
-        let code = |index: u32| self.0[index as usize % ENCODE_SIZE];
-        let [red, green, blue] = &index;
-        for (((pixel, &r), &g), &b) in out.as_chunks_mut::<3>().0.iter_mut().zip(red).zip(green).zip(blue) {
-            *pixel = [code(r), code(g), code(b)];
+        for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            for (p, byte) in pixel.iter_mut().enumerate() {
+                *byte = self.0[index[p][x] as usize % ENCODE_SIZE];
+            }
         }
     }
 }

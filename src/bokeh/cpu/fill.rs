@@ -8,8 +8,6 @@ use std::sync::atomic::AtomicBool;
 
 use super::rows::Rows;
 use super::unpack::Surfaces;
-use pulp::Arch;
-
 use crate::bokeh::occlusion::other_surface;
 use crate::bokeh::plan::Share;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
@@ -18,8 +16,6 @@ use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 const PLANES: usize = 5;
 /// A pixel of which less is known after all has flowed back is not known at all.
 const KNOWN: f32 = 0.5;
-/// Pixels of a row that are looked at together.
-const TAKEN_AT_ONCE: usize = 16;
 /// Rows of a level that are one part of the work.
 const PART: usize = 8;
 
@@ -86,8 +82,8 @@ impl Pyramid {
     }
 
     /// Fills what is hidden by all that is not `unhidden`, once the halves are laid.
-    pub fn fill(&mut self, unhidden: &Share, (workers, arch): (&mut ThreadPool, Arch)) {
-        self.lay_base(unhidden, (&mut *workers, arch));
+    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool) {
+        self.lay_base(unhidden, workers);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
@@ -95,7 +91,7 @@ impl Pyramid {
             let rows = DisjointParts::new(&mut coarse.rows.data, PART * row_len, &mut self.taken);
             workers.run(coarse.height.div_ceil(PART), &|part| {
                 for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
-                    arch.dispatch(|| pull(fine, part * PART + k, row, stride, width));
+                    pull(fine, part * PART + k, row, stride, width);
                 }
             });
         }
@@ -106,7 +102,6 @@ impl Pyramid {
             let rows = DisjointParts::new(&mut fine.rows.data, PART * row_len, &mut self.taken);
             workers.run(fine.height.div_ceil(PART), &|part| {
                 for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
-                    // Not as vectors: they would gather and scatter, which takes three times as long.
                     push(coarse, part * PART + k, row, stride, width);
                 }
             });
@@ -119,14 +114,30 @@ impl Pyramid {
     }
 
     /// The finest level: known is what nothing that hides touches, nor its neighbours.
-    fn lay_base(&mut self, unhidden: &Share, (workers, arch): (&mut ThreadPool, Arch)) {
+    fn lay_base(&mut self, unhidden: &Share, workers: &mut ThreadPool) {
         let level = &mut self.levels[0];
-        let (w, h, row_len) = (level.width, level.height, level.rows.row_len());
+        let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
         let halves = &self.halves;
         let data = DisjointParts::new(&mut level.rows.data, PART * row_len, &mut self.taken);
         workers.run(h.div_ceil(PART), &|part| {
-            for (k, row) in data.part(part).chunks_exact_mut(row_len).enumerate() {
-                arch.dispatch(|| lay_row(halves, unhidden, part * PART + k, row, (w, h)));
+            for (k, planes) in data.part(part).chunks_exact_mut(row_len).enumerate() {
+                let (planes, known) = planes.split_at_mut((PLANES - 1) * stride);
+                let y = part * PART + k;
+                let nearest = |y: usize| &halves.row(y)[(PLANES - 1) * stride..][..w];
+                let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(nearest);
+                // What hides a pixel the most is what is nearest.
+                let column = |x: usize| rows[0][x].min(rows[1][x]).min(rows[2][x]);
+                let (mut left, mut here) = (f32::INFINITY, column(0));
+                for (x, known) in known[..w].iter_mut().enumerate() {
+                    let right = if x + 1 < w { column(x + 1) } else { f32::INFINITY };
+                    *known = unhidden.at(left.min(here).min(right));
+                    (left, here) = (here, right);
+                }
+                let own = halves.row(y).chunks_exact(stride);
+                for (plane, own) in planes.chunks_exact_mut(stride).zip(own) {
+                    let values = plane[..w].iter_mut().zip(own).zip(&*known);
+                    values.for_each(|((value, own), known)| *value = own * known);
+                }
             }
         });
     }
@@ -181,28 +192,17 @@ impl Behind<'_> {
     pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
         let row = self.level.rows.row(y / 2);
         let [red, green, blue, coc] = &mut surfaces.back.0;
-        for first in (0..W).step_by(TAKEN_AT_ONCE) {
-            // Little of a picture is hidden; vectors find where anything is.
-            let cocs_px = &coc[first..][..TAKEN_AT_ONCE];
-            let mut hides = 0;
-            for &coc_px in cocs_px {
-                hides += u32::from(self.unhidden.at(coc_px) < 1.0);
-            }
-            if hides == 0 {
-                continue;
-            }
-            for x in first..first + TAKEN_AT_ONCE {
-                // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
-                let hidden = 1.0 - self.unhidden.at(coc[x]);
-                let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
-                let fill = |p: usize| row[p * self.level.rows.stride + half];
-                // Where something near touches every pixel nothing is known, and nothing lies behind.
-                if hidden > 0.0 && fill(PLANES - 1) > KNOWN {
-                    let hidden = hidden * other_surface(coc[x], fill(3));
-                    let mix = |own: f32, p: usize| own + (fill(p) - own) * hidden;
-                    (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
-                    coc[x] += (fill(3).max(self.nearest_px) - coc[x]) * hidden;
-                }
+        for x in 0..W {
+            // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
+            let hidden = 1.0 - self.unhidden.at(coc[x]);
+            let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
+            let fill = |p: usize| row[p * self.level.rows.stride + half];
+            // Where something near touches every pixel nothing is known, and nothing lies behind.
+            if hidden > 0.0 && fill(PLANES - 1) > KNOWN {
+                let hidden = hidden * other_surface(coc[x], fill(3));
+                let mix = |own: f32, p: usize| own + (fill(p) - own) * hidden;
+                (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
+                coc[x] += (fill(3).max(self.nearest_px) - coc[x]) * hidden;
             }
         }
         if surfaces.mixed {
@@ -216,46 +216,17 @@ impl Behind<'_> {
     }
 }
 
-/// Row `y` of the finest level, which has `w` x `h` pixels.
-#[inline(always)]
-fn lay_row(halves: &Rows<PLANES>, unhidden: &Share, y: usize, row: &mut [f32], (w, h): (usize, usize)) {
-    let stride = halves.stride;
-    let (planes, known) = row.split_at_mut((PLANES - 1) * stride);
-    let nearest = |y: usize| &halves.row(y)[(PLANES - 1) * stride..][..w];
-    let (above, here, below) = (nearest(y.saturating_sub(1)), nearest(y), nearest((y + 1).min(h - 1)));
-    // What hides a pixel the most is what is nearest.
-    let column = |x: usize| {
-        let least = if above[x] < here[x] { above[x] } else { here[x] };
-        if below[x] < least { below[x] } else { least }
-    };
-    let least = |a: f32, b: f32| if a < b { a } else { b };
-    for (x, known) in known[..w].iter_mut().enumerate() {
-        let (left, right) = (column(x.saturating_sub(1)), column((x + 1).min(w - 1)));
-        *known = unhidden.at(least(least(left, right), column(x)));
-    }
-    for (plane, own) in planes.chunks_exact_mut(stride).zip(halves.row(y).chunks_exact(stride)) {
-        for ((value, own), known) in plane[..w].iter_mut().zip(own).zip(&*known) {
-            *value = own * known;
-        }
-    }
-}
-
 /// Reduces by two: the sum of four pixels weighed by how far each is known, made a mean where that is more than 1. Less
 /// than that adds up from level to level, so that the coarsest one knows something if any pixel does.
-#[inline(always)]
 fn pull(fine: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
     let (above, below) = (fine.rows.row(2 * y), (2 * y + 1 < fine.height).then(|| fine.rows.row(2 * y + 1)));
     for p in 0..PLANES {
         let out = &mut out[p * stride..][..width];
         let above = &above[p * fine.rows.stride..].as_chunks::<2>().0[..width];
-        for (out, [a, b]) in out.iter_mut().zip(above) {
-            *out = a + b;
-        }
+        out.iter_mut().zip(above).for_each(|(out, [a, b])| *out = a + b);
         if let Some(below) = below {
             let below = &below[p * fine.rows.stride..].as_chunks::<2>().0[..width];
-            for (out, [a, b]) in out.iter_mut().zip(below) {
-                *out += a + b;
-            }
+            out.iter_mut().zip(below).for_each(|(out, [a, b])| *out += a + b);
         }
     }
     let (planes, known) = out.split_at_mut((PLANES - 1) * stride);
@@ -264,9 +235,7 @@ fn pull(fine: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
             *value /= if known > 1.0 { known } else { 1.0 };
         }
     }
-    for known in &mut known[..width] {
-        *known = if *known > 1.0 { 1.0 } else { *known };
-    }
+    known[..width].iter_mut().for_each(|known| *known = if *known > 1.0 { 1.0 } else { *known });
 }
 
 /// Fills what the finer level does not know from the coarser one, bilinearly: 3/4 of the coarse pixel that covers this one

@@ -50,7 +50,6 @@ fn lerp<S: Simd>(simd: S, left: f32, right: f32, across: S::f32s) -> S::f32s {
 }
 
 /// The taps of a group of `R` terms for one vector of a segment.
-#[derive(Clone, Copy)]
 pub struct Taps<'a, const R: usize> {
     pub table: &'a [f32],
     /// Where in the table tap 0 of the radius at the left edge of the segment has the group's first term.

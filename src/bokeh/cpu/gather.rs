@@ -10,7 +10,6 @@ use super::rows::{PIECE, Rows, STRIP, Strips, repeat_ends};
 use super::unpack::{Source, coc_row};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::Plan;
-use crate::compute::half::load_halves;
 use crate::compute::simd::madd;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
@@ -69,7 +68,7 @@ impl Gather {
         workers.run(size.1, &|y| {
             for (p, plane) in rows.part(y).chunks_exact_mut(stride).enumerate() {
                 for (strip, out) in plane[pad..pad + size.0].chunks_mut(STRIP).enumerate() {
-                    load_halves(out, &strips.row(strip, y)[p * STRIP..][..STRIP]);
+                    out.copy_from_slice(&strips.row(strip, y)[p * STRIP..][..out.len()]);
                 }
                 repeat_ends(plane, pad, size.0);
             }

@@ -127,7 +127,7 @@ impl CpuBokeh {
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
-                pyramid.fill(&self.plan.unhidden(layer.start), (&mut self.workers, self.arch));
+                pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers);
             }
             lap("fill")?;
             self.bin(&frame, Some(layer));
@@ -231,13 +231,11 @@ impl CpuBokeh {
     /// Pass `reach`: each part is a bin.
     fn reach(&mut self) {
         let plan = &self.plan;
-        let arch = self.arch;
         let parts = DisjointParts::new(&mut self.slots, 1, &mut self.taken);
         self.workers.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
             let bin = &plan.bins[part];
             for slot in parts.part(bin.slot).iter_mut().filter(|slot| slot.present) {
-                let Slot { cells, edges, .. } = slot;
-                arch.dispatch(|| reach::reach(plan, bin, cells, edges, &mut member.reach));
+                reach::reach(plan, bin, &slot.cells, &mut slot.edges, &mut member.reach);
             }
         });
     }

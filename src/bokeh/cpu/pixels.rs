@@ -1,7 +1,6 @@
 //! What pictures are made of, and their circles of confusion, as they lie in memory.
 
 use super::encode::{CHUNK, EncodeTable};
-use crate::compute::half;
 use crate::frame::DepthMap;
 use crate::optics::CocField;
 
@@ -16,8 +15,8 @@ pub enum Pixels<'a> {
 }
 
 impl Pixels<'_> {
-    /// The brightest light, as bins have no larger number.
-    pub const MOST_LIGHT: f32 = half::MOST;
+    /// The brightest light: the largest half float. Filters sum products, which stay finite.
+    pub const MOST_LIGHT: f32 = 65_504.0;
 
     /// Linear light as it is blurred.
     #[inline(always)]
@@ -64,8 +63,7 @@ impl Sample for f32 {
     #[inline(always)]
     fn write(color: &[[f32; CHUNK]; 3], _: &EncodeTable, out: &mut [f32]) {
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            // Filters that are cut to a few terms may go below 0 beside a light.
-            *pixel = [color[0][x], color[1][x], color[2][x]].map(|light| if light > 0.0 { light } else { 0.0 });
+            *pixel = [color[0][x], color[1][x], color[2][x]];
         }
     }
 }

@@ -7,7 +7,6 @@ use super::tiles::{TILE_H, TILE_W};
 use super::unpack::{Source, Surfaces};
 use crate::bokeh::Probe;
 use crate::bokeh::plan::{Plan, SEGMENT};
-use crate::compute::half::from_half;
 use crate::frame::{ColorImage, DepthMap};
 use crate::optics::CocField;
 
@@ -21,9 +20,8 @@ impl CpuBokeh {
             Probe::Bin(k) => {
                 let (bin, source) = (&self.plan.bins[k], &self.slots[self.plan.bins[k].slot].source);
                 let pixels = |y: usize| (0..bin.width).map(move |x| (x, y));
-                let at = |(x, y): (usize, usize)| {
-                    std::array::from_fn(|p| from_half(source.row(x / STRIP, y)[p * STRIP + x % STRIP]))
-                };
+                let at =
+                    |(x, y): (usize, usize)| std::array::from_fn(|p| source.row(x / STRIP, y)[p * STRIP + x % STRIP]);
                 (0..bin.height).flat_map(pixels).map(at).collect()
             }
             Probe::Reach(k) => self.slots[self.plan.bins[k].slot].edges.data.as_chunks::<4>().0.to_vec(),
@@ -32,7 +30,7 @@ impl CpuBokeh {
                 let pixels = |y: usize| (0..bin.width).map(move |x| (x, y));
                 let at = |(x, y): (usize, usize)| {
                     let start = (x / STRIP * bin.height + y) * 4 * STRIP + x % STRIP;
-                    std::array::from_fn(|p| from_half(rows.out[start + p * STRIP]))
+                    std::array::from_fn(|p| rows.out[start + p * STRIP])
                 };
                 (0..bin.height).flat_map(pixels).map(at).collect()
             }

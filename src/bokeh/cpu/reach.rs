@@ -12,7 +12,6 @@ pub fn nearness(distance: usize, bin: &Bin) -> f32 {
 
 /// Combines the neighbourhood of every cell, one axis after the other, and writes radius and range of colours at the
 /// `edges` of segments. `scratch` grows to the size of the grid and one row of it.
-#[inline(always)]
 pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
     let (width, height, radius) = (cells.width, cells.height, plan.reach_cells(bin));
     // Only blurs of thousands of pixels reach farther; they are cut.
@@ -35,9 +34,9 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
             let weight = weights[k.abs_diff(y)];
             let (sums, rest) = row.split_at_mut(2 * width);
             let (lows, highs) = rest.split_at_mut(3 * width);
-            combine(0, sums, source, weight);
-            combine(2, lows, &source[2 * width..], weight);
-            combine(5, highs, &source[5 * width..], weight);
+            sums.iter_mut().zip(source).for_each(|(t, s)| *t += weight * s);
+            lows.iter_mut().zip(&source[2 * width..]).for_each(|(t, &s)| *t = if s < *t { s } else { *t });
+            highs.iter_mut().zip(&source[5 * width..]).for_each(|(t, &s)| *t = if s > *t { s } else { *t });
         }
         // The mean of |CoC| becomes the radius.
         for x in 0..width {
@@ -64,42 +63,24 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
     }
 }
 
-/// Adds weighed cells to others of a plane's row, or takes the least or highest of both, as the plane has it.
-#[inline(always)]
-fn combine(plane: usize, target: &mut [f32], source: &[f32], weight: f32) {
-    // Loops, as closures of iterators may be compiled on their own, without vectors.
-    for (t, &s) in target.iter_mut().zip(source) {
-        *t = match plane {
-            0 | 1 => *t + weight * s,
-            2..5 => {
-                if s < *t {
-                    s
-                } else {
-                    *t
-                }
-            }
-            _ => {
-                if s > *t {
-                    s
-                } else {
-                    *t
-                }
-            }
-        };
-    }
-}
-
 /// Combines each cell of a plane's row with those up to `weights.len() - 1` cells away: weighted sums in planes 0 and
 /// 1, minima in planes 2 to 4, maxima in planes 5 to 7.
-#[inline(always)]
 fn combine_row(plane: usize, source: &[f32], target: &mut [f32], weights: &[f32]) {
+    let combine = |target: &mut [f32], source: &[f32], weight: f32| {
+        let pairs = target.iter_mut().zip(source);
+        match plane {
+            0 | 1 => pairs.for_each(|(t, s)| *t += weight * s),
+            2..5 => pairs.for_each(|(t, &s)| *t = if s < *t { s } else { *t }),
+            _ => pairs.for_each(|(t, &s)| *t = if s > *t { s } else { *t }),
+        }
+    };
     target.copy_from_slice(source);
     if plane < 2 {
         target.iter_mut().for_each(|value| *value *= weights[0]);
     }
     for (distance, &weight) in weights.iter().enumerate().skip(1).take_while(|(d, _)| *d < source.len()) {
         let inner = source.len() - distance;
-        combine(plane, &mut target[..inner], &source[distance..], weight);
-        combine(plane, &mut target[distance..], &source[..inner], weight);
+        combine(&mut target[..inner], &source[distance..], weight);
+        combine(&mut target[distance..], &source[..inner], weight);
     }
 }

@@ -5,7 +5,6 @@ use std::sync::atomic::AtomicBool;
 use super::tiles::{BLOCK, TILE_W};
 use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
-use crate::compute::half::{Half, from_half, load_halves};
 
 /// Columns of a strip: what one part of the blur pass produces.
 pub const STRIP: usize = 32;
@@ -139,7 +138,7 @@ impl Edges {
 /// A bin's picture in strips, so that a filter that goes down a strip reads on and on:
 /// `[row of cells][strip][CELL][4][STRIP]`, premultiplied colour and coverage.
 pub struct Strips {
-    pub data: Aligned<Half>,
+    pub data: Aligned,
     pub across: usize,
 }
 
@@ -153,27 +152,27 @@ pub const STRIP_CELLS: usize = CELL * STRIP_ROW;
 impl Strips {
     /// Row `y` of a strip: `[4][STRIP]`.
     #[inline(always)]
-    pub fn row(&self, strip: usize, y: usize) -> &[Half] {
+    pub fn row(&self, strip: usize, y: usize) -> &[f32] {
         &self.data[(y / CELL * self.across + strip) * STRIP_CELLS + y % CELL * STRIP_ROW..][..STRIP_ROW]
     }
 
-    /// Copies `P` planes of row `y` of a strip with `pad` columns on both sides (whole pieces) to `line`, `[4][STRIP + 2 pad]`.
+    /// Copies row `y` of a strip with `pad` columns on both sides (whole pieces) to `line`, `[4][STRIP + 2 pad]`.
     /// Outside the picture, which has `width` columns, the outermost ones repeat.
     #[inline(always)]
-    pub fn copy_line<const P: usize>(&self, strip: usize, y: usize, width: usize, pad: usize, line: &mut [f32]) {
+    pub fn copy_line(&self, strip: usize, y: usize, width: usize, pad: usize, line: &mut [f32]) {
         let span = STRIP + 2 * pad;
         for at in (0..span).step_by(PIECE) {
             let x = (strip * STRIP + at) as isize - pad as isize;
             // A piece lies in one strip; past the picture's last column there may be strips of which none is real.
             let inside = x.clamp(0, width as isize - 1) as usize;
             let row = self.row(inside / STRIP, y);
-            for p in 0..P {
+            for p in 0..4 {
                 let out = &mut line[p * span + at..][..PIECE];
                 let plane = &row[p * STRIP..][..STRIP];
                 if x >= 0 && x as usize / STRIP == inside / STRIP {
-                    load_halves(out, &plane[x as usize % STRIP..][..PIECE]);
+                    out.copy_from_slice(&plane[x as usize % STRIP..][..PIECE]);
                 } else {
-                    out.fill(from_half(plane[inside % STRIP]));
+                    out.fill(plane[inside % STRIP]);
                 }
             }
         }
@@ -192,7 +191,7 @@ pub struct Slot {
     /// The radius and the range of colours within reach.
     pub edges: Edges,
     /// The blurred bin, `[strip][row][4][STRIP]`: premultiplied colour and coverage.
-    pub out: Aligned<Half>,
+    pub out: Aligned,
     /// Per strip and row of cells, whether `out` holds anything but zeros.
     pub active: Vec<bool>,
     /// Whether anything in the frame belongs to this bin.
@@ -235,8 +234,8 @@ impl Slot {
         let old_rows = plan.height.div_ceil(self.scale.max(1));
         if self.scale > 0 {
             let used = self.source.across * old_rows.div_ceil(CELL) * STRIP_CELLS;
-            self.source.data[..used].fill(0);
-            self.out[..self.source.across * old_rows * STRIP_ROW].fill(0);
+            self.source.data[..used].fill(0.0);
+            self.out[..self.source.across * old_rows * STRIP_ROW].fill(0.0);
         }
         self.filled.fill(false);
         self.active.fill(false);

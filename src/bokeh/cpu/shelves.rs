@@ -6,12 +6,11 @@ use super::rows::{CELL_PLANES, Cells, Edges, STRIP_CELLS, STRIP_ROW, Slot, Strip
 use super::tiles::BLOCK;
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, CELL, Plan, Share};
-use crate::compute::half::Half;
 use crate::compute::thread_pool::DisjointParts;
 
 /// What the parts of the pass `bin` write for one bin.
 pub struct BinShelves<'a> {
-    source: DisjointParts<'a, Half>,
+    source: DisjointParts<'a, f32>,
     cells: DisjointParts<'a, f32>,
     filled: DisjointParts<'a, bool>,
     share: Option<Share>,
@@ -69,7 +68,7 @@ pub struct StripShelves<'a> {
     pub source: &'a Strips,
     pub cells: &'a Cells,
     pub edges: &'a Edges,
-    pub out: DisjointParts<'a, Half>,
+    pub out: DisjointParts<'a, f32>,
     pub active: DisjointParts<'a, bool>,
 }
 

@@ -3,12 +3,14 @@
 
 use pulp::Simd;
 
-use super::tiles::{BLOCK, MARGIN, Pieces};
+use super::tiles::BLOCK;
 use super::unpack::{Piece, Surfaces};
 use crate::bokeh::plan::{HIDING_SHARE, Share};
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, store};
 
+/// Columns beyond a block on both sides that its averages reach.
+pub const MARGIN: usize = 16;
 /// Columns of a block and its margins.
 pub const WIDE: usize = BLOCK + 2 * MARGIN;
 /// Values of a plane of a block: a line more than needed, as planes at multiples of 4096 bytes hinder each other.
@@ -26,20 +28,18 @@ pub fn sum_row<S: Simd>(
     simd: S,
     share: &ShareAt<S>,
     surfaces: &Surfaces<WIDE>,
-    (pieces, columns): (Pieces, usize),
+    columns: usize,
     weights: [f32; 2],
     above: &mut [[f32; WIDE]; SUMS],
     below: &mut [[f32; WIDE]; SUMS],
 ) {
     let weights = weights.map(|weight| simd.splat_f32s(weight));
-    for k in 0..Pieces::COUNT {
-        for x in pieces.columns(k, columns + 2 * MARGIN).step_by(S::F32_LANES) {
-            let values = share.of(simd, surfaces, x);
-            for p in 0..SUMS {
-                let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
-                store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
-                store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], sums[1]));
-            }
+    for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
+        let values = share.of(simd, surfaces, x);
+        for p in 0..SUMS {
+            let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
+            store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
+            store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], sums[1]));
         }
     }
 }

@@ -1,8 +1,6 @@
 //! Tile classification: what is where, before any colour is read: the range of CoC of every tile, and the tiles that
 //! stay as they are.
 
-use std::ops::Range;
-
 use super::pixels::Radii;
 use super::unpack::{Source, coc_row};
 use crate::bokeh::plan::Share;
@@ -12,8 +10,6 @@ use crate::optics::CocField;
 pub const TILE_W: usize = 64;
 /// Columns of the picture that are read at once.
 pub const BLOCK: usize = 4 * TILE_W;
-/// Columns beyond a block on both sides that averages of it reach.
-pub const MARGIN: usize = 16;
 /// Rows of a tile.
 pub const TILE_H: usize = 8;
 /// The picture around a tile that can change it, in tiles: the widest filter at full scale in a bin that is in focus,
@@ -21,29 +17,6 @@ pub const TILE_H: usize = 8;
 const AROUND: (usize, usize) = (1, 3);
 /// Filters of a smaller radius have one tap.
 const SHARP_PX: f32 = 0.4;
-
-/// Which columns of a block and its margins a bin takes anything of: a bit for each tile from the one before the block on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pieces(u8);
-
-impl Pieces {
-    /// Tiles of a block, and one on both sides.
-    pub const COUNT: usize = BLOCK / TILE_W + 2;
-    pub const NONE: Self = Self(0);
-    pub const ALL: Self = Self((1 << Self::COUNT) - 1);
-
-    /// The tiles of which `takes` holds.
-    pub fn of(takes: impl Fn(usize) -> bool) -> Self {
-        Self((0..Self::COUNT).fold(0, |bits, k| bits | u8::from(takes(k)) << k))
-    }
-
-    /// The columns of tile `k`, none where it is not among them, up to column `end`.
-    #[inline(always)]
-    pub fn columns(self, k: usize, end: usize) -> Range<usize> {
-        let first = |k: usize| (k * TILE_W + MARGIN).saturating_sub(TILE_W).min(end);
-        if self.0 >> k & 1 == 1 { first(k)..first(k + 1) } else { 0..0 }
-    }
-}
 
 /// The tiles of a picture.
 pub struct Tiles {
@@ -83,7 +56,7 @@ impl Tiles {
     }
 
     /// Whether any CoC of some tiles does not have the whole share.
-    pub fn any_outside(&self, share: &Share, columns: Range<usize>, rows: Range<usize>) -> bool {
+    pub fn any_outside(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
         let columns = columns.start.min(self.across)..columns.end.min(self.across);
         (rows.start..rows.end.min(self.down)).any(|row| {
             let at = row * self.across;
@@ -91,21 +64,8 @@ impl Tiles {
         })
     }
 
-    /// The tiles of a block, and beside it, of a row of tiles that a bin has a share of.
-    pub fn pieces(&self, share: &Share, block: usize, row: usize) -> Pieces {
-        Pieces::of(|k| {
-            // Beyond the picture its outermost columns repeat.
-            let column = (block * (BLOCK / TILE_W) + k).saturating_sub(1).min(self.across - 1);
-            // Averages reach into the tiles beside one that a bin needs.
-            let columns = column.saturating_sub(1)..(column + 2).min(self.across);
-            let mut rows = row.saturating_sub(1)..(row + 2).min(self.down);
-            let is_idle = |at: usize| self.idle[at * self.across..][columns.clone()].iter().all(|&idle| idle);
-            share.meets(self.ranges[row * self.across + column]) && !rows.all(is_idle)
-        })
-    }
-
     /// Whether any CoC of some tiles has a share; columns and rows of tiles are cut at the picture's end.
-    pub fn any_within(&self, share: &Share, columns: Range<usize>, rows: Range<usize>) -> bool {
+    pub fn any_within(&self, share: &Share, columns: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> bool {
         let columns = columns.start.min(self.across)..columns.end.min(self.across);
         (rows.start..rows.end.min(self.down)).any(|row| {
             let at = row * self.across;
@@ -193,55 +153,6 @@ fn erode(from: &[bool], scratch: &mut [bool], to: &mut [bool], (across, down): (
         for x in 0..across {
             to[y * across + x] =
                 (y.saturating_sub(AROUND.1)..(y + AROUND.1 + 1).min(down)).all(|y| scratch[y * across + x]);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const WIDE: usize = BLOCK + 2 * MARGIN;
-
-    #[test]
-    fn the_pieces_of_a_block_are_all_its_columns_and_margins() {
-        for end in [BLOCK / 2 + 2 * MARGIN, WIDE] {
-            let columns: Vec<usize> = (0..Pieces::COUNT).flat_map(|k| Pieces::ALL.columns(k, end)).collect();
-            assert_eq!(columns, (0..end).collect::<Vec<_>>());
-        }
-        let second = Pieces::of(|k| k == 2);
-        let columns: Vec<usize> = (0..Pieces::COUNT).flat_map(|k| second.columns(k, WIDE)).collect();
-        assert_eq!(columns, (MARGIN + TILE_W..MARGIN + 2 * TILE_W).collect::<Vec<_>>(), "the second tile of the block");
-        assert_eq!(Pieces::of(|_| false), Pieces::NONE);
-    }
-
-    /// Wherever a pixel has a share, its tile is among the pieces of the block.
-    #[test]
-    fn a_share_is_missed_nowhere() {
-        let (width, height) = (3 * TILE_W + 5, 2 * TILE_H);
-        let mut tiles = Tiles::new(width, height);
-        let coc = |x: usize, y: usize| ((x * 7 + y * 13) % 61) as f32 * 0.2 - 4.0;
-        for (at, range) in tiles.ranges.iter_mut().enumerate() {
-            let (column, row) = (at % tiles.across * TILE_W, at / tiles.across * TILE_H);
-            let values = (0..TILE_H * TILE_W).map(|k| coc(column + k % TILE_W, row + k / TILE_W));
-            *range = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
-        }
-        for low_px in [-3.0, 0.5, 5.0] {
-            let share = Share::new(Some((low_px, 4.0)), Some((low_px + 1.0, 4.0)));
-            for row in 0..tiles.down {
-                let pieces = tiles.pieces(&share, 0, row);
-                for k in 1..Pieces::COUNT - 1 {
-                    let taken = pieces.columns(k, WIDE).any(|x| {
-                        let x = (x - MARGIN).min(width - 1);
-                        (0..TILE_H).any(|y| share.at(coc(x, row * TILE_H + y)) > 0.0)
-                    });
-                    let has = (0..TILE_W * TILE_H).any(|at| {
-                        let x = ((k - 1) * TILE_W + at % TILE_W).min(width - 1);
-                        share.at(coc(x, row * TILE_H + at / TILE_W)) > 0.0
-                    });
-                    assert_eq!(taken, has, "{low_px} {row} {k}");
-                }
-            }
         }
     }
 }
