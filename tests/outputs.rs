@@ -216,6 +216,23 @@ fn an_encoder_that_hangs_does_not_keep_the_program() {
 
 #[test]
 #[ignore = "needs ffmpeg"]
+fn a_video_is_the_same_on_any_number_of_cores() {
+    let home = Home::new();
+    home.record("self", 30, 0.04);
+    for (kind, threads) in [("mp4", 1), ("mp4", 2), ("webm", 2)] {
+        let of = |cores: &str, name: &str| {
+            let args = format!("stream self {BLUR} --threads {threads} --to {name}");
+            let ran = Ran::from(home.command(&format!("taskset -pc {cores} $$ >/dev/null;"), &args).output().unwrap());
+            assert_eq!((ran.code, ran.said.contains("without effect")), (Some(0), false), "{}", ran.said);
+            fs::read(home.at(name)).unwrap()
+        };
+        assert!(of("0", &format!("one.{kind}")) == of("0-999", &format!("all.{kind}")), "{kind}, {threads} threads");
+        ["one", "all"].map(|name| fs::remove_file(home.at(&format!("{name}.{kind}"))).unwrap());
+    }
+}
+
+#[test]
+#[ignore = "needs ffmpeg"]
 fn a_video_on_a_full_disk_is_an_error_and_kept() {
     let home = Home::new();
     home.record("self", 200, 0.1);

@@ -218,8 +218,9 @@ impl Services for System {
         period_ns: u64,
         stop: &Arc<AtomicBool>,
     ) -> Result<Box<dyn Sink>, String> {
-        let (force, out_size, stop) = (self.force, self.out_size, Arc::clone(stop));
-        let options = sink::Options { force, out_size, stop, ..sink::Options::new(size, period_ns) };
+        let (force, out_size, threads, stop) =
+            (self.force, self.out_size, self.options.computing.threads, Arc::clone(stop));
+        let options = sink::Options { force, out_size, threads, stop, ..sink::Options::new(size, period_ns) };
         let target = Target::from_str(name).map_err(|error| error.to_string())?;
         target.open(&options).map_err(|error| error.to_string())
     }

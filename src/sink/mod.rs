@@ -160,6 +160,8 @@ pub struct Options {
     pub force: bool,
     /// Width and height of a virtual camera; `None`: those of the frames, the width made even.
     pub out_size: Option<(u32, u32)>,
+    /// Threads that compress a video; `None`: as many as the encoder takes. Its bytes may depend on them.
+    pub threads: Option<usize>,
     /// Notice by a virtual camera whether somebody watches.
     pub demand: Option<Demand>,
     /// Once set, the run is to end: nobody is waited for any more who does nothing.
@@ -170,7 +172,7 @@ impl Options {
     /// Nothing that exists is overwritten, nobody is told of readers, and nothing stops the run.
     pub fn new(size: (u32, u32), period_ns: u64) -> Self {
         let stop = Arc::default();
-        Self { size, period_ns, frames: None, force: false, out_size: None, demand: None, stop }
+        Self { size, period_ns, frames: None, force: false, out_size: None, threads: None, demand: None, stop }
     }
 }
 

@@ -138,6 +138,7 @@ pub fn run(command: &BenchCommand, given: &Given) -> Result<(), CliError> {
             lens: false,
             realtime: false,
             cpu_only: command.backend == Backend::Cpu,
+            compresses: false,
             window: false,
         },
     );

@@ -67,6 +67,7 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
             lens: false,
             realtime: camera.info().live,
             cpu_only: false,
+            compresses: false,
             window: false,
         },
     );

@@ -71,6 +71,7 @@ pub fn run(command: &RecordCommand, global: &options::Global, given: &Given) -> 
             lens: false,
             realtime: true,
             cpu_only: false,
+            compresses: false,
             window: false,
         },
     );

@@ -116,6 +116,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         lens: matches!(look.strength, Strength::Lens(_)),
         realtime: adaptive,
         cpu_only: parts.computing.backend == Backend::Cpu,
+        compresses: command.to.iter().any(|target| matches!(target, Target::Video(_))),
         window: false,
     };
     unused::warn(&given.settings, &unused);
@@ -134,6 +135,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         frames: info.frames,
         force: output.force,
         out_size: stream.out_size.map(|size| (size.width, size.height)),
+        threads: options.computing.threads,
         demand: noticed.clone(),
         stop: Arc::clone(&stop),
         ..sink::Options::new(info.size, info.period_ns)

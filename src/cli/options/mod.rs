@@ -93,7 +93,7 @@ pub struct Computing {
     /// Part of the name of the GPU to take
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
-    /// Threads of the CPU backend [default: one per core]
+    /// Threads of the CPU backend, and of a video's encoder [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads())]
     pub threads: Option<usize>,
 }

@@ -25,6 +25,8 @@ pub struct Run {
     pub realtime: bool,
     /// Whether the user chose the CPU backend.
     pub cpu_only: bool,
+    /// Whether a video is compressed.
+    pub compresses: bool,
     /// Whether there is a window.
     pub window: bool,
 }
@@ -92,10 +94,8 @@ const NEEDS: &[(&[&str], Why)] = &[
         if run.source == From::Bench { Some("`bench` takes --coc") } else { blur(run) }
     }),
     (&["max-coc", "aperture", "intensity", "rim", "rank", "highlights", "quality"], blur),
-    (&["backend", "adapter", "threads"], |run| match run.depth {
-        DepthFrom::Eyes => None,
-        _ => blur(run),
-    }),
+    (&["backend", "adapter"], computed),
+    (&["threads"], |run| computed(run).filter(|_| !run.compresses)),
     (&["budget-ms"], |run| match run.realtime {
         true => blur(run),
         false => Some("frames do not come in real time: add --pace realtime"),
@@ -119,6 +119,11 @@ fn dof(run: &Run) -> Option<&'static str> {
 /// Settings of the blur need any effect that blurs.
 fn blur(run: &Run) -> Option<&'static str> {
     (run.effect == Effect::None).then_some("nothing is blurred")
+}
+
+/// Settings of what computes need something to compute.
+fn computed(run: &Run) -> Option<&'static str> {
+    blur(run).filter(|_| run.depth != DepthFrom::Eyes)
 }
 
 /// Settings of the window need one.
@@ -156,6 +161,7 @@ pub fn warn_by_source(given: &[Setting], source: Kind) {
         lens: false,
         realtime: true,
         cpu_only: false,
+        compresses: false,
         window: true,
     };
     let of_source = NEEDS[..2].iter().flat_map(|(names, _)| *names);
@@ -235,6 +241,7 @@ mod tests {
         lens: false,
         realtime: false,
         cpu_only: false,
+        compresses: false,
         window: false,
     };
 

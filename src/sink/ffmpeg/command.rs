@@ -47,8 +47,8 @@ const H264: &[&str] = &["-c:v", "libx264", "-preset", "veryfast", "-crf", "18"];
 const VP9: &[&str] =
     &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-deadline", "realtime", "-cpu-used", "5", "-row-mt", "1"];
 
-/// The command that encodes the Matroska stream on its standard input into the file `part`.
-pub(super) fn encode(format: &Format, part: &Path, height: u32) -> Command {
+/// The command that encodes the Matroska stream on its standard input into the file `part`, on so many `threads`.
+pub(super) fn encode(format: &Format, part: &Path, height: u32, threads: Option<usize>) -> Command {
     let color = match Matrix::for_height(height) {
         Matrix::Bt601 => "smpte170m",
         // What players expect of high definition.
@@ -66,6 +66,7 @@ pub(super) fn encode(format: &Format, part: &Path, height: u32) -> Command {
         .args(["-colorspace", color, "-color_primaries", color, "-color_trc", color])
         .args([frame_timing_option(), "vfr", "-enc_time_base", format.time_base])
         .args(format.encoder)
+        .args(threads.iter().flat_map(|threads| ["-threads".to_owned(), threads.to_string()]))
         .args(["-flush_packets", "1"])
         .args(format.muxer)
         .arg(as_file(part))

@@ -47,7 +47,7 @@ impl Ffmpeg {
     pub fn create(path: &Path, options: &Options) -> Result<Self, SinkError> {
         let output = Output::create(path, options.force)?;
         let format = Format::of(path);
-        let mut command = command::encode(&format, output.part(), options.size.1);
+        let mut command = command::encode(&format, output.part(), options.size.1, options.threads);
         let mut process = Process::start(&mut command, &options.stop).map_err(|cause| match cause.kind() {
             ErrorKind::NotFound => SinkError::NoFfmpeg { path: path.to_owned() },
             _ => SinkError::Write { path: path.to_owned(), cause },

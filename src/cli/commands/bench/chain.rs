@@ -337,6 +337,7 @@ fn warn(command: &BenchCommand, name: &SourceName, source: &Source, look: &Look,
             lens: matches!(look.strength, Strength::Lens(_)),
             realtime: false,
             cpu_only: command.backend == Backend::Cpu,
+            compresses: false,
             window: false,
         },
     );

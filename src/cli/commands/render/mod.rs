@@ -148,6 +148,7 @@ impl RenderCommand {
                 lens: matches!(look.strength, Strength::Lens(_)),
                 realtime: false,
                 cpu_only: self.computing.backend == Backend::Cpu,
+                compresses: false,
                 window: false,
             },
         );
