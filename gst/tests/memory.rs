@@ -76,11 +76,15 @@ fn a_picture_allocates_nothing_of_its_size() {
     }
 }
 
-/// Memory of this process that is in use, in kB.
-fn resident_kb() -> u64 {
+/// Bytes that all of this process has of `malloc`, and its threads. What is resident tells less: the C library keeps what was
+/// returned, in a pool for each thread.
+fn held() -> (usize, usize) {
+    // SAFETY: it only reads the allocator's own counts.
+    #[allow(unsafe_code)]
+    let allocator = unsafe { libc::mallinfo2() };
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
-    line.trim().trim_end_matches(" kB").parse().unwrap()
+    let threads = status.lines().find_map(|line| line.strip_prefix("Threads:")).unwrap();
+    (allocator.uordblks + allocator.hblkhd, threads.trim().parse().unwrap())
 }
 
 #[test]
@@ -91,17 +95,20 @@ fn a_thousand_changes_of_state_leave_nothing_behind() {
          videotestsrc ! video/x-raw,format=RGB,{RAW} ! queue ! b.sink \
          videotestsrc pattern=gradient ! video/x-raw,format=GRAY16_LE,{RAW} ! queue ! b.depth"
     ));
-    let mut before_kb = 0;
+    let mut before = (0, 0);
     for start in 0..250 {
         // To a first picture and back: four changes of state.
         pipeline.set_state(gst::State::Paused).unwrap();
         wait_for(&pipeline, gst::MessageType::AsyncDone);
         pipeline.set_state(gst::State::Null).unwrap();
-        if start == 99 {
-            before_kb = resident_kb();
+        if start == 49 {
+            before = held();
         }
     }
-    let grown_kb = resident_kb().saturating_sub(before_kb);
-    // A picture of each start alone would be 8.6 MB, and an executor's memory a hundred times that.
-    assert!(grown_kb < 4000, "150 starts left {grown_kb} kB");
+    let after = held();
+    let grown = after.0.saturating_sub(before.0);
+    println!("200 starts: {before:?}, then {after:?}");
+    // 1 kB a start: a picture of each would be 58.
+    assert!(grown < 200_000, "200 starts left {grown} bytes");
+    assert!(after.1 <= before.1, "{} threads, then {}", before.1, after.1);
 }
