@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Prints the licences of all that is built into bokehcam: the crates of the default features, and the fonts. Each text
-stands once, below those that it is for. Needs cargo, and the crates as a build has fetched them."""
+stands once, below those that it is for. Needs cargo, which fetches what a build has left out: metadata takes crates of tests, too."""
 
 import json
 import pathlib
@@ -14,7 +14,7 @@ def built_in():
     """Packages that the program is linked with, by name."""
     version = subprocess.run(["cargo", "-vV"], check=True, capture_output=True, text=True).stdout
     host = next(line.split()[1] for line in version.splitlines() if line.startswith("host:"))
-    command = ["cargo", "metadata", "--format-version=1", "--locked", "--offline", "--filter-platform", host]
+    command = ["cargo", "metadata", "--format-version=1", "--locked", "--filter-platform", host]
     metadata = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT).stdout)
     nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
     found, waiting = set(), [metadata["resolve"]["root"]]
