@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
-"""Prints the licences of all that is built into bokehcam: the crates of the default features, and the fonts. Each text
-stands once, below those that it is for. Needs cargo, which fetches what a build has left out: metadata takes crates of tests, too."""
+"""Prints the licences of all that is built into bokehcam: the crates of the default features, and the fonts; with an
+argument, `python` or `gst`, of all that is built into what is made there. Each text stands once, below those that it is for.
+Needs cargo, which fetches what a build has left out: metadata takes crates of tests, too."""
 
 import json
 import pathlib
 import subprocess
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+FOLDER = ROOT.joinpath(*sys.argv[1:2])
 TEXTS = ("license", "licence", "copying", "notice", "unlicense")
 
 
@@ -15,7 +18,7 @@ def built_in():
     version = subprocess.run(["cargo", "-vV"], check=True, capture_output=True, text=True).stdout
     host = next(line.split()[1] for line in version.splitlines() if line.startswith("host:"))
     command = ["cargo", "metadata", "--format-version=1", "--locked", "--filter-platform", host]
-    metadata = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT).stdout)
+    metadata = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, cwd=FOLDER).stdout)
     nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
     found, waiting = set(), [metadata["resolve"]["root"]]
     while waiting:
@@ -45,10 +48,10 @@ def main():
             without.append(f"{name}: {package['license']}, by {', '.join(package['authors']) or 'its authors'}")
         for text in found:
             by_text.setdefault(text, []).append(name)
-    fonts = ROOT / "src/preview/fonts"
-    print("Roboto Regular and Medium: Apache-2.0")
-    for text in texts(fonts):
-        by_text.setdefault(text, []).append("Roboto")
+    if FOLDER == ROOT:
+        print("Roboto Regular and Medium: Apache-2.0")
+        for text in texts(ROOT / "src/preview/fonts"):
+            by_text.setdefault(text, []).append("Roboto")
     if without:
         print("\nThese bring no text of their own:\n" + "\n".join(without))
     for text, names in by_text.items():

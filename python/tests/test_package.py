@@ -20,6 +20,13 @@ def test_it_has_the_version_of_the_program(repository):
     assert bc.__version__ == version_in(repository / "Cargo.toml") == version_in(repository / "python" / "Cargo.toml")
 
 
+def test_a_wheel_brings_the_licences_of_what_is_built_in():
+    text = (Path(bc.__file__).parent / "licences.txt").read_text()
+    for crate in ["pyo3", "numpy", "image", "pulp"]:
+        assert re.search(rf"^{crate} \d", text, re.M), crate
+    assert "Permission is hereby granted" in text
+
+
 def test_what_is_public_is_explained():
     for name in bc.__all__:
         value = getattr(bc, name)
