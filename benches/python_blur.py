@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The Python package beside what people blur arrays with: times, and how near each comes to a thin lens.
 
-Needs the package (`python/test` builds it into target/python/wheels) and its group `bench`: BlurGenerator, albumentations,
+Needs the package (`python/test` builds it into target/bindings/wheels) and its group `bench`: BlurGenerator, albumentations,
 opencv-python-headless.
 
   python benches/python_blur.py [--size 1280x720] [--seeds 2,5] [--radii 8,16] [--rounds 5] [--samples 96]

@@ -89,10 +89,13 @@ fn linear_light_has_no_white_and_no_highlights_to_recover() {
     assert!(out.iter().all(|light| (light / 40.0 - 1.0).abs() < 1e-4));
     let odd = [f32::NAN, f32::INFINITY, -1.0, 1e30];
     let odd: Vec<f32> = constant.iter().enumerate().map(|(k, _)| odd[k % 4]).collect();
+    let mut lone = vec![0.5; constant.len()];
+    lone[constant.len() / 2] = 1e30;
     let flat = vec![6.0; map.metres.len()];
-    assert!(
-        blurred(&mut slices, &odd, Radii::Each(&flat)).iter().all(|light| (0.0..=Pixels::MOST_LIGHT).contains(light))
-    );
+    for light in [odd, lone] {
+        let out = blurred(&mut slices, &light, Radii::Each(&flat));
+        assert!(out.iter().all(|light| (0.0..=Pixels::MOST_LIGHT).contains(light)));
+    }
 }
 
 /// What was near in one picture is far in the next, and the other way round.

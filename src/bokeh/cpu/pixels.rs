@@ -62,8 +62,9 @@ impl Sample for f32 {
 
     #[inline(always)]
     fn write(color: &[[f32; CHUNK]; 3], _: &EncodeTable, out: &mut [f32]) {
+        // Beside the brightest light, few terms of a filter sum up to less than nothing.
         for (x, pixel) in out.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            *pixel = [color[0][x], color[1][x], color[2][x]];
+            *pixel = [Pixels::light(color[0][x]), Pixels::light(color[1][x]), Pixels::light(color[2][x])];
         }
     }
 }
