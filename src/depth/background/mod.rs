@@ -7,6 +7,7 @@
 mod cells;
 
 use crate::color::light_of_codes;
+use crate::compute::thread_pool::ThreadPool;
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use crate::optics::DepthCoc;
 
@@ -175,12 +176,17 @@ impl Background {
     }
 
     /// Finds the matte of a picture by `matting`, before what is known to lie behind.
-    pub fn find_matte(&self, matting: &mut Matting, map: &mut DepthMap, color: &ColorImage, lens: &DepthCoc) {
+    pub fn find_matte(
+        &self,
+        matting: &mut Matting,
+        workers: &mut ThreadPool,
+        (map, color): (&mut DepthMap, &ColorImage),
+        lens: &DepthCoc,
+    ) {
         let (jump, other) = [FROM_PX, OTHER_PX].map(|px| lens.inverse_depth_of_px(px)).into();
-        match self.knows(color) {
-            true => matting.find_before(map, color, jump, |at, near| self.light_behind(at, near, other)),
-            false => matting.find(map, color, jump),
-        }
+        let knows = self.knows(color);
+        let behind = |at, near| if knows { self.light_behind(at, near, other) } else { None };
+        matting.find_before(workers, (map, color), jump, behind);
     }
 
     /// Whether anything is known of pictures like this one.

@@ -3,8 +3,13 @@
 //! What is wanted around a mixed pixel are means and covariances of both surfaces, close by where there are pure pixels
 //! and from some way off where there are none, as in hair. Cells have both for a tenth of the time that pixels need.
 
+use std::ops::Range;
+
+use pulp::{Arch, WithSimd};
+
 use super::share::Contrast;
-use super::{EdgePixel, larger, smaller};
+use super::{EdgePixel, larger, light_of, smaller};
+use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 use crate::frame::DepthMap;
 
 /// Side of a cell, in pixels.
@@ -28,6 +33,10 @@ const FRINGE_SHARES: [f32; 2] = [-0.1, 0.25];
 
 /// So many pixels of it, near ones above all, tell nothing, as a lone hair is mostly what is behind it; so many are enough.
 const FRINGE_PIXELS: [f32; 2] = [6.0, 14.0];
+
+/// Fewer cells, and answers, are not worth another thread.
+const LEAST_CELLS: usize = 16;
+const LEAST_ANSWERS: usize = 32;
 
 /// Pixels of one surface in a cell, weighted: sums, but for the means of position and inverse depth.
 #[derive(Clone, Copy, Debug, Default)]
@@ -98,11 +107,11 @@ impl View<'_> {
     /// The colour of a pixel in linear light.
     #[inline(always)]
     pub fn light(&self, at: usize) -> [f32; 3] {
-        [0, 1, 2].map(|p| self.light[usize::from(self.rgb[3 * at + p])])
+        light_of(self.light, self.rgb, at)
     }
 }
 
-/// The clusters near edges, made when they are asked for.
+/// The clusters near edges, made once an answer needs them.
 #[derive(Debug, Default)]
 pub struct Clusters {
     across: usize,
@@ -111,18 +120,19 @@ pub struct Clusters {
     place: Vec<u32>,
     /// Near, far, and what of the near surface is at edges.
     clusters: Vec<[Cluster; 3]>,
+    /// The cells of the clusters.
+    cells: Vec<u32>,
     /// Per cell, the place of its last answer plus one: pixels side by side ask for the same.
     answered: Vec<u32>,
     answers: Vec<Answer>,
-    contrasts: Vec<Contrast>,
 }
 
+/// What is around the cell of an edge pixel, between its near and its far surface; none where one of these has no pixels, not
+/// even further away.
 #[derive(Clone, Copy, Debug)]
 struct Answer {
-    near: f32,
-    far: f32,
-    /// The place of the contrast.
-    contrast: Option<u32>,
+    edge: EdgePixel,
+    contrast: Option<Contrast>,
 }
 
 impl Clusters {
@@ -134,55 +144,141 @@ impl Clusters {
             places.resize(self.across * self.down, 0);
         }
         self.clusters.clear();
+        self.cells.clear();
         self.answers.clear();
-        self.contrasts.clear();
     }
 
-    /// The place of the contrast between the near and the far surface around the cell of an edge pixel, for [`Self::at`];
-    /// `None` where one has no pixels, not even further away.
+    /// The place of the answer for an edge pixel: that of the pixels before it in its cell, where its surfaces are as far, or a
+    /// new one, for [`Self::find`].
     #[inline(always)]
-    pub(super) fn around(&mut self, view: &View, edge: &EdgePixel) -> Option<u32> {
-        let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
-        let cell = row * self.across + column;
-        let same = |answer: &&Answer| {
-            (answer.near - edge.near).abs() <= view.jump && (answer.far - edge.far).abs() <= view.jump
-        };
-        let last = self.answered[cell].checked_sub(1);
-        if let Some(answer) = last.map(|last| &self.answers[last as usize]).filter(same) {
-            return answer.contrast;
+    pub(super) fn ask(&mut self, jump: f32, edge: &EdgePixel) -> u32 {
+        let answered = &mut self.answered[edge.y as usize / CELL_PX * self.across + edge.x as usize / CELL_PX];
+        let same =
+            |Answer { edge: e, .. }: &Answer| (e.near - edge.near).abs() <= jump && (e.far - edge.far).abs() <= jump;
+        if let Some(last) = answered.checked_sub(1).filter(|&last| same(&self.answers[last as usize])) {
+            return last;
         }
-        // A closure would not have the vectors of what calls it.
-        let mut found = None;
+        self.answers.push(Answer { edge: *edge, contrast: None });
+        *answered = self.answers.len() as u32;
+        *answered - 1
+    }
+
+    /// How many answers there are.
+    pub(super) fn asked(&self) -> usize {
+        self.answers.len()
+    }
+
+    /// Finds the contrasts of all answers from a place on.
+    pub(super) fn find(&mut self, (arch, workers): (Arch, &mut ThreadPool), view: &View, from: usize) {
+        let Self { across, down, place, clusters, cells, answers, .. } = self;
+        let (across, down, answers) = (*across, *down, &mut answers[from..]);
         for reach in REACHES_CELLS {
-            if let Some(colors) = self.within(view, reach, edge) {
-                found = Some(self.contrasts.len() as u32);
-                self.contrasts.push(contrast(colors));
-                break;
+            let made = clusters.len();
+            for Answer { edge, .. } in answers.iter().filter(|answer| answer.contrast.is_none()) {
+                let (columns, rows) = cells_around(edge, reach, (across, down));
+                for cell in rows.flat_map(|row| columns.clone().map(move |column| row * across + column)) {
+                    if place[cell] == 0 {
+                        cells.push(cell as u32);
+                        place[cell] = cells.len() as u32;
+                    }
+                }
+            }
+            clusters.resize(cells.len(), Default::default());
+            let new = &cells[made..];
+            let each = new.len().div_ceil(MOST_ITEMS).max(LEAST_CELLS);
+            workers.run_each(new.chunks(each).zip(clusters[made..].chunks_mut(each)), &|(cells, clusters)| {
+                arch.dispatch(SplitCells { view, across, cells, clusters });
+            });
+            let surroundings = Surroundings { across, down, place, clusters };
+            let each = answers.len().div_ceil(MOST_ITEMS).max(LEAST_ANSWERS);
+            workers.run_each(answers.chunks_mut(each), &|answers| {
+                arch.dispatch(FindContrasts { surroundings, view, reach, answers });
+            });
+        }
+    }
+
+    /// The contrast of an answer, if one was found.
+    #[inline(always)]
+    pub(super) fn at(&self, answer: u32) -> Option<&Contrast> {
+        self.answers[answer as usize].contrast.as_ref()
+    }
+}
+
+/// The columns and rows of the cells around that of an edge pixel, so many in every direction.
+#[inline(always)]
+fn cells_around(edge: &EdgePixel, reach: usize, (across, down): (usize, usize)) -> (Range<usize>, Range<usize>) {
+    let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
+    (
+        column.saturating_sub(reach)..(column + reach + 1).min(across),
+        row.saturating_sub(reach)..(row + reach + 1).min(down),
+    )
+}
+
+/// Makes the clusters of cells.
+struct SplitCells<'a> {
+    view: &'a View<'a>,
+    across: usize,
+    cells: &'a [u32],
+    clusters: &'a mut [[Cluster; 3]],
+}
+
+impl WithSimd for SplitCells<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { view, across, cells, clusters } = self;
+        for (&cell, clusters) in cells.iter().zip(clusters) {
+            *clusters = split(view, cell as usize % across, cell as usize / across);
+        }
+    }
+}
+
+/// Finds the contrasts that answers lack, in cells that were made.
+struct FindContrasts<'a> {
+    surroundings: Surroundings<'a>,
+    view: &'a View<'a>,
+    reach: usize,
+    answers: &'a mut [Answer],
+}
+
+impl WithSimd for FindContrasts<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { surroundings, view, reach, answers } = self;
+        for answer in answers {
+            if answer.contrast.is_none() {
+                // A closure would not have the vectors of what calls it.
+                if let Some(surfaces) = surroundings.within(view, reach, &answer.edge) {
+                    answer.contrast = Some(contrast(surfaces));
+                }
             }
         }
-        let contrast = found;
-        self.answers.push(Answer { near: edge.near, far: edge.far, contrast });
-        self.answered[cell] = self.answers.len() as u32;
-        contrast
     }
+}
 
-    /// A contrast that was found.
-    #[inline(always)]
-    pub(super) fn at(&self, place: u32) -> &Contrast {
-        &self.contrasts[place as usize]
-    }
+/// Clusters that were made.
+#[derive(Clone, Copy)]
+struct Surroundings<'a> {
+    across: usize,
+    down: usize,
+    place: &'a [u32],
+    clusters: &'a [[Cluster; 3]],
+}
 
-    /// The same of so many cells in every direction.
+impl Surroundings<'_> {
+    /// The surfaces around an edge pixel in so many cells in every direction.
     #[inline(always)]
-    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<Surfaces> {
+    fn within(&self, view: &View, reach: usize, edge: &EdgePixel) -> Option<Surfaces> {
         // A surface's inverse depth may change on the way, but by less than would make it the other one.
         let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
         let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
         let [x, y] = [column, row].map(|cell| (cell * CELL_PX) as f32 + 0.5 * (CELL_PX - 1) as f32);
         let mut sums = [Cluster::default(); 3];
-        for row in row.saturating_sub(reach)..(row + reach + 1).min(self.down) {
-            for column in column.saturating_sub(reach)..(column + reach + 1).min(self.across) {
-                let place = self.of_cell(view, (column, row));
+        let (columns, rows) = cells_around(edge, reach, (self.across, self.down));
+        for row in rows {
+            for column in columns.clone() {
+                let place = self.place[row * self.across + column] as usize - 1;
                 for (k, cluster) in self.clusters[place].iter().enumerate() {
                     let is_near = edge.is_near(cluster.inverse);
                     let is_fringe = k == FRINGE;
@@ -209,17 +305,6 @@ impl Clusters {
         let [few, enough] = FRINGE_PIXELS;
         let weight = ((sums[FRINGE].weight - few) / (enough - few)).clamp(0.0, 1.0);
         Some(Surfaces { near: near?, far: far?, fringe: fringe.zip(Some(weight)) })
-    }
-
-    /// The place of the clusters of a cell.
-    #[inline(always)]
-    fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> usize {
-        let place = &mut self.place[row * self.across + column];
-        if *place == 0 {
-            self.clusters.push(split(view, column, row));
-            *place = self.clusters.len() as u32;
-        }
-        *place as usize - 1
     }
 }
 
