@@ -198,11 +198,12 @@ impl CocMaker {
 
     /// Gives a map what is remembered to lie behind, having learned from it first where it is that of a picture `taken_ns`.
     fn reveal(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField, taken_ns: Option<u64>) {
-        if let (CocField::Depth(lens), Some(background), false) = (field, &mut self.background, map.is_smooth) {
+        let Self { background, workers, .. } = self;
+        if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
             if let Some(taken_ns) = taken_ns {
                 background.learn(map, color, lens, taken_ns);
             }
-            background.reveal(map, color, lens);
+            background.reveal(workers, map, color, lens);
         }
     }
 }

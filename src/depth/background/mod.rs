@@ -7,6 +7,7 @@
 mod cells;
 
 use crate::color::light_of_codes;
+use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use crate::optics::DepthCoc;
@@ -75,7 +76,8 @@ pub struct Background {
     rows: [Vec<f32>; 3],
     mixed: Vec<bool>,
     cells: Cells,
-    pixels: Vec<MixedPixel>,
+    /// What is revealed in each band.
+    pixels: Vec<Vec<MixedPixel>>,
 }
 
 impl Default for Background {
@@ -137,42 +139,52 @@ impl Background {
     }
 
     /// Gives the pixels of a map that hide something remembered, as far as blur can show it, what that is.
-    pub fn reveal(&mut self, map: &mut DepthMap, color: &ColorImage, lens: &DepthCoc) {
+    pub fn reveal(&mut self, workers: &mut ThreadPool, map: &mut DepthMap, color: &ColorImage, lens: &DepthCoc) {
         let size = self.size;
         if map.size() != color.size() || !self.knows(color) {
             return;
         }
         let other = lens.inverse_depth_of_px(OTHER_PX);
         let Self { cells, rounds, inverse, .. } = self;
-        let nearest = cells.survey(size, |at| {
+        let nearest = cells.survey(workers, size, |at| {
             let own = DepthMap::inverse_of(map.metres[at]);
             (rounds[at] >= KNOWN).then(|| (own, own - inverse[at] > other))
         });
         cells.spread(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
+        let bands = Bands::new(size.1, 1, workers);
         let mut pixels = std::mem::take(&mut self.pixels);
-        pixels.clear();
-        for y in 0..size.1 {
-            let row = y * size.0;
-            let mut before = map.matte.within(row..row + size.0).iter().peekable();
-            for (columns, is_wanted) in self.cells.row(y) {
-                let (first, end) = (row + columns.start, row + columns.end);
-                if !is_wanted {
-                    while let Some(pixel) = before.next_if(|pixel| (pixel.at as usize) < end) {
-                        pixels.push(*pixel);
-                    }
-                    continue;
-                }
-                for at in first..end {
-                    let mixed = before.next_if(|pixel| pixel.at as usize == at);
-                    pixels.extend(mixed.copied().or_else(|| self.behind(at, map.metres[at], &color.rgb, other)));
-                }
+        pixels.resize_with(bands.rows().count(), Vec::new);
+        workers.run_each(bands.rows().zip(&mut pixels), &|(rows, pixels)| {
+            pixels.clear();
+            for y in rows {
+                self.reveal_row(y, map, color, other, pixels);
             }
-        }
-        std::mem::swap(&mut map.matte.pixels, &mut pixels);
+        });
+        map.matte.pixels.clear();
+        pixels.iter().for_each(|pixels| map.matte.pixels.extend_from_slice(pixels));
         if map.matte.pixels.len() > Matte::most(size.0, size.1) {
             map.matte.pixels.retain(|pixel| pixel.share < 1.0);
         }
         self.pixels = pixels;
+    }
+
+    /// Adds the mixed pixels of a row, and what the others of it hide.
+    fn reveal_row(&self, y: usize, map: &DepthMap, color: &ColorImage, other: f32, pixels: &mut Vec<MixedPixel>) {
+        let row = y * self.size.0;
+        let mut before = map.matte.within(row..row + self.size.0).iter().peekable();
+        for (columns, is_wanted) in self.cells.row(y) {
+            let (first, end) = (row + columns.start, row + columns.end);
+            if !is_wanted {
+                while let Some(pixel) = before.next_if(|pixel| (pixel.at as usize) < end) {
+                    pixels.push(*pixel);
+                }
+                continue;
+            }
+            for at in first..end {
+                let mixed = before.next_if(|pixel| pixel.at as usize == at);
+                pixels.extend(mixed.copied().or_else(|| self.behind(at, map.metres[at], &color.rgb, other)));
+            }
+        }
     }
 
     /// Finds the matte of a picture by `matting`, before what is known to lie behind.
