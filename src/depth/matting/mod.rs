@@ -22,13 +22,17 @@ use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use clusters::{Clusters, View};
 use share::{Evidence, Labels, Prior};
 use survey::Survey;
-use trace::Trail;
+use trace::{Trace, Trail};
 
 /// Where the CoC jumps by so many pixels or more, pixels are worth taking apart.
 pub const FROM_PX: f32 = 0.5;
 /// Shares beyond this are those of a pure pixel.
 const NEARLY_PURE: f32 = 0.98;
 
+/// What the map says of pixels that were traced: nothing.
+const TRACED: Labels = Labels { is_near: false, borders: false, is_thin: false };
+/// So many pixels away from an edge, at most.
+const MOST_STEPS: usize = 16;
 /// Fewer pixels are not worth another thread.
 const LEAST_PIXELS: usize = 256;
 
@@ -40,9 +44,10 @@ pub struct Matting {
     /// Whether pixels differ in depth from one of their eight neighbours: the others are pure.
     at_edge: Vec<bool>,
     survey: Survey,
+    /// The pixels at edges, and then those that were traced.
     edges: Vec<EdgePixel>,
     clusters: Clusters,
-    /// The place of the answer for each edge.
+    /// The place of the answer for each.
     answers: Vec<u32>,
     evidence: Vec<Evidence>,
     /// What is known of pixels that were traced, while they are.
@@ -115,9 +120,8 @@ impl Matting {
         clusters.clear(size);
         answers.clear();
         answers.extend(edges.iter().map(|edge| clusters.ask(jump, edge)));
-        let DepthMap { metres, matte, .. } = map;
-        let view = View { size, metres, jump, at_edge, rgb: &color.rgb, light };
-        clusters.find((arch, workers), &view, 0);
+        let (metres, matte, rgb) = (&map.metres, &mut map.matte, &color.rgb[..]);
+        clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, 0);
         // Those between surfaces of which one has no pixels tell nothing.
         let mut kept = 0;
         for k in 0..edges.len() {
@@ -126,15 +130,46 @@ impl Matting {
                 kept += 1;
             }
         }
-        evidence.resize(kept, Evidence::default());
-        let each = kept.div_ceil(MOST_ITEMS).max(LEAST_PIXELS);
-        let asked = edges[..kept].chunks(each).zip(answers.chunks(each));
-        workers.run_each(asked.zip(evidence.chunks_mut(each)), &|((edges, answers), evidence)| {
-            arch.dispatch(Compare { view: &view, clusters, behind: &behind, edges, answers, evidence });
-        });
-        let prior = Prior::of(evidence);
-        let search = trace::Search { size, most, metres, rgb: &color.rgb, light, jump, behind: &behind };
-        search.trace((arch, workers), &prior, at_edge, clusters, evidence);
+        edges.truncate(kept);
+        answers.truncate(kept);
+        let (mut compared, mut prior, mut steps) = (0..0, Prior::default(), 0);
+        loop {
+            let (found, is_traced) = (compared.end..edges.len(), steps > 0);
+            evidence.resize(found.end, Evidence::default());
+            let each = found.len().div_ceil(MOST_ITEMS).max(LEAST_PIXELS);
+            let view = View { size, metres, jump, at_edge, rgb, light };
+            let asked = edges[found.clone()].chunks(each).zip(answers[found.clone()].chunks(each));
+            let parts = asked.zip(evidence[found.clone()].chunks_mut(each));
+            workers.run_each(parts, &|((edges, answers), evidence)| {
+                let (view, behind) = (&view, &behind);
+                arch.dispatch(Compare { view, clusters, behind, is_traced, edges, answers, evidence });
+            });
+            if !is_traced {
+                prior = Prior::of(evidence);
+            }
+            compared = found;
+            if compared.is_empty() || compared.end >= most || steps == MOST_STEPS {
+                break;
+            }
+            let (prior, evidence) = (&prior, &evidence[compared.clone()]);
+            let workers = &mut *workers;
+            arch.dispatch(Trace {
+                arch,
+                workers,
+                prior,
+                size,
+                metres,
+                jump,
+                rgb,
+                light,
+                at_edge,
+                clusters,
+                evidence,
+                edges,
+                answers,
+            });
+            steps += 1;
+        }
         trace::drop_wide(size, kept, &prior, (evidence, trails));
         let has_traced = evidence.len() > kept;
 
@@ -163,6 +198,7 @@ struct Compare<'a, B> {
     view: &'a View<'a>,
     clusters: &'a Clusters,
     behind: &'a B,
+    is_traced: bool,
     edges: &'a [EdgePixel],
     answers: &'a [u32],
     evidence: &'a mut [Evidence],
@@ -174,12 +210,13 @@ impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Compare<'_, B> {
     // iterators, which would not have them.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { view, clusters, behind, edges, answers, evidence } = self;
+        let Self { view, clusters, behind, is_traced, edges, answers, evidence } = self;
         for ((edge, &answer), evidence) in edges.iter().zip(answers).zip(evidence) {
             let Some(contrast) = clusters.at(answer) else { continue };
             let at = edge.y as usize * view.size.0 + edge.x as usize;
             let lights = (view.light(at), behind(at, edge.near));
-            *evidence = Evidence::new(edge, labels(view, edge, at), lights, (answer, contrast));
+            let labels = if is_traced { TRACED } else { labels(view, edge, at) };
+            *evidence = Evidence::new(edge, labels, lights, (answer, contrast));
         }
     }
 }

@@ -245,7 +245,7 @@ impl Evidence {
 
 /// How likely pixels at edges are mixed at all in this frame, and how often the depth map errs: from a hard mask neither is,
 /// and from a camera half of them are. Found by expectation maximisation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Prior {
     mixed: f32,
     wrong: f32,

@@ -3,17 +3,13 @@
 use pulp::{Arch, WithSimd};
 
 use super::clusters::{Clusters, View};
-use super::share::{Evidence, Labels, Prior};
+use super::share::{Evidence, Prior};
 use super::{EdgePixel, around};
 use crate::compute::thread_pool::ThreadPool;
 use crate::frame::DepthMap;
 
 /// Neighbours of a pixel with this share are looked at, too, where the map has no edge.
 const TRACED_FROM: f32 = 0.15;
-/// What the map says of them: nothing.
-const TRACED: Labels = Labels { is_near: false, borders: false, is_thin: false };
-/// So many pixels away from an edge, at most.
-const MOST_STEPS: usize = 16;
 
 /// What is known of a pixel that was traced: it has nothing of what is near, it has some, it is part of something wide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
@@ -25,84 +21,55 @@ pub enum Trail {
     Wide,
 }
 
-/// Where thin things are looked for.
-pub struct Search<'a, B> {
-    /// Columns and rows.
-    pub size: (usize, usize),
-    /// No further where there are so many pixels already.
-    pub most: usize,
+/// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near though
+/// the map has none there, to neighbours that do so, too (hysteresis, as edges are traced).
+pub struct Trace<'a> {
+    pub arch: Arch,
+    pub workers: &'a mut ThreadPool,
+    pub prior: &'a Prior,
     /// As in a [`View`].
+    pub size: (usize, usize),
     pub metres: &'a [f32],
+    pub jump: f32,
     pub rgb: &'a [u8],
     pub light: &'a [f32; 256],
-    pub jump: f32,
-    /// As for [`Matting::find_before`](super::Matting::find_before).
-    pub behind: &'a B,
+    pub at_edge: &'a mut [bool],
+    pub clusters: &'a mut Clusters,
+    pub evidence: &'a [Evidence],
+    /// Adds to these the pixels one step away from the evidence, and their answers.
+    pub edges: &'a mut Vec<EdgePixel>,
+    pub answers: &'a mut Vec<u32>,
 }
 
-impl<B: Fn(usize, f32) -> Option<[f32; 3]>> Search<'_, B> {
-    /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near
-    /// though the map has none there, to neighbours that do so, too (hysteresis, as edges are traced). One after the other, as
-    /// each changes what the next one sees.
-    pub fn trace(
-        self,
-        (arch, workers): (Arch, &mut ThreadPool),
-        prior: &Prior,
-        at_edge: &mut [bool],
-        clusters: &mut Clusters,
-        evidence: &mut Vec<Evidence>,
-    ) {
-        arch.dispatch(Trace { search: self, arch, workers, prior, at_edge, clusters, evidence });
-    }
-}
-
-/// See [`Search::trace`].
-struct Trace<'a, B> {
-    search: Search<'a, B>,
-    arch: Arch,
-    workers: &'a mut ThreadPool,
-    prior: &'a Prior,
-    at_edge: &'a mut [bool],
-    clusters: &'a mut Clusters,
-    evidence: &'a mut Vec<Evidence>,
-}
-
-impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Trace<'_, B> {
+impl WithSimd for Trace<'_> {
     type Output = ();
+    // One after the other, as the clusters that one needs are made of what is marked until then.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { search, arch, workers, prior, at_edge, clusters, evidence } = self;
-        let Search { size, most, metres, rgb, light, jump, behind } = search;
-        let (mut from, mut steps) = (0, 0);
-        while from < evidence.len() && evidence.len() < most && steps < MOST_STEPS {
-            let end = evidence.len();
-            for k in from..end {
-                let Evidence { edge, labels, .. } = evidence[k];
-                if labels.is_near || prior.share(&evidence[k]) < TRACED_FROM {
-                    continue;
-                }
-                let (xs, ys) = around(&edge, 1, size);
-                for y in ys {
-                    for x in xs.clone() {
-                        let (at, next) = (y * size.0 + x, EdgePixel { x: x as u32, y: y as u32, ..edge });
-                        let is_far = (DepthMap::inverse_of(metres[at]) - edge.far).abs() <= jump;
-                        if !is_far || std::mem::replace(&mut at_edge[at], true) {
-                            continue;
-                        }
-                        let view = View { size, metres, jump, at_edge, rgb, light };
-                        let asked = clusters.asked();
-                        let answer = clusters.ask(jump, &next);
-                        if answer as usize == asked {
-                            clusters.find((arch, workers), &view, asked);
-                        }
-                        if let Some(contrast) = clusters.at(answer) {
-                            let lights = (view.light(at), behind(at, next.near));
-                            evidence.push(Evidence::new(&next, TRACED, lights, (answer, contrast)));
-                        }
+        let Self { arch, workers, prior, size, metres, jump, rgb, light, at_edge, clusters, evidence, .. } = self;
+        for one in evidence {
+            if one.labels.is_near || prior.share(one) < TRACED_FROM {
+                continue;
+            }
+            let (xs, ys) = around(&one.edge, 1, size);
+            for y in ys {
+                for x in xs.clone() {
+                    let (at, next) = (y * size.0 + x, EdgePixel { x: x as u32, y: y as u32, ..one.edge });
+                    let is_far = (DepthMap::inverse_of(metres[at]) - next.far).abs() <= jump;
+                    if !is_far || std::mem::replace(&mut at_edge[at], true) {
+                        continue;
+                    }
+                    let asked = clusters.asked();
+                    let answer = clusters.ask(jump, &next);
+                    if answer as usize == asked {
+                        clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, asked);
+                    }
+                    if clusters.at(answer).is_some() {
+                        self.edges.push(next);
+                        self.answers.push(answer);
                     }
                 }
             }
-            (from, steps) = (end, steps + 1);
         }
     }
 }
