@@ -293,9 +293,13 @@ fn takes() -> [Vec<(ColorImage, DepthMap)>; 2] {
         let (mut color, mut map) = (ColorImage::new(width, height), DepthMap::new(width, height));
         for (k, (pixel, z_m)) in (0..).zip(color.rgb.chunks_exact_mut(3).zip(&mut map.metres)) {
             let (x, y) = (k % width + 3 * frame, k / width);
-            let near = (x / 61 + y / 83) % 3 == 0;
-            let grain = (20.0 * noise(k, frame)) as i32;
-            pixel.copy_from_slice(&(if near { [60, 50, 40] } else { [170, 180, 200] }).map(|p| (p + grain) as u8));
+            let is_near = |x: u32, y: u32| (x / 61 + y / 83).is_multiple_of(3);
+            let near = is_near(x, y);
+            // A soft picture: what is mixed is found in it.
+            let seen = (0..9u32).filter(|k| is_near((x + k % 3).saturating_sub(1), (y + k / 3).saturating_sub(1)));
+            let (share, grain) = (seen.count() as f32 / 9.0, 8.0 * noise(k, frame));
+            let mix = |near: f32, far: f32| (far + share * (near - far) + grain) as u8;
+            pixel.copy_from_slice(&[mix(60.0, 170.0), mix(50.0, 180.0), mix(40.0, 200.0)]);
             let off = 0.004 * noise(k, frame + 100);
             let is_hole = (x + 2) / 9 % 7 == 0 && y / 11 % 2 == 0;
             *z_m = if is_hole { 0.0 } else { off + if near { 1.0 + 0.001 * y as f32 } else { WALL_M } };
