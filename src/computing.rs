@@ -17,7 +17,7 @@ pub struct Computing {
     pub backend: Backend,
     /// Part of the name of the GPU to take.
     pub adapter: Option<String>,
-    /// Threads of the CPU executor; all cores when `None`.
+    /// Threads of the CPU executor, and of those that finish depth; all cores when `None`.
     pub threads: Option<usize>,
 }
 
@@ -42,6 +42,11 @@ impl Computing {
         }
     }
 
+    /// Threads for what the CPU does.
+    pub fn threads(&self) -> usize {
+        self.threads.unwrap_or_else(cores)
+    }
+
     /// An executor for pictures of `size` pixels.
     ///
     /// # Errors
@@ -60,8 +65,7 @@ impl Computing {
         effort: stereo::Effort,
         size: (u32, u32),
     ) -> Result<Box<dyn Matcher>, DepthError> {
-        let threads = self.threads.unwrap_or_else(cores);
-        let settings = stereo::Settings { size, disparities, effort, threads };
+        let settings = stereo::Settings { size, disparities, effort, threads: self.threads() };
         Ok(stereo::create(&settings, self.backend, self.adapter.as_deref())?)
     }
 }

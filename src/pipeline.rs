@@ -80,6 +80,8 @@ pub struct Run<'a> {
     pub adaptive: bool,
     /// Whether depth was measured, so that refining it makes it better ([`Look::refines`]).
     pub measured: bool,
+    /// Threads that finish depth.
+    pub threads: usize,
     /// Where a change of all that comes from; `None` keeps everything as it is.
     pub changes: Option<mpsc::Receiver<Change>>,
     /// Where they go.
@@ -127,6 +129,7 @@ impl<'a> Run<'a> {
         Ok(Self {
             bokeh: settings.map(|settings| Computing::default().blur(&settings, info.size)).transpose()?,
             measured: depth.is_some(),
+            threads: Computing::default().threads(),
             camera,
             depth,
             look,
@@ -232,6 +235,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         look: if executor.is_some() { run.look } else { Look::plain(Effect::None) },
         size: info.size,
         measured: run.measured,
+        threads: run.threads,
         adaptive: run.adaptive,
         changes: run.changes,
         rate: live_ns.map(|_| rate::Rate::new(&order)),

@@ -17,6 +17,8 @@ use bokehcam::budget::{Governor, Quality, Sample};
 use bokehcam::calibration::rectifier::Rectifier;
 use bokehcam::calibration::{Distortion, Eye, StereoCalibration};
 use bokehcam::compute::Backend;
+use bokehcam::compute::thread_pool::ThreadPool;
+use bokehcam::depth::matting::Matting;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::source::StereoDepth;
 use bokehcam::depth::stereo::{self, Effort};
@@ -193,10 +195,12 @@ fn refinement() {
         let mut measured = three_depths(width / share, height / share);
         measured.metres.iter_mut().step_by(7).for_each(|z_m| *z_m = 0.0);
         let (mut refiner, mut map) = (Refiner::new(), DepthMap::default());
+        let (mut matting, mut workers) = (Matting::default(), ThreadPool::new("depth", 2));
         let mut frame = |index: u64| {
             map.resize(measured.width, measured.height);
             map.metres.copy_from_slice(&measured.metres);
-            refiner.refine(&mut map, &image, index * 33_000_000);
+            refiner.refine_on(&mut workers, &mut map, &image, index * 33_000_000);
+            matting.find_before(&mut workers, (&mut map, &image), 0.05, |_, _| None);
         };
         frame(0);
         frame(1);

@@ -6,6 +6,7 @@ mod common;
 use std::sync::LazyLock;
 
 use bokehcam::color::srgb_to_linear;
+use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::optics::DepthCoc;
@@ -66,7 +67,7 @@ impl Seer {
         for _ in 0..frames {
             self.background.learn(&map, &picture, &LENS, self.time_ns);
             last.clone_from(&map);
-            self.background.reveal(&mut last, &picture, &LENS);
+            self.background.reveal(&mut ThreadPool::new("reveal", 2), &mut last, &picture, &LENS);
             self.time_ns += PERIOD_NS;
         }
         last
@@ -143,10 +144,10 @@ fn another_place_or_size_is_begun_anew() {
     assert!(seer.see(&after, 2).matte.pixels.is_empty());
     let (picture, mut map) = (noise(32, 24), depth(32, 24, |_, _| 1.0));
     seer.background.learn(&map, &picture, &LENS, seer.time_ns);
-    seer.background.reveal(&mut map, &picture, &LENS);
+    seer.background.reveal(&mut ThreadPool::new("reveal", 2), &mut map, &picture, &LENS);
     assert!(map.matte.pixels.is_empty());
     let small = depth(16, 12, |_, _| 1.0);
     seer.background.learn(&small, &picture, &LENS, seer.time_ns);
-    seer.background.reveal(&mut map, &picture, &LENS);
+    seer.background.reveal(&mut ThreadPool::new("reveal", 2), &mut map, &picture, &LENS);
     assert!(map.matte.pixels.is_empty(), "a map of another size");
 }

@@ -1,7 +1,13 @@
 //! Measured depth fitted to its picture: edges, noise, size, and steadiness in time.
 
+use std::path::Path;
+
+use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::look::{CocAtInfinity, CocRule};
+use bokehcam::pipeline::{CocMaker, Finish};
+use bokehcam::recording::{Options, Recording, Scratch};
 
 const WALL_M: f32 = 3.0;
 const PERSON_M: f32 = 1.2;
@@ -270,4 +276,66 @@ fn any_size_and_any_value_is_handled() {
     let mut empty = DepthMap::default();
     Refiner::new().refine(&mut empty, &ColorImage::new(4, 3), 0);
     assert_eq!(empty.metres, vec![0.0; 12]);
+}
+
+/// A recording of a real camera, and what no camera gives: edges all over, in noise, with holes.
+fn takes() -> [Vec<(ColorImage, DepthMap)>; 2] {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/portrait");
+    let (recording, mut scratch) = (Recording::open(&folder, &Options::default()).unwrap(), Scratch::default());
+    let mut real = |frame| {
+        let (mut color, mut map) = (ColorImage::default(), DepthMap::default());
+        recording.read_color(frame, &mut scratch, &mut color).unwrap();
+        recording.read_depth(frame, &mut scratch, &mut map).unwrap();
+        (color, map)
+    };
+    let made = |frame: u32| {
+        let (width, height) = (331, 257);
+        let (mut color, mut map) = (ColorImage::new(width, height), DepthMap::new(width, height));
+        for (k, (pixel, z_m)) in (0..).zip(color.rgb.chunks_exact_mut(3).zip(&mut map.metres)) {
+            let (x, y) = (k % width + 3 * frame, k / width);
+            let is_near = |x: u32, y: u32| (x / 61 + y / 83).is_multiple_of(3);
+            let near = is_near(x, y);
+            // A soft picture: what is mixed is found in it.
+            let seen = (0..9u32).filter(|k| is_near((x + k % 3).saturating_sub(1), (y + k / 3).saturating_sub(1)));
+            let (share, grain) = (seen.count() as f32 / 9.0, 8.0 * noise(k, frame));
+            let mix = |near: f32, far: f32| (far + share * (near - far) + grain) as u8;
+            pixel.copy_from_slice(&[mix(60.0, 170.0), mix(50.0, 180.0), mix(40.0, 200.0)]);
+            let off = 0.004 * noise(k, frame + 100);
+            let is_hole = (x + 2) / 9 % 7 == 0 && y / 11 % 2 == 0;
+            *z_m = if is_hole { 0.0 } else { off + if near { 1.0 + 0.001 * y as f32 } else { WALL_M } };
+        }
+        (color, map)
+    };
+    [(0..9).map(&mut real).collect(), (0..5).map(made).collect()]
+}
+
+#[test]
+fn any_number_of_threads_makes_the_same_depth_and_the_same_matte() {
+    for frames in takes() {
+        let made_by = |threads: usize| {
+            let lens = CocAtInfinity::Px(14.0);
+            let rule = CocRule::Depth { focus: FocusRule::Auto, lens, range_m: 0.0, max_coc_px: 20.0 };
+            let mut coc = CocMaker::new(rule, Finish::Refine).on_threads(threads);
+            coc.remember(true);
+            let mut made = Vec::new();
+            for ((color, measured), time_ns) in frames.iter().zip((0..).step_by(FRAME_NS as usize)) {
+                let mut map = measured.clone();
+                let field = coc.make(&mut map, color, time_ns);
+                let mut shared = DepthMap { metres: map.metres.clone(), ..DepthMap::new(map.width, map.height) };
+                coc.share(&mut shared, color, &field);
+                made.extend([map, shared]);
+            }
+            made
+        };
+        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        let alone = made_by(1);
+        let mixed: Vec<usize> = alone.iter().map(|map| map.matte.pixels.len()).collect();
+        assert!(mixed.iter().all(|&mixed| mixed > 100), "there are mattes: {mixed:?}");
+        for threads in [2, 3, 7] {
+            for (k, (map, other)) in alone.iter().zip(made_by(threads)).enumerate() {
+                assert!(bits(&map.metres) == bits(&other.metres), "the map of frame {k} by {threads} threads");
+                assert!(map.matte == other.matte, "the matte of frame {k} by {threads} threads");
+            }
+        }
+    }
 }

@@ -6,6 +6,7 @@ use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Job, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
+use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
 use bokehcam::depth::fill::Filler;
 use bokehcam::depth::matting::{self, Matting};
@@ -231,9 +232,10 @@ impl Blurrer {
     fn remember(&mut self, shot: &Shot) -> DepthMap {
         let mut depth = shot.depth.clone();
         self.filler.fill_guided(&mut depth, &shot.image);
-        self.background.find_matte(&mut self.matting, &mut depth, &shot.image, &shot.lens);
+        let mut workers = ThreadPool::new("matte", 1);
+        self.background.find_matte(&mut self.matting, &mut workers, (&mut depth, &shot.image), &shot.lens);
         self.background.learn(&depth, &shot.image, &shot.lens, self.time_ns);
-        self.background.reveal(&mut depth, &shot.image, &shot.lens);
+        self.background.reveal(&mut workers, &mut depth, &shot.image, &shot.lens);
         self.time_ns += PERIOD_NS;
         depth
     }

@@ -24,6 +24,7 @@ use std::sync::atomic::AtomicBool;
 use bokehcam::bokeh::{self, Backend};
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
+use bokehcam::compute::thread_pool::cores;
 use bokehcam::depth::DepthSource;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::look::number::OrAuto;
@@ -191,6 +192,7 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
         look,
         adaptive: true,
         measured: true,
+        threads: cores(),
         changes: None,
         sink: Box::new(Stamping::new(clock.clone(), stamps.clone())),
         pace: Pace::Realtime,

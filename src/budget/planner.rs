@@ -21,12 +21,15 @@ const COARSER_BLUR: [f64; 3] = [0.0, 3.0, 7.0];
 pub(crate) const DEADLINE_PERIODS: u64 = 2;
 /// Share of that by which the blur is to be done: the rest is for the way to the sink and for bad luck.
 const DEADLINE_SHARE: f64 = 0.8;
-/// Depth is made by one thread: it has no more than this share of the period on average.
+/// Depth is made of one frame at a time: it has no more than this share of the period on average.
 const MOST_DEPTH: f64 = 0.9;
 /// In any case the blur has this share of its budget, and depth this one of a frame's time: what makes frames old is not to be
 /// saved there.
 const OWN_BLUR: f64 = 0.6;
 const OWN_DEPTH: f64 = 0.5;
+/// Frames share depth where one that takes it over takes no more than the first share of the time of one that makes its own, and
+/// then up to the second: what moves depth and finds a new matte may cost nearly as much.
+const WORTH_SHARING: [f64; 2] = [0.65, 0.8];
 /// Frames whose ages are remembered: three seconds at 30 fps.
 const AGES: usize = 90;
 /// The first frames are old, as all that makes them is made then.
@@ -70,8 +73,11 @@ pub struct Planner {
     period_ns: Option<u64>,
     /// Ages of the last frames when depth of their own began.
     ages: Window<AGES>,
-    /// How long frames took whose depth was taken over.
+    /// How long frames took that made their own depth, and those whose depth was taken over.
+    own: Window<AGES>,
     held: Window<AGES>,
+    /// The most frames of a plan that are taken at their word: one where it saves nothing to share depth.
+    most_frames: usize,
     begun: usize,
 }
 
@@ -114,7 +120,9 @@ impl Planner {
             budget_ns,
             period_ns,
             ages: Window::default(),
+            own: Window::default(),
             held: Window::default(),
+            most_frames: MOST_FRAMES,
             begun: 0,
         }
     }
@@ -125,7 +133,8 @@ impl Planner {
         let now = Plan { rung: start, ..self.plan() };
         planner.governor = governor(&self.efforts, rungs, &planner.plans, now);
         planner.governor.learn_as(DEPTH, &self.governor);
-        Self { ages: self.ages, held: self.held, begun: self.begun, ..planner }
+        let Self { ages, own, held, most_frames, begun, .. } = *self;
+        Self { ages, own, held, most_frames, begun, ..planner }
     }
 
     /// The blur of a frame may take so long from now on.
@@ -135,7 +144,8 @@ impl Planner {
 
     /// The plan for the next frame.
     pub fn plan(&self) -> Plan {
-        self.plans[self.governor.plan()]
+        let plan = self.plans[self.governor.plan()];
+        Plan { frames: plan.frames.min(self.most_frames), ..plan }
     }
 
     /// How long the blur of the next frame is likely to take; `None` before anything is known.
@@ -150,6 +160,7 @@ impl Planner {
         // Memory is allocated with the first one.
         if self.begun > 1 {
             self.governor.learn_from(DEPTH, Sample { rung, took_ns, at_ns });
+            self.own.push(took_ns as f64);
         }
         if self.begun == WARMING_UP {
             self.ages.push(age_ns as f64);
@@ -169,7 +180,7 @@ impl Planner {
     }
 
     fn choose(&mut self) {
-        let Self { governor, plans, least_blur, budget_ns, period_ns, ages, held, .. } = self;
+        let Self { governor, plans, least_blur, budget_ns, period_ns, ages, own, held, most_frames, .. } = self;
         let budget_ns = *budget_ns as f64;
         let Some(period_ns) = period_ns.map(|period_ns| period_ns as f64) else {
             return governor.choose(|_, times| times.high_ns[BLUR] <= budget_ns);
@@ -177,13 +188,18 @@ impl Planner {
         // Who gives the blur less leaves depth no more.
         let frame_ns = budget_ns.min(period_ns);
         let (old_ns, age_ns, held_ns) = (ages.percentile(AGES, 0.95), ages.median(AGES), held.median(AGES));
+        let worth = WORTH_SHARING[usize::from(*most_frames > 1)];
+        *most_frames = if held_ns <= worth * own.median(AGES) { MOST_FRAMES } else { 1 };
+        let most_frames = *most_frames;
         let late_ns = DEADLINE_PERIODS as f64 * period_ns;
         governor.choose(|plan, Times { high_ns: [depth_ns, blur_ns], usual_ns, share }| {
             let Plan { frames, rung, .. } = plans[plan];
-            let (is_cheapest, is_shared) = (rung == 0, frames > 1);
+            let frames = frames.min(most_frames);
+            // Or nothing is to be saved by that.
+            let (is_cheapest, is_shared) = (rung == 0, frames > 1 || most_frames == 1);
             let share_ns = (depth_ns + (frames - 1) as f64 * held_ns) / frames as f64;
             let keeps_up =
-                (share_ns <= MOST_DEPTH * frame_ns || frames == MOST_FRAMES) && (blur_ns <= budget_ns || is_cheapest);
+                (share_ns <= MOST_DEPTH * frame_ns || frames == most_frames) && (blur_ns <= budget_ns || is_cheapest);
             // Bad luck rarely comes together.
             let luck =
                 (old_ns - age_ns).powi(2) + (depth_ns - usual_ns[DEPTH]).powi(2) + (blur_ns - usual_ns[BLUR]).powi(2);

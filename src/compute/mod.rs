@@ -1,6 +1,7 @@
 //! What the executors run on: a thread pool ([`thread_pool`]), vector instructions ([`simd`]), and a GPU ([`device`]).
 
 pub mod aligned;
+pub mod bands;
 #[cfg(feature = "gpu")]
 pub mod device;
 pub mod memory;

@@ -37,18 +37,20 @@ struct Pass {
     parts: usize,
 }
 
-/// The start of the members' scratch memory.
+/// The start of the members' scratch memory, or of items.
 struct Base<S>(*mut S);
 
-// SAFETY: only hands out addresses; `run_with` argues for each use. `S: Send` as members are other threads.
+// SAFETY: only hands out addresses; who takes one argues for it. `S: Send` as members are other threads.
 unsafe impl<S: Send> Sync for Base<S> {}
 
 impl<S> Base<S> {
-    fn at(&self, member: usize) -> *mut S {
-        self.0.wrapping_add(member)
+    fn at(&self, place: usize) -> *mut S {
+        self.0.wrapping_add(place)
     }
 }
 
+/// Items of one pass, at most: they are kept on the stack.
+pub const MOST_ITEMS: usize = 32;
 const OPEN: u64 = 1 << 15;
 const AT_WORK: u64 = OPEN - 1;
 const EPOCH: u64 = 1 << 16;
@@ -113,6 +115,36 @@ impl ThreadPool {
             // SAFETY: `member` is below the pool's size, which `scratch` covers, and each member is one thread that
             // does one part at a time; so nobody else holds this element, and `scratch` is borrowed throughout.
             work(unsafe { &mut *base.at(member) }, part);
+        });
+    }
+
+    /// Calls `work` once with each of at most [`MOST_ITEMS`] items, spread over the threads.
+    ///
+    /// # Panics
+    /// As [`ThreadPool::run`], and when there are more items.
+    pub fn run_each<T: Send>(&mut self, items: impl Iterator<Item = T>, work: &(dyn Fn(T) + Sync)) {
+        self.run_each_with(&mut [(); AT_WORK as usize], items, &|(), item| work(item));
+    }
+
+    /// The same with scratch memory for every thread, as for [`ThreadPool::run_with`].
+    ///
+    /// # Panics
+    /// As [`ThreadPool::run_with`], and when there are more items.
+    pub fn run_each_with<S: Send, T: Send>(
+        &mut self,
+        scratch: &mut [S],
+        mut items: impl Iterator<Item = T>,
+        work: &(dyn Fn(&mut S, T) + Sync),
+    ) {
+        let mut waiting: [Option<T>; MOST_ITEMS] = std::array::from_fn(|_| items.next());
+        assert!(items.next().is_none(), "more items than places");
+        let count = waiting.iter().flatten().count();
+        let base = Base(waiting.as_mut_ptr());
+        self.run_with(scratch, count, &|scratch, part| {
+            // SAFETY: `part` is below `count`, which `waiting` has, and is done once: nobody else holds this place.
+            if let Some(item) = unsafe { &mut *base.at(part) }.take() {
+                work(scratch, item);
+            }
         });
     }
 
@@ -253,97 +285,4 @@ impl<'a, T> DisjointParts<'a, T> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_part_is_done_once() {
-        for threads in [1, 2, 5] {
-            let mut workers = ThreadPool::new("test", threads);
-            for parts in [0, 1, 2, 7, 100] {
-                for _ in 0..if cfg!(miri) { 5 } else { 200 } {
-                    let done: Vec<AtomicUsize> = (0..parts).map(|_| AtomicUsize::new(0)).collect();
-                    workers.run(parts, &|part| {
-                        done[part].fetch_add(1, Ordering::Relaxed);
-                    });
-                    assert!(done.iter().all(|d| d.load(Ordering::Relaxed) == 1));
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_panic_in_a_part_reaches_the_caller_and_the_pool_lives_on() {
-        let mut workers = ThreadPool::new("test", 3);
-        let result = catch_unwind(AssertUnwindSafe(|| workers.run(8, &|part| assert_ne!(part, 5))));
-        assert!(result.is_err());
-        let sum = AtomicUsize::new(0);
-        workers.run(10, &|part| {
-            sum.fetch_add(part, Ordering::Relaxed);
-        });
-        assert_eq!(sum.load(Ordering::Relaxed), 45);
-    }
-
-    /// What panics again when it is dropped.
-    struct Bomb;
-
-    impl Drop for Bomb {
-        fn drop(&mut self) {
-            if !thread::panicking() {
-                std::panic::panic_any(());
-            }
-        }
-    }
-
-    #[test]
-    fn nobody_leaves_a_pass_while_members_work_whatever_is_thrown() {
-        for caller_throws in [true, false] {
-            let mut workers = ThreadPool::new("test", 2);
-            let caller = thread::current().id();
-            let (both, done) = (AtomicUsize::new(0), AtomicBool::new(false));
-            let result = catch_unwind(AssertUnwindSafe(|| {
-                workers.run(2, &|_| {
-                    // One part each.
-                    both.fetch_add(1, Ordering::Relaxed);
-                    while both.load(Ordering::Relaxed) < 2 {
-                        thread::yield_now();
-                    }
-                    if (thread::current().id() == caller) == caller_throws {
-                        std::panic::panic_any(Bomb);
-                    }
-                    thread::sleep(std::time::Duration::from_millis(50));
-                    done.store(true, Ordering::Relaxed);
-                });
-            }));
-            assert!(done.load(Ordering::Relaxed), "the pass is over for all");
-            assert!(result.is_err());
-            let sum = AtomicUsize::new(0);
-            workers.run(10, &|part| {
-                sum.fetch_add(part, Ordering::Relaxed);
-            });
-            assert_eq!(sum.load(Ordering::Relaxed), 45, "the pool lives on");
-        }
-    }
-
-    #[test]
-    fn parts_beyond_any_address_are_not_handed_out() {
-        let mut data = [0u8; 4];
-        let mut flags: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
-        let shelf = DisjointParts::new(&mut data, 1 << (usize::BITS - 1), &mut flags);
-        assert_eq!(shelf.part(0).len(), 4);
-        // Twice this size wraps to 0.
-        let second = catch_unwind(AssertUnwindSafe(|| shelf.part(2).len())).unwrap_err();
-        assert_eq!(second.downcast_ref::<&str>(), Some(&"each part is taken once"));
-    }
-
-    #[test]
-    fn a_shelf_hands_out_each_part_once() {
-        let mut data = vec![0; 10];
-        let mut flags: Vec<AtomicBool> = (0..4).map(|_| AtomicBool::new(false)).collect();
-        let shelf = DisjointParts::new(&mut data, 3, &mut flags);
-        shelf.part(3).fill(7);
-        assert_eq!(shelf.part(0).len(), 3);
-        assert!(catch_unwind(AssertUnwindSafe(|| shelf.part(0).len())).is_err());
-        assert_eq!(data[9], 7);
-    }
-}
+mod tests;

@@ -8,7 +8,7 @@ use std::ops::Range;
 /// `I + (1 - share) D` and the farther one `I - share D`: so that both together are the pixel, exactly.
 // As it lies in memory it is what the shaders read.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "gpu", derive(bytemuck::Pod, bytemuck::Zeroable))]
 pub struct MixedPixel {
     /// Which pixel: row times columns plus column.

@@ -1,5 +1,6 @@
 //! From a frame's depth to its circle of confusion (CoC): the one step that every blur by depth goes through.
 
+use crate::compute::thread_pool::ThreadPool;
 use crate::depth::background::Background;
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
@@ -35,6 +36,7 @@ pub struct CocMaker {
     mending: Mending,
     matting: Matting,
     background: Option<Background>,
+    workers: ThreadPool,
 }
 
 enum Finisher {
@@ -69,11 +71,16 @@ fn focus_of(rule: CocRule) -> FocusRule {
 }
 
 impl CocMaker {
-    /// Nothing was seen yet.
+    /// Nothing was seen yet. It works on the caller's thread.
     pub fn new(rule: CocRule, finish: Finish) -> Self {
         let (focus, mending) = (Focus::new(focus_of(rule)), Mending::default());
         let (finisher, matting) = (Finisher::new(finish, mending), Matting::default());
-        Self { rule, focus, finisher, mending, matting, background: None }
+        Self { rule, focus, finisher, mending, matting, background: None, workers: ThreadPool::new("depth", 1) }
+    }
+
+    /// The same on so many threads, the caller's included: what is made is the same to the bit.
+    pub fn on_threads(self, threads: usize) -> Self {
+        Self { workers: ThreadPool::new("depth", threads), ..self }
     }
 
     /// Mends every map from now on, where it is refined; whether it is.
@@ -154,7 +161,7 @@ impl CocMaker {
                 Finisher::Fill(filler) => filler.fill_guided(map, color),
                 Finisher::Refine(refiner) => {
                     refiner.set_focus(focus_m);
-                    refiner.refine(map, color, time_ns);
+                    refiner.refine_on(&mut self.workers, map, color, time_ns);
                     map.is_smooth = false;
                 }
             }
@@ -180,20 +187,23 @@ impl CocMaker {
     fn find_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
         map.matte.pixels.clear();
         if let (CocField::Depth(lens), false) = (field, map.is_smooth) {
+            let Self { matting, workers, .. } = self;
+            let jump = lens.inverse_depth_of_px(matting::FROM_PX);
             match &self.background {
-                Some(background) => background.find_matte(&mut self.matting, map, color, lens),
-                None => self.matting.find(map, color, lens.inverse_depth_of_px(matting::FROM_PX)),
+                Some(background) => background.find_matte(matting, workers, (map, color), lens),
+                None => matting.find_before(workers, (map, color), jump, |_, _| None),
             }
         }
     }
 
     /// Gives a map what is remembered to lie behind, having learned from it first where it is that of a picture `taken_ns`.
     fn reveal(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField, taken_ns: Option<u64>) {
-        if let (CocField::Depth(lens), Some(background), false) = (field, &mut self.background, map.is_smooth) {
+        let Self { background, workers, .. } = self;
+        if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
             if let Some(taken_ns) = taken_ns {
                 background.learn(map, color, lens, taken_ns);
             }
-            background.reveal(map, color, lens);
+            background.reveal(workers, map, color, lens);
         }
     }
 }

@@ -42,6 +42,8 @@ pub(super) struct Stage<'a> {
     pub size: (u32, u32),
     /// Whether depth was measured, so that refining it makes it better.
     pub measured: bool,
+    /// Threads that finish depth, this stage's included.
+    pub threads: usize,
     /// Whether executors are made for every quality.
     pub adaptive: bool,
     pub changes: Option<mpsc::Receiver<Change>>,
@@ -65,7 +67,8 @@ pub(super) struct Stage<'a> {
 impl Stage<'_> {
     /// Runs until the frames end or nobody takes the results. Changes of the blur take effect between frames.
     pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
-        let mut preparation = Preparation::new(&self.look, self.size, self.measured, self.knows_background());
+        let mut preparation =
+            Preparation::new(&self.look, self.size, self.measured, self.knows_background(), self.threads);
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
         let (mut change, mut between) = (0, false);

@@ -50,6 +50,7 @@ impl Stepper {
         adaptive: bool,
         computing: Computing,
     ) -> Result<Self, BokehError> {
+        let threads = computing.threads();
         let mut executors = Executors::new(computing);
         let made_for = look.settings(size, adaptive);
         let executor = made_for.as_ref().map(|settings| executors.blur(settings, size)).transpose()?;
@@ -57,7 +58,7 @@ impl Stepper {
         Ok(Self {
             size,
             adaptive,
-            preparation: Preparation::new(look, size, measured, false),
+            preparation: Preparation::new(look, size, measured, false, threads),
             executors,
             executor,
             made_for,

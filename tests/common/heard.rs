@@ -47,6 +47,7 @@ impl Heard {
             outputs: Vec::new(),
             keep_going: false,
             budget_ns: None,
+            threads: 1,
             folders: Folders::at(folder.to_owned()),
             wanted: Arc::default(),
             demand: demand.clone(),

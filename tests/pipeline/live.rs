@@ -104,6 +104,7 @@ fn the_camera_rests_while_nobody_watches_and_the_output_goes_on() {
         look: dof(),
         adaptive: false,
         measured: false,
+        threads: 1,
         changes: None,
         sink: Box::new(Screen { demand: demand.clone(), watch: None, shown: 0, phases: Arc::clone(&phases) }),
         pace: Pace::Realtime,

@@ -12,7 +12,12 @@ fn planner(efforts: &[f64]) -> Planner {
 }
 
 /// Plays frames of a machine where depth at full effort and the usual blur take so long, in milliseconds; returns the plans.
-fn play(planner: &mut Planner, (depth_ms, blur_ms): (f64, f64), frames: u64) -> Vec<Plan> {
+fn play(planner: &mut Planner, times_ms: (f64, f64), frames: u64) -> Vec<Plan> {
+    play_held(planner, times_ms, 2.0, frames)
+}
+
+/// The same where depth that is taken over takes `held_ms`.
+fn play_held(planner: &mut Planner, (depth_ms, blur_ms): (f64, f64), held_ms: f64, frames: u64) -> Vec<Plan> {
     let ns = |ms: f64| (ms * MS as f64) as u64;
     let mut since = usize::MAX;
     (0..frames)
@@ -21,7 +26,7 @@ fn play(planner: &mut Planner, (depth_ms, blur_ms): (f64, f64), frames: u64) -> 
             let at_ns = frame * PERIOD_NS;
             let is_own = since >= plan.frames;
             since = if is_own { 1 } else { since + 1 };
-            let took_ns = if is_own { ns(depth_ms * planner.efforts[plan.effort]) } else { 2 * MS };
+            let took_ns = if is_own { ns(depth_ms * planner.efforts[plan.effort]) } else { ns(held_ms) };
             let effort = is_own.then_some(plan.effort);
             planner.note_depth(DepthTimes { effort, took_ns, age_ns: 4 * MS, at_ns });
             planner.note_blur(Sample { rung: plan.rung, took_ns: ns(blur_ms * RUNGS[plan.rung]), at_ns });
@@ -124,4 +129,17 @@ fn frames_that_are_all_too_late_lower_the_plan_as_well() {
         planner.note_late();
     }
     assert_eq!(planner.plan().frames, 3);
+}
+
+#[test]
+fn depth_is_shared_only_where_that_saves_something_and_costs_the_blur_nothing_where_not() {
+    for depth_ms in [32.0, 45.0, 70.0] {
+        for (held, shares) in [(0.1, true), (0.5, true), (0.9, false), (1.2, false)] {
+            let mut planner = planner(&[1.0]);
+            let plans = play_held(&mut planner, (depth_ms, 8.0), held * depth_ms, 600);
+            assert_eq!(plans[300].frames > 1, shares, "{depth_ms} ms, held {held}: {:?}", plans[300]);
+            assert!(plans[300..].windows(2).all(|pair| pair[0].frames == pair[1].frames), "it stays so");
+            assert!(shares || plans[599].rung == BALANCED, "{depth_ms} ms: {:?}", plans[599]);
+        }
+    }
 }

@@ -192,6 +192,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         look,
         adaptive,
         measured,
+        threads: options.computing.threads(),
         changes: server.is_some().then_some(to_come),
         sink: Box::new(sink),
         pace,

@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+
 /// Side of a cell, and the step of the search in it, in pixels.
 const CELL: usize = 16;
 const STEP: usize = 2;
@@ -27,24 +30,35 @@ struct Cell {
 impl Cells {
     /// Looks at pixels of all cells: `look` tells, of those behind which something is known, the inverse depth and whether
     /// they hide it. Returns the largest inverse depth of what hides.
-    pub fn survey(&mut self, size: (usize, usize), look: impl Fn(usize) -> Option<(f32, bool)>) -> f32 {
+    pub fn survey(
+        &mut self,
+        workers: &mut ThreadPool,
+        size: (usize, usize),
+        look: impl Fn(usize) -> Option<(f32, bool)> + Sync,
+    ) -> f32 {
         let (width, height) = size;
         self.size = size;
         let across = width.div_ceil(CELL);
         self.cells.clear();
         self.cells.resize(across * height.div_ceil(CELL), Cell::default());
-        let mut nearest = 0.0f32;
-        for y in (0..height).step_by(STEP) {
-            let cells = &mut self.cells[y / CELL * across..][..across];
-            for x in (0..width).step_by(STEP) {
-                let Some((inverse, hides)) = look(y * width + x) else { continue };
-                let cell = &mut cells[x / CELL];
-                cell.hides |= hides;
-                cell.open |= !hides;
-                nearest = if hides && inverse > nearest { inverse } else { nearest };
+        let bands = Bands::new(height, CELL, workers);
+        let mut nearest = [0.0f32; MOST_ITEMS];
+        let mut rest = &mut self.cells[..];
+        let cells = bands.rows().map_while(|rows| rest.split_off_mut(..rows.len().div_ceil(CELL) * across));
+        workers.run_each(bands.rows().zip(cells).zip(&mut nearest), &|((rows, cells), nearest)| {
+            let first = rows.start;
+            for y in rows.step_by(STEP) {
+                let cells = &mut cells[(y - first) / CELL * across..][..across];
+                for x in (0..width).step_by(STEP) {
+                    let Some((inverse, hides)) = look(y * width + x) else { continue };
+                    let cell = &mut cells[x / CELL];
+                    cell.hides |= hides;
+                    cell.open |= !hides;
+                    *nearest = if hides && inverse > *nearest { inverse } else { *nearest };
+                }
             }
-        }
-        nearest
+        });
+        nearest.into_iter().fold(0.0, f32::max)
     }
 
     /// Wanted are cells that hide something, up to `reach_px` away from an open one.

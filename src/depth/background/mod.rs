@@ -5,9 +5,11 @@
 //! known while it is seen or was seen often enough, and fades while it is hidden. All is forgotten when the camera moves.
 
 mod cells;
+mod reveal;
 
 use crate::color::light_of_codes;
-use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
+use crate::compute::thread_pool::ThreadPool;
+use crate::frame::{ColorImage, DepthMap, MixedPixel};
 use crate::optics::DepthCoc;
 
 use super::alignment::{Aligner, Alignment};
@@ -74,7 +76,8 @@ pub struct Background {
     rows: [Vec<f32>; 3],
     mixed: Vec<bool>,
     cells: Cells,
-    pixels: Vec<MixedPixel>,
+    /// What is revealed in each band.
+    pixels: Vec<Vec<MixedPixel>>,
 }
 
 impl Default for Background {
@@ -135,52 +138,18 @@ impl Background {
         }
     }
 
-    /// Gives the pixels of a map that hide something remembered, as far as blur can show it, what that is.
-    pub fn reveal(&mut self, map: &mut DepthMap, color: &ColorImage, lens: &DepthCoc) {
-        let size = self.size;
-        if map.size() != color.size() || !self.knows(color) {
-            return;
-        }
-        let other = lens.inverse_depth_of_px(OTHER_PX);
-        let Self { cells, rounds, inverse, .. } = self;
-        let nearest = cells.survey(size, |at| {
-            let own = DepthMap::inverse_of(map.metres[at]);
-            (rounds[at] >= KNOWN).then(|| (own, own - inverse[at] > other))
-        });
-        cells.spread(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
-        let mut pixels = std::mem::take(&mut self.pixels);
-        pixels.clear();
-        for y in 0..size.1 {
-            let row = y * size.0;
-            let mut before = map.matte.within(row..row + size.0).iter().peekable();
-            for (columns, is_wanted) in self.cells.row(y) {
-                let (first, end) = (row + columns.start, row + columns.end);
-                if !is_wanted {
-                    while let Some(pixel) = before.next_if(|pixel| (pixel.at as usize) < end) {
-                        pixels.push(*pixel);
-                    }
-                    continue;
-                }
-                for at in first..end {
-                    let mixed = before.next_if(|pixel| pixel.at as usize == at);
-                    pixels.extend(mixed.copied().or_else(|| self.behind(at, map.metres[at], &color.rgb, other)));
-                }
-            }
-        }
-        std::mem::swap(&mut map.matte.pixels, &mut pixels);
-        if map.matte.pixels.len() > Matte::most(size.0, size.1) {
-            map.matte.pixels.retain(|pixel| pixel.share < 1.0);
-        }
-        self.pixels = pixels;
-    }
-
     /// Finds the matte of a picture by `matting`, before what is known to lie behind.
-    pub fn find_matte(&self, matting: &mut Matting, map: &mut DepthMap, color: &ColorImage, lens: &DepthCoc) {
+    pub fn find_matte(
+        &self,
+        matting: &mut Matting,
+        workers: &mut ThreadPool,
+        (map, color): (&mut DepthMap, &ColorImage),
+        lens: &DepthCoc,
+    ) {
         let (jump, other) = [FROM_PX, OTHER_PX].map(|px| lens.inverse_depth_of_px(px)).into();
-        match self.knows(color) {
-            true => matting.find_before(map, color, jump, |at, near| self.light_behind(at, near, other)),
-            false => matting.find(map, color, jump),
-        }
+        let knows = self.knows(color);
+        let behind = |at, near| if knows { self.light_behind(at, near, other) } else { None };
+        matting.find_before(workers, (map, color), jump, behind);
     }
 
     /// Whether anything is known of pictures like this one.
@@ -317,14 +286,6 @@ impl Background {
                 *seen = if is_same { (*seen + 1).min(SUREST) } else { 1 };
             }
         }
-    }
-
-    /// A pixel at `metres` and what it hides, if that is remembered.
-    fn behind(&self, at: usize, metres: f32, rgb: &[u8], other: f32) -> Option<MixedPixel> {
-        let light = self.light_behind(at, DepthMap::inverse_of(metres), other)?;
-        let difference = std::array::from_fn(|p| self.own_light[usize::from(rgb[3 * at + p])] - light[p]);
-        let far_m = self.inverse[at].recip();
-        Some(MixedPixel { at: at as u32, near_m: metres, far_m, share: 1.0, behind: 1.0, difference })
     }
 }
 

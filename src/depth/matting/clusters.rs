@@ -3,21 +3,21 @@
 //! What is wanted around a mixed pixel are means and covariances of both surfaces, close by where there are pure pixels
 //! and from some way off where there are none, as in hair. Cells have both for a tenth of the time that pixels need.
 
+mod answers;
+
 use super::share::Contrast;
-use super::{EdgePixel, larger, smaller};
+use super::{larger, light_of, smaller};
 use crate::frame::DepthMap;
+
+pub(super) use answers::Clusters;
 
 /// Side of a cell, in pixels.
 const CELL_PX: usize = 8;
-/// So many cells in every direction are looked at; more where they have nothing of a surface, as at the tips of hair.
-const REACHES_CELLS: [usize; 3] = [1, 2, 5];
 /// Pixels at an edge may be mixed themselves. They count so little that they matter only where nothing is pure.
 const AT_EDGE_WEIGHT: f32 = 4e-4;
 /// So many pixels beside an edge, too, the map may be wrong: they count less than those further away.
 const CLOSE_PX: usize = 3;
 const CLOSE_WEIGHT: f32 = 0.02;
-/// A cluster's weight falls to an eighth at this distance, in pixels; its long tail reaches hair.
-const HALF_PX: f32 = 6.0;
 
 /// The place of the cluster of the near surface's pixels at edges, after those of the near and the far surface.
 const FRINGE: usize = 2;
@@ -25,9 +25,6 @@ const FRINGE: usize = 2;
 const FRINGE_SHARE: f32 = 0.75;
 /// From the first share down, the colour of such pixels is not that of the near surface; from the second up, it is.
 const FRINGE_SHARES: [f32; 2] = [-0.1, 0.25];
-
-/// So many pixels of it, near ones above all, tell nothing, as a lone hair is mostly what is behind it; so many are enough.
-const FRINGE_PIXELS: [f32; 2] = [6.0, 14.0];
 
 /// Pixels of one surface in a cell, weighted: sums, but for the means of position and inverse depth.
 #[derive(Clone, Copy, Debug, Default)]
@@ -98,128 +95,7 @@ impl View<'_> {
     /// The colour of a pixel in linear light.
     #[inline(always)]
     pub fn light(&self, at: usize) -> [f32; 3] {
-        [0, 1, 2].map(|p| self.light[usize::from(self.rgb[3 * at + p])])
-    }
-}
-
-/// The clusters near edges, made when they are asked for.
-#[derive(Debug, Default)]
-pub struct Clusters {
-    across: usize,
-    down: usize,
-    /// Per cell, the place of its clusters plus one; 0 where none were made yet.
-    place: Vec<u32>,
-    /// Near, far, and what of the near surface is at edges.
-    clusters: Vec<[Cluster; 3]>,
-    /// Per cell, the place of its last answer plus one: pixels side by side ask for the same.
-    answered: Vec<u32>,
-    answers: Vec<Answer>,
-    contrasts: Vec<Contrast>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Answer {
-    near: f32,
-    far: f32,
-    /// The place of the contrast.
-    contrast: Option<u32>,
-}
-
-impl Clusters {
-    /// Forgets the frame before.
-    pub(super) fn clear(&mut self, (width, height): (usize, usize)) {
-        (self.across, self.down) = (width.div_ceil(CELL_PX), height.div_ceil(CELL_PX));
-        for places in [&mut self.place, &mut self.answered] {
-            places.clear();
-            places.resize(self.across * self.down, 0);
-        }
-        self.clusters.clear();
-        self.answers.clear();
-        self.contrasts.clear();
-    }
-
-    /// The place of the contrast between the near and the far surface around the cell of an edge pixel, for [`Self::at`];
-    /// `None` where one has no pixels, not even further away.
-    #[inline(always)]
-    pub(super) fn around(&mut self, view: &View, edge: &EdgePixel) -> Option<u32> {
-        let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
-        let cell = row * self.across + column;
-        let same = |answer: &&Answer| {
-            (answer.near - edge.near).abs() <= view.jump && (answer.far - edge.far).abs() <= view.jump
-        };
-        let last = self.answered[cell].checked_sub(1);
-        if let Some(answer) = last.map(|last| &self.answers[last as usize]).filter(same) {
-            return answer.contrast;
-        }
-        // A closure would not have the vectors of what calls it.
-        let mut found = None;
-        for reach in REACHES_CELLS {
-            if let Some(colors) = self.within(view, reach, edge) {
-                found = Some(self.contrasts.len() as u32);
-                self.contrasts.push(contrast(colors));
-                break;
-            }
-        }
-        let contrast = found;
-        self.answers.push(Answer { near: edge.near, far: edge.far, contrast });
-        self.answered[cell] = self.answers.len() as u32;
-        contrast
-    }
-
-    /// A contrast that was found.
-    #[inline(always)]
-    pub(super) fn at(&self, place: u32) -> &Contrast {
-        &self.contrasts[place as usize]
-    }
-
-    /// The same of so many cells in every direction.
-    #[inline(always)]
-    fn within(&mut self, view: &View, reach: usize, edge: &EdgePixel) -> Option<Surfaces> {
-        // A surface's inverse depth may change on the way, but by less than would make it the other one.
-        let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
-        let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
-        let [x, y] = [column, row].map(|cell| (cell * CELL_PX) as f32 + 0.5 * (CELL_PX - 1) as f32);
-        let mut sums = [Cluster::default(); 3];
-        for row in row.saturating_sub(reach)..(row + reach + 1).min(self.down) {
-            for column in column.saturating_sub(reach)..(column + reach + 1).min(self.across) {
-                let place = self.of_cell(view, (column, row));
-                for (k, cluster) in self.clusters[place].iter().enumerate() {
-                    let is_near = edge.is_near(cluster.inverse);
-                    let is_fringe = k == FRINGE;
-                    let surface = if is_near { edge.near } else { edge.far };
-                    let is_other = (cluster.inverse - surface).abs() > tolerance || is_fringe && !is_near;
-                    if cluster.weight <= 0.0 || is_other {
-                        continue;
-                    }
-                    let square = (cluster.x - x) * (cluster.x - x) + (cluster.y - y) * (cluster.y - y);
-                    let falloff = 1.0 / (1.0 + square / (HALF_PX * HALF_PX));
-                    let weight = falloff * falloff * falloff;
-                    let sum = &mut sums[if is_fringe { FRINGE } else { usize::from(!is_near) }];
-                    sum.weight += weight * cluster.weight;
-                    for (sum, light) in sum.light.iter_mut().zip(cluster.light) {
-                        *sum += weight * light;
-                    }
-                    for (sum, square) in sum.squares.iter_mut().zip(cluster.squares) {
-                        *sum += weight * square;
-                    }
-                }
-            }
-        }
-        let [near, far, fringe] = sums.map(|sum| (sum.weight > 0.0).then(|| sum.color()));
-        let [few, enough] = FRINGE_PIXELS;
-        let weight = ((sums[FRINGE].weight - few) / (enough - few)).clamp(0.0, 1.0);
-        Some(Surfaces { near: near?, far: far?, fringe: fringe.zip(Some(weight)) })
-    }
-
-    /// The place of the clusters of a cell.
-    #[inline(always)]
-    fn of_cell(&mut self, view: &View, (column, row): (usize, usize)) -> usize {
-        let place = &mut self.place[row * self.across + column];
-        if *place == 0 {
-            self.clusters.push(split(view, column, row));
-            *place = self.clusters.len() as u32;
-        }
-        *place as usize - 1
+        light_of(self.light, self.rgb, at)
     }
 }
 

@@ -8,59 +8,54 @@
 mod clusters;
 pub mod mask;
 mod share;
+mod survey;
+mod trace;
 
 use std::ops::Range;
 
-use pulp::WithSimd;
+use pulp::{Arch, WithSimd};
 
 use crate::color::light_of_codes;
+use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
 use clusters::{Clusters, View};
 use share::{Evidence, Labels, Prior};
+use survey::Survey;
+use trace::{Trace, Trail};
 
 /// Where the CoC jumps by so many pixels or more, pixels are worth taking apart.
 pub const FROM_PX: f32 = 0.5;
 /// Shares beyond this are those of a pure pixel.
 const NEARLY_PURE: f32 = 0.98;
 
-/// Neighbours of a pixel with this share are looked at, too, where the map has no edge.
-const TRACED_FROM: f32 = 0.15;
-/// What the map says of them: nothing.
+/// What the map says of pixels that were traced: nothing.
 const TRACED: Labels = Labels { is_near: false, borders: false, is_thin: false };
-/// Pixels of a row that are looked at at once.
-const BLOCK: usize = 64;
 /// So many pixels away from an edge, at most.
 const MOST_STEPS: usize = 16;
-
-/// What is known of a pixel that was traced: it has nothing of what is near, it has some, it is part of something wide.
-#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-enum Trail {
-    #[default]
-    None,
-    Faint,
-    Seen,
-    Wide,
-}
+/// Fewer pixels are not worth another thread.
+const LEAST_PIXELS: usize = 256;
 
 /// Estimates mattes; owns the memory for it.
 #[derive(Debug)]
 pub struct Matting {
+    arch: Arch,
     light: Box<[f32; 256]>,
     /// Whether pixels differ in depth from one of their eight neighbours: the others are pure.
     at_edge: Vec<bool>,
-    /// Inverse depth of three rows, in 1/m, 0 where it is unknown; their highest and lowest, with a column more on either side.
-    rows: [Vec<f32>; 3],
-    ranges: [Vec<f32>; 2],
+    survey: Survey,
+    /// The pixels at edges, and then those that were traced.
     edges: Vec<EdgePixel>,
     clusters: Clusters,
+    /// The place of the answer for each.
+    answers: Vec<u32>,
     evidence: Vec<Evidence>,
     /// What is known of pixels that were traced, while they are.
     trails: Vec<Trail>,
 }
 
 /// A pixel beside a jump of depth.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct EdgePixel {
     x: u32,
     y: u32,
@@ -80,12 +75,13 @@ impl EdgePixel {
 impl Default for Matting {
     fn default() -> Self {
         Self {
+            arch: Arch::new(),
             light: light_of_codes(),
             at_edge: Vec::new(),
-            rows: Default::default(),
-            ranges: [Vec::new(), Vec::new()],
+            survey: Survey::default(),
             edges: Vec::new(),
             clusters: Clusters::default(),
+            answers: Vec::new(),
             evidence: Vec::new(),
             trails: Vec::new(),
         }
@@ -96,141 +92,174 @@ impl Matting {
     /// Finds the mixed pixels of a map as large as its picture, beside jumps of inverse depth of more than `jump`, in 1/m.
     /// Of another size, or where `jump` is not finite, or with more edges than [`Matte::most`], it has none.
     pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, jump: f32) {
-        self.find_before(map, color, jump, |_, _| None);
+        self.find_before(&mut ThreadPool::new("matte", 1), (map, color), jump, |_, _| None);
     }
 
-    /// The same where `behind` may know the light behind a pixel, by its place and the inverse depth of its nearer surface.
+    /// The same on several threads, where `behind` may know the light behind a pixel, by its place and the inverse depth of its
+    /// nearer surface. The matte is the same to the bit for any number of threads.
     pub fn find_before(
         &mut self,
-        map: &mut DepthMap,
-        color: &ColorImage,
-        jump: f32,
-        behind: impl Fn(usize, f32) -> Option<[f32; 3]>,
-    ) {
-        pulp::Arch::new().dispatch(Find { matting: self, map, color, jump, behind });
-    }
-
-    #[inline(always)]
-    fn find_now<S: pulp::Simd>(
-        &mut self,
-        simd: S,
+        workers: &mut ThreadPool,
         (map, color): (&mut DepthMap, &ColorImage),
         jump: f32,
-        behind: impl Fn(usize, f32) -> Option<[f32; 3]>,
+        behind: impl Fn(usize, f32) -> Option<[f32; 3]> + Sync,
     ) {
         map.matte.pixels.clear();
         if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
             return;
         }
-        Survey { matting: self, map, jump }.with_simd(simd);
+        let Self { arch, light, at_edge, survey, edges, clusters, answers, evidence, trails } = self;
+        let arch = *arch;
+        survey.find((arch, workers), map, jump, (at_edge, edges));
         let size = (map.width as usize, map.height as usize);
         let most = Matte::most(size.0, size.1);
-        if self.edges.len() > most {
+        if edges.len() > most {
             // Noise: so many edges no picture has.
             return;
         }
-        self.clusters.clear(size);
-        self.evidence.clear();
-        let Self { light, at_edge, edges, clusters, evidence, .. } = self;
-        let view = View { size, metres: &map.metres, jump, at_edge, rgb: &color.rgb, light };
-        // Loops, not closures for iterators, which would not have the vectors of this function.
-        for edge in &*edges {
-            let Some(place) = clusters.around(&view, edge) else { continue };
-            let at = edge.y as usize * size.0 + edge.x as usize;
-            let lights = (view.light(at), behind(at, edge.near));
-            evidence.push(Evidence::new(edge, labels(&view, edge, at), lights, (place, clusters.at(place))));
-        }
-        let prior = Prior::of(&self.evidence);
-        let on_edges = self.evidence.len();
-        self.trace((size, most), jump, &prior, (&map.metres, &color.rgb, &behind));
-        self.drop_wide(size, on_edges, &prior);
-        let Self { light, at_edge, clusters, evidence, .. } = self;
-        let view = View { size, metres: &map.metres, jump, at_edge, rgb: &color.rgb, light };
-        for evidence in &*evidence {
-            let share = prior.share(evidence);
-            let pure = if evidence.labels.is_near { share > NEARLY_PURE } else { share < 1.0 - NEARLY_PURE };
-            if pure {
-                continue;
+        clusters.clear(size);
+        answers.clear();
+        answers.extend(edges.iter().map(|edge| clusters.ask(jump, edge)));
+        let (metres, matte, rgb) = (&map.metres, &mut map.matte, &color.rgb[..]);
+        clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, 0);
+        // Those between surfaces of which one has no pixels tell nothing.
+        let mut kept = 0;
+        for k in 0..edges.len() {
+            if clusters.at(answers[k]).is_some() {
+                (edges[kept], answers[kept]) = (edges[k], answers[k]);
+                kept += 1;
             }
-            let at = evidence.edge.y as usize * size.0 + evidence.edge.x as usize;
-            let (contrast, own) = (clusters.at(evidence.contrast), view.light(at));
-            let (behind, difference) = match evidence.behind {
+        }
+        edges.truncate(kept);
+        answers.truncate(kept);
+        let (mut compared, mut prior, mut steps) = (0..0, Prior::default(), 0);
+        loop {
+            let (found, is_traced) = (compared.end..edges.len(), steps > 0);
+            evidence.resize(found.end, Evidence::default());
+            let each = found.len().div_ceil(MOST_ITEMS).max(LEAST_PIXELS);
+            let view = View { size, metres, jump, at_edge, rgb, light };
+            let asked = edges[found.clone()].chunks(each).zip(answers[found.clone()].chunks(each));
+            let parts = asked.zip(evidence[found.clone()].chunks_mut(each));
+            workers.run_each(parts, &|((edges, answers), evidence)| {
+                let (view, behind) = (&view, &behind);
+                arch.dispatch(Compare { view, clusters, behind, is_traced, edges, answers, evidence });
+            });
+            if !is_traced {
+                prior = Prior::of(evidence);
+            }
+            compared = found;
+            if compared.is_empty() || compared.end >= most || steps == MOST_STEPS {
+                break;
+            }
+            let (prior, evidence) = (&prior, &evidence[compared.clone()]);
+            let workers = &mut *workers;
+            arch.dispatch(Trace {
+                arch,
+                workers,
+                prior,
+                size,
+                metres,
+                jump,
+                rgb,
+                light,
+                at_edge,
+                clusters,
+                evidence,
+                edges,
+                answers,
+            });
+            steps += 1;
+        }
+        trace::drop_wide(size, kept, &prior, (evidence, trails));
+        let has_traced = evidence.len() > kept;
+
+        let each = evidence.len().div_ceil(MOST_ITEMS).max(LEAST_PIXELS);
+        let (mut counts, light) = ([0; MOST_ITEMS], &**light);
+        matte.pixels.resize(evidence.len(), MixedPixel::default());
+        let parts = evidence.chunks(each).zip(matte.pixels.chunks_mut(each)).zip(&mut counts);
+        workers.run_each(parts, &|((evidence, pixels), count)| {
+            let (rgb, width) = (&color.rgb, size.0);
+            *count = arch.dispatch(Mix { prior: &prior, clusters, light, rgb, width, evidence, pixels });
+        });
+        let mut kept = 0;
+        for (first, count) in (0..).step_by(each).zip(counts).take_while(|(first, _)| *first < evidence.len()) {
+            matte.pixels.copy_within(first..first + count, kept);
+            kept += count;
+        }
+        matte.pixels.truncate(kept);
+        if has_traced {
+            matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
+        }
+    }
+}
+
+/// Compares pixels at edges with the surfaces around them.
+struct Compare<'a, B> {
+    view: &'a View<'a>,
+    clusters: &'a Clusters,
+    behind: &'a B,
+    is_traced: bool,
+    edges: &'a [EdgePixel],
+    answers: &'a [u32],
+    evidence: &'a mut [Evidence],
+}
+
+impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Compare<'_, B> {
+    type Output = ();
+    // No vectors by hand: the call has the compiler use what the processor has, in all that it takes in. Loops, not closures for
+    // iterators, which would not have them.
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { view, clusters, behind, is_traced, edges, answers, evidence } = self;
+        for ((edge, &answer), evidence) in edges.iter().zip(answers).zip(evidence) {
+            let Some(contrast) = clusters.at(answer) else { continue };
+            let at = edge.y as usize * view.size.0 + edge.x as usize;
+            let lights = (view.light(at), behind(at, edge.near));
+            let labels = if is_traced { TRACED } else { labels(view, edge, at) };
+            *evidence = Evidence::new(edge, labels, lights, (answer, contrast));
+        }
+    }
+}
+
+/// Writes the mixed pixels of all that are known; how many they are.
+struct Mix<'a> {
+    prior: &'a Prior,
+    clusters: &'a Clusters,
+    light: &'a [f32; 256],
+    rgb: &'a [u8],
+    width: usize,
+    evidence: &'a [Evidence],
+    pixels: &'a mut [MixedPixel],
+}
+
+impl WithSimd for Mix<'_> {
+    type Output = usize;
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> usize {
+        let Self { prior, clusters, light, rgb, width, evidence, pixels } = self;
+        let mut count = 0;
+        for one in evidence {
+            let share = prior.share(one);
+            let pure = if one.labels.is_near { share > NEARLY_PURE } else { share < 1.0 - NEARLY_PURE };
+            let Some(contrast) = clusters.at(one.answer).filter(|_| !pure) else { continue };
+            let at = one.edge.y as usize * width + one.edge.x as usize;
+            let own = light_of(light, rgb, at);
+            let (behind, difference) = match one.behind {
                 Some(light) => (1.0, contrast.difference_before(light, own, share)),
                 None => (1.0 - share, contrast.difference(own, share)),
             };
-            let (near_m, far_m) = (evidence.edge.near.recip(), evidence.edge.far.recip());
-            map.matte.pixels.push(MixedPixel { at: at as u32, near_m, far_m, share, behind, difference });
+            let (near_m, far_m) = (one.edge.near.recip(), one.edge.far.recip());
+            pixels[count] = MixedPixel { at: at as u32, near_m, far_m, share, behind, difference };
+            count += 1;
         }
-        if self.evidence.len() > on_edges {
-            map.matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
-        }
+        count
     }
+}
 
-    /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near
-    /// though the map has none there, to neighbours that do so, too (hysteresis, as edges are traced); no further where there
-    /// are `most` pixels already.
-    #[inline(always)]
-    fn trace(
-        &mut self,
-        (size, most): ((usize, usize), usize),
-        jump: f32,
-        prior: &Prior,
-        (metres, rgb, behind): (&[f32], &[u8], &impl Fn(usize, f32) -> Option<[f32; 3]>),
-    ) {
-        let Self { light, at_edge, clusters, evidence, .. } = self;
-        let (mut from, mut steps) = (0, 0);
-        while from < evidence.len() && evidence.len() < most && steps < MOST_STEPS {
-            let end = evidence.len();
-            for k in from..end {
-                let Evidence { edge, labels, .. } = evidence[k];
-                if labels.is_near || prior.share(&evidence[k]) < TRACED_FROM {
-                    continue;
-                }
-                let (xs, ys) = around(&edge, 1, size);
-                for y in ys {
-                    for x in xs.clone() {
-                        let (at, next) = (y * size.0 + x, EdgePixel { x: x as u32, y: y as u32, ..edge });
-                        let is_far = (DepthMap::inverse_of(metres[at]) - edge.far).abs() <= jump;
-                        if !is_far || std::mem::replace(&mut at_edge[at], true) {
-                            continue;
-                        }
-                        let view = View { size, metres, jump, at_edge, rgb, light };
-                        if let Some(place) = clusters.around(&view, &next) {
-                            let lights = (view.light(at), behind(at, next.near));
-                            evidence.push(Evidence::new(&next, TRACED, lights, (place, clusters.at(place))));
-                        }
-                    }
-                }
-            }
-            (from, steps) = (end, steps + 1);
-        }
-    }
-
-    /// Lets go of what was traced, those after the first `on_edges`, into something far that looks like what is near: a hair
-    /// nowhere fills a square of three pixels, as a picture's frame does.
-    fn drop_wide(&mut self, size: (usize, usize), on_edges: usize, prior: &Prior) {
-        let Self { evidence, trails, .. } = self;
-        let at = |x: usize, y: usize| y * size.0 + x;
-        let place = |one: &Evidence| at(one.edge.x as usize, one.edge.y as usize);
-        trails.resize(size.0 * size.1, Trail::None);
-        for one in &evidence[on_edges..] {
-            trails[place(one)] = if prior.share(one) < TRACED_FROM { Trail::Faint } else { Trail::Seen };
-        }
-        for one in &evidence[on_edges..] {
-            let (xs, ys) = around(&one.edge, 1, size);
-            if !ys.flat_map(|y| xs.clone().map(move |x| at(x, y))).all(|at| trails[at] >= Trail::Seen) {
-                continue;
-            }
-            // The outline of what is wide is part of it.
-            let (xs, ys) = around(&one.edge, 2, size);
-            for at in ys.flat_map(|y| xs.clone().map(move |x| at(x, y))) {
-                if trails[at] != Trail::None {
-                    trails[at] = Trail::Wide;
-                }
-            }
-        }
-        evidence.retain(|one| std::mem::take(&mut trails[place(one)]) != Trail::Wide);
-    }
+/// The colour of a pixel in linear light.
+#[inline(always)]
+fn light_of(light: &[f32; 256], rgb: &[u8], at: usize) -> [f32; 3] {
+    [0, 1, 2].map(|p| light[usize::from(rgb[3 * at + p])])
 }
 
 /// What the map says of the edge pixel `at` and its neighbours.
@@ -255,85 +284,6 @@ fn labels(view: &View, edge: &EdgePixel, at: usize) -> Labels {
 fn around(edge: &EdgePixel, by: usize, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
     let (x, y) = (edge.x as usize, edge.y as usize);
     (x.saturating_sub(by)..(x + by + 1).min(width), y.saturating_sub(by)..(y + by + 1).min(height))
-}
-
-/// See [`Matting::find_before`].
-struct Find<'a, B> {
-    matting: &'a mut Matting,
-    map: &'a mut DepthMap,
-    color: &'a ColorImage,
-    jump: f32,
-    behind: B,
-}
-
-impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Find<'_, B> {
-    type Output = ();
-    // No vectors by hand: the call has the compiler use what the processor has, in all that it takes in.
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let Self { matting, map, color, jump, behind } = self;
-        matting.find_now(simd, (map, color), jump, behind);
-    }
-}
-
-/// Finds the pixels beside jumps of depth.
-struct Survey<'a> {
-    matting: &'a mut Matting,
-    map: &'a DepthMap,
-    jump: f32,
-}
-
-impl WithSimd for Survey<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { matting: Matting { at_edge, rows, ranges: [high, low], edges, .. }, map, jump } = self;
-        let (width, height) = (map.width as usize, map.height as usize);
-        at_edge.resize(width * height, false);
-        edges.clear();
-        rows.iter_mut().for_each(|row| row.resize(width, 0.0));
-        for range in [&mut *high, &mut *low] {
-            range.resize(width + 2, 0.0);
-        }
-        for y in 0..height {
-            // The row below is new; before the first one, that itself is, too.
-            for y in (if y == 0 { 0 } else { y + 1 })..(y + 2).min(height) {
-                for (inverse, &metres) in rows[y % 3].iter_mut().zip(&map.metres[y * width..][..width]) {
-                    *inverse = DepthMap::inverse_of(metres);
-                }
-            }
-            let row = |y: usize| &rows[y % 3][..width];
-            let (above, here, below) = (row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1)));
-            let (most, least) = (&mut high[1..=width], &mut low[1..=width]);
-            for x in 0..width {
-                most[x] = larger(larger(above[x], here[x]), below[x]);
-                least[x] = smaller(smaller(above[x], here[x]), below[x]);
-            }
-            for range in [&mut *high, &mut *low] {
-                (range[0], range[width + 1]) = (range[1], range[width]);
-            }
-            let found = &mut at_edge[y * width..][..width];
-            let [left, middle, right] = [0, 1, 2].map(|by| (&high[by..][..width], &low[by..][..width]));
-            let around = |x: usize| {
-                let near = larger(larger(left.0[x], middle.0[x]), right.0[x]);
-                [near, smaller(smaller(left.1[x], middle.1[x]), right.1[x])]
-            };
-            for (x, found) in found.iter_mut().enumerate() {
-                let [near, far] = around(x);
-                *found = near - far > jump;
-            }
-            for (found, begin) in found.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
-                // `|` instead of an early exit, so that a block becomes vector code.
-                if !found.iter().fold(false, |any, found| any | found) {
-                    continue;
-                }
-                for x in (begin..).zip(found).filter(|(_, found)| **found).map(|(x, _)| x) {
-                    let [near, far] = around(x);
-                    edges.push(EdgePixel { x: x as u32, y: y as u32, near, far });
-                }
-            }
-        }
-    }
 }
 
 /// The larger of two numbers: one instruction, unlike `f32::max`, which looks for what is no number.

@@ -166,7 +166,7 @@ fn difference(near: &Color, far: &Color, own: [f32; 3], share: f32) -> [f32; 3] 
 }
 
 /// What the depth map says of a pixel at an edge.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Labels {
     /// Whether it is of the near surface.
     pub is_near: bool,
@@ -177,12 +177,12 @@ pub struct Labels {
 }
 
 /// What is known of a pixel at an edge.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Evidence {
     pub edge: EdgePixel,
     pub labels: Labels,
-    /// The place of the contrast that it was compared with.
-    pub contrast: u32,
+    /// The place of the answer whose contrast it was compared with.
+    pub answer: u32,
     /// The light behind it, where that is known.
     pub behind: Option<[f32; 3]>,
     /// Likelihood of the pixel's colour if it is pure, as the map says.
@@ -239,13 +239,13 @@ impl Evidence {
         // No pixel of a surface whose light is known is like none of it.
         let outlier = if is_near || behind.is_none() { OUTLIER / precision.sqrt() } else { 0.0 };
         let pure = likelihoods[if is_near { STEPS - 1 } else { 0 }].max(outlier);
-        Self { edge: *edge, labels, contrast: place, behind, pure, half, any }
+        Self { edge: *edge, labels, answer: place, behind, pure, half, any }
     }
 }
 
 /// How likely pixels at edges are mixed at all in this frame, and how often the depth map errs: from a hard mask neither is,
 /// and from a camera half of them are. Found by expectation maximisation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Prior {
     mixed: f32,
     wrong: f32,

@@ -16,8 +16,10 @@ use std::ops::Range;
 use pulp::{Arch, WithSimd};
 
 use super::planes::{Planes, SetColors, SetDepths};
-use super::tiles::Tiles;
+use super::tiles::{self, Tiles};
 use super::votes::{self, REACH_LANES, Votes, Weights, jump_at};
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 
 /// How far from a jump a depth may be wrong, in pixels.
 const BAND_PX: usize = 4;
@@ -26,6 +28,8 @@ const UNSURE: f32 = 0.12;
 const MADE_UP: f32 = 0.02;
 /// Rounds; each can move an edge by up to [`BAND_PX`].
 const ROUNDS: usize = 2;
+/// Fewer pixels are not worth another thread.
+const LEAST_ASKED: usize = 64;
 
 /// Aligns maps of inverse depth; owns the memory for it.
 #[derive(Debug)]
@@ -40,6 +44,8 @@ pub struct Aligner {
     nearby: Weights,
     /// Pixels to ask, in order: first those at an edge, then the neighbours of those that changed.
     front: Vec<u32>,
+    /// What those that are asked at once answer.
+    answers: Vec<f32>,
     /// All that were asked in the first round.
     asked: Vec<u32>,
     /// Pixels that changed in the last round.
@@ -56,6 +62,7 @@ impl Default for Aligner {
             tiles: Tiles::default(),
             nearby: votes::weights_by_distance(),
             front: Vec::new(),
+            answers: Vec::new(),
             asked: Vec::new(),
             moved: Vec::new(),
         }
@@ -65,45 +72,112 @@ impl Default for Aligner {
 impl Aligner {
     /// Moves the edges of `inverse` onto those of the picture `rgb`. Steps of inverse depth above `jump` are edges;
     /// depths that are `unknown` were made up.
-    pub fn align(&mut self, arch: Arch, inverse: &mut [f32], unknown: &[bool], rgb: &[u8], width: usize, jump: f32) {
+    pub fn align(
+        &mut self,
+        (arch, workers): (Arch, &mut ThreadPool),
+        inverse: &mut [f32],
+        unknown: &[bool],
+        rgb: &[u8],
+        width: usize,
+        jump: f32,
+    ) {
+        let height = inverse.len() / width;
+        let bands = Bands::new(height, tiles::ROWS, workers);
         self.moved.clear();
         self.asked.clear();
         for round in 0..ROUNDS {
-            let Self { planes, edge, band, scratch, tiles, nearby, front, asked, moved } = self;
+            let Self { planes, edge, band, scratch, tiles, nearby, front, answers, asked, moved } = self;
             if round == 0 {
                 for mask in [&mut *edge, &mut *band, &mut *scratch] {
                     mask.clear();
                     mask.resize(inverse.len(), false);
                 }
-                arch.dispatch(FindEdges { inverse, width, jump, columns: |_| iter::once(0..width), edge });
-                tiles.find(edge, width);
+                tiles.clear(width, height);
+                let parts = bands.rows().zip(bands.split(edge, width)).zip(tiles.split(bands));
+                workers.run_each(parts, &|((rows, edge), has_edge)| {
+                    let columns = |_| iter::once(0..width);
+                    arch.dispatch(FindEdges { inverse, width, jump, columns, rows, edge: &mut *edge });
+                    tiles::mark(has_edge, edge, width);
+                });
+                tiles.find_near();
                 front.clear();
                 tiles.find_all(edge, front);
+                planes.resize(width, height, REACH_LANES);
             } else {
                 // Only what moved in the round before can have moved edges, and can move its neighbours now.
-                arch.dispatch(FindEdges { inverse, width, jump, columns: |y| tiles.columns(y), edge });
+                workers.run_each(bands.rows().zip(bands.split(edge, width)), &|(rows, edge)| {
+                    arch.dispatch(FindEdges { inverse, width, jump, columns: |y| tiles.columns(y), rows, edge });
+                });
             }
-            arch.dispatch(FindBand { tiles, width, edge, band, scratch });
+            workers.run_each(bands.rows().zip(bands.split(scratch, width)), &|(rows, out)| {
+                arch.dispatch(SpreadAlong { tiles, width, edge, rows, out });
+            });
+            let parts = planes.split(bands).zip(bands.split(band, width));
+            workers.run_each(parts, &|(mut planes, band)| {
+                let rows = planes.rows.clone();
+                arch.dispatch(SpreadAcross { tiles, width, along: scratch, rows, out: band });
+                let planes = &mut planes;
+                if round == 0 {
+                    arch.dispatch(SetColors { planes, tiles, rgb });
+                }
+                arch.dispatch(SetDepths { planes, tiles, inverse, unknown, band, weights: [MADE_UP, UNSURE] });
+            });
             if round > 0 {
                 front.clear();
                 front.extend(moved.iter().filter(|&&k| band[k as usize]));
             }
-            if front.is_empty() {
-                break;
-            }
-            if round == 0 {
-                planes.resize(width, inverse.len() / width, REACH_LANES);
-                arch.dispatch(SetColors { planes, tiles, rgb });
-            }
-            let (flags, weights) = ([unknown, &**band], [MADE_UP, UNSURE]);
-            arch.dispatch(SetDepths { planes, tiles, inverse, flags, weights });
             moved.clear();
-            arch.dispatch(Vote { planes, band, nearby, inverse, jump, front, moved });
+            vote((arch, workers), (planes, nearby, jump), (inverse, band), (front, answers, moved));
             if round == 0 {
                 std::mem::swap(front, asked);
             }
         }
         decide(&self.asked, inverse, rgb, width, jump);
+    }
+}
+
+/// Finds the surface of the pixels at edges, the `front`, and of the neighbours of those that turn out to lie on another
+/// surface: an edge moves like a front, and where it is right it costs little. What a pixel is told depends on its own depth
+/// alone, and on the planes: those of the front are asked at once. `band` is where depths may change; a pixel leaves it when it
+/// joins the front, so that it is asked once.
+fn vote(
+    (arch, workers): (Arch, &mut ThreadPool),
+    (planes, nearby, jump): (&Planes, &Weights, f32),
+    (inverse, band): (&mut [f32], &mut [bool]),
+    (front, answers, moved): (&mut Vec<u32>, &mut Vec<f32>, &mut Vec<u32>),
+) {
+    let width = planes.width;
+    for &k in &*front {
+        band[k as usize] = false;
+    }
+    let mut next = 0;
+    while next < front.len() {
+        let asked = &front[next..];
+        let each = asked.len().div_ceil(MOST_ITEMS).max(LEAST_ASKED);
+        answers.resize(asked.len(), 0.0);
+        workers.run_each(asked.chunks(each).zip(answers.chunks_mut(each)), &|(asked, answers)| {
+            arch.dispatch(Vote { planes, nearby, inverse, jump, asked, answers });
+        });
+        for &answer in &*answers {
+            let asked = front[next];
+            next += 1;
+            let k = asked as usize;
+            if answer == inverse[k] {
+                continue;
+            }
+            inverse[k] = answer;
+            moved.push(asked);
+            let (x, y) = (k % width, k / width);
+            let beside =
+                [(x > 0, k.wrapping_sub(1)), (x + 1 < width, k + 1), (y > 0, k.wrapping_sub(width)), (true, k + width)];
+            // Below the last row `k + width` lies beyond the band.
+            for (inside, beside) in beside {
+                if inside && beside < band.len() && band[beside] {
+                    band[beside] = false;
+                    front.push(beside as u32);
+                }
+            }
+        }
     }
 }
 
@@ -127,12 +201,13 @@ fn decide(asked: &[u32], inverse: &mut [f32], rgb: &[u8], width: usize, jump: f3
     }
 }
 
-/// Marks both sides of every jump, in some columns of each row.
+/// Marks both sides of every jump, in some columns of each row of a band.
 struct FindEdges<'a, C> {
     inverse: &'a [f32],
     width: usize,
     jump: f32,
     columns: C,
+    rows: Range<usize>,
     edge: &'a mut [bool],
 }
 
@@ -140,13 +215,13 @@ impl<I: Iterator<Item = Range<usize>>, C: Fn(usize) -> I> WithSimd for FindEdges
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { inverse, width, jump, columns, edge } = self;
+        let Self { inverse, width, jump, columns, rows, edge } = self;
         let height = inverse.len() / width;
-        for y in 0..height {
+        for (line, y) in rows.enumerate() {
             let row = &inverse[y * width..][..width];
             let above = &inverse[y.saturating_sub(1) * width..][..width];
             let below = &inverse[(y + 1).min(height - 1) * width..][..width];
-            let edge = &mut edge[y * width..][..width];
+            let edge = &mut edge[line * width..][..width];
             for columns in columns(y) {
                 let Range { start, end } = columns;
                 // At the ends of the row a pixel is its own neighbour.
@@ -170,27 +245,27 @@ impl<I: Iterator<Item = Range<usize>>, C: Fn(usize) -> I> WithSimd for FindEdges
     }
 }
 
-/// Marks what lies within [`BAND_PX`] of an edge.
-struct FindBand<'a> {
+/// So far beside an edge the band goes: the edge pixel itself is the first of it.
+const REST_PX: usize = BAND_PX - 1;
+
+/// Marks what lies within [`BAND_PX`] of an edge along the rows of a band.
+struct SpreadAlong<'a> {
     tiles: &'a Tiles,
     width: usize,
     edge: &'a [bool],
-    band: &'a mut [bool],
-    scratch: &'a mut [bool],
+    rows: Range<usize>,
+    out: &'a mut [bool],
 }
 
-impl WithSimd for FindBand<'_> {
+impl WithSimd for SpreadAlong<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { tiles, width, edge, band, scratch } = self;
-        let height = edge.len() / width;
-        // The edge pixel itself is the first of the band. Along rows, then down the columns.
-        const REST_PX: usize = BAND_PX - 1;
-        for y in 0..height {
+        let Self { tiles, width, edge, rows, out } = self;
+        for (line, y) in rows.enumerate() {
             for columns in tiles.columns(y) {
                 let row = &edge[y * width..][..width];
-                let out = &mut scratch[y * width..][..width];
+                let out = &mut out[line * width..][..width];
                 out[columns.clone()].copy_from_slice(&row[columns.clone()]);
                 for px in 1..=REST_PX {
                     let Range { start, end } = columns;
@@ -205,12 +280,30 @@ impl WithSimd for FindBand<'_> {
                 }
             }
         }
-        for y in 0..height {
+    }
+}
+
+/// The same down the columns, of what is marked `along` the rows.
+struct SpreadAcross<'a> {
+    tiles: &'a Tiles,
+    width: usize,
+    along: &'a [bool],
+    rows: Range<usize>,
+    out: &'a mut [bool],
+}
+
+impl WithSimd for SpreadAcross<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { tiles, width, along, rows, out } = self;
+        let height = along.len() / width;
+        for (line, y) in rows.enumerate() {
             for columns in tiles.columns(y) {
-                let out = &mut band[y * width..][columns.clone()];
+                let out = &mut out[line * width..][columns.clone()];
                 out.fill(false);
                 for other in y.saturating_sub(REST_PX)..(y + BAND_PX).min(height) {
-                    or_assign(out, &scratch[other * width..][columns.clone()]);
+                    or_assign(out, &along[other * width..][columns.clone()]);
                 }
             }
         }
@@ -231,50 +324,26 @@ fn is_jump(here: f32, beside: f32, jump: f32) -> bool {
     (here - beside).abs() > 0.25 * jump_at(jump, here)
 }
 
-/// Finds the surface of the pixels at edges, and of the neighbours of those that turn out to lie on another surface:
-/// an edge moves like a front, and where it is right it costs little.
+/// Asks pixels for their surface.
 struct Vote<'a> {
     planes: &'a Planes,
-    /// Where depths may change. A pixel leaves it when it joins the front, so that it is asked once.
-    band: &'a mut [bool],
     nearby: &'a Weights,
-    inverse: &'a mut [f32],
+    inverse: &'a [f32],
     jump: f32,
-    front: &'a mut Vec<u32>,
-    moved: &'a mut Vec<u32>,
+    asked: &'a [u32],
+    answers: &'a mut [f32],
 }
 
 impl WithSimd for Vote<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { planes, band, nearby, inverse, jump, front, moved } = self;
-        let width = planes.width;
+        let Self { planes, nearby, inverse, jump, asked, answers } = self;
         let mut votes = Votes::default();
-        for &k in &*front {
-            band[k as usize] = false;
-        }
-        let mut next = 0;
-        while let Some(&asked) = front.get(next) {
-            next += 1;
+        for (&asked, answer) in asked.iter().zip(answers) {
             let k = asked as usize;
-            let (x, y) = (k % width, k / width);
-            votes.gather(planes, nearby, x, y);
-            let v = votes.surface(inverse[k], jump);
-            if v == inverse[k] {
-                continue;
-            }
-            inverse[k] = v;
-            moved.push(asked);
-            let beside =
-                [(x > 0, k.wrapping_sub(1)), (x + 1 < width, k + 1), (y > 0, k.wrapping_sub(width)), (true, k + width)];
-            // Below the last row `k + width` lies beyond the band.
-            for (inside, beside) in beside {
-                if inside && beside < band.len() && band[beside] {
-                    band[beside] = false;
-                    front.push(beside as u32);
-                }
-            }
+            votes.gather(planes, nearby, k % planes.width, k / planes.width);
+            *answer = votes.surface(inverse[k], jump);
         }
     }
 }

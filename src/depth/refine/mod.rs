@@ -20,10 +20,11 @@ use pulp::Arch;
 pub use self::outlines::Outlines;
 
 use self::align::Aligner;
-use self::smooth::{Over, Smoother};
+use self::smooth::{Smoother, over};
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
+use crate::compute::thread_pool::ThreadPool;
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
 
@@ -109,7 +110,13 @@ impl Refiner {
     /// Refines the depth `map` of the picture `color` at `time_ns` of media time; the map takes the picture's size.
     /// A frame that does not follow the one before (another size, a seek, a gap) starts anew. Where no depth was ever
     /// known, the map stays unknown (0) everywhere.
+    /// On the caller's thread, as for a few frames.
     pub fn refine(&mut self, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
+        self.refine_on(&mut ThreadPool::new("refine", 1), map, color, time_ns);
+    }
+
+    /// The same on several threads: the map is the same to the bit for any number of them.
+    pub fn refine_on(&mut self, workers: &mut ThreadPool, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
         let Mending { mut distance_px, coarsest: mut scale } = self.mending;
         while scale > 1 {
             let size = |side: u32| side.div_ceil(scale);
@@ -117,17 +124,24 @@ impl Refiner {
             reduced.resize(size(color.width), size(color.height));
             self.fit.fit(color, &mut reduced);
             let of_scale = distance_px as f32 / scale as f32;
-            self.refine_at(map, &reduced, of_scale.round() as i32, None);
+            self.refine_at(workers, map, &reduced, of_scale.round() as i32, None);
             distance_px = 0;
             self.reduced = reduced;
             scale /= 2;
         }
-        self.refine_at(map, color, distance_px, Some(time_ns));
+        self.refine_at(workers, map, color, distance_px, Some(time_ns));
     }
 
     /// Refines `map` at the size of `color`, its outlines moved first, and steadies it where it is that of a frame at `time_ns`:
     /// only at the picture's scale a frame is compared with earlier ones.
-    fn refine_at(&mut self, map: &mut DepthMap, color: &ColorImage, distance_px: i32, time_ns: Option<u64>) {
+    fn refine_at(
+        &mut self,
+        workers: &mut ThreadPool,
+        map: &mut DepthMap,
+        color: &ColorImage,
+        distance_px: i32,
+        time_ns: Option<u64>,
+    ) {
         self.upsampler.resize(map, color.size());
         let is_good = self.filler.fill_once(map, color);
         // The filler leaves either nothing unknown or everything: one pixel tells which.
@@ -140,18 +154,18 @@ impl Refiner {
         unknown.resize(map.metres.len(), false);
         filler.holes().iter().for_each(|hole| unknown[hole.of_row(width)].fill(true));
         let measured_noise = smoother.noise(|at| focus_m / map.metres[at], unknown, width);
-        smoother.smooth(arch, (&map.metres, focus_m), inverse, width, measured_noise);
+        smoother.smooth((arch, workers), (&map.metres, focus_m), inverse, width, measured_noise);
         if is_good {
             filler.take(map);
         }
         let noise = smoother.noise(|at| inverse[at], unknown, width);
         let jump = JUMP.max(JUMP_SIGMAS * noise);
         outlines.shift(inverse, unknown, width, distance_px, jump);
-        aligner.align(arch, inverse, unknown, &color.rgb, width, jump);
+        aligner.align((arch, workers), inverse, unknown, &color.rgb, width, jump);
         let Some(time_ns) = time_ns else {
-            return arch.dispatch(Over { focus_m, values: inverse, out: &mut map.metres });
+            return over((arch, workers), focus_m, (inverse, &mut map.metres), width);
         };
         let limits = Limits { noise: LEAST_CHANGE.max(CHANGE_SIGMAS * measured_noise), jump: 2.0 * jump };
-        temporal.steady(arch, inverse, (&color.rgb, width, time_ns), limits, (&mut map.metres, focus_m));
+        temporal.steady((arch, workers), inverse, (&color.rgb, width, time_ns), limits, (&mut map.metres, focus_m));
     }
 }

@@ -1,9 +1,12 @@
 //! Depth and colour of a frame laid out for windows that take every second pixel: even and odd columns apart, so that
 //! the pixels of one row of a window lie side by side.
 
+use std::ops::Range;
+
 use pulp::WithSimd;
 
 use super::tiles::Tiles;
+use crate::compute::bands::Bands;
 
 /// Values that a window reads of a row.
 pub const LANES: usize = 16;
@@ -48,22 +51,32 @@ impl Planes {
         self.reach = reach;
     }
 
-    /// Where a row begins whose pixels have this parity.
-    #[inline(always)]
-    fn row(&self, y: usize, parity: usize) -> usize {
-        (2 * y + parity) * self.stride + MARGIN
+    /// The planes of each band.
+    pub fn split(&mut self, bands: Bands) -> impl Iterator<Item = PlanesBand<'_>> {
+        let (width, stride) = (self.width, self.stride);
+        let [inverse, confidence] = self.depths.each_mut().map(|plane| bands.split(plane, 2 * stride));
+        let [red, green, blue] = self.colors.each_mut().map(|plane| bands.split(plane, 2 * stride));
+        bands.rows().zip(inverse.zip(confidence)).zip(red.zip(green).zip(blue)).map(
+            move |((rows, (inverse, confidence)), ((red, green), blue))| PlanesBand {
+                rows,
+                width,
+                stride,
+                depths: [inverse, confidence],
+                colors: [red, green, blue],
+            },
+        )
     }
 
-    /// The places of row `y` from the even column `x` on, of either parity.
+    /// The place of column `x` in row `y`.
     #[inline(always)]
-    fn places(&self, x: usize, y: usize) -> [usize; 2] {
-        [0, 1].map(|parity| self.row(y, parity) + x / 2)
+    fn place(&self, x: usize, y: usize) -> usize {
+        (2 * y + x % 2) * self.stride + MARGIN + x / 2
     }
 
     /// Red, green and blue of a pixel.
     #[inline(always)]
     pub fn color(&self, x: usize, y: usize) -> [f32; 3] {
-        let at = self.row(y, x % 2) + x / 2;
+        let at = self.place(x, y);
         self.colors.each_ref().map(|plane| f32::from(plane[at]))
     }
 
@@ -71,7 +84,7 @@ impl Planes {
     /// blue.
     #[inline(always)]
     pub fn window(&self, x: usize, y: usize) -> ([&[f32; LANES]; 2], [&[u8; LANES]; 3]) {
-        let at = self.row(y, x % 2) + x / 2 - self.reach;
+        let at = self.place(x, y) - self.reach;
         (self.depths.each_ref().map(|plane| chunk(plane, at)), self.colors.each_ref().map(|plane| chunk(plane, at)))
     }
 }
@@ -90,19 +103,38 @@ fn part<T: Copy>(plane: &mut [T], [even, odd]: [usize; 2], values: &[T]) {
     }
 }
 
-/// Copies the colours of a picture (sRGB, 0 to 255) near edges into the planes.
-pub struct SetColors<'a> {
-    pub planes: &'a mut Planes,
+/// What a band of rows has of all planes.
+pub struct PlanesBand<'a> {
+    pub rows: Range<usize>,
+    width: usize,
+    stride: usize,
+    depths: [&'a mut [f32]; 2],
+    colors: [&'a mut [u8]; 3],
+}
+
+impl PlanesBand<'_> {
+    /// The places of the `line`th row from the even column `x` on, of either parity.
+    #[inline(always)]
+    fn places(&self, x: usize, line: usize) -> [usize; 2] {
+        [0, 1].map(|parity| (2 * line + parity) * self.stride + MARGIN + x / 2)
+    }
+}
+
+/// Copies the colours of a picture (sRGB, 0 to 255) near edges into a band of the planes.
+pub struct SetColors<'a, 'b> {
+    pub planes: &'a mut PlanesBand<'b>,
     pub tiles: &'a Tiles,
     pub rgb: &'a [u8],
 }
 
-impl WithSimd for SetColors<'_> {
+impl WithSimd for SetColors<'_, '_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { planes, tiles, rgb } = self;
-        for (y, row) in rgb.as_chunks::<3>().0.chunks_exact(planes.width).enumerate() {
+        let (pixels, width) = (rgb.as_chunks::<3>().0, planes.width);
+        for (line, y) in planes.rows.clone().enumerate() {
+            let row = &pixels[y * width..][..width];
             for columns in tiles.columns(y) {
                 for (pixels, k) in row[columns.clone()].chunks(CHUNK).zip(0..) {
                     let mut values = [[0; CHUNK]; 3];
@@ -110,7 +142,7 @@ impl WithSimd for SetColors<'_> {
                     for (((pixel, red), green), blue) in pixels.iter().zip(red).zip(green).zip(blue) {
                         [*red, *green, *blue] = *pixel;
                     }
-                    let places = planes.places(columns.start + k * CHUNK, y);
+                    let places = planes.places(columns.start + k * CHUNK, line);
                     for (plane, values) in planes.colors.iter_mut().zip(&values) {
                         part(plane, places, &values[..pixels.len()]);
                     }
@@ -120,38 +152,40 @@ impl WithSimd for SetColors<'_> {
     }
 }
 
-/// Copies inverse depths near edges, and how much each of them weighs, into the planes.
-pub struct SetDepths<'a> {
-    pub planes: &'a mut Planes,
+/// Copies inverse depths near edges, and how much each of them weighs, into a band of the planes.
+pub struct SetDepths<'a, 'b> {
+    pub planes: &'a mut PlanesBand<'b>,
     pub tiles: &'a Tiles,
-    /// Inverse depths of the picture, row by row.
+    /// Inverse depths of the picture, row by row, and whether each was made up.
     pub inverse: &'a [f32],
-    /// Whether each was made up, and whether it may be wrong.
-    pub flags: [&'a [bool]; 2],
-    /// How much such depths count as votes.
+    pub unknown: &'a [bool],
+    /// Whether those of the band may be wrong.
+    pub band: &'a [bool],
+    /// How much depths that were made up count as votes, and those that may be wrong.
     pub weights: [f32; 2],
 }
 
-impl WithSimd for SetDepths<'_> {
+impl WithSimd for SetDepths<'_, '_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { planes, tiles, inverse, flags: [unknown, band], weights: [made_up, unsure] } = self;
-        for y in 0..planes.height {
+        let Self { planes, tiles, inverse, unknown, band, weights: [made_up, unsure] } = self;
+        let width = planes.width;
+        for (line, y) in planes.rows.clone().enumerate() {
             for columns in tiles.columns(y) {
-                let row = y * planes.width;
-                let places = planes.places(columns.start, y);
-                part(&mut planes.depths[0], places, &inverse[row..][columns.clone()]);
+                let row = y * width;
+                let places = planes.places(columns.start, line);
+                part(planes.depths[0], places, &inverse[row..][columns.clone()]);
                 for begin in columns.clone().step_by(CHUNK) {
-                    let pixels = row + begin..row + (begin + CHUNK).min(columns.end);
+                    let chunk = begin..(begin + CHUNK).min(columns.end);
                     let mut weights = [1.0; CHUNK];
-                    let flags = unknown[pixels.clone()].iter().zip(&band[pixels.clone()]);
+                    let flags = unknown[row..][chunk.clone()].iter().zip(&band[line * width..][chunk.clone()]);
                     for (weight, (&unknown, &band)) in weights.iter_mut().zip(flags) {
                         *weight = if band { unsure } else { 1.0 };
                         *weight = if unknown { made_up } else { *weight };
                     }
-                    let places = planes.places(begin, y);
-                    part(&mut planes.depths[1], places, &weights[..pixels.len()]);
+                    let places = planes.places(begin, line);
+                    part(planes.depths[1], places, &weights[..chunk.len()]);
                 }
             }
         }

@@ -4,7 +4,12 @@
 //! taps in symmetric pairs: a pair counts only if both its ends belong to the surface. A slanted plane then stays
 //! where it is, up to its very rim, and the two sides of an edge are never mixed.
 
+use std::ops::Range;
+
 use pulp::{Arch, WithSimd};
+
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::ThreadPool;
 
 /// Distances in pixels of the pairs that are averaged: sparse, because the noise of depth sensors is correlated over
 /// some pixels. A denser set of the same reach gains nothing.
@@ -26,7 +31,13 @@ const NO_NOISE: f32 = 5e-4;
 #[derive(Debug, Default)]
 pub struct Smoother {
     differences: Vec<f32>,
-    /// Some rows of the map after the pass along them, which take turns, and one before it.
+    /// Of every thread.
+    lines: Vec<Lines>,
+}
+
+/// Some rows of the map after the pass along them, which take turns, and one before it.
+#[derive(Debug, Default)]
+struct Lines {
     along_rows: Vec<f32>,
     row: Vec<f32>,
 }
@@ -65,21 +76,36 @@ impl Smoother {
     /// surfaces.
     pub fn smooth(
         &mut self,
-        arch: Arch,
+        (arch, workers): (Arch, &mut ThreadPool),
         (metres, focus_m): (&[f32], f32),
         inverse: &mut Vec<f32>,
         width: usize,
         noise: f32,
     ) {
         inverse.resize(metres.len(), 0.0);
-        if noise < NO_NOISE || width == 0 {
-            return arch.dispatch(Over { focus_m, values: metres, out: inverse });
-        }
-        let Self { along_rows, row, .. } = self;
-        along_rows.resize(ROWS * width, 0.0);
-        row.resize(width, 0.0);
-        arch.dispatch(Smooth { metres, focus_m, inverse, width, limit: SAME_SURFACE * noise, along_rows, row });
+        let bands = Bands::new(metres.len().checked_div(width).unwrap_or(0), 1, workers);
+        let limit = if noise < NO_NOISE { None } else { Some(SAME_SURFACE * noise) };
+        self.lines.resize_with(workers.thread_count(), Lines::default);
+        let parts = bands.rows().zip(bands.split(inverse, width));
+        workers.run_each_with(&mut self.lines, parts, &|Lines { along_rows, row }, (rows, out)| {
+            let Some(limit) = limit else {
+                let values = &metres[rows.start * width..rows.end * width];
+                return arch.dispatch(Over { focus_m, values, out });
+            };
+            along_rows.resize(ROWS * width, 0.0);
+            row.resize(width, 0.0);
+            arch.dispatch(Smooth { metres, focus_m, rows, out, width, limit, along_rows, row });
+        });
     }
+}
+
+/// Takes the distance in focus over values, as [`Over`], row by row of so many columns.
+pub fn over((arch, workers): (Arch, &mut ThreadPool), focus_m: f32, (values, out): (&[f32], &mut [f32]), width: usize) {
+    let bands = Bands::new(out.len() / width, 1, workers);
+    let parts = bands.rows().zip(bands.split(out, width));
+    workers.run_each(parts, &|(rows, out)| {
+        arch.dispatch(Over { focus_m, values: &values[rows.start * width..], out });
+    });
 }
 
 /// The distance in focus over values: inverse depth of depth in metres, and the other way round.
@@ -105,7 +131,9 @@ impl WithSimd for Over<'_> {
 struct Smooth<'a> {
     metres: &'a [f32],
     focus_m: f32,
-    inverse: &'a mut [f32],
+    /// The rows that are wanted, for `out`.
+    rows: Range<usize>,
+    out: &'a mut [f32],
     width: usize,
     limit: f32,
     along_rows: &'a mut [f32],
@@ -116,16 +144,16 @@ impl WithSimd for Smooth<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let Self { metres, focus_m, inverse, width, limit, along_rows, row } = self;
+        let Self { metres, focus_m, rows, out, width, limit, along_rows, row } = self;
         let height = metres.len() / width;
-        for y in 0..height + REACH_PX {
+        for y in rows.start.saturating_sub(REACH_PX)..rows.end + REACH_PX {
             if y < height {
                 Over { focus_m, values: &metres[y * width..][..width], out: row }.with_simd(simd);
                 smooth_row(row, &mut along_rows[y % ROWS * width..][..width], limit);
             }
-            let Some(y) = y.checked_sub(REACH_PX) else { continue };
+            let Some(y) = y.checked_sub(REACH_PX).filter(|&y| y >= rows.start) else { continue };
             let row = |y: usize| &along_rows[y % ROWS * width..][..width];
-            let (here, out) = (row(y), &mut inverse[y * width..][..width]);
+            let (here, out) = (row(y), &mut out[(y - rows.start) * width..][..width]);
             if y >= REACH_PX && y + REACH_PX < height {
                 average(PAIRS_PX.map(|px| [row(y - px), row(y + px)]), here, out, limit);
             } else {

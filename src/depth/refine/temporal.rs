@@ -5,9 +5,13 @@
 //! while the colours around rest is mostly the sensor's: the outline of a still person flickers by some pixels. Such a
 //! jump is believed only once it lasts.
 
+use std::ops::Range;
+
 use pulp::{Arch, WithSimd};
 
-use super::smooth::Over;
+use super::smooth::over;
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::ThreadPool;
 
 /// Frames that the average spans, at most: the variance of still noise falls to 1/15.
 const LONGEST: f32 = 8.0;
@@ -47,11 +51,17 @@ pub struct TemporalFilter {
     rgb: Vec<u8>,
     /// Change of colour since the last frame, summed up over 3x3 pixels.
     change: Vec<u16>,
-    /// The same of three rows, summed up along them; and of the pixels of one.
-    rows: [Vec<u16>; 3],
-    single: Vec<u16>,
+    /// Of every thread.
+    lines: Vec<Lines>,
     /// Memory for the samples of the median.
     looks: Vec<f32>,
+}
+
+/// Changes of colour of three rows, summed up along them; and of the pixels of one.
+#[derive(Debug, Default)]
+struct Lines {
+    rows: [Vec<u16>; 3],
+    single: Vec<u16>,
 }
 
 impl TemporalFilter {
@@ -68,7 +78,7 @@ impl TemporalFilter {
     /// Steadies `inverse` of the frame at `time_ns`, with the picture `rgb`; gives it out as `metres`, `focus_m` over it.
     pub fn steady(
         &mut self,
-        arch: Arch,
+        (arch, workers): (Arch, &mut ThreadPool),
         inverse: &[f32],
         (rgb, width, time_ns): (&[u8], usize, u64),
         limits: Limits,
@@ -76,13 +86,26 @@ impl TemporalFilter {
     ) {
         let same_size = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
         let in_order = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
+        let bands = Bands::new(inverse.len() / width, 1, workers);
         if same_size && in_order {
             self.change.resize(inverse.len(), 0);
-            let Self { change, rows, single, rgb: before, .. } = self;
-            arch.dispatch(Change { rgb, before, width, rows, single, change });
+            self.lines.resize_with(workers.thread_count(), Lines::default);
+            let Self { change, lines, rgb: before, .. } = self;
+            let pictures = [rgb, &before[..]];
+            workers.run_each_with(lines, bands.rows().zip(bands.split(change, width)), &|lines, (rows, change)| {
+                arch.dispatch(Change { pictures, width, lines, rows, change });
+            });
             let moved = (MOVED * self.median_change()).clamp(MOVED_BOUNDS.0, MOVED_BOUNDS.1);
-            let Self { mean, count, held, change, .. } = self;
-            arch.dispatch(Average { inverse, mean, count, held, change, moved, limits, metres, focus_m });
+            let Self { mean, count, held, change, rgb: before, .. } = self;
+            let state = bands.split(mean, width).zip(bands.split(count, width)).zip(bands.split(held, width));
+            let remembered = state.zip(bands.split(before, 3 * width));
+            let parts = bands.rows().zip(bands.split(metres, width)).zip(remembered);
+            workers.run_each(parts, &|((rows, metres), (((mean, count), held), before))| {
+                let pixels = rows.start * width..rows.end * width;
+                before.copy_from_slice(&rgb[3 * pixels.start..3 * pixels.end]);
+                let (inverse, change) = (&inverse[pixels.clone()], &change[pixels]);
+                arch.dispatch(Average { inverse, mean, count, held, change, moved, limits, metres, focus_m });
+            });
         } else {
             self.mean.clear();
             self.mean.extend_from_slice(inverse);
@@ -92,7 +115,7 @@ impl TemporalFilter {
             self.held.resize(inverse.len(), 0);
             self.rgb.clear();
             self.rgb.extend_from_slice(rgb);
-            arch.dispatch(Over { focus_m, values: inverse, out: metres });
+            over((arch, workers), focus_m, (inverse, metres), width);
         }
         (self.width, self.time_ns) = (width, time_ns);
     }
@@ -116,14 +139,14 @@ fn per_pixel(change: u16) -> f32 {
     f32::from(change) / 9.0
 }
 
-/// How much the colours around each pixel changed, summed up over 3x3 pixels: at the border the outermost ones count twice.
-/// Remembers the picture.
+/// How much the colours around each pixel changed between two pictures, summed up over 3x3 pixels: at the border the outermost
+/// ones count twice.
 struct Change<'a> {
-    rgb: &'a [u8],
-    before: &'a mut [u8],
+    pictures: [&'a [u8]; 2],
     width: usize,
-    rows: &'a mut [Vec<u16>; 3],
-    single: &'a mut Vec<u16>,
+    lines: &'a mut Lines,
+    /// The rows that are wanted, for `change`.
+    rows: Range<usize>,
     change: &'a mut [u16],
 }
 
@@ -131,29 +154,28 @@ impl WithSimd for Change<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { rgb, before, width, rows, single, change } = self;
-        let (height, last) = (change.len() / width, width - 1);
-        for row in rows.iter_mut().chain([&mut *single]) {
+        let Self { pictures, width, lines: Lines { rows: sums, single }, rows, change } = self;
+        let (height, last) = (pictures[0].len() / (3 * width), width - 1);
+        for row in sums.iter_mut().chain([&mut *single]) {
             row.resize(width, 0);
         }
-        let pictures = rgb.chunks_exact(3 * width).zip(before.chunks_exact_mut(3 * width));
-        for (y, (now, before)) in pictures.enumerate() {
-            let pixels = now.as_chunks::<3>().0.iter().zip(before.as_chunks::<3>().0);
-            for ((now, before), single) in pixels.zip(&mut *single) {
+        for y in rows.start.saturating_sub(1)..(rows.end + 1).min(height) {
+            let [now, before] = pictures.map(|rgb| rgb[3 * y * width..][..3 * width].as_chunks::<3>().0);
+            for ((now, before), single) in now.iter().zip(before).zip(&mut *single) {
                 let apart = |p: usize| u16::from(now[p].abs_diff(before[p]));
                 *single = apart(0) + apart(1) + apart(2);
             }
-            before.copy_from_slice(now);
-            let row = &mut rows[y % 3];
+            let row = &mut sums[y % 3];
             row[0] = 2 * single[0] + single[1.min(last)];
             row[last] = single[last.saturating_sub(1)] + 2 * single[last];
             for (sum, three) in row.iter_mut().skip(1).zip(single.windows(3)) {
                 *sum = three[0] + three[1] + three[2];
             }
             // The row above has all its neighbours now; the last one is its own.
-            for y in y.saturating_sub(1)..if y + 1 < height { y } else { height } {
-                let [above, here, below] = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| &rows[y % 3]);
-                let out = &mut change[y * width..][..width];
+            let end = if y + 1 < height { y } else { height };
+            for y in y.saturating_sub(1).max(rows.start)..end.min(rows.end) {
+                let [above, here, below] = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| &sums[y % 3]);
+                let out = &mut change[(y - rows.start) * width..][..width];
                 for (out, ((above, here), below)) in out.iter_mut().zip(above.iter().zip(here).zip(below)) {
                     *out = above + here + below;
                 }

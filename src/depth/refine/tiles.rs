@@ -2,10 +2,12 @@
 
 use std::ops::Range;
 
+use crate::compute::bands::Bands;
+
 /// Columns and rows of a tile: as far as edges move in the rounds before the last, and what a band and then a window reach
 /// from there. More would be laid out in vain.
 const COLUMNS: usize = 20;
-const ROWS: usize = 20;
+pub const ROWS: usize = 20;
 
 /// The tiles of a picture that have an edge, and those around them.
 #[derive(Debug, Default)]
@@ -17,20 +19,26 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Looks where a picture of so many columns has edges.
-    pub fn find(&mut self, edge: &[bool], width: usize) {
-        let down = (edge.len() / width).div_ceil(ROWS);
+    /// Takes a picture of so many columns and rows, of whose edges nothing is known.
+    pub fn clear(&mut self, width: usize, height: usize) {
+        let down = height.div_ceil(ROWS);
         (self.width, self.across) = (width, width.div_ceil(COLUMNS));
         for tiles in [&mut self.has_edge, &mut self.is_near] {
             tiles.clear();
             tiles.resize(self.across * down, false);
         }
-        for (y, row) in edge.chunks_exact(width).enumerate() {
-            let tiles = &mut self.has_edge[y / ROWS * self.across..][..self.across];
-            for (has_edge, columns) in tiles.iter_mut().zip(row.chunks(COLUMNS)) {
-                *has_edge |= columns.iter().fold(false, |any, edge| any | edge);
-            }
-        }
+    }
+
+    /// The tiles of each band, of whole tiles, for [`mark`].
+    pub fn split(&mut self, bands: Bands) -> impl Iterator<Item = &mut [bool]> {
+        bands
+            .rows()
+            .scan(&mut self.has_edge[..], |rest, rows| rest.split_off_mut(..rows.len().div_ceil(ROWS) * self.across))
+    }
+
+    /// Finds what lies near the tiles that have edges.
+    pub fn find_near(&mut self) {
+        let down = self.has_edge.len() / self.across;
         for k in (0..self.has_edge.len()).filter(|&k| self.has_edge[k]) {
             let (row, column) = (k / self.across, k % self.across);
             for row in row.saturating_sub(1)..(row + 2).min(down) {
@@ -64,6 +72,18 @@ impl Tiles {
     }
 }
 
+/// Marks the tiles of a band that have edges.
+#[inline(always)]
+pub fn mark(has_edge: &mut [bool], edge: &[bool], width: usize) {
+    let across = width.div_ceil(COLUMNS);
+    for (y, row) in edge.chunks_exact(width).enumerate() {
+        let tiles = &mut has_edge[y / ROWS * across..][..across];
+        for (has_edge, columns) in tiles.iter_mut().zip(row.chunks(COLUMNS)) {
+            *has_edge |= columns.iter().fold(false, |any, edge| any | edge);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,7 +95,9 @@ mod tests {
             let mut edge = vec![false; width * height];
             edge[y * width + x] = true;
             let mut tiles = Tiles::default();
-            tiles.find(&edge, width);
+            tiles.clear(width, height);
+            mark(&mut tiles.has_edge, &edge, width);
+            tiles.find_near();
             for row in 0..height {
                 let mut is_near = vec![false; width];
                 for columns in tiles.columns(row) {

@@ -57,7 +57,7 @@ impl Live {
         let made_for = look.settings(info.size, ADAPTIVE);
         let bokeh = made_for.as_ref().map(|made_for| start.services.executor(made_for, info.size)).transpose()?;
         let executor = bokeh.as_ref().map_or_else(|| "no blur".into(), |bokeh| bokeh.describe());
-        let budget_ns = start.budget_ns.unwrap_or(info.period_ns);
+        let (budget_ns, threads) = (start.budget_ns.unwrap_or(info.period_ns), start.threads);
         let (switch, board) = Switch::new("window", wrote);
         let period = Duration::from_nanos(info.period_ns);
         let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
@@ -76,6 +76,7 @@ impl Live {
                 look,
                 adaptive: ADAPTIVE,
                 measured,
+                threads,
                 changes: Some(to_come),
                 sink: Box::new(sink),
                 pace: Pace::Realtime,

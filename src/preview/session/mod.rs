@@ -50,6 +50,8 @@ pub struct Start {
     pub keep_going: bool,
     /// Time that a frame's blur may take; `None` is the frame period.
     pub budget_ns: Option<u64>,
+    /// Threads that finish depth.
+    pub threads: usize,
     /// Where snapshots and recordings go.
     pub folders: Folders,
     /// Where blurred pictures are wanted.

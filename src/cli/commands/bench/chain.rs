@@ -182,7 +182,8 @@ fn measure(
     let executor = executors.first().map(|(_, executor)| executor.describe()).unwrap_or_default();
 
     let measured = source.is_measured();
-    let mut coc = CocMaker::new(look.coc_rule(size), Finish::measured(look.refines(measured)));
+    let coc = CocMaker::new(look.coc_rule(size), Finish::measured(look.refines(measured)));
+    let mut coc = coc.on_threads(computing.threads());
     let is_known = source.depth.as_ref().is_some_and(|source| source.knows_background());
     coc.remember(look.background_memory == BackgroundMemory::On && !is_known);
     let mut notes = Notes { clock: Clock::system(), since: [0; 2], parts: Vec::new(), measures: false };

@@ -160,6 +160,7 @@ pub fn show(
             outputs,
             keep_going: stream.keep_going,
             budget_ns: stream.budget_ms.map(|ms| (f64::from(ms) * 1e6) as u64),
+            threads: computing.choice().threads(),
             wanted: Arc::default(),
             demand: Demand::default(),
             off: Arc::default(),

@@ -1,0 +1,61 @@
+//! Bands: the rows of a picture, split among the threads of a pool.
+
+use std::ops::Range;
+
+use super::thread_pool::{MOST_ITEMS, ThreadPool};
+
+/// A thread has so many bands of a picture: one that is held up leaves its share to the others.
+const OF_A_THREAD: usize = 4;
+/// Fewer rows are no band: what its passes read of those beside it would be too much.
+const LEAST_ROWS: usize = 40;
+
+/// How a picture is split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bands {
+    height: usize,
+    /// Rows of a band; the last may have fewer.
+    rows: usize,
+}
+
+impl Bands {
+    /// Of so many rows, a multiple of `unit` in each band, for these threads: one band for one thread.
+    pub fn new(height: usize, unit: usize, workers: &ThreadPool) -> Self {
+        let threads = workers.thread_count();
+        let most = if threads > 1 { (OF_A_THREAD * threads).min(MOST_ITEMS) } else { 1 };
+        let rows = height.div_ceil(most).max(LEAST_ROWS).next_multiple_of(unit);
+        Self { height, rows }
+    }
+
+    /// The rows of each band.
+    pub fn rows(self) -> impl Iterator<Item = Range<usize>> {
+        (0..self.height).step_by(self.rows).map(move |first| first..(first + self.rows).min(self.height))
+    }
+
+    /// What each band has of a plane with so many values for a row.
+    pub fn split<T>(self, plane: &mut [T], of_row: usize) -> impl Iterator<Item = &mut [T]> {
+        plane.chunks_mut((self.rows * of_row).max(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_are_all_rows_in_order_and_no_more_than_a_pass_takes() {
+        for threads in [1, 2, 3, 16] {
+            let workers = ThreadPool::new("test", threads);
+            for (height, unit) in [(0, 1), (1, 1), (7, 20), (720, 20), (721, 8), (4320, 1)] {
+                let bands = Bands::new(height, unit, &workers);
+                let mut plane: Vec<usize> = (0..3 * height).map(|at| at / 3).collect();
+                let (mut next, mut count) = (0, 0);
+                for (rows, values) in bands.rows().zip(bands.split(&mut plane, 3)) {
+                    assert_eq!((rows.start, values.len()), (next, 3 * rows.len()));
+                    assert!(rows.start.is_multiple_of(unit) && values[0] == rows.start);
+                    (next, count) = (rows.end, count + 1);
+                }
+                assert!(next == height && count <= MOST_ITEMS && (threads > 1 || count <= 1));
+            }
+        }
+    }
+}
