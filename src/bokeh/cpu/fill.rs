@@ -3,10 +3,14 @@
 //! the holes. Every layer is filled for itself, from what does not lie in front of it: behind a head are the trees that
 //! stand behind it, and behind both the sky.
 
+#![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
+
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use super::rows::Rows;
+use pulp::{Arch, Simd, WithSimd};
+
+use super::rows::{PIECE, Rows};
 use super::unpack::Surfaces;
 use crate::bokeh::occlusion::other_surface;
 use crate::bokeh::plan::Share;
@@ -82,17 +86,15 @@ impl Pyramid {
     }
 
     /// Fills what is hidden by all that is not `unhidden`, once the halves are laid.
-    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool) {
-        self.lay_base(unhidden, workers);
+    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool, arch: Arch) {
+        self.lay_base(unhidden, workers, arch);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
             let (width, stride, row_len) = (coarse.width, coarse.rows.stride, coarse.rows.row_len());
             let rows = DisjointParts::new(&mut coarse.rows.data, PART * row_len, &mut self.taken);
             workers.run(coarse.height.div_ceil(PART), &|part| {
-                for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
-                    pull(fine, part * PART + k, row, stride, width);
-                }
+                arch.dispatch(Pull { fine, first: part * PART, rows: rows.part(part), stride, width });
             });
         }
         for k in (1..self.levels.len()).rev() {
@@ -101,9 +103,7 @@ impl Pyramid {
             let (width, stride, row_len) = (fine.width, fine.rows.stride, fine.rows.row_len());
             let rows = DisjointParts::new(&mut fine.rows.data, PART * row_len, &mut self.taken);
             workers.run(fine.height.div_ceil(PART), &|part| {
-                for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
-                    push(coarse, part * PART + k, row, stride, width);
-                }
+                arch.dispatch(Push { coarse, first: part * PART, rows: rows.part(part), stride, width });
             });
         }
     }
@@ -114,33 +114,64 @@ impl Pyramid {
     }
 
     /// The finest level: known is what nothing that hides touches, nor its neighbours.
-    fn lay_base(&mut self, unhidden: &Share, workers: &mut ThreadPool) {
+    fn lay_base(&mut self, unhidden: &Share, workers: &mut ThreadPool, arch: Arch) {
         let level = &mut self.levels[0];
-        let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
+        let (width, height, row_len) = (level.width, level.height, level.rows.row_len());
         let halves = &self.halves;
         let data = DisjointParts::new(&mut level.rows.data, PART * row_len, &mut self.taken);
-        workers.run(h.div_ceil(PART), &|part| {
-            for (k, planes) in data.part(part).chunks_exact_mut(row_len).enumerate() {
-                let (planes, known) = planes.split_at_mut((PLANES - 1) * stride);
-                let y = part * PART + k;
-                let nearest = |y: usize| &halves.row(y)[(PLANES - 1) * stride..][..w];
-                let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(nearest);
-                // What hides a pixel the most is what is nearest.
-                let column = |x: usize| rows[0][x].min(rows[1][x]).min(rows[2][x]);
-                let (mut left, mut here) = (f32::INFINITY, column(0));
-                for (x, known) in known[..w].iter_mut().enumerate() {
-                    let right = if x + 1 < w { column(x + 1) } else { f32::INFINITY };
-                    *known = unhidden.at(left.min(here).min(right));
-                    (left, here) = (here, right);
-                }
-                let own = halves.row(y).chunks_exact(stride);
-                for (plane, own) in planes.chunks_exact_mut(stride).zip(own) {
-                    let values = plane[..w].iter_mut().zip(own).zip(&*known);
-                    values.for_each(|((value, own), known)| *value = own * known);
-                }
-            }
+        workers.run(height.div_ceil(PART), &|part| {
+            arch.dispatch(Base { halves, size: (width, height), unhidden, first: part * PART, rows: data.part(part) });
         });
     }
+}
+
+/// Some rows of the finest level, from row `first` on.
+struct Base<'a> {
+    halves: &'a Rows<PLANES>,
+    size: (usize, usize),
+    unhidden: &'a Share,
+    first: usize,
+    rows: &'a mut [f32],
+}
+
+impl WithSimd for Base<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let ((width, height), stride) = (self.size, self.halves.stride);
+        for (y, planes) in (self.first..).zip(self.rows.chunks_exact_mut(self.halves.row_len())) {
+            let (planes, known) = planes.split_at_mut((PLANES - 1) * stride);
+            let (known, last) = (&mut known[..width], width - 1);
+            let nearest = |y: usize| &self.halves.row(y)[(PLANES - 1) * stride..][..width];
+            let (above, here, below) = (nearest(y.saturating_sub(1)), nearest(y), nearest((y + 1).min(height - 1)));
+            // What hides a pixel the most is what is nearest: of three rows, then of three columns.
+            let mut before = f32::INFINITY;
+            for x in 0..width {
+                known[x] = least(above[x], least(here[x], below[x]));
+            }
+            for x in 0..last {
+                let own = known[x];
+                known[x] = least(before, least(own, known[x + 1]));
+                before = own;
+            }
+            known[last] = least(before, known[last]);
+            for value in known.iter_mut() {
+                *value = self.unhidden.at(*value);
+            }
+            for p in 0..PLANES - 1 {
+                let (plane, own) = (&mut planes[p * stride..][..width], &self.halves.row(y)[p * stride..][..width]);
+                for x in 0..width {
+                    plane[x] = own[x] * known[x];
+                }
+            }
+        }
+    }
+}
+
+/// The lesser of two, in one instruction.
+#[inline(always)]
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 impl Halves<'_> {
@@ -191,18 +222,38 @@ impl Behind<'_> {
     #[inline(always)]
     pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
         let row = self.level.rows.row(y / 2);
-        let [red, green, blue, coc] = &mut surfaces.back.0;
-        for x in 0..W {
+        for start in (0..W).step_by(PIECE) {
+            let coc = &mut surfaces.back.0[3][start..start + PIECE];
             // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
-            let hidden = 1.0 - self.unhidden.at(coc[x]);
-            let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
-            let fill = |p: usize| row[p * self.level.rows.stride + half];
-            // Where something near touches every pixel nothing is known, and nothing lies behind.
-            if hidden > 0.0 && fill(PLANES - 1) > KNOWN {
-                let hidden = hidden * other_surface(coc[x], fill(3));
-                let mix = |own: f32, p: usize| own + (fill(p) - own) * hidden;
-                (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
-                coc[x] += (fill(3).max(self.nearest_px) - coc[x]) * hidden;
+            let mut hidden = [0.0; PIECE];
+            let mut any = false;
+            for x in 0..PIECE {
+                hidden[x] = 1.0 - self.unhidden.at(coc[x]);
+                any |= hidden[x] > 0.0;
+            }
+            if !any {
+                continue;
+            }
+            let mut fill = [[0.0; PIECE]; PLANES];
+            for x in 0..PIECE {
+                let half = (x0 + (start + x) as isize).clamp(0, width as isize - 1) as usize / 2;
+                for (p, fill) in fill.iter_mut().enumerate() {
+                    fill[x] = row[p * self.level.rows.stride + half];
+                }
+            }
+            for x in 0..PIECE {
+                // Where something near touches every pixel nothing is known, and nothing lies behind.
+                let known = if fill[PLANES - 1][x] > KNOWN { hidden[x] } else { 0.0 };
+                hidden[x] = known * other_surface(coc[x], fill[3][x]);
+            }
+            for x in 0..PIECE {
+                fill[3][x] = if fill[3][x] > self.nearest_px { fill[3][x] } else { self.nearest_px };
+            }
+            for p in 0..4 {
+                let plane = &mut surfaces.back.0[p][start..start + PIECE];
+                for x in 0..PIECE {
+                    plane[x] += (fill[p][x] - plane[x]) * hidden[x];
+                }
             }
         }
         if surfaces.mixed {
@@ -216,50 +267,94 @@ impl Behind<'_> {
     }
 }
 
-/// Reduces by two: the sum of four pixels weighed by how far each is known, made a mean where that is more than 1. Less
-/// than that adds up from level to level, so that the coarsest one knows something if any pixel does.
-fn pull(fine: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
-    let (above, below) = (fine.rows.row(2 * y), (2 * y + 1 < fine.height).then(|| fine.rows.row(2 * y + 1)));
-    for p in 0..PLANES {
-        let out = &mut out[p * stride..][..width];
-        let above = &above[p * fine.rows.stride..].as_chunks::<2>().0[..width];
-        out.iter_mut().zip(above).for_each(|(out, [a, b])| *out = a + b);
-        if let Some(below) = below {
-            let below = &below[p * fine.rows.stride..].as_chunks::<2>().0[..width];
-            out.iter_mut().zip(below).for_each(|(out, [a, b])| *out += a + b);
-        }
-    }
-    let (planes, known) = out.split_at_mut((PLANES - 1) * stride);
-    for plane in planes.chunks_exact_mut(stride) {
-        for (value, &known) in plane[..width].iter_mut().zip(&*known) {
-            *value /= if known > 1.0 { known } else { 1.0 };
-        }
-    }
-    known[..width].iter_mut().for_each(|known| *known = if *known > 1.0 { 1.0 } else { *known });
+/// Some rows of a level from the finer one, by half: the sum of four pixels weighed by how far each is known, made a mean
+/// where that is more than 1. Less than that adds up from level to level, so that the coarsest one knows something if any
+/// pixel does.
+struct Pull<'a> {
+    fine: &'a Level,
+    /// The first row, and the rows' planes.
+    first: usize,
+    rows: &'a mut [f32],
+    stride: usize,
+    width: usize,
 }
 
-/// Fills what the finer level does not know from the coarser one, bilinearly: 3/4 of the coarse pixel that covers this one
-/// and 1/4 of the neighbour nearest to it, each way.
-fn push(coarse: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
-    let side = |at: usize, limit: usize| {
-        let neighbour = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { at / 2 + 1 };
-        [at / 2, neighbour.min(limit - 1)]
-    };
-    let [here, there] = side(y, coarse.height).map(|row| coarse.rows.row(row));
-    for x in 0..width {
-        let known = out[(PLANES - 1) * stride + x];
-        if known >= 1.0 {
-            continue;
-        }
-        let [near, far] = side(x, coarse.width);
-        let at = |p: usize| {
-            let [near, far] =
-                [near, far].map(|x| 0.75 * here[p * coarse.rows.stride + x] + 0.25 * there[p * coarse.rows.stride + x]);
-            0.75 * near + 0.25 * far
-        };
-        let scale = (1.0 - known) / at(PLANES - 1).max(1e-6);
-        for p in 0..PLANES {
-            out[p * stride + x] += at(p) * scale;
+impl WithSimd for Pull<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { fine, width, stride, .. } = self;
+        for (y, out) in (self.first..).zip(self.rows.chunks_exact_mut(stride * PLANES)) {
+            let (above, below) = (fine.rows.row(2 * y), (2 * y + 1 < fine.height).then(|| fine.rows.row(2 * y + 1)));
+            for p in 0..PLANES {
+                let out = &mut out[p * stride..][..width];
+                let above = &above[p * fine.rows.stride..].as_chunks::<2>().0[..width];
+                for x in 0..width {
+                    out[x] = above[x][0] + above[x][1];
+                }
+                if let Some(below) = below {
+                    let below = &below[p * fine.rows.stride..].as_chunks::<2>().0[..width];
+                    for x in 0..width {
+                        out[x] += below[x][0] + below[x][1];
+                    }
+                }
+            }
+            let (planes, known) = out.split_at_mut((PLANES - 1) * stride);
+            let known = &mut known[..width];
+            for plane in planes.chunks_exact_mut(stride) {
+                let plane = &mut plane[..width];
+                for x in 0..width {
+                    plane[x] /= if known[x] > 1.0 { known[x] } else { 1.0 };
+                }
+            }
+            for known in known {
+                *known = least(*known, 1.0);
+            }
         }
     }
+}
+
+/// Some rows of a level: what it does not know, from the coarser one, bilinearly: 3/4 of the coarse pixel that covers this
+/// one and 1/4 of the neighbour nearest to it, each way.
+struct Push<'a> {
+    coarse: &'a Level,
+    first: usize,
+    rows: &'a mut [f32],
+    stride: usize,
+    width: usize,
+}
+
+impl WithSimd for Push<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { coarse, width, stride, .. } = self;
+        for (y, out) in (self.first..).zip(self.rows.chunks_exact_mut(stride * PLANES)) {
+            let [here, there] = beside(y, coarse.height).map(|row| coarse.rows.row(row));
+            for x in 0..width {
+                let known = out[(PLANES - 1) * stride + x];
+                if known >= 1.0 {
+                    continue;
+                }
+                let [near, far] = beside(x, coarse.width);
+                let mut values = [0.0; PLANES];
+                for (p, value) in values.iter_mut().enumerate() {
+                    let (here, there) = (&here[p * coarse.rows.stride..], &there[p * coarse.rows.stride..]);
+                    *value =
+                        0.75 * (0.75 * here[near] + 0.25 * there[near]) + 0.25 * (0.75 * here[far] + 0.25 * there[far]);
+                }
+                let scale = (1.0 - known) / values[PLANES - 1].max(1e-6);
+                for (p, value) in values.iter().enumerate() {
+                    out[p * stride + x] += value * scale;
+                }
+            }
+        }
+    }
+}
+
+/// The coarse pixel that covers pixel `at`, and the neighbour nearest to it, of `limit`.
+#[inline(always)]
+fn beside(at: usize, limit: usize) -> [usize; 2] {
+    let neighbour = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { at / 2 + 1 };
+    [at / 2, neighbour.min(limit - 1)]
 }
