@@ -3,12 +3,14 @@
 mod band;
 mod bin;
 mod blur;
+mod cell_sums;
 mod composite;
 mod encode;
 mod fill;
 mod filter;
 mod frames;
 mod gather;
+mod levels;
 mod pixels;
 mod probe;
 mod reach;
