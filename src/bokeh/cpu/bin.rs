@@ -6,7 +6,7 @@ use pulp::Simd;
 
 use super::cell_sums::{CellSums, accumulate_columns, clear_cells};
 use super::rows::{CELL_PLANES, EMPTY_CELL, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, reduce, sum_row};
+use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, is_nothing, reduce, sum_row};
 use super::tiles::BLOCK;
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
@@ -214,16 +214,17 @@ impl BinRows<'_> {
     ) {
         let share = ShareAt::new(simd, &self.share);
         for x in (0..columns.min(self.across * STRIP - block * BLOCK)).step_by(V::F32_LANES) {
-            let values = share.of(simd, surfaces, MARGIN + x);
+            let taken = share.taken(simd, surfaces, MARGIN + x);
             let out = self.strip_row(block * BLOCK + x, row);
-            let Some(values) = values else {
+            if is_nothing(simd, taken) {
                 if sums.stale {
                     for p in 0..4 {
                         store::<V>(out, p * STRIP + x % STRIP, simd.splat_f32s(0.0));
                     }
                 }
                 continue;
-            };
+            }
+            let values = share.of(simd, taken, surfaces, MARGIN + x);
             for p in 0..4 {
                 store::<V>(out, p * STRIP + x % STRIP, values[p]);
             }

@@ -37,7 +37,8 @@ pub fn sum_row<S: Simd>(
     let weights = [simd.splat_f32s(weights[0]), simd.splat_f32s(weights[1])];
     let [above, below] = rows;
     for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
-        let Some(values) = share.of(simd, surfaces, x) else {
+        let taken = share.taken(simd, surfaces, x);
+        if is_nothing(simd, taken) {
             for p in 0..SUMS {
                 if fresh[0] {
                     store::<S>(&mut above[p], x, zero);
@@ -47,7 +48,8 @@ pub fn sum_row<S: Simd>(
                 }
             }
             continue;
-        };
+        }
+        let values = share.of(simd, taken, surfaces, x);
         for p in 0..SUMS {
             let falling = if fresh[0] { zero } else { load::<S>(&above[p], x) };
             let rising = if fresh[1] { zero } else { load::<S>(&below[p], x) };
@@ -70,19 +72,23 @@ impl<S: Simd> ShareAt<S> {
         Self { steps: share.as_ref().map(|share| [step(share.front), step(share.behind)]) }
     }
 
-    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels, whatever surfaces they show; `None`
-    /// where the bin takes nothing of any.
+    /// What the bin takes of a vector of pixels: of their only surface or the farther one, and of the nearer one where some
+    /// have two.
     #[inline(always)]
-    pub fn of(&self, simd: S, surfaces: &Surfaces<WIDE>, x: usize) -> Option<[S::f32s; SUMS]> {
-        let taken = self.at(simd, &surfaces.back, x);
-        let taken_in_front = if surfaces.mixed { self.at(simd, &surfaces.front, x) } else { taken };
-        if !any_above_zero(simd, simd.max_f32s(taken, taken_in_front)) {
-            return None;
-        }
+    pub fn taken(&self, simd: S, surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; 2] {
+        let back = self.at(simd, &surfaces.back, x);
+        [back, if surfaces.mixed { self.at(simd, &surfaces.front, x) } else { back }]
+    }
+
+    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels, of which so much is `taken`, whatever
+    /// surfaces they show.
+    #[inline(always)]
+    pub fn of(&self, simd: S, taken: [S::f32s; 2], surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; SUMS] {
+        let back = times(simd, taken[0], &surfaces.back, x);
         if !surfaces.mixed {
-            return Some(times(simd, taken, &surfaces.back, x));
+            return back;
         }
-        let (back, front) = (times(simd, taken, &surfaces.back, x), times(simd, taken_in_front, &surfaces.front, x));
+        let front = times(simd, taken[1], &surfaces.front, x);
         let (share, behind) = (load::<S>(&surfaces.share.0, x), load::<S>(&surfaces.behind.0, x));
         // What is known of the farther surface without being seen, and the bins that take none of the nearer one.
         let one = simd.splat_f32s(1.0);
@@ -93,7 +99,7 @@ impl<S: Simd> ShareAt<S> {
         for p in 0..SUMS {
             both[p] = fma(simd, share, front[p], simd.mul_f32s(behind, back[p]));
         }
-        Some(both)
+        both
     }
 
     /// The share of a vector of pixels of one surface.
@@ -108,9 +114,11 @@ impl<S: Simd> ShareAt<S> {
     }
 }
 
+/// Whether nothing is `taken` of any pixel of a vector.
 #[inline(always)]
-fn any_above_zero<S: Simd>(simd: S, values: S::f32s) -> bool {
-    simd.first_true_m32s(simd.greater_than_f32s(values, simd.splat_f32s(0.0))) < S::F32_LANES
+pub fn is_nothing<S: Simd>(simd: S, taken: [S::f32s; 2]) -> bool {
+    let any = simd.greater_than_f32s(simd.max_f32s(taken[0], taken[1]), simd.splat_f32s(0.0));
+    simd.first_true_m32s(any) == S::F32_LANES
 }
 
 /// A share of a vector of pixels of one surface, as [`ShareAt::of`] has it.
