@@ -4,8 +4,9 @@
 
 use pulp::Simd;
 
-use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR, STRIP, STRIP_CELLS, STRIP_ROW};
-use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, reduce, sum_row};
+use super::cell_sums::{CellSums, accumulate_columns, clear_cells};
+use super::rows::{CELL_PLANES, EMPTY_CELL, STRIP, STRIP_CELLS, STRIP_ROW};
+use super::tent::{MARGIN, Means, PLANE, SUMS, ShareAt, WIDE, is_nothing, reduce, sum_row};
 use super::tiles::BLOCK;
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
@@ -37,17 +38,20 @@ pub struct BinRows<'a> {
 #[derive(Clone)]
 pub struct BinSums {
     rows: Line<[[[f32; WIDE]; SUMS]; 2]>,
+    /// Which of the two rows are begun.
+    touched: [bool; 2],
+    /// Whether the frame before left anything in the bin where the row of cells is.
+    stale: bool,
     cells: CellSums,
     means: Means,
 }
-
-/// The rows of a row of cells so far, column by column.
-type CellSums = Line<[[f32; PLANE]; CELL_PLANES]>;
 
 impl BinSums {
     pub fn new() -> Self {
         let mut empty = Self {
             rows: Line([[[0.0; WIDE]; SUMS]; 2]),
+            touched: [false; 2],
+            stale: false,
             cells: Line([[0.0; PLANE]; CELL_PLANES]),
             means: Line([[0.0; PLANE]; SUMS]),
         };
@@ -60,34 +64,6 @@ impl BinSums {
 #[inline(always)]
 fn strip_row(across: usize, x: usize, row: usize) -> usize {
     (row / CELL * across + x / STRIP) * STRIP_CELLS + row % CELL * STRIP_ROW
-}
-
-#[inline(always)]
-fn clear_cells(cells: &mut CellSums) {
-    for (plane, &value) in cells.0.iter_mut().zip(&EMPTY_CELL) {
-        plane.fill(value);
-    }
-}
-
-/// Adds a vector of bin pixels to the sums of a row of cells, column by column: coverage and coverage times |CoC|, and with
-/// `own` the lowest and highest colour.
-#[inline(always)]
-fn accumulate_columns<V: Simd>(simd: V, cells: &mut CellSums, x: usize, sums: [V::f32s; 2], own: Option<[V::f32s; 3]>) {
-    for p in 0..2 {
-        let sum = simd.add_f32s(load::<V>(&cells.0[p], x), sums[p]);
-        store::<V>(&mut cells.0[p], x, sum);
-    }
-    let Some(own) = own else { return };
-    let cells = &mut cells.0;
-    // Without coverage there is no colour: an addition puts it out of range.
-    let counts = simd.greater_than_f32s(sums[0], simd.splat_f32s(COVERAGE_FLOOR));
-    let beyond = simd.select_f32s(counts, simd.splat_f32s(0.0), simd.splat_f32s(NO_COLOR));
-    for p in 0..3 {
-        let low = simd.min_f32s(load::<V>(&cells[2 + p], x), simd.add_f32s(own[p], beyond));
-        let high = simd.max_f32s(load::<V>(&cells[5 + p], x), simd.sub_f32s(own[p], beyond));
-        store::<V>(&mut cells[2 + p], x, low);
-        store::<V>(&mut cells[5 + p], x, high);
-    }
 }
 
 impl BinRows<'_> {
@@ -152,7 +128,13 @@ impl BinRows<'_> {
         let meets = self.share.is_none_or(|share| share.meets(range));
         if S == 1 {
             if (0..rows).contains(&(y - first)) {
-                self.whole_row(simd, (block, columns), (y - first) as usize, sums, meets.then_some(surfaces));
+                let row = (block, columns, (y - first) as usize);
+                self.open_cells(row, sums);
+                match meets {
+                    true => self.whole_row(simd, row, sums, surfaces),
+                    false => self.empty_row::<S>(row, sums),
+                }
+                self.close_cells::<S>(row, sums);
             }
             return;
         }
@@ -164,9 +146,12 @@ impl BinRows<'_> {
         if from < 0 || upper >= rows {
             return;
         }
+        let parity = upper.rem_euclid(2) as usize;
         let [even, odd] = &mut sums.rows.0;
-        let (above, below) = if upper.rem_euclid(2) == 0 { (even, odd) } else { (odd, even) };
+        let (above, below) = if parity == 0 { (even, odd) } else { (odd, even) };
         if meets {
+            let fresh = [!sums.touched[parity], !sums.touched[1 - parity]];
+            sums.touched = [true; 2];
             let rise = (k as f32 + 0.5) / (S * S) as f32;
             sum_row(
                 simd,
@@ -174,73 +159,108 @@ impl BinRows<'_> {
                 surfaces,
                 columns,
                 [1.0 / S as f32 - rise, rise],
-                above,
-                below,
+                [above, below],
+                fresh,
             );
         }
         if k == s - 1 {
-            if upper >= 0 {
-                reduce::<V, S>(simd, above, columns, &mut sums.means);
-            }
-            above.as_flattened_mut().fill(0.0);
+            let touched = std::mem::take(&mut sums.touched[parity]);
             if upper == rows - 1 {
-                below.as_flattened_mut().fill(0.0);
+                sums.touched[1 - parity] = false;
             }
             if upper >= 0 {
-                self.finish_row::<V, S>(simd, (block, columns), upper as usize, sums);
+                let row = (block, columns, upper as usize);
+                if touched {
+                    reduce::<V, S>(simd, above, columns, &mut sums.means);
+                }
+                self.open_cells(row, sums);
+                match touched {
+                    true => self.finish_row::<V, S>(simd, row, sums),
+                    false => self.empty_row::<S>(row, sums),
+                }
+                self.close_cells::<S>(row, sums);
             }
         }
     }
 
-    /// A row of a bin at full scale, straight from the picture; none holds nothing.
+    /// Begins a row of cells with its first row.
+    #[inline(always)]
+    fn open_cells(&mut self, (block, _, row): (usize, usize, usize), sums: &mut BinSums) {
+        if row.is_multiple_of(CELL) {
+            let blocks = self.blocks();
+            sums.stale = std::mem::take(&mut self.filled[row / CELL * blocks + block]);
+        }
+    }
+
+    /// A row that the bin takes nothing of.
+    #[inline(always)]
+    fn empty_row<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &BinSums) {
+        let x0 = block * BLOCK / S;
+        if sums.stale {
+            for x in (0..(columns / S).min(self.across * STRIP - x0)).step_by(STRIP) {
+                self.strip_row(x0 + x, row).fill(0.0);
+            }
+        }
+    }
+
+    /// A row of a bin at full scale, straight from the picture.
     #[inline(always)]
     fn whole_row<V: Simd>(
         &mut self,
         simd: V,
-        (block, columns): (usize, usize),
-        row: usize,
+        (block, columns, row): (usize, usize, usize),
         sums: &mut BinSums,
-        surfaces: Option<&Surfaces<WIDE>>,
+        surfaces: &Surfaces<WIDE>,
     ) {
-        let columns = columns.min(self.across * STRIP - block * BLOCK);
-        match surfaces {
-            None => (0..columns).step_by(STRIP).for_each(|x| self.strip_row(block * BLOCK + x, row).fill(0.0)),
-            Some(surfaces) => {
-                let share = ShareAt::new(simd, &self.share);
-                for x in (0..columns).step_by(V::F32_LANES) {
-                    let values = share.of(simd, surfaces, MARGIN + x);
-                    let out = self.strip_row(block * BLOCK + x, row);
+        let share = ShareAt::new(simd, &self.share);
+        for x in (0..columns.min(self.across * STRIP - block * BLOCK)).step_by(V::F32_LANES) {
+            let taken = share.taken(simd, surfaces, MARGIN + x);
+            let out = self.strip_row(block * BLOCK + x, row);
+            if is_nothing(simd, taken) {
+                if sums.stale {
                     for p in 0..4 {
-                        store::<V>(out, p * STRIP + x % STRIP, values[p]);
+                        store::<V>(out, p * STRIP + x % STRIP, simd.splat_f32s(0.0));
                     }
-                    // At full scale a pixel is its own mean: its colour counts whatever its share. Of two surfaces that is
-                    // the colour of what the bin takes of both.
-                    let own = self.ranged.then(|| {
-                        let inverse = surfaces.mixed.then(|| {
-                            let floor = simd.splat_f32s(COVERAGE_FLOOR);
-                            simd.div_f32s(simd.splat_f32s(1.0), simd.max_f32s(values[3], floor))
-                        });
-                        let of_plane = |p: usize| match inverse {
-                            Some(inverse) => simd.mul_f32s(values[p], inverse),
-                            None => load::<V>(&surfaces.back.0[p], MARGIN + x),
-                        };
-                        [of_plane(0), of_plane(1), of_plane(2)]
-                    });
-                    accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
                 }
-                let blocks = self.blocks();
-                self.filled[row / CELL * blocks + block] = true;
+                continue;
             }
+            let values = share.of(simd, taken, surfaces, MARGIN + x);
+            for p in 0..4 {
+                store::<V>(out, p * STRIP + x % STRIP, values[p]);
+            }
+            // At full scale a pixel is its own mean: its colour counts whatever its share. Of two surfaces that is the
+            // colour of what the bin takes of both.
+            let mut own = None;
+            if self.ranged {
+                let mut colors = [values[0], values[1], values[2]];
+                if surfaces.mixed {
+                    let floor = simd.splat_f32s(COVERAGE_FLOOR);
+                    let inverse = simd.div_f32s(simd.splat_f32s(1.0), simd.max_f32s(values[3], floor));
+                    for p in 0..3 {
+                        colors[p] = simd.mul_f32s(values[p], inverse);
+                    }
+                } else {
+                    for p in 0..3 {
+                        colors[p] = load::<V>(&surfaces.back.0[p], MARGIN + x);
+                    }
+                }
+                own = Some(colors);
+            }
+            accumulate_columns(simd, &mut sums.cells, x, [values[3], values[4]], own);
         }
-        self.close_cells::<1>((block, columns), row, sums);
+        let blocks = self.blocks();
+        self.filled[row / CELL * blocks + block] = true;
     }
 
     /// Stores the row of cells when its last row is done.
     #[inline(always)]
-    fn close_cells<const S: usize>(&mut self, block: (usize, usize), row: usize, sums: &mut BinSums) {
+    fn close_cells<const S: usize>(&mut self, (block, columns, row): (usize, usize, usize), sums: &mut BinSums) {
         if row % CELL == CELL - 1 || row == self.rows - 1 {
-            self.finish_cells::<S>(block, row / CELL, &sums.cells);
-            clear_cells(&mut sums.cells);
+            let filled = self.filled[row / CELL * self.blocks() + block];
+            self.finish_cells::<S>((block, columns), row / CELL, filled.then_some(&sums.cells));
+            if filled {
+                clear_cells(&mut sums.cells);
+            }
         }
     }
 
@@ -249,8 +269,7 @@ impl BinRows<'_> {
     fn finish_row<V: Simd, const S: usize>(
         &mut self,
         simd: V,
-        (block, columns): (usize, usize),
-        row: usize,
+        (block, columns, row): (usize, usize, usize),
         sums: &mut BinSums,
     ) {
         let (x0, width) = (block * BLOCK / S, columns / S);
@@ -263,7 +282,7 @@ impl BinRows<'_> {
         }
         let blocks = self.blocks();
         self.filled[row / CELL * blocks + block] = true;
-        let [floor, one] = [COVERAGE_FLOOR, 1.0].map(|value| simd.splat_f32s(value));
+        let (floor, one) = (simd.splat_f32s(COVERAGE_FLOOR), simd.splat_f32s(1.0));
         for x in (0..width).step_by(V::F32_LANES) {
             let coverage = load::<V>(&means[3], x);
             let mut own = None;
@@ -278,23 +297,30 @@ impl BinRows<'_> {
             }
             accumulate_columns(simd, &mut sums.cells, x, [coverage, load::<V>(&means[4], x)], own);
         }
-        self.close_cells::<S>((block, columns), row, sums);
     }
 
     #[inline(always)]
-    fn finish_cells<const S: usize>(&mut self, (block, columns): (usize, usize), row: usize, cells: &CellSums) {
+    fn finish_cells<const S: usize>(&mut self, (block, columns): (usize, usize), row: usize, cells: Option<&CellSums>) {
         let across = self.cells.len() / (CELL_PLANES * self.rows_of_cells());
         let (x0, width) = (block * BLOCK / S, columns / S);
         let valid = width.min(self.size.0.saturating_sub(x0));
-        for (p, values) in cells.0.iter().enumerate().take(if self.ranged { CELL_PLANES } else { 2 }) {
+        for p in 0..if self.ranged { CELL_PLANES } else { 2 } {
             let out = &mut self.cells[(row * CELL_PLANES + p) * across + x0 / CELL..];
+            let Some(cells) = cells else {
+                out[..valid.div_ceil(CELL)].fill(EMPTY_CELL[p]);
+                continue;
+            };
+            let values = &cells.0[p];
             for (out, values) in out.iter_mut().zip(values[..valid].chunks(CELL)) {
-                let values = values.iter().copied();
-                *out = match p {
-                    0 | 1 => values.sum(),
-                    2..5 => values.fold(NO_COLOR, f32::min),
-                    _ => values.fold(-NO_COLOR, f32::max),
-                };
+                let mut total = EMPTY_CELL[p];
+                for &value in values {
+                    total = match p {
+                        0 | 1 => total + value,
+                        2..5 => total.min(value),
+                        _ => total.max(value),
+                    };
+                }
+                *out = total;
             }
         }
     }

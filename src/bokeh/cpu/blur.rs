@@ -55,8 +55,8 @@ fn ring_rows(reach: usize) -> usize {
 pub struct Scratch {
     /// `[row % ring][term][4][STRIP]`.
     rows: Aligned,
-    /// A row of a strip and what the filters reach on both sides: `[4][STRIP + 2 pad]`.
-    line: Aligned,
+    /// Rows of a strip and what the filters reach on both sides: `[BLOCK_ROWS][4][STRIP + 2 pad]`.
+    lines: Aligned,
     /// Rows of cells whose rows are filtered.
     filtered: Vec<bool>,
 }
@@ -67,7 +67,7 @@ impl Scratch {
         let reach = plan.ladder.most_reach();
         Self {
             rows: Aligned::zeros(ring_rows(reach) * GROUP.min(plan.ladder.most_terms()) * STRIP_ROW),
-            line: Aligned::zeros(4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
+            lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
     }
@@ -136,66 +136,77 @@ impl Strip<'_> {
     #[inline(always)]
     fn filter_group<S: Simd, const R: usize, const EVEN: bool, const P: usize>(&mut self, simd: S, first: usize) {
         let mut scratch = std::mem::take(&mut self.scratch.rows);
-        let (row_len, ring) = (R * STRIP_ROW, ring_rows(self.reach));
+        let rows = &mut scratch[..ring_rows(self.reach) * R * STRIP_ROW];
         let mut next_y = 0;
         for y in (0..self.size.1).step_by(BLOCK_ROWS) {
             if !self.active[y / CELL] {
                 continue;
             }
             // A ring of rows, no more than the columns reach, stays in the nearest caches.
-            for source_y in next_y.max(y.saturating_sub(self.reach))..(y + self.reach + BLOCK_ROWS).min(self.size.1) {
-                let row = &mut scratch[source_y % ring * row_len..][..row_len];
-                if self.scratch.filtered[source_y / CELL] {
-                    self.filter_row::<S, R, EVEN, P>(simd, first, source_y, row);
-                } else {
-                    row.fill(0.0);
-                }
-                next_y = source_y + 1;
+            let end_y = (y + self.reach + BLOCK_ROWS).min(self.size.1);
+            next_y = next_y.max(y.saturating_sub(self.reach));
+            while next_y < end_y {
+                let source_ys = next_y..(next_y + BLOCK_ROWS).min(end_y);
+                self.filter_rows::<S, R, EVEN, P>(simd, first, source_ys, rows);
+                next_y = (next_y + BLOCK_ROWS).min(end_y);
             }
-            let rows = y..(y + BLOCK_ROWS).min(self.size.1);
-            self.filter_columns::<S, R, EVEN, P>(simd, first, rows, &scratch[..ring * row_len]);
+            let ys = y..(y + BLOCK_ROWS).min(self.size.1);
+            self.filter_columns::<S, R, EVEN, P>(simd, first, ys, rows);
         }
         self.scratch.rows = scratch;
     }
 
-    /// The horizontal pass over row `y`: `R` terms from `first` on, all planes of each in turn in `out`.
+    /// The horizontal pass over the rows `ys`, `BLOCK_ROWS` at most: `R` terms from `first` on, all planes of each in turn in
+    /// the ring `rows`.
     #[inline(always)]
-    fn filter_row<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
+    fn filter_rows<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
         &mut self,
         simd: S,
         first: usize,
-        y: usize,
-        out: &mut [f32],
+        ys: Range<usize>,
+        rows: &mut [f32],
     ) {
-        let mut line = std::mem::take(&mut self.scratch.line);
+        let row_len = R * STRIP_ROW;
+        let ring_mask = rows.len() / row_len - 1;
+        let mut lines = std::mem::take(&mut self.scratch.lines);
         // The source's rows are copied `PIECE` columns at a time.
         let pad = self.reach.next_multiple_of(PIECE);
         let span = STRIP + 2 * pad;
-        self.source.copy_line(self.strip, y, self.size.0, pad, &mut line);
-        let plane = |p: usize| &line[p * span..][..span];
-        let planes = [plane(0), plane(1), plane(2), plane(3)];
-        let edges = self.edges.at(self.strip, y);
-        let mut x = 0;
-        while x < STRIP {
-            let taps = self.taps::<R>(&self.bank.horizontal, first, &edges, x);
-            // The radius is linear between two edges, and the same at both nearly everywhere: then a tap is one number
-            // for the whole vector and not a vector of its own.
-            let sums = if taps.steady {
-                along_row::<S, R, EVEN, false, P>(simd, &taps, &planes, x + pad)
-            } else {
-                along_row::<S, R, EVEN, true, P>(simd, &taps, &planes, x + pad)
-            };
-            for r in 0..R {
-                for p in 0..P {
-                    store::<S>(out, (r * 4 + p) * STRIP + x, sums[r][p]);
+        // All copies come first, as a line is read across the vectors it was written in: at once, that has to wait.
+        for (k, y) in ys.clone().enumerate() {
+            if self.scratch.filtered[y / CELL] {
+                self.source.copy_line(self.strip, y, self.size.0, pad, &mut lines[k * 4 * span..][..4 * span]);
+            }
+        }
+        for (k, y) in ys.enumerate() {
+            let out = &mut rows[(y & ring_mask) * row_len..][..row_len];
+            if !self.scratch.filtered[y / CELL] {
+                out.fill(0.0);
+                continue;
+            }
+            let plane = |p: usize| &lines[(k * 4 + p) * span..][..span];
+            let planes = [plane(0), plane(1), plane(2), plane(3)];
+            let edges = self.edges.at(self.strip, y);
+            for x in (0..STRIP).step_by(S::F32_LANES) {
+                let taps = self.taps::<R>(&self.bank.horizontal, first, &edges, x);
+                // The radius is linear between two edges, and the same at both nearly everywhere: then a tap is one number
+                // for the whole vector and not a vector of its own.
+                let sums = if taps.steady {
+                    along_row::<S, R, EVEN, false, P>(simd, &taps, &planes, x + pad)
+                } else {
+                    along_row::<S, R, EVEN, true, P>(simd, &taps, &planes, x + pad)
+                };
+                for r in 0..R {
+                    for p in 0..P {
+                        store::<S>(out, (r * 4 + p) * STRIP + x, sums[r][p]);
+                    }
                 }
             }
-            x += S::F32_LANES;
         }
-        self.scratch.line = line;
+        self.scratch.lines = lines;
     }
 
-    /// The vertical pass for the rows `ys` of the result, from the ring of filtered `rows`.
+    /// The vertical pass for the rows `ys` of the result, `BLOCK_ROWS` at most, from the ring of filtered `rows`.
     #[inline(always)]
     fn filter_columns<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
         &mut self,
@@ -204,34 +215,36 @@ impl Strip<'_> {
         ys: Range<usize>,
         rows: &[f32],
     ) {
+        let table = &self.bank.vertical;
+        let mut edges = [[[0.0; EDGE_VALUES]; STRIP_EDGES]; BLOCK_ROWS];
+        for (edges, y) in edges.iter_mut().zip(ys.clone()) {
+            *edges = self.edges.at(self.strip, y);
+        }
         for x in (0..STRIP).step_by(S::F32_LANES) {
-            let (table, edges, strip) = (&self.bank.vertical, self.edges, self.strip);
             // With one radius for the whole picture, the rows of a block have the same taps and share what they read.
             if P == 3 && ys.len() == BLOCK_ROWS {
-                let shared = self.taps::<R>(table, first, &edges.at(strip, ys.start), x);
+                let shared = self.taps::<R>(table, first, &edges[0], x);
                 let mut same = true;
-                for y in ys.clone() {
-                    let taps = self.taps::<R>(table, first, &edges.at(strip, y), x);
+                for edges in &edges {
+                    let taps = self.taps::<R>(table, first, edges, x);
                     same &= taps.steady && taps.left == shared.left;
                 }
                 if same {
                     let sums = along_column_block::<S, R, P>(simd, &shared, rows, ys.start, x, self.size.1);
                     for k in 0..BLOCK_ROWS {
-                        let y = ys.start + k;
-                        self.add_to_result::<S, R, P>(simd, first, (x, y), sums[k], &edges.at(strip, y));
+                        self.add_to_result::<S, R, P>(simd, first, (x, ys.start + k), sums[k], &edges[k]);
                     }
                     continue;
                 }
             }
-            for y in ys.clone() {
-                let edges = edges.at(strip, y);
-                let taps = self.taps::<R>(table, first, &edges, x);
+            for (edges, y) in edges.iter().zip(ys.clone()) {
+                let taps = self.taps::<R>(table, first, edges, x);
                 let sums = if taps.steady {
                     along_column::<S, R, EVEN, false, P>(simd, &taps, rows, y, x, self.size.1)
                 } else {
                     along_column::<S, R, EVEN, true, P>(simd, &taps, rows, y, x, self.size.1)
                 };
-                self.add_to_result::<S, R, P>(simd, first, (x, y), sums, &edges);
+                self.add_to_result::<S, R, P>(simd, first, (x, y), sums, edges);
             }
         }
     }

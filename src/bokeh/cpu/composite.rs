@@ -10,7 +10,7 @@ use pulp::{Simd, WithSimd};
 
 use super::encode::{CHUNK, EncodeTable};
 use super::pixels::Sample;
-use super::rows::{STRIP, Slot};
+use super::rows::{PIECE, STRIP, Slot};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress};
 use crate::bokeh::ladder::Compositing;
@@ -51,14 +51,21 @@ struct Pile<S: Simd> {
 impl<S: Simd> Pile<S> {
     #[inline(always)]
     fn new(simd: S) -> Self {
-        let [zero, one] = [0.0, 1.0].map(|value| simd.splat_f32s(value));
+        let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
         Self { color: [zero; 3], open: one, hindmost: [zero; 3], known: zero }
     }
 
-    /// Adds a bin behind all others, as premultiplied colour and coverage.
+    /// Adds a vector of a bin behind all others, premultiplied colour and coverage.
     #[inline(always)]
-    fn add(&mut self, simd: S, layer: [S::f32s; 4]) {
-        let one = simd.splat_f32s(1.0);
+    fn add(&mut self, simd: S, planes: &[[f32; CHUNK]; 4], x: usize) {
+        let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+        let mut layer = [zero; 4];
+        for p in 0..4 {
+            layer[p] = load::<S>(&planes[p], x);
+        }
+        if simd.first_true_m32s(simd.greater_than_f32s(layer[3], zero)) == S::F32_LANES {
+            return;
+        }
         let covered = simd.min_f32s(layer[3], self.open);
         let inverse = simd.div_f32s(one, simd.max_f32s(layer[3], simd.splat_f32s(1e-6)));
         let weight = simd.min_f32s(simd.mul_f32s(layer[3], simd.splat_f32s(1.0 / HINDMOST_COVERAGE)), one);
@@ -75,7 +82,11 @@ impl<S: Simd> Pile<S> {
     #[inline(always)]
     fn with_rest_filled(&self, simd: S) -> [S::f32s; 3] {
         let scale = simd.div_f32s(self.open, simd.max_f32s(self.known, simd.splat_f32s(1e-6)));
-        std::array::from_fn(|p| fma(simd, self.hindmost[p], scale, self.color[p]))
+        let mut color = self.color;
+        for p in 0..3 {
+            color[p] = fma(simd, self.hindmost[p], scale, color[p]);
+        }
+        color
     }
 }
 
@@ -93,13 +104,16 @@ impl Layers {
         let (near, rest) = self.planes.0[..self.count].split_at(self.near);
         let zero = simd.splat_f32s(0.0);
         for x in (0..CHUNK).step_by(S::F32_LANES) {
-            let layer = |planes: &[[f32; CHUNK]; 4]| planes.each_ref().map(|plane| load::<S>(plane, x));
             let mut back = Pile::new(simd);
-            rest.iter().for_each(|planes| back.add(simd, layer(planes)));
+            for planes in rest {
+                back.add(simd, planes, x);
+            }
             let mut light = back.with_rest_filled(simd);
             if !near.is_empty() {
                 let mut front = Pile::new(simd);
-                near.iter().for_each(|planes| front.add(simd, layer(planes)));
+                for planes in near {
+                    front.add(simd, planes, x);
+                }
                 // Where nothing lies behind, the near bins have to fill the pixel.
                 let has_back = simd.greater_than_f32s(back.known, simd.splat_f32s(1e-4));
                 let alone = front.with_rest_filled(simd);
@@ -138,13 +152,13 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
                 let row = &mut row[x0 * 3..][..take * 3];
                 match self.plan.compositing {
                     Compositing::Layers => {
-                        if !self.read_layers::<S>(y, x0, still, &mut layers) {
+                        if !self.read_layers(simd, y, x0, still, &mut layers) {
                             row.copy_from_slice(&self.pixels[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
                         layers.flatten(simd, &mut color);
                     }
-                    Compositing::Select => self.select::<S>(y, x0, take, &mut layers.planes.0[0], &mut color.0),
+                    Compositing::Select => self.select(simd, y, x0, take, &mut layers.planes.0[0], &mut color.0),
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
                 }
                 compress_highlights(&mut color.0, self.frame.expansion);
@@ -157,13 +171,13 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
 impl<T> Composite<'_, T> {
     /// Reads the bins that hold anything in a chunk; false where it is `still` and nothing near reaches it: it stays.
     #[inline(always)]
-    fn read_layers<S: Simd>(&self, y: usize, x0: usize, still: bool, layers: &mut Layers) -> bool {
+    fn read_layers<S: Simd>(&self, simd: S, y: usize, x0: usize, still: bool, layers: &mut Layers) -> bool {
         (layers.near, layers.count) = (0, 0);
         for bin in &self.plan.bins {
             if still && !bin.near && layers.count == 0 {
                 return false;
             }
-            if sample::<S>(bin, &self.slots[bin.slot], y, x0, &mut layers.planes.0[layers.count]) {
+            if sample(simd, bin, &self.slots[bin.slot], y, x0, &mut layers.planes.0[layers.count]) {
                 layers.count += 1;
                 layers.near += usize::from(bin.near);
             }
@@ -175,6 +189,7 @@ impl<T> Composite<'_, T> {
     #[inline(always)]
     fn select<S: Simd>(
         &self,
+        simd: S,
         y: usize,
         x0: usize,
         take: usize,
@@ -185,7 +200,7 @@ impl<T> Composite<'_, T> {
         coc_row(self.frame, y, x0, &mut coc[..take]);
         *color = [[0.0; CHUNK]; 3];
         for (k, bin) in self.plan.bins.iter().enumerate() {
-            if !sample::<S>(bin, &self.slots[bin.slot], y, x0, layer) {
+            if !sample(simd, bin, &self.slots[bin.slot], y, x0, layer) {
                 continue;
             }
             let share = self.plan.share(k);
@@ -210,7 +225,7 @@ fn copy_gathered(rows: &[f32], width: usize, y: usize, x0: usize, color: &mut [[
 
 /// Reads a chunk of a bin at the picture's scale (linear interpolation); false when there is nothing in it.
 #[inline(always)]
-fn sample<S: Simd>(bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32; CHUNK]; 4]) -> bool {
+fn sample<S: Simd>(simd: S, bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32; CHUNK]; 4]) -> bool {
     if !slot.present {
         return false;
     }
@@ -227,10 +242,10 @@ fn sample<S: Simd>(bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32;
         return false;
     }
     match bin.scale {
-        1 => upsample::<S, 1>(slot, bin.height, (above, below, share), x0, out),
-        2 => upsample::<S, 2>(slot, bin.height, (above, below, share), x0, out),
-        4 => upsample::<S, 4>(slot, bin.height, (above, below, share), x0, out),
-        _ => upsample::<S, 8>(slot, bin.height, (above, below, share), x0, out),
+        1 => upsample::<S, 1>(simd, slot, bin.height, (above, below, share), x0, out),
+        2 => upsample::<S, 2>(simd, slot, bin.height, (above, below, share), x0, out),
+        4 => upsample::<S, 4>(simd, slot, bin.height, (above, below, share), x0, out),
+        _ => upsample::<S, 8>(simd, slot, bin.height, (above, below, share), x0, out),
     }
     true
 }
@@ -238,6 +253,7 @@ fn sample<S: Simd>(bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &mut [[f32;
 /// A chunk of a bin of scale `S`, linear between rows `above` and `below` (by `share`) and between columns.
 #[inline(always)]
 fn upsample<V: Simd, const S: usize>(
+    simd: V,
     slot: &Slot,
     height: usize,
     (above, below, share): (usize, usize, f32),
@@ -245,35 +261,47 @@ fn upsample<V: Simd, const S: usize>(
     out: &mut [[f32; CHUNK]; 4],
 ) {
     let width = slot.source.across * STRIP;
-    let strip_row = |strip: usize, y: usize, p: usize| &slot.out[((strip * height + y) * 4 + p) * STRIP..][..STRIP];
-    let mix = |a: f32, b: f32| madd::<V>(b - a, share, a);
-    for (p, out) in out.iter_mut().enumerate() {
-        let value =
-            |x: usize| mix(strip_row(x / STRIP, above, p)[x % STRIP], strip_row(x / STRIP, below, p)[x % STRIP]);
-        let first = x0 / S;
-        // One column more on both sides than the chunk covers.
-        let mut line = [0.0; CHUNK + 2];
-        let mut x = first;
-        while x < (first + CHUNK / S).min(width) {
-            let count = (STRIP - x % STRIP).min(first + CHUNK / S - x);
-            let (a, b) = (strip_row(x / STRIP, above, p), strip_row(x / STRIP, below, p));
-            let (a, b) = (&a[x % STRIP..][..count], &b[x % STRIP..][..count]);
-            for ((out, &a), &b) in line[1 + x - first..][..count].iter_mut().zip(a).zip(b) {
-                *out = mix(a, b);
+    let share = simd.splat_f32s(share);
+    let (first, end) = (x0 / S, ((x0 + CHUNK) / S).min(width));
+    // A piece lies in one strip.
+    let piece =
+        |x: usize, y: usize, p: usize| &slot.out[((x / STRIP * height + y) * 4 + p) * STRIP + x % STRIP..][..PIECE];
+    if S == 1 {
+        // Rows and columns of the bin are those of the picture.
+        for (p, out) in out.iter_mut().enumerate() {
+            for x in (first..end).step_by(PIECE) {
+                out[x - first..][..PIECE].copy_from_slice(piece(x, above, p));
             }
-            x += count;
         }
-        if S == 1 {
-            out.copy_from_slice(&line[1..1 + CHUNK]);
-            continue;
+        return;
+    }
+    // One column more on both sides than the chunk covers.
+    let mut lines = Line([[0.0; CHUNK + 2 * PIECE]; 4]);
+    for (p, line) in lines.0.iter_mut().enumerate() {
+        for x in (first.saturating_sub(PIECE)..(end + PIECE).min(width)).step_by(PIECE) {
+            let (a, b) = (piece(x, above, p), piece(x, below, p));
+            let line = &mut line[PIECE + x - first..][..PIECE];
+            for k in (0..PIECE).step_by(V::F32_LANES) {
+                let (a, b) = (load::<V>(a, k), load::<V>(b, k));
+                store::<V>(line, k, fma(simd, simd.sub_f32s(b, a), share, a));
+            }
         }
-        line[0] = if first > 0 { value(first - 1) } else { line[1] };
-        line[1 + x - first] = if x < width { value(x) } else { line[x - first] };
-        for (k, group) in out.as_chunks_mut::<S>().0.iter_mut().enumerate() {
-            let (before, here, after) = (line[k], line[k + 1], line[k + 2]);
-            for (i, out) in group.iter_mut().enumerate() {
+        if first == 0 {
+            line[PIECE - 1] = line[PIECE];
+        }
+        if end == width {
+            line[PIECE + end - first] = line[PIECE + end - first - 1];
+        }
+    }
+    for (line, out) in lines.0.iter().zip(out) {
+        let (befores, line) = (&line[PIECE - 1..], &line[PIECE..]);
+        let (befores, heres, afters) = (&befores[..CHUNK / S], &line[..CHUNK / S], &line[1..][..CHUNK / S]);
+        let groups = &mut out.as_chunks_mut::<S>().0[..CHUNK / S];
+        for k in 0..CHUNK / S {
+            let (before, here, after) = (befores[k], heres[k], afters[k]);
+            for i in 0..S {
                 let offset = (i as f32 + 0.5) / S as f32 - 0.5;
-                *out = if offset < 0.0 {
+                groups[k][i] = if offset < 0.0 {
                     madd::<V>(before - here, -offset, here)
                 } else {
                     madd::<V>(after - here, offset, here)

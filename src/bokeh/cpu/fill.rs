@@ -3,17 +3,20 @@
 //! the holes. Every layer is filled for itself, from what does not lie in front of it: behind a head are the trees that
 //! stand behind it, and behind both the sky.
 
+#![allow(clippy::needless_range_loop)] // Planes and columns index several arrays at once.
+
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use super::rows::Rows;
+use pulp::Arch;
+
+use super::levels::{Base, Level, PLANES, Pull, Push};
+use super::rows::{PIECE, Rows};
 use super::unpack::Surfaces;
 use crate::bokeh::occlusion::other_surface;
 use crate::bokeh::plan::Share;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
-/// Planes of a level: premultiplied colour and CoC, and how much of it is known.
-const PLANES: usize = 5;
 /// A pixel of which less is known after all has flowed back is not known at all.
 const KNOWN: f32 = 0.5;
 /// Rows of a level that are one part of the work.
@@ -26,12 +29,6 @@ pub struct Pyramid {
     levels: Vec<Level>,
     /// Which parts are handed out, as many as there can be.
     taken: Vec<AtomicBool>,
-}
-
-struct Level {
-    width: usize,
-    height: usize,
-    rows: Rows<PLANES>,
 }
 
 /// The picture at half size, as the bands lay it: means of linear r, g, b and CoC, and the least CoC of any surface.
@@ -82,17 +79,15 @@ impl Pyramid {
     }
 
     /// Fills what is hidden by all that is not `unhidden`, once the halves are laid.
-    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool) {
-        self.lay_base(unhidden, workers);
+    pub fn fill(&mut self, unhidden: &Share, workers: &mut ThreadPool, arch: Arch) {
+        self.lay_base(unhidden, workers, arch);
         for k in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(k);
             let (fine, coarse) = (&fine[k - 1], &mut coarse[0]);
             let (width, stride, row_len) = (coarse.width, coarse.rows.stride, coarse.rows.row_len());
             let rows = DisjointParts::new(&mut coarse.rows.data, PART * row_len, &mut self.taken);
             workers.run(coarse.height.div_ceil(PART), &|part| {
-                for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
-                    pull(fine, part * PART + k, row, stride, width);
-                }
+                arch.dispatch(Pull { fine, first: part * PART, rows: rows.part(part), stride, width });
             });
         }
         for k in (1..self.levels.len()).rev() {
@@ -101,9 +96,7 @@ impl Pyramid {
             let (width, stride, row_len) = (fine.width, fine.rows.stride, fine.rows.row_len());
             let rows = DisjointParts::new(&mut fine.rows.data, PART * row_len, &mut self.taken);
             workers.run(fine.height.div_ceil(PART), &|part| {
-                for (k, row) in rows.part(part).chunks_exact_mut(row_len).enumerate() {
-                    push(coarse, part * PART + k, row, stride, width);
-                }
+                arch.dispatch(Push { coarse, first: part * PART, rows: rows.part(part), stride, width });
             });
         }
     }
@@ -114,31 +107,13 @@ impl Pyramid {
     }
 
     /// The finest level: known is what nothing that hides touches, nor its neighbours.
-    fn lay_base(&mut self, unhidden: &Share, workers: &mut ThreadPool) {
+    fn lay_base(&mut self, unhidden: &Share, workers: &mut ThreadPool, arch: Arch) {
         let level = &mut self.levels[0];
-        let (w, h, stride, row_len) = (level.width, level.height, level.rows.stride, level.rows.row_len());
+        let (width, height, row_len) = (level.width, level.height, level.rows.row_len());
         let halves = &self.halves;
         let data = DisjointParts::new(&mut level.rows.data, PART * row_len, &mut self.taken);
-        workers.run(h.div_ceil(PART), &|part| {
-            for (k, planes) in data.part(part).chunks_exact_mut(row_len).enumerate() {
-                let (planes, known) = planes.split_at_mut((PLANES - 1) * stride);
-                let y = part * PART + k;
-                let nearest = |y: usize| &halves.row(y)[(PLANES - 1) * stride..][..w];
-                let rows = [y.saturating_sub(1), y, (y + 1).min(h - 1)].map(nearest);
-                // What hides a pixel the most is what is nearest.
-                let column = |x: usize| rows[0][x].min(rows[1][x]).min(rows[2][x]);
-                let (mut left, mut here) = (f32::INFINITY, column(0));
-                for (x, known) in known[..w].iter_mut().enumerate() {
-                    let right = if x + 1 < w { column(x + 1) } else { f32::INFINITY };
-                    *known = unhidden.at(left.min(here).min(right));
-                    (left, here) = (here, right);
-                }
-                let own = halves.row(y).chunks_exact(stride);
-                for (plane, own) in planes.chunks_exact_mut(stride).zip(own) {
-                    let values = plane[..w].iter_mut().zip(own).zip(&*known);
-                    values.for_each(|((value, own), known)| *value = own * known);
-                }
-            }
+        workers.run(height.div_ceil(PART), &|part| {
+            arch.dispatch(Base { halves, size: (width, height), unhidden, first: part * PART, rows: data.part(part) });
         });
     }
 }
@@ -191,18 +166,38 @@ impl Behind<'_> {
     #[inline(always)]
     pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
         let row = self.level.rows.row(y / 2);
-        let [red, green, blue, coc] = &mut surfaces.back.0;
-        for x in 0..W {
+        for start in (0..W).step_by(PIECE) {
+            let coc = &mut surfaces.back.0[3][start..start + PIECE];
             // What a silhouette only touches keeps its own colour: it is seen, and filling would smear it.
-            let hidden = 1.0 - self.unhidden.at(coc[x]);
-            let half = (x0 + x as isize).clamp(0, width as isize - 1) as usize / 2;
-            let fill = |p: usize| row[p * self.level.rows.stride + half];
-            // Where something near touches every pixel nothing is known, and nothing lies behind.
-            if hidden > 0.0 && fill(PLANES - 1) > KNOWN {
-                let hidden = hidden * other_surface(coc[x], fill(3));
-                let mix = |own: f32, p: usize| own + (fill(p) - own) * hidden;
-                (red[x], green[x], blue[x]) = (mix(red[x], 0), mix(green[x], 1), mix(blue[x], 2));
-                coc[x] += (fill(3).max(self.nearest_px) - coc[x]) * hidden;
+            let mut hidden = [0.0; PIECE];
+            let mut any = false;
+            for x in 0..PIECE {
+                hidden[x] = 1.0 - self.unhidden.at(coc[x]);
+                any |= hidden[x] > 0.0;
+            }
+            if !any {
+                continue;
+            }
+            let mut fill = [[0.0; PIECE]; PLANES];
+            for x in 0..PIECE {
+                let half = (x0 + (start + x) as isize).clamp(0, width as isize - 1) as usize / 2;
+                for (p, fill) in fill.iter_mut().enumerate() {
+                    fill[x] = row[p * self.level.rows.stride + half];
+                }
+            }
+            for x in 0..PIECE {
+                // Where something near touches every pixel nothing is known, and nothing lies behind.
+                let known = if fill[PLANES - 1][x] > KNOWN { hidden[x] } else { 0.0 };
+                hidden[x] = known * other_surface(coc[x], fill[3][x]);
+            }
+            for x in 0..PIECE {
+                fill[3][x] = if fill[3][x] > self.nearest_px { fill[3][x] } else { self.nearest_px };
+            }
+            for p in 0..4 {
+                let plane = &mut surfaces.back.0[p][start..start + PIECE];
+                for x in 0..PIECE {
+                    plane[x] += (fill[p][x] - plane[x]) * hidden[x];
+                }
             }
         }
         if surfaces.mixed {
@@ -212,54 +207,6 @@ impl Behind<'_> {
                 let before = self.unhidden.at(*coc_px);
                 (*share, *behind) = (*share * before, 1.0 - (1.0 - *behind) * before);
             }
-        }
-    }
-}
-
-/// Reduces by two: the sum of four pixels weighed by how far each is known, made a mean where that is more than 1. Less
-/// than that adds up from level to level, so that the coarsest one knows something if any pixel does.
-fn pull(fine: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
-    let (above, below) = (fine.rows.row(2 * y), (2 * y + 1 < fine.height).then(|| fine.rows.row(2 * y + 1)));
-    for p in 0..PLANES {
-        let out = &mut out[p * stride..][..width];
-        let above = &above[p * fine.rows.stride..].as_chunks::<2>().0[..width];
-        out.iter_mut().zip(above).for_each(|(out, [a, b])| *out = a + b);
-        if let Some(below) = below {
-            let below = &below[p * fine.rows.stride..].as_chunks::<2>().0[..width];
-            out.iter_mut().zip(below).for_each(|(out, [a, b])| *out += a + b);
-        }
-    }
-    let (planes, known) = out.split_at_mut((PLANES - 1) * stride);
-    for plane in planes.chunks_exact_mut(stride) {
-        for (value, &known) in plane[..width].iter_mut().zip(&*known) {
-            *value /= if known > 1.0 { known } else { 1.0 };
-        }
-    }
-    known[..width].iter_mut().for_each(|known| *known = if *known > 1.0 { 1.0 } else { *known });
-}
-
-/// Fills what the finer level does not know from the coarser one, bilinearly: 3/4 of the coarse pixel that covers this one
-/// and 1/4 of the neighbour nearest to it, each way.
-fn push(coarse: &Level, y: usize, out: &mut [f32], stride: usize, width: usize) {
-    let side = |at: usize, limit: usize| {
-        let neighbour = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { at / 2 + 1 };
-        [at / 2, neighbour.min(limit - 1)]
-    };
-    let [here, there] = side(y, coarse.height).map(|row| coarse.rows.row(row));
-    for x in 0..width {
-        let known = out[(PLANES - 1) * stride + x];
-        if known >= 1.0 {
-            continue;
-        }
-        let [near, far] = side(x, coarse.width);
-        let at = |p: usize| {
-            let [near, far] =
-                [near, far].map(|x| 0.75 * here[p * coarse.rows.stride + x] + 0.25 * there[p * coarse.rows.stride + x]);
-            0.75 * near + 0.25 * far
-        };
-        let scale = (1.0 - known) / at(PLANES - 1).max(1e-6);
-        for p in 0..PLANES {
-            out[p * stride + x] += at(p) * scale;
         }
     }
 }

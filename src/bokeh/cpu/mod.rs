@@ -3,12 +3,14 @@
 mod band;
 mod bin;
 mod blur;
+mod cell_sums;
 mod composite;
 mod encode;
 mod fill;
 mod filter;
 mod frames;
 mod gather;
+mod levels;
 mod pixels;
 mod probe;
 mod reach;
@@ -25,6 +27,7 @@ use band::{Band, BandSums, Hidden, Layer, NONE};
 use blur::{Scratch, Strip};
 use gather::Gather;
 use pulp::Arch;
+use reach::Reach;
 use rows::Slot;
 use shelves::{BinShelves, StripShelves};
 use tiles::{BLOCK, Survey, TILE_H, Tiles};
@@ -127,7 +130,7 @@ impl CpuBokeh {
         lap("bin")?;
         for layer in self.plan.layers().skip(1) {
             if let Some(pyramid) = &mut self.pyramid {
-                pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers);
+                pyramid.fill(&self.plan.unhidden(layer.start), &mut self.workers, self.arch);
             }
             lap("fill")?;
             self.bin(&frame, Some(layer));
@@ -230,12 +233,13 @@ impl CpuBokeh {
 
     /// Pass `reach`: each part is a bin.
     fn reach(&mut self) {
-        let plan = &self.plan;
+        let (plan, arch) = (&self.plan, self.arch);
         let parts = DisjointParts::new(&mut self.slots, 1, &mut self.taken);
         self.workers.run_with(&mut self.members, plan.bins.len(), &|member: &mut Member, part| {
             let bin = &plan.bins[part];
             for slot in parts.part(bin.slot).iter_mut().filter(|slot| slot.present) {
-                reach::reach(plan, bin, &slot.cells, &mut slot.edges, &mut member.reach);
+                let (cells, edges, scratch) = (&slot.cells, &mut slot.edges, &mut member.reach);
+                arch.dispatch(Reach { plan, bin, cells, edges, scratch });
             }
         });
     }

@@ -1,6 +1,8 @@
 //! Pass `reach`, a dilation of radii on the coarse grid. Each cell gets the radius of the content that the filters can
 //! reach from there (its mean, weighted by coverage and nearness), and the range of its colours.
 
+use pulp::{Simd, WithSimd};
+
 use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges, NO_COLOR};
 use crate::bokeh::plan::{ANY_COLOR, Bin, CELL, FAR_WEIGHT, Plan, SEGMENT};
 
@@ -10,9 +12,27 @@ pub fn nearness(distance: usize, bin: &Bin) -> f32 {
     (-0.5 * d * d).exp() + FAR_WEIGHT
 }
 
-/// Combines the neighbourhood of every cell, one axis after the other, and writes radius and range of colours at the
-/// `edges` of segments. `scratch` grows to the size of the grid and one row of it.
-pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
+/// Combines the neighbourhood of every cell of a bin, one axis after the other, and writes radius and range of colours at
+/// the `edges` of segments.
+pub struct Reach<'a> {
+    pub plan: &'a Plan,
+    pub bin: &'a Bin,
+    pub cells: &'a Cells,
+    pub edges: &'a mut Edges,
+    /// Grows to the size of the grid and one row of it.
+    pub scratch: &'a mut Vec<f32>,
+}
+
+impl WithSimd for Reach<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        reach(self.plan, self.bin, self.cells, self.edges, self.scratch);
+    }
+}
+
+#[inline(always)]
+fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
     let (width, height, radius) = (cells.width, cells.height, plan.reach_cells(bin));
     // Only blurs of thousands of pixels reach farther; they are cut.
     let mut weights = [0.0; 64];
@@ -34,9 +54,9 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
             let weight = weights[k.abs_diff(y)];
             let (sums, rest) = row.split_at_mut(2 * width);
             let (lows, highs) = rest.split_at_mut(3 * width);
-            sums.iter_mut().zip(source).for_each(|(t, s)| *t += weight * s);
-            lows.iter_mut().zip(&source[2 * width..]).for_each(|(t, &s)| *t = if s < *t { s } else { *t });
-            highs.iter_mut().zip(&source[5 * width..]).for_each(|(t, &s)| *t = if s > *t { s } else { *t });
+            add(sums, source, weight);
+            keep_lowest(lows, &source[2 * width..]);
+            keep_highest(highs, &source[5 * width..]);
         }
         // The mean of |CoC| becomes the radius.
         for x in 0..width {
@@ -65,22 +85,44 @@ pub fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: 
 
 /// Combines each cell of a plane's row with those up to `weights.len() - 1` cells away: weighted sums in planes 0 and
 /// 1, minima in planes 2 to 4, maxima in planes 5 to 7.
+#[inline(always)]
 fn combine_row(plane: usize, source: &[f32], target: &mut [f32], weights: &[f32]) {
-    let combine = |target: &mut [f32], source: &[f32], weight: f32| {
-        let pairs = target.iter_mut().zip(source);
-        match plane {
-            0 | 1 => pairs.for_each(|(t, s)| *t += weight * s),
-            2..5 => pairs.for_each(|(t, &s)| *t = if s < *t { s } else { *t }),
-            _ => pairs.for_each(|(t, &s)| *t = if s > *t { s } else { *t }),
-        }
-    };
     target.copy_from_slice(source);
     if plane < 2 {
-        target.iter_mut().for_each(|value| *value *= weights[0]);
+        for value in target.iter_mut() {
+            *value *= weights[0];
+        }
     }
-    for (distance, &weight) in weights.iter().enumerate().skip(1).take_while(|(d, _)| *d < source.len()) {
+    for distance in 1..weights.len().min(source.len()) {
         let inner = source.len() - distance;
-        combine(&mut target[..inner], &source[distance..], weight);
-        combine(&mut target[distance..], &source[..inner], weight);
+        for (to, from) in [(0, distance), (distance, 0)] {
+            let (target, source) = (&mut target[to..][..inner], &source[from..][..inner]);
+            match plane {
+                0 | 1 => add(target, source, weights[distance]),
+                2..5 => keep_lowest(target, source),
+                _ => keep_highest(target, source),
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add(target: &mut [f32], source: &[f32], weight: f32) {
+    for (target, source) in target.iter_mut().zip(source) {
+        *target += weight * source;
+    }
+}
+
+#[inline(always)]
+fn keep_lowest(target: &mut [f32], source: &[f32]) {
+    for (target, &source) in target.iter_mut().zip(source) {
+        *target = if source < *target { source } else { *target };
+    }
+}
+
+#[inline(always)]
+fn keep_highest(target: &mut [f32], source: &[f32]) {
+    for (target, &source) in target.iter_mut().zip(source) {
+        *target = if source > *target { source } else { *target };
     }
 }

@@ -128,8 +128,9 @@ impl Edges {
         };
         let (above, below) = (row(above), row(below));
         let mut values = [[0.0; EDGE_VALUES]; STRIP_EDGES];
-        for (k, value) in values.as_flattened_mut().iter_mut().enumerate() {
-            *value = above[k] + (below[k] - above[k]) * share;
+        let flat = values.as_flattened_mut();
+        for k in 0..STRIP_EDGES * EDGE_VALUES {
+            flat[k] = above[k] + (below[k] - above[k]) * share;
         }
         values
     }

@@ -21,7 +21,7 @@ pub const SUMS: usize = 5;
 /// A row of a block of the bin: the planes of a sum.
 pub type Means = Line<[[f32; PLANE]; SUMS]>;
 
-/// Adds a row's shares to two rows of sums. Down the picture the tent falls for one row of the bin while it rises for
+/// Adds a row's shares to two rows of sums, or begins them where they are `fresh`. Down the picture the tent falls for one row of the bin while it rises for
 /// the next, so a row of the picture is read once and never kept: one pass makes any scale.
 #[inline(always)]
 pub fn sum_row<S: Simd>(
@@ -30,16 +30,31 @@ pub fn sum_row<S: Simd>(
     surfaces: &Surfaces<WIDE>,
     columns: usize,
     weights: [f32; 2],
-    above: &mut [[f32; WIDE]; SUMS],
-    below: &mut [[f32; WIDE]; SUMS],
+    rows: [&mut [[f32; WIDE]; SUMS]; 2],
+    fresh: [bool; 2],
 ) {
-    let weights = weights.map(|weight| simd.splat_f32s(weight));
+    let zero = simd.splat_f32s(0.0);
+    let weights = [simd.splat_f32s(weights[0]), simd.splat_f32s(weights[1])];
+    let [above, below] = rows;
     for x in (0..columns + 2 * MARGIN).step_by(S::F32_LANES) {
-        let values = share.of(simd, surfaces, x);
+        let taken = share.taken(simd, surfaces, x);
+        if is_nothing(simd, taken) {
+            for p in 0..SUMS {
+                if fresh[0] {
+                    store::<S>(&mut above[p], x, zero);
+                }
+                if fresh[1] {
+                    store::<S>(&mut below[p], x, zero);
+                }
+            }
+            continue;
+        }
+        let values = share.of(simd, taken, surfaces, x);
         for p in 0..SUMS {
-            let sums = [&above[p], &below[p]].map(|sums| load::<S>(sums, x));
-            store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], sums[0]));
-            store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], sums[1]));
+            let falling = if fresh[0] { zero } else { load::<S>(&above[p], x) };
+            let rising = if fresh[1] { zero } else { load::<S>(&below[p], x) };
+            store::<S>(&mut above[p], x, fma(simd, values[p], weights[0], falling));
+            store::<S>(&mut below[p], x, fma(simd, values[p], weights[1], rising));
         }
     }
 }
@@ -57,40 +72,64 @@ impl<S: Simd> ShareAt<S> {
         Self { steps: share.as_ref().map(|share| [step(share.front), step(share.behind)]) }
     }
 
-    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels, whatever surfaces they show.
+    /// What the bin takes of a vector of pixels: of their only surface or the farther one, and of the nearer one where some
+    /// have two.
     #[inline(always)]
-    pub fn of(&self, simd: S, surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; SUMS] {
-        let back = self.of_one(simd, &surfaces.back, x);
+    pub fn taken(&self, simd: S, surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; 2] {
+        let back = self.at(simd, &surfaces.back, x);
+        [back, if surfaces.mixed { self.at(simd, &surfaces.front, x) } else { back }]
+    }
+
+    /// Premultiplied colour, coverage, and coverage times |CoC| of a vector of pixels, of which so much is `taken`, whatever
+    /// surfaces they show.
+    #[inline(always)]
+    pub fn of(&self, simd: S, taken: [S::f32s; 2], surfaces: &Surfaces<WIDE>, x: usize) -> [S::f32s; SUMS] {
+        let back = times(simd, taken[0], &surfaces.back, x);
         if !surfaces.mixed {
             return back;
         }
-        let front = self.of_one(simd, &surfaces.front, x);
-        let [share, behind] = [&surfaces.share, &surfaces.behind].map(|plane| load::<S>(&plane.0, x));
+        let front = times(simd, taken[1], &surfaces.front, x);
+        let (share, behind) = (load::<S>(&surfaces.share.0, x), load::<S>(&surfaces.behind.0, x));
         // What is known of the farther surface without being seen, and the bins that take none of the nearer one.
         let one = simd.splat_f32s(1.0);
         let unseen = simd.sub_f32s(simd.add_f32s(behind, share), one);
         let hidden = simd.min_f32s(simd.mul_f32s(simd.splat_f32s(1.0 / HIDING_SHARE), front[3]), one);
         let behind = simd.sub_f32s(behind, simd.mul_f32s(unseen, hidden));
-        std::array::from_fn(|p| fma(simd, share, front[p], simd.mul_f32s(behind, back[p])))
+        let mut both = back;
+        for p in 0..SUMS {
+            both[p] = fma(simd, share, front[p], simd.mul_f32s(behind, back[p]));
+        }
+        both
     }
 
-    /// The same, of pixels of one surface.
+    /// The share of a vector of pixels of one surface.
     #[inline(always)]
-    fn of_one(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
-        let [r, g, b, coc] = piece.0.each_ref().map(|plane| load::<S>(plane, x));
-        let [zero, one] = [0.0, 1.0].map(|value| simd.splat_f32s(value));
-        let share = match &self.steps {
-            None => one,
-            Some(steps) => {
-                let at = |[slope, offset]: [S::f32s; 2]| {
-                    simd.min_f32s(simd.max_f32s(fma(simd, coc, slope, offset), zero), one)
-                };
-                simd.sub_f32s(at(steps[0]), at(steps[1]))
-            }
-        };
-        let by = |value| simd.mul_f32s(share, value);
-        [by(r), by(g), by(b), share, by(simd.abs_f32s(coc))]
+    fn at(&self, simd: S, piece: &Piece<WIDE>, x: usize) -> S::f32s {
+        let [zero, one] = [simd.splat_f32s(0.0), simd.splat_f32s(1.0)];
+        let Some([up, down]) = &self.steps else { return one };
+        let coc = load::<S>(&piece.0[3], x);
+        let up = simd.min_f32s(simd.max_f32s(fma(simd, coc, up[0], up[1]), zero), one);
+        let down = simd.min_f32s(simd.max_f32s(fma(simd, coc, down[0], down[1]), zero), one);
+        simd.sub_f32s(up, down)
     }
+}
+
+/// Whether nothing is `taken` of any pixel of a vector.
+#[inline(always)]
+pub fn is_nothing<S: Simd>(simd: S, taken: [S::f32s; 2]) -> bool {
+    let any = simd.greater_than_f32s(simd.max_f32s(taken[0], taken[1]), simd.splat_f32s(0.0));
+    simd.first_true_m32s(any) == S::F32_LANES
+}
+
+/// A share of a vector of pixels of one surface, as [`ShareAt::of`] has it.
+#[inline(always)]
+fn times<S: Simd>(simd: S, share: S::f32s, piece: &Piece<WIDE>, x: usize) -> [S::f32s; SUMS] {
+    let mut values = [share; SUMS];
+    for p in 0..3 {
+        values[p] = simd.mul_f32s(share, load::<S>(&piece.0[p], x));
+    }
+    values[4] = simd.mul_f32s(share, simd.abs_f32s(load::<S>(&piece.0[3], x)));
+    values
 }
 
 /// The tent across: a row of sums at the bin's scale. Weights repeat every `S` columns, so rise and fall fit in one vector
@@ -122,7 +161,11 @@ pub fn reduce<V: Simd, const S: usize>(simd: V, sums: &[[f32; WIDE]; SUMS], colu
             store::<V>(&mut weighed.0, x, fma(simd, after, fall, simd.mul_f32s(before, rise)));
         }
         for (mean, group) in mean[..columns / S].iter_mut().zip(weighed.0.as_chunks::<S>().0) {
-            *mean = group.iter().sum();
+            let mut total = 0.0;
+            for value in group {
+                total += value;
+            }
+            *mean = total;
         }
     }
 }

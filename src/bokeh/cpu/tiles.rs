@@ -137,9 +137,18 @@ pub fn widen(range: &mut (f32, f32), values: &[f32], of: impl Fn(f32) -> f32) {
             high[k] = if value > high[k] { value } else { high[k] };
         }
     }
-    let rest = || rest.iter().map(|&value| of(value));
-    range.0 = low.into_iter().chain(rest()).fold(range.0, f32::min);
-    range.1 = high.into_iter().chain(rest()).fold(range.1, f32::max);
+    // Halves against halves, as one value after the other waits for each.
+    for half in [8, 4, 2, 1] {
+        for k in 0..half {
+            low[k] = if low[k + half] < low[k] { low[k + half] } else { low[k] };
+            high[k] = if high[k + half] > high[k] { high[k + half] } else { high[k] };
+        }
+    }
+    (range.0, range.1) = (range.0.min(low[0]), range.1.max(high[0]));
+    for value in rest {
+        let value = of(*value);
+        (range.0, range.1) = (range.0.min(value), range.1.max(value));
+    }
 }
 
 /// A tile stays set when all around it are set.

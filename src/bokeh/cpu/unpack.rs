@@ -198,15 +198,21 @@ pub fn coc_row(source: &Source<'_>, y: usize, x0: usize, coc: &mut [f32]) {
             let (w, h) = (map.width as usize, map.height as usize);
             let row = &map.metres[nearest(y, height, h) * w..][..w];
             if w == width {
-                coc.iter_mut().zip(&row[x0..]).for_each(|(coc, &metres)| *coc = lens.coc_px(metres));
+                for (coc, &metres) in coc.iter_mut().zip(&row[x0..]) {
+                    *coc = lens.coc_px(metres);
+                }
             } else {
-                coc.iter_mut().enumerate().for_each(|(x, coc)| *coc = lens.coc_px(row[nearest(x0 + x, width, w)]));
+                for (x, coc) in coc.iter_mut().enumerate() {
+                    *coc = lens.coc_px(row[nearest(x0 + x, width, w)]);
+                }
             }
         }
         (CocField::Depth(lens), _) => coc.fill(lens.coc_px(0.0)),
         (CocField::Uniform { radius_px }, _) => coc.fill(*radius_px),
         (CocField::Ramp(ramp), _) => {
-            coc.iter_mut().enumerate().for_each(|(x, coc)| *coc = ramp.coc_px((x0 + x) as f32, y as f32));
+            for (x, coc) in coc.iter_mut().enumerate() {
+                *coc = ramp.coc_px((x0 + x) as f32, y as f32);
+            }
         }
     }
 }
