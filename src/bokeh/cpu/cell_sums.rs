@@ -1,5 +1,7 @@
 //! What the coarse grid over a bin is summed from: a row of cells, column by column.
 
+#![allow(clippy::needless_range_loop)] // Planes index several arrays at once.
+
 use pulp::Simd;
 
 use super::rows::{CELL_PLANES, EMPTY_CELL, NO_COLOR};

@@ -1,6 +1,8 @@
 //! Pass `reach`, a dilation of radii on the coarse grid. Each cell gets the radius of the content that the filters can
 //! reach from there (its mean, weighted by coverage and nearness), and the range of its colours.
 
+#![allow(clippy::needless_range_loop)] // Planes and distances index several arrays at once.
+
 use pulp::{Simd, WithSimd};
 
 use super::rows::{CELL_PLANES, Cells, EDGE_VALUES, Edges, NO_COLOR};

@@ -1,6 +1,8 @@
 //! Shares of a row of pixels, and the tent that averages them down: twice as wide as a pixel of the bin, so that
 //! reducing a picture keeps its centroid.
 
+#![allow(clippy::needless_range_loop)] // Planes index several arrays at once.
+
 use pulp::Simd;
 
 use super::tiles::BLOCK;
