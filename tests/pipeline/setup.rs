@@ -90,6 +90,7 @@ impl Setup {
             }),
             depth: self.depth.map(|trouble| Box::new(FakeDepth(trouble)) as _),
             bokeh: self.bokeh.map(|bokeh| Box::new(bokeh) as _),
+            threads: 2,
             look: self.look,
             adaptive: false,
             measured: false,
