@@ -6,6 +6,7 @@
 mod answers;
 
 use super::share::Contrast;
+use super::symmetric::{Symmetric, outer};
 use super::{larger, light_of, smaller};
 use crate::frame::DepthMap;
 
@@ -35,15 +36,6 @@ struct Cluster {
     inverse: f32,
     light: [f32; 3],
     squares: Symmetric,
-}
-
-/// A symmetric matrix: xx, xy, xz, yy, yz, zz.
-pub type Symmetric = [f32; 6];
-
-/// The upper triangle of `a` times its transpose.
-#[inline(always)]
-pub(super) fn outer(a: [f32; 3]) -> Symmetric {
-    [a[0] * a[0], a[0] * a[1], a[0] * a[2], a[1] * a[1], a[1] * a[2], a[2] * a[2]]
 }
 
 /// Mean and covariance of a surface's colours in linear light.

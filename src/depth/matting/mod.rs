@@ -9,6 +9,7 @@ mod clusters;
 pub mod mask;
 mod share;
 mod survey;
+mod symmetric;
 mod trace;
 
 use std::ops::Range;

@@ -1,7 +1,8 @@
 //! The share of a mixed pixel: what its colour says, and what was likely before that.
 
 use super::EdgePixel;
-use super::clusters::{Color, Symmetric};
+use super::clusters::Color;
+use super::symmetric::{Symmetric, dot, inverse, times};
 
 /// Shares are tried in steps of an eighth.
 const STEPS: usize = 9;
@@ -322,17 +323,6 @@ fn gaussian(precision: f32, mean: f32) -> [f32; STEPS] {
     values
 }
 
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// `matrix` times `vector`.
-#[inline(always)]
-fn times(&[xx, xy, xz, yy, yz, zz]: &Symmetric, vector: [f32; 3]) -> [f32; 3] {
-    [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| dot(row, vector))
-}
-
 /// A covariance of few pixels with what goes evenly into all directions.
 #[inline(always)]
 fn widened(mut spread: Symmetric) -> Symmetric {
@@ -341,14 +331,4 @@ fn widened(mut spread: Symmetric) -> Symmetric {
         spread[k] += floor;
     }
     spread
-}
-
-/// The inverse, by the adjugate; of a matrix that has none, zeros.
-#[inline(always)]
-fn inverse(&[xx, xy, xz, yy, yz, zz]: &Symmetric) -> Symmetric {
-    let (a, b, c) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
-    let (d, e, f) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
-    let determinant = xx * a + xy * b + xz * c;
-    let scale = if determinant > 0.0 { 1.0 / determinant } else { 0.0 };
-    [a, b, c, d, e, f].map(|value| scale * value)
 }

@@ -1,0 +1,32 @@
+//! Symmetric matrices of three rows, and vectors: what covariances of colours need.
+
+/// A symmetric matrix: xx, xy, xz, yy, yz, zz.
+pub type Symmetric = [f32; 6];
+
+/// The upper triangle of `a` times its transpose.
+#[inline(always)]
+pub(super) fn outer(a: [f32; 3]) -> Symmetric {
+    [a[0] * a[0], a[0] * a[1], a[0] * a[2], a[1] * a[1], a[1] * a[2], a[2] * a[2]]
+}
+
+/// The product of two vectors.
+#[inline(always)]
+pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `matrix` times `vector`.
+#[inline(always)]
+pub(super) fn times(&[xx, xy, xz, yy, yz, zz]: &Symmetric, vector: [f32; 3]) -> [f32; 3] {
+    [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| dot(row, vector))
+}
+
+/// The inverse, by the adjugate; of a matrix that has none, zeros.
+#[inline(always)]
+pub(super) fn inverse(&[xx, xy, xz, yy, yz, zz]: &Symmetric) -> Symmetric {
+    let (a, b, c) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
+    let (d, e, f) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
+    let determinant = xx * a + xy * b + xz * c;
+    let scale = if determinant > 0.0 { 1.0 / determinant } else { 0.0 };
+    [a, b, c, d, e, f].map(|value| scale * value)
+}
