@@ -67,7 +67,8 @@ pub(super) fn encode(format: &Format, part: &Path, height: u32, threads: Option<
         .args([frame_timing_option(), "vfr", "-enc_time_base", format.time_base])
         .args(format.encoder)
         .args(threads.iter().flat_map(|threads| ["-threads".to_owned(), threads.to_string()]))
-        .args(["-flush_packets", "1"])
+        // Without random numbers for its parts: the same frames are the same file.
+        .args(["-fflags", "+bitexact", "-flush_packets", "1"])
         .args(format.muxer)
         .arg(as_file(part))
         .stdin(Stdio::piped());
