@@ -5,14 +5,15 @@
     benches/farm.py --runs 5 --wait 3
 
 Needs Ray (pip install 'bokehcam[ray]') and the program, built here or named by BOKEHCAM. Each run does the same work on one
-node and on two, in turn. With other work on the machine only the ratio means something; with --wait each recording is one
-frame and so many seconds of sleep, so that the farm alone is measured.
+node and on two, in turn; each node's processes stay on a core of their own. With other work on the machine only the ratio means
+something; with --wait each recording is one frame and so many seconds of sleep, so that the farm alone is measured.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import statistics
 import sys
 import tempfile
@@ -61,14 +62,24 @@ def main() -> None:
     parser.add_argument("--wait", type=float, metavar="SECONDS")
     given = parser.parse_args()
     print(f"{PROGRAM}, {RECORDINGS} recordings of {FRAMES} frames, 640x360, one thread each")
-    clusters = {1: Cluster(), 2: Cluster()}
+    clusters = {nodes: on_core(0, Cluster) for nodes in (1, 2)}
     try:
-        clusters[2].add()
+        on_core(1, clusters[2].add)
         with tempfile.TemporaryDirectory() as folder:
             measure(clusters, Path(folder), given.runs, given.wait)
     finally:
         for cluster in clusters.values():
             cluster.stop()
+
+
+def on_core(core: int, start):
+    """What `start` makes, its processes on one core: a task of one CPU has threads for more."""
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {sorted(cores)[core]})
+    try:
+        return start()
+    finally:
+        os.sched_setaffinity(0, cores)
 
 
 def sleeper(folder: Path, wait_s: float) -> Path:
