@@ -35,6 +35,16 @@ impl Bands {
     pub fn split<T>(self, plane: &mut [T], of_row: usize) -> impl Iterator<Item = &mut [T]> {
         plane.chunks_mut((self.rows * of_row).max(1))
     }
+
+    /// What each band has of tiles that are `side` rows high and lie `across` beside each other; `side` divides the unit.
+    pub fn split_tiles<T>(self, tiles: &mut [T], side: usize, across: usize) -> impl Iterator<Item = &mut [T]> {
+        tiles.chunks_mut((self.rows / side * across).max(1))
+    }
+}
+
+/// How many of `count` values each item of a pass has, and no fewer than `least`, which are worth a thread.
+pub fn share(count: usize, least: usize) -> usize {
+    count.div_ceil(MOST_ITEMS).max(least)
 }
 
 #[cfg(test)]

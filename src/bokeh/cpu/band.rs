@@ -6,8 +6,7 @@ use pulp::{Simd, WithSimd};
 use super::bin::{BinRows, BinSums};
 use super::fill::{Behind, HalfRows};
 use super::tent::{MARGIN, WIDE};
-use super::tiles::BLOCK;
-use super::tiles::{TILE_H, TILE_W, Tiles, widen};
+use super::tiles::{BLOCK, TILE_H, TILE_W, Tiles, widen};
 use super::unpack::{Source, Surfaces};
 use crate::bokeh::plan::{CELL, MAX_BINS, Share};
 

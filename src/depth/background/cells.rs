@@ -43,8 +43,7 @@ impl Cells {
         self.cells.resize(across * height.div_ceil(CELL), Cell::default());
         let bands = Bands::new(height, CELL, workers);
         let mut nearest = [0.0f32; MOST_ITEMS];
-        let mut rest = &mut self.cells[..];
-        let cells = bands.rows().map_while(|rows| rest.split_off_mut(..rows.len().div_ceil(CELL) * across));
+        let cells = bands.split_tiles(&mut self.cells, CELL, across);
         workers.run_each(bands.rows().zip(cells).zip(&mut nearest), &|((rows, cells), nearest)| {
             let first = rows.start;
             for y in rows.step_by(STEP) {

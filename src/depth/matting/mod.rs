@@ -17,6 +17,7 @@ use std::ops::Range;
 use pulp::{Arch, WithSimd};
 
 use crate::color::light_of_codes;
+use crate::compute::bands;
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
@@ -137,7 +138,7 @@ impl Matting {
         loop {
             let (found, is_traced) = (compared.end..edges.len(), steps > 0);
             evidence.resize(found.end, Evidence::default());
-            let each = found.len().div_ceil(MOST_ITEMS).max(LEAST_PIXELS);
+            let each = bands::share(found.len(), LEAST_PIXELS);
             let view = View { size, metres, jump, at_edge, rgb, light };
             let asked = edges[found.clone()].chunks(each).zip(answers[found.clone()].chunks(each));
             let parts = asked.zip(evidence[found.clone()].chunks_mut(each));
@@ -174,7 +175,7 @@ impl Matting {
         trace::drop_wide(size, kept, &prior, (evidence, trails));
         let has_traced = evidence.len() > kept;
 
-        let each = evidence.len().div_ceil(MOST_ITEMS).max(LEAST_PIXELS);
+        let each = bands::share(evidence.len(), LEAST_PIXELS);
         let (mut counts, light) = ([0; MOST_ITEMS], &**light);
         matte.pixels.resize(evidence.len(), MixedPixel::default());
         let parts = evidence.chunks(each).zip(matte.pixels.chunks_mut(each)).zip(&mut counts);

@@ -18,8 +18,8 @@ use pulp::{Arch, WithSimd};
 use super::planes::{Planes, SetColors, SetDepths};
 use super::tiles::{self, Tiles};
 use super::votes::{self, REACH_LANES, Votes, Weights, jump_at};
-use crate::compute::bands::Bands;
-use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+use crate::compute::bands::{self, Bands};
+use crate::compute::thread_pool::ThreadPool;
 
 /// How far from a jump a depth may be wrong, in pixels.
 const BAND_PX: usize = 4;
@@ -153,7 +153,7 @@ fn vote(
     let mut next = 0;
     while next < front.len() {
         let asked = &front[next..];
-        let each = asked.len().div_ceil(MOST_ITEMS).max(LEAST_ASKED);
+        let each = bands::share(asked.len(), LEAST_ASKED);
         answers.resize(asked.len(), 0.0);
         workers.run_each(asked.chunks(each).zip(answers.chunks_mut(each)), &|(asked, answers)| {
             arch.dispatch(Vote { planes, nearby, inverse, jump, asked, answers });

@@ -31,9 +31,7 @@ impl Tiles {
 
     /// The tiles of each band, of whole tiles, for [`mark`].
     pub fn split(&mut self, bands: Bands) -> impl Iterator<Item = &mut [bool]> {
-        bands
-            .rows()
-            .scan(&mut self.has_edge[..], |rest, rows| rest.split_off_mut(..rows.len().div_ceil(ROWS) * self.across))
+        bands.split_tiles(&mut self.has_edge, ROWS, self.across)
     }
 
     /// Finds what lies near the tiles that have edges.

@@ -7,7 +7,8 @@ use pulp::{Arch, WithSimd};
 use super::super::EdgePixel;
 use super::super::share::Contrast;
 use super::{CELL_PX, Cluster, FRINGE, Surfaces, View, contrast, split};
-use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+use crate::compute::bands;
+use crate::compute::thread_pool::ThreadPool;
 
 /// So many cells in every direction are looked at; more where they have nothing of a surface, as at the tips of hair.
 const REACHES_CELLS: [usize; 3] = [1, 2, 5];
@@ -96,12 +97,12 @@ impl Clusters {
             }
             clusters.resize(cells.len(), Default::default());
             let new = &cells[made..];
-            let each = new.len().div_ceil(MOST_ITEMS).max(LEAST_CELLS);
+            let each = bands::share(new.len(), LEAST_CELLS);
             workers.run_each(new.chunks(each).zip(clusters[made..].chunks_mut(each)), &|(cells, clusters)| {
                 arch.dispatch(SplitCells { view, across, cells, clusters });
             });
             let surroundings = Surroundings { across, down, place, clusters };
-            let each = answers.len().div_ceil(MOST_ITEMS).max(LEAST_ANSWERS);
+            let each = bands::share(answers.len(), LEAST_ANSWERS);
             workers.run_each(answers.chunks_mut(each), &|answers| {
                 arch.dispatch(FindContrasts { surroundings, view, reach, answers });
             });
