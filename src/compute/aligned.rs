@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 
 /// Bytes of a cache line, and of the widest vector.
-const LINE: usize = 64;
+pub const LINE: usize = 64;
 
 /// A fixed number of values that starts at a cache line.
 #[derive(Default)]

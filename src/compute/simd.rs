@@ -6,6 +6,8 @@
 
 use pulp::{Arch, Simd};
 
+use super::aligned::LINE;
+
 /// `a * b + c`: one instruction where there is one, two where it would be a library call.
 #[inline(always)]
 pub fn madd<S: Simd>(a: f32, b: f32, c: f32) -> f32 {
@@ -40,5 +42,18 @@ pub fn name(arch: Arch) -> &'static str {
         #[cfg(target_arch = "aarch64")]
         Arch::Neon(_) => "NEON",
         _ => "baseline",
+    }
+}
+
+/// Asks for the cache lines of `values`, which are read some time later: where a pass jumps through memory, the machine does
+/// not see by itself what comes next.
+#[allow(unsafe_code)]
+#[inline(always)]
+pub fn prefetch<T>(values: &[T]) {
+    #[cfg(target_arch = "x86_64")]
+    for at in (0..values.len()).step_by(LINE / size_of::<T>()) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a prefetch has no effect that a program can see, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(values[at..].as_ptr().cast()) };
     }
 }

@@ -43,6 +43,9 @@ pub struct Layer {
     pub unhidden: Share,
 }
 
+/// Rows from the one that is read to the one that is asked for.
+const AHEAD: isize = 2;
+
 /// No bin waits.
 pub const NONE: usize = usize::MAX;
 
@@ -115,6 +118,8 @@ impl Band<'_> {
         let last = end.min((height as usize).next_multiple_of(CELL) as isize);
         for y in first - reach..last + reach {
             let inside = y.clamp(0, height - 1) as usize;
+            let ahead = (y + AHEAD).clamp(0, height - 1) as usize;
+            self.source.prefetch(ahead, (block * BLOCK) as isize - MARGIN as isize, columns + 2 * MARGIN);
             self.source.unpack::<V, WIDE>(
                 inside,
                 (block * BLOCK) as isize - MARGIN as isize,
@@ -130,7 +135,7 @@ impl Band<'_> {
                 }
                 Hidden::Filled { behind, .. } => {
                     let width = self.source.size.0;
-                    behind.put((block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
+                    behind.put(simd, (block * BLOCK) as isize - MARGIN as isize, inside, width, &mut surfaces);
                 }
             }
             let mut range = (f32::INFINITY, f32::NEG_INFINITY);

@@ -178,6 +178,11 @@ impl Strip<'_> {
                 self.source.copy_line(self.strip, y, self.size.0, pad, &mut lines[k * 4 * span..][..4 * span]);
             }
         }
+        for y in (ys.end..ys.end + BLOCK_ROWS).take_while(|&y| y < self.size.1) {
+            if self.scratch.filtered[y / CELL] {
+                self.source.prefetch_line(self.strip, y, pad);
+            }
+        }
         for (k, y) in ys.enumerate() {
             let out = &mut rows[(y & ring_mask) * row_len..][..row_len];
             if !self.scratch.filtered[y / CELL] {

@@ -8,13 +8,14 @@
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use pulp::Arch;
+use pulp::{Arch, Simd};
 
 use super::levels::{Base, Level, PLANES, Pull, Push};
 use super::rows::{PIECE, Rows};
 use super::unpack::Surfaces;
 use crate::bokeh::occlusion::other_surface;
 use crate::bokeh::plan::Share;
+use crate::compute::simd::{load, store};
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// A pixel of which less is known after all has flowed back is not known at all.
@@ -164,7 +165,14 @@ impl HalfRows<'_> {
 impl Behind<'_> {
     /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
     #[inline(always)]
-    pub fn put<const W: usize>(&self, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
+    pub fn put<S: Simd, const W: usize>(
+        &self,
+        simd: S,
+        x0: isize,
+        y: usize,
+        width: usize,
+        surfaces: &mut Surfaces<W>,
+    ) {
         let row = self.level.rows.row(y / 2);
         for start in (0..W).step_by(PIECE) {
             let coc = &mut surfaces.back.0[3][start..start + PIECE];
@@ -179,10 +187,19 @@ impl Behind<'_> {
                 continue;
             }
             let mut fill = [[0.0; PIECE]; PLANES];
-            for x in 0..PIECE {
-                let half = (x0 + (start + x) as isize).clamp(0, width as isize - 1) as usize / 2;
-                for (p, fill) in fill.iter_mut().enumerate() {
-                    fill[x] = row[p * self.level.rows.stride + half];
+            let first = x0 + start as isize;
+            for (p, fill) in fill.iter_mut().enumerate() {
+                let plane = &row[p * self.level.rows.stride..];
+                if first >= 0 && first as usize + PIECE <= width {
+                    // Pieces begin at even columns, and two columns have the same half.
+                    let halves = &plane[first as usize / 2..][..PIECE / 2];
+                    for k in 0..PIECE / 2 {
+                        (fill[2 * k], fill[2 * k + 1]) = (halves[k], halves[k]);
+                    }
+                } else {
+                    for x in 0..PIECE {
+                        fill[x] = plane[(first + x as isize).clamp(0, width as isize - 1) as usize / 2];
+                    }
                 }
             }
             for x in 0..PIECE {
@@ -193,10 +210,13 @@ impl Behind<'_> {
             for x in 0..PIECE {
                 fill[3][x] = if fill[3][x] > self.nearest_px { fill[3][x] } else { self.nearest_px };
             }
-            for p in 0..4 {
-                let plane = &mut surfaces.back.0[p][start..start + PIECE];
-                for x in 0..PIECE {
-                    plane[x] += (fill[p][x] - plane[x]) * hidden[x];
+            // By hand, as the compiler would take the same pixel of all planes together.
+            for (plane, fill) in surfaces.back.0.iter_mut().zip(&fill) {
+                for x in (0..PIECE).step_by(S::F32_LANES) {
+                    let own = load::<S>(plane, start + x);
+                    let change = simd.sub_f32s(load::<S>(fill, x), own);
+                    let change = simd.mul_f32s(change, load::<S>(&hidden, x));
+                    store::<S>(plane, start + x, simd.add_f32s(own, change));
                 }
             }
         }

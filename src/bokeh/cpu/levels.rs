@@ -4,7 +4,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::rows::Rows;
+use super::rows::{PIECE, Rows};
 use crate::bokeh::plan::Share;
 
 /// Planes of a level: premultiplied colour and CoC, and how much of it is known.
@@ -37,16 +37,15 @@ impl WithSimd for Base<'_> {
             let nearest = |y: usize| &self.halves.row(y)[(PLANES - 1) * stride..][..width];
             let (above, here, below) = (nearest(y.saturating_sub(1)), nearest(y), nearest((y + 1).min(height - 1)));
             // What hides a pixel the most is what is nearest: of three rows, then of three columns.
-            let mut before = f32::INFINITY;
+            let of_rows = &mut planes[..width];
             for x in 0..width {
-                known[x] = least(above[x], least(here[x], below[x]));
+                of_rows[x] = least(above[x], least(here[x], below[x]));
             }
-            for x in 0..last {
-                let own = known[x];
-                known[x] = least(before, least(own, known[x + 1]));
-                before = own;
+            known[0] = least(of_rows[0], of_rows[1.min(last)]);
+            known[last] = least(of_rows[last.saturating_sub(1)], of_rows[last]);
+            for ((known, beside), own) in known[1.min(last)..last].iter_mut().zip(&of_rows[2.min(last)..]).zip(of_rows.windows(2)) {
+                *known = least(own[0], least(own[1], *beside));
             }
-            known[last] = least(before, known[last]);
             for value in known.iter_mut() {
                 *value = self.unhidden.at(*value);
             }
@@ -130,28 +129,62 @@ impl WithSimd for Push<'_> {
         let Self { coarse, width, stride, .. } = self;
         for (y, out) in (self.first..).zip(self.rows.chunks_exact_mut(stride * PLANES)) {
             let [here, there] = beside(y, coarse.height).map(|row| coarse.rows.row(row));
-            for x in 0..width {
-                let known = out[(PLANES - 1) * stride + x];
-                if known >= 1.0 {
+            for first in (0..width).step_by(2 * PIECE) {
+                let count = (2 * PIECE).min(width - first);
+                let mut open = [0.0; 2 * PIECE];
+                let known = &out[(PLANES - 1) * stride + first..][..count];
+                for (open, known) in open.iter_mut().zip(known) {
+                    *open = if *known < 1.0 { 1.0 - *known } else { 0.0 };
+                }
+                if open.iter().all(|&open| open <= 0.0) {
                     continue;
                 }
-                let [near, far] = beside(x, coarse.width);
-                let mut values = [0.0; PLANES];
-                for (p, value) in values.iter_mut().enumerate() {
-                    let (here, there) = (&here[p * coarse.rows.stride..], &there[p * coarse.rows.stride..]);
-                    *value =
-                        0.75 * (0.75 * here[near] + 0.25 * there[near]) + 0.25 * (0.75 * here[far] + 0.25 * there[far]);
+                let mut values = [[0.0; 2 * PIECE]; PLANES];
+                for (p, values) in values.iter_mut().enumerate() {
+                    let plane = p * coarse.rows.stride..p * coarse.rows.stride + coarse.width;
+                    between(&here[plane.clone()], &there[plane], first / 2, values);
                 }
-                let scale = (1.0 - known) / values[PLANES - 1].max(1e-6);
-                for (p, value) in values.iter().enumerate() {
-                    out[p * stride + x] += value * scale;
+                let mut scale = [0.0; 2 * PIECE];
+                for x in 0..2 * PIECE {
+                    let sum = values[PLANES - 1][x];
+                    scale[x] = open[x] / if sum > 1e-6 { sum } else { 1e-6 };
+                }
+                for (p, values) in values.iter().enumerate() {
+                    let out = &mut out[p * stride + first..][..count];
+                    for ((out, value), scale) in out.iter_mut().zip(values).zip(&scale) {
+                        *out += value * scale;
+                    }
                 }
             }
         }
     }
 }
 
-/// The coarse pixel that covers pixel `at`, and the neighbour nearest to it, of `limit`.
+/// Two pixels for each of [`PIECE`] coarse ones from column `first` on, between the rows `here` and `there`.
+#[inline(always)]
+fn between(here: &[f32], there: &[f32], first: usize, values: &mut [f32; 2 * PIECE]) {
+    // One more on both sides; outside, the outermost repeat.
+    let mut rows = [[0.0; PIECE + 2]; 2];
+    for (row, line) in rows.iter_mut().zip([here, there]) {
+        if first > 0 && first + PIECE < line.len() {
+            row.copy_from_slice(&line[first - 1..][..PIECE + 2]);
+        } else {
+            for (k, value) in row.iter_mut().enumerate() {
+                *value = line[(first + k).saturating_sub(1).min(line.len() - 1)];
+            }
+        }
+    }
+    let mut column = [0.0; PIECE + 2];
+    for k in 0..PIECE + 2 {
+        column[k] = 0.75 * rows[0][k] + 0.25 * rows[1][k];
+    }
+    for k in 0..PIECE {
+        values[2 * k] = 0.75 * column[k + 1] + 0.25 * column[k];
+        values[2 * k + 1] = 0.75 * column[k + 1] + 0.25 * column[k + 2];
+    }
+}
+
+/// The coarse row that covers row `at`, and the neighbour nearest to it, of `limit`.
 #[inline(always)]
 fn beside(at: usize, limit: usize) -> [usize; 2] {
     let neighbour = if at.is_multiple_of(2) { (at / 2).saturating_sub(1) } else { at / 2 + 1 };

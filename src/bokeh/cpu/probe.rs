@@ -74,7 +74,7 @@ impl CpuBokeh {
             for x0 in (0..width).step_by(SPAN) {
                 source.unpack::<pulp::Scalar, SPAN>(y, x0 as isize, SPAN, &mut surfaces);
                 if let Some(behind) = &behind {
-                    behind.put(x0 as isize, y, width, &mut surfaces);
+                    behind.put(pulp::Scalar::new(), x0 as isize, y, width, &mut surfaces);
                 }
                 scene.extend((0..SPAN.min(width - x0)).map(|x| surfaces.pixel(x)));
             }

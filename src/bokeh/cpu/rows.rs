@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 use super::tiles::{BLOCK, TILE_W};
 use crate::bokeh::plan::{Bin, CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
+use crate::compute::simd::prefetch;
 
 /// Columns of a strip: what one part of the blur pass produces.
 pub const STRIP: usize = 32;
@@ -155,6 +156,19 @@ impl Strips {
     #[inline(always)]
     pub fn row(&self, strip: usize, y: usize) -> &[f32] {
         &self.data[(y / CELL * self.across + strip) * STRIP_CELLS + y % CELL * STRIP_ROW..][..STRIP_ROW]
+    }
+
+    /// Asks for what [`Strips::copy_line`] reads.
+    #[inline(always)]
+    pub fn prefetch_line(&self, strip: usize, y: usize, pad: usize) {
+        let first = (strip * STRIP).saturating_sub(pad);
+        let end = ((strip + 1) * STRIP + pad).min(self.across * STRIP);
+        for x in (first..end).step_by(PIECE) {
+            let row = self.row(x / STRIP, y);
+            for p in 0..4 {
+                prefetch(&row[p * STRIP + x % STRIP..][..PIECE]);
+            }
+        }
     }
 
     /// Copies row `y` of a strip with `pad` columns on both sides (whole pieces) to `line`, `[4][STRIP + 2 pad]`.

@@ -8,7 +8,7 @@ use super::pixels::{Pixels, Radii};
 use crate::bokeh::plan::Plan;
 use crate::color::luminance;
 use crate::compute::aligned::Line;
-use crate::compute::simd::madd;
+use crate::compute::simd::{madd, prefetch};
 use crate::frame::Matte;
 use crate::optics::CocField;
 
@@ -150,6 +150,25 @@ impl<'a> Source<'a> {
                 plane[..before].fill(left);
                 plane[end..columns].fill(right);
             }
+        }
+    }
+
+    /// Asks for what [`Source::unpack`] reads of row `y`.
+    #[inline(always)]
+    pub fn prefetch(&self, y: usize, x0: isize, columns: usize) {
+        let (width, height) = self.size;
+        let first = x0.max(0) as usize;
+        let end = (x0 + columns as isize).clamp(0, width as isize) as usize;
+        let values = (y * width + first) * 3..(y * width + end) * 3;
+        match self.pixels {
+            Pixels::Srgb(rgb) => prefetch(&rgb[values]),
+            Pixels::Linear(rgb) => prefetch(&rgb[values]),
+        }
+        match self.coc {
+            Radii::Field(CocField::Depth(_), Some(map)) if map.size() == (width as u32, height as u32) => {
+                prefetch(&map.metres[y * width + first..y * width + end]);
+            }
+            _ => {}
         }
     }
 
