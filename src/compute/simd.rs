@@ -52,8 +52,8 @@ pub fn name(arch: Arch) -> &'static str {
 pub fn prefetch<T>(values: &[T]) {
     #[cfg(target_arch = "x86_64")]
     for at in (0..values.len()).step_by(LINE / size_of::<T>()) {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
         // SAFETY: a prefetch has no effect that a program can see, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(values[at..].as_ptr().cast()) };
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(values[at..].as_ptr().cast()) };
     }
 }

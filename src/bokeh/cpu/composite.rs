@@ -10,14 +10,14 @@ use pulp::{Simd, WithSimd};
 
 use super::encode::{CHUNK, EncodeTable};
 use super::pixels::Sample;
-use super::rows::{PIECE, STRIP, Slot};
+use super::rows::{PIECE, STRIP, STRIP_ROW, Slot};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress};
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::plan::{Bin, CELL, HINDMOST_COVERAGE, MAX_BINS, Plan};
 use crate::color::luminance;
 use crate::compute::aligned::Line;
-use crate::compute::simd::{fma, load, madd, store};
+use crate::compute::simd::{fma, load, madd, prefetch, store};
 
 /// Makes rows `y0..` of the result: a row of tiles.
 pub struct Composite<'a, T> {
@@ -33,6 +33,8 @@ pub struct Composite<'a, T> {
     /// Back to 8 bits.
     pub encode: &'a EncodeTable,
     pub y0: usize,
+    /// Memory of the thread.
+    pub layers: &'a mut Layers,
     /// Whole rows of RGB.
     pub out: &'a mut [T],
 }
@@ -90,29 +92,34 @@ impl<S: Simd> Pile<S> {
     }
 }
 
-/// The layers of a chunk, front to back.
-struct Layers {
-    planes: Line<[[[f32; CHUNK]; 4]; MAX_BINS]>,
+/// The layers of a chunk, front to back: what bins have there.
+pub struct Layers {
+    planes: Box<[Line<[[f32; CHUNK]; 4]>]>,
     near: usize,
     count: usize,
 }
 
 impl Layers {
+    /// Memory for all bins that there can be.
+    pub fn new() -> Self {
+        Self { planes: vec![Line([[0.0; CHUNK]; 4]); MAX_BINS].into(), near: 0, count: 0 }
+    }
+
     /// Composites the layers, the near ones over the others, to linear light.
     #[inline(always)]
     fn flatten<S: Simd>(&self, simd: S, color: &mut Color) {
-        let (near, rest) = self.planes.0[..self.count].split_at(self.near);
+        let (near, rest) = self.planes[..self.count].split_at(self.near);
         let zero = simd.splat_f32s(0.0);
         for x in (0..CHUNK).step_by(S::F32_LANES) {
             let mut back = Pile::new(simd);
             for planes in rest {
-                back.add(simd, planes, x);
+                back.add(simd, &planes.0, x);
             }
             let mut light = back.with_rest_filled(simd);
             if !near.is_empty() {
                 let mut front = Pile::new(simd);
                 for planes in near {
-                    front.add(simd, planes, x);
+                    front.add(simd, &planes.0, x);
                 }
                 // Where nothing lies behind, the near bins have to fill the pixel.
                 let has_back = simd.greater_than_f32s(back.known, simd.splat_f32s(1e-4));
@@ -141,24 +148,26 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
         let width = self.plan.width;
         let row_of_tiles = self.y0 / TILE_H * self.tiles.across;
         let out = std::mem::take(&mut self.out);
-        let mut layers = Layers { planes: Line([[[0.0; CHUNK]; 4]; MAX_BINS]), near: 0, count: 0 };
         let mut color = Line([[0.0; CHUNK]; 3]);
         for x0 in (0..width).step_by(CHUNK) {
             let take = CHUNK.min(width - x0);
             let tiles = row_of_tiles + x0 / TILE_W..row_of_tiles + (x0 + take).div_ceil(TILE_W);
             let still = self.tiles.still[tiles].iter().all(|&still| still);
+            if x0 + CHUNK < width {
+                self.prefetch(x0 + CHUNK, (out.len() / (width * 3)).max(1));
+            }
             for (dy, row) in out.chunks_exact_mut(width * 3).enumerate() {
                 let y = self.y0 + dy;
                 let row = &mut row[x0 * 3..][..take * 3];
                 match self.plan.compositing {
                     Compositing::Layers => {
-                        if !self.read_layers(simd, y, x0, still, &mut layers) {
+                        if !self.read_layers(simd, y, x0, still) {
                             row.copy_from_slice(&self.pixels[(y * width + x0) * 3..][..take * 3]);
                             continue;
                         }
-                        layers.flatten(simd, &mut color);
+                        self.layers.flatten(simd, &mut color);
                     }
-                    Compositing::Select => self.select(simd, y, x0, take, &mut layers.planes.0[0], &mut color.0),
+                    Compositing::Select => self.select(simd, y, x0, take, &mut color.0),
                     Compositing::Gather => copy_gathered(self.gathered, width, y, x0, &mut color.0),
                 }
                 compress_highlights(&mut color.0, self.frame.expansion);
@@ -169,15 +178,36 @@ impl<T: Sample> WithSimd for Composite<'_, T> {
 }
 
 impl<T> Composite<'_, T> {
+    /// Asks for what the bins have of a chunk of `rows` rows.
+    #[inline(always)]
+    fn prefetch(&self, x0: usize, rows: usize) {
+        for bin in &self.plan.bins {
+            let slot = &self.slots[bin.slot];
+            if !slot.present {
+                continue;
+            }
+            let first = (self.y0 / bin.scale).min(bin.height - 1);
+            let end = ((self.y0 + rows - 1) / bin.scale + 2).min(bin.height);
+            let down = bin.height.div_ceil(CELL);
+            let strips = x0 / bin.scale / STRIP..((x0 + CHUNK) / bin.scale).div_ceil(STRIP).min(slot.source.across);
+            for strip in strips {
+                if slot.active[strip * down + first / CELL] {
+                    prefetch(&slot.out[(strip * bin.height + first) * STRIP_ROW..(strip * bin.height + end) * STRIP_ROW]);
+                }
+            }
+        }
+    }
+
     /// Reads the bins that hold anything in a chunk; false where it is `still` and nothing near reaches it: it stays.
     #[inline(always)]
-    fn read_layers<S: Simd>(&self, simd: S, y: usize, x0: usize, still: bool, layers: &mut Layers) -> bool {
+    fn read_layers<S: Simd>(&mut self, simd: S, y: usize, x0: usize, still: bool) -> bool {
+        let (plan, layers) = (self.plan, &mut *self.layers);
         (layers.near, layers.count) = (0, 0);
-        for bin in &self.plan.bins {
+        for bin in &plan.bins {
             if still && !bin.near && layers.count == 0 {
                 return false;
             }
-            if sample(simd, bin, &self.slots[bin.slot], y, x0, &mut layers.planes.0[layers.count]) {
+            if sample(simd, bin, &self.slots[bin.slot], y, x0, &mut layers.planes[layers.count].0) {
                 layers.count += 1;
                 layers.near += usize::from(bin.near);
             }
@@ -187,15 +217,8 @@ impl<T> Composite<'_, T> {
 
     /// The colour of a chunk of `take` pixels, from the bins of each pixel's own CoC, by their share of it.
     #[inline(always)]
-    fn select<S: Simd>(
-        &self,
-        simd: S,
-        y: usize,
-        x0: usize,
-        take: usize,
-        layer: &mut [[f32; CHUNK]; 4],
-        color: &mut [[f32; CHUNK]; 3],
-    ) {
+    fn select<S: Simd>(&mut self, simd: S, y: usize, x0: usize, take: usize, color: &mut [[f32; CHUNK]; 3]) {
+        let layer = &mut self.layers.planes[0].0;
         let mut coc = [0.0; CHUNK];
         coc_row(self.frame, y, x0, &mut coc[..take]);
         *color = [[0.0; CHUNK]; 3];

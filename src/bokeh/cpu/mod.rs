@@ -69,6 +69,7 @@ struct Member {
     sums: BandSums,
     reach: Vec<f32>,
     blur: Scratch,
+    layers: composite::Layers,
 }
 
 impl CpuBokeh {
@@ -85,6 +86,7 @@ impl CpuBokeh {
                 // The pass takes a grid and a row of it.
                 reach: Vec::with_capacity(slots.iter().map(|slot| slot.cells.data.len() * 2).max().unwrap_or(0)),
                 blur: Scratch::new(&plan),
+                layers: composite::Layers::new(),
             })
             .collect();
         let flags = |n: usize| (0..n).map(|_| AtomicBool::new(false)).collect();
@@ -287,10 +289,10 @@ impl CpuBokeh {
         let gathered = self.gather.as_ref().map_or(&[][..], |gather| gather.result());
         let (plan, slots, tiles) = (&self.plan, &self.slots, &self.tiles);
         let (arch, encode) = (self.arch, &self.encode);
-        self.workers.run(self.plan.height.div_ceil(TILE_H), &|part| {
-            let y0 = part * TILE_H;
+        self.workers.run_with(&mut self.members, plan.height.div_ceil(TILE_H), &|member: &mut Member, part| {
+            let (y0, layers) = (part * TILE_H, &mut member.layers);
             let out = out.part(part);
-            arch.dispatch(composite::Composite { plan, slots, tiles, frame, pixels, gathered, encode, y0, out });
+            arch.dispatch(composite::Composite { plan, slots, tiles, frame, pixels, gathered, encode, y0, layers, out });
         });
     }
 }
