@@ -11,7 +11,7 @@ use super::tiles::BLOCK;
 use super::unpack::Surfaces;
 use crate::bokeh::plan::{CELL, COVERAGE_FLOOR, Share};
 use crate::compute::aligned::Line;
-use crate::compute::simd::{load, store};
+use crate::compute::simd::{load, prefetch, store};
 
 /// One bin's memory of a band.
 pub struct BinRows<'a> {
@@ -59,6 +59,9 @@ impl BinSums {
         empty
     }
 }
+
+/// Rows from the one that is stored to the one that is asked for: a strip of it lies far from the next.
+const AHEAD: usize = 2;
 
 /// Where row `row` of the strip at column `x` begins.
 #[inline(always)]
@@ -225,6 +228,11 @@ impl BinRows<'_> {
                 continue;
             }
             let values = share.of(simd, taken, surfaces, MARGIN + x);
+            let ahead = &self.strip_row(block * BLOCK + x, (row + AHEAD).min(self.rows - 1))[x % STRIP..];
+            for p in 0..4 {
+                prefetch(&ahead[p * STRIP..][..V::F32_LANES]);
+            }
+            let out = self.strip_row(block * BLOCK + x, row);
             for p in 0..4 {
                 store::<V>(out, p * STRIP + x % STRIP, values[p]);
             }
@@ -279,6 +287,7 @@ impl BinRows<'_> {
             for p in 0..4 {
                 out[p * STRIP..][..STRIP].copy_from_slice(&means[p][x..x + STRIP]);
             }
+            prefetch(self.strip_row(x0 + x, (row + 1).min(self.rows - 1)));
         }
         let blocks = self.blocks();
         self.filled[row / CELL * blocks + block] = true;

@@ -14,7 +14,7 @@ use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_RO
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
 use crate::compute::aligned::Aligned;
-use crate::compute::simd::{load, store};
+use crate::compute::simd::{load, prefetch, store};
 
 /// Terms filtered at once; more are done in groups.
 pub const GROUP: usize = 4;
@@ -151,6 +151,7 @@ impl Strip<'_> {
                 next_y = (next_y + BLOCK_ROWS).min(end_y);
             }
             let ys = y..(y + BLOCK_ROWS).min(self.size.1);
+            prefetch(&self.out[ys.end * STRIP_ROW..(ys.end + BLOCK_ROWS).min(self.size.1) * STRIP_ROW]);
             self.filter_columns::<S, R, EVEN, P>(simd, first, ys, rows);
         }
         self.scratch.rows = scratch;
