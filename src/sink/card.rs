@@ -7,18 +7,31 @@ const TOP: [f32; 3] = [44.0, 48.0, 56.0];
 const BOTTOM: [f32; 3] = [24.0, 26.0, 31.0];
 const ICON: [f32; 3] = [150.0, 158.0, 170.0];
 
+/// How far the icon reaches from the middle to either side, up and down, in units.
+const REACH: (f32, f32) = (2.2, 1.8);
+
 /// A camera that is crossed out, in the middle of a dark picture: the camera is off.
 pub fn draw(picture: &mut ColorImage) {
     let (width, height) = (picture.width as usize, picture.height as usize);
     // The icon is about four units wide and two high.
     let unit_px = 0.09 * width.min(height) as f32;
     let middle = (width as f32 / 2.0, height as f32 / 2.0);
+    let around = |middle: f32, reach: f32| {
+        // The edge is antialiased over a pixel: half of one to either side.
+        let reach_px = reach * unit_px + 1.0;
+        (middle - reach_px).max(0.0) as usize..(middle + reach_px) as usize
+    };
+    let (columns, rows) = (around(middle.0, REACH.0), around(middle.1, REACH.1));
     for (y, row) in picture.rgb.chunks_exact_mut((3 * width).max(1)).enumerate() {
         let down = (y as f32 + 0.5) / height as f32;
         let behind: [f32; 3] = std::array::from_fn(|channel| TOP[channel] + (BOTTOM[channel] - TOP[channel]) * down);
-        for (x, pixel) in row.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+        let pixels = row.as_chunks_mut::<3>().0;
+        pixels.fill(behind.map(|value| value.round() as u8));
+        if !rows.contains(&y) {
+            continue;
+        }
+        for (x, pixel) in pixels.iter_mut().enumerate().take(columns.end).skip(columns.start) {
             let at = ((x as f32 + 0.5 - middle.0) / unit_px, (y as f32 + 0.5 - middle.1) / unit_px);
-            // The edge is antialiased over a pixel: half of one to either side.
             let cover = (0.5 - icon_distance(at) * unit_px).clamp(0.0, 1.0);
             *pixel = std::array::from_fn(|channel| {
                 (behind[channel] + (ICON[channel] - behind[channel]) * cover).round() as u8
