@@ -11,6 +11,9 @@ const WEIGHT_BITS: u32 = 14;
 const VALUE_BITS: u32 = 8;
 /// The weight of a tap that is alone.
 const ONE: u16 = 1 << WEIGHT_BITS;
+/// Columns that are filtered at once, and the values that a pixel of them is read as: the last is not used.
+const BLOCK: usize = 128;
+const VALUES: usize = 4;
 
 /// From one size to another.
 #[derive(Debug, Default)]
@@ -65,12 +68,7 @@ impl WithSimd for Row<'_> {
         let needed = across.needs(&columns);
         let needed = 3 * needed.start..3 * needed.end;
         filter_down(&from[stride * first + needed.start..], stride, weights, &mut row[needed]);
-        match across.taps {
-            2 => across.filter::<2>(row, columns, scaled),
-            3 => across.filter::<3>(row, columns, scaled),
-            4 => across.filter::<4>(row, columns, scaled),
-            _ => across.filter_many(row, columns, scaled),
-        }
+        across.filter(row, columns, scaled);
     }
 }
 
@@ -106,12 +104,23 @@ fn filter_down(rows: &[u8], stride: usize, weights: &[u16], row: &mut [u16]) {
     }
 }
 
-/// A value times a weight below [`ONE`], cut to 8 bits of fraction: below a tenth of a code in all, for every usual size.
-/// The upper half of a product of 16 bits each, which vectors have.
+/// A code times a weight below [`ONE`].
 #[inline(always)]
-fn share(value: u8, weight: u16) -> u16 {
-    let (value, weight) = (u16::from(value) << VALUE_BITS, weight << (16 - WEIGHT_BITS));
+fn share(code: u8, weight: u16) -> u16 {
+    share_of(u16::from(code) << VALUE_BITS, upper(weight))
+}
+
+/// A value times a weight of 16 bits, cut to the value's bits: below a tenth of a code in all, for every usual size. The upper
+/// half of a product of 16 bits each, which vectors have.
+#[inline(always)]
+fn share_of(value: u16, weight: u16) -> u16 {
     ((u32::from(value) * u32::from(weight)) >> 16) as u16
+}
+
+/// A weight of 16 bits. That of a tap that is alone is a little less than 1, which rounding makes good.
+#[inline(always)]
+fn upper(weight: u16) -> u16 {
+    if weight == ONE { u16::MAX } else { weight << (16 - WEIGHT_BITS) }
 }
 
 /// The taps of every pixel along one axis of the scaled picture: equally many each, within the source.
@@ -124,6 +133,8 @@ struct Axis {
     taps: usize,
     /// `taps` of each pixel; they sum to 1.
     weights: Vec<u16>,
+    /// The same, as [`share_of`] takes them, for each of the values of a pixel: `[tap][pixel][VALUES]`.
+    spread: Vec<u16>,
 }
 
 impl Axis {
@@ -154,6 +165,11 @@ impl Axis {
             }
             self.firsts.push(first);
         }
+        self.spread.clear();
+        for tap in 0..self.taps {
+            let weights = self.weights.iter().skip(tap).step_by(self.taps);
+            self.spread.extend(weights.flat_map(|&weight| [upper(weight); VALUES]));
+        }
     }
 
     fn taps(&self, pixel: usize) -> (usize, &[u16]) {
@@ -165,37 +181,29 @@ impl Axis {
         self.firsts[pixels.start]..self.firsts[pixels.end - 1] + self.taps
     }
 
-    /// Filters some of a row of 3-channel pixels, by `N` taps each.
+    /// Filters some of a row of 3-channel pixels.
     #[inline(always)]
-    fn filter<const N: usize>(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
-        let weights = &self.weights.as_chunks::<N>().0[columns.clone()];
-        let firsts = &self.firsts[columns];
-        for ((pixel, &first), weights) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(firsts).zip(weights) {
-            *pixel = filtered(&row[3 * first..][..3 * N + 1], weights);
+    fn filter(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
+        let to = self.firsts.len();
+        for (block, scaled) in scaled.as_chunks_mut::<3>().0.chunks_mut(BLOCK).enumerate() {
+            let at = columns.start + block * BLOCK;
+            let firsts = &self.firsts[at..at + scaled.len()];
+            let mut sums = [1 << (VALUE_BITS - 1); VALUES * BLOCK];
+            let mut pixels = [0; VALUES * BLOCK];
+            for tap in 0..self.taps {
+                // First the pixels side by side, as they lie apart; then all of them are weighed by vectors.
+                for (pixel, &first) in pixels.as_chunks_mut::<VALUES>().0.iter_mut().zip(firsts) {
+                    pixel.copy_from_slice(&row[3 * (first + tap)..][..VALUES]);
+                }
+                let weights = &self.spread[VALUES * (tap * to + at)..][..VALUES * scaled.len()];
+                for ((sum, &value), &weight) in sums.iter_mut().zip(&pixels).zip(weights) {
+                    *sum += share_of(value, weight);
+                }
+            }
+            let codes = sums.map(|sum| (sum >> VALUE_BITS) as u8);
+            for (scaled, code) in scaled.iter_mut().zip(codes.as_chunks::<VALUES>().0) {
+                scaled.copy_from_slice(&code[..3]);
+            }
         }
     }
-
-    #[inline(always)]
-    fn filter_many(&self, row: &[u16], columns: Range<usize>, scaled: &mut [u8]) {
-        let weights = self.weights[columns.start * self.taps..columns.end * self.taps].chunks_exact(self.taps);
-        let firsts = &self.firsts[columns];
-        for ((pixel, &first), weights) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(firsts).zip(weights) {
-            *pixel = filtered(&row[3 * first..][..3 * self.taps + 1], weights);
-        }
-    }
-}
-
-/// The weighted sum of pixels. Each is read as four values; what the fourth makes is not used.
-#[inline(always)]
-fn filtered(pixels: &[u16], weights: &[u16]) -> [u8; 3] {
-    const SHIFT: u32 = WEIGHT_BITS + VALUE_BITS;
-    let mut sums = [1_u32 << (SHIFT - 1); 4];
-    for (tap, &weight) in weights.iter().enumerate() {
-        let values = &pixels[3 * tap..][..4];
-        for (sum, &value) in sums.iter_mut().zip(values) {
-            *sum += u32::from(weight) * u32::from(value);
-        }
-    }
-    let [r, g, b, _] = sums.map(|sum| (sum >> SHIFT) as u8);
-    [r, g, b]
 }

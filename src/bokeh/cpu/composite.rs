@@ -192,7 +192,9 @@ impl<T> Composite<'_, T> {
             let strips = x0 / bin.scale / STRIP..((x0 + CHUNK) / bin.scale).div_ceil(STRIP).min(slot.source.across);
             for strip in strips {
                 if slot.active[strip * down + first / CELL] {
-                    prefetch(&slot.out[(strip * bin.height + first) * STRIP_ROW..(strip * bin.height + end) * STRIP_ROW]);
+                    prefetch(
+                        &slot.out[(strip * bin.height + first) * STRIP_ROW..(strip * bin.height + end) * STRIP_ROW],
+                    );
                 }
             }
         }

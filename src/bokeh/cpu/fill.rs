@@ -165,14 +165,7 @@ impl HalfRows<'_> {
 impl Behind<'_> {
     /// Replaces what is hidden in a piece of row `y` that begins at column `x0` of the picture.
     #[inline(always)]
-    pub fn put<S: Simd, const W: usize>(
-        &self,
-        simd: S,
-        x0: isize,
-        y: usize,
-        width: usize,
-        surfaces: &mut Surfaces<W>,
-    ) {
+    pub fn put<S: Simd, const W: usize>(&self, simd: S, x0: isize, y: usize, width: usize, surfaces: &mut Surfaces<W>) {
         let row = self.level.rows.row(y / 2);
         for start in (0..W).step_by(PIECE) {
             let coc = &mut surfaces.back.0[3][start..start + PIECE];

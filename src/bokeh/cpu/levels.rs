@@ -43,7 +43,9 @@ impl WithSimd for Base<'_> {
             }
             known[0] = least(of_rows[0], of_rows[1.min(last)]);
             known[last] = least(of_rows[last.saturating_sub(1)], of_rows[last]);
-            for ((known, beside), own) in known[1.min(last)..last].iter_mut().zip(&of_rows[2.min(last)..]).zip(of_rows.windows(2)) {
+            for ((known, beside), own) in
+                known[1.min(last)..last].iter_mut().zip(&of_rows[2.min(last)..]).zip(of_rows.windows(2))
+            {
                 *known = least(own[0], least(own[1], *beside));
             }
             for value in known.iter_mut() {

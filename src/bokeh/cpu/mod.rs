@@ -292,7 +292,18 @@ impl CpuBokeh {
         self.workers.run_with(&mut self.members, plan.height.div_ceil(TILE_H), &|member: &mut Member, part| {
             let (y0, layers) = (part * TILE_H, &mut member.layers);
             let out = out.part(part);
-            arch.dispatch(composite::Composite { plan, slots, tiles, frame, pixels, gathered, encode, y0, layers, out });
+            arch.dispatch(composite::Composite {
+                plan,
+                slots,
+                tiles,
+                frame,
+                pixels,
+                gathered,
+                encode,
+                y0,
+                layers,
+                out,
+            });
         });
     }
 }
