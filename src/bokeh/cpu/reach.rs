@@ -28,24 +28,24 @@ pub struct Reach<'a> {
 impl WithSimd for Reach<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        reach(self.plan, self.bin, self.cells, self.edges, self.scratch);
+    fn with_simd<S: Simd>(self, simd: S) {
+        reach(simd, self.plan, self.bin, self.cells, self.edges, self.scratch);
     }
 }
 
 #[inline(always)]
-fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
+fn reach<S: Simd>(simd: S, plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut Vec<f32>) {
     let (width, height, radius) = (cells.width, cells.height, plan.reach_cells(bin));
     // Only blurs of thousands of pixels reach farther; they are cut.
     let mut weights = [0.0; 64];
     let radius = radius.min(weights.len() - 1);
     (0..=radius).for_each(|d| weights[d] = nearness(d, bin));
     let row_len = CELL_PLANES * width;
-    scratch.clear();
-    scratch.resize(cells.data.len() + row_len, 0.0);
-    let (across, row) = scratch.split_at_mut(cells.data.len());
+    // All of it is written before it is read.
+    scratch.resize(scratch.len().max(cells.data.len() + row_len), 0.0);
+    let (across, row) = scratch[..cells.data.len() + row_len].split_at_mut(cells.data.len());
     for (k, (source, target)) in cells.data.chunks_exact(width).zip(across.chunks_exact_mut(width)).enumerate() {
-        combine_row(k % CELL_PLANES, source, target, &weights[..=radius]);
+        combine_row(simd, k % CELL_PLANES, source, target, &weights[..=radius]);
     }
     for y in 0..height {
         row[..2 * width].fill(0.0);
@@ -57,8 +57,8 @@ fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut
             let (sums, rest) = row.split_at_mut(2 * width);
             let (lows, highs) = rest.split_at_mut(3 * width);
             add(sums, source, weight);
-            keep_lowest(lows, &source[2 * width..]);
-            keep_highest(highs, &source[5 * width..]);
+            keep_lowest(simd, lows, &source[2 * width..]);
+            keep_highest(simd, highs, &source[5 * width..]);
         }
         // The mean of |CoC| becomes the radius.
         for x in 0..width {
@@ -88,7 +88,7 @@ fn reach(plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Edges, scratch: &mut
 /// Combines each cell of a plane's row with those up to `weights.len() - 1` cells away: weighted sums in planes 0 and
 /// 1, minima in planes 2 to 4, maxima in planes 5 to 7.
 #[inline(always)]
-fn combine_row(plane: usize, source: &[f32], target: &mut [f32], weights: &[f32]) {
+fn combine_row<S: Simd>(simd: S, plane: usize, source: &[f32], target: &mut [f32], weights: &[f32]) {
     target.copy_from_slice(source);
     if plane < 2 {
         for value in target.iter_mut() {
@@ -101,8 +101,8 @@ fn combine_row(plane: usize, source: &[f32], target: &mut [f32], weights: &[f32]
             let (target, source) = (&mut target[to..][..inner], &source[from..][..inner]);
             match plane {
                 0 | 1 => add(target, source, weights[distance]),
-                2..5 => keep_lowest(target, source),
-                _ => keep_highest(target, source),
+                2..5 => keep_lowest(simd, target, source),
+                _ => keep_highest(simd, target, source),
             }
         }
     }
@@ -116,14 +116,22 @@ fn add(target: &mut [f32], source: &[f32], weight: f32) {
 }
 
 #[inline(always)]
-fn keep_lowest(target: &mut [f32], source: &[f32]) {
+fn keep_lowest<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
+    let ((targets, target), (sources, source)) = (S::as_mut_simd_f32s(target), S::as_simd_f32s(source));
+    for (target, &source) in targets.iter_mut().zip(sources) {
+        *target = simd.min_f32s(source, *target);
+    }
     for (target, &source) in target.iter_mut().zip(source) {
         *target = if source < *target { source } else { *target };
     }
 }
 
 #[inline(always)]
-fn keep_highest(target: &mut [f32], source: &[f32]) {
+fn keep_highest<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
+    let ((targets, target), (sources, source)) = (S::as_mut_simd_f32s(target), S::as_simd_f32s(source));
+    for (target, &source) in targets.iter_mut().zip(sources) {
+        *target = simd.max_f32s(source, *target);
+    }
     for (target, &source) in target.iter_mut().zip(source) {
         *target = if source > *target { source } else { *target };
     }
