@@ -22,6 +22,16 @@ pub struct Stamp {
     pub captured_ns: Option<u64>,
 }
 
+/// Gives `values` the length `count`; the content is unspecified after. Memory that is new comes zeroed from the system, which
+/// provides it only as it is used.
+fn make_room<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
+    if values.capacity() < count {
+        *values = vec![T::default(); count];
+    } else {
+        values.resize(count, T::default());
+    }
+}
+
 /// An 8-bit sRGB picture: `height` x `width` x 3 bytes (R, G, B), row-major, no padding.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ColorImage {
@@ -44,7 +54,7 @@ impl ColorImage {
     /// Gives the picture another size, keeping its memory where that suffices. The content is unspecified after.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        self.rgb.resize(width as usize * height as usize * 3, 0);
+        make_room(&mut self.rgb, width as usize * height as usize * 3);
     }
 
     /// Columns and rows.
@@ -68,7 +78,7 @@ impl GrayImage {
     /// Gives the picture another size, keeping its memory where that suffices. The content is unspecified after.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        self.luma.resize(width as usize * height as usize, 0);
+        make_room(&mut self.luma, width as usize * height as usize);
     }
 
     /// Columns and rows.
@@ -118,7 +128,7 @@ impl DisparityMap {
     /// Gives the map another size, keeping its memory where that suffices. The content is unspecified after.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        self.px.resize(width as usize * height as usize, 0.0);
+        make_room(&mut self.px, width as usize * height as usize);
     }
 
     /// Columns and rows.
@@ -175,7 +185,7 @@ impl DepthMap {
     /// Gives the map another size, keeping its memory where that suffices. The content is unspecified after.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        self.metres.resize(width as usize * height as usize, 0.0);
+        make_room(&mut self.metres, width as usize * height as usize);
     }
 
     /// Columns and rows.

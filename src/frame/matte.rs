@@ -42,7 +42,7 @@ impl Mask {
     /// Gives the mask another size, keeping its memory where that suffices. The content is unspecified after.
     pub fn resize(&mut self, width: u32, height: u32) {
         (self.width, self.height) = (width, height);
-        self.share.resize(width as usize * height as usize, 0.0);
+        super::make_room(&mut self.share, width as usize * height as usize);
     }
 }
 
