@@ -5,7 +5,9 @@
 //! each share (Bayesian matting, after Chuang et al. 2001), and the map says which shares are likely before that.
 //! Everything is local, from one frame, and in time that grows with the length of the outlines.
 
+mod bits;
 mod clusters;
+mod contrast;
 pub mod mask;
 mod share;
 mod survey;
@@ -21,18 +23,17 @@ use crate::compute::bands;
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
+use bits::Bits;
 use clusters::{Clusters, View};
-use share::{Evidence, Labels, Prior};
+use share::{Colors, Evidence, LANES, Labels, Prior};
 use survey::Survey;
-use trace::{Trace, Trail};
+use trace::{Trace, Wide};
 
 /// Where the CoC jumps by so many pixels or more, pixels are worth taking apart.
 pub const FROM_PX: f32 = 0.5;
 /// Shares beyond this are those of a pure pixel.
 const NEARLY_PURE: f32 = 0.98;
 
-/// What the map says of pixels that were traced: nothing.
-const TRACED: Labels = Labels { is_near: false, borders: false, is_thin: false };
 /// So many pixels away from an edge, at most.
 const MOST_STEPS: usize = 16;
 /// Fewer pixels are not worth another thread.
@@ -44,16 +45,17 @@ pub struct Matting {
     arch: Arch,
     light: Box<[f32; 256]>,
     /// Whether pixels differ in depth from one of their eight neighbours: the others are pure.
-    at_edge: Vec<bool>,
+    at_edge: Bits,
     survey: Survey,
-    /// The pixels at edges, and then those that were traced.
     edges: Vec<EdgePixel>,
+    /// The pixels at edges, and then those that were traced.
+    pixels: Vec<Pixel>,
     clusters: Clusters,
-    /// The place of the answer for each.
-    answers: Vec<u32>,
     evidence: Vec<Evidence>,
-    /// What is known of pixels that were traced, while they are.
-    trails: Vec<Trail>,
+    wide: Wide,
+    /// The places of those that are mixed, in the order of the picture, and memory for that.
+    order: Vec<u32>,
+    traced: Vec<u64>,
 }
 
 /// A pixel beside a jump of depth.
@@ -64,6 +66,8 @@ struct EdgePixel {
     /// Inverse depth of the nearest and the farthest of the pixel and its neighbours, in 1/m.
     near: f32,
     far: f32,
+    /// What the map says of it; nothing of a pixel that was traced.
+    labels: Labels,
 }
 
 impl EdgePixel {
@@ -74,18 +78,53 @@ impl EdgePixel {
     }
 }
 
+/// A pixel that may be mixed.
+#[derive(Clone, Copy, Debug)]
+struct Pixel {
+    edge: EdgePixel,
+    /// The place of the answer with the surfaces around it.
+    answer: u32,
+    /// Its own light, and what is behind it where that is known.
+    own: [f32; 3],
+    behind: Option<[f32; 3]>,
+    /// How much of it the near surface has.
+    share: f32,
+}
+
+impl Pixel {
+    /// One that nothing else is known of.
+    #[inline(always)]
+    fn new(edge: EdgePixel, answer: u32) -> Self {
+        Self { edge, answer, own: [0.0; 3], behind: None, share: 0.0 }
+    }
+
+    /// Its place in a picture so wide.
+    #[inline(always)]
+    fn at(&self, width: usize) -> usize {
+        self.edge.y as usize * width + self.edge.x as usize
+    }
+
+    /// Whether it shows two surfaces.
+    #[inline(always)]
+    fn is_mixed(&self) -> bool {
+        if self.edge.labels.is_near { self.share <= NEARLY_PURE } else { self.share >= 1.0 - NEARLY_PURE }
+    }
+}
+
 impl Default for Matting {
     fn default() -> Self {
         Self {
             arch: Arch::new(),
             light: light_of_codes(),
-            at_edge: Vec::new(),
+            at_edge: Bits::default(),
             survey: Survey::default(),
             edges: Vec::new(),
+            pixels: Vec::new(),
             clusters: Clusters::default(),
-            answers: Vec::new(),
             evidence: Vec::new(),
-            trails: Vec::new(),
+            wide: Wide::default(),
+            order: Vec::new(),
+            traced: Vec::new(),
         }
     }
 }
@@ -110,7 +149,7 @@ impl Matting {
         if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
             return;
         }
-        let Self { arch, light, at_edge, survey, edges, clusters, answers, evidence, trails } = self;
+        let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced } = self;
         let arch = *arch;
         survey.find((arch, workers), map, jump, (at_edge, edges));
         let size = (map.width as usize, map.height as usize);
@@ -120,89 +159,70 @@ impl Matting {
             return;
         }
         clusters.clear(size);
-        answers.clear();
-        answers.extend(edges.iter().map(|edge| clusters.ask(jump, edge)));
+        pixels.clear();
+        pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.ask(jump, edge))));
         let (metres, matte, rgb) = (&map.metres, &mut map.matte, &color.rgb[..]);
         clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, 0);
         // Those between surfaces of which one has no pixels tell nothing.
-        let mut kept = 0;
-        for k in 0..edges.len() {
-            if clusters.at(answers[k]).is_some() {
-                (edges[kept], answers[kept]) = (edges[k], answers[k]);
-                kept += 1;
-            }
-        }
-        edges.truncate(kept);
-        answers.truncate(kept);
+        pixels.retain(|pixel| clusters.at(pixel.answer).is_some());
+        let on_edges = pixels.len();
         let (mut compared, mut prior, mut steps) = (0..0, Prior::default(), 0);
         loop {
-            let (found, is_traced) = (compared.end..edges.len(), steps > 0);
-            evidence.resize(found.end, Evidence::default());
-            let each = bands::share(found.len(), LEAST_PIXELS);
+            let found = compared.end..pixels.len();
+            evidence.resize(found.len().div_ceil(LANES), Evidence::default());
+            let each = bands::share(found.len(), LEAST_PIXELS).next_multiple_of(LANES);
             let view = View { size, metres, jump, at_edge, rgb, light };
-            let asked = edges[found.clone()].chunks(each).zip(answers[found.clone()].chunks(each));
-            let parts = asked.zip(evidence[found.clone()].chunks_mut(each));
-            workers.run_each(parts, &|((edges, answers), evidence)| {
+            let parts = pixels[found.clone()].chunks_mut(each).zip(evidence.chunks_mut(each / LANES));
+            workers.run_each(parts, &|(pixels, evidence)| {
                 let (view, behind) = (&view, &behind);
-                arch.dispatch(Compare { view, clusters, behind, is_traced, edges, answers, evidence });
+                arch.dispatch(Compare { view, clusters, behind, pixels, evidence });
             });
-            if !is_traced {
-                prior = Prior::of(evidence);
-            }
+            let is_first = steps == 0;
+            arch.dispatch(Weigh { prior: &mut prior, is_first, evidence, pixels: &mut pixels[found.clone()] });
             compared = found;
             if compared.is_empty() || compared.end >= most || steps == MOST_STEPS {
                 break;
             }
-            let (prior, evidence) = (&prior, &evidence[compared.clone()]);
-            let workers = &mut *workers;
-            arch.dispatch(Trace {
-                arch,
-                workers,
-                prior,
-                size,
-                metres,
-                jump,
-                rgb,
-                light,
-                at_edge,
-                clusters,
-                evidence,
-                edges,
-                answers,
-            });
+            let (compared, workers) = (compared.clone(), &mut *workers);
+            arch.dispatch(Trace { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels });
             steps += 1;
         }
-        trace::drop_wide(size, kept, &prior, (evidence, trails));
-        let has_traced = evidence.len() > kept;
+        wide.drop(size, on_edges, pixels);
+        sort(size.0, pixels, on_edges, (order, traced));
 
-        let each = bands::share(evidence.len(), LEAST_PIXELS);
-        let (mut counts, light) = ([0; MOST_ITEMS], &**light);
-        matte.pixels.resize(evidence.len(), MixedPixel::default());
-        let parts = evidence.chunks(each).zip(matte.pixels.chunks_mut(each)).zip(&mut counts);
-        workers.run_each(parts, &|((evidence, pixels), count)| {
-            let (rgb, width) = (&color.rgb, size.0);
-            *count = arch.dispatch(Mix { prior: &prior, clusters, light, rgb, width, evidence, pixels });
+        let each = bands::share(order.len(), LEAST_PIXELS);
+        matte.pixels.resize(order.len(), MixedPixel::default());
+        workers.run_each(order.chunks(each).zip(matte.pixels.chunks_mut(each)), &|(order, mixed)| {
+            arch.dispatch(Mix { clusters, width: size.0, pixels, order, mixed });
         });
-        let mut kept = 0;
-        for (first, count) in (0..).step_by(each).zip(counts).take_while(|(first, _)| *first < evidence.len()) {
-            matte.pixels.copy_within(first..first + count, kept);
-            kept += count;
-        }
-        matte.pixels.truncate(kept);
-        if has_traced {
-            matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
-        }
     }
 }
 
-/// Compares pixels at edges with the surfaces around them.
+/// Replaces `order` by the places of the mixed pixels, of which the first are in order and the others are not; `rest` is memory.
+fn sort(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut Vec<u32>, &mut Vec<u64>)) {
+    const PLACE_BITS: u32 = 32;
+    let key = |k: usize| (pixels[k].at(width) as u64) << PLACE_BITS | k as u64;
+    let mixed = |places: Range<usize>| places.filter(|&k| pixels[k].is_mixed());
+    rest.clear();
+    rest.extend(mixed(first..pixels.len()).map(key));
+    rest.sort_unstable();
+    let mut rest = rest.iter().copied().peekable();
+    order.clear();
+    for k in mixed(0..first) {
+        while let Some(key) = rest.next_if(|&other| other < key(k)) {
+            order.push(key as u32);
+        }
+        order.push(k as u32);
+    }
+    order.extend(rest.map(|key| key as u32));
+}
+
+/// Compares pixels with the surfaces around them.
 struct Compare<'a, B> {
     view: &'a View<'a>,
     clusters: &'a Clusters,
     behind: &'a B,
-    is_traced: bool,
-    edges: &'a [EdgePixel],
-    answers: &'a [u32],
+    pixels: &'a mut [Pixel],
     evidence: &'a mut [Evidence],
 }
 
@@ -212,49 +232,83 @@ impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Compare<'_, B> {
     // iterators, which would not have them.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { view, clusters, behind, is_traced, edges, answers, evidence } = self;
-        for ((edge, &answer), evidence) in edges.iter().zip(answers).zip(evidence) {
-            let Some(contrast) = clusters.at(answer) else { continue };
-            let at = edge.y as usize * view.size.0 + edge.x as usize;
-            let lights = (view.light(at), behind(at, edge.near));
-            let labels = if is_traced { TRACED } else { labels(view, edge, at) };
-            *evidence = Evidence::new(edge, labels, lights, (answer, contrast));
+        let Self { view, clusters, behind, pixels, evidence } = self;
+        for (pixels, evidence) in pixels.chunks_mut(LANES).zip(evidence) {
+            let mut colors = Colors::NONE;
+            for (k, pixel) in pixels.iter_mut().enumerate() {
+                let Some(contrast) = clusters.at(pixel.answer) else { continue };
+                let at = pixel.at(view.size.0);
+                let own = view.light(at);
+                // What is remembered of a surface that looks otherwise here is not of that surface.
+                let behind = match behind(at, pixel.edge.near) {
+                    Some(light) if contrast.is_like_far(light) => Some(light),
+                    _ => None,
+                };
+                let discriminant = contrast.discriminant(behind);
+                let share = discriminant.share(own);
+                let off_line = match behind {
+                    Some(light) => Some(contrast.off_line(light, own, share)),
+                    None => None,
+                };
+                colors.set(k, pixel.edge.labels, (share, discriminant.precision), off_line);
+                (pixel.own, pixel.behind) = (own, behind);
+            }
+            *evidence = Evidence::of(&colors);
         }
     }
 }
 
-/// Writes the mixed pixels of all that are known; how many they are.
-struct Mix<'a> {
-    prior: &'a Prior,
-    clusters: &'a Clusters,
-    light: &'a [f32; 256],
-    rgb: &'a [u8],
-    width: usize,
+/// Gives pixels their shares, by what is likely in this frame: that is found from the first of them.
+struct Weigh<'a> {
+    prior: &'a mut Prior,
+    is_first: bool,
     evidence: &'a [Evidence],
-    pixels: &'a mut [MixedPixel],
+    pixels: &'a mut [Pixel],
+}
+
+impl WithSimd for Weigh<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { prior, is_first, evidence, pixels } = self;
+        if is_first {
+            *prior = Prior::of(evidence);
+        }
+        for (pixels, evidence) in pixels.chunks_mut(LANES).zip(evidence) {
+            let shares = prior.shares(evidence);
+            for (pixel, share) in pixels.iter_mut().zip(shares) {
+                pixel.share = share;
+            }
+        }
+    }
+}
+
+/// Takes mixed pixels apart.
+struct Mix<'a> {
+    clusters: &'a Clusters,
+    width: usize,
+    pixels: &'a [Pixel],
+    /// The places of those that are mixed.
+    order: &'a [u32],
+    mixed: &'a mut [MixedPixel],
 }
 
 impl WithSimd for Mix<'_> {
-    type Output = usize;
+    type Output = ();
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> usize {
-        let Self { prior, clusters, light, rgb, width, evidence, pixels } = self;
-        let mut count = 0;
-        for one in evidence {
-            let share = prior.share(one);
-            let pure = if one.labels.is_near { share > NEARLY_PURE } else { share < 1.0 - NEARLY_PURE };
-            let Some(contrast) = clusters.at(one.answer).filter(|_| !pure) else { continue };
-            let at = one.edge.y as usize * width + one.edge.x as usize;
-            let own = light_of(light, rgb, at);
-            let (behind, difference) = match one.behind {
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { clusters, width, pixels, order, mixed } = self;
+        for (&k, mixed) in order.iter().zip(mixed) {
+            let pixel = &pixels[k as usize];
+            let Some(contrast) = clusters.at(pixel.answer) else { continue };
+            let Pixel { edge, own, behind, share, .. } = *pixel;
+            let (behind, difference) = match behind {
                 Some(light) => (1.0, contrast.difference_before(light, own, share)),
                 None => (1.0 - share, contrast.difference(own, share)),
             };
-            let (near_m, far_m) = (one.edge.near.recip(), one.edge.far.recip());
-            pixels[count] = MixedPixel { at: at as u32, near_m, far_m, share, behind, difference };
-            count += 1;
+            let (near_m, far_m) = (edge.near.recip(), edge.far.recip());
+            *mixed = MixedPixel { at: pixel.at(width) as u32, near_m, far_m, share, behind, difference };
         }
-        count
     }
 }
 
@@ -262,23 +316,6 @@ impl WithSimd for Mix<'_> {
 #[inline(always)]
 fn light_of(light: &[f32; 256], rgb: &[u8], at: usize) -> [f32; 3] {
     [0, 1, 2].map(|p| light[usize::from(rgb[3 * at + p])])
-}
-
-/// What the map says of the edge pixel `at` and its neighbours.
-#[inline(always)]
-fn labels(view: &View, edge: &EdgePixel, at: usize) -> Labels {
-    let is_near = edge.is_near(view.inverse(at));
-    let (mut borders, mut alike) = (false, 0);
-    let (xs, ys) = around(edge, 1, view.size);
-    for y in ys {
-        for x in xs.clone() {
-            let is_alike = edge.is_near(view.inverse(y * view.size.0 + x)) == is_near;
-            alike += u32::from(is_alike);
-            borders |= !is_alike && (x == edge.x as usize || y == edge.y as usize);
-        }
-    }
-    // Itself, and two neighbours in a row.
-    Labels { is_near, borders, is_thin: is_near && alike <= 3 }
 }
 
 /// The columns and rows of a pixel and those around it, `by` pixels to each side, as far as the picture has them.
