@@ -5,10 +5,10 @@
 
 mod answers;
 
-use super::bits::{Bits, places};
 use super::contrast::Contrast;
 use super::symmetric::{Symmetric, outer};
 use super::{larger, light_of, smaller};
+use crate::depth::bits::{Bits, places};
 use crate::frame::DepthMap;
 
 pub(super) use answers::Clusters;

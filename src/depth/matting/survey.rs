@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::bits::{Bits, WORD, places};
 use super::share::Labels;
 use super::{EdgePixel, around, larger, smaller};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
+use crate::depth::bits::{Bits, WORD, places};
 use crate::frame::DepthMap;
 
 /// Finds them; owns the memory for it.

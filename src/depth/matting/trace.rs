@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::bits::{Bits, places};
 use super::clusters::{Clusters, View};
 use super::share::Labels;
 use super::{EdgePixel, Pixel, around};
 use crate::compute::thread_pool::ThreadPool;
+use crate::depth::bits::{Bits, places};
 use crate::frame::DepthMap;
 
 /// Neighbours of a pixel with this share are looked at, too, where the map has no edge.
