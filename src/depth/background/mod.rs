@@ -125,7 +125,7 @@ impl Background {
             self.resumes_ns = time_ns.saturating_add(REST_NS);
             return;
         }
- /*L*/crate::laps::lap("l unlike");/*E*/        self.learn_rows(workers, (map, color), other); /*L*/crate::laps::lap("l rows");/*E*/
+        self.learn_rows(workers, (map, color), other);
     }
 
     /// Finds the matte of a picture by `matting`, before what is known to lie behind.
@@ -149,9 +149,20 @@ impl Background {
 
     /// The light behind pixel `at`, as the camera exposes now, whose nearer surface has inverse depth `near`, in 1/m; `None`
     /// where that is not known. Surfaces are another beyond a step `other` of it.
+    #[inline(always)]
     fn light_behind(&self, at: usize, near: f32, other: f32) -> Option<[f32; 3]> {
         let is_known = self.rounds[at] >= KNOWN && near - self.inverse[at] > other;
-        is_known.then(|| [0, 1, 2].map(|p| self.light[p][usize::from(self.rgb[3 * at + p])]))
+        if is_known { Some(self.light_at(at)) } else { None }
+    }
+
+    /// The light that is remembered of a pixel, as the camera exposes now.
+    #[inline(always)]
+    fn light_at(&self, at: usize) -> [f32; 3] {
+        let (rgb, mut light) = (&self.rgb[3 * at..][..3], [0.0; 3]);
+        for p in 0..3 {
+            light[p] = self.light[p][usize::from(rgb[p])];
+        }
+        light
     }
 
     /// Starts anew.
@@ -170,7 +181,7 @@ impl Background {
     fn align(&mut self, map: &DepthMap, color: &ColorImage, other: f32) -> bool {
         let size = reduced_size(color);
         let block_px = block_px(color.width);
- /*L*/crate::laps::start();/*E*/        self.reducer.reduce(color, &mut self.now); /*L*/crate::laps::lap("l reduce");/*E*/
+        self.reducer.reduce(color, &mut self.now);
         let Self { now, reduced, has, hidden, rounds, inverse, .. } = self;
         if reduced.len() != now.len() {
             reduced.clone_from(now);
@@ -196,12 +207,12 @@ impl Background {
         }
         let mut alignment = Alignment { gain: self.gain, ..Alignment::default() };
         self.aligner.shift(reduced, size, [0.0; 2]);
-        self.aligner.step(now, hidden, size, &mut alignment); /*L*/crate::laps::lap("l align");/*E*/
+        self.aligner.step(now, hidden, size, &mut alignment);
         self.gain = alignment.gain;
         self.reducer.expose(self.gain, &mut self.light);
         for (codes, gain) in self.codes.iter_mut().zip(self.gain) {
             codes.iter_mut().zip(0..=255).for_each(|(code, now)| *code = self.reducer.without_gain(now, gain));
-        } /*L*/crate::laps::lap("l codes");/*E*/
+        }
         let mut counts = [0usize; 2];
         for ((now, then), _) in now.iter().zip(&*reduced).zip(&*hidden).filter(|(_, hidden)| !**hidden) {
             let is_unlike =

@@ -150,7 +150,7 @@ impl Matting {
         }
         let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced } = self;
         let arch = *arch;
- /*L*/crate::laps::start();/*E*/        survey.find((arch, workers), map, jump, (at_edge, edges)); /*L*/crate::laps::lap("survey");/*E*/
+        survey.find((arch, workers), map, jump, (at_edge, edges));
         let size = (map.width as usize, map.height as usize);
         let most = Matte::most(size.0, size.1);
         if edges.len() > most {
@@ -159,12 +159,12 @@ impl Matting {
         }
         clusters.clear(size);
         pixels.clear();
-        pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.ask(jump, edge)))); /*L*/crate::laps::lap("ask");/*E*/
+        pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.ask(jump, edge))));
         let (metres, matte, rgb) = (&map.metres, &mut map.matte, &color.rgb[..]);
-        clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, 0); /*L*/crate::laps::lap("find");/*E*/
+        clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, 0);
         // Those between surfaces of which one has no pixels tell nothing.
         pixels.retain(|pixel| clusters.at(pixel.answer).is_some());
-        let on_edges = pixels.len(); /*L*/crate::laps::lap("keep");/*E*/
+        let on_edges = pixels.len();
         let (mut compared, mut prior, mut steps) = (0..0, Prior::default(), 0);
         loop {
             let found = compared.end..pixels.len();
@@ -175,25 +175,25 @@ impl Matting {
             workers.run_each(parts, &|(pixels, evidence)| {
                 let (view, behind) = (&view, &behind);
                 arch.dispatch(Compare { view, clusters, behind, pixels, evidence });
-            }); /*L*/crate::laps::lap(if steps>0 {"compare traced"} else {"compare"});/*E*/
+            });
             let is_first = steps == 0;
-            arch.dispatch(Weigh { prior: &mut prior, is_first, evidence, pixels: &mut pixels[found.clone()] }); /*L*/crate::laps::lap("weigh");/*E*/
+            arch.dispatch(Weigh { prior: &mut prior, is_first, evidence, pixels: &mut pixels[found.clone()] });
             compared = found;
             if compared.is_empty() || compared.end >= most || steps == MOST_STEPS {
                 break;
             }
             let (compared, workers) = (compared.clone(), &mut *workers);
-            arch.dispatch(Trace { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels }); /*L*/crate::laps::lap("trace");/*E*/
+            arch.dispatch(Trace { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels });
             steps += 1;
         }
-        wide.drop(size, on_edges, pixels); /*L*/crate::laps::lap("wide");/*E*/
-        sort(size.0, pixels, on_edges, (order, traced)); /*L*/crate::laps::lap("sort");/*E*/
+        wide.drop(size, on_edges, pixels);
+        sort(size.0, pixels, on_edges, (order, traced));
 
         let each = bands::share(order.len(), LEAST_PIXELS);
         matte.pixels.resize(order.len(), MixedPixel::default());
         workers.run_each(order.chunks(each).zip(matte.pixels.chunks_mut(each)), &|(order, mixed)| {
             arch.dispatch(Mix { clusters, width: size.0, pixels, order, mixed });
-        }); /*L*/crate::laps::lap("mix");/*E*/
+        });
     }
 }
 
