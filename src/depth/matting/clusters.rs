@@ -5,9 +5,12 @@
 
 mod answers;
 
+use pulp::Simd;
+
 use super::contrast::Contrast;
+use super::light_of;
 use super::symmetric::{Symmetric, outer};
-use super::{larger, light_of, smaller};
+use crate::compute::simd::load;
 use crate::depth::bits::{Bits, places};
 use crate::frame::DepthMap;
 
@@ -39,13 +42,14 @@ struct Cluster {
 }
 
 impl Cluster {
-    /// Of the total weight of pixels, and with it their light, its products, and their positions and inverse depths.
+    /// Of the sums of pixels, and of their columns and rows in a cell and their inverse depths, with their weights.
     #[inline(always)]
-    fn of_sums(weight: f32, [r, g, b]: [f32; 3], of_light: ([f32; 3], [f32; 3]), [x, y, inverse]: [f32; 3]) -> Self {
-        let ([rr, rg, rb], [gg, gb, bb]) = of_light;
-        let scale = if weight > 0.0 { 1.0 / weight } else { 0.0 };
-        let sums = Sums([weight, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]);
-        Self { sums, x: scale * x, y: scale * y, inverse: scale * inverse }
+    fn new(sums: Sums, [x, y, inverse]: [f32; 3], (left, top): (usize, usize)) -> Self {
+        if sums.weight() <= 0.0 {
+            return Self::default();
+        }
+        let scale = 1.0 / sums.weight();
+        Self { sums, x: left as f32 + scale * x, y: top as f32 + scale * y, inverse: scale * inverse }
     }
 }
 
@@ -144,31 +148,52 @@ fn contrast(Surfaces { near, far, fringe }: Surfaces) -> Contrast {
     Contrast::of([Color { mean, covariance }, far])
 }
 
-/// Every other pixel of a cell, as on a chessboard, tells enough.
-const SAMPLES: usize = CELL_PX * CELL_PX / 2;
-/// Numbers of so many pixels.
+/// Pixels of a cell, and every other of them, as on a chessboard, which tells enough.
+const PIXELS: usize = CELL_PX * CELL_PX;
+const SAMPLES: usize = PIXELS / 2;
+/// Numbers of the samples.
 type Lanes = [f32; SAMPLES];
 
-/// Pixels of a cell: weight, position, inverse depth and light.
+/// The places of the samples in their cell, in its order, and their columns and rows.
+const PLACES: [usize; SAMPLES] = {
+    let (mut places, mut k) = ([0; SAMPLES], 0);
+    while k < SAMPLES {
+        let row = 2 * k / CELL_PX;
+        places[k] = 2 * k + row % 2;
+        k += 1;
+    }
+    places
+};
+const COLUMNS: Lanes = along(1);
+const ROWS: Lanes = along(CELL_PX);
+
+const fn along(step: usize) -> Lanes {
+    let (mut along, mut k) = ([0.0; SAMPLES], 0);
+    while k < SAMPLES {
+        along[k] = (PLACES[k] / step % CELL_PX) as f32;
+        k += 1;
+    }
+    along
+}
+
+/// Samples of a cell: inverse depth and light.
 struct Samples {
-    weight: Lanes,
-    x: Lanes,
-    y: Lanes,
     inverse: Lanes,
     light: [Lanes; 3],
 }
 
 impl Samples {
-    /// The cluster of those that are chosen, with these weights.
+    /// The cluster of those that are chosen, with these weights, in a cell that begins there.
     #[inline(always)]
-    fn cluster(&self, weight: &Lanes) -> Cluster {
-        let Self { x, y, inverse, light: [r, g, b], .. } = self;
+    fn cluster(&self, weight: &Lanes, corner: (usize, usize)) -> Cluster {
+        let Self { inverse, light: [r, g, b] } = self;
         let (own_r, own_g, own_b) = (product(weight, r), product(weight, g), product(weight, b));
         let light = [total(&own_r), total(&own_g), total(&own_b)];
-        let of_r = [total(&product(&own_r, r)), total(&product(&own_r, g)), total(&product(&own_r, b))];
-        let others = [total(&product(&own_g, g)), total(&product(&own_g, b)), total(&product(&own_b, b))];
-        let means = [total(&product(weight, x)), total(&product(weight, y)), total(&product(weight, inverse))];
-        Cluster::of_sums(total(weight), light, (of_r, others), means)
+        let [rr, rg, rb] = [total(&product(&own_r, r)), total(&product(&own_r, g)), total(&product(&own_r, b))];
+        let [gg, gb, bb] = [total(&product(&own_g, g)), total(&product(&own_g, b)), total(&product(&own_b, b))];
+        let sums = Sums([total(weight), light[0], light[1], light[2], rr, rg, rb, gg, gb, bb, 0.0, 0.0]);
+        let (columns, rows) = (total(&product(weight, &COLUMNS)), total(&product(weight, &ROWS)));
+        Cluster::new(sums, [columns, rows, total(&product(weight, inverse))], corner)
     }
 }
 
@@ -197,98 +222,119 @@ fn total(values: &Lanes) -> f32 {
 /// The clusters of a cell: one where inverse depths differ by no more than `jump`, or else those of its nearest and of its
 /// farthest surface.
 #[inline(always)]
-fn split(view: &View, column: usize, row: usize) -> [Cluster; 3] {
+fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Cluster; 3] {
     let View { size: (width, height), jump, at_edge, .. } = *view;
-    let (left, top) = (column * CELL_PX, row * CELL_PX);
+    let corner @ (left, top) = (column * CELL_PX, row * CELL_PX);
     let (across, down) = ((width - left).min(CELL_PX), (height - top).min(CELL_PX));
-    let (mut values, mut edges) = ([[0.0; CELL_PX]; CELL_PX], [0u32; CELL_PX]);
-    let [(mut high, mut low), (mut pure_high, mut pure_low)] = [([0.0; CELL_PX], [f32::INFINITY; CELL_PX]); 2];
-    for k in 0..down {
-        let metres = &view.metres[(top + k) * width + left..][..across];
-        for x in 0..across {
-            values[k][x] = DepthMap::inverse_of(metres[x]);
-        }
-        // What is beyond the picture is as its last column, and at an edge.
-        for x in across..CELL_PX {
-            values[k][x] = values[k][across - 1];
-        }
-        edges[k] = (at_edge.from(left, top + k) as u32 & (1 << across) - 1) | !0 << across;
-        for x in 0..CELL_PX {
-            let (value, is_pure) = (values[k][x], edges[k] >> x & 1 == 0);
-            (high[x], low[x]) = (larger(high[x], value), smaller(low[x], value));
-            pure_high[x] = if is_pure { larger(pure_high[x], value) } else { pure_high[x] };
-            pure_low[x] = if is_pure { smaller(pure_low[x], value) } else { pure_low[x] };
-        }
+    // What is beyond the picture is as its last column and row.
+    let mut values = [0.0; PIXELS];
+    let mut codes = [[0; 3]; PIXELS];
+    let (mut edges, mut beyond) = (0, 0);
+    for (k, values) in values.as_chunks_mut::<CELL_PX>().0.iter_mut().enumerate() {
+        let y = top + k.min(down - 1);
+        let row = &view.rgb[3 * (y * width + left)..][..3 * across];
+        codes[k * CELL_PX..][..across].copy_from_slice(row.as_chunks().0);
+        let metres = &view.metres[y * width + left..][..across];
+        values[..across].copy_from_slice(metres);
+        values[across..].fill(metres[across - 1]);
+        let missing = if k < down { ROW & !0 << across } else { ROW };
+        edges |= (at_edge.from(left, y) & ROW & !missing) << (k * CELL_PX);
+        beyond |= missing << (k * CELL_PX);
     }
-    let ends = |high: [f32; CELL_PX], low: [f32; CELL_PX]| {
-        (high.into_iter().fold(0.0, larger), low.into_iter().fold(f32::INFINITY, smaller))
-    };
-    let (pure, all) = (ends(pure_high, pure_low), ends(high, low));
+    for value in &mut values {
+        *value = DepthMap::inverse_of(*value);
+    }
+    let close = close_to_edge(view, left, top);
+    let (mut weights, mut is_edge) = ([0.0; PIXELS], [0.0; PIXELS]);
+    for k in 0..PIXELS {
+        let is = |bits: u64| bits >> k & 1 != 0;
+        is_edge[k] = if is(edges | beyond) { 1.0 } else { 0.0 };
+        let weight = if is(close) { CLOSE_WEIGHT } else { 1.0 };
+        weights[k] = if is(edges) { AT_EDGE_WEIGHT } else { weight };
+        weights[k] = if is(beyond) { 0.0 } else { weights[k] };
+    }
+    let (pure, all) = ends(simd, &values, &is_edge);
     let (high, low) = if pure.0 >= pure.1 { pure } else { all };
     let is_one = high - low <= jump;
     let tolerance = if is_one { 2.0 * jump } else { jump };
-    let close = close_to_edge(view, left, top);
     let zeros = [0.0; SAMPLES];
-    let mut samples = Samples { weight: zeros, x: zeros, y: zeros, inverse: zeros, light: [zeros; 3] };
-    for k in 0..down {
-        for (n, x) in (k % 2..across).step_by(2).enumerate() {
-            let n = k * CELL_PX / 2 + n;
-            let light = view.light((top + k) * width + left + x);
-            for p in 0..3 {
-                samples.light[p][n] = light[p];
-            }
-            (samples.x[n], samples.y[n], samples.inverse[n]) = ((left + x) as f32, (top + k) as f32, values[k][x]);
-            let of_edge = (edges[k] >> x & 1, close[k] >> x & 1);
-            samples.weight[n] = match of_edge {
-                (0, 0) => 1.0,
-                (0, _) => CLOSE_WEIGHT,
-                _ => AT_EDGE_WEIGHT,
-            };
+    let mut samples = Samples { inverse: zeros, light: [zeros; 3] };
+    let [mut near, mut far] = [zeros; 2];
+    for k in 0..SAMPLES {
+        let (place, code) = (PLACES[k], &codes[PLACES[k]]);
+        for p in 0..3 {
+            samples.light[p][k] = view.light[usize::from(code[p])];
         }
+        (samples.inverse[k], near[k]) = (values[place], weights[place]);
     }
-    let mut weights = [zeros; 2];
-    for n in 0..SAMPLES {
-        let is_far = !is_one & (samples.inverse[n] <= 0.5 * (high + low));
-        let off = (samples.inverse[n] - if is_far { low } else { high }).abs();
-        let weight = if off > tolerance { 0.0 } else { samples.weight[n] };
-        weights[0][n] = if is_far { 0.0 } else { weight };
-        weights[1][n] = if is_far { weight } else { 0.0 };
+    for k in 0..SAMPLES {
+        let is_far = !is_one & (samples.inverse[k] <= 0.5 * (high + low));
+        let off = (samples.inverse[k] - if is_far { low } else { high }).abs();
+        let weight = if off > tolerance { 0.0 } else { near[k] };
+        near[k] = if is_far { 0.0 } else { weight };
+        far[k] = if is_far { weight } else { 0.0 };
     }
-    let far = if is_one { Cluster::default() } else { samples.cluster(&weights[1]) };
-    let mut clusters = [samples.cluster(&weights[0]), far, Cluster::default()];
+    let far = if is_one { Cluster::default() } else { samples.cluster(&far, corner) };
+    let mut clusters = [samples.cluster(&near, corner), far, Cluster::default()];
     if all.0 - all.1 > jump {
-        let fringe = &mut clusters[FRINGE];
-        for k in 0..down {
-            for x in places(u64::from(edges[k] & (1 << across) - 1)) {
-                let value = values[k][x];
-                if value > 0.5 * (all.0 + all.1) {
-                    let light = view.light((top + k) * width + left + x);
-                    let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer(light));
-                    fringe.sums.add(1.0, &Sums([1.0, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]));
-                    fringe.x += (left + x) as f32;
-                    fringe.y += (top + k) as f32;
-                    fringe.inverse += value;
-                }
+        let (mut sums, mut of_place) = (Sums::default(), [0.0; 3]);
+        for place in places(edges) {
+            let value = values[place];
+            if value > 0.5 * (all.0 + all.1) {
+                let (x, y) = (place % CELL_PX, place / CELL_PX);
+                let light = view.light((top + y) * width + left + x);
+                let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer(light));
+                sums.add(1.0, &Sums([1.0, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]));
+                of_place = [of_place[0] + x as f32, of_place[1] + y as f32, of_place[2] + value];
             }
         }
-        if fringe.sums.weight() > 0.0 {
-            let scale = 1.0 / fringe.sums.weight();
-            (fringe.x, fringe.y, fringe.inverse) = (scale * fringe.x, scale * fringe.y, scale * fringe.inverse);
-        }
+        clusters[FRINGE] = Cluster::new(sums, of_place, corner);
     }
     clusters
 }
 
-/// Which pixels of the rows of a cell are at an edge or close to one, a bit for each.
+/// The bits of a row of a cell.
+const ROW: u64 = (1 << CELL_PX) - 1;
+
+/// The largest and the smallest of those values that are not at an edge, and of all.
 #[inline(always)]
-fn close_to_edge(view: &View, left: usize, top: usize) -> [u32; CELL_PX] {
-    let mut rows = [0u32; CELL_PX + 2 * CLOSE_PX];
-    for (k, row) in rows.iter_mut().enumerate() {
-        let Some(y) = (top + k).checked_sub(CLOSE_PX).filter(|&y| y < view.size.1) else { continue };
-        let first = left.saturating_sub(CLOSE_PX);
-        let edges = (view.at_edge.from(first, y) as u32) << (first + CLOSE_PX - left);
-        // The bit of column `left` of the cell is that of its first `2 CLOSE_PX + 1` columns.
-        *row = (0..=2 * CLOSE_PX).fold(0, |close, by| close | edges >> by);
+fn ends<S: Simd>(simd: S, values: &[f32; PIXELS], is_edge: &[f32; PIXELS]) -> ((f32, f32), (f32, f32)) {
+    let (zero, beyond) = (simd.splat_f32s(0.0), simd.splat_f32s(f32::INFINITY));
+    let (mut high, mut low, mut pure_high, mut pure_low) = (zero, beyond, zero, beyond);
+    for at in (0..PIXELS).step_by(S::F32_LANES) {
+        let value = load::<S>(values, at);
+        let is_edge = simd.greater_than_f32s(load::<S>(is_edge, at), zero);
+        (high, low) = (simd.max_f32s(high, value), simd.min_f32s(low, value));
+        pure_high = simd.max_f32s(pure_high, simd.select_f32s(is_edge, zero, value));
+        pure_low = simd.min_f32s(pure_low, simd.select_f32s(is_edge, beyond, value));
     }
-    std::array::from_fn(|k| rows[k..=k + 2 * CLOSE_PX].iter().fold(0, |close, row| close | row))
+    let [pure, all] =
+        [[pure_high, pure_low], [high, low]].map(|[high, low]| (simd.reduce_max_f32s(high), simd.reduce_min_f32s(low)));
+    (pure, all)
+}
+
+/// Which pixels of a cell are at an edge or close to one, a bit for each.
+#[inline(always)]
+fn close_to_edge(view: &View, left: usize, top: usize) -> u64 {
+    let first = left.saturating_sub(CLOSE_PX);
+    let mut rows = [0u64; CELL_PX + 2 * CLOSE_PX];
+    for (k, row) in rows.iter_mut().enumerate() {
+        let y = top + k;
+        if (CLOSE_PX..view.size.1 + CLOSE_PX).contains(&y) {
+            let edges = view.at_edge.from(first, y - CLOSE_PX) << (first + CLOSE_PX - left);
+            // The bit of column `left` of the cell is that of its first `2 CLOSE_PX + 1` columns.
+            for by in 0..=2 * CLOSE_PX {
+                *row |= edges >> by;
+            }
+        }
+    }
+    let mut close = 0;
+    for k in 0..CELL_PX {
+        let mut of_row = 0;
+        for row in &rows[k..=k + 2 * CLOSE_PX] {
+            of_row |= row;
+        }
+        close |= (of_row & ROW) << (k * CELL_PX);
+    }
+    close
 }

@@ -137,10 +137,10 @@ struct SplitCells<'a> {
 impl WithSimd for SplitCells<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
         let Self { view, across, cells, clusters } = self;
         for (&cell, clusters) in cells.iter().zip(clusters) {
-            *clusters = split(view, cell as usize % across, cell as usize / across);
+            *clusters = split(simd, view, cell as usize % across, cell as usize / across);
         }
     }
 }
