@@ -151,7 +151,7 @@ impl Background {
     /// where that is not known. Surfaces are another beyond a step `other` of it.
     #[inline(always)]
     fn light_behind(&self, at: usize, near: f32, other: f32) -> Option<[f32; 3]> {
-        let is_known = self.rounds[at] >= KNOWN && near - self.inverse[at] > other;
+        let is_known = (self.rounds[at] >= KNOWN) & (near - self.inverse[at] > other);
         if is_known { Some(self.light_at(at)) } else { None }
     }
 

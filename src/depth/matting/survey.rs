@@ -5,7 +5,7 @@ use std::ops::Range;
 use pulp::{Arch, WithSimd};
 
 use super::share::Labels;
-use super::{EdgePixel, around, larger, smaller};
+use super::{EdgePixel, larger, smaller};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 use crate::depth::bits::{Bits, WORD, places};
@@ -134,16 +134,20 @@ fn word_of(bytes: &[u8; WORD]) -> u64 {
 
 /// What the map says of an edge pixel, by the inverse depth of its row and those beside it.
 #[inline(always)]
-fn labels(edge: &EdgePixel, rows: &[Vec<f32>; 3], size: (usize, usize)) -> Labels {
+fn labels(edge: &EdgePixel, rows: &[Vec<f32>; 3], (width, height): (usize, usize)) -> Labels {
     let (x, y) = (edge.x as usize, edge.y as usize);
-    let is_near = edge.is_near(rows[y % 3][x]);
+    let middle = edge.middle();
+    let is_near = rows[y % 3][x] > middle;
+    // No branches; what is beyond the picture is left out of both.
+    let columns = [(x.saturating_sub(1), x > 0), (x, true), ((x + 1).min(width - 1), x + 1 < width)];
+    let ys = [(y.saturating_sub(1), y > 0), (y, true), ((y + 1).min(height - 1), y + 1 < height)];
     let (mut borders, mut alike) = (false, 0);
-    let (xs, ys) = around(edge, 1, size);
-    for other_y in ys {
-        for other_x in xs.clone() {
-            let is_alike = edge.is_near(rows[other_y % 3][other_x]) == is_near;
-            alike += u32::from(is_alike);
-            borders |= !is_alike && (other_x == x || other_y == y);
+    for j in 0..3 {
+        let row = &rows[ys[j].0 % 3];
+        for i in 0..3 {
+            let is_alike = (row[columns[i].0] > middle) == is_near;
+            alike += u32::from(is_alike & columns[i].1 & ys[j].1);
+            borders |= !is_alike & (i == 1 || j == 1);
         }
     }
     // Itself, and two neighbours in a row.
