@@ -1,7 +1,9 @@
 //! How the colours of two surfaces differ, and which of them a mixed pixel is made of.
 
 use super::clusters::Color;
+use super::share::{LANES, Lanes};
 use super::symmetric::{Symmetric, dot, inverse, times};
+use super::{larger, smaller};
 
 /// Covariances of few pixels are too narrow: so much of them goes evenly into all directions.
 const SHRINKAGE: f32 = 0.01;
@@ -135,6 +137,13 @@ impl Contrast {
         dot(off, times(&self.inverse, off))
     }
 
+    /// Both surfaces, of which the far one has this light here, but for noise, where that is known.
+    #[inline(always)]
+    pub(super) fn before(&self, light: Option<[f32; 3]>) -> [Color; 2] {
+        let [near, far] = self.surfaces;
+        [near, Color { mean: light.unwrap_or(far.mean), ..far }]
+    }
+
     /// Colour of the near surface less that of the far one, for a pixel of which the near one has a share: the most likely
     /// ones of those that add up to the pixel's `own` (Chuang et al. 2001, equation 9, with the pixel as exact). None is
     /// darker than black, or brighter than white.
@@ -155,18 +164,71 @@ impl Contrast {
 #[inline(always)]
 fn difference(near: &Color, far: &Color, own: [f32; 3], share: f32) -> [f32; 3] {
     let rest = 1.0 - share;
-    let spread = std::array::from_fn(|k| share * share * near.covariance[k] + rest * rest * far.covariance[k]);
-    let spread = widened(spread);
-    let residual = std::array::from_fn(|p| own[p] - share * near.mean[p] - rest * far.mean[p]);
-    let step = times(&inverse(&spread), residual);
+    let (mut spread, mut residual) = ([0.0; 6], [0.0; 3]);
+    for k in 0..6 {
+        spread[k] = share * share * near.covariance[k] + rest * rest * far.covariance[k];
+    }
+    for p in 0..3 {
+        residual[p] = own[p] - share * near.mean[p] - rest * far.mean[p];
+    }
+    let step = times(&inverse(&widened(spread)), residual);
     let (of_near, of_far) = (times(&near.covariance, step), times(&far.covariance, step));
-    let (up, down) = (rest.max(1e-3), share.max(1e-3));
-    std::array::from_fn(|p| {
+    let (up, down) = (larger(rest, 1e-3), larger(share, 1e-3));
+    let mut differences = [0.0; 3];
+    for p in 0..3 {
         let difference = near.mean[p] + share * of_near[p] - far.mean[p] - rest * of_far[p];
-        let most = ((1.0 - own[p]) / up).min(own[p] / down);
-        let least = -(own[p] / up).min((1.0 - own[p]) / down);
-        difference.clamp(least.min(0.0), most.max(0.0))
-    })
+        let most = smaller((1.0 - own[p]) / up, own[p] / down);
+        let least = -smaller(own[p] / up, (1.0 - own[p]) / down);
+        differences[p] = smaller(larger(difference, smaller(least, 0.0)), larger(most, 0.0));
+    }
+    differences
+}
+
+/// Some pixels and their surfaces, a number of all of them after the other: means, covariances, light, shares.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Parts {
+    means: [[Lanes; 3]; 2],
+    covariances: [[Lanes; 6]; 2],
+    own: [Lanes; 3],
+    share: Lanes,
+}
+
+impl Parts {
+    /// Replaces one.
+    #[inline(always)]
+    pub fn set(&mut self, k: usize, surfaces: [Color; 2], own: [f32; 3], share: f32) {
+        for n in 0..2 {
+            for p in 0..3 {
+                self.means[n][p][k] = surfaces[n].mean[p];
+            }
+            for p in 0..6 {
+                self.covariances[n][p][k] = surfaces[n].covariance[p];
+            }
+        }
+        for p in 0..3 {
+            self.own[p][k] = own[p];
+        }
+        self.share[k] = share;
+    }
+
+    /// [`Contrast::difference`] of all.
+    #[inline(always)]
+    pub fn differences(&self) -> [Lanes; 3] {
+        let mut differences = [[0.0; LANES]; 3];
+        for k in 0..LANES {
+            let ([near, far], [of_near, of_far]) = (&self.means, &self.covariances);
+            let mean = |mean: &[Lanes; 3]| [mean[0][k], mean[1][k], mean[2][k]];
+            let color = |of: &[Lanes; 3], with: &[Lanes; 6]| Color {
+                mean: mean(of),
+                covariance: [with[0][k], with[1][k], with[2][k], with[3][k], with[4][k], with[5][k]],
+            };
+            let of_one = difference(&color(near, of_near), &color(far, of_far), mean(&self.own), self.share[k]);
+            for p in 0..3 {
+                differences[p][k] = of_one[p];
+            }
+        }
+        differences
+    }
 }
 
 /// A covariance of few pixels with what goes evenly into all directions.

@@ -8,6 +8,7 @@
 mod clusters;
 mod contrast;
 pub mod mask;
+mod passes;
 mod share;
 mod survey;
 mod symmetric;
@@ -15,7 +16,7 @@ mod trace;
 
 use std::ops::Range;
 
-use pulp::{Arch, WithSimd};
+use pulp::Arch;
 
 use crate::color::light_of_codes;
 use crate::compute::bands;
@@ -24,7 +25,8 @@ use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
 use super::bits::Bits;
 use clusters::{Clusters, View};
-use share::{Colors, Evidence, LANES, Labels, Prior};
+use passes::{Compare, Mix, Weigh};
+use share::{Evidence, LANES, Labels, Prior};
 use survey::Survey;
 use trace::{Trace, Wide};
 
@@ -220,103 +222,6 @@ fn sort(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut Vec<u
         order.push(k as u32);
     }
     order.extend(rest.map(|key| key as u32));
-}
-
-/// Compares pixels with the surfaces around them.
-struct Compare<'a, B> {
-    view: &'a View<'a>,
-    clusters: &'a Clusters,
-    behind: &'a B,
-    pixels: &'a mut [Pixel],
-    evidence: &'a mut [Evidence],
-}
-
-impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Compare<'_, B> {
-    type Output = ();
-    // No vectors by hand: the call has the compiler use what the processor has, in all that it takes in. Loops, not closures for
-    // iterators, which would not have them.
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { view, clusters, behind, pixels, evidence } = self;
-        for (pixels, evidence) in pixels.chunks_mut(LANES).zip(evidence) {
-            // What lies apart in memory first, so that none waits for another.
-            for pixel in &mut *pixels {
-                let at = pixel.at(view.size.0);
-                (pixel.own, pixel.behind) = (view.light(at), behind(at, pixel.edge.near));
-            }
-            let mut colors = Colors::NONE;
-            for (k, pixel) in pixels.iter_mut().enumerate() {
-                let Some(contrast) = clusters.at(pixel.answer) else { continue };
-                // What is remembered of a surface that looks otherwise here is not of that surface.
-                pixel.behind = match pixel.behind {
-                    Some(light) if contrast.is_like_far(light) => Some(light),
-                    _ => None,
-                };
-                let discriminant = contrast.discriminant(pixel.behind);
-                let share = discriminant.share(pixel.own);
-                let off_line = match pixel.behind {
-                    Some(light) => Some(contrast.off_line(light, pixel.own, share)),
-                    None => None,
-                };
-                colors.set(k, pixel.edge.labels, (share, discriminant.precision), off_line);
-            }
-            *evidence = Evidence::of(&colors);
-        }
-    }
-}
-
-/// Gives pixels their shares, by what is likely in this frame: that is found from the first of them.
-struct Weigh<'a> {
-    prior: &'a mut Prior,
-    is_first: bool,
-    evidence: &'a [Evidence],
-    pixels: &'a mut [Pixel],
-}
-
-impl WithSimd for Weigh<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { prior, is_first, evidence, pixels } = self;
-        if is_first {
-            *prior = Prior::of(evidence);
-        }
-        for (pixels, evidence) in pixels.chunks_mut(LANES).zip(evidence) {
-            let shares = prior.shares(evidence);
-            for (pixel, share) in pixels.iter_mut().zip(shares) {
-                pixel.share = share;
-            }
-        }
-    }
-}
-
-/// Takes mixed pixels apart.
-struct Mix<'a> {
-    clusters: &'a Clusters,
-    width: usize,
-    pixels: &'a [Pixel],
-    /// The places of those that are mixed.
-    order: &'a [u32],
-    mixed: &'a mut [MixedPixel],
-}
-
-impl WithSimd for Mix<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { clusters, width, pixels, order, mixed } = self;
-        for (&k, mixed) in order.iter().zip(mixed) {
-            let pixel = &pixels[k as usize];
-            let Some(contrast) = clusters.at(pixel.answer) else { continue };
-            let Pixel { edge, own, behind, share, .. } = *pixel;
-            let (behind, difference) = match behind {
-                Some(light) => (1.0, contrast.difference_before(light, own, share)),
-                None => (1.0 - share, contrast.difference(own, share)),
-            };
-            let (near_m, far_m) = (edge.near.recip(), edge.far.recip());
-            *mixed = MixedPixel { at: pixel.at(width) as u32, near_m, far_m, share, behind, difference };
-        }
-    }
 }
 
 /// The colour of a pixel in linear light.

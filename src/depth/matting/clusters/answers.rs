@@ -6,7 +6,8 @@ use pulp::{Arch, WithSimd};
 
 use super::super::EdgePixel;
 use super::super::contrast::Contrast;
-use super::{CELL_PX, Cluster, FRINGE, Sums, Surfaces, View, contrast, split};
+use super::cell::split;
+use super::{CELL_PX, Cluster, FRINGE, Sums, Surfaces, View, contrast};
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
 
