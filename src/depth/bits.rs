@@ -45,7 +45,7 @@ impl Bits {
     /// Sets that of a pixel.
     #[inline(always)]
     pub fn set(&mut self, x: usize, y: usize) {
-        self.set_from(x, y, 1);
+        self.words[y * self.across + x / WORD] |= 1 << (x % WORD);
     }
 
     /// Sets those that are set in `bits`, as [`Self::from`] gives them.

@@ -43,9 +43,9 @@ impl Reducer {
     /// The square root of the light of a value in codes, 0 to 255.
     #[inline(always)]
     pub fn root(&self, code: f32) -> f32 {
-        let first = code as usize;
-        let [a, b] = [self.roots[first], self.roots[first + 1]];
-        a + (b - a) * (code - first as f32)
+        let first = code as u8;
+        let [a, b] = [self.roots[usize::from(first)], self.roots[usize::from(first) + 1]];
+        a + (b - a) * (code - f32::from(first))
     }
 
     /// The code of a value whose light's root is this.

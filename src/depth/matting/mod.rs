@@ -194,7 +194,7 @@ impl Matting {
             arch.dispatch(Trace { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels });
             steps += 1;
         }
-        wide.drop(size, on_edges, pixels);
+        wide.drop(size, &mut pixels[on_edges..]);
         sort(size.0, pixels, on_edges, (order, traced));
 
         let each = bands::share(order.len(), LEAST_PIXELS);

@@ -83,26 +83,31 @@ pub struct Wide {
 }
 
 impl Wide {
-    /// Lets go of what was traced, those after the first `on_edges`, into something far that looks like what is near: a hair
-    /// nowhere fills a square of three pixels, as a picture's frame does.
-    pub fn drop(&mut self, size: (usize, usize), on_edges: usize, pixels: &mut Vec<Pixel>) {
-        if pixels.len() == on_edges {
+    /// Lets go of pixels that were traced into something far that looks like what is near: a hair nowhere fills a square of three
+    /// pixels, as a picture's frame does.
+    pub fn drop(&mut self, size: (usize, usize), pixels: &mut [Pixel]) {
+        if pixels.is_empty() {
             return;
         }
         let Self { traced, seen, wide } = self;
         for bits in [&mut *traced, &mut *seen, &mut *wide] {
             bits.clear(size);
         }
-        for Pixel { edge, share, .. } in &pixels[on_edges..] {
+        for Pixel { edge, share, .. } in &*pixels {
             let (x, y) = (edge.x as usize, edge.y as usize);
             traced.set(x, y);
             if *share >= TRACED_FROM {
                 seen.set(x, y);
             }
         }
-        for Pixel { edge, .. } in &pixels[on_edges..] {
-            let (xs, mut ys) = around(edge, 1, size);
-            if ys.any(|y| !seen.from(xs.start, y) & below(xs.len()) != 0) {
+        let mut is_any = false;
+        for Pixel { edge, .. } in &*pixels {
+            let (xs, ys) = around(edge, 1, size);
+            let mut missing = 0;
+            for y in ys {
+                missing |= !seen.from(xs.start, y);
+            }
+            if missing & below(xs.len()) != 0 {
                 continue;
             }
             // The outline of what is wide is part of it.
@@ -112,11 +117,14 @@ impl Wide {
                 seen.set_from(xs.start, y, part);
                 wide.set_from(xs.start, y, part);
             }
+            is_any = true;
         }
-        let mut at = 0;
-        pixels.retain(|Pixel { edge, .. }| {
-            at += 1;
-            at <= on_edges || !wide.has(edge.x as usize, edge.y as usize)
-        });
+        if is_any {
+            for pixel in pixels {
+                if wide.has(pixel.edge.x as usize, pixel.edge.y as usize) {
+                    pixel.share = 0.0;
+                }
+            }
+        }
     }
 }
