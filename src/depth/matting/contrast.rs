@@ -1,4 +1,5 @@
 //! How the colours of two surfaces differ, and which of them a mixed pixel is made of.
+
 #![allow(clippy::needless_range_loop)] // Planes and pixels index several arrays at once.
 
 use super::clusters::Color;

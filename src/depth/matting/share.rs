@@ -1,4 +1,5 @@
 //! The share of a mixed pixel: what its colour says, and what was likely before that.
+
 #![allow(clippy::needless_range_loop)] // Steps and pixels index several arrays at once.
 
 use super::larger;

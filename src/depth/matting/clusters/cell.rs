@@ -1,4 +1,5 @@
 //! The clusters of one cell.
+
 #![allow(clippy::needless_range_loop)] // Pixels and planes index several arrays at once.
 
 use pulp::Simd;
