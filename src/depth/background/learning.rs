@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use pulp::{Arch, WithSimd};
 
-use super::{Background, KNOWN, LESSONS};
+use super::{Background, LESSONS};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 use crate::depth::bits::Bits;
@@ -27,8 +27,6 @@ const CHANGED: i32 = 20;
 const MEMORY: i32 = 4;
 /// Pixels of a row that are looked at at once.
 const BLOCK: usize = 32;
-
-const _: () = assert!(KNOWN < SURE);
 
 /// Numbers of a block, and with those beside it.
 type Lanes<T> = [T; BLOCK];
@@ -79,7 +77,7 @@ impl WithSimd for Learn<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { view, rows, rgb, inverse, rounds } = self;
         let (width, first) = (view.size.0, rows.start);
-        for y in rows.filter(|y| (y + view.lesson) % ROWS == 0) {
+        for y in rows.filter(|y| y % ROWS == view.lesson % ROWS) {
             for begin in (0..width).step_by(BLOCK) {
                 let count = (width - begin).min(BLOCK);
                 let at = (y - first) * width + begin;
