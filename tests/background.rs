@@ -65,9 +65,10 @@ impl Seer {
         let (picture, map) = shot.taken();
         let mut last = map.clone();
         for _ in 0..frames {
-            self.background.learn(&map, &picture, &LENS, self.time_ns);
+            let mut workers = ThreadPool::new("background", 2);
+            self.background.learn(&mut workers, (&map, &picture), &LENS, self.time_ns);
             last.clone_from(&map);
-            self.background.reveal(&mut ThreadPool::new("reveal", 2), &mut last, &picture, &LENS);
+            self.background.reveal(&mut workers, &mut last, &picture, &LENS);
             self.time_ns += PERIOD_NS;
         }
         last
@@ -143,11 +144,12 @@ fn another_place_or_size_is_begun_anew() {
     let after = Shot { person: BEFORE.person + STEP, ..BEFORE };
     assert!(seer.see(&after, 2).matte.pixels.is_empty());
     let (picture, mut map) = (noise(32, 24), depth(32, 24, |_, _| 1.0));
-    seer.background.learn(&map, &picture, &LENS, seer.time_ns);
-    seer.background.reveal(&mut ThreadPool::new("reveal", 2), &mut map, &picture, &LENS);
+    let mut workers = ThreadPool::new("background", 2);
+    seer.background.learn(&mut workers, (&map, &picture), &LENS, seer.time_ns);
+    seer.background.reveal(&mut workers, &mut map, &picture, &LENS);
     assert!(map.matte.pixels.is_empty());
     let small = depth(16, 12, |_, _| 1.0);
-    seer.background.learn(&small, &picture, &LENS, seer.time_ns);
-    seer.background.reveal(&mut ThreadPool::new("reveal", 2), &mut map, &picture, &LENS);
+    seer.background.learn(&mut workers, (&small, &picture), &LENS, seer.time_ns);
+    seer.background.reveal(&mut workers, &mut map, &picture, &LENS);
     assert!(map.matte.pixels.is_empty(), "a map of another size");
 }

@@ -7,6 +7,7 @@ mod alignment;
 pub mod backdrop;
 pub mod background;
 pub mod beside;
+mod bits;
 pub mod defocus;
 pub mod fill;
 pub mod focus;

@@ -1,6 +1,8 @@
 //! A picture in few pixels, as the square root of its light: exposure and white balance are factors there, and noise is
 //! nearly the same everywhere.
 
+use pulp::{Arch, WithSimd};
+
 use crate::color::light_of_codes;
 use crate::frame::ColorImage;
 
@@ -41,9 +43,9 @@ impl Reducer {
     /// The square root of the light of a value in codes, 0 to 255.
     #[inline(always)]
     pub fn root(&self, code: f32) -> f32 {
-        let first = code as usize;
-        let [a, b] = [self.roots[first], self.roots[first + 1]];
-        a + (b - a) * (code - first as f32)
+        let first = code as u8;
+        let [a, b] = [self.roots[usize::from(first)], self.roots[usize::from(first) + 1]];
+        a + (b - a) * (code - f32::from(first))
     }
 
     /// The code of a value whose light's root is this.
@@ -71,13 +73,10 @@ impl Reducer {
 
     /// The means of the blocks of a picture.
     pub fn reduce(&mut self, color: &ColorImage, reduced: &mut Vec<[f32; 3]>) {
-        let (block_px, (across, down)) = (block_px(color.width), reduced_size(color));
-        reduced.clear();
-        for row in 0..down {
-            self.reduce_row(color, (block_px, across), row, reduced);
-        }
+        Arch::new().dispatch(Reduce { reducer: self, color, reduced });
     }
 
+    #[inline(always)]
     fn reduce_row(
         &mut self,
         color: &ColorImage,
@@ -99,9 +98,35 @@ impl Reducer {
             let share = 1.0 / (columns.len() * lines.len()) as f32;
             let mut sums = [0; 3];
             for pixel in self.sums[3 * columns.start..3 * columns.end].chunks_exact(3) {
-                (0..3).for_each(|p| sums[p] += pixel[p]);
+                for p in 0..3 {
+                    sums[p] += pixel[p];
+                }
             }
-            reduced.push(sums.map(|sum| self.root(sum as f32 * share)));
+            let mut roots = [0.0; 3];
+            for p in 0..3 {
+                roots[p] = self.root(sums[p] as f32 * share);
+            }
+            reduced.push(roots);
+        }
+    }
+}
+
+/// See [`Reducer::reduce`].
+struct Reduce<'a> {
+    reducer: &'a mut Reducer,
+    color: &'a ColorImage,
+    reduced: &'a mut Vec<[f32; 3]>,
+}
+
+impl WithSimd for Reduce<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { reducer, color, reduced } = self;
+        let (block_px, (across, down)) = (block_px(color.width), reduced_size(color));
+        reduced.clear();
+        for row in 0..down {
+            reducer.reduce_row(color, (block_px, across), row, reduced);
         }
     }
 }

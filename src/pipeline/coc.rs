@@ -201,7 +201,7 @@ impl CocMaker {
         let Self { background, workers, .. } = self;
         if let (CocField::Depth(lens), Some(background), false) = (field, background, map.is_smooth) {
             if let Some(taken_ns) = taken_ns {
-                background.learn(map, color, lens, taken_ns);
+                background.learn(workers, (map, color), lens, taken_ns);
             }
             background.reveal(workers, map, color, lens);
         }

@@ -1,6 +1,11 @@
 //! What the pixels of a map hide, as far as that is remembered and may be seen.
 
-use super::{Background, KNOWN, OTHER_PX};
+use std::ops::Range;
+
+use pulp::{Arch, WithSimd};
+
+use super::cells::{CELL, Known};
+use super::{Background, OTHER_PX};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
@@ -13,54 +18,93 @@ impl Background {
         if map.size() != color.size() || !self.knows(color) {
             return;
         }
-        let other = lens.inverse_depth_of_px(OTHER_PX);
-        let Self { cells, rounds, inverse, .. } = self;
-        let nearest = cells.survey(workers, size, |at| {
-            let own = DepthMap::inverse_of(map.metres[at]);
-            (rounds[at] >= KNOWN).then(|| (own, own - inverse[at] > other))
-        });
-        cells.spread(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
-        let bands = Bands::new(size.1, 1, workers);
+        let mut cells = std::mem::take(&mut self.cells);
         let mut pixels = std::mem::take(&mut self.pixels);
+        let other = lens.inverse_depth_of_px(OTHER_PX);
+        let known = Known { metres: &map.metres, rounds: &self.rounds, inverse: &self.inverse, other };
+        let nearest = cells.survey(workers, size, &known);
+        cells.spread(lens.coc_px(0.0).max(-lens.coc_px(nearest.recip())));
+        self.cells = cells;
+        let bands = Bands::new(size.1, 1, workers);
         pixels.resize_with(bands.rows().count(), Vec::new);
         workers.run_each(bands.rows().zip(&mut pixels), &|(rows, pixels)| {
-            pixels.clear();
-            for y in rows {
-                self.reveal_row(y, map, color, other, pixels);
-            }
+            Arch::new().dispatch(Reveal { background: self, map, color, known: &known, rows, pixels });
         });
-        map.matte.pixels.clear();
-        pixels.iter().for_each(|pixels| map.matte.pixels.extend_from_slice(pixels));
+        // The first band's are taken, not copied.
+        if let Some((first, others)) = pixels.split_first_mut() {
+            std::mem::swap(&mut map.matte.pixels, first);
+            others.iter().for_each(|pixels| map.matte.pixels.extend_from_slice(pixels));
+        }
         if map.matte.pixels.len() > Matte::most(size.0, size.1) {
             map.matte.pixels.retain(|pixel| pixel.share < 1.0);
         }
         self.pixels = pixels;
     }
 
-    /// Adds the mixed pixels of a row, and what the others of it hide.
-    fn reveal_row(&self, y: usize, map: &DepthMap, color: &ColorImage, other: f32, pixels: &mut Vec<MixedPixel>) {
-        let row = y * self.size.0;
-        let mut before = map.matte.within(row..row + self.size.0).iter().peekable();
-        for (columns, is_wanted) in self.cells.row(y) {
-            let (first, end) = (row + columns.start, row + columns.end);
-            if !is_wanted {
-                while let Some(pixel) = before.next_if(|pixel| (pixel.at as usize) < end) {
-                    pixels.push(*pixel);
+    /// A pixel at `metres` and what it hides.
+    #[inline(always)]
+    fn behind(&self, at: usize, metres: f32, rgb: &[u8]) -> MixedPixel {
+        let (light, own) = (self.light_at(at), &rgb[3 * at..][..3]);
+        let mut difference = [0.0; 3];
+        for p in 0..3 {
+            difference[p] = self.own_light[usize::from(own[p])] - light[p];
+        }
+        let far_m = self.inverse[at].recip();
+        MixedPixel { at: at as u32, near_m: metres, far_m, share: 1.0, behind: 1.0, difference }
+    }
+}
+
+/// Finds the mixed pixels of some rows, and what the others of them hide.
+struct Reveal<'a> {
+    background: &'a Background,
+    map: &'a DepthMap,
+    color: &'a ColorImage,
+    known: &'a Known<'a>,
+    rows: Range<usize>,
+    pixels: &'a mut Vec<MixedPixel>,
+}
+
+impl WithSimd for Reveal<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { background, map, color, known, rows, pixels } = self;
+        let width = background.size.0;
+        pixels.clear();
+        let mut mixed = map.matte.within(rows.start * width..rows.end * width);
+        for y in rows {
+            for columns in background.cells.wanted_in(y) {
+                let (first, end) = (y * width + columns.start, y * width + columns.end);
+                pixels.extend_from_slice(take_before(&mut mixed, first));
+                let (metres, rounds, inverse) = known.pixels(first, columns.len());
+                let mut is_hiding = [0; CELL];
+                let hiding = &mut is_hiding[..columns.len()];
+                for k in 0..hiding.len() {
+                    hiding[k] = known.look(metres[k], rounds[k], inverse[k]).1;
                 }
-                continue;
-            }
-            for at in first..end {
-                let mixed = before.next_if(|pixel| pixel.at as usize == at);
-                pixels.extend(mixed.copied().or_else(|| self.behind(at, map.metres[at], &color.rgb, other)));
+                let mut here = take_before(&mut mixed, end).iter().peekable();
+                for (k, hides) in hiding.iter().enumerate() {
+                    let at = first + k;
+                    match here.next_if(|pixel| pixel.at as usize == at) {
+                        Some(pixel) => pixels.push(*pixel),
+                        None if *hides != 0 => pixels.push(background.behind(at, metres[k], &color.rgb)),
+                        None => {}
+                    }
+                }
             }
         }
+        pixels.extend_from_slice(mixed);
     }
+}
 
-    /// A pixel at `metres` and what it hides, if that is remembered.
-    fn behind(&self, at: usize, metres: f32, rgb: &[u8], other: f32) -> Option<MixedPixel> {
-        let light = self.light_behind(at, DepthMap::inverse_of(metres), other)?;
-        let difference = std::array::from_fn(|p| self.own_light[usize::from(rgb[3 * at + p])] - light[p]);
-        let far_m = self.inverse[at].recip();
-        Some(MixedPixel { at: at as u32, near_m: metres, far_m, share: 1.0, behind: 1.0, difference })
+/// Takes those pixels away that come before one.
+#[inline(always)]
+fn take_before<'a>(pixels: &mut &'a [MixedPixel], at: usize) -> &'a [MixedPixel] {
+    let mut count = 0;
+    while pixels.get(count).is_some_and(|pixel| (pixel.at as usize) < at) {
+        count += 1;
     }
+    let (taken, left) = pixels.split_at(count);
+    *pixels = left;
+    taken
 }

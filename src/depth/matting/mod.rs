@@ -6,7 +6,9 @@
 //! Everything is local, from one frame, and in time that grows with the length of the outlines.
 
 mod clusters;
+mod contrast;
 pub mod mask;
+mod passes;
 mod share;
 mod survey;
 mod symmetric;
@@ -14,25 +16,25 @@ mod trace;
 
 use std::ops::Range;
 
-use pulp::{Arch, WithSimd};
+use pulp::Arch;
 
 use crate::color::light_of_codes;
 use crate::compute::bands;
-use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
+use crate::compute::thread_pool::ThreadPool;
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
+use super::bits::Bits;
 use clusters::{Clusters, View};
-use share::{Evidence, Labels, Prior};
+use passes::{Compare, Mix, Weigh};
+use share::{Evidence, LANES, Labels, Prior};
 use survey::Survey;
-use trace::{Trace, Trail};
+use trace::{Trace, Wide};
 
 /// Where the CoC jumps by so many pixels or more, pixels are worth taking apart.
 pub const FROM_PX: f32 = 0.5;
 /// Shares beyond this are those of a pure pixel.
 const NEARLY_PURE: f32 = 0.98;
 
-/// What the map says of pixels that were traced: nothing.
-const TRACED: Labels = Labels { is_near: false, borders: false, is_thin: false };
 /// So many pixels away from an edge, at most.
 const MOST_STEPS: usize = 16;
 /// Fewer pixels are not worth another thread.
@@ -44,16 +46,17 @@ pub struct Matting {
     arch: Arch,
     light: Box<[f32; 256]>,
     /// Whether pixels differ in depth from one of their eight neighbours: the others are pure.
-    at_edge: Vec<bool>,
+    at_edge: Bits,
     survey: Survey,
-    /// The pixels at edges, and then those that were traced.
     edges: Vec<EdgePixel>,
+    /// The pixels at edges, and then those that were traced.
+    pixels: Vec<Pixel>,
     clusters: Clusters,
-    /// The place of the answer for each.
-    answers: Vec<u32>,
     evidence: Vec<Evidence>,
-    /// What is known of pixels that were traced, while they are.
-    trails: Vec<Trail>,
+    wide: Wide,
+    /// The places of those that are mixed, in the order of the picture, and memory for that.
+    order: Vec<u32>,
+    traced: Vec<u64>,
 }
 
 /// A pixel beside a jump of depth.
@@ -64,13 +67,54 @@ struct EdgePixel {
     /// Inverse depth of the nearest and the farthest of the pixel and its neighbours, in 1/m.
     near: f32,
     far: f32,
+    /// What the map says of it; nothing of a pixel that was traced.
+    labels: Labels,
 }
 
 impl EdgePixel {
+    /// The inverse depth in the middle between both surfaces.
+    #[inline(always)]
+    fn middle(&self) -> f32 {
+        0.5 * (self.near + self.far)
+    }
+
     /// Whether an inverse depth is closer to that of the near surface.
     #[inline(always)]
     fn is_near(&self, inverse: f32) -> bool {
-        inverse > 0.5 * (self.near + self.far)
+        inverse > self.middle()
+    }
+}
+
+/// A pixel that may be mixed.
+#[derive(Clone, Copy, Debug)]
+struct Pixel {
+    edge: EdgePixel,
+    /// The place of the answer with the surfaces around it.
+    answer: u32,
+    /// Its own light, and what is behind it where that is known.
+    own: [f32; 3],
+    behind: Option<[f32; 3]>,
+    /// How much of it the near surface has.
+    share: f32,
+}
+
+impl Pixel {
+    /// One that nothing else is known of.
+    #[inline(always)]
+    fn new(edge: EdgePixel, answer: u32) -> Self {
+        Self { edge, answer, own: [0.0; 3], behind: None, share: 0.0 }
+    }
+
+    /// Its place in a picture so wide.
+    #[inline(always)]
+    fn at(&self, width: usize) -> usize {
+        self.edge.y as usize * width + self.edge.x as usize
+    }
+
+    /// Whether it shows two surfaces.
+    #[inline(always)]
+    fn is_mixed(&self) -> bool {
+        if self.edge.labels.is_near { self.share <= NEARLY_PURE } else { self.share >= 1.0 - NEARLY_PURE }
     }
 }
 
@@ -79,13 +123,15 @@ impl Default for Matting {
         Self {
             arch: Arch::new(),
             light: light_of_codes(),
-            at_edge: Vec::new(),
+            at_edge: Bits::default(),
             survey: Survey::default(),
             edges: Vec::new(),
+            pixels: Vec::new(),
             clusters: Clusters::default(),
-            answers: Vec::new(),
             evidence: Vec::new(),
-            trails: Vec::new(),
+            wide: Wide::default(),
+            order: Vec::new(),
+            traced: Vec::new(),
         }
     }
 }
@@ -110,7 +156,7 @@ impl Matting {
         if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
             return;
         }
-        let Self { arch, light, at_edge, survey, edges, clusters, answers, evidence, trails } = self;
+        let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced } = self;
         let arch = *arch;
         survey.find((arch, workers), map, jump, (at_edge, edges));
         let size = (map.width as usize, map.height as usize);
@@ -120,165 +166,69 @@ impl Matting {
             return;
         }
         clusters.clear(size);
-        answers.clear();
-        answers.extend(edges.iter().map(|edge| clusters.ask(jump, edge)));
+        pixels.clear();
+        pixels.extend(edges.iter().map(|edge| Pixel::new(*edge, clusters.ask(jump, edge))));
         let (metres, matte, rgb) = (&map.metres, &mut map.matte, &color.rgb[..]);
         clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, 0);
         // Those between surfaces of which one has no pixels tell nothing.
-        let mut kept = 0;
-        for k in 0..edges.len() {
-            if clusters.at(answers[k]).is_some() {
-                (edges[kept], answers[kept]) = (edges[k], answers[k]);
-                kept += 1;
-            }
-        }
-        edges.truncate(kept);
-        answers.truncate(kept);
+        pixels.retain(|pixel| clusters.at(pixel.answer).is_some());
+        let on_edges = pixels.len();
         let (mut compared, mut prior, mut steps) = (0..0, Prior::default(), 0);
         loop {
-            let (found, is_traced) = (compared.end..edges.len(), steps > 0);
-            evidence.resize(found.end, Evidence::default());
-            let each = bands::share(found.len(), LEAST_PIXELS);
+            let found = compared.end..pixels.len();
+            evidence.resize(found.len().div_ceil(LANES), Evidence::default());
+            let each = bands::share(found.len(), LEAST_PIXELS).next_multiple_of(LANES);
             let view = View { size, metres, jump, at_edge, rgb, light };
-            let asked = edges[found.clone()].chunks(each).zip(answers[found.clone()].chunks(each));
-            let parts = asked.zip(evidence[found.clone()].chunks_mut(each));
-            workers.run_each(parts, &|((edges, answers), evidence)| {
+            let parts = pixels[found.clone()].chunks_mut(each).zip(evidence.chunks_mut(each / LANES));
+            workers.run_each(parts, &|(pixels, evidence)| {
                 let (view, behind) = (&view, &behind);
-                arch.dispatch(Compare { view, clusters, behind, is_traced, edges, answers, evidence });
+                arch.dispatch(Compare { view, clusters, behind, pixels, evidence });
             });
-            if !is_traced {
-                prior = Prior::of(evidence);
-            }
+            let is_first = steps == 0;
+            arch.dispatch(Weigh { prior: &mut prior, is_first, evidence, pixels: &mut pixels[found.clone()] });
             compared = found;
             if compared.is_empty() || compared.end >= most || steps == MOST_STEPS {
                 break;
             }
-            let (prior, evidence) = (&prior, &evidence[compared.clone()]);
-            let workers = &mut *workers;
-            arch.dispatch(Trace {
-                arch,
-                workers,
-                prior,
-                size,
-                metres,
-                jump,
-                rgb,
-                light,
-                at_edge,
-                clusters,
-                evidence,
-                edges,
-                answers,
-            });
+            let (compared, workers) = (compared.clone(), &mut *workers);
+            arch.dispatch(Trace { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels });
             steps += 1;
         }
-        trace::drop_wide(size, kept, &prior, (evidence, trails));
-        let has_traced = evidence.len() > kept;
+        wide.drop(size, &mut pixels[on_edges..]);
+        sort(size.0, pixels, on_edges, (order, traced));
 
-        let each = bands::share(evidence.len(), LEAST_PIXELS);
-        let (mut counts, light) = ([0; MOST_ITEMS], &**light);
-        matte.pixels.resize(evidence.len(), MixedPixel::default());
-        let parts = evidence.chunks(each).zip(matte.pixels.chunks_mut(each)).zip(&mut counts);
-        workers.run_each(parts, &|((evidence, pixels), count)| {
-            let (rgb, width) = (&color.rgb, size.0);
-            *count = arch.dispatch(Mix { prior: &prior, clusters, light, rgb, width, evidence, pixels });
+        let each = bands::share(order.len(), LEAST_PIXELS);
+        matte.pixels.resize(order.len(), MixedPixel::default());
+        workers.run_each(order.chunks(each).zip(matte.pixels.chunks_mut(each)), &|(order, mixed)| {
+            arch.dispatch(Mix { clusters, width: size.0, pixels, order, mixed });
         });
-        let mut kept = 0;
-        for (first, count) in (0..).step_by(each).zip(counts).take_while(|(first, _)| *first < evidence.len()) {
-            matte.pixels.copy_within(first..first + count, kept);
-            kept += count;
-        }
-        matte.pixels.truncate(kept);
-        if has_traced {
-            matte.pixels.sort_unstable_by_key(|pixel| pixel.at);
-        }
     }
 }
 
-/// Compares pixels at edges with the surfaces around them.
-struct Compare<'a, B> {
-    view: &'a View<'a>,
-    clusters: &'a Clusters,
-    behind: &'a B,
-    is_traced: bool,
-    edges: &'a [EdgePixel],
-    answers: &'a [u32],
-    evidence: &'a mut [Evidence],
-}
-
-impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Compare<'_, B> {
-    type Output = ();
-    // No vectors by hand: the call has the compiler use what the processor has, in all that it takes in. Loops, not closures for
-    // iterators, which would not have them.
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { view, clusters, behind, is_traced, edges, answers, evidence } = self;
-        for ((edge, &answer), evidence) in edges.iter().zip(answers).zip(evidence) {
-            let Some(contrast) = clusters.at(answer) else { continue };
-            let at = edge.y as usize * view.size.0 + edge.x as usize;
-            let lights = (view.light(at), behind(at, edge.near));
-            let labels = if is_traced { TRACED } else { labels(view, edge, at) };
-            *evidence = Evidence::new(edge, labels, lights, (answer, contrast));
+/// Replaces `order` by the places of the mixed pixels, of which the first are in order and the others are not; `rest` is memory.
+fn sort(width: usize, pixels: &[Pixel], first: usize, (order, rest): (&mut Vec<u32>, &mut Vec<u64>)) {
+    const PLACE_BITS: u32 = 32;
+    let key = |k: usize| (pixels[k].at(width) as u64) << PLACE_BITS | k as u64;
+    let mixed = |places: Range<usize>| places.filter(|&k| pixels[k].is_mixed());
+    rest.clear();
+    rest.extend(mixed(first..pixels.len()).map(key));
+    rest.sort_unstable();
+    let mut rest = rest.iter().copied().peekable();
+    order.clear();
+    for k in mixed(0..first) {
+        while let Some(key) = rest.next_if(|&other| other < key(k)) {
+            order.push(key as u32);
         }
+        order.push(k as u32);
     }
-}
-
-/// Writes the mixed pixels of all that are known; how many they are.
-struct Mix<'a> {
-    prior: &'a Prior,
-    clusters: &'a Clusters,
-    light: &'a [f32; 256],
-    rgb: &'a [u8],
-    width: usize,
-    evidence: &'a [Evidence],
-    pixels: &'a mut [MixedPixel],
-}
-
-impl WithSimd for Mix<'_> {
-    type Output = usize;
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> usize {
-        let Self { prior, clusters, light, rgb, width, evidence, pixels } = self;
-        let mut count = 0;
-        for one in evidence {
-            let share = prior.share(one);
-            let pure = if one.labels.is_near { share > NEARLY_PURE } else { share < 1.0 - NEARLY_PURE };
-            let Some(contrast) = clusters.at(one.answer).filter(|_| !pure) else { continue };
-            let at = one.edge.y as usize * width + one.edge.x as usize;
-            let own = light_of(light, rgb, at);
-            let (behind, difference) = match one.behind {
-                Some(light) => (1.0, contrast.difference_before(light, own, share)),
-                None => (1.0 - share, contrast.difference(own, share)),
-            };
-            let (near_m, far_m) = (one.edge.near.recip(), one.edge.far.recip());
-            pixels[count] = MixedPixel { at: at as u32, near_m, far_m, share, behind, difference };
-            count += 1;
-        }
-        count
-    }
+    order.extend(rest.map(|key| key as u32));
 }
 
 /// The colour of a pixel in linear light.
 #[inline(always)]
 fn light_of(light: &[f32; 256], rgb: &[u8], at: usize) -> [f32; 3] {
-    [0, 1, 2].map(|p| light[usize::from(rgb[3 * at + p])])
-}
-
-/// What the map says of the edge pixel `at` and its neighbours.
-#[inline(always)]
-fn labels(view: &View, edge: &EdgePixel, at: usize) -> Labels {
-    let is_near = edge.is_near(view.inverse(at));
-    let (mut borders, mut alike) = (false, 0);
-    let (xs, ys) = around(edge, 1, view.size);
-    for y in ys {
-        for x in xs.clone() {
-            let is_alike = edge.is_near(view.inverse(y * view.size.0 + x)) == is_near;
-            alike += u32::from(is_alike);
-            borders |= !is_alike && (x == edge.x as usize || y == edge.y as usize);
-        }
-    }
-    // Itself, and two neighbours in a row.
-    Labels { is_near, borders, is_thin: is_near && alike <= 3 }
+    let code = &rgb[3 * at..][..3];
+    [light[usize::from(code[0])], light[usize::from(code[1])], light[usize::from(code[2])]]
 }
 
 /// The columns and rows of a pixel and those around it, `by` pixels to each side, as far as the picture has them.

@@ -2,15 +2,14 @@
 
 use std::ops::Range;
 
-use pulp::{Arch, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
+use super::share::Labels;
 use super::{EdgePixel, larger, smaller};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
+use crate::depth::bits::{Bits, WORD, places};
 use crate::frame::DepthMap;
-
-/// Pixels of a row that are looked at at once.
-const BLOCK: usize = 64;
 
 /// Finds them; owns the memory for it.
 #[derive(Debug, Default)]
@@ -20,10 +19,21 @@ pub struct Survey(Vec<Band>);
 #[derive(Debug, Default)]
 struct Band {
     edges: Vec<EdgePixel>,
-    /// Inverse depth of three rows, in 1/m, 0 where it is unknown; their highest and lowest, with a column more on either side.
-    rows: [Vec<f32>; 3],
-    ranges: [Vec<f32>; 2],
+    /// Three rows, which take turns.
+    rows: [Vec<Block>; 3],
 }
+
+/// Pixels of a row, with one more on either side.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    /// The highest and the lowest inverse depth of them, in 1/m; 0 where it is unknown.
+    near: f32,
+    far: f32,
+    /// That of each, once it was needed.
+    inverse: Option<[f32; WIDE]>,
+}
+
+const WIDE: usize = WORD + 2;
 
 impl Survey {
     /// Replaces `edges` by the pixels of a map that differ by more than `jump` from one of their eight neighbours, row by row,
@@ -33,16 +43,17 @@ impl Survey {
         (arch, workers): (Arch, &mut ThreadPool),
         map: &DepthMap,
         jump: f32,
-        (at_edge, edges): (&mut Vec<bool>, &mut Vec<EdgePixel>),
+        (at_edge, edges): (&mut Bits, &mut Vec<EdgePixel>),
     ) {
         let (width, height) = (map.width as usize, map.height as usize);
-        at_edge.resize(width * height, false);
+        at_edge.resize((width, height));
+        let (words, across) = at_edge.words();
         let bands = Bands::new(height, 1, workers);
         let found = &mut self.0;
         found.resize_with(bands.rows().count(), Band::default);
-        let parts = bands.rows().zip(bands.split(at_edge, width)).zip(&mut *found);
-        workers.run_each(parts, &|((of_band, at_edge), band)| {
-            arch.dispatch(FindEdges { map, jump, of_band, at_edge, band });
+        let parts = bands.rows().zip(bands.split(words, across)).zip(&mut *found);
+        workers.run_each(parts, &|((of_band, words), band)| {
+            arch.dispatch(FindEdges { map, jump, of_band, words, across, band });
         });
         edges.clear();
         found.iter().for_each(|band| edges.extend_from_slice(&band.edges));
@@ -54,59 +65,155 @@ struct FindEdges<'a> {
     map: &'a DepthMap,
     jump: f32,
     of_band: Range<usize>,
-    at_edge: &'a mut [bool],
+    /// Marks for its pixels, so many words for a row.
+    words: &'a mut [u64],
+    across: usize,
     band: &'a mut Band,
 }
 
 impl WithSimd for FindEdges<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { map, jump, of_band, at_edge, band: Band { edges, rows, ranges: [high, low] } } = self;
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { map, jump, of_band, words, across, band: Band { edges, rows } } = self;
         let (width, height) = (map.width as usize, map.height as usize);
+        let metres = |y: usize| &map.metres[y * width..][..width];
         edges.clear();
-        rows.iter_mut().for_each(|row| row.resize(width, 0.0));
-        for range in [&mut *high, &mut *low] {
-            range.resize(width + 2, 0.0);
-        }
         let first = of_band.start;
         for y in of_band {
             // The row below is new; before the first one, that itself is, too, and the one above.
             for y in (if y == first { y.saturating_sub(1) } else { y + 1 })..(y + 2).min(height) {
-                for (inverse, &metres) in rows[y % 3].iter_mut().zip(&map.metres[y * width..][..width]) {
-                    *inverse = DepthMap::inverse_of(metres);
+                let row = &mut rows[y % 3];
+                row.clear();
+                for begin in (0..width).step_by(WORD) {
+                    let [near, far] = ends(simd, &metres(y)[begin.saturating_sub(1)..(begin + WORD + 1).min(width)]);
+                    row.push(Block { near, far, inverse: None });
                 }
             }
-            let row = |y: usize| &rows[y % 3][..width];
-            let (above, here, below) = (row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1)));
-            let (most, least) = (&mut high[1..=width], &mut low[1..=width]);
-            for x in 0..width {
-                most[x] = larger(larger(above[x], here[x]), below[x]);
-                least[x] = smaller(smaller(above[x], here[x]), below[x]);
-            }
-            for range in [&mut *high, &mut *low] {
-                (range[0], range[width + 1]) = (range[1], range[width]);
-            }
-            let found = &mut at_edge[(y - first) * width..][..width];
-            let [left, middle, right] = [0, 1, 2].map(|by| (&high[by..][..width], &low[by..][..width]));
-            let around = |x: usize| {
-                let near = larger(larger(left.0[x], middle.0[x]), right.0[x]);
-                [near, smaller(smaller(left.1[x], middle.1[x]), right.1[x])]
-            };
-            for (x, found) in found.iter_mut().enumerate() {
-                let [near, far] = around(x);
-                *found = near - far > jump;
-            }
-            for (found, begin) in found.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
-                // `|` instead of an early exit, so that a block becomes vector code.
-                if !found.iter().fold(false, |any, found| any | found) {
+            let around = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+            let words = &mut words[(y - first) * across..][..across];
+            words.fill(0);
+            for (k, word) in words.iter_mut().enumerate().take(width.div_ceil(WORD)) {
+                let (mut near, mut far) = (0.0, f32::INFINITY);
+                for y in around {
+                    let block = &rows[y % 3][k];
+                    (near, far) = (larger(near, block.near), smaller(far, block.far));
+                }
+                // Mostly it is one surface.
+                if near - far <= jump {
                     continue;
                 }
-                for x in (begin..).zip(found).filter(|(_, found)| **found).map(|(x, _)| x) {
-                    let [near, far] = around(x);
-                    edges.push(EdgePixel { x: x as u32, y: y as u32, near, far });
+                let begin = k * WORD;
+                let mut three = [[0.0; WIDE]; 3];
+                for (own, y) in three.iter_mut().zip(around) {
+                    *own = *rows[y % 3][k].inverse.get_or_insert_with(|| inverse(metres(y), begin));
+                }
+                let (near, far) = ranges(&three);
+                let mut found = [0; WORD];
+                for x in 0..WORD {
+                    found[x] = u8::from(near[x] - far[x] > jump);
+                }
+                let there = !0 >> (WORD - (width - begin).min(WORD));
+                *word = word_of(&found) & there;
+                for place in places(*word) {
+                    let [x, y] = [(begin + place) as u32, y as u32];
+                    let mut edge = EdgePixel { x, y, near: near[place], far: far[place], labels: Labels::default() };
+                    edge.labels = labels(&edge, &three, place + 1, (width, height));
+                    edges.push(edge);
                 }
             }
         }
     }
+}
+
+/// The highest and the lowest inverse depth of some pixels, in 1/m.
+#[inline(always)]
+fn ends<S: Simd>(simd: S, metres: &[f32]) -> [f32; 2] {
+    // Inverse depth falls with depth, so that one division each is enough.
+    let [least, most] = [DepthMap::LEAST_M, DepthMap::MOST_M].map(|metres| simd.splat_f32s(metres));
+    let [mut nearest, mut farthest] = [simd.splat_f32s(f32::INFINITY), simd.splat_f32s(0.0)];
+    let (head, tail) = S::as_simd_f32s(metres);
+    for &metres in head {
+        let is_known =
+            simd.and_m32s(simd.greater_than_or_equal_f32s(metres, least), simd.less_than_or_equal_f32s(metres, most));
+        nearest = simd.min_f32s(nearest, simd.select_f32s(is_known, metres, nearest));
+        // What is unknown is farthest.
+        farthest = simd.max_f32s(farthest, simd.select_f32s(is_known, metres, simd.splat_f32s(f32::INFINITY)));
+    }
+    let (mut nearest, mut farthest) = (simd.reduce_min_f32s(nearest), simd.reduce_max_f32s(farthest));
+    for &metres in tail {
+        let is_known = DepthMap::is_known(metres);
+        nearest = smaller(nearest, if is_known { metres } else { nearest });
+        farthest = larger(farthest, if is_known { metres } else { f32::INFINITY });
+    }
+    [DepthMap::inverse_of(nearest), DepthMap::inverse_of(farthest)]
+}
+
+/// The inverse depth of a block of a row and of one pixel more on either side, in 1/m; what is beyond the row is as its ends.
+#[inline(always)]
+fn inverse(metres: &[f32], begin: usize) -> [f32; WIDE] {
+    let mut inverse = [0.0; WIDE];
+    if begin > 0 && begin + WORD < metres.len() {
+        inverse.copy_from_slice(&metres[begin - 1..][..WIDE]);
+    } else {
+        for (k, inverse) in inverse.iter_mut().enumerate() {
+            *inverse = metres[(begin + k).saturating_sub(1).min(metres.len() - 1)];
+        }
+    }
+    for inverse in &mut inverse {
+        *inverse = DepthMap::inverse_of(*inverse);
+    }
+    inverse
+}
+
+/// The highest and the lowest inverse depth around each pixel of a block.
+#[inline(always)]
+fn ranges([above, here, below]: &[[f32; WIDE]; 3]) -> ([f32; WORD], [f32; WORD]) {
+    let (mut high, mut low) = ([0.0; WIDE], [0.0; WIDE]);
+    for k in 0..WIDE {
+        high[k] = larger(larger(above[k], here[k]), below[k]);
+        low[k] = smaller(smaller(above[k], here[k]), below[k]);
+    }
+    let (mut near, mut far) = ([0.0; WORD], [0.0; WORD]);
+    for k in 0..WORD {
+        near[k] = larger(larger(high[k], high[k + 1]), high[k + 2]);
+        far[k] = smaller(smaller(low[k], low[k + 1]), low[k + 2]);
+    }
+    (near, far)
+}
+
+/// The bits of bytes that are 1 or 0.
+#[inline(always)]
+fn word_of(bytes: &[u8; WORD]) -> u64 {
+    // `|` instead of an early exit, so that it becomes vector code: mostly there are none.
+    if bytes.iter().fold(0, |any, byte| any | byte) == 0 {
+        return 0;
+    }
+    let mut word = 0;
+    for (k, bytes) in bytes.as_chunks().0.iter().enumerate() {
+        // The product has the sum of all bytes, each moved to a bit of its own, in its highest byte.
+        word |= (u64::from_le_bytes(*bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * k);
+    }
+    word
+}
+
+/// What the map says of an edge pixel, by the inverse depth of its row and those beside it, where it is at place `at`.
+#[inline(always)]
+fn labels(edge: &EdgePixel, rows: &[[f32; WIDE]; 3], at: usize, (width, height): (usize, usize)) -> Labels {
+    let (x, y, middle) = (edge.x as usize, edge.y as usize, edge.middle());
+    let is_near = rows[1][at] > middle;
+    // No branches; what is beyond the picture is no neighbour.
+    let (columns, lines) = ([x > 0, true, x + 1 < width], [y > 0, true, y + 1 < height]);
+    let (mut borders, mut alike) = (false, 0);
+    for (row, is_line) in rows.iter().zip(lines) {
+        for (inverse, is_column) in row[at - 1..][..3].iter().zip(columns) {
+            let is_alike = (*inverse > middle) == is_near;
+            alike += u32::from(is_alike & is_line & is_column);
+        }
+    }
+    for inverse in [rows[0][at], rows[2][at], rows[1][at - 1], rows[1][at + 1]] {
+        borders |= (inverse > middle) != is_near;
+    }
+    // Itself, and two neighbours in a row.
+    Labels { is_near, borders, is_thin: is_near && alike <= 3 }
 }

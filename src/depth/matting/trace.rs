@@ -1,44 +1,35 @@
 //! Thin things beyond the edges of the map.
 
+use std::ops::Range;
+
 use pulp::{Arch, WithSimd};
 
 use super::clusters::{Clusters, View};
-use super::share::{Evidence, Prior};
-use super::{EdgePixel, around};
+use super::share::Labels;
+use super::{EdgePixel, Pixel, around};
 use crate::compute::thread_pool::ThreadPool;
+use crate::depth::bits::{Bits, places};
 use crate::frame::DepthMap;
 
 /// Neighbours of a pixel with this share are looked at, too, where the map has no edge.
 const TRACED_FROM: f32 = 0.15;
-
-/// What is known of a pixel that was traced: it has nothing of what is near, it has some, it is part of something wide.
-#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-pub enum Trail {
-    #[default]
-    None,
-    Faint,
-    Seen,
-    Wide,
-}
 
 /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near though
 /// the map has none there, to neighbours that do so, too (hysteresis, as edges are traced).
 pub struct Trace<'a> {
     pub arch: Arch,
     pub workers: &'a mut ThreadPool,
-    pub prior: &'a Prior,
     /// As in a [`View`].
     pub size: (usize, usize),
     pub metres: &'a [f32],
     pub jump: f32,
     pub rgb: &'a [u8],
     pub light: &'a [f32; 256],
-    pub at_edge: &'a mut [bool],
+    pub at_edge: &'a mut Bits,
     pub clusters: &'a mut Clusters,
-    pub evidence: &'a [Evidence],
-    /// Adds to these the pixels one step away from the evidence, and their answers.
-    pub edges: &'a mut Vec<EdgePixel>,
-    pub answers: &'a mut Vec<u32>,
+    /// From these of the pixels one step is taken; what that finds is added to them.
+    pub compared: Range<usize>,
+    pub pixels: &'a mut Vec<Pixel>,
 }
 
 impl WithSimd for Trace<'_> {
@@ -46,27 +37,29 @@ impl WithSimd for Trace<'_> {
     // One after the other, as the clusters that one needs are made of what is marked until then.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { arch, workers, prior, size, metres, jump, rgb, light, at_edge, clusters, evidence, .. } = self;
-        for one in evidence {
-            if one.labels.is_near || prior.share(one) < TRACED_FROM {
+        let Self { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels } = self;
+        for k in compared {
+            let Pixel { edge, share, .. } = pixels[k];
+            if edge.labels.is_near || share < TRACED_FROM {
                 continue;
             }
-            let (xs, ys) = around(&one.edge, 1, size);
+            let (xs, ys) = around(&edge, 1, size);
             for y in ys {
-                for x in xs.clone() {
-                    let (at, next) = (y * size.0 + x, EdgePixel { x: x as u32, y: y as u32, ..one.edge });
-                    let is_far = (DepthMap::inverse_of(metres[at]) - next.far).abs() <= jump;
-                    if !is_far || std::mem::replace(&mut at_edge[at], true) {
+                for place in places(!at_edge.from(xs.start, y) & below(xs.len())) {
+                    let x = xs.start + place;
+                    let is_far = (DepthMap::inverse_of(metres[y * size.0 + x]) - edge.far).abs() <= jump;
+                    if !is_far {
                         continue;
                     }
+                    at_edge.set(x, y);
+                    let next = EdgePixel { x: x as u32, y: y as u32, labels: Labels::default(), ..edge };
                     let asked = clusters.asked();
                     let answer = clusters.ask(jump, &next);
                     if answer as usize == asked {
                         clusters.find((arch, workers), &View { size, metres, jump, at_edge, rgb, light }, asked);
                     }
                     if clusters.at(answer).is_some() {
-                        self.edges.push(next);
-                        self.answers.push(answer);
+                        pixels.push(Pixel::new(next, answer));
                     }
                 }
             }
@@ -74,39 +67,64 @@ impl WithSimd for Trace<'_> {
     }
 }
 
-/// Lets go of what was traced, those after the first `on_edges`, into something far that looks like what is near: a hair
-/// nowhere fills a square of three pixels, as a picture's frame does.
-pub fn drop_wide(
-    size: (usize, usize),
-    on_edges: usize,
-    prior: &Prior,
-    (evidence, trails): (&mut Vec<Evidence>, &mut Vec<Trail>),
-) {
-    let at = |x: usize, y: usize| y * size.0 + x;
-    let place = |one: &Evidence| at(one.edge.x as usize, one.edge.y as usize);
-    trails.resize(size.0 * size.1, Trail::None);
-    for one in &evidence[on_edges..] {
-        trails[place(one)] = if prior.share(one) < TRACED_FROM { Trail::Faint } else { Trail::Seen };
-    }
-    for one in &evidence[on_edges..] {
-        let (xs, ys) = around(&one.edge, 1, size);
-        if !ys.flat_map(|y| xs.clone().map(move |x| at(x, y))).all(|at| trails[at] >= Trail::Seen) {
-            continue;
+/// So many bits, the lowest ones.
+#[inline(always)]
+fn below(count: usize) -> u64 {
+    (1 << count) - 1
+}
+
+/// Tells what is wide from what is thin; owns the memory for it.
+#[derive(Debug, Default)]
+pub struct Wide {
+    /// What was traced, what of that has some of what is near, and what is part of something wide.
+    traced: Bits,
+    seen: Bits,
+    wide: Bits,
+}
+
+impl Wide {
+    /// Lets go of pixels that were traced into something far that looks like what is near: a hair nowhere fills a square of three
+    /// pixels, as a picture's frame does.
+    pub fn drop(&mut self, size: (usize, usize), pixels: &mut [Pixel]) {
+        if pixels.is_empty() {
+            return;
         }
-        // The outline of what is wide is part of it.
-        let (xs, ys) = around(&one.edge, 2, size);
-        for at in ys.flat_map(|y| xs.clone().map(move |x| at(x, y))) {
-            if trails[at] != Trail::None {
-                trails[at] = Trail::Wide;
+        let Self { traced, seen, wide } = self;
+        for bits in [&mut *traced, &mut *seen, &mut *wide] {
+            bits.clear(size);
+        }
+        for Pixel { edge, share, .. } in &*pixels {
+            let (x, y) = (edge.x as usize, edge.y as usize);
+            traced.set(x, y);
+            if *share >= TRACED_FROM {
+                seen.set(x, y);
+            }
+        }
+        let mut is_any = false;
+        for Pixel { edge, .. } in &*pixels {
+            let (xs, ys) = around(edge, 1, size);
+            let mut missing = 0;
+            for y in ys {
+                missing |= !seen.from(xs.start, y);
+            }
+            if missing & below(xs.len()) != 0 {
+                continue;
+            }
+            // The outline of what is wide is part of it.
+            let (xs, ys) = around(edge, 2, size);
+            for y in ys {
+                let part = traced.from(xs.start, y) & below(xs.len());
+                seen.set_from(xs.start, y, part);
+                wide.set_from(xs.start, y, part);
+            }
+            is_any = true;
+        }
+        if is_any {
+            for pixel in pixels {
+                if wide.has(pixel.edge.x as usize, pixel.edge.y as usize) {
+                    pixel.share = 0.0;
+                }
             }
         }
     }
-    let mut kept = on_edges;
-    for k in on_edges..evidence.len() {
-        if std::mem::take(&mut trails[place(&evidence[k])]) != Trail::Wide {
-            evidence[kept] = evidence[k];
-            kept += 1;
-        }
-    }
-    evidence.truncate(kept);
 }

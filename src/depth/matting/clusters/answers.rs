@@ -5,8 +5,9 @@ use std::ops::Range;
 use pulp::{Arch, WithSimd};
 
 use super::super::EdgePixel;
-use super::super::share::Contrast;
-use super::{CELL_PX, Cluster, FRINGE, Surfaces, View, contrast, split};
+use super::super::contrast::Contrast;
+use super::cell::split;
+use super::{CELL_PX, Cluster, FRINGE, Sums, Surfaces, View, contrast};
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
 
@@ -137,10 +138,10 @@ struct SplitCells<'a> {
 impl WithSimd for SplitCells<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
         let Self { view, across, cells, clusters } = self;
         for (&cell, clusters) in cells.iter().zip(clusters) {
-            *clusters = split(view, cell as usize % across, cell as usize / across);
+            *clusters = split(simd, view, cell as usize % across, cell as usize / across);
         }
     }
 }
@@ -186,7 +187,7 @@ impl Surroundings<'_> {
         let tolerance = (2.0 * view.jump).max(0.25 * (edge.near - edge.far));
         let (column, row) = (edge.x as usize / CELL_PX, edge.y as usize / CELL_PX);
         let [x, y] = [column, row].map(|cell| (cell * CELL_PX) as f32 + 0.5 * (CELL_PX - 1) as f32);
-        let mut sums = [Cluster::default(); 3];
+        let mut sums = [Sums::default(); 3];
         let (columns, rows) = cells_around(edge, reach, (self.across, self.down));
         for row in rows {
             for column in columns.clone() {
@@ -196,26 +197,19 @@ impl Surroundings<'_> {
                     let is_fringe = k == FRINGE;
                     let surface = if is_near { edge.near } else { edge.far };
                     let is_other = (cluster.inverse - surface).abs() > tolerance || is_fringe && !is_near;
-                    if cluster.weight <= 0.0 || is_other {
+                    if cluster.sums.weight() <= 0.0 || is_other {
                         continue;
                     }
                     let square = (cluster.x - x) * (cluster.x - x) + (cluster.y - y) * (cluster.y - y);
                     let falloff = 1.0 / (1.0 + square / (HALF_PX * HALF_PX));
                     let weight = falloff * falloff * falloff;
-                    let sum = &mut sums[if is_fringe { FRINGE } else { usize::from(!is_near) }];
-                    sum.weight += weight * cluster.weight;
-                    for (sum, light) in sum.light.iter_mut().zip(cluster.light) {
-                        *sum += weight * light;
-                    }
-                    for (sum, square) in sum.squares.iter_mut().zip(cluster.squares) {
-                        *sum += weight * square;
-                    }
+                    sums[if is_fringe { FRINGE } else { usize::from(!is_near) }].add(weight, &cluster.sums);
                 }
             }
         }
-        let [near, far, fringe] = sums.map(|sum| (sum.weight > 0.0).then(|| sum.color()));
+        let [near, far, fringe] = sums.map(|sum| (sum.weight() > 0.0).then(|| sum.color()));
         let [few, enough] = FRINGE_PIXELS;
-        let weight = ((sums[FRINGE].weight - few) / (enough - few)).clamp(0.0, 1.0);
+        let weight = ((sums[FRINGE].weight() - few) / (enough - few)).clamp(0.0, 1.0);
         Some(Surfaces { near: near?, far: far?, fringe: fringe.zip(Some(weight)) })
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::Backdrop;
 use crate::depth::matting::clusters::Color;
-use crate::depth::matting::share::Contrast;
+use crate::depth::matting::contrast::Contrast;
 use crate::depth::matting::symmetric::{Symmetric, outer};
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, Mask};

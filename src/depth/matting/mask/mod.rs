@@ -18,7 +18,7 @@ use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap, Mask, Matte, MixedPixel};
 
 use super::NEARLY_PURE;
-use super::share::{Contrast, Discriminant, share_by};
+use super::contrast::{Contrast, Discriminant, share_by};
 use cells::{Cell, Kernel, REACH, Sums, View};
 use posterior::Posterior;
 

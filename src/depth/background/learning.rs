@@ -1,0 +1,183 @@
+//! What a picture teaches: a block of pixels at a time, in vectors.
+
+use std::ops::Range;
+
+use pulp::{Arch, WithSimd};
+
+use super::{Background, LESSONS};
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::ThreadPool;
+use crate::depth::bits::Bits;
+use crate::frame::{ColorImage, DepthMap};
+
+/// One row of so many of a lesson teaches.
+const ROWS: usize = 2;
+/// No pixel is surer than after so many rounds.
+const SUREST: u8 = 250;
+/// From this many on its colour is looked at in one round of so many.
+const SURE: u8 = 8;
+const REFRESH: usize = 4;
+/// What is hidden is surer by one round less in so many rounds.
+const FADES: usize = 2;
+/// Nothing is learned so close to another surface, in pixels: camera and depth map mix them there.
+const CLEAR_PX: usize = 3;
+/// A change of more codes than this is another colour.
+const CHANGED: i32 = 20;
+/// A new picture counts as one of so many.
+const MEMORY: i32 = 4;
+/// Pixels of a row that are looked at at once.
+const BLOCK: usize = 32;
+
+/// Numbers of a block, and with those beside it.
+type Lanes<T> = [T; BLOCK];
+type Wide = [f32; BLOCK + 2 * CLEAR_PX];
+
+impl Background {
+    /// Learns from the rows of a picture that are due. Surfaces are another beyond a step `other` of inverse depth.
+    pub(super) fn learn_rows(&mut self, workers: &mut ThreadPool, (map, color): (&DepthMap, &ColorImage), other: f32) {
+        let (size, lesson) = (self.size, self.frame / LESSONS);
+        self.mixed.clear(size);
+        for pixel in &map.matte.pixels {
+            self.mixed.set(pixel.at as usize % size.0, pixel.at as usize / size.0);
+        }
+        let Self { rgb, inverse, rounds, mixed, codes, .. } = self;
+        let view = View { map, color, other, mixed, codes, size, lesson };
+        let bands = Bands::new(size.1, 1, workers);
+        let planes = bands.split(rgb, 3 * size.0).zip(bands.split(inverse, size.0)).zip(bands.split(rounds, size.0));
+        workers.run_each(bands.rows().zip(planes), &|(rows, ((rgb, inverse), rounds))| {
+            Arch::new().dispatch(Learn { view: &view, rows, rgb, inverse, rounds });
+        });
+    }
+}
+
+/// What is learned from.
+struct View<'a> {
+    map: &'a DepthMap,
+    color: &'a ColorImage,
+    other: f32,
+    mixed: &'a Bits,
+    /// What each code would have been when it was remembered, by channel.
+    codes: &'a [[u8; 256]; 3],
+    size: (usize, usize),
+    lesson: usize,
+}
+
+/// Learns from some rows.
+struct Learn<'a> {
+    view: &'a View<'a>,
+    rows: Range<usize>,
+    rgb: &'a mut [u8],
+    inverse: &'a mut [f32],
+    rounds: &'a mut [u8],
+}
+
+impl WithSimd for Learn<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { view, rows, rgb, inverse, rounds } = self;
+        let (width, first) = (view.size.0, rows.start);
+        for y in rows.filter(|y| y % ROWS == view.lesson % ROWS) {
+            for begin in (0..width).step_by(BLOCK) {
+                let count = (width - begin).min(BLOCK);
+                let at = (y - first) * width + begin;
+                let rounds = &mut rounds[at..][..count];
+                view.learn((begin, y), &mut rgb[3 * at..][..3 * count], &mut inverse[at..][..count], rounds);
+            }
+        }
+    }
+}
+
+impl View<'_> {
+    /// Learns from a block from a pixel on.
+    #[inline(always)]
+    fn learn(&self, (begin, y): (usize, usize), rgb: &mut [u8], inverse: &mut [f32], rounds: &mut [u8]) {
+        let (other, count, at) = (self.other, rounds.len().min(BLOCK), y * self.size.0 + begin);
+        let (inverse, rounds) = (&mut inverse[..count], &mut rounds[..count]);
+        let round = self.lesson / ROWS;
+        let (fades, refreshes) = (round.is_multiple_of(FADES), (round + y).is_multiple_of(REFRESH));
+        let (mut own, mut steps) = ([0.0; BLOCK], [0.0; BLOCK]);
+        let metres = &self.map.metres[at..][..count];
+        let (mut seen, mut is_hidden, mut is_sure) = ([0u32; BLOCK], [false; BLOCK], [true; BLOCK]);
+        let mut is_idle = true;
+        for k in 0..count {
+            own[k] = DepthMap::inverse_of(metres[k]);
+            steps[k] = own[k] - inverse[k];
+            seen[k] = u32::from(rounds[k]);
+            is_hidden[k] = (steps[k] > other) & (seen[k] > 0);
+            is_sure[k] = (seen[k] >= u32::from(SURE)) & (steps[k] >= -other) & !refreshes;
+            is_idle &= if is_hidden[k] { !fades } else { is_sure[k] };
+        }
+        // Most of a picture is known, or hides it.
+        if is_idle {
+            return;
+        }
+        let is_clear = self.clear((begin, y), &own, count);
+        let (mut now, mut kept) = ([[0i32; BLOCK]; 3], [[0i32; BLOCK]; 3]);
+        let codes = &self.color.rgb[3 * at..][..3 * count];
+        for k in 0..count {
+            for p in 0..3 {
+                now[p][k] = i32::from(self.codes[p][usize::from(codes[3 * k + p])]);
+                kept[p][k] = i32::from(rgb[3 * k + p]);
+            }
+        }
+        // Rounding takes turns, so that it evens out.
+        let turn = i32::from(round as i16) % MEMORY;
+        for k in 0..count {
+            let apart = [now[0][k] - kept[0][k], now[1][k] - kept[1][k], now[2][k] - kept[2][k]];
+            let is_alike = (apart[0].abs() <= CHANGED) & (apart[1].abs() <= CHANGED) & (apart[2].abs() <= CHANGED);
+            let is_same = (seen[k] > 0) & (steps[k].abs() <= other) & is_alike;
+            let learns = !is_hidden[k] & !is_sure[k] & is_clear[k];
+            for p in 0..3 {
+                let moved = if is_same { (apart[p] + turn).div_euclid(MEMORY) } else { apart[p] };
+                kept[p][k] += if learns { moved } else { 0 };
+            }
+            let nearer = if is_same { inverse[k] + steps[k] / MEMORY as f32 } else { own[k] };
+            inverse[k] = if learns { nearer } else { inverse[k] };
+            let surer = if seen[k] < u32::from(SUREST) { seen[k] + 1 } else { u32::from(SUREST) };
+            let surer = if is_same { surer } else { 1 };
+            let fainter = seen[k] - u32::from(is_hidden[k] & fades);
+            rounds[k] = if learns { surer } else { fainter } as u8;
+        }
+        for k in 0..count {
+            for p in 0..3 {
+                rgb[3 * k + p] = kept[p][k] as u8;
+            }
+        }
+    }
+
+    /// Which pixels of a block are clear of other surfaces; `own` is their inverse depth.
+    #[inline(always)]
+    fn clear(&self, (begin, y): (usize, usize), own: &Lanes<f32>, count: usize) -> Lanes<bool> {
+        let ((width, height), metres, other) = (self.size, &self.map.metres, self.other);
+        let first = begin.saturating_sub(CLEAR_PX);
+        let (top, bottom) = (y.saturating_sub(CLEAR_PX), (y + CLEAR_PX).min(height - 1));
+        let mut mixed = 0;
+        for y in top..=bottom {
+            mixed |= self.mixed.from(first, y);
+        }
+        mixed <<= first + CLEAR_PX - begin;
+        let mut close = 0;
+        for by in 0..=2 * CLEAR_PX {
+            close |= mixed >> by;
+        }
+        let mut wide: Wide = [0.0; BLOCK + 2 * CLEAR_PX];
+        wide[CLEAR_PX..][..BLOCK].copy_from_slice(own);
+        for k in 0..CLEAR_PX {
+            let (left, right) = ((begin + k).saturating_sub(CLEAR_PX), (begin + count + k).min(width - 1));
+            wide[k] = DepthMap::inverse_of(metres[y * width + left]);
+            wide[CLEAR_PX + count + k] = DepthMap::inverse_of(metres[y * width + right]);
+        }
+        let above = &metres[top * width + begin..][..count];
+        let below = &metres[bottom * width + begin..][..count];
+        let (left, right) = (&wide[..BLOCK], &wide[2 * CLEAR_PX..][..BLOCK]);
+        let mut is_clear = [false; BLOCK];
+        for k in 0..count {
+            let (above, below) = (DepthMap::inverse_of(above[k]), DepthMap::inverse_of(below[k]));
+            let is_flat = ((above - own[k]).abs() <= other) & ((below - own[k]).abs() <= other);
+            let is_level = ((left[k] - own[k]).abs() <= other) & ((right[k] - own[k]).abs() <= other);
+            is_clear[k] = is_flat & is_level & ((close >> k) as u32 & 1 == 0);
+        }
+        is_clear
+    }
+}

@@ -1,0 +1,208 @@
+//! The clusters of one cell.
+
+#![allow(clippy::needless_range_loop)] // Pixels and planes index several arrays at once.
+
+use pulp::Simd;
+
+use super::{CELL_PX, Cluster, FRINGE, Sums, View};
+use crate::compute::simd::load;
+use crate::depth::bits::places;
+use crate::depth::matting::symmetric::outer;
+use crate::frame::DepthMap;
+
+/// Pixels at an edge may be mixed themselves. They count so little that they matter only where nothing is pure.
+const AT_EDGE_WEIGHT: f32 = 4e-4;
+/// So many pixels beside an edge, too, the map may be wrong: they count less than those further away.
+const CLOSE_PX: usize = 3;
+const CLOSE_WEIGHT: f32 = 0.02;
+
+/// Pixels of a cell, and every other of them, as on a chessboard, which tells enough.
+const PIXELS: usize = CELL_PX * CELL_PX;
+const SAMPLES: usize = PIXELS / 2;
+/// Numbers of the samples.
+type Lanes = [f32; SAMPLES];
+
+/// The places of the samples in their cell, in its order, and their columns and rows.
+const PLACES: [usize; SAMPLES] = {
+    let (mut places, mut k) = ([0; SAMPLES], 0);
+    while k < SAMPLES {
+        let row = 2 * k / CELL_PX;
+        places[k] = 2 * k + row % 2;
+        k += 1;
+    }
+    places
+};
+const COLUMNS: Lanes = along(1);
+const ROWS: Lanes = along(CELL_PX);
+
+const fn along(step: usize) -> Lanes {
+    let (mut along, mut k) = ([0.0; SAMPLES], 0);
+    while k < SAMPLES {
+        along[k] = (PLACES[k] / step % CELL_PX) as f32;
+        k += 1;
+    }
+    along
+}
+
+/// Samples of a cell: inverse depth and light.
+struct Samples {
+    inverse: Lanes,
+    light: [Lanes; 3],
+}
+
+impl Samples {
+    /// The cluster of those that are chosen, with these weights, in a cell that begins there.
+    #[inline(always)]
+    fn cluster(&self, weight: &Lanes, corner: (usize, usize)) -> Cluster {
+        let Self { inverse, light: [r, g, b] } = self;
+        let (own_r, own_g, own_b) = (product(weight, r), product(weight, g), product(weight, b));
+        let light = [total(&own_r), total(&own_g), total(&own_b)];
+        let [rr, rg, rb] = [total(&product(&own_r, r)), total(&product(&own_r, g)), total(&product(&own_r, b))];
+        let [gg, gb, bb] = [total(&product(&own_g, g)), total(&product(&own_g, b)), total(&product(&own_b, b))];
+        let sums = Sums([total(weight), light[0], light[1], light[2], rr, rg, rb, gg, gb, bb, 0.0, 0.0]);
+        let (columns, rows) = (total(&product(weight, &COLUMNS)), total(&product(weight, &ROWS)));
+        Cluster::new(sums, [columns, rows, total(&product(weight, inverse))], corner)
+    }
+}
+
+#[inline(always)]
+fn product(a: &Lanes, b: &Lanes) -> Lanes {
+    let mut products = [0.0; SAMPLES];
+    for k in 0..SAMPLES {
+        products[k] = a[k] * b[k];
+    }
+    products
+}
+
+/// The sum of all, in the same order on every processor.
+#[inline(always)]
+fn total(values: &Lanes) -> f32 {
+    let mut quarters = [0.0; SAMPLES / 4];
+    for k in 0..SAMPLES / 4 {
+        let (a, b) = (values[k], values[k + SAMPLES / 4]);
+        let (c, d) = (values[k + SAMPLES / 2], values[k + 3 * SAMPLES / 4]);
+        quarters[k] = (a + b) + (c + d);
+    }
+    let [a, b, c, d, e, f, g, h] = quarters;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
+/// The clusters of a cell: one where inverse depths differ by no more than `jump`, or else those of its nearest and of its
+/// farthest surface.
+#[inline(always)]
+pub fn split<S: Simd>(simd: S, view: &View, column: usize, row: usize) -> [Cluster; 3] {
+    let View { size: (width, height), jump, at_edge, .. } = *view;
+    let corner @ (left, top) = (column * CELL_PX, row * CELL_PX);
+    let (across, down) = ((width - left).min(CELL_PX), (height - top).min(CELL_PX));
+    // What is beyond the picture is as its last column and row.
+    let mut values = [0.0; PIXELS];
+    let mut codes = [[0; 3]; PIXELS];
+    let (mut edges, mut beyond) = (0, 0);
+    for (k, values) in values.as_chunks_mut::<CELL_PX>().0.iter_mut().enumerate() {
+        let y = top + k.min(down - 1);
+        let row = &view.rgb[3 * (y * width + left)..][..3 * across];
+        codes[k * CELL_PX..][..across].copy_from_slice(row.as_chunks().0);
+        let metres = &view.metres[y * width + left..][..across];
+        values[..across].copy_from_slice(metres);
+        values[across..].fill(metres[across - 1]);
+        let missing = if k < down { ROW & !0 << across } else { ROW };
+        edges |= (at_edge.from(left, y) & ROW & !missing) << (k * CELL_PX);
+        beyond |= missing << (k * CELL_PX);
+    }
+    for value in &mut values {
+        *value = DepthMap::inverse_of(*value);
+    }
+    let close = close_to_edge(view, left, top);
+    let (mut weights, mut is_edge) = ([0.0; PIXELS], [0.0; PIXELS]);
+    for k in 0..PIXELS {
+        let is = |bits: u64| bits >> k & 1 != 0;
+        is_edge[k] = if is(edges | beyond) { 1.0 } else { 0.0 };
+        let weight = if is(close) { CLOSE_WEIGHT } else { 1.0 };
+        weights[k] = if is(edges) { AT_EDGE_WEIGHT } else { weight };
+        weights[k] = if is(beyond) { 0.0 } else { weights[k] };
+    }
+    let (pure, all) = ends(simd, &values, &is_edge);
+    let (high, low) = if pure.0 >= pure.1 { pure } else { all };
+    let is_one = high - low <= jump;
+    let tolerance = if is_one { 2.0 * jump } else { jump };
+    let zeros = [0.0; SAMPLES];
+    let mut samples = Samples { inverse: zeros, light: [zeros; 3] };
+    let [mut near, mut far] = [zeros; 2];
+    for k in 0..SAMPLES {
+        let (place, code) = (PLACES[k], &codes[PLACES[k]]);
+        for p in 0..3 {
+            samples.light[p][k] = view.light[usize::from(code[p])];
+        }
+        (samples.inverse[k], near[k]) = (values[place], weights[place]);
+    }
+    for k in 0..SAMPLES {
+        let is_far = !is_one & (samples.inverse[k] <= 0.5 * (high + low));
+        let off = (samples.inverse[k] - if is_far { low } else { high }).abs();
+        let weight = if off > tolerance { 0.0 } else { near[k] };
+        near[k] = if is_far { 0.0 } else { weight };
+        far[k] = if is_far { weight } else { 0.0 };
+    }
+    let far = if is_one { Cluster::default() } else { samples.cluster(&far, corner) };
+    let mut clusters = [samples.cluster(&near, corner), far, Cluster::default()];
+    if all.0 - all.1 > jump {
+        let (mut sums, mut of_place) = (Sums::default(), [0.0; 3]);
+        for place in places(edges) {
+            let value = values[place];
+            if value > 0.5 * (all.0 + all.1) {
+                let (x, y) = (place % CELL_PX, place / CELL_PX);
+                let light = view.light((top + y) * width + left + x);
+                let ([r, g, b], [rr, rg, rb, gg, gb, bb]) = (light, outer(light));
+                sums.add(1.0, &Sums([1.0, r, g, b, rr, rg, rb, gg, gb, bb, 0.0, 0.0]));
+                of_place = [of_place[0] + x as f32, of_place[1] + y as f32, of_place[2] + value];
+            }
+        }
+        clusters[FRINGE] = Cluster::new(sums, of_place, corner);
+    }
+    clusters
+}
+
+/// The bits of a row of a cell.
+const ROW: u64 = (1 << CELL_PX) - 1;
+
+/// The largest and the smallest of those values that are not at an edge, and of all.
+#[inline(always)]
+fn ends<S: Simd>(simd: S, values: &[f32; PIXELS], is_edge: &[f32; PIXELS]) -> ((f32, f32), (f32, f32)) {
+    let (zero, beyond) = (simd.splat_f32s(0.0), simd.splat_f32s(f32::INFINITY));
+    let (mut high, mut low, mut pure_high, mut pure_low) = (zero, beyond, zero, beyond);
+    for at in (0..PIXELS).step_by(S::F32_LANES) {
+        let value = load::<S>(values, at);
+        let is_edge = simd.greater_than_f32s(load::<S>(is_edge, at), zero);
+        (high, low) = (simd.max_f32s(high, value), simd.min_f32s(low, value));
+        pure_high = simd.max_f32s(pure_high, simd.select_f32s(is_edge, zero, value));
+        pure_low = simd.min_f32s(pure_low, simd.select_f32s(is_edge, beyond, value));
+    }
+    let [pure, all] =
+        [[pure_high, pure_low], [high, low]].map(|[high, low]| (simd.reduce_max_f32s(high), simd.reduce_min_f32s(low)));
+    (pure, all)
+}
+
+/// Which pixels of a cell are at an edge or close to one, a bit for each.
+#[inline(always)]
+fn close_to_edge(view: &View, left: usize, top: usize) -> u64 {
+    let first = left.saturating_sub(CLOSE_PX);
+    let mut rows = [0u64; CELL_PX + 2 * CLOSE_PX];
+    for (k, row) in rows.iter_mut().enumerate() {
+        let y = top + k;
+        if (CLOSE_PX..view.size.1 + CLOSE_PX).contains(&y) {
+            let edges = view.at_edge.from(first, y - CLOSE_PX) << (first + CLOSE_PX - left);
+            // The bit of column `left` of the cell is that of its first `2 CLOSE_PX + 1` columns.
+            for by in 0..=2 * CLOSE_PX {
+                *row |= edges >> by;
+            }
+        }
+    }
+    let mut close = 0;
+    for k in 0..CELL_PX {
+        let mut of_row = 0;
+        for row in &rows[k..=k + 2 * CLOSE_PX] {
+            of_row |= row;
+        }
+        close |= (of_row & ROW) << (k * CELL_PX);
+    }
+    close
+}
