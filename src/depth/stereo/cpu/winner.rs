@@ -1,25 +1,16 @@
 //! Winner takes all, with the left-right consistency check: of each pixel, the disparity that costs least, if the right
 //! eye agrees.
 
-use pulp::WithSimd;
-
 use super::super::fixed::{AGREE, ONE, UNKNOWN};
 use super::GROUP;
 
-/// The winners of a group of rows.
-pub struct Winners<'a, const N: usize> {
-    /// Sums of costs, `[column][row][disparity]`.
-    pub sums: &'a [u8],
-    pub width: usize,
-    pub eyes: &'a mut Eyes,
-    /// Fixed-point disparities, `[row][column]`: of the rows of the group that there are.
-    pub out: &'a mut [u16],
-}
-
-/// The disparity that costs least for each pixel of a group, as seen from each eye.
+/// The disparity that costs least for each pixel of a group of rows, as seen from each eye.
 pub struct Eyes {
+    width: usize,
     /// `[row][column]`.
     left: Vec<u8>,
+    /// The same refined, in fixed point.
+    refined: Vec<u16>,
     /// `[row][column]`, mirrored: from the last column to the first, and after that the columns left of the picture.
     right: Vec<u8>,
     /// The least sums so far, laid out as `right`.
@@ -29,55 +20,52 @@ pub struct Eyes {
 impl Eyes {
     /// Memory for rows of so many columns.
     pub fn new(width: usize, disparities: usize) -> Self {
-        let right_len = GROUP * (width + disparities);
-        Self { left: vec![0; GROUP * width], right: vec![0; right_len], right_sums: vec![0; right_len] }
+        let (left_len, right_len) = (GROUP * width, GROUP * (width + disparities));
+        let (left, refined) = (vec![0; left_len], vec![0; left_len]);
+        Self { width, left, refined, right: vec![0; right_len], right_sums: vec![0; right_len] }
     }
-}
 
-impl<const N: usize> WithSimd for Winners<'_, N> {
-    type Output = ();
+    /// Begins a group of rows.
+    pub fn clear(&mut self) {
+        self.right_sums.fill(u8::MAX);
+    }
+
+    /// Takes the sums of pixel `x` of a row; the least of them is `least`. Pixels of a row are taken from the left.
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { sums, width, eyes: Eyes { left, right, right_sums }, out } = self;
-        let sums = &sums.as_chunks::<N>().0[..width * GROUP];
-        let (rows, right_stride) = (out.len() / width, width + N);
-        right_sums.fill(u8::MAX);
-        for x in 0..width {
-            // Rows alternate: the next column of a row reads sums that this one writes, and would wait for them.
-            for row in 0..rows {
-                let cells = &sums[x * GROUP + row];
-                left[row * width + x] = index_of_least(cells);
-                // For each d, column x - d of the right eye, mirrored.
-                let first = row * right_stride + width - 1 - x;
-                let partners = first..first + N;
-                keep_less(cells, &mut right_sums[partners.clone()], &mut right[partners]);
-            }
-        }
+    pub fn take<const N: usize>(&mut self, row: usize, x: usize, sums: &[u8; N], least: u8) {
+        let d = index_of(sums, least);
+        let pixel = row * self.width + x;
+        self.left[pixel] = d;
+        self.refined[pixel] = refine(sums, d.into());
+        // For each d, column x - d of the right eye, mirrored.
+        let first = row * (self.width + N) + self.width - 1 - x;
+        let partners = first..first + N;
+        keep_less(sums, &mut self.right_sums[partners.clone()], &mut self.right[partners]);
+    }
+
+    /// Writes the fixed-point disparities that both eyes agree on to `out`, `[row][column]`.
+    pub fn agreed(&self, out: &mut [u16]) {
+        let Self { width, left, refined, right, .. } = self;
+        let width = *width;
+        let right_stride = right.len() / GROUP;
         for (row, out) in out.chunks_exact_mut(width).enumerate() {
-            let (left, right) = (&left[row * width..], &right[row * right_stride..]);
-            for (x, out) in out.iter_mut().enumerate() {
+            let (left, refined) = (&left[row * width..][..width], &refined[row * width..][..width]);
+            let right = &right[row * right_stride..];
+            for x in 0..width {
                 let d = usize::from(left[x]);
                 let agrees = d <= x && right[width - 1 - x + d].abs_diff(left[x]) <= AGREE;
-                *out = if agrees { refine(&sums[x * GROUP + row], d) } else { UNKNOWN };
+                out[x] = if agrees { refined[x] } else { UNKNOWN };
             }
         }
     }
 }
 
-/// The lowest index of the least of `cells`, without branches: vector code.
+/// The lowest index of `least`, without branches: vector code.
 #[inline(always)]
-fn index_of_least<const N: usize>(cells: &[u8; N]) -> u8 {
-    let mut least = u8::MAX;
-    for &cell in cells {
-        least = least.min(cell);
-    }
-    let mut indices = [0; N];
-    for d in 0..N {
-        indices[d] = if cells[d] == least { d as u8 } else { u8::MAX };
-    }
+fn index_of<const N: usize>(cells: &[u8; N], least: u8) -> u8 {
     let mut index = u8::MAX;
-    for d in indices {
-        index = index.min(d);
+    for d in 0..N {
+        index = index.min(if cells[d] == least { d as u8 } else { u8::MAX });
     }
     index
 }
