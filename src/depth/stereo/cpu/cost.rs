@@ -52,7 +52,7 @@ impl<'a, const N: usize> Costs<'a, N> {
                 right[row][plane] = array(&self.codes[row][1][plane][first..]);
             }
         }
-        let last_inside = x.min(N - 1) as u8;
+        let (numbers, last_inside) = (numbers::<N>(), x.min(N - 1) as u8);
         let mut costs = Line([[0; N]; GROUP]);
         for d in 0..N {
             let mut differing = [0; ROWS];
@@ -60,7 +60,7 @@ impl<'a, const N: usize> Costs<'a, N> {
                 let [a, b, c] = left[row];
                 let [of_a, of_b, of_c] = right[row];
                 let bits = bits(a ^ of_a[d], b ^ of_b[d], c ^ of_c[d]);
-                differing[row] = if d as u8 > last_inside { OUTSIDE } else { bits };
+                differing[row] = if numbers[d] > last_inside { OUTSIDE } else { bits };
             }
             for row in 0..GROUP {
                 let next = differing[row] + differing[row + 1] + differing[row + 2];
@@ -93,4 +93,19 @@ pub fn bonus(likely: u16) -> impl Fn(u8) -> u8 {
 #[inline(always)]
 pub fn array<const N: usize>(values: &[u8]) -> &[u8; N] {
     values.first_chunk().expect("rows are long enough")
+}
+
+/// The disparities as bytes. From memory: the compiler compares an index in 64 bits, whatever it is converted to.
+#[inline(always)]
+pub fn numbers<const N: usize>() -> &'static [u8; N] {
+    static NUMBERS: Line<[u8; 256]> = {
+        let mut numbers = [0; 256];
+        let mut d = 0;
+        while d < numbers.len() {
+            numbers[d] = d as u8;
+            d += 1;
+        }
+        Line(numbers)
+    };
+    array(&NUMBERS.0)
 }

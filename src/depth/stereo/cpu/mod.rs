@@ -10,12 +10,12 @@ mod path;
 mod sweep;
 mod winner;
 
-use std::iter;
+use std::{array, iter};
 use std::sync::atomic::AtomicBool;
 
 use census::Census;
 use pulp::Arch;
-use sweep::{Along, BLOCK, Cells, Down, FromLeft, FromRight, Group};
+use sweep::{Agreed, BLOCK, Cells, Down, FromLeft, FromRight, Steps};
 use winner::Eyes;
 
 use super::executor::Executor;
@@ -47,6 +47,7 @@ pub struct CpuExecutor {
 
 /// Memory of one thread.
 struct Member {
+    steps: Steps,
     cells: Cells,
     eyes: Eyes,
 }
@@ -55,7 +56,11 @@ impl CpuExecutor {
     /// For pairs of this size, and at least as many disparities, at most 256.
     pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
         let disparities = fixed::range(disparities);
-        let member = || Member { cells: Cells::new(width, disparities), eyes: Eyes::new(width, disparities) };
+        let member = || Member {
+            steps: Steps::new(width),
+            cells: Cells::new(width, disparities),
+            eyes: Eyes::new(width, disparities),
+        };
         Self {
             width,
             height,
@@ -83,26 +88,23 @@ impl CpuExecutor {
         self.down.begin().for_each(Down::clear);
         let (down, census) = (&self.down, [&self.left, &self.right]);
         let out = DisjointParts::new(out, GROUP * width, &mut self.taken);
-        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { cells, eyes }, part| {
-            let first = part * GROUP;
-            let pixels = first * width..(first + GROUP).min(height) * width;
-            let above = &left[first.saturating_sub(1) * width..][..width];
-            let group = Group { luma: &left[pixels.clone()], above, width, penalties };
+        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { steps, cells, eyes }, part| {
+            // The row `k` below the one above the group; beyond the borders the outermost ones repeat.
+            let row = |k: usize| (part * GROUP + k).saturating_sub(1).min(height - 1);
+            let pixels = |y: usize| y * width..(y + 1) * width;
+            steps.compute(array::from_fn(|k| &left[pixels(row(k))]), penalties);
             // Costs are sums over three rows, so one above and one below the group are read, too.
-            let codes = std::array::from_fn(|k| {
-                let y = (first + k).saturating_sub(1).min(height - 1);
-                census.map(|census| census.row(y))
-            });
-            let likely = likely.map(|likely| &likely[pixels]);
-            arch.dispatch(FromRight::<N> { group, codes, likely, cells });
-            let mut along = Along::start::<N>();
+            let codes = array::from_fn(|k| census.map(|census| census.row(row(k))));
+            let likely = likely.map(|likely| array::from_fn(|k| &likely[pixels(row(k + 1))]));
+            arch.dispatch(FromRight::<N> { codes, steps, likely, cells });
+            let mut along = sweep::start::<N>();
             eyes.clear();
             let mut blocks = down.runner(part);
             for first in (0..width).step_by(BLOCK) {
                 let Some(mut down) = blocks.next_block() else { break };
-                arch.dispatch(FromLeft::<N> { group, cells, first, along: &mut along, down: &mut down, eyes });
+                arch.dispatch(FromLeft::<N> { steps, cells, first, along: &mut along, down: &mut down, eyes });
             }
-            eyes.agreed(out.part(part));
+            arch.dispatch(Agreed { eyes, out: out.part(part) });
         });
     }
 }

@@ -1,6 +1,8 @@
 //! Winner takes all, with the left-right consistency check: of each pixel, the disparity that costs least, if the right
 //! eye agrees.
 
+use std::ops::Range;
+
 use super::super::fixed::{AGREE, ONE, UNKNOWN};
 use super::GROUP;
 
@@ -8,21 +10,29 @@ use super::GROUP;
 pub struct Eyes {
     width: usize,
     /// `[row][column]`.
-    left: Vec<u8>,
-    /// The same refined, in fixed point.
-    refined: Vec<u16>,
+    left: Vec<Winner>,
     /// `[row][column]`, mirrored: from the last column to the first, and after that the columns left of the picture.
     right: Vec<u8>,
     /// The least sums so far, laid out as `right`.
     right_sums: Vec<u8>,
 }
 
+/// A disparity, and the sums of the one below it, of itself, and of the one above; three times its own at either end.
+type Winner = [u8; 4];
+
+/// What a row of [`Eyes`] has, in some columns.
+pub struct Row<'a, const N: usize> {
+    left: &'a mut [Winner],
+    /// From the last of the columns on.
+    right: &'a mut [u8],
+    right_sums: &'a mut [u8],
+}
+
 impl Eyes {
     /// Memory for rows of so many columns.
     pub fn new(width: usize, disparities: usize) -> Self {
-        let (left_len, right_len) = (GROUP * width, GROUP * (width + disparities));
-        let (left, refined) = (vec![0; left_len], vec![0; left_len]);
-        Self { width, left, refined, right: vec![0; right_len], right_sums: vec![0; right_len] }
+        let right_len = GROUP * (width + disparities);
+        Self { width, left: vec![[0; 4]; GROUP * width], right: vec![0; right_len], right_sums: vec![0; right_len] }
     }
 
     /// Begins a group of rows.
@@ -30,68 +40,85 @@ impl Eyes {
         self.right_sums.fill(u8::MAX);
     }
 
-    /// Takes the sums of pixel `x` of a row; the least of them is `least`. Pixels of a row are taken from the left.
+    /// The rows, `columns` of them.
     #[inline(always)]
-    pub fn take<const N: usize>(&mut self, row: usize, x: usize, sums: &[u8; N], least: u8) {
-        let d = index_of(sums, least);
-        let pixel = row * self.width + x;
-        self.left[pixel] = d;
-        self.refined[pixel] = refine(sums, d.into());
-        // For each d, column x - d of the right eye, mirrored.
-        let first = row * (self.width + N) + self.width - 1 - x;
-        let partners = first..first + N;
-        keep_less(sums, &mut self.right_sums[partners.clone()], &mut self.right[partners]);
+    pub fn rows<const N: usize>(&mut self, columns: Range<usize>) -> [Row<'_, N>; GROUP] {
+        let (width, stride) = (self.width, self.width + N);
+        let partners = width - columns.end..stride - columns.start;
+        let mut left = self.left.chunks_exact_mut(width);
+        let mut right = self.right.chunks_exact_mut(stride);
+        let mut right_sums = self.right_sums.chunks_exact_mut(stride);
+        std::array::from_fn(|_| Row {
+            left: left.next().map_or(&mut [], |row| &mut row[columns.clone()]),
+            right: right.next().map_or(&mut [], |row| &mut row[partners.clone()]),
+            right_sums: right_sums.next().map_or(&mut [], |row| &mut row[partners.clone()]),
+        })
     }
 
     /// Writes the fixed-point disparities that both eyes agree on to `out`, `[row][column]`.
+    #[inline(always)]
     pub fn agreed(&self, out: &mut [u16]) {
-        let Self { width, left, refined, right, .. } = self;
-        let width = *width;
-        let right_stride = right.len() / GROUP;
+        let (width, stride) = (self.width, self.right.len() / GROUP);
         for (row, out) in out.chunks_exact_mut(width).enumerate() {
-            let (left, refined) = (&left[row * width..][..width], &refined[row * width..][..width]);
-            let right = &right[row * right_stride..];
+            let (left, right) = (&self.left[row * width..][..width], &self.right[row * stride..][..stride]);
             for x in 0..width {
-                let d = usize::from(left[x]);
-                let agrees = d <= x && right[width - 1 - x + d].abs_diff(left[x]) <= AGREE;
-                out[x] = if agrees { refined[x] } else { UNKNOWN };
+                out[x] = refine(left[x]);
+            }
+            for x in 0..width {
+                let d = left[x][0];
+                let agrees = usize::from(d) <= x && right[width - 1 - x + usize::from(d)].abs_diff(d) <= AGREE;
+                out[x] = if agrees { out[x] } else { UNKNOWN };
             }
         }
     }
 }
 
-/// The lowest index of `least`, without branches: vector code.
-#[inline(always)]
-fn index_of<const N: usize>(cells: &[u8; N], least: u8) -> u8 {
-    let mut index = u8::MAX;
-    for d in 0..N {
-        index = index.min(if cells[d] == least { d as u8 } else { u8::MAX });
+impl<const N: usize> Row<'_, N> {
+    /// Takes the sums of pixel `x` of the columns. Pixels are taken from the left.
+    #[inline(always)]
+    pub fn take(&mut self, x: usize, sums: &[u8; N]) {
+        let d = index_of_least(sums);
+        let d = usize::from(d);
+        let beside = usize::from(d > 0 && d + 1 < N);
+        self.left[x] = [d as u8, sums[(d - beside) % N], sums[d % N], sums[(d + beside) % N]];
+        // For each d, column x - d of the right eye, mirrored.
+        let first = self.left.len() - 1 - x;
+        let (right, right_sums) = (&mut self.right[first..], &mut self.right_sums[first..]);
+        if let (Some(right), Some(right_sums)) = (right.first_chunk_mut(), right_sums.first_chunk_mut()) {
+            keep_less::<N>(sums, right_sums, right);
+        }
     }
-    index
+}
+
+/// The lowest index of the least of `cells`.
+#[inline(always)]
+fn index_of_least<const N: usize>(cells: &[u8; N]) -> u8 {
+    let mut least = u16::MAX;
+    for d in 0..N {
+        least = least.min(u16::from(cells[d]) << 8 | d as u16);
+    }
+    least as u8
 }
 
 /// Where a cell is less than its sum, puts it into `sums`, and its disparity into `disparities`.
 #[inline(always)]
-fn keep_less<const N: usize>(cells: &[u8; N], sums: &mut [u8], disparities: &mut [u8]) {
+fn keep_less<const N: usize>(cells: &[u8; N], sums: &mut [u8; N], disparities: &mut [u8; N]) {
     let mut taken = [0; N];
     for d in 0..N {
         taken[d] = if cells[d] < sums[d] { d as u8 } else { disparities[d] };
     }
-    disparities.copy_from_slice(&taken);
+    *disparities = taken;
     for d in 0..N {
         sums[d] = sums[d].min(cells[d]);
     }
 }
 
-/// Refines the disparity `d` to parts of a pixel, in fixed point: the minimum of a V with equally steep sides through
-/// its cost and those beside it.
+/// A winner to parts of a pixel, in fixed point: the minimum of a V with equally steep sides through its sum and those
+/// beside it.
 #[inline(always)]
-fn refine(cells: &[u8], d: usize) -> u16 {
-    let whole = d as i32 * i32::from(ONE);
-    if d == 0 || d + 1 >= cells.len() {
-        return whole as u16;
-    }
-    let [lower, least, upper] = [cells[d - 1], cells[d], cells[d + 1]].map(i32::from);
-    let slope = lower.max(upper) - least;
-    if slope == 0 { whole as u16 } else { (whole + (lower - upper) * i32::from(ONE / 2) / slope) as u16 }
+fn refine([d, lower, least, upper]: Winner) -> u16 {
+    let [lower, least, upper] = [lower, least, upper].map(f32::from);
+    // Exact to the whole number below: a quotient of such small numbers is nowhere as near to the next one as rounding is.
+    let parts = (lower - upper) * f32::from(ONE / 2) / (lower.max(upper) - least).max(1.0);
+    (i32::from(d) * i32::from(ONE) + parts as i32) as u16
 }
