@@ -86,7 +86,8 @@ fn bits(a: u8, b: u8, c: u8) -> u8 {
 #[inline(always)]
 pub fn bonus(likely: u16) -> impl Fn(u8) -> u8 {
     let (near, bonus) = (likely.wrapping_sub(1) as u8, if likely > 0 { BONUS } else { 0 });
-    move |d| if d.abs_diff(near) <= 1 { bonus } else { 0 }
+    // Not `abs_diff`, which is computed in 32 bits.
+    move |d| if d.max(near) - d.min(near) <= 1 { bonus } else { 0 }
 }
 
 /// The first `N` values.

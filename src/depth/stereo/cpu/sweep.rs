@@ -7,7 +7,7 @@ use super::super::penalty::Penalties;
 use super::GROUP;
 use super::cost::{self, Codes, Costs};
 use super::path::Values;
-use super::winner::Eyes;
+use super::winner::{Eyes, Row};
 use crate::compute::aligned::{Aligned, Line};
 
 /// The penalties P2 in a group of rows, `[column][row]`. Rows below the picture have those of its last one.
@@ -42,7 +42,8 @@ impl Steps {
 /// right.
 pub struct Cells(Aligned<u8>);
 
-type Column<const N: usize> = [[[u8; N]; 2]; GROUP];
+/// Of the rows of a column.
+type Cell<const N: usize> = [[[u8; N]; 2]; GROUP];
 
 impl Cells {
     /// Of `width` columns.
@@ -51,30 +52,23 @@ impl Cells {
     }
 
     #[inline(always)]
-    fn columns<const N: usize>(&self) -> &[Column<N>] {
+    fn columns<const N: usize>(&self) -> &[Cell<N>] {
         self.0.as_chunks().0.as_chunks().0.as_chunks().0
     }
 
     #[inline(always)]
-    fn columns_mut<const N: usize>(&mut self) -> &mut [Column<N>] {
+    fn columns_mut<const N: usize>(&mut self) -> &mut [Cell<N>] {
         self.0.as_chunks_mut().0.as_chunks_mut().0.as_chunks_mut().0
     }
 }
 
-/// Paths along the rows of a group. Two buffers take turns: the values of the pixel before, and those that are made.
+/// The values of paths along the rows of a group, at the pixel before and at the present one in turn.
 pub type Along = [[Values; GROUP]; 2];
 
 /// Before the first pixels.
 #[inline(always)]
 pub fn start<const N: usize>() -> Along {
     [[Values::start::<N>(); GROUP]; 2]
-}
-
-/// The path of row `row` for its step to column `x`: its values before, and those that are made.
-#[inline(always)]
-fn turn(along: &mut Along, row: usize, x: usize) -> (&Values, &mut Values) {
-    let [first, second] = along;
-    if x.is_multiple_of(2) { (&first[row], &mut second[row]) } else { (&second[row], &mut first[row]) }
 }
 
 /// The costs of a group, and the path from the right.
@@ -93,18 +87,39 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { codes, steps, likely, cells } = self;
         let width = steps.along.len();
-        let columns = &mut cells.columns_mut::<N>()[..width];
-        let mut made = Costs::<N>::new(&codes, width);
-        let mut along = start::<N>();
-        for x in (0..width).rev() {
-            let made = made.of_column(x);
-            let p2 = steps.along[(x + 1).min(width - 1)];
-            let likely = likely.map_or([0; GROUP], |likely| likely.map(|row| row[x]));
-            for row in 0..GROUP {
-                let (before, now) = turn(&mut along, row, x);
-                let [costs, halves] = &mut columns[x][row];
-                step(before, p2[row], likely[row], &made.0[row], now, costs, halves);
+        let mut column = Column { steps, likely, costs: Costs::<N>::new(&codes, width), cells: cells.columns_mut() };
+        let [mut one, mut two] = start::<N>();
+        // The two take turns.
+        for x in (0..width).rev().step_by(2) {
+            column.go_on(x, &one, &mut two);
+            if x > 0 {
+                column.go_on(x - 1, &two, &mut one);
             }
+        }
+    }
+}
+
+/// What each column of a sweep from the right needs.
+struct Column<'a, const N: usize> {
+    steps: &'a Steps,
+    likely: Option<[&'a [u16]; GROUP]>,
+    costs: Costs<'a, N>,
+    cells: &'a mut [Cell<N>],
+}
+
+impl<const N: usize> Column<'_, N> {
+    /// Takes the paths to column `x`.
+    #[inline(always)]
+    fn go_on(&mut self, x: usize, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
+        let made = self.costs.of_column(x);
+        let along = &self.steps.along;
+        let p2 = along[(x + 1).min(along.len() - 1)];
+        let likely = self.likely.map_or([0; GROUP], |likely| likely.map(|row| row[x]));
+        let cells = &mut self.cells[x];
+        for row in 0..GROUP {
+            let mut cell = Line([[0; N]; 2]);
+            step(&before[row], p2[row], likely[row], &made.0[row], &mut now[row], &mut cell.0);
+            cells[row] = cell.0;
         }
     }
 }
@@ -117,8 +132,7 @@ fn step<const N: usize>(
     likely: u16,
     made: &[u8; N],
     now: &mut Values,
-    costs: &mut [u8; N],
-    halves: &mut [u8; N],
+    [costs, halves]: &mut [[u8; N]; 2],
 ) {
     let (step, bonus, numbers) = (before.step::<N>(p2), cost::bonus(likely), cost::numbers::<N>());
     let values = now.of_mut::<N>();
@@ -173,37 +187,67 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { steps, cells, first, along, down, eyes } = self;
         let end = (first + BLOCK).min(steps.along.len());
-        let (p2_along, p2_down) = (&steps.along[first..end], &steps.down[first..end]);
-        let columns = end - first;
-        let cells = &cells.columns::<N>()[first..end];
-        let states = &mut down.values.as_chunks_mut::<N>().0[..columns];
-        let mut rows = eyes.rows::<N>(first..end);
-        // Above each row the values of a column, below the last one those for the next group.
-        let mut between = [Values::start::<N>(); GROUP + 1];
+        let mut block = Block::<N> {
+            p2: [&steps.along[first..end], &steps.down[first..end]],
+            cells: &cells.columns()[first..end],
+            columns: end - first,
+            between: [Values::start::<N>(); GROUP + 1],
+            rows: eyes.rows(first..end),
+        };
+        // Copies, so that the compiler knows that they are apart.
+        let [mut one, mut two] = *along;
         // Each row is a column behind the one above, so that no step waits for what was made just before it.
-        for k in 0..columns + GROUP {
-            if let Some(x) = k.checked_sub(GROUP) {
-                states[x] = *between[GROUP].of::<N>();
-                down.least[x] = between[GROUP].least;
-            }
-            for row in (0..GROUP).rev() {
-                let x = k.wrapping_sub(row);
-                if x >= columns {
-                    continue;
-                }
-                if row == 0 {
-                    *between[0].of_mut::<N>() = states[x];
-                    between[0].least = down.least[x];
-                }
-                let (above, below) = between.split_at_mut(row + 1);
-                let (before, now) = turn(along, row, x);
-                let [costs, halves] = &cells[x][row];
-                let mut sums = Line([0; N]);
-                let p2 = [p2_along[x][row], p2_down[x][row]];
-                step_two(before, &above[row], p2, costs, halves, now, &mut below[0], &mut sums.0);
-                rows[row].take(x, &sums.0);
-            }
+        for k in (0..block.columns + GROUP).step_by(2) {
+            block.go_on(k, down, &one, &mut two);
+            block.go_on(k + 1, down, &two, &mut one);
         }
+        *along = [one, two];
+    }
+}
+
+/// What each step of a sweep from the left through a block needs.
+struct Block<'a, const N: usize> {
+    /// Along the rows and down the columns.
+    p2: [&'a [[u8; GROUP]]; 2],
+    cells: &'a [Cell<N>],
+    columns: usize,
+    /// The values of paths down the columns above each row, and below the last one.
+    between: [Values; GROUP + 1],
+    rows: [Row<'a, N>; GROUP],
+}
+
+impl<const N: usize> Block<'_, N> {
+    /// Takes row 0 to column `k`, row 1 to the one before, and so on.
+    #[inline(always)]
+    fn go_on(&mut self, k: usize, down: &mut Down, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
+        let states = &mut down.values.as_chunks_mut::<N>().0[..self.columns];
+        let past = k.wrapping_sub(GROUP);
+        if past < self.columns {
+            states[past] = *self.between[GROUP].of::<N>();
+            down.least[past] = self.between[GROUP].least;
+        }
+        self.row::<3>(k, before, now);
+        self.row::<2>(k, before, now);
+        self.row::<1>(k, before, now);
+        if k < self.columns {
+            *self.between[0].of_mut::<N>() = states[k];
+            self.between[0].least = down.least[k];
+        }
+        self.row::<0>(k, before, now);
+    }
+
+    /// Takes a row to its column; does nothing where that is outside the block.
+    #[inline(always)]
+    fn row<const ROW: usize>(&mut self, k: usize, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
+        let x = k.wrapping_sub(ROW);
+        if x >= self.columns {
+            return;
+        }
+        let mut sums = Line([0; N]);
+        let p2 = self.p2.map(|p2| p2[x][ROW]);
+        let (above, below) = self.between.split_at_mut(ROW + 1);
+        step_two(&before[ROW], &above[ROW], p2, &self.cells[x][ROW], &mut now[ROW], &mut below[0], &mut sums.0);
+        self.rows[ROW].take(x, &sums.0);
     }
 }
 
@@ -213,8 +257,7 @@ fn step_two<const N: usize>(
     before: &Values,
     above: &Values,
     p2: [u8; 2],
-    costs: &[u8; N],
-    halves: &[u8; N],
+    [costs, halves]: &[[u8; N]; 2],
     now: &mut Values,
     below: &mut Values,
     sums: &mut [u8; N],
