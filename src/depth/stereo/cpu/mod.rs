@@ -15,7 +15,7 @@ use std::sync::atomic::AtomicBool;
 
 use census::Census;
 use pulp::Arch;
-use sweep::{Agreed, BLOCK, Cells, Down, FromLeft, FromRight, Steps};
+use sweep::{Agreed, BLOCK, Cells, Down, FromLeft, FromRight, Paths, Steps};
 use winner::Eyes;
 
 use super::executor::Executor;
@@ -49,6 +49,7 @@ pub struct CpuExecutor {
 struct Member {
     steps: Steps,
     cells: Cells,
+    paths: Paths,
     eyes: Eyes,
 }
 
@@ -59,6 +60,7 @@ impl CpuExecutor {
         let member = || Member {
             steps: Steps::new(width),
             cells: Cells::new(width, disparities),
+            paths: Paths::new(),
             eyes: Eyes::new(width, disparities),
         };
         Self {
@@ -88,7 +90,7 @@ impl CpuExecutor {
         self.down.begin().for_each(Down::clear);
         let (down, census) = (&self.down, [&self.left, &self.right]);
         let out = DisjointParts::new(out, GROUP * width, &mut self.taken);
-        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { steps, cells, eyes }, part| {
+        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { steps, cells, paths, eyes }, part| {
             // The row `k` below the one above the group; beyond the borders the outermost ones repeat.
             let row = |k: usize| (part * GROUP + k).saturating_sub(1).min(height - 1);
             let pixels = |y: usize| y * width..(y + 1) * width;
@@ -96,13 +98,14 @@ impl CpuExecutor {
             // Costs are sums over three rows, so one above and one below the group are read, too.
             let codes = array::from_fn(|k| census.map(|census| census.row(row(k))));
             let likely = likely.map(|likely| array::from_fn(|k| &likely[pixels(row(k + 1))]));
-            arch.dispatch(FromRight::<N> { codes, steps, likely, cells });
-            let mut along = sweep::start::<N>();
+            paths.clear::<N>();
+            arch.dispatch(FromRight::<N> { codes, steps, likely, cells, paths });
+            paths.clear::<N>();
             eyes.clear();
             let mut blocks = down.runner(part);
             for first in (0..width).step_by(BLOCK) {
                 let Some(mut down) = blocks.next_block() else { break };
-                arch.dispatch(FromLeft::<N> { steps, cells, first, along: &mut along, down: &mut down, eyes });
+                arch.dispatch(FromLeft::<N> { steps, cells, first, paths, down: &mut down, eyes });
             }
             arch.dispatch(Agreed { eyes, out: out.part(part) });
         });

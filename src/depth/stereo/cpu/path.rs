@@ -24,7 +24,6 @@ pub struct Values {
 
 impl Values {
     /// Before the first pixel of a path, which takes its costs from there.
-    #[inline(always)]
     pub fn start<const N: usize>() -> Self {
         let mut start = Self { values: [u8::MAX; LENGTH], least: 0 };
         start.of_mut::<N>().fill(0);

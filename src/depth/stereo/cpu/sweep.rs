@@ -62,13 +62,25 @@ impl Cells {
     }
 }
 
-/// The values of paths along the rows of a group, at the pixel before and at the present one in turn.
-pub type Along = [[Values; GROUP]; 2];
+/// The values of paths in a group. They are handed around by reference, as the compiler gives locals another place than
+/// a cache line of their own.
+pub struct Paths {
+    /// Along the rows, at the pixel before and at the present one in turn.
+    along: [[Values; GROUP]; 2],
+    /// Down a column: above each row, and below the last one.
+    down: [Values; GROUP + 1],
+}
 
-/// Before the first pixels.
-#[inline(always)]
-pub fn start<const N: usize>() -> Along {
-    [[Values::start::<N>(); GROUP]; 2]
+impl Paths {
+    pub fn new() -> Self {
+        Self { along: [[Values::start::<0>(); GROUP]; 2], down: [Values::start::<0>(); GROUP + 1] }
+    }
+
+    /// Back before the first pixels.
+    pub fn clear<const N: usize>(&mut self) {
+        self.along = [[Values::start::<N>(); GROUP]; 2];
+        self.down = [Values::start::<N>(); GROUP + 1];
+    }
 }
 
 /// The costs of a group, and the path from the right.
@@ -79,21 +91,22 @@ pub struct FromRight<'a, const N: usize> {
     /// Of each row, one more than the likely disparity, or 0.
     pub likely: Option<[&'a [u16]; GROUP]>,
     pub cells: &'a mut Cells,
+    /// Before the first pixels.
+    pub paths: &'a mut Paths,
 }
 
 impl<const N: usize> WithSimd for FromRight<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { codes, steps, likely, cells } = self;
+        let Self { codes, steps, likely, cells, paths } = self;
         let width = steps.along.len();
         let mut column = Column { steps, likely, costs: Costs::<N>::new(&codes, width), cells: cells.columns_mut() };
-        let [mut one, mut two] = start::<N>();
-        // The two take turns.
+        let [one, two] = &mut paths.along;
         for x in (0..width).rev().step_by(2) {
-            column.go_on(x, &one, &mut two);
+            column.go_on(x, one, two);
             if x > 0 {
-                column.go_on(x - 1, &two, &mut one);
+                column.go_on(x - 1, two, one);
             }
         }
     }
@@ -176,7 +189,7 @@ pub struct FromLeft<'a, const N: usize> {
     pub cells: &'a Cells,
     /// First column of the block.
     pub first: usize,
-    pub along: &'a mut Along,
+    pub paths: &'a mut Paths,
     pub down: &'a mut Down,
     pub eyes: &'a mut Eyes,
 }
@@ -185,23 +198,20 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { steps, cells, first, along, down, eyes } = self;
+        let Self { steps, cells, first, paths, down, eyes } = self;
         let end = (first + BLOCK).min(steps.along.len());
         let mut block = Block::<N> {
             p2: [&steps.along[first..end], &steps.down[first..end]],
             cells: &cells.columns()[first..end],
             columns: end - first,
-            between: [Values::start::<N>(); GROUP + 1],
             rows: eyes.rows(first..end),
         };
-        // Copies, so that the compiler knows that they are apart.
-        let [mut one, mut two] = *along;
+        let Paths { along: [one, two], down: between } = paths;
         // Each row is a column behind the one above, so that no step waits for what was made just before it.
         for k in (0..block.columns + GROUP).step_by(2) {
-            block.go_on(k, down, &one, &mut two);
-            block.go_on(k + 1, down, &two, &mut one);
+            block.go_on(k, down, between, one, two);
+            block.go_on(k + 1, down, between, two, one);
         }
-        *along = [one, two];
     }
 }
 
@@ -211,42 +221,54 @@ struct Block<'a, const N: usize> {
     p2: [&'a [[u8; GROUP]]; 2],
     cells: &'a [Cell<N>],
     columns: usize,
-    /// The values of paths down the columns above each row, and below the last one.
-    between: [Values; GROUP + 1],
     rows: [Row<'a, N>; GROUP],
 }
 
 impl<const N: usize> Block<'_, N> {
     /// Takes row 0 to column `k`, row 1 to the one before, and so on.
     #[inline(always)]
-    fn go_on(&mut self, k: usize, down: &mut Down, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
+    fn go_on(
+        &mut self,
+        k: usize,
+        down: &mut Down,
+        between: &mut [Values; GROUP + 1],
+        before: &[Values; GROUP],
+        now: &mut [Values; GROUP],
+    ) {
         let states = &mut down.values.as_chunks_mut::<N>().0[..self.columns];
         let past = k.wrapping_sub(GROUP);
         if past < self.columns {
-            states[past] = *self.between[GROUP].of::<N>();
-            down.least[past] = self.between[GROUP].least;
+            states[past] = *between[GROUP].of::<N>();
+            down.least[past] = between[GROUP].least;
         }
-        self.row::<3>(k, before, now);
-        self.row::<2>(k, before, now);
-        self.row::<1>(k, before, now);
+        self.row::<3>(k, between, before, now);
+        self.row::<2>(k, between, before, now);
+        self.row::<1>(k, between, before, now);
         if k < self.columns {
-            *self.between[0].of_mut::<N>() = states[k];
-            self.between[0].least = down.least[k];
+            *between[0].of_mut::<N>() = states[k];
+            between[0].least = down.least[k];
         }
-        self.row::<0>(k, before, now);
+        self.row::<0>(k, between, before, now);
     }
 
     /// Takes a row to its column; does nothing where that is outside the block.
     #[inline(always)]
-    fn row<const ROW: usize>(&mut self, k: usize, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
+    fn row<const ROW: usize>(
+        &mut self,
+        k: usize,
+        between: &mut [Values; GROUP + 1],
+        before: &[Values; GROUP],
+        now: &mut [Values; GROUP],
+    ) {
         let x = k.wrapping_sub(ROW);
         if x >= self.columns {
             return;
         }
         let mut sums = Line([0; N]);
         let p2 = self.p2.map(|p2| p2[x][ROW]);
-        let (above, below) = self.between.split_at_mut(ROW + 1);
-        step_two(&before[ROW], &above[ROW], p2, &self.cells[x][ROW], &mut now[ROW], &mut below[0], &mut sums.0);
+        let cell = Line(self.cells[x][ROW]);
+        let (above, below) = between.split_at_mut(ROW + 1);
+        step_two(&before[ROW], &above[ROW], p2, &cell.0, &mut now[ROW], &mut below[0], &mut sums.0);
         self.rows[ROW].take(x, &sums.0);
     }
 }
