@@ -16,7 +16,7 @@ pub type Codes<'a> = [[&'a [u8]; PLANES]; 2];
 /// differences over three rows and columns.
 pub struct Costs<'a, const N: usize> {
     /// From the row above the group to the one below it.
-    codes: &'a [Codes<'a>; ROWS],
+    codes: [Codes<'a>; ROWS],
     width: usize,
     /// Differences summed over three rows: of the column whose costs are next, and of it and the one right of it.
     here: Line<[[u8; N]; GROUP]>,
@@ -25,7 +25,15 @@ pub struct Costs<'a, const N: usize> {
 
 impl<'a, const N: usize> Costs<'a, N> {
     #[inline(always)]
-    pub fn new(codes: &'a [Codes<'a>; ROWS], width: usize) -> Self {
+    pub fn new(mut codes: [Codes<'a>; ROWS], width: usize) -> Self {
+        // Slices of one length need one bounds check.
+        for row in 0..ROWS {
+            let [left, right] = &mut codes[row];
+            for plane in 0..PLANES {
+                left[plane] = &left[plane][..width];
+                right[plane] = &right[plane][..width + N];
+            }
+        }
         let mut first = Self { codes, width, here: Line([[0; N]; GROUP]), two: Line([[0; N]; GROUP]) };
         // Beyond the borders the outermost columns repeat.
         first.go_on(width - 1);
@@ -77,7 +85,7 @@ impl<'a, const N: usize> Costs<'a, N> {
 #[inline(always)]
 fn bits(a: u8, b: u8, c: u8) -> u8 {
     // They add up to ones and twos, so that two bytes are counted for three.
-    let (ones, twos) = (a ^ b ^ c, (a & b) | (c & (a ^ b)));
+    let (ones, twos) = (a ^ b ^ c, (a & b) | (c & (a | b)));
     ones.count_ones() as u8 + 2 * twos.count_ones() as u8
 }
 

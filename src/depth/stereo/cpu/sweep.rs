@@ -101,7 +101,7 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { codes, steps, likely, cells, paths } = self;
         let width = steps.along.len();
-        let mut column = Column { steps, likely, costs: Costs::<N>::new(&codes, width), cells: cells.columns_mut() };
+        let mut column = Column { steps, likely, costs: Costs::<N>::new(codes, width), cells: cells.columns_mut() };
         let [one, two] = &mut paths.along;
         for x in (0..width).rev().step_by(2) {
             column.go_on(x, one, two);
