@@ -41,6 +41,13 @@ impl Values {
         self.values[GUARD..].first_chunk_mut().expect("the most disparities fit")
     }
 
+    /// Takes over these values, of which `least` is the least.
+    #[inline(always)]
+    pub fn set<const N: usize>(&mut self, values: &[u8; N], least: u8) {
+        *self.of_mut() = *values;
+        self.least = least;
+    }
+
     /// The values from disparity `first` on, -1 to 1.
     #[inline(always)]
     fn from<const N: usize>(&self, first: isize) -> &[u8; N] {

@@ -207,6 +207,7 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
             rows: eyes.rows(first..end),
         };
         let Paths { along: [one, two], down: between } = paths;
+        between[0].set(&down.values.as_chunks::<N>().0[0], down.least[0]);
         // Each row is a column behind the one above, so that no step waits for what was made just before it.
         for k in (0..block.columns + GROUP).step_by(2) {
             block.go_on(k, down, between, one, two);
@@ -244,11 +245,11 @@ impl<const N: usize> Block<'_, N> {
         self.row::<3>(k, between, before, now);
         self.row::<2>(k, between, before, now);
         self.row::<1>(k, between, before, now);
-        if k < self.columns {
-            *between[0].of_mut::<N>() = states[k];
-            between[0].least = down.least[k];
-        }
         self.row::<0>(k, between, before, now);
+        // One step before it is read, too.
+        if k + 1 < self.columns {
+            between[0].set(&states[k + 1], down.least[k + 1]);
+        }
     }
 
     /// Takes a row to its column; does nothing where that is outside the block.
