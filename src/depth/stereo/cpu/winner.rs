@@ -66,7 +66,8 @@ impl Eyes {
             }
             for x in 0..width {
                 let d = left[x][0];
-                let agrees = usize::from(d) <= x && right[width - 1 - x + usize::from(d)].abs_diff(d) <= AGREE;
+                let apart = i32::from(right[width - 1 - x + usize::from(d)]) - i32::from(d);
+                let agrees = (usize::from(d) <= x) & (apart.unsigned_abs() <= AGREE.into());
                 out[x] = if agrees { out[x] } else { UNKNOWN };
             }
         }
@@ -118,7 +119,18 @@ fn keep_less<const N: usize>(cells: &[u8; N], sums: &mut [u8; N], disparities: &
 #[inline(always)]
 fn refine([d, lower, least, upper]: Winner) -> u16 {
     let [lower, least, upper] = [lower, least, upper].map(f32::from);
-    // Exact to the whole number below: a quotient of such small numbers is nowhere as near to the next one as rounding is.
-    let parts = (lower - upper) * f32::from(ONE / 2) / (lower.max(upper) - least).max(1.0);
-    (i32::from(d) * i32::from(ONE) + parts as i32) as u16
+    let parts = (lower - upper).abs() * f32::from(ONE / 2) / (lower.max(upper) - least).max(1.0);
+    let (whole, parts) = (u16::from(d) * ONE, floor(parts));
+    if lower < upper { whole - parts } else { whole + parts }
+}
+
+/// The whole number below a quotient of less than 256, whose divisor is less than 256, too. A conversion of the language
+/// would be made number by number, as it treats those that fit nowhere.
+#[inline(always)]
+fn floor(quotient: f32) -> u16 {
+    // Rounds to whole numbers when added; the last bits of the sum are the number.
+    const WHOLE: f32 = 1.5 * (1 << 23) as f32;
+    // No quotient is as near to the next whole number as this is to a half.
+    const HALF: f32 = 0.5 - 1.0 / 512.0;
+    (quotient - HALF + WHOLE).to_bits() as u16 & 0xff
 }
