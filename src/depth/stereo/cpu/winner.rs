@@ -106,7 +106,9 @@ fn index_of_least<const N: usize>(cells: &[u8; N]) -> u8 {
 fn keep_less<const N: usize>(cells: &[u8; N], sums: &mut [u8; N], disparities: &mut [u8; N]) {
     let mut taken = [0; N];
     for d in 0..N {
-        taken[d] = if cells[d] < sums[d] { d as u8 } else { disparities[d] };
+        // Bits, not a choice: that would be read from memory only where it is made.
+        let less = if cells[d] < sums[d] { u8::MAX } else { 0 };
+        taken[d] = (d as u8 & less) | (disparities[d] & !less);
     }
     *disparities = taken;
     for d in 0..N {
