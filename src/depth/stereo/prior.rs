@@ -100,7 +100,8 @@ impl WithSimd for Likely<'_> {
         }
         // Slices of one length need no bounds checks: vector code.
         let inner = width.saturating_sub(2);
-        let (before, here, after) = (&changes[..inner], &changes[width - inner - 1..][..inner], &changes[width - inner..]);
+        let (before, here, after) =
+            (&changes[..inner], &changes[width - inner - 1..][..inner], &changes[width - inner..]);
         let (map, likely) = (&map[width - inner - 1..][..inner], &mut likely[width - inner - 1..][..inner]);
         for x in 0..inner {
             likely[x] = pick(map[x], before[x] + here[x] + after[x]);

@@ -52,7 +52,8 @@ impl Speckles {
         let mut places: [Range<usize>; MOST_ITEMS] = std::array::from_fn(|_| 0..0);
         let (runs, parents) = (bands.split(&mut self.runs, width), bands.split(&mut self.parents, width));
         let items = bands.rows().zip(runs.zip(parents)).zip(bands.split(&mut self.pixels, width)).zip(&mut places);
-        let items = items.map(|(((rows, (runs, parents)), pixels), places)| Band { rows, runs, parents, pixels, places });
+        let items =
+            items.map(|(((rows, (runs, parents)), pixels), places)| Band { rows, runs, parents, pixels, places });
         workers.run_each(items, &|band| band.find(map, width));
         for pair in places.windows(2) {
             self.join_bands(&pair[0], &pair[1], map, width);
@@ -204,5 +205,62 @@ mod tests {
         assert!((0..map.len()).all(|i| map[i] == UNKNOWN || map[i] == whole[i]));
         speckles.remove(&mut map, width, 28, &mut workers);
         assert_eq!(map.iter().filter(|&&d| d == UNKNOWN).count(), 12 + 16 + 28);
+    }
+    /// The same, pixel by pixel.
+    fn removed(map: &[u16], width: usize, max_pixels: usize) -> Vec<u16> {
+        let mut out = map.to_vec();
+        let mut seen = vec![false; map.len()];
+        for from in 0..map.len() {
+            let (mut island, mut at) = (vec![from], 0);
+            if map[from] == UNKNOWN || std::mem::replace(&mut seen[from], true) {
+                continue;
+            }
+            while let Some(&here) = island.get(at) {
+                at += 1;
+                let (x, y) = (here % width, here / width);
+                let beside = [(x > 0).then(|| here - 1), (x + 1 < width).then_some(here + 1)];
+                let others = [(y > 0).then(|| here - width), Some(here + width).filter(|&below| below < map.len())];
+                for next in beside.into_iter().chain(others).flatten() {
+                    let touches = map[next] != UNKNOWN && map[next].abs_diff(map[here]) <= STEP;
+                    if touches && !std::mem::replace(&mut seen[next], true) {
+                        island.push(next);
+                    }
+                }
+            }
+            if island.len() <= max_pixels {
+                island.into_iter().for_each(|pixel| out[pixel] = UNKNOWN);
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn islands_reach_from_band_to_band_whatever_the_threads() {
+        let (width, height) = (50, 370);
+        let mut state = 1u32;
+        let mut next = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) % below
+        };
+        // Three levels and what is unknown, in patches; some rows have nothing.
+        let mut map = vec![0; width * height];
+        for k in 0..map.len() {
+            let other = if next(3) == 0 { k.saturating_sub(width) } else { k.saturating_sub(1) };
+            map[k] = if next(4) > 0 { map[other] } else { [0, 200, 400, UNKNOWN][next(4) as usize] };
+        }
+        map[120 * width..123 * width].fill(UNKNOWN);
+        for max_pixels in [5, 40] {
+            let expected = removed(&map, width, max_pixels as usize);
+            assert!(expected != map);
+            for threads in [1, 2, 5] {
+                let mut workers = ThreadPool::new("test", threads);
+                let mut speckles = Speckles::new(map.len());
+                // Memory that another map has left.
+                speckles.remove(&mut map.clone(), width, 3, &mut workers);
+                let mut ours = map.clone();
+                speckles.remove(&mut ours, width, max_pixels, &mut workers);
+                assert!(ours == expected, "{threads} threads, {max_pixels} pixels");
+            }
+        }
     }
 }

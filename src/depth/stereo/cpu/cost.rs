@@ -27,8 +27,7 @@ impl<'a, const N: usize> Costs<'a, N> {
     #[inline(always)]
     pub fn new(mut codes: [Codes<'a>; ROWS], width: usize) -> Self {
         // Slices of one length need one bounds check.
-        for row in 0..ROWS {
-            let [left, right] = &mut codes[row];
+        for [left, right] in &mut codes {
             for plane in 0..PLANES {
                 left[plane] = &left[plane][..width];
                 right[plane] = &right[plane][..width + N];

@@ -10,12 +10,13 @@ mod path;
 mod sweep;
 mod winner;
 
-use std::{array, iter};
 use std::sync::atomic::AtomicBool;
+use std::{array, iter};
 
 use census::Census;
+use path::{Paths, StepPenalties};
 use pulp::Arch;
-use sweep::{Agreed, BLOCK, Cells, Down, FromLeft, FromRight, Paths, Steps};
+use sweep::{Agreed, BLOCK, Cells, Down, FromLeft, FromRight};
 use winner::Eyes;
 
 use super::executor::Executor;
@@ -47,7 +48,7 @@ pub struct CpuExecutor {
 
 /// Memory of one thread.
 struct Member {
-    steps: Steps,
+    p2: StepPenalties,
     cells: Cells,
     paths: Paths,
     eyes: Eyes,
@@ -58,7 +59,7 @@ impl CpuExecutor {
     pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
         let disparities = fixed::range(disparities);
         let member = || Member {
-            steps: Steps::new(width),
+            p2: StepPenalties::new(width),
             cells: Cells::new(width, disparities),
             paths: Paths::new(),
             eyes: Eyes::new(width, disparities),
@@ -90,22 +91,22 @@ impl CpuExecutor {
         self.down.begin().for_each(Down::clear);
         let (down, census) = (&self.down, [&self.left, &self.right]);
         let out = DisjointParts::new(out, GROUP * width, &mut self.taken);
-        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { steps, cells, paths, eyes }, part| {
+        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { p2, cells, paths, eyes }, part| {
             // The row `k` below the one above the group; beyond the borders the outermost ones repeat.
             let row = |k: usize| (part * GROUP + k).saturating_sub(1).min(height - 1);
             let pixels = |y: usize| y * width..(y + 1) * width;
-            steps.compute(array::from_fn(|k| &left[pixels(row(k))]), penalties);
+            p2.compute(array::from_fn(|k| &left[pixels(row(k))]), penalties);
             // Costs are sums over three rows, so one above and one below the group are read, too.
             let codes = array::from_fn(|k| census.map(|census| census.row(row(k))));
             let likely = likely.map(|likely| array::from_fn(|k| &likely[pixels(row(k + 1))]));
             paths.clear::<N>();
-            arch.dispatch(FromRight::<N> { codes, steps, likely, cells, paths });
+            arch.dispatch(FromRight::<N> { codes, p2, likely, cells, paths });
             paths.clear::<N>();
             eyes.clear();
             let mut blocks = down.runner(part);
             for first in (0..width).step_by(BLOCK) {
                 let Some(mut down) = blocks.next_block() else { break };
-                arch.dispatch(FromLeft::<N> { steps, cells, first, paths, down: &mut down, eyes });
+                arch.dispatch(FromLeft::<N> { p2, cells, first, paths, down: &mut down, eyes });
             }
             arch.dispatch(Agreed { eyes, out: out.part(part) });
         });

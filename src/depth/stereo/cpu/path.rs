@@ -9,6 +9,8 @@
 
 use super::super::Settings;
 use super::super::fixed::SLOPE;
+use super::super::penalty::Penalties;
+use super::GROUP;
 
 /// Bytes of 255 beyond both ends of the disparities, so that d - 1 and d + 1 need no test: a cache line.
 const GUARD: usize = 64;
@@ -78,5 +80,55 @@ impl<const N: usize> Step<'_, N> {
         let near = self.lower[d].min(self.upper[d]).saturating_add(SLOPE);
         // Never wraps: see the bounds in the module's documentation.
         self.same[d].min(near).min(self.jump).wrapping_sub(self.least).wrapping_add(cost)
+    }
+}
+
+/// The values of paths in a group. They are handed around by reference, as the compiler gives locals another place than
+/// a cache line of their own.
+pub struct Paths {
+    /// Along the rows, at the pixel before and at the present one in turn.
+    pub along: [[Values; GROUP]; 2],
+    /// Down a column: above each row, and below the last one.
+    pub down: [Values; GROUP + 1],
+}
+
+impl Paths {
+    pub fn new() -> Self {
+        Self { along: [[Values::start::<0>(); GROUP]; 2], down: [Values::start::<0>(); GROUP + 1] }
+    }
+
+    /// Back before the first pixels.
+    pub fn clear<const N: usize>(&mut self) {
+        self.along = [[Values::start::<N>(); GROUP]; 2];
+        self.down = [Values::start::<N>(); GROUP + 1];
+    }
+}
+
+/// The penalties P2 of the steps of paths in a group of rows, `[column][row]`. Rows below the picture have those of its
+/// last one.
+pub struct StepPenalties {
+    /// Between the column before and this one.
+    pub along: Vec<[u8; GROUP]>,
+    /// Between the row above and this one.
+    pub down: Vec<[u8; GROUP]>,
+}
+
+impl StepPenalties {
+    /// Of `width` columns.
+    pub fn new(width: usize) -> Self {
+        Self { along: vec![[0; GROUP]; width], down: vec![[0; GROUP]; width] }
+    }
+
+    /// Computes them for the grey values of the rows from the one above the group to its last one.
+    pub fn compute(&mut self, luma: [&[u8]; GROUP + 1], penalties: &Penalties) {
+        for row in 0..GROUP {
+            let (above, here) = (luma[row], luma[row + 1]);
+            let mut before = here[0];
+            for (((&above, &here), along), down) in above.iter().zip(here).zip(&mut self.along).zip(&mut self.down) {
+                along[row] = penalties.between(here, before);
+                down[row] = penalties.between(here, above);
+                before = here;
+            }
+        }
     }
 }

@@ -3,40 +3,11 @@
 
 use pulp::WithSimd;
 
-use super::super::penalty::Penalties;
 use super::GROUP;
 use super::cost::{self, Codes, Costs};
-use super::path::Values;
+use super::path::{Paths, StepPenalties, Values};
 use super::winner::{Eyes, Row};
 use crate::compute::aligned::{Aligned, Line};
-
-/// The penalties P2 in a group of rows, `[column][row]`. Rows below the picture have those of its last one.
-pub struct Steps {
-    /// Between the column before and this one.
-    along: Vec<[u8; GROUP]>,
-    /// Between the row above and this one.
-    down: Vec<[u8; GROUP]>,
-}
-
-impl Steps {
-    /// Of `width` columns.
-    pub fn new(width: usize) -> Self {
-        Self { along: vec![[0; GROUP]; width], down: vec![[0; GROUP]; width] }
-    }
-
-    /// Computes them for the grey values of the rows from the one above the group to its last one.
-    pub fn compute(&mut self, luma: [&[u8]; GROUP + 1], penalties: &Penalties) {
-        for row in 0..GROUP {
-            let (above, here) = (luma[row], luma[row + 1]);
-            let mut before = here[0];
-            for (((&above, &here), along), down) in above.iter().zip(here).zip(&mut self.along).zip(&mut self.down) {
-                along[row] = penalties.between(here, before);
-                down[row] = penalties.between(here, above);
-                before = here;
-            }
-        }
-    }
-}
 
 /// What the sweep from the right leaves of a group, `[column][row]`: costs, and half of the values of the path from the
 /// right.
@@ -62,32 +33,11 @@ impl Cells {
     }
 }
 
-/// The values of paths in a group. They are handed around by reference, as the compiler gives locals another place than
-/// a cache line of their own.
-pub struct Paths {
-    /// Along the rows, at the pixel before and at the present one in turn.
-    along: [[Values; GROUP]; 2],
-    /// Down a column: above each row, and below the last one.
-    down: [Values; GROUP + 1],
-}
-
-impl Paths {
-    pub fn new() -> Self {
-        Self { along: [[Values::start::<0>(); GROUP]; 2], down: [Values::start::<0>(); GROUP + 1] }
-    }
-
-    /// Back before the first pixels.
-    pub fn clear<const N: usize>(&mut self) {
-        self.along = [[Values::start::<N>(); GROUP]; 2];
-        self.down = [Values::start::<N>(); GROUP + 1];
-    }
-}
-
 /// The costs of a group, and the path from the right.
 pub struct FromRight<'a, const N: usize> {
     /// From the row above the group to the one below it.
     pub codes: [Codes<'a>; cost::ROWS],
-    pub steps: &'a Steps,
+    pub p2: &'a StepPenalties,
     /// Of each row, one more than the likely disparity, or 0.
     pub likely: Option<[&'a [u16]; GROUP]>,
     pub cells: &'a mut Cells,
@@ -99,9 +49,9 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { codes, steps, likely, cells, paths } = self;
-        let width = steps.along.len();
-        let mut column = Column { steps, likely, costs: Costs::<N>::new(codes, width), cells: cells.columns_mut() };
+        let Self { codes, p2, likely, cells, paths } = self;
+        let width = p2.along.len();
+        let mut column = Column { p2, likely, costs: Costs::<N>::new(codes, width), cells: cells.columns_mut() };
         let [one, two] = &mut paths.along;
         for x in (0..width).rev().step_by(2) {
             column.go_on(x, one, two);
@@ -114,7 +64,7 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
 
 /// What each column of a sweep from the right needs.
 struct Column<'a, const N: usize> {
-    steps: &'a Steps,
+    p2: &'a StepPenalties,
     likely: Option<[&'a [u16]; GROUP]>,
     costs: Costs<'a, N>,
     cells: &'a mut [Cell<N>],
@@ -125,7 +75,7 @@ impl<const N: usize> Column<'_, N> {
     #[inline(always)]
     fn go_on(&mut self, x: usize, before: &[Values; GROUP], now: &mut [Values; GROUP]) {
         let made = self.costs.of_column(x);
-        let along = &self.steps.along;
+        let along = &self.p2.along;
         let p2 = along[(x + 1).min(along.len() - 1)];
         let likely = self.likely.map_or([0; GROUP], |likely| likely.map(|row| row[x]));
         let cells = &mut self.cells[x];
@@ -161,7 +111,7 @@ fn step<const N: usize>(
     now.least = least;
 }
 
-/// Columns of a block.
+/// Columns of a block: an even number, so that the paths along the rows go on in the buffer that they left off in.
 pub const BLOCK: usize = 64;
 
 /// The paths down the columns of a block, at the last row so far.
@@ -185,7 +135,7 @@ impl Down {
 
 /// The paths from the left and from above, in a block of columns, and the winners of the sums of all paths.
 pub struct FromLeft<'a, const N: usize> {
-    pub steps: &'a Steps,
+    pub p2: &'a StepPenalties,
     pub cells: &'a Cells,
     /// First column of the block.
     pub first: usize,
@@ -198,10 +148,10 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { steps, cells, first, paths, down, eyes } = self;
-        let end = (first + BLOCK).min(steps.along.len());
+        let Self { p2, cells, first, paths, down, eyes } = self;
+        let end = (first + BLOCK).min(p2.along.len());
         let mut block = Block::<N> {
-            p2: [&steps.along[first..end], &steps.down[first..end]],
+            p2: [&p2.along[first..end], &p2.down[first..end]],
             cells: &cells.columns()[first..end],
             columns: end - first,
             rows: eyes.rows(first..end),

@@ -95,8 +95,8 @@ impl<const N: usize> Row<'_, N> {
 #[inline(always)]
 fn index_of_least<const N: usize>(cells: &[u8; N]) -> u8 {
     let mut least = u16::MAX;
-    for d in 0..N {
-        least = least.min(u16::from(cells[d]) << 8 | d as u16);
+    for (d, &cell) in cells.iter().enumerate() {
+        least = least.min(u16::from(cell) << 8 | d as u16);
     }
     least as u8
 }
