@@ -32,15 +32,16 @@ impl<T> Relay<T> {
         Self { blocks: blocks.map(block).collect() }
     }
 
-    /// Begins a pass: part 0 is next everywhere. Returns the blocks.
-    pub fn begin(&mut self) -> impl Iterator<Item = &mut T> {
-        self.blocks.iter_mut().map(|Block { turn, value }| {
+    /// Begins a pass, for which `prepare` is called with each block: part 0 is next everywhere.
+    pub fn begin(&mut self, mut prepare: impl FnMut(&mut T)) {
+        for Block { turn, value } in &mut self.blocks {
             *turn.get_mut() = 0;
-            value.get_mut()
-        })
+            prepare(value.get_mut());
+        }
     }
 
-    /// What part number `part` takes the blocks by: once for each part of a pass.
+    /// What part number `part` takes the blocks by: once for each part of a pass, and before all else that it does, so
+    /// that a panic passes them on.
     pub fn runner(&self, part: usize) -> Runner<'_, T> {
         Runner { relay: self, part, next: 0 }
     }
@@ -116,7 +117,7 @@ mod tests {
             let mut workers = ThreadPool::new("test", threads);
             let mut relay = Relay::new((0..7).map(|_| Vec::new()));
             for parts in [1, 2, 40] {
-                relay.begin().for_each(Vec::clear);
+                relay.begin(Vec::clear);
                 workers.run(parts, &|part| {
                     let mut runner = relay.runner(part);
                     // Some leave blocks out.
@@ -125,7 +126,7 @@ mod tests {
                     }
                 });
                 let all: Vec<usize> = (0..parts).filter(|part| part % 5 != 3).collect();
-                assert!(relay.begin().all(|block| *block == all), "{threads} threads, {parts} parts");
+                relay.begin(|block| assert_eq!(*block, all, "{threads} threads, {parts} parts"));
             }
         }
     }
@@ -134,7 +135,7 @@ mod tests {
     fn a_part_that_panics_keeps_nobody_waiting() {
         let mut workers = ThreadPool::new("test", 3);
         let mut relay = Relay::new((0..4).map(|_| 0));
-        relay.begin().for_each(|block| *block = 0);
+        relay.begin(|block| *block = 0);
         let pass = std::panic::AssertUnwindSafe(|| {
             workers.run(6, &|part| {
                 let mut runner = relay.runner(part);
@@ -146,6 +147,6 @@ mod tests {
         });
         assert!(std::panic::catch_unwind(pass).is_err());
         // Whoever panicked takes no more parts; with the others alive, all else is done.
-        assert!(relay.begin().all(|block| *block == 5));
+        relay.begin(|block| assert_eq!(*block, 5));
     }
 }

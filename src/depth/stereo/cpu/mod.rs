@@ -88,10 +88,11 @@ impl CpuExecutor {
         out: &mut [u16],
     ) {
         let Self { width, height, arch, ref penalties, .. } = *self;
-        self.down.begin().for_each(Down::clear);
+        self.down.begin(Down::clear);
         let (down, census) = (&self.down, [&self.left, &self.right]);
         let out = DisjointParts::new(out, GROUP * width, &mut self.taken);
         workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { p2, cells, paths, eyes }, part| {
+            let mut blocks = down.runner(part);
             // The row `k` below the one above the group; beyond the borders the outermost ones repeat.
             let row = |k: usize| (part * GROUP + k).saturating_sub(1).min(height - 1);
             let pixels = |y: usize| y * width..(y + 1) * width;
@@ -103,7 +104,6 @@ impl CpuExecutor {
             arch.dispatch(FromRight::<N> { codes, p2, likely, cells, paths });
             paths.clear::<N>();
             eyes.clear();
-            let mut blocks = down.runner(part);
             for first in (0..width).step_by(BLOCK) {
                 let Some(mut down) = blocks.next_block() else { break };
                 arch.dispatch(FromLeft::<N> { p2, cells, first, paths, down: &mut down, eyes });
