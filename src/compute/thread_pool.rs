@@ -5,6 +5,8 @@
 //! what guarantees that they never use it afterwards, whatever panics.
 #![allow(unsafe_code)]
 
+pub mod relay;
+
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;

@@ -2,6 +2,8 @@
 //! the farther one of the disparities left and right of them.
 
 use super::fixed::UNKNOWN;
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::ThreadPool;
 
 /// Fills the gaps of a row; one without any disparity stays as it is.
 pub fn fill_row(row: &mut [u16]) {
@@ -22,9 +24,10 @@ pub fn fill_row(row: &mut [u16]) {
 
 /// Fills all gaps of `map`: along rows, and rows without any disparity from the nearest one above, or else below. A map
 /// without any becomes 0.
-pub fn fill(map: &mut [u16], width: usize) {
-    map.chunks_exact_mut(width).for_each(fill_row);
+pub fn fill(map: &mut [u16], width: usize, workers: &mut ThreadPool) {
     let height = map.len() / width;
+    let bands = Bands::new(height, 1, workers).split(map, width);
+    workers.run_each(bands, &|band: &mut [u16]| band.chunks_exact_mut(width).for_each(fill_row));
     // A row is now full or empty: one pixel tells which.
     let Some(first) = (0..height).find(|&y| map[y * width] != UNKNOWN) else { return map.fill(0) };
     for y in (0..first).rev() {
@@ -45,10 +48,11 @@ mod tests {
     fn gaps_take_the_farther_side_and_empty_rows_their_neighbour() {
         const U: u16 = UNKNOWN;
         let mut map = vec![U, U, U, U, U, U, 5, U, 9, U, U, U, U, U, U];
-        fill(&mut map, 5);
+        let mut workers = ThreadPool::new("test", 2);
+        fill(&mut map, 5, &mut workers);
         assert_eq!(map, [5, 5, 5, 9, 9].repeat(3));
         let mut none = vec![U; 6];
-        fill(&mut none, 3);
+        fill(&mut none, 3, &mut workers);
         assert_eq!(none, [0; 6]);
     }
 }

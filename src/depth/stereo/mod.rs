@@ -188,8 +188,8 @@ impl Level {
     ) -> Result<(), GpuError> {
         let Self { executor, prior, tidy, map, px } = self;
         let [luma, right] = eyes.map(|eye| &*eye.luma);
-        executor.winners([luma, right], prior.likely(luma), workers, map)?;
-        tidy.drop_islands(map, speckle);
+        executor.winners([luma, right], prior.likely(luma, workers), workers, map)?;
+        tidy.drop_islands(map, speckle, workers);
         // Before filling: what was not matched says nothing about the next pair.
         prior.keep(luma, map);
         tidy.fill(map, luma, colors, workers, into.unwrap_or(px));

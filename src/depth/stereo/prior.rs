@@ -4,7 +4,11 @@
 //! the last disparity decides instead. Where there is texture, the right disparity is better by more than the bonus, so
 //! that nothing that moved keeps its old one.
 
+use pulp::{Arch, WithSimd};
+
 use super::fixed::{ONE, UNKNOWN};
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 
 /// Sum of the changes of 3x3 pixels, in 8-bit codes, up to which they are taken for noise: 4 a pixel.
 const NOISE: u16 = 36;
@@ -17,7 +21,7 @@ pub struct Prior {
     luma: Vec<u8>,
     /// The last disparities that both eyes agreed on, in fixed point.
     map: Vec<u16>,
-    /// Sums of changes of three neighbours in a row.
+    /// A row for each band: sums of the changes of three neighbours in a column.
     changes: Vec<u16>,
     /// One more than the whole disparity that is likely, or 0.
     likely: Vec<u16>,
@@ -31,31 +35,25 @@ impl Prior {
 
     /// One more than the whole disparity that is likely for each pixel of the left picture `luma`, or 0; nothing before
     /// the first pair.
-    pub fn likely(&mut self, luma: &[u8]) -> Option<&[u16]> {
+    pub fn likely(&mut self, luma: &[u8], workers: &mut ThreadPool) -> Option<&[u16]> {
         if self.luma.len() != luma.len() {
             return None;
         }
         let Self { width, luma: last, map, changes, likely } = self;
-        let width = *width;
-        changes.resize(luma.len(), 0);
-        for ((row, last), changes) in
-            luma.chunks_exact(width).zip(last.chunks_exact(width)).zip(changes.chunks_exact_mut(width))
-        {
-            let change = |x: usize| u16::from(row[x].abs_diff(last[x]));
-            for (x, out) in changes.iter_mut().enumerate() {
-                *out = change(x.saturating_sub(1)) + change(x) + change((x + 1).min(width - 1));
-            }
-        }
-        likely.clear();
+        let (width, last, map) = (*width, &**last, &**map);
         let height = luma.len() / width;
-        for (y, map) in map.chunks_exact(width).enumerate() {
-            let row = |y: usize| &changes[y * width..(y + 1) * width];
-            let three = row(y.saturating_sub(1)).iter().zip(row(y)).zip(row((y + 1).min(height - 1)));
-            likely.extend(map.iter().zip(three).map(|(&d, ((above, here), below))| {
-                let is_still = above + here + below <= NOISE;
-                if is_still && d != UNKNOWN { (d + ONE / 2) / ONE + 1 } else { 0 }
-            }));
-        }
+        changes.resize(MOST_ITEMS * width, 0);
+        likely.resize(luma.len(), 0);
+        let bands = Bands::new(height, 1, workers);
+        let items = bands.rows().zip(bands.split(likely, width)).zip(changes.chunks_exact_mut(width));
+        let arch = Arch::new();
+        workers.run_each(items, &|((rows, likely), changes)| {
+            for (y, likely) in rows.zip(likely.chunks_exact_mut(width)) {
+                let three = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+                let rows = three.map(|y| [luma, last].map(|luma| &luma[y * width..(y + 1) * width]));
+                arch.dispatch(Likely { rows, map: &map[y * width..(y + 1) * width], changes, likely });
+            }
+        });
         Some(likely)
     }
 
@@ -65,6 +63,49 @@ impl Prior {
         self.luma.extend_from_slice(luma);
         self.map.clear();
         self.map.extend_from_slice(map);
+    }
+}
+
+/// What is likely in a row.
+struct Likely<'a> {
+    /// The present and the last picture, in it and the rows above and below.
+    rows: [[&'a [u8]; 2]; 3],
+    /// The last disparities.
+    map: &'a [u16],
+    changes: &'a mut [u16],
+    likely: &'a mut [u16],
+}
+
+impl WithSimd for Likely<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { rows, map, changes, likely } = self;
+        let width = likely.len();
+        let (map, changes) = (&map[..width], &mut changes[..width]);
+        changes.fill(0);
+        for [here, last] in rows {
+            let (here, last) = (&here[..width], &last[..width]);
+            for x in 0..width {
+                changes[x] += u16::from(here[x].max(last[x]) - here[x].min(last[x]));
+            }
+        }
+        let pick = |d: u16, change: u16| {
+            if (change <= NOISE) & (d != UNKNOWN) { (d.wrapping_add(ONE / 2)) / ONE + 1 } else { 0 }
+        };
+        let last = width - 1;
+        for x in [0, last] {
+            let change = changes[x.saturating_sub(1)] + changes[x] + changes[(x + 1).min(last)];
+            likely[x] = pick(map[x], change);
+        }
+        // Slices of one length need no bounds checks: vector code.
+        let inner = width.saturating_sub(2);
+        let (before, here, after) =
+            (&changes[..inner], &changes[width - inner - 1..][..inner], &changes[width - inner..]);
+        let (map, likely) = (&map[width - inner - 1..][..inner], &mut likely[width - inner - 1..][..inner]);
+        for x in 0..inner {
+            likely[x] = pick(map[x], before[x] + here[x] + after[x]);
+        }
     }
 }
 
@@ -79,12 +120,13 @@ mod tests {
         let mut map = vec![5 * ONE + ONE / 2; width * height];
         map[3] = UNKNOWN;
         let mut prior = Prior::new(width);
-        assert!(prior.likely(&luma).is_none(), "before the first pair");
+        let mut workers = ThreadPool::new("test", 2);
+        assert!(prior.likely(&luma, &mut workers).is_none(), "before the first pair");
         prior.keep(&luma, &map);
         // Noise, and a change at (10, 5).
         let mut next: Vec<u8> = luma.iter().enumerate().map(|(i, &v)| v + (i % 3) as u8).collect();
         next[5 * width + 10] += 50;
-        let likely = prior.likely(&next).unwrap();
+        let likely = prior.likely(&next, &mut workers).unwrap();
         for (i, &d) in likely.iter().enumerate() {
             let moved = (i % width).abs_diff(10) <= 1 && (i / width).abs_diff(5) <= 1;
             assert_eq!(d, if i == 3 || moved { 0 } else { 7 }, "{i}");

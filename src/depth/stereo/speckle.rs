@@ -1,113 +1,179 @@
 //! The speckle filter: small islands whose disparity differs from all around them are mismatches, and become unknown.
 
+use std::ops::Range;
+
 use super::fixed::{ONE, UNKNOWN};
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
 
 /// Neighbours that differ by more are not of one island.
 const STEP: u16 = 2 * ONE;
 
 /// Removes islands, found by union-find over runs of rows; owns the memory for it.
+///
+/// Each band of rows has as many places for runs as it has pixels, and fills the first ones: so threads find the runs of
+/// bands, and the islands within each, before those that cross from band to band are joined.
 #[derive(Debug, Default)]
 pub struct Speckles {
     runs: Vec<Run>,
-    /// Of each run, another run of its island, or itself.
+    /// Of each run, the place of another run of its island, or its own.
     parents: Vec<u32>,
     /// Of each run that is its own parent, the pixels of the island.
     pixels: Vec<u32>,
 }
 
 /// Columns `start` to `end` (exclusive) of row `y`, whose neighbours belong together.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Run {
     y: u32,
     start: u32,
     end: u32,
 }
 
+/// The runs of a band of rows, and the islands that they are of.
+struct Band<'a> {
+    rows: Range<usize>,
+    runs: &'a mut [Run],
+    parents: &'a mut [u32],
+    pixels: &'a mut [u32],
+    /// Takes the places of its first run and of one past its last.
+    places: &'a mut Range<usize>,
+}
+
 impl Speckles {
     /// For maps of this many pixels: no memory is taken later.
     pub fn new(pixels: usize) -> Self {
-        Self {
-            runs: Vec::with_capacity(pixels),
-            parents: Vec::with_capacity(pixels),
-            pixels: Vec::with_capacity(pixels),
-        }
+        Self { runs: vec![Run::default(); pixels], parents: vec![0; pixels], pixels: vec![0; pixels] }
     }
 
     /// Makes all islands of `map`, `width` columns, unknown that have at most `max_pixels`.
-    pub fn remove(&mut self, map: &mut [u16], width: usize, max_pixels: u32) {
-        self.find_runs(map, width);
-        self.join_rows(map, width);
-        self.pixels.clear();
-        self.pixels.resize(self.runs.len(), 0);
-        for run in 0..self.runs.len() {
-            let root = self.root(run as u32);
-            self.parents[run] = root;
-            self.pixels[root as usize] += self.runs[run].end - self.runs[run].start;
+    pub fn remove(&mut self, map: &mut [u16], width: usize, max_pixels: u32, workers: &mut ThreadPool) {
+        let bands = Bands::new(map.len() / width, 1, workers);
+        let mut places: [Range<usize>; MOST_ITEMS] = std::array::from_fn(|_| 0..0);
+        let (runs, parents) = (bands.split(&mut self.runs, width), bands.split(&mut self.parents, width));
+        let items = bands.rows().zip(runs.zip(parents)).zip(bands.split(&mut self.pixels, width)).zip(&mut places);
+        let items =
+            items.map(|(((rows, (runs, parents)), pixels), places)| Band { rows, runs, parents, pixels, places });
+        workers.run_each(items, &|band| band.find(map, width));
+        for pair in places.windows(2) {
+            self.join_bands(&pair[0], &pair[1], map, width);
         }
-        for (run, &root) in self.runs.iter().zip(&self.parents) {
-            if self.pixels[root as usize] <= max_pixels {
-                let row = run.y as usize * width;
-                map[row + run.start as usize..row + run.end as usize].fill(UNKNOWN);
-            }
-        }
-    }
-
-    /// Splits the rows into runs of known pixels without a step, each an island of its own at first.
-    fn find_runs(&mut self, map: &[u16], width: usize) {
-        self.runs.clear();
-        for (y, row) in (0..).zip(map.chunks_exact(width)) {
-            let mut start = 0;
-            for x in 0..width {
-                let goes_on = x + 1 < width && row[x + 1] != UNKNOWN && row[x].abs_diff(row[x + 1]) <= STEP;
-                if row[x] == UNKNOWN {
-                    start = x + 1;
-                } else if !goes_on {
-                    self.runs.push(Run { y, start: start as u32, end: x as u32 + 1 });
-                    start = x + 1;
+        let Self { runs, parents, pixels } = self;
+        let items = bands.rows().zip(bands.split(map, width)).zip(&places);
+        workers.run_each(items, &|((rows, map), places)| {
+            for place in places.clone() {
+                if pixels[root(parents, place)] <= max_pixels {
+                    let Run { y, start, end } = runs[place];
+                    let row = (y as usize - rows.start) * width;
+                    map[row + start as usize..row + end as usize].fill(UNKNOWN);
                 }
             }
-        }
-        self.parents.clear();
-        self.parents.extend(0..self.runs.len() as u32);
+        });
     }
 
-    /// Joins the islands of runs in neighbouring rows that touch without a step.
-    fn join_rows(&mut self, map: &[u16], width: usize) {
-        // The first run that may touch the present one from the row above.
-        let mut above = 0;
-        for below in 0..self.runs.len() {
-            let run = self.runs[below];
-            // Runs are in the order of the rows, and of the columns in them.
-            while self.runs[above].y + 1 < run.y
-                || (self.runs[above].y + 1 == run.y && self.runs[above].end <= run.start)
-            {
-                above += 1;
+    /// Joins the islands of a band and of the one below it, whose runs have these places.
+    fn join_bands(&mut self, above: &Range<usize>, below: &Range<usize>, map: &[u16], width: usize) {
+        let Self { runs, parents, pixels } = self;
+        let (upper, lower) = (&runs[above.clone()], &runs[below.clone()]);
+        let Some(first) = lower.first() else { return };
+        let first_row = &lower[..lower.partition_point(|run| run.y == first.y)];
+        let skipped = upper.partition_point(|run| run.y + 1 < first.y);
+        each_touching(&upper[skipped..], first_row, map, width, |a, b| {
+            let (a, b) = (root(parents, above.start + skipped + a), root(parents, below.start + b));
+            if a != b {
+                parents[a.max(b)] = a.min(b) as u32;
+                pixels[a.min(b)] += pixels[a.max(b)];
             }
-            let row = run.y as usize * width;
-            for other in above..below {
-                let Run { y, start, end } = self.runs[other];
-                if y + 1 != run.y || start >= run.end {
-                    break;
-                }
-                let shared = row + run.start.max(start) as usize..row + run.end.min(end) as usize;
-                let (here, there) = (&map[shared.clone()], &map[shared.start - width..shared.end - width]);
-                if here.iter().zip(there).any(|(here, there)| here.abs_diff(*there) <= STEP) {
-                    let (a, b) = (self.root(below as u32), self.root(other as u32));
-                    self.parents[a.max(b) as usize] = a.min(b);
-                }
-            }
-        }
+        });
     }
+}
 
-    /// The run that stands for the island of `run`; shortens the way to it for the next time.
-    fn root(&mut self, mut run: u32) -> u32 {
-        while self.parents[run as usize] != run {
-            let parent = self.parents[run as usize];
-            self.parents[run as usize] = self.parents[parent as usize];
-            run = parent;
+impl Band<'_> {
+    /// Finds the runs and islands of the band.
+    fn find(self, map: &[u16], width: usize) {
+        let Self { rows, runs, parents, pixels, places } = self;
+        let first = rows.start * width;
+        let count = find_runs(rows, map, width, runs);
+        *places = first..first + count;
+        let (runs, parents, pixels) = (&runs[..count], &mut parents[..count], &mut pixels[..count]);
+        // By their numbers in the band.
+        for (number, parent) in parents.iter_mut().enumerate() {
+            *parent = number as u32;
         }
-        run
+        each_touching(runs, runs, map, width, |a, b| {
+            let (a, b) = (shortened_root(parents, a), shortened_root(parents, b));
+            parents[a.max(b)] = a.min(b) as u32;
+        });
+        // From here on by their places. Parents have lower numbers, so that theirs are known.
+        pixels.fill(0);
+        for number in 0..count {
+            let parent = parents[number] as usize;
+            let root = if parent == number { first + number } else { parents[parent] as usize };
+            parents[number] = root as u32;
+            pixels[root - first] += runs[number].end - runs[number].start;
+        }
     }
+}
+
+/// Splits rows into runs of known pixels without a step; returns how many there are.
+fn find_runs(rows: Range<usize>, map: &[u16], width: usize, runs: &mut [Run]) -> usize {
+    let mut count = 0;
+    for y in rows {
+        let row = &map[y * width..(y + 1) * width];
+        let mut start = 0;
+        for x in 0..width {
+            let goes_on = x + 1 < width && row[x + 1] != UNKNOWN && row[x].abs_diff(row[x + 1]) <= STEP;
+            if row[x] == UNKNOWN {
+                start = x + 1;
+            } else if !goes_on {
+                runs[count] = Run { y: y as u32, start: start as u32, end: x as u32 + 1 };
+                count += 1;
+                start = x + 1;
+            }
+        }
+    }
+    count
+}
+
+/// Calls `join` with the numbers of a run of `above` and one of `below` that are in neighbouring rows and touch without a
+/// step, for all such pairs. Runs are in the order of the rows, and of the columns in them.
+fn each_touching(above: &[Run], below: &[Run], map: &[u16], width: usize, mut join: impl FnMut(usize, usize)) {
+    // The first run that may touch the present one.
+    let mut first = 0;
+    for (number, run) in below.iter().enumerate() {
+        while above.get(first).is_some_and(|a| a.y + 1 < run.y || (a.y + 1 == run.y && a.end <= run.start)) {
+            first += 1;
+        }
+        let row = run.y as usize * width;
+        for (other, &Run { y, start, end }) in above.iter().enumerate().skip(first) {
+            if y + 1 != run.y || start >= run.end {
+                break;
+            }
+            let shared = row + run.start.max(start) as usize..row + run.end.min(end) as usize;
+            let (here, there) = (&map[shared.clone()], &map[shared.start - width..shared.end - width]);
+            if here.iter().zip(there).any(|(here, there)| here.abs_diff(*there) <= STEP) {
+                join(other, number);
+            }
+        }
+    }
+}
+
+/// The run that stands for the island of `run`.
+fn root(parents: &[u32], mut run: usize) -> usize {
+    while parents[run] as usize != run {
+        run = parents[run] as usize;
+    }
+    run
+}
+
+/// The same; shortens the way to it for the next time.
+fn shortened_root(parents: &mut [u32], mut run: usize) -> usize {
+    while parents[run] as usize != run {
+        let parent = parents[run] as usize;
+        parents[run] = parents[parent];
+        run = parent;
+    }
+    run
 }
 
 #[cfg(test)]
@@ -131,12 +197,70 @@ mod tests {
         put(20, 7, 8, 1);
         let whole = map.clone();
         let mut speckles = Speckles::new(width * height);
-        speckles.remove(&mut map, width, 15);
+        let mut workers = ThreadPool::new("test", 2);
+        speckles.remove(&mut map, width, 15, &mut workers);
         let gone: Vec<usize> = (0..map.len()).filter(|&i| map[i] == UNKNOWN).collect();
         assert_eq!(gone.len(), 12);
         assert!(gone.iter().all(|&i| (2..5).contains(&(i % width)) && (2..6).contains(&(i / width))));
         assert!((0..map.len()).all(|i| map[i] == UNKNOWN || map[i] == whole[i]));
-        speckles.remove(&mut map, width, 28);
+        speckles.remove(&mut map, width, 28, &mut workers);
         assert_eq!(map.iter().filter(|&&d| d == UNKNOWN).count(), 12 + 16 + 28);
+    }
+    /// The same, pixel by pixel.
+    fn removed(map: &[u16], width: usize, max_pixels: usize) -> Vec<u16> {
+        let mut out = map.to_vec();
+        let mut seen = vec![false; map.len()];
+        for from in 0..map.len() {
+            let (mut island, mut at) = (vec![from], 0);
+            if map[from] == UNKNOWN || std::mem::replace(&mut seen[from], true) {
+                continue;
+            }
+            while let Some(&here) = island.get(at) {
+                at += 1;
+                let (x, y) = (here % width, here / width);
+                let beside = [(x > 0).then(|| here - 1), (x + 1 < width).then_some(here + 1)];
+                let others = [(y > 0).then(|| here - width), Some(here + width).filter(|&below| below < map.len())];
+                for next in beside.into_iter().chain(others).flatten() {
+                    let touches = map[next] != UNKNOWN && map[next].abs_diff(map[here]) <= STEP;
+                    if touches && !std::mem::replace(&mut seen[next], true) {
+                        island.push(next);
+                    }
+                }
+            }
+            if island.len() <= max_pixels {
+                island.into_iter().for_each(|pixel| out[pixel] = UNKNOWN);
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn islands_reach_from_band_to_band_whatever_the_threads() {
+        let (width, height) = (50, 370);
+        let mut state = 1u32;
+        let mut next = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) % below
+        };
+        // Three levels and what is unknown, in patches; some rows have nothing.
+        let mut map = vec![0; width * height];
+        for k in 0..map.len() {
+            let other = if next(3) == 0 { k.saturating_sub(width) } else { k.saturating_sub(1) };
+            map[k] = if next(4) > 0 { map[other] } else { [0, 200, 400, UNKNOWN][next(4) as usize] };
+        }
+        map[120 * width..123 * width].fill(UNKNOWN);
+        for max_pixels in [5, 40] {
+            let expected = removed(&map, width, max_pixels as usize);
+            assert!(expected != map);
+            for threads in [1, 2, 5] {
+                let mut workers = ThreadPool::new("test", threads);
+                let mut speckles = Speckles::new(map.len());
+                // Memory that another map has left.
+                speckles.remove(&mut map.clone(), width, 3, &mut workers);
+                let mut ours = map.clone();
+                speckles.remove(&mut ours, width, max_pixels, &mut workers);
+                assert!(ours == expected, "{threads} threads, {max_pixels} pixels");
+            }
+        }
     }
 }

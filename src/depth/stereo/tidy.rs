@@ -37,8 +37,8 @@ impl Tidy {
     }
 
     /// Makes islands of at most `max_pixels` unknown.
-    pub fn drop_islands(&mut self, map: &mut [u16], max_pixels: u32) {
-        self.speckles.remove(map, self.width, max_pixels);
+    pub fn drop_islands(&mut self, map: &mut [u16], max_pixels: u32, workers: &mut ThreadPool) {
+        self.speckles.remove(map, self.width, max_pixels, workers);
     }
 
     /// Fills the gaps of `map`, whose left picture is `luma`, and writes its 3x3 median to `px`, in pixels, above 0.
@@ -56,7 +56,7 @@ impl Tidy {
         if let Some(colors) = colors {
             similarity.correct(map, width, border.first(), colors);
         }
-        gaps::fill(map, width);
+        gaps::fill(map, width, workers);
         let map = &*map;
         let height = map.len() / width;
         let out = DisjointParts::new(px, width, taken);

@@ -1,11 +1,10 @@
 //! The matching cost of a disparity at a pixel: the bits in which the census codes of both eyes differ (their Hamming
 //! distance), averaged over 3x3 pixels.
 
-use pulp::WithSimd;
-
 use super::super::fixed::{BONUS, OUTSIDE};
 use super::GROUP;
 use super::census::PLANES;
+use crate::compute::aligned::Line;
 
 /// Rows whose differences the costs of a group are made of: one more above and one below.
 pub const ROWS: usize = GROUP + 2;
@@ -13,98 +12,108 @@ pub const ROWS: usize = GROUP + 2;
 /// Census of a left row, and of the right one from its last column to its first.
 pub type Codes<'a> = [[&'a [u8]; PLANES]; 2];
 
-/// The costs of a group of rows, 0 to 27: an eighth of the sum of the differences over three rows and columns.
+/// Makes the costs of a group of rows, 0 to 27, column by column from the last one: an eighth of the sum of the
+/// differences over three rows and columns.
 pub struct Costs<'a, const N: usize> {
     /// From the row above the group to the one below it.
-    pub codes: [Codes<'a>; ROWS],
-    pub width: usize,
-    /// `[column][row][disparity]`, at least `width * GROUP * N`.
-    pub out: &'a mut [u8],
+    codes: [Codes<'a>; ROWS],
+    width: usize,
+    /// Differences summed over three rows: of the column whose costs are next, and of it and the one right of it.
+    here: Line<[[u8; N]; GROUP]>,
+    two: Line<[[u8; N]; GROUP]>,
 }
 
-impl<const N: usize> WithSimd for Costs<'_, N> {
-    type Output = ();
+impl<'a, const N: usize> Costs<'a, N> {
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { codes, width, out } = self;
-        let out = out.as_chunks_mut::<N>().0;
-        // Sums over three rows, of the columns before, here, and after.
-        let mut before = [[0u8; N]; GROUP];
-        let mut here = [[0u8; N]; GROUP];
-        let mut after = [[0u8; N]; GROUP];
-        sum_rows(&codes, width, 0, &mut here);
+    pub fn new(mut codes: [Codes<'a>; ROWS], width: usize) -> Self {
+        // Slices of one length need one bounds check.
+        for [left, right] in &mut codes {
+            for plane in 0..PLANES {
+                left[plane] = &left[plane][..width];
+                right[plane] = &right[plane][..width + N];
+            }
+        }
+        let mut first = Self { codes, width, here: Line([[0; N]; GROUP]), two: Line([[0; N]; GROUP]) };
         // Beyond the borders the outermost columns repeat.
-        before.copy_from_slice(&here);
-        after.copy_from_slice(&here);
-        for x in 0..width {
-            if x + 1 < width {
-                sum_rows(&codes, width, x + 1, &mut after);
+        first.go_on(width - 1);
+        first.go_on(width - 1);
+        first
+    }
+
+    /// The costs of column `x` of each row, which is the next one.
+    #[inline(always)]
+    pub fn of_column(&mut self, x: usize) -> Line<[[u8; N]; GROUP]> {
+        self.go_on(x.saturating_sub(1))
+    }
+
+    /// Takes the differences of column `x`; returns the costs of the one before.
+    #[inline(always)]
+    fn go_on(&mut self, x: usize) -> Line<[[u8; N]; GROUP]> {
+        // The partner at disparity d is in column x - d, which is this one plus d in the mirrored row.
+        let first = self.width - 1 - x;
+        let mut left = [[0; PLANES]; ROWS];
+        let mut right = [[&[0; N]; PLANES]; ROWS];
+        for row in 0..ROWS {
+            for plane in 0..PLANES {
+                left[row][plane] = self.codes[row][0][plane][x];
+                right[row][plane] = array(&self.codes[row][1][plane][first..]);
+            }
+        }
+        let (numbers, last_inside) = (numbers::<N>(), x.min(N - 1) as u8);
+        let mut costs = Line([[0; N]; GROUP]);
+        for d in 0..N {
+            let mut differing = [0; ROWS];
+            for row in 0..ROWS {
+                let [a, b, c] = left[row];
+                let [of_a, of_b, of_c] = right[row];
+                let bits = bits(a ^ of_a[d], b ^ of_b[d], c ^ of_c[d]);
+                differing[row] = if numbers[d] > last_inside { OUTSIDE } else { bits };
             }
             for row in 0..GROUP {
-                let out = &mut out[x * GROUP + row];
-                let (before, here, after) = (&mut before[row], &mut here[row], &after[row]);
-                for d in 0..N {
-                    out[d] = (before[d] + here[d] + after[d] + 4) >> 3;
-                    before[d] = here[d];
-                    here[d] = after[d];
-                }
+                let next = differing[row] + differing[row + 1] + differing[row + 2];
+                costs.0[row][d] = (self.two.0[row][d] + next + 4) >> 3;
+                self.two.0[row][d] = self.here.0[row][d] + next;
+                self.here.0[row][d] = next;
             }
         }
+        costs
     }
 }
 
-/// Lowers the costs of each pixel's likely disparity, and of the two beside it, by [`BONUS`]. `likely`, `[row][column]`
-/// of the group, has one more than that disparity, or 0 where none is.
-pub fn favour<const N: usize>(likely: &[u16], width: usize, costs: &mut [u8]) {
-    let costs = costs.as_chunks_mut::<N>().0;
-    for (row, likely) in likely.chunks_exact(width).enumerate() {
-        for (&likely, costs) in likely.iter().zip(costs.iter_mut().skip(row).step_by(GROUP)) {
-            let likely = usize::from(likely);
-            if likely > 0 {
-                for cost in &mut costs[likely.saturating_sub(2)..(likely + 1).min(N)] {
-                    *cost = cost.saturating_sub(BONUS);
-                }
-            }
-        }
-    }
-}
-
-/// For each row of the group, the differences of column `x` summed over it and the rows above and below, 0 to 72.
+/// Bits of three bytes, 0 to 24.
 #[inline(always)]
-fn sum_rows<const N: usize>(codes: &[Codes; ROWS], width: usize, x: usize, sums: &mut [[u8; N]; GROUP]) {
-    // The differences of the last two rows.
-    let mut last = [[0u8; N]; 2];
-    for (k, codes) in codes.iter().enumerate() {
-        let present = differences::<N>(codes, width, x);
-        for d in 0..N {
-            if k >= 2 {
-                sums[k - 2][d] = last[0][d] + last[1][d] + present[d];
-            }
-            last[0][d] = last[1][d];
-            last[1][d] = present[d];
-        }
-    }
+fn bits(a: u8, b: u8, c: u8) -> u8 {
+    // They add up to ones and twos, so that two bytes are counted for three.
+    let (ones, twos) = (a ^ b ^ c, (a & b) | (c & (a | b)));
+    ones.count_ones() as u8 + 2 * twos.count_ones() as u8
 }
 
-/// The bits that differ between pixel `x` and each partner, 0 to 24.
+/// What a pixel's cost at disparity `d` is lowered by: [`BONUS`] if its disparity is likely to be that or one beside it.
+/// `likely` is one more than the likely disparity, or 0 where none is.
 #[inline(always)]
-fn differences<const N: usize>([left, right]: &Codes, width: usize, x: usize) -> [u8; N] {
-    // The partner at disparity d is in column x - d, which is this one plus d in the mirrored row.
-    let first = width - 1 - x;
-    let [a, b, c] = left.map(|plane| plane[x]);
-    let [of_a, of_b, of_c] = right;
-    let (of_a, of_b, of_c) = (&of_a[first..first + N], &of_b[first..first + N], &of_c[first..first + N]);
-    let mut out = [0u8; N];
-    for d in 0..N {
-        let (a, b, c) = (a ^ of_a[d], b ^ of_b[d], c ^ of_c[d]);
-        // Bits add up to ones and twos, so that two bytes are counted for three.
-        let (ones, twos) = (a ^ b ^ c, (a & b) | (c & (a ^ b)));
-        out[d] = ones.count_ones() as u8 + 2 * twos.count_ones() as u8;
-    }
-    if x + 1 < N {
-        for (d, out) in out.iter_mut().enumerate() {
-            *out = if d > x { OUTSIDE } else { *out };
+pub fn bonus(likely: u16) -> impl Fn(u8) -> u8 {
+    let (near, bonus) = (likely.wrapping_sub(1) as u8, if likely > 0 { BONUS } else { 0 });
+    // Not `abs_diff`, which is computed in 32 bits.
+    move |d| if d.max(near) - d.min(near) <= 1 { bonus } else { 0 }
+}
+
+/// The first `N` values.
+#[inline(always)]
+pub fn array<const N: usize>(values: &[u8]) -> &[u8; N] {
+    values.first_chunk().expect("rows are long enough")
+}
+
+/// The disparities as bytes. From memory: the compiler compares an index in 64 bits, whatever it is converted to.
+#[inline(always)]
+pub fn numbers<const N: usize>() -> &'static [u8; N] {
+    static NUMBERS: Line<[u8; 256]> = {
+        let mut numbers = [0; 256];
+        let mut d = 0;
+        while d < numbers.len() {
+            numbers[d] = d as u8;
+            d += 1;
         }
-    }
-    out
+        Line(numbers)
+    };
+    array(&NUMBERS.0)
 }
