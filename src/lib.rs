@@ -38,8 +38,9 @@
 //! the focal plane; *disparity* is in pixels of the rectified left picture; depth is in metres; time is in
 //! nanoseconds of a monotonic clock; blurring happens in linear light.
 //!
-//! `unsafe` is allowed in `compute/thread_pool.rs`, `link/slot.rs`, `link/pool.rs`, `pipewire/buffer.rs` and under `v4l2`, where
-//! each block carries its argument (and in `link/bell.rs` under Miri alone). `scripts/prove-link` runs what can be proved of it.
+//! `unsafe` is allowed in `compute/thread_pool.rs` and its `relay`, for a prefetch in `compute/simd.rs`, in `link/slot.rs`,
+//! `link/pool.rs`, `pipewire/buffer.rs` and under `v4l2`, where each block carries its argument (and in `link/bell.rs` under Miri
+//! alone). `scripts/prove-link` runs what can be proved of it.
 
 pub mod bokeh;
 pub mod budget;

@@ -234,7 +234,7 @@ impl Blurrer {
         self.filler.fill_guided(&mut depth, &shot.image);
         let mut workers = ThreadPool::new("matte", 1);
         self.background.find_matte(&mut self.matting, &mut workers, (&mut depth, &shot.image), &shot.lens);
-        self.background.learn(&depth, &shot.image, &shot.lens, self.time_ns);
+        self.background.learn(&mut workers, (&depth, &shot.image), &shot.lens, self.time_ns);
         self.background.reveal(&mut workers, &mut depth, &shot.image, &shot.lens);
         self.time_ns += PERIOD_NS;
         depth
