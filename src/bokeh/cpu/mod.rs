@@ -155,17 +155,22 @@ impl CpuBokeh {
 
     /// Splits the frame's CoC into bins, finds the tiles that stay as they are, and which bins hold anything.
     fn split(&mut self, frame: &Source<'_>) {
-        match frame.coc {
-            Radii::Field(field, depth) => self.plan.split(depth, field),
-            Radii::Each(coc_px) => self.plan.split_radii(coc_px),
-        }
         let across = self.tiles.across;
         let layered = self.plan.compositing == Compositing::Layers;
         if layered {
+            // The split is a part of its own, beside those that survey a row of tiles each.
+            let mut alone = [AtomicBool::new(false)];
+            let plan = DisjointParts::new(std::slice::from_mut(&mut self.plan), 1, &mut alone);
             let ranges = DisjointParts::new(&mut self.tiles.ranges, across, &mut self.taken);
             let arch = self.arch;
-            self.workers.run_with(&mut self.members, self.tiles.down, &|member: &mut Member, row| {
-                arch.dispatch(Survey { source: frame, row, ranges: ranges.part(row), coc: &mut member.coc });
+            self.workers.run_with(&mut self.members, self.tiles.down + 1, &|member: &mut Member, part| {
+                match (part.checked_sub(1), frame.coc) {
+                    (Some(row), _) => {
+                        arch.dispatch(Survey { source: frame, row, ranges: ranges.part(row), coc: &mut member.coc });
+                    }
+                    (None, Radii::Field(field, depth)) => plan.part(0)[0].split(depth, field),
+                    (None, Radii::Each(coc_px)) => plan.part(0)[0].split_radii(coc_px),
+                }
             });
         }
         self.tiles.settle(layered);

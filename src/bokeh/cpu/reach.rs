@@ -57,7 +57,7 @@ fn reach<S: Simd>(simd: S, plan: &Plan, bin: &Bin, cells: &Cells, edges: &mut Ed
             let (sums, rest) = row.split_at_mut(2 * width);
             let (lows, highs) = rest.split_at_mut(3 * width);
             add(sums, source, weight);
-            keep_lowest(simd, lows, &source[2 * width..]);
+            keep_lowest(simd, lows, &source[2 * width..5 * width]);
             keep_highest(simd, highs, &source[5 * width..]);
         }
         // The mean of |CoC| becomes the radius.
@@ -117,6 +117,7 @@ fn add(target: &mut [f32], source: &[f32], weight: f32) {
 
 #[inline(always)]
 fn keep_lowest<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
+    assert_eq!(target.len(), source.len());
     let ((targets, target), (sources, source)) = (S::as_mut_simd_f32s(target), S::as_simd_f32s(source));
     for (target, &source) in targets.iter_mut().zip(sources) {
         *target = simd.min_f32s(source, *target);
@@ -128,6 +129,7 @@ fn keep_lowest<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
 
 #[inline(always)]
 fn keep_highest<S: Simd>(simd: S, target: &mut [f32], source: &[f32]) {
+    assert_eq!(target.len(), source.len());
     let ((targets, target), (sources, source)) = (S::as_mut_simd_f32s(target), S::as_simd_f32s(source));
     for (target, &source) in targets.iter_mut().zip(sources) {
         *target = simd.max_f32s(source, *target);
