@@ -163,15 +163,14 @@ impl CpuBokeh {
             let plan = DisjointParts::new(std::slice::from_mut(&mut self.plan), 1, &mut alone);
             let ranges = DisjointParts::new(&mut self.tiles.ranges, across, &mut self.taken);
             let arch = self.arch;
-            self.workers.run_with(&mut self.members, self.tiles.down + 1, &|member: &mut Member, part| match (
-                part.checked_sub(1),
-                frame.coc,
-            ) {
-                (Some(row), _) => {
-                    arch.dispatch(Survey { source: frame, row, ranges: ranges.part(row), coc: &mut member.coc });
-                }
-                (None, Radii::Field(field, depth)) => plan.part(0)[0].split(depth, field),
-                (None, Radii::Each(coc_px)) => plan.part(0)[0].split_radii(coc_px),
+            self.workers.run_with(&mut self.members, self.tiles.down + 1, &|member: &mut Member, part| {
+                let Some(row) = part.checked_sub(1) else {
+                    return match frame.coc {
+                        Radii::Field(field, depth) => plan.part(0)[0].split(depth, field),
+                        Radii::Each(coc_px) => plan.part(0)[0].split_radii(coc_px),
+                    };
+                };
+                arch.dispatch(Survey { source: frame, row, ranges: ranges.part(row), coc: &mut member.coc });
             });
         }
         self.tiles.settle(layered);
