@@ -14,7 +14,7 @@ use super::rows::{PIECE, STRIP, STRIP_ROW, Slot};
 use super::tiles::{TILE_H, TILE_W, Tiles};
 use super::unpack::{Source, coc_row, compress};
 use crate::bokeh::ladder::Compositing;
-use crate::bokeh::plan::{Bin, CELL, HINDMOST_COVERAGE, MAX_BINS, Plan};
+use crate::bokeh::plan::{Bin, HINDMOST_COVERAGE, MAX_BINS, Plan};
 use crate::color::luminance;
 use crate::compute::aligned::Line;
 use crate::compute::simd::{fma, load, madd, prefetch, store};
@@ -188,10 +188,8 @@ impl<T> Composite<'_, T> {
             }
             let first = (self.y0 / bin.scale).min(bin.height - 1);
             let end = ((self.y0 + rows - 1) / bin.scale + 2).min(bin.height);
-            let down = bin.height.div_ceil(CELL);
-            let strips = x0 / bin.scale / STRIP..((x0 + CHUNK) / bin.scale).div_ceil(STRIP).min(slot.source.across);
-            for strip in strips {
-                if slot.active[strip * down + first / CELL] {
+            for strip in slot.strips(x0 / bin.scale..(x0 + CHUNK) / bin.scale) {
+                if slot.is_active(strip, first, bin.height) {
                     prefetch(
                         &slot.out[(strip * bin.height + first) * STRIP_ROW..(strip * bin.height + end) * STRIP_ROW],
                     );
@@ -258,11 +256,7 @@ fn sample<S: Simd>(simd: S, bin: &Bin, slot: &Slot, y: usize, x0: usize, out: &m
     let (above, share) = (along as usize, along.fract());
     let below = (above + 1).min(bin.height - 1);
     let columns = (x0 / bin.scale).saturating_sub(1)..(x0 + CHUNK) / bin.scale + 1;
-    let holds = |y: usize| {
-        let strips = columns.start / STRIP..columns.end.div_ceil(STRIP).min(slot.source.across);
-        let down = bin.height.div_ceil(CELL);
-        strips.into_iter().any(|strip| slot.active[strip * down + y / CELL])
-    };
+    let holds = |y: usize| slot.strips(columns.clone()).any(|strip| slot.is_active(strip, y, bin.height));
     if !holds(above) && !holds(below) {
         return false;
     }

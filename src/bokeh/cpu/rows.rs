@@ -1,5 +1,6 @@
 //! The memory of the CPU executor: pictures as rows of planes, and a bin's result as strips.
 
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use super::tiles::{BLOCK, TILE_W};
@@ -218,6 +219,18 @@ pub struct Slot {
 }
 
 impl Slot {
+    /// The strips that hold these columns of the bin, as far as there are any.
+    #[inline(always)]
+    pub fn strips(&self, columns: Range<usize>) -> Range<usize> {
+        columns.start / STRIP..columns.end.div_ceil(STRIP).min(self.source.across)
+    }
+
+    /// Whether the result of a bin so high holds anything but zeros in the row of cells of row `y` of a strip.
+    #[inline(always)]
+    pub fn is_active(&self, strip: usize, y: usize, height: usize) -> bool {
+        self.active[strip * height.div_ceil(CELL) + y / CELL]
+    }
+
     /// Zeros for the largest bin that can be in the slot; the system provides pages only as frames touch them.
     pub fn new(plan: &Plan, slot: usize) -> Self {
         let scale = plan.least_scale(slot);
