@@ -178,12 +178,20 @@ fn islands_of_chance_are_found_every_time() {
     for size in [(1, 200), (200, 1), (53, 61), (128, 90), (511, 200)] {
         // About where islands begin to reach across a picture, and where there are many or few.
         for known in [0.1, 0.5, 0.593, 0.65, 0.9] {
-            for levels in [1.0, 2.0, 90.0] {
-                let mut one = || if numbers.next() < known { (numbers.next() * levels) as u16 * 170 } else { UNKNOWN };
+            // Equal ones touch alone, or some of those beside them, too.
+            for (levels, apart) in [(1.0, 170), (2.0, 170), (90.0, 170), (6.0, 60), (100.0, 20)] {
+                let mut one =
+                    || if numbers.next() < known { (numbers.next() * levels) as u16 * apart } else { UNKNOWN };
                 let map: Vec<u16> = (0..size.0 * size.1).map(|_| one()).collect();
                 for island in [1, 6, 100] {
                     for _ in 0..2 {
-                        assert_tidied(&device, size, island, &map, &format!("{known} known, {levels} levels"));
+                        assert_tidied(
+                            &device,
+                            size,
+                            island,
+                            &map,
+                            &format!("{known} known, {levels} levels {apart} apart"),
+                        );
                     }
                 }
             }
