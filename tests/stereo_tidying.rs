@@ -183,15 +183,10 @@ fn islands_of_chance_are_found_every_time() {
                 let mut one =
                     || if numbers.next() < known { (numbers.next() * levels) as u16 * apart } else { UNKNOWN };
                 let map: Vec<u16> = (0..size.0 * size.1).map(|_| one()).collect();
+                let what = format!("{known} known, {levels} levels {apart} apart");
                 for island in [1, 6, 100] {
                     for _ in 0..2 {
-                        assert_tidied(
-                            &device,
-                            size,
-                            island,
-                            &map,
-                            &format!("{known} known, {levels} levels {apart} apart"),
-                        );
+                        assert_tidied(&device, size, island, &map, &what);
                     }
                 }
             }
