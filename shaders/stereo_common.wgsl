@@ -9,6 +9,10 @@ override SLOPE: u32;        // penalty for a disparity that differs by one
 override AGREE: u32;        // left and right may differ by this much
 override ONE: u32;          // one pixel in fixed point
 override UNKNOWN: u32;      // no disparity
+override FILLED: u32;       // the bit of a disparity that was filled in
+override NOISE: u32;        // sum of changes of 3x3 pixels that are none
+override STEP: u32;         // neighbours of an island differ by no more
+override ISLAND: u32;       // islands of up to so many pixels are dropped
 override BACK: u32;         // of a path along a row: 1 from the right, after the one from the left
 
 // Where the sums of all paths lie, for threads side by side: `[row][word][column]`.

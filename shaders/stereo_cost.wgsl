@@ -2,7 +2,7 @@
 // census of both eyes differs, over 3x3 pixels, and less for what is likely. A workgroup goes along a strip of a row.
 
 @group(0) @binding(0) var<storage, read> census: array<u32>;        // left, then right
-@group(0) @binding(1) var<storage, read> likely: array<u32>;        // one more than a disparity or 0, two a word
+@group(0) @binding(1) var<storage, read> likely: array<u32>;        // one more than a disparity, or 0
 @group(0) @binding(2) var<storage, read_write> costs: array<u32>;   // four a word, `[row][column][word]`
 
 const STRIP = 16u;
@@ -25,7 +25,7 @@ fn column_at(x: i32, y: u32, word: u32) -> vec4<u32> {
 
 // The costs at a pixel, where that disparity and those beside it are favoured which is likely.
 fn favour(pixel: u32, word: u32, cost: vec4<u32>) -> vec4<u32> {
-    let one_more = vec4((likely[pixel / 2u] >> (16u * (pixel % 2u))) & 0xffffu);
+    let one_more = vec4(likely[pixel]);
     let here = 4u * word + vec4(1u, 2u, 3u, 4u);
     let near = (max(here, one_more) - min(here, one_more) <= vec4(1u)) & (one_more > vec4(0u));
     return cost - select(vec4(0u), min(cost, vec4(BONUS)), near);

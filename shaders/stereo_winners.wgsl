@@ -2,11 +2,7 @@
 // point, if the right eye agrees.
 
 @group(0) @binding(0) var<storage, read> totals: array<u32>;
-@group(0) @binding(1) var<storage, read_write> winners: array<u32>;     // two pixels a word
-
-const INVOCATIONS = 64u;
-
-var<workgroup> found: array<u32, INVOCATIONS>;
+@group(0) @binding(1) var<storage, read_write> map: array<u32>;
 
 fn total(x: u32, y: u32, disparity: u32) -> u32 {
     return (totals[total_at(x, y, disparity / 4u)] >> (8u * (disparity % 4u))) & 255u;
@@ -54,15 +50,11 @@ fn winner_at(x: u32, y: u32) -> u32 {
     return between(x, y, disparity);
 }
 
-@compute @workgroup_size(INVOCATIONS)
+@compute @workgroup_size(LINE)
 fn stereo_winners(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
                   @builtin(local_invocation_index) thread: u32) {
-    let pixel = (workgroup.y * workgroups.x + workgroup.x) * INVOCATIONS + thread;
+    let pixel = line_at(workgroup, workgroups, thread);
     if pixel < WIDTH * HEIGHT {
-        found[thread] = winner_at(pixel % WIDTH, pixel / WIDTH);
-    }
-    workgroupBarrier();
-    if pixel < WIDTH * HEIGHT && thread % 2u == 0u {
-        winners[pixel / 2u] = found[thread] | (found[thread + 1u] << 16u);
+        map[pixel] = winner_at(pixel % WIDTH, pixel / WIDTH);
     }
 }

@@ -16,7 +16,7 @@ fn parse(source: &str) -> naga::Module {
 #[test]
 fn every_shader_validates_and_is_named_like_its_file() {
     let blur = ALL.map(|shader| (shader, CONSTANTS.map(|(name, _)| name).to_vec()));
-    let constants = stereo::constants((1, 1), 16, false).map(|(name, _)| name);
+    let constants = stereo::constants((1, 1), 16, 0, false).map(|(name, _)| name);
     let stereo = stereo::ALL.map(|shader| (shader, constants.to_vec()));
     for (shader, constants) in blur.into_iter().chain(stereo) {
         let module = parse(shader.source);
@@ -37,8 +37,8 @@ fn every_file_is_a_pass_or_shared_and_short() {
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let shared =
-            "base common filter list meet mixed next pyramid range show tent tiles todo work stereo_common stereo_path";
+        let shared = "base common filter list meet mixed next pyramid range show tent tiles todo work stereo_common stereo_line \
+             stereo_path stereo_root stereo_row stereo_touch";
         let known = shared.split(' ').any(|file| file == name)
             || ALL.iter().chain(&stereo::ALL).any(|shader| shader.name == name)
             || name == "present";

@@ -11,7 +11,7 @@ use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::compute::{Backend, GpuError};
 use bokehcam::depth::stereo::cpu::CpuExecutor;
 use bokehcam::depth::stereo::executor::Executor;
-use bokehcam::depth::stereo::fixed::UNKNOWN;
+use bokehcam::depth::stereo::fixed::{ONE, UNKNOWN, is_known};
 use bokehcam::depth::stereo::gpu::GpuExecutor;
 use bokehcam::depth::stereo::{self, Effort, Pair, Settings};
 use bokehcam::frame::{DisparityMap, GrayImage};
@@ -44,52 +44,64 @@ fn pair(width: usize, height: usize, most: usize) -> [Vec<u8>; 2] {
     noise.collect::<Vec<_>>().try_into().expect("two eyes")
 }
 
-/// Both executors' winners of the pairs, one after the other, are the same; returns those of the last.
-fn same(device: &Arc<Device>, size: (usize, usize), disparities: usize, pairs: &[[Vec<u8>; 2]]) -> Vec<u16> {
+/// Both executors find the same in the pairs, one after the other, and drop islands of up to `island` pixels; returns what
+/// they find in the last.
+fn same(
+    device: &Arc<Device>,
+    size: (usize, usize),
+    disparities: usize,
+    island: u32,
+    pairs: &[[Vec<u8>; 2]],
+) -> Vec<u16> {
     let mut workers = ThreadPool::new("test", 2);
-    let mut cpu = CpuExecutor::new(size, disparities, 2);
-    let mut gpu = GpuExecutor::new(device, size, disparities).expect("room for a small picture");
+    let mut cpu = CpuExecutor::new(size, disparities, island, 2);
+    let mut gpu = GpuExecutor::new(device, size, disparities, island).expect("room for a small picture");
     let mut found = [vec![1; size.0 * size.1], vec![2; size.0 * size.1]];
-    let mut numbers = Numbers(5);
-    let most = disparities.next_multiple_of(16) as f32;
-    // Nothing likely, anything the range has and 0, and nothing again.
-    let likely: Vec<u16> = (0..size.0 * size.1).map(|_| (numbers.next() * (most + 1.0)) as u16).collect();
-    let rounds = pairs.iter().flat_map(|pair| [(pair, None), (pair, Some(&*likely)), (pair, None)]);
-    for (number, ([left, right], likely)) in rounds.enumerate() {
-        cpu.winners([left, right], likely, &mut workers, &mut found[0]).expect("the CPU matches");
-        gpu.winners([left, right], likely, &mut workers, &mut found[1]).expect("the GPU matches");
-        let off = (0..found[0].len()).filter(|&k| found[0][k] != found[1][k]).collect::<Vec<_>>();
-        if let Some(&first) = off.first() {
-            let (x, y) = (first % size.0, first / size.0);
-            let [cpu, gpu] = [found[0][first], found[1][first]];
-            panic!(
-                "{size:?}, {disparities} disparities, round {number}: {} differ, at first {x},{y}: {cpu} and {gpu}",
-                off.len()
-            );
-        }
+    // With nothing likely, what was found in the same pair, and what another right eye had: anything the range has.
+    let other = &pairs[pairs.len() - 1][1];
+    let rounds = pairs.iter().flat_map(|[left, right]| [[left, right], [left, right], [left, other], [left, right]]);
+    for (number, [left, right]) in rounds.enumerate() {
+        cpu.disparities([left, right], &mut workers, &mut found[0]).expect("the CPU matches");
+        gpu.disparities([left, right], &mut workers, &mut found[1]).expect("the GPU matches");
+        assert_same(&found[0], &found[1], size, &format!("{disparities} disparities, {island}, round {number}"));
     }
     found[0].clone()
 }
 
-#[test]
-#[ignore = "needs a Vulkan adapter (software will do)"]
-fn winners_agree_whatever_the_size_and_range() {
-    let device = device();
-    for (width, height) in [(17, 13), (1, 1), (1, 9), (2, 3), (4096, 2), (33, 200), (150, 41)] {
-        for disparities in [1, 16, 64, 90, 128, 256] {
-            let pairs = [pair(width, height, (disparities - 1).min(60)), pair(width, height, 3)];
-            same(&device, (width, height), disparities, &pairs);
-        }
+fn assert_same(expected: &[u16], found: &[u16], size: (usize, usize), what: &str) {
+    let off = (0..expected.len()).filter(|&k| expected[k] != found[k]).collect::<Vec<_>>();
+    if let Some(&first) = off.first() {
+        let (x, y) = (first % size.0, first / size.0);
+        let [expected, found] = [expected[first], found[first]];
+        panic!("{what}, {size:?}: {} differ, at first {x},{y}: {expected} and {found}", off.len());
     }
-    let found = same(&device, (150, 41), 64, &[pair(150, 41, 20)]);
-    let known = found.iter().filter(|&&winner| winner != UNKNOWN).count();
-    assert!(known > found.len() / 2, "{known} of {} are known", found.len());
-    assert!(found.iter().any(|&winner| winner != UNKNOWN && winner % 64 != 0), "some are between whole pixels");
 }
 
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
-fn winners_agree_on_extreme_pictures() {
+fn disparities_agree_whatever_the_size_and_range() {
+    let device = device();
+    for (width, height) in [(17, 13), (1, 1), (1, 9), (2, 3), (4096, 2), (33, 200), (150, 41)] {
+        for disparities in [1, 16, 64, 90, 128, 256] {
+            let pairs = [pair(width, height, (disparities - 1).min(60)), pair(width, height, 3)];
+            for island in [0, 12] {
+                same(&device, (width, height), disparities, island, &pairs);
+            }
+        }
+    }
+    let found = same(&device, (150, 41), 64, 12, &[pair(150, 41, 20)]);
+    let known = found.iter().filter(|&&disparity| is_known(disparity)).count();
+    assert!(known > found.len() / 2, "{known} of {} are known", found.len());
+    assert!(
+        found.iter().any(|&disparity| is_known(disparity) && disparity % ONE != 0),
+        "some are between whole pixels"
+    );
+    assert!(found.iter().any(|&disparity| !is_known(disparity) && disparity != UNKNOWN), "some are filled");
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn disparities_agree_on_extreme_pictures() {
     let device = device();
     let (width, height) = (61, 37);
     let mut numbers = Numbers(5);
@@ -106,7 +118,9 @@ fn winners_agree_on_extreme_pictures() {
         ],
     ];
     for disparities in [16, 32, 96] {
-        same(&device, (width, height), disparities, &pairs);
+        for island in [0, 3] {
+            same(&device, (width, height), disparities, island, &pairs);
+        }
     }
 }
 
@@ -117,20 +131,22 @@ fn maps_agree_at_every_effort() {
         for disparities in [16, 64, 128] {
             let size = (width as u32, height as u32);
             let settings = Settings { size, disparities, effort: Effort::Fast, threads: 2 };
-            let [left, right] = pair(width, height, 20).map(|luma| {
-                let mut image = GrayImage::default();
-                (image.width, image.height, image.luma) = (size.0, size.1, luma);
-                image
-            });
+            let image = |luma| GrayImage { width: size.0, height: size.1, luma };
+            let pairs = [20, 20, 3].map(|most| pair(width, height, most).map(image));
+            let color = common::noise(size.0, size.1);
             let mut maps = [DisparityMap::default(), DisparityMap::default()];
             let mut matchers = [Backend::Cpu, Backend::Gpu]
                 .map(|backend| stereo::create(&settings, backend, None).expect("a matcher on any adapter"));
             for effort in [Effort::Fast, Effort::Full, Effort::Fast] {
-                for (matcher, map) in matchers.iter_mut().zip(&mut maps) {
-                    matcher.set_effort(effort);
-                    matcher.disparity(Pair { left: &left, color: None, right: &right }, map).expect("a map");
+                for (number, [left, right]) in pairs.iter().enumerate() {
+                    let color = (number > 0).then_some(&color);
+                    for (matcher, map) in matchers.iter_mut().zip(&mut maps) {
+                        matcher.set_effort(effort);
+                        matcher.disparity(Pair { left, color, right }, map).expect("a map");
+                    }
+                    let same = maps[0].px == maps[1].px;
+                    assert!(same, "{width}x{height}, {disparities} disparities, {effort:?}, pair {number}");
                 }
-                assert!(maps[0].px == maps[1].px, "{width}x{height}, {disparities} disparities, {effort:?}");
             }
             assert_ne!(matchers[0].describe(), matchers[1].describe());
         }
@@ -140,7 +156,7 @@ fn maps_agree_at_every_effort() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn what_the_device_cannot_hold_is_an_error() {
-    let Err(error) = GpuExecutor::new(&device(), (60_000, 60_000), 256) else { panic!("no device holds so much") };
+    let Err(error) = GpuExecutor::new(&device(), (60_000, 60_000), 256, 0) else { panic!("no device holds so much") };
     assert!(matches!(error, GpuError::Failed(_)));
     assert!(error.to_string().contains("60000 x 60000"), "{error}");
 }
@@ -156,11 +172,11 @@ fn the_passes_of_a_pair_take_less_time_than_the_pair() {
     let (width, height, disparities) = (wanted[0], wanted[1], wanted[2]);
     let [left, right] = pair(width, height, disparities / 2);
     let mut workers = ThreadPool::new("test", 1);
-    let mut gpu = GpuExecutor::new(&device(), (width, height), disparities).expect("room for the picture");
+    let mut gpu = GpuExecutor::new(&device(), (width, height), disparities, 100).expect("room for the picture");
     let mut out = vec![0; width * height];
     for _ in 0..5 {
         let started = std::time::Instant::now();
-        gpu.winners([&left, &right], None, &mut workers, &mut out).expect("the GPU matches");
+        gpu.disparities([&left, &right], &mut workers, &mut out).expect("the GPU matches");
         let (whole, passes) = (started.elapsed(), gpu.pass_times().collect::<Vec<_>>());
         eprintln!("{}: {whole:?} {passes:?}", gpu.describe());
         assert!(passes.iter().map(|(_, time)| *time).sum::<std::time::Duration>() <= whole);

@@ -3,7 +3,8 @@
 //! No rule of geometry says what stands there: it is neither before nor behind what is next to it. Each pixel takes the
 //! disparity of the known one that is nearest along a way through the picture on which brightness changes little.
 
-use super::fixed::UNKNOWN;
+use super::fixed::is_known;
+use super::gaps::first_known;
 
 /// Cost of a step along a row, and to another row: most of the border belongs to what is beside it.
 const STEP: [u16; 2] = [1, 8];
@@ -36,8 +37,7 @@ impl Border {
     /// `luma` is the left picture; rows without any disparity stay as they are.
     pub fn fill(&mut self, map: &mut [u16], luma: &[u8], width: usize) {
         self.first.clear();
-        let first = |row: &[u16]| row.iter().position(|&d| d != UNKNOWN).unwrap_or(0);
-        self.first.extend(map.chunks_exact(width).map(first));
+        self.first.extend(map.chunks_exact(width).map(|row| first_known(row).unwrap_or(0)));
         // The strip reaches to the first known column of the row where that is farthest.
         let columns = self.first.iter().max().map_or(0, |&most| (most + 1).min(width));
         if columns < 2 {
@@ -66,8 +66,8 @@ impl Border {
             let so_far = self.length[from_y * columns + from_x];
             let change = u16::from(luma[to].abs_diff(luma[from]));
             let length = so_far.saturating_add(STEP[usize::from(from_y != y)] + CHANGE * change);
-            // Rows without any disparity have length 0 and nothing to give.
-            if length < self.length[y * columns + x] && map[from] != UNKNOWN {
+            // Rows without any disparity and gaps have length 0 and nothing to give.
+            if length < self.length[y * columns + x] && is_known(map[from]) {
                 self.length[y * columns + x] = length;
                 map[to] = map[from];
             }

@@ -8,7 +8,7 @@
 use std::ops::AddAssign;
 
 use super::Settings;
-use super::fixed::{ONE, UNKNOWN};
+use super::fixed::{ONE, UNKNOWN, is_known};
 use crate::frame::ColorImage;
 
 /// Disparities this far apart, in fixed point, are not of one surface.
@@ -126,7 +126,7 @@ impl ColorSimilarity {
         self.counts.fill(0);
         for (y, (row, &first)) in map.chunks_exact(width).zip(first).enumerate().step_by(2) {
             for (x, &d) in row[..end].iter().enumerate().skip(first).step_by(2) {
-                if d != UNKNOWN {
+                if is_known(d) {
                     let color = colors.at(x, y);
                     // Cleared on first use: most colours do not occur.
                     if self.counts[color] == 0 {

@@ -51,24 +51,31 @@ impl Executors {
         if backend == Backend::Gpu || adapter.is_some() { Err(GpuError::left_out()) } else { Ok(Self { threads }) }
     }
 
-    /// An executor for pictures of `size` (columns, rows) and at least so many disparities, at most 256.
+    /// An executor for pictures of `size` (columns, rows) and at least so many disparities, at most 256, that drops
+    /// islands of up to `island` pixels.
     ///
     /// # Errors
     /// The GPU that was asked for has no room, or failed.
-    pub fn executor(&self, size: (usize, usize), disparities: usize) -> Result<Box<dyn Executor>, GpuError> {
+    pub fn executor(
+        &self,
+        size: (usize, usize),
+        disparities: usize,
+        island: u32,
+    ) -> Result<Box<dyn Executor>, GpuError> {
         #[cfg(feature = "gpu")]
         if let Some((device, is_required)) = &self.gpu {
-            match GpuExecutor::new(device, size, disparities) {
+            match GpuExecutor::new(device, size, disparities, island) {
                 Ok(gpu) => {
                     let threads = self.threads;
-                    let cpu = move || Box::new(CpuExecutor::new(size, disparities, threads)) as Box<dyn Executor>;
+                    let cpu =
+                        move || Box::new(CpuExecutor::new(size, disparities, island, threads)) as Box<dyn Executor>;
                     return Ok(Box::new(Fallback::new(Box::new(gpu), cpu)));
                 }
                 Err(error) if *is_required => return Err(error),
                 Err(error) => tracing::info!("matching on the CPU: {error}"),
             }
         }
-        Ok(Box::new(CpuExecutor::new(size, disparities, self.threads)))
+        Ok(Box::new(CpuExecutor::new(size, disparities, island, self.threads)))
     }
 }
 
@@ -96,19 +103,13 @@ impl Executor for Fallback {
         self.now.describe()
     }
 
-    fn winners(
-        &mut self,
-        eyes: [&[u8]; 2],
-        likely: Option<&[u16]>,
-        workers: &mut ThreadPool,
-        out: &mut [u16],
-    ) -> Result<(), GpuError> {
-        match (self.now.winners(eyes, likely, workers, out), self.other.take()) {
+    fn disparities(&mut self, eyes: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
+        match (self.now.disparities(eyes, workers, out), self.other.take()) {
             (Err(error), Some(other)) => {
                 tracing::warn!("{error}; the CPU matches from here on");
-                // This pair is matched anew, so that none is lost.
+                // This pair is matched anew, so that none is lost; what the last one made likely is gone with the GPU.
                 self.now = other();
-                self.now.winners(eyes, likely, workers, out)
+                self.now.disparities(eyes, workers, out)
             }
             (found, other) => {
                 self.other = other;

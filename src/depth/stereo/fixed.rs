@@ -6,6 +6,15 @@ pub const ONE: u16 = 64;
 /// A pixel whose disparity is not known.
 pub const UNKNOWN: u16 = u16::MAX;
 
+/// The bit of a disparity that was not matched, but filled in from beside it; unknown ones have it, too.
+pub const FILLED: u16 = 1 << 15;
+
+/// Whether both eyes agree on this disparity of a map: it is neither unknown nor filled in.
+#[inline(always)]
+pub fn is_known(disparity: u16) -> bool {
+    disparity < FILLED
+}
+
 /// As many disparities as the executors are made for.
 const RANGES: [usize; 7] = [16, 32, 64, 96, 128, 192, 256];
 
@@ -26,6 +35,13 @@ pub const BONUS: u8 = 2;
 
 /// The disparities that left and right take may differ by this much.
 pub const AGREE: u8 = 1;
+
+/// Neighbours whose disparities differ by more, in fixed point, are not of one island.
+pub const STEP: u16 = 2 * ONE;
+
+/// Sum of the changes of 3x3 pixels from picture to picture, in 8-bit codes, up to which they are taken for noise: 4 a
+/// pixel.
+pub const NOISE: u16 = 36;
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,7 @@
 //! Depth from two eyes: the disparity of a rectified pair.
 //!
-//! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on, in whole numbers, so that
-//! all executors find the same ([`fixed`]); what is made of them is common to all (`tidy`).
+//! [`create`] makes a [`Matcher`]. An executor finds the disparities that both eyes agree on and fills the gaps between
+//! them, in whole numbers, so that all executors find the same ([`fixed`]); what is left is common to all (`tidy`).
 
 mod border;
 pub mod check;
@@ -17,9 +17,7 @@ mod gaps;
 pub mod gpu;
 mod half;
 mod penalty;
-mod prior;
 pub mod source;
-mod speckle;
 mod tidy;
 
 use std::iter;
@@ -28,7 +26,6 @@ use std::sync::atomic::AtomicBool;
 use color_similarity::Colors;
 use executor::Executor;
 use executors::Executors;
-use prior::Prior;
 use tidy::Tidy;
 
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
@@ -151,7 +148,6 @@ struct Matching {
 /// What one effort needs.
 struct Level {
     executor: Box<dyn Executor>,
-    prior: Prior,
     tidy: Tidy,
     /// Disparities in fixed point, as they are found.
     map: Vec<u16>,
@@ -162,14 +158,14 @@ struct Level {
 impl Level {
     fn new(settings: &Settings, effort: Effort, executors: &Executors) -> Result<Self, GpuError> {
         let whole = (settings.size.0 as usize, settings.size.1 as usize);
-        let (size, disparities) = match effort {
-            Effort::Fast => (half::size(whole), settings.disparities.div_ceil(2)),
-            Effort::Full => (whole, settings.disparities),
+        let (size, disparities, island) = match effort {
+            // The same island has a quarter of the pixels.
+            Effort::Fast => (half::size(whole), settings.disparities.div_ceil(2), SPECKLE / 4),
+            Effort::Full => (whole, settings.disparities, SPECKLE),
         };
         let pixels = size.0 * size.1;
         Ok(Self {
-            executor: executors.executor(size, disparities as usize)?,
-            prior: Prior::new(size.0),
+            executor: executors.executor(size, disparities as usize, island)?,
             tidy: Tidy::new(size),
             map: vec![0; pixels],
             px: vec![0.0; if effort == Effort::Fast { pixels } else { 0 }],
@@ -177,21 +173,17 @@ impl Level {
     }
 
     /// Matches a pair of this level's size and writes a disparity for every pixel, in pixels, to `into`, or without it
-    /// to the level's own `px`. Islands of up to `speckle` pixels are dropped.
+    /// to the level's own `px`.
     fn match_pair(
         &mut self,
         eyes: [&GrayImage; 2],
         colors: Option<Colors>,
-        speckle: u32,
         workers: &mut ThreadPool,
         into: Option<&mut [f32]>,
     ) -> Result<(), GpuError> {
-        let Self { executor, prior, tidy, map, px } = self;
+        let Self { executor, tidy, map, px } = self;
         let [luma, right] = eyes.map(|eye| &*eye.luma);
-        executor.winners([luma, right], prior.likely(luma, workers), workers, map)?;
-        tidy.drop_islands(map, speckle, workers);
-        // Before filling: what was not matched says nothing about the next pair.
-        prior.keep(luma, map);
+        executor.disparities([luma, right], workers, map)?;
         tidy.fill(map, luma, colors, workers, into.unwrap_or(px));
         Ok(())
     }
@@ -221,13 +213,12 @@ impl Matcher for Matching {
         let Self { settings, workers, levels, small, taken } = self;
         let level = &mut levels[settings.effort as usize];
         match settings.effort {
-            Effort::Full => level.match_pair([left, right], colors(1), SPECKLE, workers, Some(&mut into.px))?,
+            Effort::Full => level.match_pair([left, right], colors(1), workers, Some(&mut into.px))?,
             Effort::Fast => {
                 half::shrink(left, &mut small[0]);
                 half::shrink(right, &mut small[1]);
                 let [small_left, small_right] = &*small;
-                // The same island has a quarter of the pixels.
-                level.match_pair([small_left, small_right], colors(2), SPECKLE / 4, workers, None)?;
+                level.match_pair([small_left, small_right], colors(2), workers, None)?;
                 let (px, rows) = (&level.px, DisjointParts::new(&mut into.px, left.width as usize, taken));
                 workers.run(left.height as usize, &|y| half::grow_row(left, small_left, px, y, rows.part(y)));
             }

@@ -1,5 +1,5 @@
-//! Post-processing: turns the disparities that both eyes agree on into one for every pixel. Islands are dropped, gaps
-//! are filled from the background, and the median of 3x3 pixels removes what outliers are left.
+//! Post-processing: turns what an executor found into a disparity for every pixel. The left border and empty rows are
+//! filled, and the median of 3x3 pixels removes what outliers are left.
 
 use std::sync::atomic::AtomicBool;
 
@@ -7,15 +7,13 @@ use pulp::{Arch, WithSimd};
 
 use super::border::Border;
 use super::color_similarity::{ColorSimilarity, Colors};
-use super::fixed::ONE;
+use super::fixed::{FILLED, ONE};
 use super::gaps;
-use super::speckle::Speckles;
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
 
 /// Post-processes maps of one size; owns the memory for it.
 pub struct Tidy {
     width: usize,
-    speckles: Speckles,
     border: Border,
     similarity: ColorSimilarity,
     /// A flag for each row, with which [`DisjointParts`] hands it to one thread only.
@@ -28,7 +26,6 @@ impl Tidy {
     pub fn new((width, height): (usize, usize)) -> Self {
         Self {
             width,
-            speckles: Speckles::new(width * height),
             border: Border::new((width, height)),
             similarity: ColorSimilarity::default(),
             taken: std::iter::repeat_with(AtomicBool::default).take(height).collect(),
@@ -36,12 +33,7 @@ impl Tidy {
         }
     }
 
-    /// Makes islands of at most `max_pixels` unknown.
-    pub fn drop_islands(&mut self, map: &mut [u16], max_pixels: u32, workers: &mut ThreadPool) {
-        self.speckles.remove(map, self.width, max_pixels, workers);
-    }
-
-    /// Fills the gaps of `map`, whose left picture is `luma`, and writes its 3x3 median to `px`, in pixels, above 0.
+    /// Fills what is unknown in `map`, whose left picture is `luma`, and writes its 3x3 median to `px`, in pixels, above 0.
     pub fn fill(
         &mut self,
         map: &mut [u16],
@@ -56,7 +48,11 @@ impl Tidy {
         if let Some(colors) = colors {
             similarity.correct(map, width, border.first(), colors);
         }
-        gaps::fill(map, width, workers);
+        // Ways along which brightness changes too much have reached nothing.
+        for (row, &first) in map.chunks_exact_mut(width).zip(border.first()) {
+            gaps::fill_row(&mut row[..=first], 0);
+        }
+        gaps::fill_empty_rows(map, width);
         let map = &*map;
         let height = map.len() / width;
         let out = DisjointParts::new(px, width, taken);
@@ -86,7 +82,7 @@ impl WithSimd for Median<'_> {
             for (k, row) in [above, here, below].into_iter().enumerate() {
                 (nine[3 * k], nine[3 * k + 1], nine[3 * k + 2]) = (row[before], row[x], row[after]);
             }
-            to_px(median(nine))
+            median_px(nine)
         };
         (out[0], out[width - 1]) = (at(0), at(width - 1));
         if width < 3 {
@@ -96,7 +92,7 @@ impl WithSimd for Median<'_> {
         let inner = width - 2;
         let (above, here, below) = (columns(above, inner), columns(here, inner), columns(below, inner));
         for (x, out) in out[1..=inner].iter_mut().enumerate() {
-            *out = to_px(median([
+            *out = median_px([
                 above[0][x],
                 above[1][x],
                 above[2][x],
@@ -106,7 +102,7 @@ impl WithSimd for Median<'_> {
                 below[0][x],
                 below[1][x],
                 below[2][x],
-            ]));
+            ]);
         }
     }
 }
@@ -115,6 +111,16 @@ impl WithSimd for Median<'_> {
 #[inline(always)]
 fn columns(row: &[u16], length: usize) -> [&[u16]; 3] {
     [&row[..length], &row[1..=length], &row[2..length + 2]]
+}
+
+/// The median of nine disparities, filled in or not, in pixels.
+#[inline(always)]
+fn median_px(nine: [u16; 9]) -> f32 {
+    let mut plain = nine;
+    for d in &mut plain {
+        *d &= !FILLED;
+    }
+    to_px(median(plain))
 }
 
 /// Pixels from fixed point, above 0: 0 would mean unknown, and a disparity of 0 is known.

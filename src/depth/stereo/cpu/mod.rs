@@ -1,31 +1,24 @@
 //! The CPU executor: every core, the best vector instructions that the machine has, nothing allocated per pair.
-//!
-//! The picture is worked on from the top, some rows at a time: a group of rows is one thread's, from the census to the
-//! winners, so that what is made of them stays in the cache of one core. Only the paths down the columns go from group
-//! to group, and so from thread to thread.
 
 mod census;
 mod cost;
 mod path;
+mod prior;
+mod semi_global;
+mod speckle;
 mod sweep;
 mod winner;
 
-use std::sync::atomic::AtomicBool;
-use std::{array, iter};
-
-use census::Census;
-use path::{Paths, StepPenalties};
-use pulp::Arch;
-use sweep::{Agreed, BLOCK, Cells, Down, FromLeft, FromRight};
-use winner::Eyes;
+use prior::Prior;
+use semi_global::SemiGlobal;
+use speckle::Speckles;
 
 use super::executor::Executor;
-use super::fixed;
-use super::penalty::Penalties;
+use super::fixed::FILLED;
+use super::gaps;
 use crate::compute::GpuError;
-use crate::compute::simd;
-use crate::compute::thread_pool::relay::Relay;
-use crate::compute::thread_pool::{DisjointParts, ThreadPool};
+use crate::compute::bands::Bands;
+use crate::compute::thread_pool::ThreadPool;
 
 /// Rows whose values lie side by side, `[column][row][disparity]`, as one part of the work.
 const GROUP: usize = 4;
@@ -33,110 +26,45 @@ const GROUP: usize = 4;
 /// Matches pairs of one size on the CPU.
 pub struct CpuExecutor {
     width: usize,
-    height: usize,
-    disparities: usize,
-    arch: Arch,
-    penalties: Penalties,
-    left: Census,
-    right: Census,
-    /// The paths down the columns.
-    down: Relay<Down>,
-    members: Vec<Member>,
-    /// Flags with which [`DisjointParts`] hands each part to one thread only.
-    taken: Vec<AtomicBool>,
-}
-
-/// Memory of one thread.
-struct Member {
-    p2: StepPenalties,
-    cells: Cells,
-    paths: Paths,
-    eyes: Eyes,
+    /// Islands of up to so many pixels are dropped.
+    island: u32,
+    prior: Prior,
+    semi_global: SemiGlobal,
+    speckles: Speckles,
 }
 
 impl CpuExecutor {
-    /// For pairs of this size, and at least as many disparities, at most 256.
-    pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
-        let disparities = fixed::range(disparities);
-        let member = || Member {
-            p2: StepPenalties::new(width),
-            cells: Cells::new(width, disparities),
-            paths: Paths::new(),
-            eyes: Eyes::new(width, disparities),
-        };
+    /// For pairs of this size, and at least as many disparities, at most 256; drops islands of up to `island` pixels.
+    pub fn new(size: (usize, usize), disparities: usize, island: u32, threads: usize) -> Self {
         Self {
-            width,
-            height,
-            disparities,
-            arch: Arch::new(),
-            penalties: Penalties::new(),
-            left: Census::new((width, height), false, 0),
-            right: Census::new((width, height), true, disparities),
-            down: Relay::new((0..width.div_ceil(BLOCK)).map(|_| Down::new(disparities))),
-            members: iter::repeat_with(member).take(threads).collect(),
-            // The census shares out padded rows.
-            taken: iter::repeat_with(AtomicBool::default).take(height + 2 * census::REACH).collect(),
+            width: size.0,
+            island,
+            prior: Prior::new(size.0),
+            semi_global: SemiGlobal::new(size, disparities, threads),
+            speckles: Speckles::new(size.0 * size.1),
         }
-    }
-
-    /// Matches a pair, whose census is known, with `N` disparities.
-    fn match_range<const N: usize>(
-        &mut self,
-        left: &[u8],
-        likely: Option<&[u16]>,
-        workers: &mut ThreadPool,
-        out: &mut [u16],
-    ) {
-        let Self { width, height, arch, ref penalties, .. } = *self;
-        self.down.begin(Down::clear);
-        let (down, census) = (&self.down, [&self.left, &self.right]);
-        let out = DisjointParts::new(out, GROUP * width, &mut self.taken);
-        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { p2, cells, paths, eyes }, part| {
-            let mut blocks = down.runner(part);
-            // The row `k` below the one above the group; beyond the borders the outermost ones repeat.
-            let row = |k: usize| (part * GROUP + k).saturating_sub(1).min(height - 1);
-            let pixels = |y: usize| y * width..(y + 1) * width;
-            p2.compute(array::from_fn(|k| &left[pixels(row(k))]), penalties);
-            // Costs are sums over three rows, so one above and one below the group are read, too.
-            let codes = array::from_fn(|k| census.map(|census| census.row(row(k))));
-            let likely = likely.map(|likely| array::from_fn(|k| &likely[pixels(row(k + 1))]));
-            paths.clear::<N>();
-            arch.dispatch(FromRight::<N> { codes, p2, likely, cells, paths });
-            paths.clear::<N>();
-            eyes.clear();
-            for first in (0..width).step_by(BLOCK) {
-                let Some(mut down) = blocks.next_block() else { break };
-                arch.dispatch(FromLeft::<N> { p2, cells, first, paths, down: &mut down, eyes });
-            }
-            arch.dispatch(Agreed { eyes, out: out.part(part) });
-        });
     }
 }
 
 impl Executor for CpuExecutor {
     fn describe(&self) -> String {
-        format!("cpu, {} threads, {}", self.members.len(), simd::name(self.arch))
+        self.semi_global.describe()
     }
 
-    fn winners(
-        &mut self,
-        [left, right]: [&[u8]; 2],
-        likely: Option<&[u16]>,
-        workers: &mut ThreadPool,
-        out: &mut [u16],
-    ) -> Result<(), GpuError> {
-        let Self { arch, taken, .. } = self;
-        self.left.compute(left, workers, *arch, taken);
-        self.right.compute(right, workers, *arch, taken);
-        match self.disparities {
-            16 => self.match_range::<16>(left, likely, workers, out),
-            32 => self.match_range::<32>(left, likely, workers, out),
-            64 => self.match_range::<64>(left, likely, workers, out),
-            96 => self.match_range::<96>(left, likely, workers, out),
-            128 => self.match_range::<128>(left, likely, workers, out),
-            192 => self.match_range::<192>(left, likely, workers, out),
-            _ => self.match_range::<256>(left, likely, workers, out),
-        }
+    fn disparities(&mut self, eyes: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
+        let Self { width, prior, semi_global, speckles, .. } = self;
+        let width = *width;
+        semi_global.winners(eyes, prior.likely(eyes[0], workers), workers, out);
+        speckles.remove(out, width, self.island, workers);
+        // Before filling: what was not matched says nothing about the next pair.
+        prior.keep(eyes[0], out);
+        let bands = Bands::new(out.len() / width, 1, workers).split(out, width);
+        workers.run_each(bands, &|band: &mut [u16]| {
+            for row in band.chunks_exact_mut(width) {
+                let first = gaps::first_known(row).unwrap_or(width);
+                gaps::fill_row(&mut row[first..], FILLED);
+            }
+        });
         Ok(())
     }
 }

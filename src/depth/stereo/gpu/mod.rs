@@ -4,27 +4,34 @@
 //! Costs and sums are bytes, four disparities a word, in volumes on the device: their traffic is little beside the
 //! steps of the paths, which wait for each other. So each path is a workgroup of its own with four disparities in each
 //! invocation, and what lies ahead is fetched while it goes.
+//!
+//! What has one number for each pixel has a word for it, so that no two invocations write to one. Both eyes go up and one
+//! map comes back; what the next pair needs of this one stays.
 
+pub mod pass;
 pub mod shaders;
+pub mod tidying;
 mod times;
 
 use std::sync::Arc;
 use std::time::Duration;
 
+use pass::{Pass, in_line};
 use times::Times;
 
 use super::executor::Executor;
-use super::fixed;
+use super::fixed::{self, UNKNOWN};
 use super::penalty::Penalties;
 use crate::compute::GpuError;
-use crate::compute::device::{Device, Shader, workgroups_2d};
+use crate::compute::bands;
+use crate::compute::device::Device;
 use crate::compute::thread_pool::ThreadPool;
 
-/// What a workgroup does, as the shaders declare it: pixels a side of `stereo_census`, columns of `stereo_cost`, and
-/// pixels of `stereo_winners`.
+/// What a workgroup does, as the shaders declare it: pixels a side of `stereo_census`, and columns of `stereo_cost`.
 const TILE: usize = 16;
 const STRIP: usize = 16;
-const LINE: usize = 64;
+/// So many pixels of the map that comes back are worth a thread.
+const LEAST_PIXELS: usize = 1 << 14;
 
 /// Matches pairs of one size on a GPU.
 pub struct GpuExecutor {
@@ -32,29 +39,23 @@ pub struct GpuExecutor {
     pixels: usize,
     /// Grey values, left and right; the right ones begin at a multiple of 4 bytes, as uploads must.
     luma: wgpu::Buffer,
-    /// One more than the disparity that is likely, or 0.
-    likely: wgpu::Buffer,
-    passes: [Pass; 6],
-    winners: wgpu::Buffer,
-    /// A copy of the winners that the CPU can map.
+    /// Those of the last pair.
+    last_luma: wgpu::Buffer,
+    passes: [Pass; 12],
+    /// The map, two pixels a word.
+    words: wgpu::Buffer,
+    /// A copy of it that the CPU can map.
     readback: wgpu::Buffer,
     times: Option<Times>,
 }
 
-/// A pipeline, its buffers, and how many workgroups it takes.
-struct Pass {
-    name: &'static str,
-    pipeline: wgpu::ComputePipeline,
-    bindings: wgpu::BindGroup,
-    workgroups: [u32; 3],
-}
-
 impl GpuExecutor {
-    /// For pairs of this size (columns, rows), and at least as many disparities, at most 256.
+    /// For pairs of this size (columns, rows), and at least as many disparities, at most 256; drops islands of up to
+    /// `island` pixels.
     ///
     /// # Errors
     /// The device has no room for that, or failed.
-    pub fn new(device: &Arc<Device>, size: (usize, usize), disparities: usize) -> Result<Self, GpuError> {
+    pub fn new(device: &Arc<Device>, size: (usize, usize), disparities: usize, island: u32) -> Result<Self, GpuError> {
         let ((width, height), disparities) = (size, fixed::range(disparities));
         let pixels = width * height;
         has_room(device, size, disparities)?;
@@ -69,40 +70,50 @@ impl GpuExecutor {
                 mapped_at_creation: false,
             })
         };
-        let luma = buffer("luma", 2 * pixels.next_multiple_of(4), Usage::STORAGE | Usage::COPY_DST);
+        let luma = buffer("luma", 2 * pixels.next_multiple_of(4), Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC);
+        let last_luma = buffer("last luma", pixels, Usage::STORAGE | Usage::COPY_DST);
         let table = buffer("P2", 256, Usage::STORAGE | Usage::COPY_DST);
         device.queue.write_buffer(&table, 0, Penalties::new().table());
-        let likely = buffer("likely", pixels * 2, Usage::STORAGE | Usage::COPY_DST);
+        let likely = buffer("likely", pixels * 4, Usage::STORAGE);
         let census = buffer("census", 2 * pixels * 4, Usage::STORAGE);
         let penalties = buffer("penalties", pixels * 4, Usage::STORAGE);
         let [costs, sums, totals] =
             ["costs", "sums", "totals"].map(|label| buffer(label, pixels * disparities, Usage::STORAGE));
-        let winners = buffer("winners", pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
-        let readback = buffer("winners back", pixels * 2, Usage::MAP_READ | Usage::COPY_DST);
+        let map = buffer("map", pixels * 4, Usage::STORAGE | Usage::COPY_DST);
+        // Before the first pair nothing is likely.
+        device.queue.write_buffer(&map, 0, bytemuck::cast_slice(&vec![u32::from(UNKNOWN); pixels]));
+        let words = buffer("words", pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
+        let readback = buffer("words back", pixels * 2, Usage::MAP_READ | Usage::COPY_DST);
 
-        let pass = |shader: Shader, from_right, buffers: &[&wgpu::Buffer], workgroups: [usize; 3]| {
-            let pipeline = device.pipeline(shader, &shaders::constants(size, disparities, from_right));
-            let bindings = device.bindings(&pipeline, buffers.iter().map(|buffer| buffer.as_entire_buffer_binding()));
-            Pass { name: shader.name, pipeline, bindings, workgroups: workgroups.map(|count| count as u32) }
+        let constants = |from_right| shaders::constants(size, disparities, island, from_right);
+        let forwards = constants(false);
+        let pass =
+            |shader, buffers: &[&wgpu::Buffer], workgroups| Pass::new(device, shader, &forwards, buffers, workgroups);
+        let along_rows = |from_right| {
+            let buffers = [&costs, &penalties, &sums];
+            Pass::new(device, shaders::ROWS, &constants(from_right), &buffers, [height, 1, 1])
         };
-        let along_rows = |from_right| pass(shaders::ROWS, from_right, &[&costs, &penalties, &sums], [height, 1, 1]);
-        let [across, down] = workgroups_2d(pixels.div_ceil(LINE) as u32);
+        // After the winners nobody needs the volumes and the penalties.
+        let scratch = tidying::Scratch { labels: &costs, sizes: &sums, filled: &penalties };
+        let [runs, join, sizes, gaps, pack] = tidying::passes(device, size, &forwards, &map, scratch, &words);
+        let tiles = [width.div_ceil(TILE), height.div_ceil(TILE), 2];
         let passes = [
-            pass(
-                shaders::CENSUS,
-                false,
-                &[&luma, &table, &census, &penalties],
-                [width.div_ceil(TILE), height.div_ceil(TILE), 2],
-            ),
-            pass(shaders::COST, false, &[&census, &likely, &costs], [width.div_ceil(STRIP), height, 1]),
+            pass(shaders::LIKELY, &[&luma, &last_luma, &map, &likely], in_line(pixels)),
+            pass(shaders::CENSUS, &[&luma, &table, &census, &penalties], tiles),
+            pass(shaders::COST, &[&census, &likely, &costs], [width.div_ceil(STRIP), height, 1]),
             along_rows(false),
             along_rows(true),
-            pass(shaders::COLUMNS, false, &[&costs, &penalties, &sums, &totals], [width, 1, 1]),
-            pass(shaders::WINNERS, false, &[&totals, &winners], [across as usize, down as usize, 1]),
+            pass(shaders::COLUMNS, &[&costs, &penalties, &sums, &totals], [width, 1, 1]),
+            pass(shaders::WINNERS, &[&totals, &map], in_line(pixels)),
+            runs,
+            join,
+            sizes,
+            gaps,
+            pack,
         ];
         let times = device.timestamps.then(|| Times::new(&device.device, passes.len()));
         device.check()?;
-        Ok(Self { device: Arc::clone(device), pixels, luma, likely, passes, winners, readback, times })
+        Ok(Self { device: Arc::clone(device), pixels, luma, last_luma, passes, words, readback, times })
     }
 
     /// Name and time of each pass over the last pair, in their order; empty where the device has no timestamps.
@@ -140,11 +151,10 @@ impl Executor for GpuExecutor {
         self.device.name.clone()
     }
 
-    fn winners(
+    fn disparities(
         &mut self,
         [left, right]: [&[u8]; 2],
-        likely: Option<&[u16]>,
-        _: &mut ThreadPool,
+        workers: &mut ThreadPool,
         out: &mut [u16],
     ) -> Result<(), GpuError> {
         let Self { device, .. } = &*self;
@@ -153,21 +163,11 @@ impl Executor for GpuExecutor {
         device.upload(&self.luma, self.pixels.next_multiple_of(4) as u64, right);
 
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        match likely {
-            Some(likely) => device.upload(&self.likely, 0, bytemuck::cast_slice(likely)),
-            None => encoder.clear_buffer(&self.likely, 0, None),
+        for (index, pass) in self.passes.iter().enumerate() {
+            pass.record(&mut encoder, self.times.as_ref(), index);
         }
-        for (k, step) in self.passes.iter().enumerate() {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some(step.name),
-                timestamp_writes: self.times.as_ref().map(|times| times.of_pass(k)),
-            });
-            pass.set_pipeline(&step.pipeline);
-            pass.set_bind_group(0, &step.bindings, &[]);
-            let [x, y, z] = step.workgroups;
-            pass.dispatch_workgroups(x, y, z);
-        }
-        encoder.copy_buffer_to_buffer(&self.winners, 0, &self.readback, 0, self.readback.size());
+        encoder.copy_buffer_to_buffer(&self.luma, 0, &self.last_luma, 0, self.last_luma.size());
+        encoder.copy_buffer_to_buffer(&self.words, 0, &self.readback, 0, self.readback.size());
         if let Some(times) = &self.times {
             times.fetch(&mut encoder);
         }
@@ -180,10 +180,13 @@ impl Executor for GpuExecutor {
         let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", device.name));
         device.poll(Some(submission))?;
         {
-            let bytes = self.readback.get_mapped_range(..).map_err(|error| fault(&error))?;
-            for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {
-                *out = u16::from_le_bytes(*bytes);
-            }
+            let view = self.readback.get_mapped_range(..).map_err(|error| fault(&error))?;
+            let each = bands::share(out.len(), LEAST_PIXELS);
+            workers.run_each(out.chunks_mut(each).zip(view.chunks(2 * each)), &|(out, bytes): (&mut [u16], &[u8])| {
+                for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {
+                    *out = u16::from_le_bytes(*bytes);
+                }
+            });
         }
         self.readback.unmap();
         if let Some(times) = &mut self.times {

@@ -1,6 +1,6 @@
 //! The shaders, and the numbers that Rust shares with them.
 
-use super::super::fixed::{AGREE, BONUS, ONE, OUTSIDE, SLOPE, UNKNOWN};
+use super::super::fixed::{AGREE, BONUS, FILLED, NOISE, ONE, OUTSIDE, SLOPE, STEP, UNKNOWN};
 use crate::compute::device::Shader;
 
 macro_rules! shader {
@@ -16,6 +16,8 @@ macro_rules! shader {
     };
 }
 
+/// What the last pair makes likely.
+pub const LIKELY: Shader = shader!("stereo_likely", "stereo_line");
 /// Which neighbours are darker, of both eyes, and P2 between left pixels.
 pub const CENSUS: Shader = shader!("stereo_census");
 /// What each disparity costs.
@@ -25,15 +27,26 @@ pub const ROWS: Shader = shader!("stereo_rows", "stereo_path");
 /// The path down each column.
 pub const COLUMNS: Shader = shader!("stereo_columns", "stereo_path");
 /// What both eyes agree on.
-pub const WINNERS: Shader = shader!("stereo_winners");
+pub const WINNERS: Shader = shader!("stereo_winners", "stereo_line");
+/// Islands within rows.
+pub const RUNS: Shader = shader!("stereo_runs", "stereo_row", "stereo_touch");
+/// Islands from row to row.
+pub const JOIN: Shader = shader!("stereo_join", "stereo_line", "stereo_touch", "stereo_root");
+/// How large they are.
+pub const SIZES: Shader = shader!("stereo_sizes", "stereo_line", "stereo_touch", "stereo_root");
+/// What is left without small ones, and between it.
+pub const GAPS: Shader = shader!("stereo_gaps", "stereo_row");
+/// The same, as the CPU takes it.
+pub const PACK: Shader = shader!("stereo_pack", "stereo_line");
 
-pub const ALL: [Shader; 5] = [CENSUS, COST, ROWS, COLUMNS, WINNERS];
+pub const ALL: [Shader; 11] = [LIKELY, CENSUS, COST, ROWS, COLUMNS, WINNERS, RUNS, JOIN, SIZES, GAPS, PACK];
 
 /// The `override` constants of `stereo_common.wgsl`.
-pub type Constants = [(&'static str, f64); 10];
+pub type Constants = [(&'static str, f64); 14];
 
-/// The constants for pictures of this size; `from_right` turns the path along the rows round.
-pub fn constants((width, height): (usize, usize), disparities: usize, from_right: bool) -> Constants {
+/// The constants for pictures of this size, where islands of up to `island` pixels are dropped; `from_right` turns the
+/// path along the rows round.
+pub fn constants((width, height): (usize, usize), disparities: usize, island: u32, from_right: bool) -> Constants {
     [
         ("WIDTH", width as f64),
         ("HEIGHT", height as f64),
@@ -44,6 +57,10 @@ pub fn constants((width, height): (usize, usize), disparities: usize, from_right
         ("AGREE", AGREE.into()),
         ("ONE", ONE.into()),
         ("UNKNOWN", UNKNOWN.into()),
+        ("FILLED", FILLED.into()),
+        ("NOISE", NOISE.into()),
+        ("STEP", STEP.into()),
+        ("ISLAND", island.into()),
         ("BACK", u8::from(from_right).into()),
     ]
 }

@@ -6,12 +6,9 @@
 
 use pulp::{Arch, WithSimd};
 
-use super::fixed::{ONE, UNKNOWN};
+use super::super::fixed::{NOISE, ONE, UNKNOWN};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
-
-/// Sum of the changes of 3x3 pixels, in 8-bit codes, up to which they are taken for noise: 4 a pixel.
-const NOISE: u16 = 36;
 
 /// Remembers the last pair.
 #[derive(Debug, Default)]

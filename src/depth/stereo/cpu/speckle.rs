@@ -2,12 +2,9 @@
 
 use std::ops::Range;
 
-use super::fixed::{ONE, UNKNOWN};
+use super::super::fixed::{STEP, UNKNOWN};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::{MOST_ITEMS, ThreadPool};
-
-/// Neighbours that differ by more are not of one island.
-const STEP: u16 = 2 * ONE;
 
 /// Removes islands, found by union-find over runs of rows; owns the memory for it.
 ///

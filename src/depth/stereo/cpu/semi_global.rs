@@ -1,0 +1,132 @@
+//! Semi-global matching: the disparities that both eyes agree on.
+//!
+//! The picture is worked on from the top, some rows at a time: a group of rows is one thread's, from the census to the
+//! winners, so that what is made of them stays in the cache of one core. Only the paths down the columns go from group
+//! to group, and so from thread to thread.
+
+use std::sync::atomic::AtomicBool;
+use std::{array, iter};
+
+use pulp::Arch;
+
+use super::super::fixed;
+use super::super::penalty::Penalties;
+use super::GROUP;
+use super::census::{self, Census};
+use super::path::{Paths, StepPenalties};
+use super::sweep::{Agreed, BLOCK, Cells, Down, FromLeft, FromRight};
+use super::winner::Eyes;
+use crate::compute::simd;
+use crate::compute::thread_pool::relay::Relay;
+use crate::compute::thread_pool::{DisjointParts, ThreadPool};
+
+/// Matches pairs of one size.
+pub struct SemiGlobal {
+    width: usize,
+    height: usize,
+    disparities: usize,
+    arch: Arch,
+    penalties: Penalties,
+    left: Census,
+    right: Census,
+    /// The paths down the columns.
+    down: Relay<Down>,
+    members: Vec<Member>,
+    /// Flags with which [`DisjointParts`] hands each part to one thread only.
+    taken: Vec<AtomicBool>,
+}
+
+/// Memory of one thread.
+struct Member {
+    p2: StepPenalties,
+    cells: Cells,
+    paths: Paths,
+    eyes: Eyes,
+}
+
+impl SemiGlobal {
+    /// For pairs of this size, and at least as many disparities, at most 256.
+    pub fn new((width, height): (usize, usize), disparities: usize, threads: usize) -> Self {
+        let disparities = fixed::range(disparities);
+        let member = || Member {
+            p2: StepPenalties::new(width),
+            cells: Cells::new(width, disparities),
+            paths: Paths::new(),
+            eyes: Eyes::new(width, disparities),
+        };
+        Self {
+            width,
+            height,
+            disparities,
+            arch: Arch::new(),
+            penalties: Penalties::new(),
+            left: Census::new((width, height), false, 0),
+            right: Census::new((width, height), true, disparities),
+            down: Relay::new((0..width.div_ceil(BLOCK)).map(|_| Down::new(disparities))),
+            members: iter::repeat_with(member).take(threads).collect(),
+            // The census shares out padded rows.
+            taken: iter::repeat_with(AtomicBool::default).take(height + 2 * census::REACH).collect(),
+        }
+    }
+
+    /// Matches a pair, whose census is known, with `N` disparities.
+    fn match_range<const N: usize>(
+        &mut self,
+        left: &[u8],
+        likely: Option<&[u16]>,
+        workers: &mut ThreadPool,
+        out: &mut [u16],
+    ) {
+        let Self { width, height, arch, ref penalties, .. } = *self;
+        self.down.begin(Down::clear);
+        let (down, census) = (&self.down, [&self.left, &self.right]);
+        let out = DisjointParts::new(out, GROUP * width, &mut self.taken);
+        workers.run_with(&mut self.members, height.div_ceil(GROUP), &|Member { p2, cells, paths, eyes }, part| {
+            let mut blocks = down.runner(part);
+            // The row `k` below the one above the group; beyond the borders the outermost ones repeat.
+            let row = |k: usize| (part * GROUP + k).saturating_sub(1).min(height - 1);
+            let pixels = |y: usize| y * width..(y + 1) * width;
+            p2.compute(array::from_fn(|k| &left[pixels(row(k))]), penalties);
+            // Costs are sums over three rows, so one above and one below the group are read, too.
+            let codes = array::from_fn(|k| census.map(|census| census.row(row(k))));
+            let likely = likely.map(|likely| array::from_fn(|k| &likely[pixels(row(k + 1))]));
+            paths.clear::<N>();
+            arch.dispatch(FromRight::<N> { codes, p2, likely, cells, paths });
+            paths.clear::<N>();
+            eyes.clear();
+            for first in (0..width).step_by(BLOCK) {
+                let Some(mut down) = blocks.next_block() else { break };
+                arch.dispatch(FromLeft::<N> { p2, cells, first, paths, down: &mut down, eyes });
+            }
+            arch.dispatch(Agreed { eyes, out: out.part(part) });
+        });
+    }
+
+    /// What runs it.
+    pub fn describe(&self) -> String {
+        format!("cpu, {} threads, {}", self.members.len(), simd::name(self.arch))
+    }
+
+    /// Writes the disparities of the left picture to `out`, in fixed point, or unknown. `likely` has one more than the
+    /// whole disparity that is likely for a pixel, or 0: that one and those beside it cost less by [`fixed::BONUS`].
+    pub fn winners(
+        &mut self,
+        [left, right]: [&[u8]; 2],
+        likely: Option<&[u16]>,
+        workers: &mut ThreadPool,
+        out: &mut [u16],
+    ) {
+        let Self { arch, taken, .. } = self;
+        self.left.compute(left, workers, *arch, taken);
+        self.right.compute(right, workers, *arch, taken);
+        match self.disparities {
+            16 => self.match_range::<16>(left, likely, workers, out),
+            32 => self.match_range::<32>(left, likely, workers, out),
+            64 => self.match_range::<64>(left, likely, workers, out),
+            96 => self.match_range::<96>(left, likely, workers, out),
+            128 => self.match_range::<128>(left, likely, workers, out),
+            192 => self.match_range::<192>(left, likely, workers, out),
+            _ => self.match_range::<256>(left, likely, workers, out),
+        }
+    }
+}
