@@ -6,11 +6,14 @@
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
+use std::path::PathBuf;
+use std::process::Command;
 use std::sync::Arc;
 
 use bokehcam::compute::Device;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap};
+use bokehcam::recording::{Options, Recording, Scratch};
 
 const FRAME_NS: u64 = 33_000_000;
 const SAME: f32 = 1e-4;
@@ -145,22 +148,54 @@ fn sequences_agree_whatever_happens_in_them() {
     let unknown = |frame: &mut Frame| frame.1.metres.fill(0.0);
     let none = same(&device, "nothing is ever known", &with(&|_, frame| unknown(frame)));
     assert!(none.metres.iter().all(|&metres| metres == 0.0));
-    let kept = same(&device, "nothing is known at last", &with(&|k, frame| if k > 3 { unknown(frame) }));
+    let kept = same(
+        &device,
+        "nothing is known at last",
+        &with(&|k, frame| {
+            if k > 3 {
+                unknown(frame)
+            }
+        }),
+    );
     assert!(kept.metres.iter().all(|&metres| DepthMap::is_known(metres)), "the last that was known stands");
-    same(&device, "nothing is known at first, and in between", &with(&|k, frame| if k % 4 == 0 { unknown(frame) }));
-    same(&device, "an empty map", &with(&|k, frame| if k % 3 == 1 { frame.1 = DepthMap::default() }));
-    let other = |size, from| move |k: usize, frame: &mut Frame| {
-        if (3..6).contains(&k) {
-            (frame.0, frame.1) = scene(size, from, k, 0.05);
+    same(
+        &device,
+        "nothing is known at first, and in between",
+        &with(&|k, frame| {
+            if k % 4 == 0 {
+                unknown(frame)
+            }
+        }),
+    );
+    same(
+        &device,
+        "an empty map",
+        &with(&|k, frame| {
+            if k % 3 == 1 {
+                frame.1 = DepthMap::default()
+            }
+        }),
+    );
+    let other = |size, from| {
+        move |k: usize, frame: &mut Frame| {
+            if (3..6).contains(&k) {
+                (frame.0, frame.1) = scene(size, from, k, 0.05);
+            }
         }
     };
     same(&device, "maps of another size", &with(&other(size, size)));
     same(&device, "maps of many samples", &with(&other(size, (320, 241))));
     same(&device, "pictures of another size", &with(&other((70, 90), (80, 50))));
-    same(&device, "one known sample", &with(&|k, frame| if k > 5 {
-        unknown(frame);
-        frame.1.metres[1234] = 2.0;
-    }));
+    same(
+        &device,
+        "one known sample",
+        &with(&|k, frame| {
+            if k > 5 {
+                unknown(frame);
+                frame.1.metres[1234] = 2.0;
+            }
+        }),
+    );
     let still = frames().swap_remove(0);
     let still = (0..12).map(|k| (still.0.clone(), still.1.clone(), k * FRAME_NS, 1.5)).collect::<Vec<_>>();
     same(&device, "the same again and again", &still);
@@ -202,5 +237,43 @@ fn a_device_that_is_gone_is_followed_by_the_processor() {
         }
         assert_eq!(refiner.backends(), "gpu, then cpu");
         assert_eq!(Refiner::new().on(Some(&device)).backends(), "cpu", "nobody tries that device again");
+    }
+}
+
+fn portrait() -> PathBuf {
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait"))
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn the_bundled_recording_agrees() {
+    let recording = Recording::open(&portrait(), &Options::default()).expect("it is bundled");
+    let mut scratch = Scratch::default();
+    let frame = |index: usize| {
+        let (mut color, mut map) = (ColorImage::default(), DepthMap::default());
+        recording.read_color(index, &mut scratch, &mut color).expect("a picture");
+        recording.read_depth(index, &mut scratch, &mut map).expect("its depth");
+        (color, map, index as u64 * FRAME_NS, 1.0)
+    };
+    same(&device(), "portrait", &(0..6).map(frame).collect::<Vec<_>>());
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_stream_is_refined_where_it_is_blurred() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (backend, refine, expected) in [("gpu", "on", "gpu"), ("cpu", "on", "cpu"), ("cpu", "off", "none")] {
+        let report = folder.path().join("report.json");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
+        command.env("XDG_CONFIG_HOME", folder.path()).arg("stream").arg(portrait());
+        command
+            .args(["--backend", backend, "--refine", refine, "--pace", "asap", "--to", "null", "--report"])
+            .arg(&report);
+        let output = command.output().expect("the program");
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && !told.contains("the CPU refines"), "{told}");
+        let report = std::fs::read_to_string(report).expect("a report");
+        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+        assert_eq!((&report["refined_by"], &report["backend"]), (&expected.into(), &backend.into()), "{report}");
     }
 }

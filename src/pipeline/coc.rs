@@ -102,7 +102,9 @@ impl CocMaker {
         let is_other = |device: &Arc<Device>| !self.device.as_ref().is_some_and(|own| Arc::ptr_eq(own, device));
         if let Some(device) = device.filter(is_other) {
             self.device = Some(device);
-            self.renew(self.finisher.finish());
+            if matches!(self.finisher, Finisher::Refine(_)) {
+                self.renew(Finish::Refine);
+            }
         }
     }
 

@@ -19,25 +19,19 @@ const DEPTHS: usize = (SIZE.0 * SIZE.1 * FRAMES) as usize;
 /// Whether the device is sound: refines a few small frames there and on the processor, once for each device, and says what is
 /// wrong. A device that has failed is not; who had it has said so.
 pub fn is_passed(device: &Arc<Device>) -> bool {
-    device.check().is_ok()
-        && device
-            .refining
-            .get_or_init(|| match differing(device) {
-                Ok(wrong) if wrong <= DEPTHS / 100 => true,
-                Ok(wrong) => {
-                    let name = &device.name;
-                    tracing::warn!(
-                        "GPU: {name}: {wrong} of the {DEPTHS} depths of a trial are wrong: its driver may have a fault; \
-                         the CPU refines"
-                    );
-                    false
-                }
-                Err(error) => {
-                    tracing::warn!("{error}; the CPU refines");
-                    false
-                }
-            })
-            .to_owned()
+    device.check().is_ok() && *device.refining.get_or_init(|| try_out(device))
+}
+
+fn try_out(device: &Arc<Device>) -> bool {
+    match differing(device) {
+        Ok(wrong) if wrong <= DEPTHS / 100 => return true,
+        Ok(wrong) => tracing::warn!(
+            "GPU: {}: {wrong} of the {DEPTHS} depths of a trial are wrong: its driver may have a fault; the CPU refines",
+            device.name
+        ),
+        Err(error) => tracing::warn!("{error}; the CPU refines"),
+    }
+    false
 }
 
 /// How many depths differ.
