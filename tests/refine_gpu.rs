@@ -263,7 +263,7 @@ fn the_bundled_recording_agrees() {
 fn a_stream_is_refined_where_it_is_blurred() {
     let folder = tempfile::tempdir().expect("a folder");
     for (backend, refine, expected) in [("gpu", "on", "gpu"), ("cpu", "on", "cpu"), ("cpu", "off", "none")] {
-        let report = folder.path().join("report.json");
+        let report = folder.path().join(format!("{backend} {refine}.json"));
         let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
         command.env("XDG_CONFIG_HOME", folder.path()).arg("stream").arg(portrait());
         command
