@@ -15,7 +15,7 @@ impl Tap {
     }
 
     /// The sample that is nearer.
-    #[inline(always)]
+    #[cfg(feature = "gpu")]
     pub fn nearest(self) -> usize {
         if self.share >= 0.5 { self.second } else { self.first }
     }

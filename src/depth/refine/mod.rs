@@ -113,14 +113,17 @@ impl Refiner {
     /// The same on a device, where there is one that refines as the processor does, and maps need no mending. When it fails, the
     /// processor goes on, from the frame on with which it does.
     #[must_use]
-    pub fn on(mut self, device: Option<&Arc<Device>>) -> Self {
+    pub fn on(self, device: Option<&Arc<Device>>) -> Self {
         #[cfg(feature = "gpu")]
-        if self.mending == Mending::default() {
-            self.gpu = device.and_then(gpu::GpuRefiner::tried);
+        {
+            let device = device.filter(|_| self.mending == Mending::default());
+            Self { gpu: device.and_then(gpu::GpuRefiner::tried), ..self }
         }
         #[cfg(not(feature = "gpu"))]
-        let _ = device;
-        self
+        {
+            let _ = device;
+            self
+        }
     }
 
     /// What refined, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
