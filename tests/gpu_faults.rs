@@ -239,7 +239,7 @@ fn depth_is_refined_whatever_becomes_of_the_device() {
     let mut device = device();
     // The trial compiles the shaders, which may take longer than a second.
     let shared = Arc::new(device);
-    Refiner::new().on(Some(&shared));
+    let _ = Refiner::new().on(Some(&shared));
     device = Arc::into_inner(shared).expect("nobody else has it").with_patience(Duration::from_secs(1));
     let mut refiner = Refiner::new().on(Some(&Arc::new(device)));
     let mut cpu = Refiner::new();
