@@ -6,8 +6,8 @@ use std::mem::offset_of;
 
 use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Work};
 use bokehcam::bokeh::plan::MAX_BINS;
+use bokehcam::compute::device::Shader;
 use bokehcam::depth::refine::gpu::shaders as refine;
-use bokehcam::depth::refine::gpu::shaders::Wave;
 use bokehcam::depth::stereo::gpu::shaders as stereo;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -102,11 +102,22 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             has_lobes
         }),
         layout!(Work { first, count, group, terms, last, nearest_px, unhidden }),
-        layout!(Wave { first, at, marks }),
     ];
+    have_layouts(&ALL, expected);
+    {
+        use refine::{Frame, Wave};
+        let frame = layout!(Frame { size, map_size, focus_m, times, longest, empty, fresh });
+        have_layouts(&refine::ALL, [frame, layout!(Wave { first, at, marks })]);
+    }
+}
+
+/// A struct's name, size, and the places of its fields.
+type Layout = (&'static str, usize, Vec<(&'static str, usize)>);
+
+fn have_layouts<const N: usize>(shaders: &[Shader], expected: [Layout; N]) {
     for (name, size, fields) in expected {
         let mut found = false;
-        for shader in ALL.into_iter().chain([refine::VOTE]) {
+        for shader in shaders {
             let module = parse(shader.source);
             for (_, kind) in module.types.iter().filter(|(_, kind)| kind.name.as_deref() == Some(name)) {
                 let naga::TypeInner::Struct { members, span } = &kind.inner else { panic!("{name} is a struct") };
