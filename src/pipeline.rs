@@ -232,12 +232,13 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let efforts = source.as_ref().map_or(&[1.0][..], |source| source.efforts());
     let picker = quality::Picker::new((quality, finest), run.budget_ns, live_ns, efforts);
     let order = rate::Order::new(picker.plan());
+    // Without a blur nobody asks for depth.
+    let look = if executor.is_some() { run.look } else { Look::plain(Effect::None) };
+    let knows_background = source.as_ref().is_some_and(|source| source.knows_background());
+    let mut preparation = prepare::Preparation::new(&look, info.size, run.measured, knows_background, run.threads);
+    preparation.beside(executor.as_deref());
+    let mut refined_by = None;
     let depth = depth::Stage {
-        // Without a blur nobody asks for depth.
-        look: if executor.is_some() { run.look } else { Look::plain(Effect::None) },
-        size: info.size,
-        measured: run.measured,
-        threads: run.threads,
         adaptive: run.adaptive,
         changes: run.changes,
         rate: live_ns.map(|_| rate::Rate::new(&order)),
@@ -251,6 +252,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         clock: &clock,
         times: depth_times,
         held,
+        refined_by: &mut refined_by,
     };
     let blur = blur::Stage {
         executor,
@@ -284,7 +286,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let ended = thread::scope(|scope| {
         let upstream = [
             spawn(scope, "capture", &over, move || capture.run(to_depth))?,
-            spawn(scope, "depth", &over, move || depth.run(from_capture, to_blur))?,
+            spawn(scope, "depth", &over, move || depth.run(preparation, from_capture, to_blur))?,
             spawn(scope, "blur", &over, move || blur.run(from_depth, to_sink))?,
         ];
         let delivered = guard("sink", &over, move || deliver.run(from_blur));
@@ -294,6 +296,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let is_cut = run.stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
     about.pipewire = sink.nodes();
+    about.refined_by = refined_by.unwrap_or("none").into();
     let finished = guard("sink", &over, move || Ok(sink.finish(ending)?));
     // What came first is the cause.
     let ended = ended.and(finished);

@@ -19,6 +19,7 @@ use bokehcam::bokeh::{self, Bokeh, BokehError, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::device::Device;
 use bokehcam::compute::{Backend, Place};
+use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::{self, Effort, Pair};
 use bokehcam::frame::{ColorImage, DisparityMap, GrayImage};
 use bokehcam::link::pool::Pooled;
@@ -228,6 +229,50 @@ fn matching_goes_on_after_the_gpu() {
     for fault in ["submit:2", "wait:3"] {
         let told = test_under(&layer, fault, "pairs_are_matched_whatever_becomes_of_the_device");
         assert!(told.contains("ran on cpu"), "{fault}: {told}");
+    }
+}
+
+/// Under the layer, the faults are its.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn depth_is_refined_whatever_becomes_of_the_device() {
+    let mut device = device();
+    // The trial compiles the shaders, which may take longer than a second.
+    let shared = Arc::new(device);
+    let _ = Refiner::new().on(Some(&shared));
+    device = Arc::into_inner(shared).expect("nobody else has it").with_patience(Duration::from_secs(1));
+    let mut refiner = Refiner::new().on(Some(&Arc::new(device)));
+    let mut cpu = Refiner::new();
+    for frame in 0..8 {
+        let (color, measured) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
+        let [mut made, mut expected] = [measured.clone(), measured];
+        refiner.refine(&mut made, &color, frame * 33_000_000);
+        cpu.refine(&mut expected, &color, frame * 33_000_000);
+        let is_off = |(a, b): &(&f32, &f32)| (*a - *b).abs() > 1e-3 * *b;
+        let off = made.metres.iter().zip(&expected.metres).filter(is_off).count();
+        assert!(made.size() == SIZE && off * 100 <= made.metres.len(), "frame {frame}: {off} are off");
+    }
+    println!("ran on {}", refiner.backends());
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn refining_goes_on_after_the_gpu() {
+    let layer = layer();
+    for (fault, ran) in [
+        // In the trial, and later.
+        ("submit:2", "ran on cpu"),
+        ("submit:6", "ran on gpu, then cpu"),
+        ("wait:6", "ran on gpu, then cpu"),
+        ("hang:6", "ran on gpu, then cpu"),
+        // Passes that are not run.
+        ("idle:1", "ran on cpu"),
+        ("idle:30", "ran on cpu"),
+        ("submit:1000000", "ran on gpu"),
+    ] {
+        let told = test_under(&layer, fault, "depth_is_refined_whatever_becomes_of_the_device");
+        let line = told.lines().find_map(|line| line.find("ran on").map(|at| &line[at..]));
+        assert_eq!(line, Some(ran), "{fault}: {told}");
     }
 }
 

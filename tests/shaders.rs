@@ -6,6 +6,8 @@ use std::mem::offset_of;
 
 use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Work};
 use bokehcam::bokeh::plan::MAX_BINS;
+use bokehcam::compute::device::Shader;
+use bokehcam::depth::refine::gpu::shaders as refine;
 use bokehcam::depth::stereo::gpu::shaders as stereo;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -18,7 +20,8 @@ fn every_shader_validates_and_is_named_like_its_file() {
     let blur = ALL.map(|shader| (shader, CONSTANTS.map(|(name, _)| name).to_vec()));
     let constants = stereo::constants((1, 1), 16, 0, false).map(|(name, _)| name);
     let stereo = stereo::ALL.map(|shader| (shader, constants.to_vec()));
-    for (shader, constants) in blur.into_iter().chain(stereo) {
+    let refine = refine::ALL.map(|shader| (shader, refine::constants(false).map(|(name, _)| name).to_vec()));
+    for (shader, constants) in blur.into_iter().chain(stereo).chain(refine) {
         let module = parse(shader.source);
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
         if let Err(error) = validator.validate(&module) {
@@ -38,9 +41,9 @@ fn every_file_is_a_pass_or_shared_and_short() {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
         let shared = "base common filter list meet mixed next pyramid range show tent tiles todo work stereo_common stereo_line \
-             stereo_path stereo_root stereo_row stereo_touch";
+             stereo_path stereo_root stereo_row stereo_touch refine_common refine_lanes refine_select refine_window";
         let known = shared.split(' ').any(|file| file == name)
-            || ALL.iter().chain(&stereo::ALL).any(|shader| shader.name == name)
+            || ALL.iter().chain(&stereo::ALL).chain(&refine::ALL).any(|shader| shader.name == name)
             || name == "present";
         assert!(known, "{} belongs to no pass", path.display());
         let lines = std::fs::read_to_string(&path).expect("a text").lines().count();
@@ -100,9 +103,21 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
         }),
         layout!(Work { first, count, group, terms, last, nearest_px, unhidden }),
     ];
+    have_layouts(&ALL, expected);
+    {
+        use refine::{Frame, Wave};
+        let frame = layout!(Frame { size, map_size, focus_m, times, longest, empty, fresh });
+        have_layouts(&refine::ALL, [frame, layout!(Wave { first, at, marks })]);
+    }
+}
+
+/// A struct's name, size, and the places of its fields.
+type Layout = (&'static str, usize, Vec<(&'static str, usize)>);
+
+fn have_layouts<const N: usize>(shaders: &[Shader], expected: [Layout; N]) {
     for (name, size, fields) in expected {
         let mut found = false;
-        for shader in ALL {
+        for shader in shaders {
             let module = parse(shader.source);
             for (_, kind) in module.types.iter().filter(|(_, kind)| kind.name.as_deref() == Some(name)) {
                 let naga::TypeInner::Struct { members, span } = &kind.inner else { panic!("{name} is a struct") };

@@ -1,9 +1,10 @@
 //! Goes over to another executor (the CPU) when the GPU fails, from the oldest frame in flight on.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use super::{Bokeh, BokehError, Finished, Job};
-use crate::compute::{Backend, GpuError};
+use crate::compute::{Backend, Device, GpuError};
 
 /// Makes the executor to go over to.
 pub type Makes = Box<dyn FnOnce() -> Box<dyn Bokeh> + Send>;
@@ -85,6 +86,10 @@ impl Bokeh for Fallback {
 
     fn backend(&self) -> Backend {
         self.current.backend()
+    }
+
+    fn device(&self) -> Option<Arc<Device>> {
+        self.current.device()
     }
 
     fn backends(&self) -> &'static str {

@@ -32,7 +32,6 @@ pub mod split;
 
 use std::fmt;
 use std::str::FromStr;
-#[cfg(feature = "gpu")]
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -41,9 +40,7 @@ pub use error::BokehError;
 pub use picture::Picture;
 
 pub use crate::compute::Backend;
-#[cfg(feature = "gpu")]
-use crate::compute::device::Device;
-use crate::compute::{GpuError, Place};
+use crate::compute::{Device, GpuError, Place};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::names::named;
@@ -295,6 +292,11 @@ pub trait Bokeh: Send {
     /// What ran it, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
     fn backends(&self) -> &'static str {
         self.backend().name()
+    }
+
+    /// The GPU that it runs on, for what else there is to do of its frames.
+    fn device(&self) -> Option<Arc<Device>> {
+        None
     }
 
     /// One line for the report, such as `cpu, 2 threads, AVX-512` or the adapter's name.

@@ -44,6 +44,8 @@ pub struct Device {
     pub timestamps: bool,
     /// What the trial of this device found wrong, once that is over.
     pub trial: OnceLock<Option<String>>,
+    /// Whether it refines depth as the processor does, once that was tried.
+    pub refining: OnceLock<bool>,
     /// Those made so far, by the names of their shaders and the bits of their constants.
     pipelines: Mutex<HashMap<(&'static str, Vec<u64>), wgpu::ComputePipeline>>,
     patience: Duration,
@@ -101,8 +103,8 @@ impl Device {
         // Dropping the device calls this, too; then nobody is left to read the fault.
         device.set_device_lost_callback(move |_, message| on_loss(format!("device lost: {message}")));
         let patience = if infos[best].device_type == wgpu::DeviceType::Cpu { PATIENCE_WITH_SOFTWARE } else { PATIENCE };
-        let (trial, pipelines) = (OnceLock::new(), Mutex::default());
-        Ok(Self { instance, adapter, device, queue, name, timestamps, trial, pipelines, patience, fault })
+        let (trial, refining, pipelines) = (OnceLock::new(), OnceLock::new(), Mutex::default());
+        Ok(Self { instance, adapter, device, queue, name, timestamps, trial, refining, pipelines, patience, fault })
     }
 
     /// The same device, which may take so long before it counts as hung.
@@ -181,9 +183,11 @@ impl Device {
     /// # Errors
     /// The device refused something of it.
     pub fn attempt<T>(&self, work: impl FnOnce() -> T) -> Result<T, GpuError> {
-        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let done = work();
-        match pollster::block_on(scope.pop()) {
+        let errors = [validation, memory].map(|scope| pollster::block_on(scope.pop()));
+        match errors.into_iter().flatten().next() {
             Some(error) => Err(GpuError::Failed(format!("{}: {error}", self.name))),
             None => Ok(done),
         }

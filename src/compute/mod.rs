@@ -14,7 +14,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use crate::names::named;
 
 #[cfg(feature = "gpu")]
-pub use device::DevicePicture;
+pub use device::{Device, DevicePicture};
+
+/// A GPU, of which this build has none.
+#[cfg(not(feature = "gpu"))]
+#[derive(Debug)]
+pub enum Device {}
 
 /// A picture in a GPU's memory, of which this build has none.
 #[cfg(not(feature = "gpu"))]

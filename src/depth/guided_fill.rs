@@ -9,13 +9,13 @@ use std::ops::Range;
 use crate::frame::{ColorImage, DepthMap};
 
 /// Depths within this ratio are one surface: nothing to decide.
-const SAME_SURFACE: f32 = 1.15;
+pub const SAME_SURFACE: f32 = 1.15;
 /// Known pixels beside a hole whose mean colour stands for that side.
-const SAMPLE_PX: usize = 4;
+pub const SAMPLE_PX: usize = 4;
 /// A pixel is the near side's if it is this much closer to its colour than to the far side's.
-const PREFERENCE: f32 = 1.3;
+pub const PREFERENCE: f32 = 1.3;
 /// How fast the near side's colour follows the pixels it takes.
-const FOLLOW: f32 = 0.2;
+pub const FOLLOW: f32 = 0.2;
 /// A sensor's shadow is at most this share of the picture's width.
 const LONGEST: f32 = 0.12;
 
@@ -87,7 +87,7 @@ impl GuidedHoleFill {
         self.claims_m.resize(width * height, 0.0);
         self.is_hole.resize(width * height, false);
         holes.iter().for_each(|hole| self.is_hole[hole.of_row(width)].fill(true));
-        let longest = ((width as f32 * LONGEST) as usize).max(4);
+        let longest = longest(width);
         for &hole in holes {
             let line = Line { first: hole.line as usize * width, step: 1, length: width };
             let claimed = claim_run(line, hole.range(), longest, &map.metres, &color.rgb, &mut self.claims_m);
@@ -143,6 +143,11 @@ impl GuidedHoleFill {
             }
         }
     }
+}
+
+/// The longest hole that may be the near side's, in pixels of a picture of so many columns.
+pub fn longest(width: usize) -> usize {
+    ((width as f32 * LONGEST) as usize).max(4)
 }
 
 /// Pixels that are looked at at once.

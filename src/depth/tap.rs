@@ -14,6 +14,12 @@ impl Tap {
         Self::at((at as f32 + 0.5) * from as f32 / to as f32 - 0.5, from)
     }
 
+    /// The sample that is nearer.
+    #[cfg(feature = "gpu")]
+    pub fn nearest(self) -> usize {
+        if self.share >= 0.5 { self.second } else { self.first }
+    }
+
     /// The samples around a place among `count`; beyond the outermost it is as there.
     #[inline(always)]
     pub fn at(place: f32, count: usize) -> Self {

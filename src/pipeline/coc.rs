@@ -1,5 +1,8 @@
 //! From a frame's depth to its circle of confusion (CoC): the one step that every blur by depth goes through.
 
+use std::sync::Arc;
+
+use crate::compute::Device;
 use crate::compute::thread_pool::ThreadPool;
 use crate::depth::background::Background;
 use crate::depth::fill::Filler;
@@ -34,6 +37,8 @@ pub struct CocMaker {
     focus: Focus,
     finisher: Finisher,
     mending: Mending,
+    /// Where depth is refined, if not on the processor.
+    device: Option<Arc<Device>>,
     matting: Matting,
     background: Option<Background>,
     workers: ThreadPool,
@@ -46,11 +51,11 @@ enum Finisher {
 }
 
 impl Finisher {
-    fn new(finish: Finish, mending: Mending) -> Self {
+    fn new(finish: Finish, mending: Mending, device: Option<&Arc<Device>>) -> Self {
         match finish {
             Finish::Keep => Self::Keep,
             Finish::Fill => Self::Fill(Box::default()),
-            Finish::Refine => Self::Refine(Box::new(Refiner::mending(mending))),
+            Finish::Refine => Self::Refine(Box::new(Refiner::mending(mending).on(device))),
         }
     }
 
@@ -74,8 +79,17 @@ impl CocMaker {
     /// Nothing was seen yet. It works on the caller's thread.
     pub fn new(rule: CocRule, finish: Finish) -> Self {
         let (focus, mending) = (Focus::new(focus_of(rule)), Mending::default());
-        let (finisher, matting) = (Finisher::new(finish, mending), Matting::default());
-        Self { rule, focus, finisher, mending, matting, background: None, workers: ThreadPool::new("depth", 1) }
+        let (finisher, matting) = (Finisher::new(finish, mending, None), Matting::default());
+        Self {
+            rule,
+            focus,
+            finisher,
+            mending,
+            device: None,
+            matting,
+            background: None,
+            workers: ThreadPool::new("depth", 1),
+        }
     }
 
     /// The same on so many threads, the caller's included: what is made is the same to the bit.
@@ -83,13 +97,37 @@ impl CocMaker {
         Self { workers: ThreadPool::new("depth", threads), ..self }
     }
 
+    /// Refines on a device from now on; nothing changes where that is `None`, or the one that does so already.
+    pub fn refine_on(&mut self, device: Option<Arc<Device>>) {
+        let is_other = |device: &Arc<Device>| !self.device.as_ref().is_some_and(|own| Arc::ptr_eq(own, device));
+        if let Some(device) = device.filter(is_other) {
+            self.device = Some(device);
+            if matches!(self.finisher, Finisher::Refine(_)) {
+                self.renew(Finish::Refine);
+            }
+        }
+    }
+
+    /// What refined, for the report; `None` where nothing is refined.
+    pub fn refined_by(&self) -> Option<&'static str> {
+        match (&self.finisher, self.rule) {
+            (Finisher::Refine(refiner), CocRule::Depth { .. }) => Some(refiner.backends()),
+            _ => None,
+        }
+    }
+
+    /// Finishes maps with no memory of those before.
+    fn renew(&mut self, finish: Finish) {
+        let uses_depth = matches!(self.rule, CocRule::Depth { .. });
+        self.finisher = Finisher::new(finish, self.mending, self.device.as_ref().filter(|_| uses_depth));
+    }
+
     /// Mends every map from now on, where it is refined; whether it is.
     pub fn mend(&mut self, mending: Mending) -> bool {
         let refines = matches!(self.finisher, Finisher::Refine(_));
-        if self.mending != mending && refines {
-            self.finisher = Finisher::new(Finish::Refine, mending);
+        if std::mem::replace(&mut self.mending, mending) != mending && refines {
+            self.renew(Finish::Refine);
         }
-        self.mending = mending;
         refines
     }
 
@@ -103,25 +141,28 @@ impl CocMaker {
     /// Another scene comes: nothing is left of those before.
     pub fn forget(&mut self) {
         self.focus = Focus::new(focus_of(self.rule));
-        self.finisher = Finisher::new(self.finisher.finish(), self.mending);
+        match &mut self.finisher {
+            Finisher::Keep => {}
+            Finisher::Fill(filler) => **filler = Filler::new(),
+            Finisher::Refine(refiner) => refiner.forget(),
+        }
         self.background = self.background.take().map(|_| Background::default());
     }
 
     /// Follows another rule, from where the lens stands now.
     pub fn follow(&mut self, rule: CocRule, finish: Finish) {
-        match (self.rule, rule) {
+        match (std::mem::replace(&mut self.rule, rule), rule) {
             (CocRule::Depth { .. }, CocRule::Depth { focus, .. }) => {
                 self.focus.follow(focus);
                 if self.finisher.finish() != finish {
-                    self.finisher = Finisher::new(finish, self.mending);
+                    self.renew(finish);
                 }
             }
             _ => {
                 self.focus = Focus::new(focus_of(rule));
-                self.finisher = Finisher::new(finish, self.mending);
+                self.renew(finish);
             }
         }
-        self.rule = rule;
     }
 
     /// The CoC of every frame, where that needs no depth.

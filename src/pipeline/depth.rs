@@ -16,7 +16,6 @@ use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Received, Receiver, Sender};
-use crate::look::Look;
 use crate::optics::CocField;
 use crate::stats::{Cause, Histogram, Tally};
 
@@ -37,13 +36,6 @@ pub(super) struct Ready {
 }
 
 pub(super) struct Stage<'a> {
-    pub look: Look,
-    /// Columns and rows of the pictures.
-    pub size: (u32, u32),
-    /// Whether depth was measured, so that refining it makes it better.
-    pub measured: bool,
-    /// Threads that finish depth, this stage's included.
-    pub threads: usize,
     /// Whether executors are made for every quality.
     pub adaptive: bool,
     pub changes: Option<mpsc::Receiver<Change>>,
@@ -62,13 +54,18 @@ pub(super) struct Stage<'a> {
     pub wanted: Option<Arc<Wanted>>,
     /// Counts frames that took over the depth of the one before.
     pub held: &'a mut u64,
+    /// Told what refines ([`Preparation::refined_by`]).
+    pub refined_by: &'a mut Option<&'static str>,
 }
 
 impl Stage<'_> {
     /// Runs until the frames end or nobody takes the results. Changes of the blur take effect between frames.
-    pub(super) fn run(mut self, mut from: Receiver<Frame<Shot>>, mut to: Sender<Frame<Ready>>) -> Ended {
-        let mut preparation =
-            Preparation::new(&self.look, self.size, self.measured, self.knows_background(), self.threads);
+    pub(super) fn run(
+        mut self,
+        mut preparation: Preparation,
+        mut from: Receiver<Frame<Shot>>,
+        mut to: Sender<Frame<Ready>>,
+    ) -> Ended {
         let mut complained = false;
         let mut swap: Option<Arc<Swap>> = None;
         let (mut change, mut between) = (0, false);
@@ -90,6 +87,7 @@ impl Stage<'_> {
                 (change, between) = (number, matches!(bokeh, Executor::Meanwhile));
                 self.rate.iter_mut().for_each(Rate::forget);
                 if let Executor::To(executor) = bokeh {
+                    preparation.beside(executor.as_deref());
                     let number = swap.map_or(1, |last| last.number + 1);
                     swap = Some(Arc::new(Swap::new(number, executor, look.quality_rule(self.adaptive))));
                 }
@@ -129,6 +127,7 @@ impl Stage<'_> {
                     continue;
                 }
             };
+            *self.refined_by = preparation.refined_by().or(*self.refined_by);
             (trace.change, trace.between) = (change, between);
             let taken = depth.as_deref().zip(self.taken.filter(|_| preparation.replaces(&coc))).map(|(map, pool)| {
                 let mut taken = pool.take();

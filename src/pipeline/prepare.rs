@@ -4,6 +4,7 @@
 use super::coc::{CocMaker, Finish};
 use super::fit_check::{FitCheck, Verdict};
 use super::staging::Staging;
+use crate::bokeh::Bokeh;
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
 use crate::look::{BackgroundMemory, Look};
@@ -35,6 +36,16 @@ impl Preparation {
         self.coc.follow(look.coc_rule(self.size), Finish::measured(look.refines(self.measured)));
         self.coc.remember(remembers(look, knows_background));
         self.staging.follow(look);
+    }
+
+    /// Refines depth where the blur runs ([`CocMaker::refine_on`]).
+    pub fn beside(&mut self, bokeh: Option<&dyn Bokeh>) {
+        self.coc.refine_on(bokeh.and_then(Bokeh::device));
+    }
+
+    /// What refined ([`CocMaker::refined_by`]).
+    pub fn refined_by(&self) -> Option<&'static str> {
+        self.coc.refined_by()
     }
 
     /// Another scene comes: nothing is left of those before.

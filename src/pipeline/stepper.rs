@@ -55,10 +55,12 @@ impl Stepper {
         let made_for = look.settings(size, adaptive);
         let executor = made_for.as_ref().map(|settings| executors.blur(settings, size)).transpose()?;
         let finest = finest_quality(executor.as_deref());
+        let mut preparation = Preparation::new(look, size, measured, false, threads);
+        preparation.beside(executor.as_deref());
         Ok(Self {
             size,
             adaptive,
-            preparation: Preparation::new(look, size, measured, false, threads),
+            preparation,
             executors,
             executor,
             made_for,
@@ -87,6 +89,7 @@ impl Stepper {
             self.picker = self.picker.with(look.quality_rule(self.adaptive), finest_quality(self.executor.as_deref()));
         }
         self.preparation.follow(look, false);
+        self.preparation.beside(self.executor.as_deref());
         Ok(())
     }
 

@@ -14,6 +14,8 @@ pub struct About {
     pub backend: String,
     /// What executed the blur.
     pub adapter: String,
+    /// What refined their depth, as `backend`.
+    pub refined_by: String,
     /// Where the frames came from.
     pub source: String,
     /// Where they went.
@@ -53,6 +55,8 @@ pub struct Report {
     pub backend: String,
     /// What executed the blur.
     pub adapter: String,
+    /// What refined the depth: `cpu`, `gpu`, `gpu, then cpu` or `none`.
+    pub refined_by: String,
     /// Where the frames came from.
     pub source: String,
     /// Where they went.
@@ -175,6 +179,7 @@ impl Report {
             repeats: timings.repeats,
             backend: about.backend,
             adapter: about.adapter,
+            refined_by: about.refined_by,
             source: about.source,
             sink: about.sink,
             elapsed_s: ms(about.elapsed_ns) / 1000.0,
@@ -306,7 +311,7 @@ mod tests {
             (&json["budget_ms"], &json["elapsed_s"], &json["cpu_s"]),
             (&33.333.into(), &0.5.into(), &0.25.into())
         );
-        for key in ["misses", "backend", "adapter", "source", "sink", "versions"] {
+        for key in ["misses", "backend", "adapter", "refined_by", "source", "sink", "versions"] {
             assert!(!json[key].is_null(), "{key}");
         }
     }

@@ -230,6 +230,10 @@ impl Bokeh for GpuBokeh {
         Backend::Gpu
     }
 
+    fn device(&self) -> Option<Arc<Device>> {
+        Some(Arc::clone(&self.device))
+    }
+
     fn describe(&self) -> String {
         self.device.name.clone()
     }

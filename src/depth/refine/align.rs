@@ -22,12 +22,14 @@ use crate::compute::bands::{self, Bands};
 use crate::compute::thread_pool::ThreadPool;
 
 /// How far from a jump a depth may be wrong, in pixels.
-const BAND_PX: usize = 4;
+pub const BAND_PX: usize = 4;
 /// Weight of a depth that may be wrong itself, and of one that nobody measured.
-const UNSURE: f32 = 0.12;
-const MADE_UP: f32 = 0.02;
+pub const UNSURE: f32 = 0.12;
+pub const MADE_UP: f32 = 0.02;
+/// Neighbours on the two sides of a jump differ by at least this share of one: an edge may be spread over some pixels.
+pub const EDGE_SHARE: f32 = 0.25;
 /// Rounds; each can move an edge by up to [`BAND_PX`].
-const ROUNDS: usize = 2;
+pub const ROUNDS: usize = 2;
 /// Fewer pixels are not worth another thread.
 const LEAST_ASKED: usize = 64;
 
@@ -317,11 +319,10 @@ fn or_assign(to: &mut [bool], from: &[bool]) {
     }
 }
 
-/// Whether two neighbours lie on the two sides of a jump, or share a quarter of one: an edge may be spread over some
-/// pixels.
+/// Whether two neighbours lie on the two sides of a jump, or share enough of one.
 #[inline(always)]
 fn is_jump(here: f32, beside: f32, jump: f32) -> bool {
-    (here - beside).abs() > 0.25 * jump_at(jump, here)
+    (here - beside).abs() > EDGE_SHARE * jump_at(jump, here)
 }
 
 /// Asks pixels for their surface.

@@ -7,6 +7,9 @@
 //! *Accuracy and resolution of Kinect depth data*, 2012).
 
 mod align;
+#[cfg(feature = "gpu")]
+#[doc(hidden)]
+pub mod gpu;
 mod outlines;
 mod planes;
 mod smooth;
@@ -14,6 +17,8 @@ mod temporal;
 mod tiles;
 mod upsample;
 mod votes;
+
+use std::sync::Arc;
 
 use pulp::Arch;
 
@@ -24,6 +29,7 @@ use self::smooth::{Smoother, over};
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
+use crate::compute::Device;
 use crate::compute::thread_pool::ThreadPool;
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
@@ -74,6 +80,12 @@ pub struct Refiner {
     /// The picture, reduced.
     reduced: ColorImage,
     fit: Fit,
+    /// Refines in the processor's place, as long as the device does not fail.
+    #[cfg(feature = "gpu")]
+    gpu: Option<gpu::GpuRefiner>,
+    /// Whether the device did.
+    #[cfg(feature = "gpu")]
+    has_failed: bool,
 }
 
 /// The distance in focus, in metres. Inverse depth is this over the depth, so that equal steps of it blur equally.
@@ -98,6 +110,42 @@ impl Refiner {
         Self { mending: Mending { coarsest, ..mending }, ..Self::default() }
     }
 
+    /// The same on a device, where there is one that refines as the processor does, and maps need no mending. When it fails, the
+    /// processor goes on, from the frame on with which it does.
+    #[must_use]
+    pub fn on(self, device: Option<&Arc<Device>>) -> Self {
+        #[cfg(feature = "gpu")]
+        {
+            let device = device.filter(|_| self.mending == Mending::default());
+            Self { gpu: device.and_then(gpu::GpuRefiner::tried), ..self }
+        }
+        #[cfg(not(feature = "gpu"))]
+        {
+            let _ = device;
+            self
+        }
+    }
+
+    /// What refined, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
+    pub fn backends(&self) -> &'static str {
+        #[cfg(feature = "gpu")]
+        match (&self.gpu, self.has_failed) {
+            (Some(_), _) => return "gpu",
+            (None, true) => return "gpu, then cpu",
+            (None, false) => {}
+        }
+        "cpu"
+    }
+
+    /// Another scene comes: nothing is left of the frames before.
+    pub fn forget(&mut self) {
+        self.filler = Filler::new();
+        self.temporal.forget();
+        self.focus = Focus::default();
+        #[cfg(feature = "gpu")]
+        self.gpu.iter_mut().for_each(gpu::GpuRefiner::forget);
+    }
+
     /// What is in focus from the next frame on, in metres: for a street, a step of depth counts less than for a desk. A
     /// metre before the first call.
     pub fn set_focus(&mut self, focus_m: f32) {
@@ -117,6 +165,14 @@ impl Refiner {
 
     /// The same on several threads: the map is the same to the bit for any number of them.
     pub fn refine_on(&mut self, workers: &mut ThreadPool, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &mut self.gpu {
+            match gpu.refine(map, color, time_ns, self.focus.0) {
+                Ok(()) => return,
+                Err(error) => tracing::warn!("{error}; the CPU refines from here on"),
+            }
+            (self.gpu, self.has_failed) = (None, true);
+        }
         let Mending { mut distance_px, coarsest: mut scale } = self.mending;
         while scale > 1 {
             let size = |side: u32| side.div_ceil(scale);

@@ -13,19 +13,19 @@ use crate::compute::thread_pool::ThreadPool;
 
 /// Distances in pixels of the pairs that are averaged: sparse, because the noise of depth sensors is correlated over
 /// some pixels. A denser set of the same reach gains nothing.
-const PAIRS_PX: [usize; 4] = [2, 4, 6, 8];
+pub const PAIRS_PX: [usize; 4] = [2, 4, 6, 8];
 /// Depths within this many standard deviations belong to one surface.
-const SAME_SURFACE: f32 = 3.5;
+pub const SAME_SURFACE: f32 = 3.5;
 /// Distance in pixels between the three depths that tell noise from slope, above the length over which it correlates.
-const LAG_PX: usize = 6;
+pub const LAG_PX: usize = 6;
 /// Rows and columns sampled for the noise, at most.
-const LOOKS: usize = 96;
+pub const LOOKS: usize = 96;
 /// Share of the differences that lie on smooth surfaces, whatever else the picture holds, and the quantile of `|x|`
 /// there of a normal distribution in standard deviations.
-const SMOOTH_SHARE: f32 = 0.35;
-const SMOOTH_QUANTILE: f32 = 0.4538;
+pub const SMOOTH_SHARE: f32 = 0.35;
+pub const SMOOTH_QUANTILE: f32 = 0.4538;
 /// Noise below this is none: it is 1/20 px of CoC with a strong blur.
-const NO_NOISE: f32 = 5e-4;
+pub const NO_NOISE: f32 = 5e-4;
 
 /// Reduces the noise of maps of inverse depth; owns the memory for it.
 #[derive(Debug, Default)]

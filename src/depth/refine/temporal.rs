@@ -14,18 +14,23 @@ use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
 
 /// Frames that the average spans, at most: the variance of still noise falls to 1/15.
-const LONGEST: f32 = 8.0;
+pub const LONGEST: f32 = 8.0;
 /// Frames for which a jump under resting colours is held back: a tenth of a second at 30 per second.
-const HOLD: u8 = 2;
+pub const HOLD: u8 = 2;
 /// A pixel rests up to a change of colour (of red, green and blue together, in steps of 8-bit sRGB, averaged over 3x3
 /// pixels) of this many times the median change, which is mostly camera noise, within these bounds; at twice that it
 /// has moved.
-const MOVED: f32 = 2.5;
-const MOVED_BOUNDS: (f32, f32) = (8.0, 24.0);
+pub const MOVED: f32 = 2.5;
+pub const MOVED_BOUNDS: (f32, f32) = (8.0, 24.0);
 /// Frames further apart than this in media time, or not in order, do not follow each other.
 const LONGEST_GAP_NS: u64 = 500_000_000;
 /// Rows and columns sampled for the median change, at most.
-const LOOKS: usize = 64;
+pub const LOOKS: usize = 64;
+
+/// Whether a frame follows the one before, by their media times.
+pub fn follows(before_ns: u64, time_ns: u64) -> bool {
+    (before_ns..=before_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns)
+}
 
 /// What a change of inverse depth means.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +90,7 @@ impl TemporalFilter {
         (metres, focus_m): (&mut [f32], f32),
     ) {
         let same_size = self.mean.len() == inverse.len() && self.width == width && self.rgb.len() == rgb.len();
-        let in_order = (self.time_ns..=self.time_ns.saturating_add(LONGEST_GAP_NS)).contains(&time_ns);
+        let in_order = follows(self.time_ns, time_ns);
         let bands = Bands::new(inverse.len() / width, 1, workers);
         if same_size && in_order {
             self.change.resize(inverse.len(), 0);

@@ -8,7 +8,7 @@ use crate::depth::tap::Tap;
 use crate::frame::DepthMap;
 
 /// Neighbours whose inverse depths differ by less than this share of the larger are one surface.
-const SAME_SURFACE: f32 = 0.05;
+pub const SAME_SURFACE: f32 = 0.05;
 
 /// Resamples depth maps; owns the memory for it.
 #[derive(Debug, Default)]

@@ -14,13 +14,17 @@ const ROWS: usize = 2 * REACH_PX / ROW_STEP_PX + 1;
 const NEARBY_PX: f32 = 8.0;
 /// Standard deviation, in steps of 8-bit sRGB, of the weight by colour.
 const ALIKE: f32 = 12.0;
+/// A quarter of the `t` of that weight, exp(-t), of a difference of 1.
+pub const QUARTER_T: f32 = 1.0 / (8.0 * ALIKE * ALIKE);
+/// The share of an inverse depth that is a jump at least.
+pub const JUMP_SHARE: f32 = 0.05;
 /// Weight of a vote whose colour is altogether different: decides where no colour is alike.
-const UNLIKE: f32 = 0.003;
+pub const UNLIKE: f32 = 0.003;
 /// The votes of the other side must outweigh those of the pixel's present side this many times.
-const LOYALTY: f32 = 1.15;
+pub const LOYALTY: f32 = 1.15;
 /// Added to [`LOYALTY`] where all votes have the pixel's colour: colour does not tell the sides apart then, and the
 /// mere majority would round corners off.
-const LOYALTY_WITHOUT_CONTRAST: f32 = 6.0;
+pub const LOYALTY_WITHOUT_CONTRAST: f32 = 6.0;
 /// Lanes (columns of the pixel's parity) from the start of a window to its own pixel.
 pub const REACH_LANES: usize = REACH_PX / STEP_PX;
 
@@ -40,10 +44,10 @@ pub fn weights_by_distance() -> Weights {
     std::array::from_fn(row)
 }
 
-/// The step of inverse depth that is an edge near the inverse depth `v`: `jump`, but at least a twentieth of `v`.
+/// The step of inverse depth that is an edge near the inverse depth `v`: `jump`, but at least [`JUMP_SHARE`] of `v`.
 #[inline(always)]
 pub fn jump_at(jump: f32, v: f32) -> f32 {
-    let relative = 0.05 * v;
+    let relative = JUMP_SHARE * v;
     if relative > jump { relative } else { jump }
 }
 
@@ -64,7 +68,6 @@ impl Votes {
     #[inline(always)]
     pub fn gather(&mut self, planes: &Planes, nearby: &Weights, x: usize, y: usize) {
         // exp(-t) with t = apart / (2 ALIKE^2) is computed as (1 - t/4)^4, cut where that would rise again.
-        const QUARTER_T: f32 = 1.0 / (8.0 * ALIKE * ALIKE);
         let center = planes.color(x, y);
         let (mut low, mut high) = ([f32::MAX; LANES], [0.0_f32; LANES]);
         let (mut total, mut alike_total) = ([0.0_f32; LANES], [0.0_f32; LANES]);

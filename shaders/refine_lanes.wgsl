@@ -1,0 +1,25 @@
+// Shared by the pass whose threads do a pixel together, `LANES` each: sums and ends of what they have.
+
+const LANES = 16u;
+
+// What each thread adds up for its pixel, and its least and largest depths.
+var<workgroup> sums: array<vec4<f32>, PIXELS * LANES>;
+var<workgroup> ends: array<vec2<f32>, PIXELS * LANES>;
+
+// Halves added to halves, as vector code on the processor does it.
+fn sum_of(first: u32) -> vec4<f32> {
+    var four: array<vec4<f32>, 4>;
+    for (var n = 0u; n < 4u; n++) {
+        four[n] = (sums[first + n] + sums[first + n + 8u]) + (sums[first + n + 4u] + sums[first + n + 12u]);
+    }
+    return (four[0] + four[2]) + (four[1] + four[3]);
+}
+
+fn ends_of(first: u32) -> vec2<f32> {
+    var both = ends[first];
+    for (var n = 1u; n < LANES; n++) {
+        let other = ends[first + n];
+        both = vec2(min(both.x, other.x), max(both.y, other.y));
+    }
+    return both;
+}

@@ -1,0 +1,78 @@
+// Pass refine_steady: what is left between two surfaces takes the one whose colour is more like its own; then the temporal
+// filter moves the mean of each pixel towards its inverse depth, and gives it out in metres.
+
+struct Remembered {
+    mean: f32,      // inverse depth as it was given out
+    count: f32,     // frames in it
+    held: u32,      // frames for which a jump was held back
+}
+
+@group(0) @binding(1) var<storage, read> measures: array<f32>;
+@group(0) @binding(2) var<storage, read> flags: array<u32>;
+@group(0) @binding(3) var<storage, read> inverse: array<f32>;
+@group(0) @binding(4) var<storage, read> colors: array<u32>;
+@group(0) @binding(5) var<storage, read> change: array<u32>;
+@group(0) @binding(6) var<storage, read_write> memory: array<Remembered>;
+@group(0) @binding(7) var<storage, read_write> before: array<u32>;
+@group(0) @binding(8) var<storage, read_write> metres: array<f32>;
+
+// Whether a depth lies between those at both ends of a pair.
+fn is_between(here: f32, a: u32, b: u32) -> bool {
+    let low = min(inverse[a], inverse[b]);
+    let high = max(inverse[a], inverse[b]);
+    let jump = measures[STEP];
+    return here - low > jump_at(jump, here) && high - here > jump_at(jump, high);
+}
+
+// The depth of a pixel that was asked. Its neighbours are as the votes have left them, whatever they decide.
+fn decided(pixel: vec2<u32>, k: u32) -> f32 {
+    let here = inverse[k];
+    for (var n = 0u; n < 2u; n++) {
+        let axis = 1u - n;
+        let step = select(1u, frame.size.x, axis == 1u);
+        if pixel[axis] > 0u && pixel[axis] + 1u < frame.size[axis] && is_between(here, k - step, k + step) {
+            let own = color_of(colors[k]);
+            let a = color_of(colors[k - step]) - own;
+            let b = color_of(colors[k + step]) - own;
+            return inverse[select(k + step, k - step, dot(a, a) <= dot(b, b))];
+        }
+    }
+    return here;
+}
+
+fn steadied(now: f32, old: Remembered, changed: f32) -> Remembered {
+    // From 1 up to the bound to 0 at twice the bound: the weight of the past.
+    let rest = saturate(2.0 - changed / 9.0 / measures[CHANGED]);
+    let step = now - old.mean;
+    let noise_share = saturate(abs(step) / measures[STILL]);
+    if abs(step) > 2.0 * measures[STEP] && rest >= 1.0 && old.held < HOLD {
+        return Remembered(old.mean, old.count, old.held + 1u);
+    }
+    let frames = old.count * rest;
+    // The nearer to the limit, the less it is noise: the share of the new depth grows to 1 there, smoothly.
+    let squared = noise_share * noise_share;
+    let share = 1.0 / (frames + 1.0);
+    let count = select(min(frames + 1.0, LONGEST), 1.0, noise_share >= 1.0);
+    return Remembered(old.mean + (share + (1.0 - share) * squared * squared) * step, count, 0u);
+}
+
+@compute @workgroup_size(64, 4)
+fn refine_steady(@builtin(global_invocation_id) id: vec3<u32>) {
+    if any(id.xy >= frame.size) {
+        return;
+    }
+    let k = id.y * frame.size.x + id.x;
+    var now = inverse[k];
+    if (flags[k] & ASKED) != 0u {
+        now = decided(id.xy, k);
+    }
+    var next = Remembered(now, 1.0, 0u);
+    if frame.fresh == 0u {
+        var old = memory[k];
+        old.mean *= frame.times;
+        next = steadied(now, old, f32(change[k]));
+    }
+    memory[k] = next;
+    before[k] = colors[k];
+    metres[k] = frame.focus_m / next.mean;
+}

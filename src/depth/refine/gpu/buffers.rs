@@ -1,0 +1,134 @@
+//! The memory for pictures of one size.
+
+use super::super::align::ROUNDS;
+use super::super::votes;
+use super::shaders::{ASKED, COUNTS, Frame, MEASURES, SAMPLES, WAVES, Wave};
+use crate::compute::GpuError;
+use crate::compute::device::Device;
+
+/// The distance of one uniform from the next, as devices may ask for.
+const UNIFORM_STRIDE: u64 = 256;
+
+/// Buffers for a picture; some serve one pass after the other, which says what is in them then.
+pub struct Buffers {
+    pub frame: wgpu::Buffer,
+    waves: wgpu::Buffer,
+    /// The map as it came; grows to the largest that did.
+    pub map: wgpu::Buffer,
+    /// Where each pixel's samples are in it.
+    pub taps: wgpu::Buffer,
+    pub rgb: wgpu::Buffer,
+    /// The picture, and the one before.
+    pub colors: wgpu::Buffer,
+    pub before: wgpu::Buffer,
+    pub flags: wgpu::Buffer,
+    /// The map without holes, kept for a frame of which nothing is known.
+    pub filled: wgpu::Buffer,
+    /// What is beside holes; then the map smoothed along rows; then the pixels to ask in the second round; then the change of
+    /// colours.
+    pub lent: wgpu::Buffer,
+    /// What is claimed along rows; then inverse depth.
+    pub inverse: wgpu::Buffer,
+    /// What is claimed along columns; then the pixels to ask in the first round.
+    pub front: wgpu::Buffer,
+    pub votes: wgpu::Buffer,
+    pub nearby: wgpu::Buffer,
+    pub counts: wgpu::Buffer,
+    pub measures: wgpu::Buffer,
+    pub samples: wgpu::Buffer,
+    /// What is remembered of earlier frames.
+    pub memory: wgpu::Buffer,
+    pub refined: wgpu::Buffer,
+    /// A copy of the refined map that the CPU can map.
+    pub readback: wgpu::Buffer,
+}
+
+impl Buffers {
+    /// For pictures of `size` pixels.
+    ///
+    /// # Errors
+    /// The device has no room for that.
+    pub fn new(device: &Device, size: (u32, u32)) -> Result<Self, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        let (width, height) = (size.0 as usize, size.1 as usize);
+        let pixels = width * height;
+        // What is remembered is the largest: three numbers a pixel.
+        has_room(device, size, pixels as u64 * 12)?;
+        let buffer = |label, bytes: usize, usage| {
+            device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                // A binding must not be empty.
+                size: bytes.max(16).next_multiple_of(4) as u64,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let words = |label, count: usize| buffer(label, 4 * count, Usage::STORAGE | Usage::COPY_DST);
+        let buffers = device.attempt(|| Self {
+            frame: buffer("refined frame", size_of::<Frame>(), Usage::UNIFORM | Usage::COPY_DST),
+            waves: buffer("waves", ROUNDS * (WAVES + 1) * UNIFORM_STRIDE as usize, Usage::UNIFORM | Usage::COPY_DST),
+            map: Self::map(device, pixels),
+            taps: words("taps", 2 * (width + height)),
+            rgb: words("rgb", (3 * pixels).div_ceil(4)),
+            colors: words("colors", pixels),
+            before: words("colors before", pixels),
+            flags: words("flags", pixels),
+            filled: words("filled", pixels),
+            lent: words("lent", pixels),
+            inverse: words("inverse", pixels),
+            front: words("front", pixels),
+            votes: words("votes", 2 * pixels),
+            nearby: words("nearby", size_of::<votes::Weights>() / 4),
+            counts: words("counts", COUNTS),
+            measures: words("measures", MEASURES),
+            samples: words("samples", SAMPLES),
+            memory: words("memory", 3 * pixels),
+            refined: buffer("refined", 4 * pixels, Usage::STORAGE | Usage::COPY_SRC),
+            readback: buffer("refined back", 4 * pixels, Usage::MAP_READ | Usage::COPY_DST),
+        })?;
+        device.upload(&buffers.nearby, 0, bytemuck::cast_slice(votes::weights_by_distance().as_flattened()));
+        for round in 0..ROUNDS {
+            for wave in 0..=WAVES {
+                let first = (1 + round * (WAVES + 2)) as u32;
+                let marks = if round == 0 { ASKED } else { 0 };
+                let uniform = Wave { first, at: first + wave as u32, marks };
+                device.upload(&buffers.waves, wave_at(round, wave), bytemuck::bytes_of(&uniform));
+            }
+        }
+        Ok(buffers)
+    }
+
+    /// A buffer for a map of so many samples, in metres.
+    pub fn map(device: &Device, samples: usize) -> wgpu::Buffer {
+        device.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("measured"),
+            size: 4 * samples.max(4) as u64,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// The uniform of a wave.
+    pub fn wave(&self, round: usize, wave: usize) -> wgpu::BufferBinding<'_> {
+        let size = wgpu::BufferSize::new(size_of::<Wave>() as u64);
+        wgpu::BufferBinding { buffer: &self.waves, offset: wave_at(round, wave), size }
+    }
+}
+
+fn wave_at(round: usize, wave: usize) -> u64 {
+    (round * (WAVES + 1) + wave) as u64 * UNIFORM_STRIDE
+}
+
+/// Refuses sizes whose largest buffer, or whose number of workgroups, exceeds the limits of the device.
+pub fn has_room(device: &Device, (width, height): (u32, u32), bytes: u64) -> Result<(), GpuError> {
+    let limits = device.device.limits();
+    let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let longest = limits.max_compute_workgroups_per_dimension;
+    if bytes > most || width.max(height) > longest {
+        let name = &device.name;
+        return Err(GpuError::Failed(format!(
+            "{name}: pictures of {width} x {height} are too large to be refined there"
+        )));
+    }
+    Ok(())
+}

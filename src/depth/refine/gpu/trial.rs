@@ -1,0 +1,74 @@
+//! Whether a device refines as the processor does: drivers have faults, and none is to be found out by whoever is looked at.
+
+use std::sync::Arc;
+
+use super::super::Refiner;
+use super::GpuRefiner;
+use crate::compute::GpuError;
+use crate::compute::device::Device;
+use crate::frame::{ColorImage, DepthMap};
+
+const SIZE: (u32, u32) = (96, 64);
+const MAP_SIZE: (u32, u32) = (60, 40);
+const FRAMES: u32 = 3;
+const FRAME_NS: u64 = 33_000_000;
+/// A depth that differs by a larger share is wrong; one in a hundred may be, as roundings fall either way.
+const SHARE: f32 = 1e-3;
+const DEPTHS: usize = (SIZE.0 * SIZE.1 * FRAMES) as usize;
+
+/// Whether the device is sound: refines a few small frames there and on the processor, once for each device, and says what is
+/// wrong. A device that has failed is not; who had it has said so.
+pub fn is_passed(device: &Arc<Device>) -> bool {
+    device.check().is_ok() && *device.refining.get_or_init(|| try_out(device))
+}
+
+fn try_out(device: &Arc<Device>) -> bool {
+    match differing(device) {
+        Ok(wrong) if wrong <= DEPTHS / 100 => return true,
+        Ok(wrong) => tracing::warn!(
+            "GPU: {}: {wrong} of the {DEPTHS} depths of a trial are wrong: its driver may have a fault; the CPU refines",
+            device.name
+        ),
+        Err(error) => tracing::warn!("{error}; the CPU refines"),
+    }
+    false
+}
+
+/// How many depths differ.
+fn differing(device: &Arc<Device>) -> Result<usize, GpuError> {
+    let (mut cpu, mut gpu) = (Refiner::new(), GpuRefiner::new(device));
+    let mut wrong = 0;
+    for frame in 0..FRAMES {
+        let (color, map) = scene(frame);
+        let (mut expected, mut made) = (map.clone(), map);
+        let time_ns = u64::from(frame) * FRAME_NS;
+        cpu.refine(&mut expected, &color, time_ns);
+        gpu.refine(&mut made, &color, time_ns, 1.0)?;
+        // What is no number is not the same.
+        let is_same = |(a, b): &(&f32, &f32)| (*a - *b).abs() <= SHARE * *b;
+        wrong += expected.metres.len() - made.metres.iter().zip(&expected.metres).filter(is_same).count();
+    }
+    Ok(wrong)
+}
+
+/// Somebody before a wall, with noise and a shadow, whose outline in the map is off.
+fn scene(frame: u32) -> (ColorImage, DepthMap) {
+    let chance = |k: usize| ((k as u32 ^ (frame << 20)).wrapping_mul(0x9e37_79b1) >> 24) as u8;
+    let is_near = |x: u32, y: u32, (width, height): (u32, u32), wider: u32| {
+        (width / 3 - wider..width * 2 / 3 + wider).contains(&(x + frame)) && y > height / 3
+    };
+    let mut color = ColorImage::new(SIZE.0, SIZE.1);
+    for (k, pixel) in color.rgb.chunks_exact_mut(3).enumerate() {
+        let (x, y) = (k as u32 % SIZE.0, k as u32 / SIZE.0);
+        let base = if is_near(x, y, SIZE, 0) { [50, 40, 30] } else { [180, 190, 200] };
+        pixel.copy_from_slice(&base.map(|value: u8| value + chance(k) % 9));
+    }
+    let mut map = DepthMap::new(MAP_SIZE.0, MAP_SIZE.1);
+    for (k, metres) in map.metres.iter_mut().enumerate() {
+        let (x, y) = (k as u32 % MAP_SIZE.0, k as u32 / MAP_SIZE.0);
+        let noise = 1.0 + f32::from(chance(k)) * 2e-5;
+        let is_hole = (MAP_SIZE.0 / 3 - 3..MAP_SIZE.0 / 3).contains(&x) || chance(k) < 2;
+        *metres = if is_hole { 0.0 } else { noise * if is_near(x, y, MAP_SIZE, 1) { 1.2 } else { 3.0 } };
+    }
+    (color, map)
+}
