@@ -46,6 +46,13 @@ struct Lines {
 const REACH_PX: usize = PAIRS_PX[PAIRS_PX.len() - 1];
 const ROWS: usize = 2 * REACH_PX + 1;
 
+impl Lines {
+    fn resize(&mut self, width: usize) {
+        self.along_rows.resize(ROWS * width, 0.0);
+        self.row.resize(width, 0.0);
+    }
+}
+
 impl Smoother {
     /// The noise of a map of so many columns, as a standard deviation: a low quantile of second differences, which slanted
     /// planes do not raise, and edges only where they are everywhere. Unknown depths are left out. `inverse` gives the inverse
@@ -85,15 +92,17 @@ impl Smoother {
         inverse.resize(metres.len(), 0.0);
         let bands = Bands::new(metres.len().checked_div(width).unwrap_or(0), 1, workers);
         let limit = if noise < NO_NOISE { None } else { Some(SAME_SURFACE * noise) };
+        // Before they start: a thread that has no part of this frame would allocate in a later one.
         self.lines.resize_with(workers.thread_count(), Lines::default);
+        if limit.is_some() {
+            self.lines.iter_mut().for_each(|lines| lines.resize(width));
+        }
         let parts = bands.rows().zip(bands.split(inverse, width));
         workers.run_each_with(&mut self.lines, parts, &|Lines { along_rows, row }, (rows, out)| {
             let Some(limit) = limit else {
                 let values = &metres[rows.start * width..rows.end * width];
                 return arch.dispatch(Over { focus_m, values, out });
             };
-            along_rows.resize(ROWS * width, 0.0);
-            row.resize(width, 0.0);
             arch.dispatch(Smooth { metres, focus_m, rows, out, width, limit, along_rows, row });
         });
     }

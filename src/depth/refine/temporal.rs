@@ -94,7 +94,10 @@ impl TemporalFilter {
         let bands = Bands::new(inverse.len() / width, 1, workers);
         if same_size && in_order {
             self.change.resize(inverse.len(), 0);
+            // Before they start: a thread that has no part of this frame would allocate in a later one.
             self.lines.resize_with(workers.thread_count(), Lines::default);
+            let rows = self.lines.iter_mut().flat_map(|Lines { rows, single }| rows.iter_mut().chain([single]));
+            rows.for_each(|row| row.resize(width, 0));
             let Self { change, lines, rgb: before, .. } = self;
             let pictures = [rgb, &before[..]];
             workers.run_each_with(lines, bands.rows().zip(bands.split(change, width)), &|lines, (rows, change)| {
@@ -161,9 +164,6 @@ impl WithSimd for Change<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { pictures, width, lines: Lines { rows: sums, single }, rows, change } = self;
         let (height, last) = (pictures[0].len() / (3 * width), width - 1);
-        for row in sums.iter_mut().chain([&mut *single]) {
-            row.resize(width, 0);
-        }
         for y in rows.start.saturating_sub(1)..(rows.end + 1).min(height) {
             let [now, before] = pictures.map(|rgb| rgb[3 * y * width..][..3 * width].as_chunks::<3>().0);
             for ((now, before), single) in now.iter().zip(before).zip(&mut *single) {
