@@ -1,12 +1,12 @@
-// Pass unpack: 8-bit sRGB to linear light with highlights expanded; depth to signed CoC; mixed pixels to two surfaces.
-// Reads packed RGB bytes and metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile, which
-// shows no bins yet; lists the tiles of the bins of the foremost layer.
+// Pass unpack: 8-bit sRGB to linear light with highlights expanded; mixed pixels to two surfaces. Reads packed RGB bytes, and
+// of a depth map the signed CoC; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile, which shows
+// no bins yet; lists the tiles of the bins of the foremost layer.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> color: array<u32>;
-@group(0) @binding(4) var<storage, read> depth: array<f32>;
+@group(0) @binding(4) var<storage, read> radii: array<u32>;      // two CoC a word, as in scene_packed
 @group(0) @binding(5) var<storage, read_write> scene: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read_write> ranges: array<vec2<f32>>;
 @group(0) @binding(7) var<storage, read_write> mixed: array<MixedPixel>;
@@ -41,11 +41,17 @@ fn coc_of(x: u32, y: u32) -> f32 {
         return min(max(distance_px, 0.0) * frame.ramp.x, frame.ramp.y);
     }
     if all(frame.depth_size == frame.size) {
-        return coc_of_depth(depth[y * frame.size.x + x]);
+        return radius_at(y * frame.size.x + x);
     }
     let column = min((2u * x + 1u) * frame.depth_size.x / (2u * frame.size.x), frame.depth_size.x - 1u);
     let row = min((2u * y + 1u) * frame.depth_size.y / (2u * frame.size.y), frame.depth_size.y - 1u);
-    return coc_of_depth(depth[row * frame.depth_size.x + column]);
+    return radius_at(row * frame.depth_size.x + column);
+}
+
+fn radius_at(index: u32) -> f32 {
+    let roots = unpack2x16snorm(radii[index / 2u]);
+    let root = select(roots.x, roots.y, index % 2u == 1u);
+    return root * abs(root) * frame.most_px;
 }
 
 fn coc_of_depth(metres: f32) -> f32 {

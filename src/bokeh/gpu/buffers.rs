@@ -1,6 +1,7 @@
 //! What lives on the device: allocated once per picture size.
 
 use super::layout::Capacity;
+use super::radii::radii_bytes;
 use super::shaders::{Bin, Frame, LIST_HEAD};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
@@ -155,11 +156,11 @@ impl Buffers {
         }
     }
 
-    /// A buffer for a depth map of so many pixels, in metres.
-    pub fn depth(device: &Device, pixels: usize) -> wgpu::Buffer {
+    /// A buffer for the CoC of a depth map of so many pixels.
+    pub fn radii(device: &Device, pixels: usize) -> wgpu::Buffer {
         device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("depth"),
-            size: (pixels.max(4) * 4) as u64,
+            label: Some("radii"),
+            size: radii_bytes(pixels.max(8)),
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         })

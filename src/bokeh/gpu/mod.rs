@@ -5,6 +5,7 @@ mod buffers;
 mod layout;
 mod passes;
 mod probe;
+mod radii;
 mod readback;
 pub mod shaders;
 mod trial;
@@ -37,8 +38,8 @@ pub struct GpuBokeh {
     plan: Plan,
     device: Arc<Device>,
     buffers: Buffers,
-    /// Depth of the current frame; grows to the largest map that came.
-    depth: wgpu::Buffer,
+    /// CoC of the current frame's depth map; grows to the largest that came.
+    radii: wgpu::Buffer,
     capacity: Capacity,
     layout: Layout,
     passes: Passes,
@@ -79,8 +80,8 @@ impl GpuBokeh {
             .into());
         }
         let buffers = Buffers::new(&device, plan, &capacity);
-        let depth = Buffers::depth(&device, plan.width * plan.height);
-        let passes = Passes::new(&device, plan, &buffers, &depth);
+        let radii = Buffers::radii(&device, plan.width * plan.height);
+        let passes = Passes::new(&device, plan, &buffers, &radii);
         let ring = Ring::new(&device, buffers::picture_bytes(plan));
         let queries = device.timestamps.then(|| {
             let set = device.device.create_query_set(&wgpu::QuerySetDescriptor {
@@ -98,7 +99,7 @@ impl GpuBokeh {
         });
         device.check()?;
         let (plan, layout, refused, results) = (plan.clone(), Layout::new(), None, None);
-        Ok(Self { plan, device, buffers, depth, capacity, layout, passes, ring, refused, results, queries })
+        Ok(Self { plan, device, buffers, radii, capacity, layout, passes, ring, refused, results, queries })
     }
 
     /// Memory to leave a result in on the device, where `place` asks for that and some is free.
@@ -113,11 +114,6 @@ impl GpuBokeh {
     /// The uniform `Frame` of a job; `common.wgsl` says what the numbers mean.
     fn frame_uniform(&self, job: &Job) -> shaders::Frame {
         let plan = &self.plan;
-        let most_px = match job.coc {
-            CocField::Uniform { radius_px } => radius_px,
-            CocField::Ramp(ramp) => ramp.max_px,
-            CocField::Depth(lens) => lens.max_coc_px,
-        };
         let (coc_kind, coc, ramp) = match job.coc {
             CocField::Uniform { radius_px } => (0, [radius_px, 0.0, 0.0, 0.0], [0.0; 2]),
             CocField::Ramp(r) => (1, [r.normal.x, r.normal.y, r.offset_px, r.half_band_px], [r.slope, r.max_px]),
@@ -137,8 +133,7 @@ impl GpuBokeh {
             reach: plan.bank.reach as u32,
             nodes: plan.bank.nodes as u32,
             groups: plan.bank.terms.div_ceil(4) as u32,
-            // The shaders divide by it.
-            most_px: most_px.max(1e-3),
+            most_px: most_px(&job.coc),
             coc,
             ramp,
             even: u32::from(plan.bank.even),
@@ -149,6 +144,16 @@ impl GpuBokeh {
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),
         }
     }
+}
+
+/// No |CoC| of a frame is above this, in pixels, > 0: the shaders divide by it.
+fn most_px(coc: &CocField) -> f32 {
+    let most_px = match coc {
+        CocField::Uniform { radius_px } => *radius_px,
+        CocField::Ramp(ramp) => ramp.max_px,
+        CocField::Depth(lens) => lens.max_coc_px,
+    };
+    most_px.max(1e-3)
 }
 
 impl Bokeh for GpuBokeh {
@@ -170,13 +175,12 @@ impl Bokeh for GpuBokeh {
         let started = Instant::now();
         let on_device = self.device_picture(job.place);
         job.out.resize(made_for.0, made_for.1);
-        if let Some(map) = &job.depth {
-            let bytes: &[u8] = bytemuck::cast_slice(&map.metres);
-            if bytes.len() as u64 > self.depth.size() {
-                self.depth = Buffers::depth(&self.device, map.metres.len());
-                self.passes.set_depth(&self.device, &self.buffers, &self.depth);
+        if let (CocField::Depth(lens), Some(map)) = (job.coc, &job.depth) {
+            if radii::radii_bytes(map.metres.len()) > self.radii.size() {
+                self.radii = Buffers::radii(&self.device, map.metres.len());
+                self.passes.set_radii(&self.device, &self.buffers, &self.radii);
             }
-            self.device.upload(&self.depth, 0, bytes);
+            radii::upload(&self.device.queue, &self.radii, map, lens, most_px(&job.coc));
         }
         if let Some(matte) = self.plan.matte(job.depth.as_deref(), &job.coc) {
             self.device.upload(&self.buffers.mixed, 0, bytemuck::cast_slice(&matte.pixels));

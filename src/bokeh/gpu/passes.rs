@@ -89,14 +89,14 @@ fn work_binding(b: &Buffers, index: usize) -> wgpu::BufferBinding<'_> {
     wgpu::BufferBinding { buffer: &b.work, offset: index as u64 * WORK_STRIDE, size }
 }
 
-/// The bind group of `unpack`: the depth is in it, whose buffer may become another.
+/// The bind group of `unpack`: the CoC of the depth map is in it, whose buffer may become another.
 fn unpack_bindings(
     device: &Device,
     pipeline: &wgpu::ComputePipeline,
     b: &Buffers,
-    depth: &wgpu::Buffer,
+    radii: &wgpu::Buffer,
 ) -> wgpu::BindGroup {
-    let buffers = [&b.bins, &b.frame, &b.color, depth, &b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned];
+    let buffers = [&b.bins, &b.frame, &b.color, radii, &b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned];
     let buffers = buffers.map(wgpu::Buffer::as_entire_buffer_binding);
     device.bindings(pipeline, std::iter::once(work_binding(b, 0)).chain(buffers))
 }
@@ -113,7 +113,7 @@ fn over(step: Step, size: [u32; 2], tile: u32) -> Fixed {
 
 impl Passes {
     /// The passes of a plan over its buffers.
-    pub fn new(device: &Device, plan: &Plan, b: &Buffers, depth: &wgpu::Buffer) -> Self {
+    pub fn new(device: &Device, plan: &Plan, b: &Buffers, radii: &wgpu::Buffer) -> Self {
         let maker = Maker { device, buffers: b };
         let picture = [plan.width as u32, plan.height as u32];
         let half = picture.map(|v| v.div_ceil(2));
@@ -168,7 +168,7 @@ impl Passes {
         };
         let clear = [&b.binned, &b.filtered, &b.active, &b.grid];
         let pipeline = maker.pipeline(shaders::UNPACK);
-        let bindings = unpack_bindings(device, &pipeline, b, depth);
+        let bindings = unpack_bindings(device, &pipeline, b, radii);
         let unpack = Step { name: "unpack", pipeline, bindings };
         Self {
             clear: Fixed {
@@ -186,9 +186,9 @@ impl Passes {
         }
     }
 
-    /// Binds another depth buffer.
-    pub fn set_depth(&mut self, device: &Device, b: &Buffers, depth: &wgpu::Buffer) {
-        self.unpack.step.bindings = unpack_bindings(device, &self.unpack.step.pipeline, b, depth);
+    /// Binds another buffer of the CoC of depth maps.
+    pub fn set_radii(&mut self, device: &Device, b: &Buffers, radii: &wgpu::Buffer) {
+        self.unpack.step.bindings = unpack_bindings(device, &self.unpack.step.pipeline, b, radii);
     }
 
     /// Uploads which bins each pass of this frame does, with the terms of the plan's bank.

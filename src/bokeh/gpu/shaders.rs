@@ -22,7 +22,7 @@ macro_rules! shader {
 
 /// Nothing is listed.
 pub const CLEAR: Shader = shader!("clear", "list");
-/// 8-bit sRGB and depth to linear light and CoC.
+/// 8-bit sRGB to linear light, with the CoC.
 pub const UNPACK: Shader = shader!("unpack", "range", "mixed", "list", "tiles", "next", "meet");
 /// A bin's share of each pixel, and the coarse grid over it.
 pub const BIN: Shader = shader!("bin", "mixed", "tent", "list", "tiles", "todo", "next");

@@ -1,0 +1,90 @@
+//! Depth on its way to the device: as CoC, which is all that the passes make of it, in the 16 bits that they keep it in.
+
+use pulp::{Arch, Simd, WithSimd};
+use wgpu::{Queue, QueueWriteBufferView};
+
+use crate::frame::DepthMap;
+use crate::optics::DepthCoc;
+
+/// Pixels that are converted before they are copied: they stay in the nearest cache. Even, as two are a word.
+const BLOCK: usize = 1024;
+/// What stands for the largest CoC, as `unpack2x16snorm` reads it.
+const WHOLE: f32 = 32_767.0;
+/// A float of this size has no fraction, and its lowest bits are the integer, a negative one's as well.
+const NO_FRACTION: f32 = 12_582_912.0;
+
+/// Bytes of a map of so many pixels, in whole words.
+pub fn radii_bytes(pixels: usize) -> u64 {
+    (2 * pixels).next_multiple_of(4) as u64
+}
+
+/// Writes the CoC of a map to `buffer`, as signed square roots of its share of `most_px`, which none is above: the same 16 bits
+/// that the scene has in the end (`scene_packed` of `common.wgsl`), so that nothing is rounded that would not be anyhow.
+pub fn upload(queue: &Queue, buffer: &wgpu::Buffer, map: &DepthMap, lens: DepthCoc, most_px: f32) {
+    let Some(size) = wgpu::BufferSize::new(radii_bytes(map.metres.len())) else { return };
+    // A device that has failed has no memory for it, which is found out later.
+    if let Some(to) = queue.write_buffer_with(buffer, 0, size) {
+        Arch::new().dispatch(Radii { lens, metres: &map.metres, most_px, to });
+    }
+}
+
+struct Radii<'a> {
+    lens: DepthCoc,
+    metres: &'a [f32],
+    most_px: f32,
+    /// Memory that is only written, and in order.
+    to: QueueWriteBufferView,
+}
+
+impl WithSimd for Radii<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, _: S) {
+        let (mut codes, mut at) = ([0; BLOCK], 0);
+        for metres in self.metres.chunks(BLOCK) {
+            to_codes(&self.lens, self.most_px, metres, &mut codes);
+            // The last word of an odd number of pixels is filled up with what was there.
+            let bytes: &[u8] = bytemuck::cast_slice(&codes[..metres.len().next_multiple_of(2)]);
+            self.to.slice(at..at + bytes.len()).copy_from_slice(bytes);
+            at += bytes.len();
+        }
+    }
+}
+
+/// The CoC of some pixels in 16 bits.
+#[inline(always)]
+fn to_codes(lens: &DepthCoc, most_px: f32, metres: &[f32], codes: &mut [u16; BLOCK]) {
+    let share_per_px = 1.0 / most_px;
+    for (code, &metres) in codes.iter_mut().zip(metres) {
+        let coc_px = lens.coc_px(metres);
+        let root = (coc_px.abs() * share_per_px).sqrt().copysign(coc_px);
+        *code = (root * WHOLE + NO_FRACTION).to_bits() as u16;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_sharp_stays_so_and_all_else_is_off_by_half_a_step_at_most() {
+        let metres_m = (0..8000).map(|step| 1e-4 * 10f32.powf(step as f32 * 1e-3));
+        let odd_m = [0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, 6e-8, 65_536.0, 1e12, f32::MAX];
+        let metres: Vec<f32> = metres_m.chain(odd_m).collect();
+        for (coc_at_infinity_px, range_m, max_coc_px) in
+            [(16.0, 0.5, 40.0), (300.0, 0.0, 300.0), (20.0, 0.0, 7.0), (0.3, 0.0, 1e-3), (1e-4, 0.0, 5.0)]
+        {
+            let lens = DepthCoc { coc_at_infinity_px, focus_m: 2.0, range_m, max_coc_px };
+            let root_of = |coc_px: f32| (coc_px / max_coc_px).abs().sqrt().copysign(coc_px) * WHOLE;
+            let mut codes = [0; BLOCK];
+            for metres in metres.chunks(BLOCK) {
+                to_codes(&lens, max_coc_px, metres, &mut codes);
+                for (&metres, &code) in metres.iter().zip(&codes) {
+                    let (exact, code) = (root_of(lens.coc_px(metres)), f32::from(code as i16));
+                    assert!((code - exact).abs() <= 0.51, "{metres} m: {code} not {exact}");
+                }
+            }
+        }
+    }
+}
