@@ -14,6 +14,21 @@ pub struct Shader {
     pub source: &'static str,
 }
 
+/// A shader by the name of its file under `shaders/`, after what it shares with others, that of all its kind first.
+macro_rules! shader {
+    ($common:literal; $name:literal $(, $shared:literal)*) => {
+        $crate::compute::device::Shader {
+            name: $name,
+            source: concat!(
+                include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $common, ".wgsl")),
+                $(include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $shared, ".wgsl")),)*
+                include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $name, ".wgsl")),
+            ),
+        }
+    };
+}
+pub(crate) use shader;
+
 /// How long a device may take before it counts as hung; one in software is slow, but does not hang.
 const PATIENCE: Duration = Duration::from_secs(10);
 const PATIENCE_WITH_SOFTWARE: Duration = Duration::from_secs(60);
@@ -166,6 +181,16 @@ impl Device {
         })
     }
 
+    /// A buffer of so many bytes, in whole words; a binding must not be empty.
+    pub fn buffer(&self, label: &str, bytes: usize, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: bytes.max(16).next_multiple_of(4) as u64,
+            usage,
+            mapped_at_creation: false,
+        })
+    }
+
     /// Copies any number of bytes to a buffer, from byte `at` on, a multiple of 4. A device takes whole words only, so
     /// the last one is padded with zeros.
     pub fn upload(&self, buffer: &wgpu::Buffer, at: u64, bytes: &[u8]) {
@@ -265,14 +290,10 @@ pub struct DevicePicture {
 impl DevicePicture {
     /// Memory for a picture of `size` pixels.
     pub fn new(device: &Device, size: (u32, u32)) -> Self {
-        let quads = (u64::from(size.0) * u64::from(size.1)).div_ceil(4);
-        let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("picture"),
-            // Whole quads of pixels: what follows the last pixel is unspecified. A binding must not be empty.
-            size: (quads * 12).max(16),
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        use wgpu::BufferUsages as Usage;
+        // Whole quads of pixels: what follows the last pixel is unspecified.
+        let quads = (size.0 as usize * size.1 as usize).div_ceil(4);
+        let buffer = device.buffer("picture", quads * 12, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST);
         Self { device: device.device.clone(), size, buffer }
     }
 

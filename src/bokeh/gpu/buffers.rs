@@ -91,13 +91,7 @@ impl Buffers {
     pub fn new(device: &Device, plan: &Plan, capacity: &Capacity) -> Self {
         use wgpu::BufferUsages as Usage;
         let buffer = |label: &str, bytes: usize, usage: Usage| {
-            device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                // A binding must not be empty.
-                size: bytes.max(16).next_multiple_of(16) as u64,
-                usage: usage | Usage::COPY_DST,
-                mapped_at_creation: false,
-            })
+            device.buffer(label, bytes.next_multiple_of(16), usage | Usage::COPY_DST)
         };
         let with_data = |label: &str, data: &[u8], usage: Usage| {
             let target = buffer(label, data.len(), usage);
@@ -158,12 +152,7 @@ impl Buffers {
 
     /// A buffer for the CoC of a depth map of so many pixels.
     pub fn radii(device: &Device, pixels: usize) -> wgpu::Buffer {
-        device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("radii"),
-            size: radii_bytes(pixels.max(8)),
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
+        device.buffer("radii", radii_bytes(pixels) as usize, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
     }
 }
 

@@ -5,42 +5,29 @@ use bytemuck::{Pod, Zeroable};
 use crate::bokeh::bank::{OCTAVE_SHIFT, OCTAVES_FROM_PX};
 use crate::bokeh::occlusion::{OTHER_FROM, OTHER_TO};
 use crate::bokeh::plan::{ANY_COLOR, CELL, COVERAGE_FLOOR, FAR_WEIGHT, HIDING_SHARE, HINDMOST_COVERAGE, SEGMENT};
-use crate::compute::device::Shader;
-
-macro_rules! shader {
-    ($name:literal $(, $shared:literal)*) => {
-        Shader {
-            name: $name,
-            source: concat!(
-                include_str!("../../../shaders/common.wgsl"),
-                $(include_str!(concat!("../../../shaders/", $shared, ".wgsl")),)*
-                include_str!(concat!("../../../shaders/", $name, ".wgsl")),
-            ),
-        }
-    };
-}
+use crate::compute::device::{Shader, shader};
 
 /// Nothing is listed.
-pub const CLEAR: Shader = shader!("clear", "list");
+pub const CLEAR: Shader = shader!("common"; "clear", "list");
 /// 8-bit sRGB to linear light, with the CoC.
-pub const UNPACK: Shader = shader!("unpack", "range", "mixed", "list", "tiles", "next", "meet");
+pub const UNPACK: Shader = shader!("common"; "unpack", "range", "mixed", "list", "tiles", "next", "meet");
 /// A bin's share of each pixel, and the coarse grid over it.
-pub const BIN: Shader = shader!("bin", "mixed", "tent", "list", "tiles", "todo", "next");
+pub const BIN: Shader = shader!("common"; "bin", "mixed", "tent", "list", "tiles", "todo", "next");
 /// Local radius and range of colours.
-pub const REACH: Shader = shader!("reach", "work");
-pub const BLUR_ROWS: Shader = shader!("blur_rows", "filter", "list", "tiles", "todo", "next");
-pub const BLUR_COLUMNS: Shader = shader!("blur_columns", "filter", "show", "list", "tiles", "todo");
+pub const REACH: Shader = shader!("common"; "reach", "work");
+pub const BLUR_ROWS: Shader = shader!("common"; "blur_rows", "filter", "list", "tiles", "todo", "next");
+pub const BLUR_COLUMNS: Shader = shader!("common"; "blur_columns", "filter", "show", "list", "tiles", "todo");
 /// The exact two-dimensional gather.
-pub const GATHER: Shader = shader!("gather");
+pub const GATHER: Shader = shader!("common"; "gather");
 /// The nearest surface.
-pub const HIDE: Shader = shader!("hide", "mixed");
+pub const HIDE: Shader = shader!("common"; "hide", "mixed");
 /// What is known behind a layer, at half size and over ever larger areas.
-pub const PULL: Shader = shader!("pull", "pyramid", "base");
+pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base");
 /// The largest areas, and back.
-pub const COARSE: Shader = shader!("coarse", "pyramid");
+pub const COARSE: Shader = shader!("common"; "coarse", "pyramid");
 /// Back to the picture.
-pub const FILL: Shader = shader!("fill", "pyramid", "base", "range", "list", "tiles", "next", "meet");
-pub const COMPOSITE: Shader = shader!("composite", "list");
+pub const FILL: Shader = shader!("common"; "fill", "pyramid", "base", "range", "list", "tiles", "next", "meet");
+pub const COMPOSITE: Shader = shader!("common"; "composite", "list");
 
 pub const ALL: [Shader; 12] =
     [CLEAR, UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, PULL, COARSE, FILL, COMPOSITE];

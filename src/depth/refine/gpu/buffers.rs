@@ -54,15 +54,7 @@ impl Buffers {
         let pixels = width * height;
         // What is remembered is the largest: three numbers a pixel.
         has_room(device, size, pixels as u64 * 12)?;
-        let buffer = |label, bytes: usize, usage| {
-            device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                // A binding must not be empty.
-                size: bytes.max(16).next_multiple_of(4) as u64,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
+        let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
         let words = |label, count: usize| buffer(label, 4 * count, Usage::STORAGE | Usage::COPY_DST);
         let buffers = device.attempt(|| Self {
             frame: buffer("refined frame", size_of::<Frame>(), Usage::UNIFORM | Usage::COPY_DST),
@@ -100,12 +92,7 @@ impl Buffers {
 
     /// A buffer for a map of so many samples, in metres.
     pub fn map(device: &Device, samples: usize) -> wgpu::Buffer {
-        device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("measured"),
-            size: 4 * samples.max(4) as u64,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
+        device.buffer("measured", 4 * samples, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
     }
 
     /// The uniform of a wave.

@@ -8,41 +8,28 @@ use super::super::smooth::{self, LAG_PX, NO_NOISE, PAIRS_PX, SMOOTH_QUANTILE, SM
 use super::super::temporal::{self, HOLD, LONGEST, MOVED, MOVED_BOUNDS};
 use super::super::votes::{JUMP_SHARE, LOYALTY, LOYALTY_WITHOUT_CONTRAST, QUARTER_T, UNLIKE, Weights};
 use super::super::{CHANGE_SIGMAS, JUMP, JUMP_SIGMAS, LEAST_CHANGE, upsample};
-use crate::compute::device::Shader;
+use crate::compute::device::{Shader, shader};
 use crate::depth::guided_fill::{self, FOLLOW, PREFERENCE, SAMPLE_PX};
 use crate::frame::DepthMap;
 
-macro_rules! shader {
-    ($name:literal $(, $shared:literal)*) => {
-        Shader {
-            name: $name,
-            source: concat!(
-                include_str!("../../../../shaders/refine_common.wgsl"),
-                $(include_str!(concat!("../../../../shaders/", $shared, ".wgsl")),)*
-                include_str!(concat!("../../../../shaders/", $name, ".wgsl")),
-            ),
-        }
-    };
-}
-
 /// The map in the picture's size, and the picture.
-pub const PREPARE: Shader = shader!("refine_prepare");
+pub const PREPARE: Shader = shader!("refine_common"; "refine_prepare");
 /// Holes: what is known beside them, and then above and below.
-pub const BESIDE: Shader = shader!("refine_beside");
-pub const FILL: Shader = shader!("refine_fill");
+pub const BESIDE: Shader = shader!("refine_common"; "refine_beside");
+pub const FILL: Shader = shader!("refine_common"; "refine_fill");
 /// Which holes are the near side's.
-pub const CLAIM: Shader = shader!("refine_claim");
-pub const AGREE: Shader = shader!("refine_agree");
+pub const CLAIM: Shader = shader!("refine_common"; "refine_claim");
+pub const AGREE: Shader = shader!("refine_common"; "refine_agree");
 /// How much noise there is, and less of it.
-pub const NOISE: Shader = shader!("refine_noise", "refine_select");
-pub const SMOOTH: Shader = shader!("refine_smooth");
+pub const NOISE: Shader = shader!("refine_common"; "refine_noise", "refine_select");
+pub const SMOOTH: Shader = shader!("refine_common"; "refine_smooth");
 /// Where edges are, and where they should be.
-pub const BAND: Shader = shader!("refine_band");
-pub const VOTE: Shader = shader!("refine_vote", "refine_lanes", "refine_window");
+pub const BAND: Shader = shader!("refine_common"; "refine_band");
+pub const VOTE: Shader = shader!("refine_common"; "refine_vote", "refine_lanes", "refine_window");
 /// What changed since the last frame, and what did not.
-pub const CHANGE: Shader = shader!("refine_change");
-pub const MEDIAN: Shader = shader!("refine_median", "refine_select");
-pub const STEADY: Shader = shader!("refine_steady");
+pub const CHANGE: Shader = shader!("refine_common"; "refine_change");
+pub const MEDIAN: Shader = shader!("refine_common"; "refine_median", "refine_select");
+pub const STEADY: Shader = shader!("refine_common"; "refine_steady");
 
 pub const ALL: [Shader; 12] = [PREPARE, BESIDE, FILL, CLAIM, AGREE, NOISE, SMOOTH, BAND, VOTE, CHANGE, MEDIAN, STEADY];
 

@@ -61,15 +61,7 @@ impl GpuExecutor {
         has_room(device, size, disparities)?;
 
         use wgpu::BufferUsages as Usage;
-        let buffer = |label, bytes: usize, usage| {
-            device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                // A binding must not be empty.
-                size: bytes.max(16).next_multiple_of(4) as u64,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
+        let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
         let luma = buffer("luma", 2 * pixels.next_multiple_of(4), Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC);
         let last_luma = buffer("last luma", pixels, Usage::STORAGE | Usage::COPY_DST);
         let table = buffer("P2", 256, Usage::STORAGE | Usage::COPY_DST);

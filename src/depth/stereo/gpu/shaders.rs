@@ -1,43 +1,30 @@
 //! The shaders, and the numbers that Rust shares with them.
 
 use super::super::fixed::{AGREE, BONUS, FILLED, NOISE, ONE, OUTSIDE, SLOPE, STEP, UNKNOWN};
-use crate::compute::device::Shader;
-
-macro_rules! shader {
-    ($name:literal $(, $shared:literal)*) => {
-        Shader {
-            name: $name,
-            source: concat!(
-                include_str!("../../../../shaders/stereo_common.wgsl"),
-                $(include_str!(concat!("../../../../shaders/", $shared, ".wgsl")),)*
-                include_str!(concat!("../../../../shaders/", $name, ".wgsl")),
-            ),
-        }
-    };
-}
+use crate::compute::device::{Shader, shader};
 
 /// What the last pair makes likely.
-pub const LIKELY: Shader = shader!("stereo_likely", "stereo_line");
+pub const LIKELY: Shader = shader!("stereo_common"; "stereo_likely", "stereo_line");
 /// Which neighbours are darker, of both eyes, and P2 between left pixels.
-pub const CENSUS: Shader = shader!("stereo_census");
+pub const CENSUS: Shader = shader!("stereo_common"; "stereo_census");
 /// What each disparity costs.
-pub const COST: Shader = shader!("stereo_cost");
+pub const COST: Shader = shader!("stereo_common"; "stereo_cost");
 /// A path along each row.
-pub const ROWS: Shader = shader!("stereo_rows", "stereo_path");
+pub const ROWS: Shader = shader!("stereo_common"; "stereo_rows", "stereo_path");
 /// The path down each column.
-pub const COLUMNS: Shader = shader!("stereo_columns", "stereo_path");
+pub const COLUMNS: Shader = shader!("stereo_common"; "stereo_columns", "stereo_path");
 /// What both eyes agree on.
-pub const WINNERS: Shader = shader!("stereo_winners", "stereo_line");
+pub const WINNERS: Shader = shader!("stereo_common"; "stereo_winners", "stereo_line");
 /// Islands within rows.
-pub const RUNS: Shader = shader!("stereo_runs", "stereo_row", "stereo_touch");
+pub const RUNS: Shader = shader!("stereo_common"; "stereo_runs", "stereo_row", "stereo_touch");
 /// Islands from row to row.
-pub const JOIN: Shader = shader!("stereo_join", "stereo_line", "stereo_touch", "stereo_root");
+pub const JOIN: Shader = shader!("stereo_common"; "stereo_join", "stereo_line", "stereo_touch", "stereo_root");
 /// How large they are.
-pub const SIZES: Shader = shader!("stereo_sizes", "stereo_line", "stereo_touch", "stereo_root");
+pub const SIZES: Shader = shader!("stereo_common"; "stereo_sizes", "stereo_line", "stereo_touch", "stereo_root");
 /// What is left without small ones, and between it.
-pub const GAPS: Shader = shader!("stereo_gaps", "stereo_row");
+pub const GAPS: Shader = shader!("stereo_common"; "stereo_gaps", "stereo_row");
 /// The same, as the CPU takes it.
-pub const PACK: Shader = shader!("stereo_pack", "stereo_line");
+pub const PACK: Shader = shader!("stereo_common"; "stereo_pack", "stereo_line");
 
 pub const ALL: [Shader; 11] = [LIKELY, CENSUS, COST, ROWS, COLUMNS, WINNERS, RUNS, JOIN, SIZES, GAPS, PACK];
 

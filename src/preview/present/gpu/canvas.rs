@@ -78,12 +78,8 @@ impl Canvas {
             multiview_mask: None,
             cache: None,
         });
-        let window = device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("window"),
-            size: size_of::<Window>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        use wgpu::BufferUsages as Usage;
+        let window = device.buffer("window", size_of::<Window>(), Usage::UNIFORM | Usage::COPY_DST);
         let uploads = [upload_buffer(&device, 0), upload_buffer(&device, 0)];
         let overlay = Overlay::new(&device, format);
         Self { device, linear: format.is_srgb(), pipeline, window, uploads, bound: Vec::new(), overlay }
@@ -199,11 +195,7 @@ impl Canvas {
 
 /// A buffer for a picture of so many bytes.
 fn upload_buffer(device: &Device, bytes: usize) -> wgpu::Buffer {
-    device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("picture to present"),
-        // The shader reads whole words, also for the last pixel; and a binding must not be empty.
-        size: (bytes.next_multiple_of(4) + 16) as u64,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
+    use wgpu::BufferUsages as Usage;
+    // The shader reads whole words, also for the last pixel.
+    device.buffer("picture to present", bytes.next_multiple_of(4) + 16, Usage::STORAGE | Usage::COPY_DST)
 }
