@@ -20,15 +20,9 @@ fn refine_beside(@builtin(workgroup_id) row: vec3<u32>, @builtin(local_invocatio
     let each = (width + THREADS - 1u) / THREADS;
     let start = row.y * width + min(thread * each, width);
     let end = row.y * width + min((thread + 1u) * each, width);
-    var first = 0.0;
-    var last = 0.0;
-    for (var k = start; k < end; k++) {
-        let depth_m = metres[k];
-        first = select(first, depth_m, first == 0.0);
-        last = select(last, depth_m, depth_m > 0.0);
-    }
-    firsts[thread] = first;
-    lasts[thread] = last;
+    let ends = known_ends(start, end - start, 1u);
+    firsts[thread] = ends.x;
+    lasts[thread] = ends.y;
     workgroupBarrier();
     var nearest = 0.0;
     for (var part = thread; part > 0u && nearest == 0.0; part--) {

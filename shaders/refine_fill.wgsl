@@ -32,15 +32,9 @@ fn refine_fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     let start = min(local.y * each, height);
     // Beyond the last column there is nothing.
     let end = select(start, min((local.y + 1u) * each, height), x < width);
-    var first = 0.0;
-    var last = 0.0;
-    for (var y = start; y < end; y++) {
-        let depth_m = metres[y * width + x];
-        first = select(first, depth_m, first == 0.0);
-        last = select(last, depth_m, depth_m > 0.0);
-    }
-    firsts[thread] = first;
-    lasts[thread] = last;
+    let ends = known_ends(start * width + x, end - start, width);
+    firsts[thread] = ends.x;
+    lasts[thread] = ends.y;
     workgroupBarrier();
     var nearest = 0.0;
     for (var strip = local.y + 1u; strip < STRIPS && nearest == 0.0; strip++) {

@@ -41,7 +41,8 @@ fn every_file_is_a_pass_or_shared_and_short() {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
         let shared = "base common filter list meet mixed next pyramid range show tent tiles todo work stereo_common stereo_line \
-             stereo_path stereo_root stereo_row stereo_touch refine_common refine_lanes refine_select refine_window";
+             stereo_path stereo_root stereo_row stereo_touch refine_common refine_ends refine_lanes refine_select \
+             refine_window";
         let known = shared.split(' ').any(|file| file == name)
             || ALL.iter().chain(&stereo::ALL).chain(&refine::ALL).any(|shader| shader.name == name)
             || name == "present";

@@ -15,8 +15,8 @@ use crate::frame::DepthMap;
 /// The map in the picture's size, and the picture.
 pub const PREPARE: Shader = shader!("refine_common"; "refine_prepare");
 /// Holes: what is known beside them, and then above and below.
-pub const BESIDE: Shader = shader!("refine_common"; "refine_beside");
-pub const FILL: Shader = shader!("refine_common"; "refine_fill");
+pub const BESIDE: Shader = shader!("refine_common"; "refine_beside", "refine_ends");
+pub const FILL: Shader = shader!("refine_common"; "refine_fill", "refine_ends");
 /// Which holes are the near side's.
 pub const CLAIM: Shader = shader!("refine_common"; "refine_claim");
 pub const AGREE: Shader = shader!("refine_common"; "refine_agree");
