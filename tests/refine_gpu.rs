@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use bokehcam::compute::Device;
 use bokehcam::depth::refine::Refiner;
+use bokehcam::depth::refine::gpu::GpuRefiner;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::recording::{Options, Recording, Scratch};
 
@@ -275,5 +276,25 @@ fn a_stream_is_refined_where_it_is_blurred() {
         let report = std::fs::read_to_string(report).expect("a report");
         let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
         assert_eq!((&report["refined_by"], &report["backend"]), (&expected.into(), &backend.into()), "{report}");
+    }
+}
+
+/// Prints the times, of frames of any size: `BOKEHCAM_SIZE=1280x720 cargo test --release --test refine_gpu -- --ignored
+/// --nocapture the_passes`.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn the_passes_of_a_frame_take_less_time_than_the_frame() {
+    let wanted = std::env::var("BOKEHCAM_SIZE").unwrap_or_else(|_| "160x120".to_owned());
+    let (width, height) = wanted.split_once('x').expect("COLUMNSxROWS");
+    let size = [width, height].map(|side| side.parse().expect("COLUMNSxROWS"));
+    let device = device();
+    let mut gpu = GpuRefiner::new(&device);
+    for (color, mut map, time_ns, focus_m) in scenes(size.into(), size.into(), 5, 0.05) {
+        let started = std::time::Instant::now();
+        gpu.refine(&mut map, &color, time_ns, focus_m).expect("the GPU refines");
+        let (whole, passes) = (started.elapsed(), gpu.pass_times());
+        eprintln!("{}: {whole:?} {:?}", device.name, passes.iter().collect::<Vec<_>>());
+        assert!(passes.iter().map(|(_, time)| time).sum::<std::time::Duration>() <= whole);
+        assert_eq!(passes.iter().count() > 0, device.timestamps);
     }
 }

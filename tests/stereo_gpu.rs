@@ -177,7 +177,7 @@ fn the_passes_of_a_pair_take_less_time_than_the_pair() {
     for _ in 0..5 {
         let started = std::time::Instant::now();
         gpu.disparities([&left, &right], &mut workers, &mut out).expect("the GPU matches");
-        let (whole, passes) = (started.elapsed(), gpu.pass_times().collect::<Vec<_>>());
+        let (whole, passes) = (started.elapsed(), gpu.pass_times().iter().collect::<Vec<_>>());
         eprintln!("{}: {whole:?} {passes:?}", gpu.describe());
         assert!(passes.iter().map(|(_, time)| *time).sum::<std::time::Duration>() <= whole);
     }

@@ -6,6 +6,8 @@
 mod common;
 
 use bokehcam::compute::device::Device;
+use bokehcam::compute::device::pass::Recorder;
+use bokehcam::compute::device::readback::Readback;
 use bokehcam::depth::stereo::fixed::{FILLED, STEP, UNKNOWN};
 use bokehcam::depth::stereo::gpu::shaders;
 use bokehcam::depth::stereo::gpu::tidying::{Scratch, passes};
@@ -14,10 +16,7 @@ use common::Numbers;
 /// What the GPU makes of a map.
 fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Vec<u16> {
     use wgpu::BufferUsages as Usage;
-    let buffer = |bytes: usize, usage| {
-        let size = bytes.max(16).next_multiple_of(4) as u64;
-        device.device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
-    };
+    let buffer = |bytes, usage| device.buffer("test", bytes, usage);
     let pixels = map.len();
     let words: Vec<u32> = map.iter().map(|&disparity| disparity.into()).collect();
     let on_device = buffer(pixels * 4, Usage::STORAGE | Usage::COPY_DST);
@@ -30,18 +29,17 @@ fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Ve
     });
     let scratch = Scratch { labels: &used[0], sizes: &used[1], filled: &used[2] };
     let out = buffer(pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
-    let back = buffer(pixels * 2, Usage::MAP_READ | Usage::COPY_DST);
+    let back = Readback::new(device, "words back", pixels * 2);
     let constants = shaders::constants(size, 16, island, false);
-    let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    for pass in passes(device, size, &constants, &on_device, scratch, &out) {
-        pass.record(&mut encoder, None, 0);
-    }
-    encoder.copy_buffer_to_buffer(&out, 0, &back, 0, back.size());
-    let submission = device.queue.submit([encoder.finish()]);
-    back.map_async(wgpu::MapMode::Read, .., |_| {});
-    device.poll(Some(submission)).expect("the device is there");
-    let bytes = back.get_mapped_range(..).expect("it is mapped");
-    bytes.as_chunks().0[..pixels].iter().map(|bytes| u16::from_le_bytes(*bytes)).collect()
+    let mut recorder = Recorder::new(device, None);
+    passes(device, size, &constants, &on_device, scratch, &out).iter().for_each(|pass| recorder.run(pass));
+    back.copy(&mut recorder.encoder, &out);
+    let submission = recorder.submit(device);
+    back.map();
+    back.wait(device, submission).expect("the device is there");
+    let taken = back
+        .read(device, |bytes| bytes.as_chunks().0[..pixels].iter().map(|bytes| u16::from_le_bytes(*bytes)).collect());
+    taken.expect("it is mapped")
 }
 
 /// The same, pixel by pixel.

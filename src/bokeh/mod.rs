@@ -33,13 +33,12 @@ pub mod split;
 use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Duration;
 
 use crate::budget::Quality;
 pub use error::BokehError;
 pub use picture::Picture;
 
-pub use crate::compute::Backend;
+pub use crate::compute::{Backend, PassTimes};
 use crate::compute::{Device, GpuError, Place};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -140,44 +139,6 @@ pub struct Finished {
     pub depth: Option<Pooled<DepthMap>>,
     /// Time per pass.
     pub times: PassTimes,
-}
-
-/// Time per pass of one frame, in the order the passes ran. Fixed size, so that a frame allocates nothing.
-#[derive(Clone, Copy, Debug)]
-pub struct PassTimes {
-    passes: [(&'static str, Duration); Self::CAPACITY],
-    len: usize,
-}
-
-impl PassTimes {
-    /// More than the distinct passes of any executor.
-    const CAPACITY: usize = 16;
-
-    /// No pass yet.
-    pub fn new() -> Self {
-        Self { passes: [("", Duration::ZERO); Self::CAPACITY], len: 0 }
-    }
-
-    /// Adds time to the pass `name`, which is the name of its file under `shaders/`.
-    pub fn add(&mut self, name: &'static str, time: Duration) {
-        if let Some(pass) = self.passes[..self.len].iter_mut().find(|pass| pass.0 == name) {
-            pass.1 += time;
-        } else if self.len < Self::CAPACITY {
-            self.passes[self.len] = (name, time);
-            self.len += 1;
-        }
-    }
-
-    /// Pass names and times.
-    pub fn iter(&self) -> impl Iterator<Item = (&'static str, Duration)> + '_ {
-        self.passes[..self.len].iter().copied()
-    }
-}
-
-impl Default for PassTimes {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 /// Which intermediate result of the last frame to read, as vectors of four values.

@@ -1,5 +1,8 @@
 //! Which adapter, and the device on it.
 
+pub mod pass;
+pub mod readback;
+
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
@@ -309,12 +312,6 @@ impl DevicePicture {
     pub fn is_on(&self, device: &Device) -> bool {
         self.device == device.device
     }
-}
-
-/// Workgroups in x and y, as a device may limit both to 65,535: `workgroups` in all, or a few more.
-pub fn workgroups_2d(workgroups: u32) -> [u32; 2] {
-    let down = workgroups.div_ceil(32_768).max(1);
-    [workgroups.div_ceil(down), down]
 }
 
 /// Whether the kernel offers any GPU at all. Asking Vulkan instead takes time, and some drivers write to stderr.

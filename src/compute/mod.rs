@@ -5,6 +5,7 @@ pub mod bands;
 #[cfg(feature = "gpu")]
 pub mod device;
 pub mod memory;
+pub mod pass_times;
 pub mod simd;
 pub mod thread_pool;
 
@@ -15,6 +16,7 @@ use crate::names::named;
 
 #[cfg(feature = "gpu")]
 pub use device::{Device, DevicePicture};
+pub use pass_times::PassTimes;
 
 /// A GPU, of which this build has none.
 #[cfg(not(feature = "gpu"))]

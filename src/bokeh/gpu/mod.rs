@@ -18,12 +18,13 @@ pub use trial::try_out;
 use buffers::Buffers;
 use layout::{Capacity, Layout};
 use passes::Passes;
-use readback::{CAPACITY, MAX_QUERIES, Ring, Sent};
+use readback::{CAPACITY, Ring, Sent};
 
 use super::bank::STEPS_PER_PX;
 use super::ladder::Compositing;
 use super::plan::Plan;
 use super::{Bokeh, BokehError, Finished, Job};
+use crate::compute::device::pass::Recorder;
 use crate::compute::device::{Device, DevicePicture};
 use crate::compute::{Backend, GpuError, Place};
 use crate::link::pool::{Pool, Pooled};
@@ -48,8 +49,6 @@ pub struct GpuBokeh {
     refused: Option<Job>,
     /// Results that stay on the device, once any is wanted there.
     results: Option<Pool<DevicePicture>>,
-    /// Two timestamps a pass, and the buffer that they are resolved to.
-    queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
 }
 
 impl GpuBokeh {
@@ -82,24 +81,10 @@ impl GpuBokeh {
         let buffers = Buffers::new(&device, plan, &capacity);
         let radii = Buffers::radii(&device, plan.width * plan.height);
         let passes = Passes::new(&device, plan, &buffers, &radii);
-        let ring = Ring::new(&device, buffers::picture_bytes(plan));
-        let queries = device.timestamps.then(|| {
-            let set = device.device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("pass times"),
-                ty: wgpu::QueryType::Timestamp,
-                count: MAX_QUERIES,
-            });
-            let resolved = device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("stamps"),
-                size: u64::from(MAX_QUERIES) * 8,
-                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            });
-            (set, resolved)
-        });
+        let ring = Ring::new(&device, buffers::picture_bytes(plan) as usize);
         device.check()?;
         let (plan, layout, refused, results) = (plan.clone(), Layout::new(), None, None);
-        Ok(Self { plan, device, buffers, radii, capacity, layout, passes, ring, refused, results, queries })
+        Ok(Self { plan, device, buffers, radii, capacity, layout, passes, ring, refused, results })
     }
 
     /// Memory to leave a result in on the device, where `place` asks for that and some is free.
@@ -193,23 +178,17 @@ impl Bokeh for GpuBokeh {
         let frame = self.frame_uniform(&job);
         self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
 
-        let mut encoder = self.device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let set = self.queries.as_ref().map(|(set, _)| set);
-        self.passes.encode(&mut encoder, &self.plan, &self.layout, set, &mut slot.passes);
-        let result = &self.buffers.result;
+        let mut recorder = Recorder::new(&self.device, slot.stamps.as_mut());
+        self.passes.record(&mut recorder, &self.plan, &self.layout);
+        let (result, encoder) = (&self.buffers.result, &mut recorder.encoder);
         if let Some(picture) = &on_device {
             encoder.copy_buffer_to_buffer(result, 0, picture.buffer(), 0, result.size().min(picture.buffer().size()));
         }
         let in_memory = on_device.is_none() || job.place == Place::Both;
         if in_memory {
-            encoder.copy_buffer_to_buffer(result, 0, &slot.picture, 0, slot.picture.size());
+            slot.picture.copy(encoder, result);
         }
-        if let (Some((set, resolved)), Some(back)) = (&self.queries, &slot.stamps) {
-            let count = 2 * slot.passes.len() as u32;
-            encoder.resolve_query_set(set, 0..count, resolved, 0);
-            encoder.copy_buffer_to_buffer(resolved, 0, back, 0, u64::from(count) * 8);
-        }
-        let submission = self.device.queue.submit([encoder.finish()]);
+        let submission = recorder.submit(&self.device);
         self.ring.push(&self.device, slot, Sent { job, on_device, in_memory, submission, started });
         Ok(())
     }

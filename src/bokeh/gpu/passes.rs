@@ -4,49 +4,38 @@ use std::ops::Range;
 
 use super::buffers::{Buffers, Filters, WORK_STRIDE, work_count};
 use super::layout::{self, Layout, tiles};
-use super::readback::MAX_QUERIES;
 use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, TAKING_TURNS, TILE, Work};
 use crate::bokeh::occlusion::MOST_LAYERS;
 use crate::bokeh::plan::{MAX_BINS, Plan};
-use crate::compute::device::{Device, Shader, workgroups_2d};
+use crate::compute::device::pass::{Pass, Recorder, workgroups_2d};
+use crate::compute::device::{Device, Shader};
 
 /// Which uniform `Work` a dispatch has: that of its layer, of `reach`, or of a batch of the filters.
 const ALL: usize = MOST_LAYERS;
 const FIRST_BATCH: usize = ALL + 1;
-
-/// One pass: a pipeline and its buffers.
-struct Step {
-    name: &'static str,
-    pipeline: wgpu::ComputePipeline,
-    bindings: wgpu::BindGroup,
-}
-
-/// A pass over the picture or the pyramid: always as many workgroups.
-struct Fixed {
-    step: Step,
-    workgroups: [u32; 2],
-}
+/// What counts as one pass, where it is several.
+const FILL: &str = shaders::FILL.name;
 
 /// The passes of a layer.
 struct Layer {
     /// What is known behind those in front of it, up and down a pyramid, and the scene with that filled in; the foremost
     /// has the scene as it is.
-    fill: Option<[Fixed; 3]>,
-    bin: Step,
+    fill: Option<[Pass; 3]>,
+    bin: Pass,
 }
 
 /// Everything that a frame runs.
 pub struct Passes {
-    clear: Fixed,
-    unpack: Fixed,
+    clear: Pass,
+    unpack: Pass,
     /// What may hide others.
-    hide: Fixed,
+    hide: Pass,
     layers: Vec<Layer>,
-    gather: Option<Fixed>,
-    reach: Step,
+    gather: Option<Pass>,
+    reach: Pass,
     /// For each bank, rows and columns of each batch of bins and group of terms.
-    blur: Vec<Vec<[Step; 2]>>,
-    composite: Fixed,
+    blur: Vec<Vec<[Pass; 2]>>,
+    composite: Pass,
     /// The uniforms `Work` as they are uploaded.
     work: Vec<u8>,
 }
@@ -58,28 +47,23 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    fn pipeline(&self, shader: Shader) -> wgpu::ComputePipeline {
-        self.device.pipeline(shader, &shaders::CONSTANTS)
-    }
-
-    /// A pass with these uniforms first and then `buffers`; its time counts for `name`.
-    fn step(
+    /// A pass with these uniforms first and then `buffers`.
+    fn pass(
         &self,
-        name: &'static str,
         shader: Shader,
         uniforms: &[wgpu::BufferBinding<'_>],
         buffers: &[&wgpu::Buffer],
-    ) -> Step {
-        let pipeline = self.pipeline(shader);
+        workgroups: [u32; 3],
+    ) -> Pass {
         let buffers = buffers.iter().map(|buffer| buffer.as_entire_buffer_binding());
-        let bindings = self.device.bindings(&pipeline, uniforms.iter().cloned().chain(buffers));
-        Step { name, pipeline, bindings }
+        Pass::new(self.device, shader, &shaders::CONSTANTS, uniforms.iter().cloned().chain(buffers), workgroups)
     }
 
-    /// A pass over several bins at once, which are in uniform `Work` number `work`; binds that and the bins first.
-    fn over_bins(&self, name: &'static str, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Step {
+    /// A pass over several bins at once, which are in uniform `Work` number `work`; binds that and the bins first. How many
+    /// workgroups it takes is up to the frame.
+    fn over_bins(&self, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Pass {
         let uniforms = [work_binding(self.buffers, work), self.buffers.bins.as_entire_buffer_binding()];
-        self.step(name, shader, &uniforms, buffers)
+        self.pass(shader, &uniforms, buffers, [1; 3])
     }
 }
 
@@ -89,26 +73,21 @@ fn work_binding(b: &Buffers, index: usize) -> wgpu::BufferBinding<'_> {
     wgpu::BufferBinding { buffer: &b.work, offset: index as u64 * WORK_STRIDE, size }
 }
 
-/// The bind group of `unpack`: the CoC of the depth map is in it, whose buffer may become another.
-fn unpack_bindings(
-    device: &Device,
-    pipeline: &wgpu::ComputePipeline,
-    b: &Buffers,
-    radii: &wgpu::Buffer,
-) -> wgpu::BindGroup {
+/// What `unpack` binds: the CoC of the depth map is in it, whose buffer may become another.
+fn unpack_bindings<'a>(b: &'a Buffers, radii: &'a wgpu::Buffer) -> impl Iterator<Item = wgpu::BufferBinding<'a>> {
     let buffers = [&b.bins, &b.frame, &b.color, radii, &b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned];
-    let buffers = buffers.map(wgpu::Buffer::as_entire_buffer_binding);
-    device.bindings(pipeline, std::iter::once(work_binding(b, 0)).chain(buffers))
+    std::iter::once(work_binding(b, 0)).chain(buffers.map(wgpu::Buffer::as_entire_buffer_binding))
 }
 
 /// Workgroups for so many pieces of work, which they take turns with.
-fn turns(pieces: usize) -> u32 {
-    pieces.clamp(1, TAKING_TURNS) as u32
+fn turns(pieces: usize) -> [u32; 3] {
+    [pieces.clamp(1, TAKING_TURNS) as u32, 1, 1]
 }
 
-/// A pass over `size` invocations in workgroups of `tile` x `tile`.
-fn over(step: Step, size: [u32; 2], tile: u32) -> Fixed {
-    Fixed { step, workgroups: size.map(|size| size.div_ceil(tile)) }
+/// Workgroups of `tile` x `tile` for `size` invocations.
+fn over(size: [u32; 2], tile: u32) -> [u32; 3] {
+    let [across, down] = size.map(|size| size.div_ceil(tile));
+    [across, down, 1]
 }
 
 impl Passes {
@@ -119,7 +98,7 @@ impl Passes {
         let half = picture.map(|v| v.div_ceil(2));
 
         let hide = [&b.frame, &b.scene, &b.nearest_px, &b.ranges, &b.mixed];
-        let hide = over(maker.step("fill", shaders::HIDE, &[], &hide), half, TILE);
+        let hide = maker.pass(shaders::HIDE, &[], &hide, over(half, TILE)).named(FILL);
         let layers = (0..MOST_LAYERS).map(|index| {
             let fill = (index > 0).then(|| {
                 let pulled = [&b.frame, &b.scene, &b.nearest_px, &b.pyramid, &b.known];
@@ -130,14 +109,14 @@ impl Passes {
                 let work = [work_binding(b, index)];
                 [
                     // A thread takes four pixels of half the size, or of the picture.
-                    over(maker.step("fill", shaders::PULL, &work, &pulled), half, 2 * TILE),
-                    over(maker.step("fill", shaders::COARSE, &[], &coarse), [1, 1], 1),
-                    over(maker.step("fill", shaders::FILL, &work, &filled), picture, TILE),
+                    maker.pass(shaders::PULL, &work, &pulled, over(half, 2 * TILE)).named(FILL),
+                    maker.pass(shaders::COARSE, &[], &coarse, [1; 3]).named(FILL),
+                    maker.pass(shaders::FILL, &work, &filled, over(picture, TILE)),
                 ]
             });
             let (seen, lists) = ([&b.scene, &b.behind, &b.ranges], [&b.binned, &b.filtered]);
             let bin = [&b.frame, seen[0], seen[1], seen[2], &b.source, &b.grid, &b.mixed, lists[0], lists[1]];
-            Layer { fill, bin: maker.over_bins("bin", shaders::BIN, index, &bin) }
+            Layer { fill, bin: maker.over_bins(shaders::BIN, index, &bin) }
         });
         let layers = layers.collect();
         let filters = |bank: &Filters, k: usize| {
@@ -146,8 +125,8 @@ impl Passes {
             let columns =
                 [&b.frame, vertical, &b.edges, &b.scene, &b.rows, &b.filtered, &b.blurred, &b.active, &b.shown];
             [
-                maker.over_bins("blur_rows", shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
-                maker.over_bins("blur_columns", shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
+                maker.over_bins(shaders::BLUR_ROWS, FIRST_BATCH + k, &rows),
+                maker.over_bins(shaders::BLUR_COLUMNS, FIRST_BATCH + k, &columns),
             ]
         };
         // A batch has at least one bin, so there are no more batches than bins.
@@ -159,36 +138,30 @@ impl Passes {
         let gather = plan.exact.then(|| {
             let [starts, kernels] = &b.kernels;
             let buffers = [&b.frame, starts, kernels, &b.scene, &b.banks[plan.bank_index].node_reach, &b.blurred];
-            over(maker.step("gather", shaders::GATHER, &[], &buffers), picture, TILE)
+            maker.pass(shaders::GATHER, &[], &buffers, over(picture, TILE))
         });
         let composite = [&b.frame, &b.bins, &b.blurred, &b.scene, &b.result, &b.active, &b.shown];
-        let composite = Fixed {
-            step: maker.step("composite", shaders::COMPOSITE, &[], &composite),
-            workgroups: workgroups_2d((plan.width * plan.height).div_ceil(LINE as usize) as u32),
-        };
+        let lines = workgroups_2d((plan.width * plan.height).div_ceil(LINE as usize) as u32);
         let clear = [&b.binned, &b.filtered, &b.active, &b.grid];
-        let pipeline = maker.pipeline(shaders::UNPACK);
-        let bindings = unpack_bindings(device, &pipeline, b, radii);
-        let unpack = Step { name: "unpack", pipeline, bindings };
+        let unpack =
+            Pass::new(device, shaders::UNPACK, &shaders::CONSTANTS, unpack_bindings(b, radii), over(picture, TILE));
+        let cleared = turns(b.grid.size() as usize / (16 * LINE as usize));
         Self {
-            clear: Fixed {
-                step: maker.step("clear", shaders::CLEAR, &[], &clear),
-                workgroups: [turns(b.grid.size() as usize / (16 * LINE as usize)), 1],
-            },
-            unpack: over(unpack, picture, TILE),
+            clear: maker.pass(shaders::CLEAR, &[], &clear, cleared),
+            unpack,
             hide,
             layers,
             gather,
-            reach: maker.over_bins("reach", shaders::REACH, ALL, &[&b.grid, &b.edges]),
+            reach: maker.over_bins(shaders::REACH, ALL, &[&b.grid, &b.edges]),
             blur,
-            composite,
+            composite: maker.pass(shaders::COMPOSITE, &[], &composite, lines),
             work: vec![0; work_count(plan) * WORK_STRIDE as usize],
         }
     }
 
     /// Binds another buffer of the CoC of depth maps.
     pub fn set_radii(&mut self, device: &Device, b: &Buffers, radii: &wgpu::Buffer) {
-        self.unpack.step.bindings = unpack_bindings(device, &self.unpack.step.pipeline, b, radii);
+        self.unpack.bind(device, unpack_bindings(b, radii));
     }
 
     /// Uploads which bins each pass of this frame does, with the terms of the plan's bank.
@@ -219,59 +192,36 @@ impl Passes {
         device.queue.write_buffer(&b.bins, 0, bytemuck::cast_slice(&layout.bins));
     }
 
-    /// Records one frame of a plan's level. `names` gets the name of every pass that `queries` times.
-    pub fn encode(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        plan: &Plan,
-        layout: &Layout,
-        queries: Option<&wgpu::QuerySet>,
-        names: &mut Vec<&'static str>,
-    ) {
-        let mut run = |step: &Step, [x, y]: [u32; 2]| {
-            let index = 2 * names.len() as u32;
-            let timed = queries.filter(|_| index + 1 < MAX_QUERIES);
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some(step.name),
-                timestamp_writes: timed.map(|query_set| wgpu::ComputePassTimestampWrites {
-                    query_set,
-                    beginning_of_pass_write_index: Some(index),
-                    end_of_pass_write_index: Some(index + 1),
-                }),
-            });
-            pass.set_pipeline(&step.pipeline);
-            pass.set_bind_group(0, &step.bindings, &[]);
-            pass.dispatch_workgroups(x, y, 1);
-            drop(pass);
-            if timed.is_some() {
-                names.push(step.name);
-            }
-        };
+    /// Records one frame of a plan's level.
+    pub fn record(&self, recorder: &mut Recorder, plan: &Plan, layout: &Layout) {
         // Workgroups that take turns with the tiles of some bins.
-        let workgroups = |bins: &[Bin], of: &dyn Fn(&Bin) -> usize| [turns(bins.iter().map(of).sum()), 1];
-        run(&self.clear.step, self.clear.workgroups);
-        run(&self.unpack.step, self.unpack.workgroups);
+        let workgroups = |bins: &[Bin], of: &dyn Fn(&Bin) -> usize| turns(bins.iter().map(of).sum());
+        recorder.run(&self.clear);
+        recorder.run(&self.unpack);
         if let Some(gather) = &self.gather {
-            run(&gather.step, gather.workgroups);
+            recorder.run(gather);
         } else {
             for ((index, bins), layer) in plan.layers().enumerate().zip(&self.layers) {
                 if index == 1 {
-                    run(&self.hide.step, self.hide.workgroups);
+                    recorder.run(&self.hide);
                 }
-                layer.fill.iter().flatten().for_each(|fixed| run(&fixed.step, fixed.workgroups));
-                run(&layer.bin, workgroups(&layout.bins[bins], &|bin| layout::binned_tiles(bin.size, bin.scale)));
+                layer.fill.iter().flatten().for_each(|pass| recorder.run(pass));
+                recorder.run_by(
+                    &layer.bin,
+                    workgroups(&layout.bins[bins], &|bin| layout::binned_tiles(bin.size, bin.scale)),
+                );
             }
             let edges = layout.bins.iter().map(|bin| tiles([2 * bin.edges, bin.cells[1]], EDGES_TILE) as u32);
-            run(&self.reach, workgroups_2d(edges.sum()));
+            recorder.run_by(&self.reach, workgroups_2d(edges.sum()));
             let groups = plan.bank.terms.div_ceil(4);
             for (batch, steps) in layout.batches.iter().zip(self.blur[plan.bank_index].chunks_exact(groups)) {
                 let bins = &layout.bins[batch.clone()];
                 for [rows, columns] in steps {
-                    run(rows, workgroups(bins, &|bin| tiles(bin.size, ROWS_TILE)));
-                    run(columns, workgroups(bins, &|bin| tiles(bin.size, RESULT_TILE)));
+                    recorder.run_by(rows, workgroups(bins, &|bin| tiles(bin.size, ROWS_TILE)));
+                    recorder.run_by(columns, workgroups(bins, &|bin| tiles(bin.size, RESULT_TILE)));
                 }
             }
         }
-        run(&self.composite.step, self.composite.workgroups);
+        recorder.run(&self.composite);
     }
 }

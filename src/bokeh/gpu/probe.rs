@@ -4,7 +4,8 @@ use super::GpuBokeh;
 use super::shaders::{LIST_HEAD, RESULT_TILE};
 use crate::bokeh::plan::CELL;
 use crate::bokeh::{BokehError, Probe};
-use crate::compute::GpuError;
+use crate::compute::device::pass::Recorder;
+use crate::compute::device::readback::Readback;
 
 impl GpuBokeh {
     /// The result of a pass over the last frame, in the layout that [`Probe`] states. Waits and allocates; for tests.
@@ -59,22 +60,16 @@ impl GpuBokeh {
 
     /// Reads back `count` words of a buffer, from word `first` on; waits for the device.
     fn read(&self, buffer: &wgpu::Buffer, first: u32, count: u32) -> Result<Vec<u32>, BokehError> {
-        let device = &self.device.device;
-        let staging = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("probe"),
-            size: u64::from(count) * 4,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &staging, 0, u64::from(count) * 4);
-        let submission = self.device.queue.submit([encoder.finish()]);
-        staging.map_async(wgpu::MapMode::Read, .., |_| {});
-        let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", self.device.name));
-        self.device.poll(Some(submission))?;
-        let mapped = staging.get_mapped_range(..).map_err(|error| fault(&error))?;
-        self.device.check()?;
-        Ok(bytemuck::pod_collect_to_vec(&mapped[..]))
+        let (device, bytes) = (&self.device, u64::from(count) * 4);
+        let part = device.buffer("probe", bytes as usize, wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST);
+        let readback = Readback::new(device, "probe back", bytes as usize);
+        let mut recorder = Recorder::new(device, None);
+        recorder.encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &part, 0, bytes);
+        readback.copy(&mut recorder.encoder, &part);
+        let submission = recorder.submit(device);
+        readback.map();
+        readback.wait(device, submission)?;
+        Ok(readback.read(device, |words| bytemuck::pod_collect_to_vec(&words[..bytes as usize]))?)
     }
 }
 

@@ -3,30 +3,24 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use crate::bokeh::{BokehError, Finished, Job, PassTimes, Picture};
-use crate::compute::GpuError;
+use crate::compute::device::pass::Stamps;
+use crate::compute::device::readback::Readback;
 use crate::compute::device::{Device, DevicePicture};
 use crate::link::pool::Pooled;
 
 /// Frames that may be in flight: one on the device, one waiting, one on its way back.
 pub const CAPACITY: usize = 3;
-/// Timestamps a frame can have.
-pub const MAX_QUERIES: u32 = 512;
-
-const PENDING: u8 = 0;
-const READY: u8 = 1;
-const FAILED: u8 = 2;
+/// Passes of a frame that are timed, at most.
+const MOST_PASSES: usize = 256;
 
 /// Buffers of one frame in flight.
 pub struct Slot {
-    pub picture: wgpu::Buffer,
-    /// Timestamps: two per pass.
-    pub stamps: Option<wgpu::Buffer>,
-    /// Name of each timed pass, in order.
-    pub passes: Vec<&'static str>,
+    pub picture: Readback,
+    pub stamps: Option<Stamps>,
 }
 
 /// A frame that was submitted.
@@ -43,12 +37,20 @@ pub struct Sent {
     pub started: Instant,
 }
 
-/// A frame whose buffers are being mapped.
+/// A frame on its way back.
 struct Pending {
     slot: Slot,
     sent: Sent,
-    /// [`PENDING`], [`READY`] or [`FAILED`]: set by the device's callback.
-    state: Arc<AtomicU8>,
+    /// Whether the device is done with it.
+    done: Arc<AtomicBool>,
+}
+
+impl Pending {
+    fn is_back(&self) -> bool {
+        self.done.load(Ordering::Acquire)
+            && !self.slot.picture.is_pending()
+            && !self.slot.stamps.as_ref().is_some_and(Stamps::are_pending)
+    }
 }
 
 /// The frames on their way back, and the buffers for more.
@@ -61,20 +63,9 @@ pub struct Ring {
 
 impl Ring {
     /// A ring for pictures of `bytes` (a multiple of 4).
-    pub fn new(device: &Device, bytes: u64) -> Self {
-        let buffer = |label, size| {
-            device.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
-        let slot = || Slot {
-            picture: buffer("picture back", bytes),
-            stamps: device.timestamps.then(|| buffer("stamps back", u64::from(MAX_QUERIES) * 8)),
-            passes: Vec::with_capacity(MAX_QUERIES as usize / 2),
-        };
+    pub fn new(device: &Device, bytes: usize) -> Self {
+        let slot =
+            || Slot { picture: Readback::new(device, "picture back", bytes), stamps: Stamps::new(device, MOST_PASSES) };
         let free = std::iter::repeat_with(slot).take(CAPACITY).collect();
         Self { free, pending: VecDeque::with_capacity(CAPACITY), last: None }
     }
@@ -95,23 +86,13 @@ impl Ring {
 
     /// Starts the way back of a frame that was submitted.
     pub fn push(&mut self, device: &Device, slot: Slot, sent: Sent) {
-        let state = Arc::new(AtomicU8::new(PENDING));
-        let done = Arc::clone(&state);
-        let done = move |is_ok: bool| done.store(if is_ok { READY } else { FAILED }, Ordering::Release);
-        // Only the last mapping reports: callbacks run in the order of the calls, so all is mapped then.
-        match &slot.stamps {
-            Some(stamps) if !sent.in_memory => {
-                stamps.map_async(wgpu::MapMode::Read, .., move |result| done(result.is_ok()));
-            }
-            None if !sent.in_memory => device.queue.on_submitted_work_done(move || done(true)),
-            stamps => {
-                if let Some(stamps) = stamps {
-                    stamps.map_async(wgpu::MapMode::Read, .., |_| {});
-                }
-                slot.picture.map_async(wgpu::MapMode::Read, .., move |result| done(result.is_ok()));
-            }
+        if sent.in_memory {
+            slot.picture.map();
         }
-        self.pending.push_back(Pending { slot, sent, state });
+        let done = Arc::new(AtomicBool::new(false));
+        let is_done = Arc::clone(&done);
+        device.queue.on_submitted_work_done(move || is_done.store(true, Ordering::Release));
+        self.pending.push_back(Pending { slot, sent, done });
     }
 
     /// The oldest frame, if it is back; with `wait`, blocks until it is.
@@ -122,56 +103,29 @@ impl Ring {
         let Some(oldest) = self.pending.front() else { return Ok(None) };
         device.poll(wait.then(|| oldest.sent.submission.clone()))?;
         if wait {
-            device.wait_for(|| oldest.state.load(Ordering::Acquire) != PENDING)?;
+            device.wait_for(|| oldest.is_back())?;
         }
-        match oldest.state.load(Ordering::Acquire) {
-            PENDING => return Ok(None),
-            FAILED => {
-                return Err(GpuError::Failed(format!("{}: the picture could not be read back", device.name)).into());
-            }
-            _ => {}
+        if !oldest.is_back() {
+            return Ok(None);
         }
         let Some(Pending { slot, sent, .. }) = self.pending.front_mut() else { return Ok(None) };
-        let Sent { job, in_memory, started, .. } = sent;
-        let (in_memory, started) = (*in_memory, *started);
-        let fault = |error: wgpu::MapRangeError| GpuError::Failed(error.to_string());
-        if in_memory {
-            {
-                let bytes = slot.picture.get_mapped_range(..).map_err(fault)?;
-                let out = &mut job.out.rgb;
-                let length = out.len();
-                out.copy_from_slice(&bytes[..length]);
-            }
-            slot.picture.unmap();
+        if sent.in_memory {
+            let out = &mut sent.job.out.rgb;
+            let length = out.len();
+            slot.picture.read(device, |bytes| out.copy_from_slice(&bytes[..length]))?;
         }
         let mut times = PassTimes::new();
         if let Some(stamps) = &slot.stamps {
-            {
-                let bytes = stamps.get_mapped_range(..).map_err(fault)?;
-                let stamp =
-                    |k: usize| bytes.get(k * 8..k * 8 + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
-                let period_ns = f64::from(device.queue.get_timestamp_period());
-                for (k, name) in slot.passes.iter().enumerate() {
-                    let Some((from, to)) = stamp(2 * k).zip(stamp(2 * k + 1)) else { continue };
-                    if to < from {
-                        // Stamps may run backwards when clocks change; such a frame's times say nothing.
-                        times = PassTimes::new();
-                        break;
-                    }
-                    times.add(name, Duration::from_nanos(((to - from) as f64 * period_ns) as u64));
-                }
-            }
-            stamps.unmap();
+            times = stamps.read(device)?;
         } else {
             // Frames run one after the other: the time before the previous one was back does not count.
-            let began = self.last.map_or(started, |last| last.max(started));
+            let began = self.last.map_or(sent.started, |last| last.max(sent.started));
             times.add("gpu", began.elapsed());
         }
         self.last = Some(Instant::now());
         // Only now, so that the frame can be given back after an error.
-        let Some(Pending { mut slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
-        let Sent { job, on_device, .. } = sent;
-        slot.passes.clear();
+        let Some(Pending { slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
+        let Sent { job, on_device, in_memory, .. } = sent;
         self.free.push(slot);
         let Job { ticket, color, depth, out, .. } = job;
         let picture = match on_device {

@@ -5,6 +5,7 @@ use super::super::votes;
 use super::shaders::{ASKED, COUNTS, Frame, MEASURES, SAMPLES, WAVES, Wave};
 use crate::compute::GpuError;
 use crate::compute::device::Device;
+use crate::compute::device::readback::Readback;
 
 /// The distance of one uniform from the next, as devices may ask for.
 const UNIFORM_STRIDE: u64 = 256;
@@ -40,7 +41,7 @@ pub struct Buffers {
     pub memory: wgpu::Buffer,
     pub refined: wgpu::Buffer,
     /// A copy of the refined map that the CPU can map.
-    pub readback: wgpu::Buffer,
+    pub readback: Readback,
 }
 
 impl Buffers {
@@ -76,7 +77,7 @@ impl Buffers {
             samples: words("samples", SAMPLES),
             memory: words("memory", 3 * pixels),
             refined: buffer("refined", 4 * pixels, Usage::STORAGE | Usage::COPY_SRC),
-            readback: buffer("refined back", 4 * pixels, Usage::MAP_READ | Usage::COPY_DST),
+            readback: Readback::new(device, "refined back", 4 * pixels),
         })?;
         device.upload(&buffers.nearby, 0, bytemuck::cast_slice(votes::weights_by_distance().as_flattened()));
         for round in 0..ROUNDS {

@@ -13,15 +13,15 @@ mod trial;
 
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
 
 use buffers::Buffers;
 use passes::Passes;
 use shaders::Frame;
 
 use super::temporal;
-use crate::compute::GpuError;
 use crate::compute::device::Device;
+use crate::compute::device::pass::{Recorder, Stamps};
+use crate::compute::{GpuError, PassTimes};
 use crate::depth::guided_fill;
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap};
@@ -52,12 +52,12 @@ struct Work {
     has_filled: bool,
     /// What is remembered is of a frame at this time, with this distance in focus.
     last: Option<(u64, f32)>,
-    state: Arc<AtomicU8>,
+    stamps: Option<Stamps>,
+    times: PassTimes,
 }
 
-const PENDING: u8 = 0;
-const READY: u8 = 1;
-const FAILED: u8 = 2;
+/// More passes than a frame has.
+const MOST_PASSES: usize = 48;
 
 impl GpuRefiner {
     /// On a device, whether it does it right or not.
@@ -76,6 +76,11 @@ impl GpuRefiner {
         if let Some(work) = &mut self.work {
             (work.has_filled, work.last) = (false, None);
         }
+    }
+
+    /// The time of each pass over the last frame; of none where the device has no timestamps.
+    pub fn pass_times(&self) -> PassTimes {
+        self.work.as_ref().map(|work| work.times).unwrap_or_default()
     }
 
     /// Whether it is on this device.
@@ -111,8 +116,8 @@ impl Work {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
         let (from, columns, rows) = ((0, 0), Vec::new(), Vec::new());
-        let state = Arc::new(AtomicU8::new(PENDING));
-        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None, state })
+        let (stamps, times) = (Stamps::new(device, MOST_PASSES), PassTimes::new());
+        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None, stamps, times })
     }
 
     /// Takes maps of another size.
@@ -179,47 +184,31 @@ impl Work {
         if !is_empty {
             device.upload(&self.buffers.map, 0, bytemuck::cast_slice(&map.metres));
         }
-        self.run(device, is_empty, last.is_none())?;
-        self.read(device, map)?;
+        self.run(device, map, is_empty, last.is_none())?;
         self.has_filled = true;
         self.last = Some((time_ns, focus_m));
         Ok(())
     }
 
-    /// Runs the passes, and waits for the refined map.
-    fn run(&self, device: &Device, is_empty: bool, is_fresh: bool) -> Result<(), GpuError> {
+    /// Runs the passes, and takes the refined map.
+    fn run(&mut self, device: &Device, map: &mut DepthMap, is_empty: bool, is_fresh: bool) -> Result<(), GpuError> {
         let Buffers { counts, refined, readback, .. } = &self.buffers;
-        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.clear_buffer(counts, 0, None);
-        self.passes.encode(&mut encoder, is_empty, is_fresh);
-        encoder.copy_buffer_to_buffer(refined, 0, readback, 0, readback.size());
-        let submission = device.queue.submit([encoder.finish()]);
-        self.state.store(PENDING, Ordering::Relaxed);
-        let state = Arc::clone(&self.state);
-        readback.map_async(wgpu::MapMode::Read, .., move |mapped| {
-            state.store(if mapped.is_ok() { READY } else { FAILED }, Ordering::Release);
-        });
-        device.poll(Some(submission))?;
-        // Where others use the device, too, one of them may be about to run the callback.
-        device.wait_for(|| self.state.load(Ordering::Acquire) != PENDING)?;
-        match self.state.load(Ordering::Acquire) {
-            READY => Ok(()),
-            _ => Err(GpuError::Failed(format!("{}: the refined map could not be read back", device.name))),
-        }
-    }
-
-    /// Takes the refined map.
-    fn read(&self, device: &Device, map: &mut DepthMap) -> Result<(), GpuError> {
-        let readback = &self.buffers.readback;
-        {
-            let bytes =
-                readback.get_mapped_range(..).map_err(|error| GpuError::Failed(format!("{}: {error}", device.name)))?;
+        let mut recorder = Recorder::new(device, self.stamps.as_mut());
+        recorder.encoder.clear_buffer(counts, 0, None);
+        self.passes.record(&mut recorder, is_empty, is_fresh);
+        readback.copy(&mut recorder.encoder, refined);
+        let submission = recorder.submit(device);
+        readback.map();
+        readback.wait(device, submission)?;
+        readback.read(device, |bytes| {
             map.resize(self.size.0, self.size.1);
             let out: &mut [u8] = bytemuck::cast_slice_mut(&mut map.metres);
             let length = out.len();
             out.copy_from_slice(&bytes[..length]);
+        })?;
+        if let Some(stamps) = &self.stamps {
+            self.times = stamps.read(device)?;
         }
-        readback.unmap();
         Ok(())
     }
 }

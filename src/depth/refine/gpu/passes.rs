@@ -3,23 +3,8 @@
 use super::super::align::ROUNDS;
 use super::buffers::Buffers;
 use super::shaders::{self, COLUMNS, STRIP, TILE, WAVES};
+use crate::compute::device::pass::{Pass, Recorder};
 use crate::compute::device::{Device, Shader};
-
-/// A pipeline, its buffers, and how many workgroups it takes.
-struct Pass {
-    pipeline: wgpu::ComputePipeline,
-    bindings: wgpu::BindGroup,
-    workgroups: [u32; 2],
-}
-
-impl Pass {
-    fn encode(&self, pass: &mut wgpu::ComputePass) {
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.bindings, &[]);
-        let [x, y] = self.workgroups;
-        pass.dispatch_workgroups(x, y, 1);
-    }
-}
 
 /// Everything that a frame runs.
 pub struct Passes {
@@ -47,12 +32,11 @@ impl<'a> Maker<'a> {
         shader: Shader,
         again: bool,
         buffers: impl IntoIterator<Item = wgpu::BufferBinding<'a>>,
-        workgroups: [u32; 2],
+        [across, down]: [u32; 2],
     ) -> Pass {
-        let pipeline = self.device.pipeline(shader, &shaders::constants(again));
         let frame = self.b.frame.as_entire_buffer_binding();
-        let bindings = self.device.bindings(&pipeline, std::iter::once(frame).chain(buffers));
-        Pass { pipeline, bindings, workgroups }
+        let buffers = std::iter::once(frame).chain(buffers);
+        Pass::new(self.device, shader, &shaders::constants(again), buffers, [across, down, 1])
     }
 
     fn over<const N: usize>(
@@ -157,12 +141,10 @@ impl Passes {
     }
 
     /// All passes of a frame; whether nothing is known of its map, and whether no frame before counts.
-    pub fn encode(&self, encoder: &mut wgpu::CommandEncoder, is_empty: bool, is_fresh: bool) {
-        let mut pass =
-            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("refine"), timestamp_writes: None });
+    pub fn record(&self, recorder: &mut Recorder, is_empty: bool, is_fresh: bool) {
         let fill = self.fill.iter().filter(|_| !is_empty);
         let change = self.change.iter().filter(|_| !is_fresh);
         let passes = [&self.prepare].into_iter().chain(fill).chain(&self.align).chain(change).chain([&self.steady]);
-        passes.for_each(|step| step.encode(&mut pass));
+        passes.for_each(|pass| recorder.run(pass));
     }
 }

@@ -8,28 +8,25 @@
 //! What has one number for each pixel has a word for it, so that no two invocations write to one. Both eyes go up and one
 //! map comes back; what the next pair needs of this one stays.
 
-pub mod pass;
 pub mod shaders;
 pub mod tidying;
-mod times;
 
 use std::sync::Arc;
-use std::time::Duration;
 
-use pass::{Pass, in_line};
-use times::Times;
+use shaders::in_line;
 
 use super::executor::Executor;
 use super::fixed::{self, UNKNOWN};
 use super::penalty::Penalties;
-use crate::compute::GpuError;
-use crate::compute::bands;
 use crate::compute::device::Device;
+use crate::compute::device::pass::{Pass, Recorder, Stamps};
+use crate::compute::device::readback::Readback;
 use crate::compute::thread_pool::ThreadPool;
+use crate::compute::{GpuError, PassTimes, bands};
 
 /// What a workgroup does, as the shaders declare it: pixels a side of `stereo_census`, and columns of `stereo_cost`.
-const TILE: usize = 16;
-const STRIP: usize = 16;
+const TILE: u32 = 16;
+const STRIP: u32 = 16;
 /// So many pixels of the map that comes back are worth a thread.
 const LEAST_PIXELS: usize = 1 << 14;
 
@@ -44,9 +41,9 @@ pub struct GpuExecutor {
     passes: [Pass; 12],
     /// The map, two pixels a word.
     words: wgpu::Buffer,
-    /// A copy of it that the CPU can map.
-    readback: wgpu::Buffer,
-    times: Option<Times>,
+    readback: Readback,
+    stamps: Option<Stamps>,
+    times: PassTimes,
 }
 
 impl GpuExecutor {
@@ -75,27 +72,30 @@ impl GpuExecutor {
         // Before the first pair nothing is likely.
         device.queue.write_buffer(&map, 0, bytemuck::cast_slice(&vec![u32::from(UNKNOWN); pixels]));
         let words = buffer("words", pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
-        let readback = buffer("words back", pixels * 2, Usage::MAP_READ | Usage::COPY_DST);
+        let readback = Readback::new(device, "words back", pixels * 2);
 
         let constants = |from_right| shaders::constants(size, disparities, island, from_right);
         let forwards = constants(false);
-        let pass =
-            |shader, buffers: &[&wgpu::Buffer], workgroups| Pass::new(device, shader, &forwards, buffers, workgroups);
+        let (columns, rows) = (width as u32, height as u32);
+        let pass = |shader, buffers: &[&wgpu::Buffer], workgroups| {
+            let buffers = buffers.iter().map(|buffer| buffer.as_entire_buffer_binding());
+            Pass::new(device, shader, &forwards, buffers, workgroups)
+        };
         let along_rows = |from_right| {
-            let buffers = [&costs, &penalties, &sums];
-            Pass::new(device, shaders::ROWS, &constants(from_right), &buffers, [height, 1, 1])
+            let buffers = [&costs, &penalties, &sums].map(wgpu::Buffer::as_entire_buffer_binding);
+            Pass::new(device, shaders::ROWS, &constants(from_right), buffers, [rows, 1, 1])
         };
         // After the winners nobody needs the volumes and the penalties.
         let scratch = tidying::Scratch { labels: &costs, sizes: &sums, filled: &penalties };
         let [runs, join, sizes, gaps, pack] = tidying::passes(device, size, &forwards, &map, scratch, &words);
-        let tiles = [width.div_ceil(TILE), height.div_ceil(TILE), 2];
+        let tiles = [columns.div_ceil(TILE), rows.div_ceil(TILE), 2];
         let passes = [
             pass(shaders::LIKELY, &[&luma, &last_luma, &map, &likely], in_line(pixels)),
             pass(shaders::CENSUS, &[&luma, &table, &census, &penalties], tiles),
-            pass(shaders::COST, &[&census, &likely, &costs], [width.div_ceil(STRIP), height, 1]),
+            pass(shaders::COST, &[&census, &likely, &costs], [columns.div_ceil(STRIP), rows, 1]),
             along_rows(false),
             along_rows(true),
-            pass(shaders::COLUMNS, &[&costs, &penalties, &sums, &totals], [width, 1, 1]),
+            pass(shaders::COLUMNS, &[&costs, &penalties, &sums, &totals], [columns, 1, 1]),
             pass(shaders::WINNERS, &[&totals, &map], in_line(pixels)),
             runs,
             join,
@@ -103,15 +103,14 @@ impl GpuExecutor {
             gaps,
             pack,
         ];
-        let times = device.timestamps.then(|| Times::new(&device.device, passes.len()));
+        let (stamps, times) = (Stamps::new(device, passes.len()), PassTimes::new());
         device.check()?;
-        Ok(Self { device: Arc::clone(device), pixels, luma, last_luma, passes, words, readback, times })
+        Ok(Self { device: Arc::clone(device), pixels, luma, last_luma, passes, words, readback, stamps, times })
     }
 
-    /// Name and time of each pass over the last pair, in their order; empty where the device has no timestamps.
-    pub fn pass_times(&self) -> impl Iterator<Item = (&'static str, Duration)> {
-        let times = self.times.iter().flat_map(|times| times.last());
-        self.passes.iter().map(|pass| pass.name).zip(times)
+    /// The time of each pass over the last pair; of none where the device has no timestamps.
+    pub fn pass_times(&self) -> &PassTimes {
+        &self.times
     }
 }
 
@@ -149,40 +148,28 @@ impl Executor for GpuExecutor {
         workers: &mut ThreadPool,
         out: &mut [u16],
     ) -> Result<(), GpuError> {
-        let Self { device, .. } = &*self;
+        let Self { device, pixels, luma, last_luma, passes, words, readback, stamps, times } = self;
         device.check()?;
-        device.upload(&self.luma, 0, left);
-        device.upload(&self.luma, self.pixels.next_multiple_of(4) as u64, right);
+        device.upload(luma, 0, left);
+        device.upload(luma, pixels.next_multiple_of(4) as u64, right);
 
-        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        for (index, pass) in self.passes.iter().enumerate() {
-            pass.record(&mut encoder, self.times.as_ref(), index);
-        }
-        encoder.copy_buffer_to_buffer(&self.luma, 0, &self.last_luma, 0, self.last_luma.size());
-        encoder.copy_buffer_to_buffer(&self.words, 0, &self.readback, 0, self.readback.size());
-        if let Some(times) = &self.times {
-            times.fetch(&mut encoder);
-        }
-        let submission = device.queue.submit([encoder.finish()]);
-        // Takes effect once the submission is done, which `poll` waits for.
-        self.readback.map_async(wgpu::MapMode::Read, .., |_| {});
-        if let Some(times) = &self.times {
-            times.map();
-        }
-        let fault = |error: &dyn std::fmt::Display| GpuError::Failed(format!("{}: {error}", device.name));
-        device.poll(Some(submission))?;
-        {
-            let view = self.readback.get_mapped_range(..).map_err(|error| fault(&error))?;
+        let mut recorder = Recorder::new(device, stamps.as_mut());
+        passes.iter().for_each(|pass| recorder.run(pass));
+        recorder.encoder.copy_buffer_to_buffer(luma, 0, last_luma, 0, last_luma.size());
+        readback.copy(&mut recorder.encoder, words);
+        let submission = recorder.submit(device);
+        readback.map();
+        readback.wait(device, submission)?;
+        readback.read(device, |bytes| {
             let each = bands::share(out.len(), LEAST_PIXELS);
-            workers.run_each(out.chunks_mut(each).zip(view.chunks(2 * each)), &|(out, bytes): (&mut [u16], &[u8])| {
+            workers.run_each(out.chunks_mut(each).zip(bytes.chunks(2 * each)), &|(out, bytes): (&mut [u16], &[u8])| {
                 for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {
                     *out = u16::from_le_bytes(*bytes);
                 }
             });
-        }
-        self.readback.unmap();
-        if let Some(times) = &mut self.times {
-            times.read(self.device.queue.get_timestamp_period());
+        })?;
+        if let Some(stamps) = stamps {
+            *times = stamps.read(device)?;
         }
         Ok(())
     }

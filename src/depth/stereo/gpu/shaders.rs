@@ -1,6 +1,7 @@
 //! The shaders, and the numbers that Rust shares with them.
 
 use super::super::fixed::{AGREE, BONUS, FILLED, NOISE, ONE, OUTSIDE, SLOPE, STEP, UNKNOWN};
+use crate::compute::device::pass::workgroups_2d;
 use crate::compute::device::{Shader, shader};
 
 /// What the last pair makes likely.
@@ -27,6 +28,14 @@ pub const GAPS: Shader = shader!("stereo_common"; "stereo_gaps", "stereo_row");
 pub const PACK: Shader = shader!("stereo_common"; "stereo_pack", "stereo_line");
 
 pub const ALL: [Shader; 11] = [LIKELY, CENSUS, COST, ROWS, COLUMNS, WINNERS, RUNS, JOIN, SIZES, GAPS, PACK];
+
+/// Pixels, or words, of a workgroup, as `stereo_line.wgsl` declares it.
+const LINE: usize = 64;
+
+/// The workgroups of a pass that goes through so many pixels or words in one line.
+pub fn in_line(count: usize) -> [u32; 3] {
+    workgroups_2d(count.div_ceil(LINE) as u32)
+}
 
 /// The `override` constants of `stereo_common.wgsl`.
 pub type Constants = [(&'static str, f64); 14];

@@ -5,9 +5,9 @@
 //! iteration*, Computer Physics Communications, 2015). Whatever the order, the root of an island is its first pixel that
 //! begins a run.
 
-use super::pass::{Pass, in_line};
-use super::shaders::{self, Constants};
+use super::shaders::{self, Constants, in_line};
 use crate::compute::device::Device;
+use crate::compute::device::pass::Pass;
 
 /// Four bytes a pixel each, of any content.
 pub struct Scratch<'a> {
@@ -25,9 +25,10 @@ pub fn passes(
     Scratch { labels, sizes, filled }: Scratch,
     words: &wgpu::Buffer,
 ) -> [Pass; 5] {
-    let (pixels, rows) = (width * height, [height, 1, 1]);
-    let pass =
-        |shader, buffers: &[&wgpu::Buffer], workgroups| Pass::new(device, shader, constants, buffers, workgroups);
+    let (pixels, rows) = (width * height, [height as u32, 1, 1]);
+    let pass = |shader, buffers: &[&wgpu::Buffer], workgroups| {
+        Pass::new(device, shader, constants, buffers.iter().map(|buffer| buffer.as_entire_buffer_binding()), workgroups)
+    };
     [
         pass(shaders::RUNS, &[map, labels, sizes], rows),
         pass(shaders::JOIN, &[map, labels], in_line(pixels)),
