@@ -19,9 +19,10 @@ fn parse(source: &str) -> naga::Module {
 fn every_shader_validates_and_is_named_like_its_file() {
     let blur = ALL.map(|shader| (shader, CONSTANTS.map(|(name, _)| name).to_vec()));
     let constants = stereo::constants((1, 1), 16, 0, false).map(|(name, _)| name);
-    let stereo = stereo::ALL.map(|shader| (shader, constants.to_vec()));
+    let matching = stereo::ALL.map(|shader| (shader, constants.to_vec()));
     let refine = refine::ALL.map(|shader| (shader, refine::constants(false).map(|(name, _)| name).to_vec()));
-    for (shader, constants) in blur.into_iter().chain(stereo).chain(refine) {
+    let rectify = (stereo::RECTIFY, stereo::rectify_constants(4, 4, 1).map(|(name, _)| name).to_vec());
+    for (shader, constants) in blur.into_iter().chain(matching).chain(refine).chain([rectify]) {
         let module = parse(shader.source);
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
         if let Err(error) = validator.validate(&module) {
@@ -44,7 +45,12 @@ fn every_file_is_a_pass_or_shared_and_short() {
              stereo_path stereo_root stereo_row stereo_touch refine_common refine_ends refine_lanes refine_select \
              refine_window";
         let known = shared.split(' ').any(|file| file == name)
-            || ALL.iter().chain(&stereo::ALL).chain(&refine::ALL).any(|shader| shader.name == name)
+            || ALL
+                .iter()
+                .chain(&stereo::ALL)
+                .chain(&refine::ALL)
+                .chain([&stereo::RECTIFY])
+                .any(|shader| shader.name == name)
             || name == "present";
         assert!(known, "{} belongs to no pass", path.display());
         let lines = std::fs::read_to_string(&path).expect("a text").lines().count();

@@ -11,11 +11,11 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::frame::{ColorImage, GrayImage};
 
 /// 1 in fixed point: fractions and weights are in parts of this.
-const ONE: u32 = 256;
+pub(crate) const ONE: u32 = 256;
 /// Where the second fraction begins.
-const DOWN_SHIFT: u32 = 16;
+pub(crate) const DOWN_SHIFT: u32 = 16;
 /// Marks a pixel that sees nothing: the sign bit, which no fractions reach.
-const NOWHERE: u32 = 1 << 31;
+pub(crate) const NOWHERE: u32 = 1 << 31;
 /// Pixels that are gathered before they are weighted: the weighting alone is vector code.
 const BLOCK: usize = 64;
 /// Bytes of a colour pixel.
@@ -63,6 +63,13 @@ impl Map {
     /// Columns and rows of the pictures.
     pub fn size(&self) -> (u32, u32) {
         self.size
+    }
+
+    /// For every pixel the index of the upper left one of the four that it comes from, and both fractions: for executors
+    /// elsewhere.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn words(&self) -> [&[u32]; 2] {
+        [&self.starts, &self.fractions]
     }
 
     /// Where the pixel in column `x` and row `y` comes from, as it is stored; `None` where it sees nothing.

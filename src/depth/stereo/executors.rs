@@ -103,6 +103,10 @@ impl Executor for Fallback {
         self.now.describe()
     }
 
+    fn device(&self) -> Option<Arc<Device>> {
+        self.now.device()
+    }
+
     fn disparities(&mut self, eyes: [&[u8]; 2], workers: &mut ThreadPool, out: &mut [u16]) -> Result<(), GpuError> {
         match (self.now.disparities(eyes, workers, out), self.other.take()) {
             (Err(error), Some(other)) => {

@@ -17,10 +17,12 @@ mod gaps;
 pub mod gpu;
 mod half;
 mod penalty;
+mod rectify;
 pub mod source;
 mod tidy;
 
 use std::iter;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use color_similarity::Colors;
@@ -29,7 +31,7 @@ use executors::Executors;
 use tidy::Tidy;
 
 use crate::compute::thread_pool::{DisjointParts, ThreadPool};
-use crate::compute::{Backend, GpuError};
+use crate::compute::{Backend, Device, GpuError};
 use crate::frame::{ColorImage, DisparityMap, GrayImage};
 use crate::names::named;
 
@@ -79,6 +81,12 @@ pub trait Matcher: Send {
 
     /// Changes the effort from the next pair on.
     fn set_effort(&mut self, effort: Effort);
+
+    /// The GPU that it runs on, for what else there is to do of its pairs.
+    #[doc(hidden)]
+    fn device(&self) -> Option<Arc<Device>> {
+        None
+    }
 
     /// The disparity of `pair` into `into`, which becomes as large as its pictures; every pixel is answered.
     ///
@@ -192,6 +200,10 @@ impl Level {
 impl Matcher for Matching {
     fn describe(&self) -> String {
         self.levels[self.settings.effort as usize].executor.describe()
+    }
+
+    fn device(&self) -> Option<Arc<Device>> {
+        self.levels[self.settings.effort as usize].executor.device()
     }
 
     fn set_effort(&mut self, effort: Effort) {

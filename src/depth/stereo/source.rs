@@ -6,6 +6,7 @@
 //! ([`StereoRig::assumed`]) blurs as well as a measured one; only distances in metres mean nothing then.
 
 use super::check::{Verdict, check};
+use super::rectify::PairRectifier;
 use super::{Effort, Matcher, Pair, Settings};
 use crate::calibration::rectifier::Rectifier;
 use crate::depth::{DepthError, DepthSource, Seen};
@@ -32,7 +33,7 @@ type Widen = Box<dyn Fn(u32) -> Result<Box<dyn Matcher>, DepthError> + Send>;
 pub struct StereoDepth {
     source_name: String,
     rig: StereoRig,
-    rectifier: Option<Rectifier>,
+    rectifier: Option<PairRectifier>,
     matcher: Box<dyn Matcher>,
     left: GrayImage,
     /// Where pictures are rectified to.
@@ -65,9 +66,13 @@ impl StereoDepth {
         }
     }
 
-    /// The same from pairs that `rectifier` rectifies. Their left pictures are rectified as well.
+    /// The same from pairs that `rectifier` rectifies, on the GPU that matches if one does. Their left pictures are rectified as
+    /// well.
     pub fn of_raw(source_name: &str, rectifier: Rectifier, matcher: Box<dyn Matcher>, disparities: u32) -> Self {
         let rig = rectifier.rig();
+        let rectifier = PairRectifier::new(rectifier);
+        #[cfg(feature = "gpu")]
+        let rectifier = rectifier.on(matcher.device());
         Self { rectifier: Some(rectifier), ..Self::of_rectified(source_name, rig, matcher, disparities) }
     }
 
@@ -141,7 +146,7 @@ fn log_check((source_name, calibrated): (&str, bool), verdict: Verdict) -> bool 
 
 impl DepthSource for StereoDepth {
     fn rectify(&mut self, color: &mut ColorImage) {
-        if let Some(rectifier) = &self.rectifier {
+        if let Some(rectifier) = &mut self.rectifier {
             rectifier.left(color, &mut self.color);
             std::mem::swap(color, &mut self.color);
         }
@@ -152,7 +157,7 @@ impl DepthSource for StereoDepth {
             return Err(DepthError::OneEye { source_name: self.source_name.clone() });
         };
         self.left.set_luma_of(seen.color);
-        let rectified = match &self.rectifier {
+        let rectified = match &mut self.rectifier {
             Some(rectifier) => {
                 rectifier.right(right, &mut self.right);
                 None

@@ -8,6 +8,7 @@
 //! What has one number for each pixel has a word for it, so that no two invocations write to one. Both eyes go up and one
 //! map comes back; what the next pair needs of this one stays.
 
+pub mod rectifier;
 pub mod shaders;
 pub mod tidying;
 
@@ -140,6 +141,10 @@ fn has_room(device: &Device, (width, height): (usize, usize), disparities: usize
 impl Executor for GpuExecutor {
     fn describe(&self) -> String {
         self.device.name.clone()
+    }
+
+    fn device(&self) -> Option<Arc<Device>> {
+        Some(Arc::clone(&self.device))
     }
 
     fn disparities(

@@ -1,6 +1,7 @@
 //! The shaders, and the numbers that Rust shares with them.
 
 use super::super::fixed::{AGREE, BONUS, FILLED, NOISE, ONE, OUTSIDE, SLOPE, STEP, UNKNOWN};
+use crate::calibration::map::{DOWN_SHIFT, NOWHERE, ONE as WHOLE};
 use crate::compute::device::pass::workgroups_2d;
 use crate::compute::device::{Shader, shader};
 
@@ -28,6 +29,21 @@ pub const GAPS: Shader = shader!("stereo_common"; "stereo_gaps", "stereo_row");
 pub const PACK: Shader = shader!("stereo_common"; "stereo_pack", "stereo_line");
 
 pub const ALL: [Shader; 11] = [LIKELY, CENSUS, COST, ROWS, COLUMNS, WINNERS, RUNS, JOIN, SIZES, GAPS, PACK];
+
+/// Pictures of an eye, before they are matched: it has constants of its own.
+pub const RECTIFY: Shader = shader!("stereo_line"; "stereo_rectify");
+
+/// The `override` constants of `stereo_rectify.wgsl`, for pictures of so many bytes.
+pub fn rectify_constants(bytes: usize, stride: usize, channels: usize) -> [(&'static str, f64); 6] {
+    [
+        ("BYTES", bytes as f64),
+        ("STRIDE", stride as f64),
+        ("CHANNELS", channels as f64),
+        ("ONE", WHOLE.into()),
+        ("DOWN_SHIFT", DOWN_SHIFT.into()),
+        ("NOWHERE", NOWHERE.into()),
+    ]
+}
 
 /// Pixels, or words, of a workgroup, as `stereo_line.wgsl` declares it.
 const LINE: usize = 64;

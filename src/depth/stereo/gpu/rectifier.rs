@@ -1,0 +1,115 @@
+//! Rectification on a device: pictures of both eyes become on it what [`Map`] makes of them, to the bit.
+
+use std::sync::Arc;
+
+use super::shaders::{self, in_line};
+use crate::calibration::map::Map;
+use crate::compute::GpuError;
+use crate::compute::device::Device;
+use crate::compute::device::pass::{Pass, Recorder};
+use crate::compute::device::readback::Readback;
+use crate::frame::{ColorImage, GrayImage};
+
+/// Rectifies pictures of one size on a GPU.
+pub struct GpuRectifier {
+    device: Arc<Device>,
+    size: (u32, u32),
+    /// The left eye's, in colour, and the right eye's, in grey.
+    eyes: [Eye; 2],
+}
+
+/// What an eye's pictures take.
+struct Eye {
+    raw: wgpu::Buffer,
+    pass: Pass,
+    rectified: wgpu::Buffer,
+    readback: Readback,
+}
+
+impl Eye {
+    fn new(device: &Device, map: &Map, channels: usize) -> Self {
+        use wgpu::BufferUsages as Usage;
+        let (width, height) = map.size();
+        let (stride, bytes) = (channels * width as usize, channels * width as usize * height as usize);
+        let [starts, fractions] = map.words().map(|words| {
+            let buffer = device.buffer("sources", 4 * words.len(), Usage::STORAGE | Usage::COPY_DST);
+            device.upload(&buffer, 0, bytemuck::cast_slice(words));
+            buffer
+        });
+        let raw = device.buffer("raw", bytes, Usage::STORAGE | Usage::COPY_DST);
+        let rectified = device.buffer("rectified", bytes, Usage::STORAGE | Usage::COPY_SRC);
+        let constants = shaders::rectify_constants(bytes, stride, channels);
+        let buffers = [&starts, &fractions, &raw, &rectified].map(wgpu::Buffer::as_entire_buffer_binding);
+        let pass = Pass::new(device, shaders::RECTIFY, &constants, buffers, in_line(bytes.div_ceil(4)));
+        Self { raw, pass, readback: Readback::new(device, "rectified back", bytes), rectified }
+    }
+
+    fn rectify(&self, device: &Device, from: &[u8], into: &mut [u8]) -> Result<(), GpuError> {
+        device.check()?;
+        device.upload(&self.raw, 0, from);
+        let mut recorder = Recorder::new(device, None);
+        recorder.run(&self.pass);
+        self.readback.copy(&mut recorder.encoder, &self.rectified);
+        let submission = recorder.submit(device);
+        self.readback.map();
+        self.readback.wait(device, submission)?;
+        let length = into.len();
+        self.readback.read(device, |bytes| into.copy_from_slice(&bytes[..length]))
+    }
+}
+
+impl GpuRectifier {
+    /// The maps of the left and of the right eye on a device.
+    ///
+    /// # Errors
+    /// It has no room for them, failed, or resamples a picture otherwise than the processor.
+    pub fn new(device: &Arc<Device>, maps: &[Map; 2]) -> Result<Self, GpuError> {
+        let eyes = device.attempt(|| [Eye::new(device, &maps[0], 3), Eye::new(device, &maps[1], 1)])?;
+        let mut made = Self { device: Arc::clone(device), size: maps[0].size(), eyes };
+        made.try_out(&maps[1])?;
+        device.check()?;
+        Ok(made)
+    }
+
+    /// Drivers have faults, and none is to be found out by whoever is looked at.
+    fn try_out(&mut self, map: &Map) -> Result<(), GpuError> {
+        let (width, height) = map.size();
+        let luma = (0..width * height).map(|k| (k.wrapping_mul(0x9e37_79b1) >> 24) as u8).collect();
+        let from = GrayImage { width, height, luma };
+        let (mut expected, mut found) = (GrayImage::default(), GrayImage::default());
+        map.gray(&from, &mut expected);
+        self.right(&from, &mut found)?;
+        let name = &self.device.name;
+        if found.luma == expected.luma {
+            Ok(())
+        } else {
+            Err(GpuError::Failed(format!("{name}: a trial is rectified wrongly: its driver may have a fault")))
+        }
+    }
+
+    /// The left picture, rectified, into `into`.
+    ///
+    /// # Errors
+    /// The device failed.
+    ///
+    /// # Panics
+    /// When `from` has not the size of the maps.
+    pub fn left(&mut self, from: &ColorImage, into: &mut ColorImage) -> Result<(), GpuError> {
+        assert_eq!(from.size(), self.size, "pictures are resampled at one size");
+        into.resize(from.width, from.height);
+        self.eyes[0].rectify(&self.device, &from.rgb, &mut into.rgb)
+    }
+
+    /// The right picture, rectified, into `into`.
+    ///
+    /// # Errors
+    /// The device failed.
+    ///
+    /// # Panics
+    /// When `from` has not the size of the maps.
+    pub fn right(&mut self, from: &GrayImage, into: &mut GrayImage) -> Result<(), GpuError> {
+        assert_eq!(from.size(), self.size, "pictures are resampled at one size");
+        into.resize(from.width, from.height);
+        self.eyes[1].rectify(&self.device, &from.luma, &mut into.luma)
+    }
+}

@@ -1,0 +1,72 @@
+//! Pairs are rectified where they are matched: on a GPU, or on the processor, which takes over when that fails.
+
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
+
+#[cfg(feature = "gpu")]
+use super::gpu::rectifier::GpuRectifier;
+use crate::calibration::rectifier::Rectifier;
+#[cfg(feature = "gpu")]
+use crate::compute::{Device, GpuError};
+use crate::frame::{ColorImage, GrayImage};
+
+/// Rectifies the pictures of both eyes; the same to the bit wherever it does.
+pub(super) struct PairRectifier {
+    rectifier: Rectifier,
+    #[cfg(feature = "gpu")]
+    gpu: Option<GpuRectifier>,
+}
+
+impl PairRectifier {
+    /// On the processor.
+    pub fn new(rectifier: Rectifier) -> Self {
+        Self {
+            rectifier,
+            #[cfg(feature = "gpu")]
+            gpu: None,
+        }
+    }
+
+    /// On a device, where there is one that does it right: what keeps it from that is said.
+    #[cfg(feature = "gpu")]
+    pub fn on(self, device: Option<Arc<Device>>) -> Self {
+        let gpu = device.and_then(|device| match GpuRectifier::new(&device, self.rectifier.maps()) {
+            Ok(gpu) => Some(gpu),
+            Err(error) => {
+                tracing::warn!("{error}; the CPU rectifies");
+                None
+            }
+        });
+        Self { gpu, ..self }
+    }
+
+    /// The left picture, rectified, into `into`.
+    pub fn left(&mut self, from: &ColorImage, into: &mut ColorImage) {
+        #[cfg(feature = "gpu")]
+        if self.takes(|gpu| gpu.left(from, into)) {
+            return;
+        }
+        self.rectifier.left(from, into);
+    }
+
+    /// The right picture, rectified, into `into`.
+    pub fn right(&mut self, from: &GrayImage, into: &mut GrayImage) {
+        #[cfg(feature = "gpu")]
+        if self.takes(|gpu| gpu.right(from, into)) {
+            return;
+        }
+        self.rectifier.right(from, into);
+    }
+
+    /// Whether there is a device, and it did this; one that fails is not asked again.
+    #[cfg(feature = "gpu")]
+    fn takes(&mut self, rectify: impl FnOnce(&mut GpuRectifier) -> Result<(), GpuError>) -> bool {
+        match self.gpu.as_mut().map(rectify) {
+            Some(Ok(())) => return true,
+            Some(Err(error)) => tracing::warn!("{error}; the CPU rectifies from here on"),
+            None => {}
+        }
+        self.gpu = None;
+        false
+    }
+}
