@@ -3,7 +3,11 @@
 //! Every depth pixel is a small square that faces its camera. It is put where the colour camera sees it, as large as
 //! it looks from there, and the nearest one wins. What only the colour camera sees stays unknown.
 
+mod draw;
+
+use draw::Draw;
 use glam::{Mat3, Vec3};
+use pulp::Arch;
 
 use crate::frame::DepthMap;
 
@@ -120,9 +124,11 @@ pub struct Registration {
     size: (u32, u32),
     depth: Pinhole,
     out: Pinhole,
-    /// What each column adds to the direction of its pixels, seen by the colour camera.
-    columns: Vec<Vec3>,
+    /// How far to the right each column looks, a metre ahead, in metres.
+    columns: Vec<f32>,
+    /// Where the middle of each row looks, seen by the colour camera.
     rows: Vec<Vec3>,
+    arch: Arch,
 }
 
 impl Registration {
@@ -133,7 +139,8 @@ impl Registration {
     pub fn new(calibration: Calibration) -> Result<Self, CalibrationError> {
         calibration.check()?;
         let Calibration { depth, color: out, .. } = calibration;
-        Ok(Self { calibration, size: (0, 0), depth, out, columns: Vec::new(), rows: Vec::new() })
+        let (columns, rows, arch) = (Vec::new(), Vec::new(), Arch::new());
+        Ok(Self { calibration, size: (0, 0), depth, out, columns, rows, arch })
     }
 
     /// Moves `from` into `into`, which covers what the colour camera sees, as finely as `from` does and no finer than
@@ -142,44 +149,8 @@ impl Registration {
         if from.size() != self.size {
             self.fit(from.size());
         }
-        let out = self.out;
-        into.resize(out.width, out.height);
-        into.metres.fill(f32::INFINITY);
-        let offset = self.calibration.translation_m;
-        // Half of what a pixel covers where it is as far from either camera.
-        let (half_across, half_down) = (HALF * out.fx / self.depth.fx, HALF * out.fy / self.depth.fy);
-        let width = out.width as usize;
-        for (row, measured) in self.rows.iter().zip(from.metres.chunks_exact(from.width.max(1) as usize)) {
-            for (&z_m, column) in measured.iter().zip(&self.columns) {
-                if !DepthMap::is_known(z_m) {
-                    continue;
-                }
-                let point = (*column + *row) * z_m + offset;
-                if point.z <= NEAREST_M {
-                    continue;
-                }
-                let per_m = 1.0 / point.z;
-                let (u, v) = (out.fx * point.x * per_m + out.cx, out.fy * point.y * per_m + out.cy);
-                let (half_u, half_v) =
-                    ((half_across * z_m * per_m).min(LARGEST_PX), (half_down * z_m * per_m).min(LARGEST_PX));
-                // From the first centre that lies in it to the one behind the last; conversion keeps to whole numbers.
-                let left = (u - half_u).ceil().max(0.0) as usize;
-                let right = ((u + half_u).ceil().max(0.0) as usize).min(width);
-                let top = (v - half_v).ceil().max(0.0) as usize;
-                let bottom = ((v + half_v).ceil().max(0.0) as usize).min(out.height as usize);
-                if left >= right {
-                    continue;
-                }
-                for y in top..bottom {
-                    for nearest in &mut into.metres[y * width + left..y * width + right] {
-                        *nearest = nearest.min(point.z);
-                    }
-                }
-            }
-        }
-        for z_m in &mut into.metres {
-            *z_m = if *z_m < f32::INFINITY { *z_m } else { 0.0 };
-        }
+        into.resize(self.out.width, self.out.height);
+        self.arch.dispatch(Draw { registration: self, from: &from.metres, into: &mut into.metres });
     }
 
     /// Prepares for maps of another size.
@@ -193,21 +164,12 @@ impl Registration {
         self.out = color.resized(side(color.width), side(color.height));
         let camera = &self.depth;
         self.columns.clear();
-        self.columns.extend((0..size.0).map(|x| rotation.x_axis * ((x as f32 - camera.cx) / camera.fx)));
+        self.columns.extend((0..size.0).map(|x| (x as f32 - camera.cx) / camera.fx));
         self.rows.clear();
         let down = |y: u32| rotation.y_axis * ((y as f32 - camera.cy) / camera.fy) + rotation.z_axis;
         self.rows.extend((0..size.1).map(down));
     }
 }
-
-/// Half of a pixel, and a little more: slanted surfaces, whose pixels are drawn apart, hang together.
-const HALF: f32 = 0.5 * 1.15;
-
-/// What is nearer to the colour camera is not believed.
-const NEAREST_M: f32 = 0.01;
-
-/// Half of the largest square: what is much nearer to the colour camera than to the other has gaps.
-const LARGEST_PX: f32 = 4.0;
 
 #[cfg(test)]
 mod tests {
