@@ -35,8 +35,8 @@ pub struct Sent {
     pub job: Job,
     /// Where the result is left on the device.
     pub on_device: Option<Pooled<DevicePicture>>,
-    /// Whether it was copied to the slot.
-    pub in_memory: bool,
+    /// Bytes of it that were copied to the slot; 0 where it stays on the device.
+    pub copied: u64,
     /// What to wait for.
     pub submission: wgpu::SubmissionIndex,
     /// When it was begun.
@@ -100,15 +100,15 @@ impl Ring {
         let done = move |is_ok: bool| done.store(if is_ok { READY } else { FAILED }, Ordering::Release);
         // Only the last mapping reports: callbacks run in the order of the calls, so all is mapped then.
         match &slot.stamps {
-            Some(stamps) if !sent.in_memory => {
+            Some(stamps) if sent.copied == 0 => {
                 stamps.map_async(wgpu::MapMode::Read, .., move |result| done(result.is_ok()));
             }
-            None if !sent.in_memory => device.queue.on_submitted_work_done(move || done(true)),
+            None if sent.copied == 0 => device.queue.on_submitted_work_done(move || done(true)),
             stamps => {
                 if let Some(stamps) = stamps {
                     stamps.map_async(wgpu::MapMode::Read, .., |_| {});
                 }
-                slot.picture.map_async(wgpu::MapMode::Read, .., move |result| done(result.is_ok()));
+                slot.picture.map_async(wgpu::MapMode::Read, ..sent.copied, move |result| done(result.is_ok()));
             }
         }
         self.pending.push_back(Pending { slot, sent, state });
@@ -132,13 +132,13 @@ impl Ring {
             _ => {}
         }
         let Some(Pending { slot, sent, .. }) = self.pending.front_mut() else { return Ok(None) };
-        let Sent { job, in_memory, started, .. } = sent;
-        let (in_memory, started) = (*in_memory, *started);
+        let Sent { job, copied, started, .. } = sent;
+        let (copied, started) = (*copied, *started);
         let fault = |error: wgpu::MapRangeError| GpuError::Failed(error.to_string());
-        if in_memory {
+        if copied > 0 {
             {
-                let bytes = slot.picture.get_mapped_range(..).map_err(fault)?;
-                let out = &mut job.out.rgb;
+                let bytes = slot.picture.get_mapped_range(..copied).map_err(fault)?;
+                let out = job.yuyv.as_mut().map_or(&mut job.out.rgb, |yuyv| &mut yuyv.bytes);
                 let length = out.len();
                 out.copy_from_slice(&bytes[..length]);
             }
@@ -173,10 +173,11 @@ impl Ring {
         let Sent { job, on_device, .. } = sent;
         slot.passes.clear();
         self.free.push(slot);
-        let Job { ticket, color, depth, out, .. } = job;
-        let picture = match on_device {
-            Some(device) => Picture::on_device(device, out, in_memory),
-            None => Picture::in_memory(out),
+        let Job { ticket, color, depth, out, yuyv, .. } = job;
+        let picture = match (on_device, yuyv) {
+            (Some(device), _) => Picture::on_device(device, out, copied > 0),
+            (None, Some(yuyv)) => Picture::as_yuyv(yuyv, out),
+            (None, None) => Picture::in_memory(out),
         };
         Ok(Some(Finished { ticket, picture, color, depth, times }))
     }
