@@ -46,6 +46,7 @@ struct Frame {
     even: u32,                  // 1: taps at -j and j are equal
     extent: f32,                // of the aperture: the outermost point, in radii
     rows_apart: u32,            // pixels filtered at once: from one term's rows to the next one's
+    yuyv: u32,                  // 1: the result is YUYV
 }
 
 // What a dispatch does: some bins, of one layer where it goes over the picture.

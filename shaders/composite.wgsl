@@ -1,4 +1,4 @@
-// Pass composite: the blurred bins, front to back as disjoint coverage, become one picture of packed 8-bit sRGB.
+// Pass composite: the blurred bins, front to back as disjoint coverage, become one picture of packed 8-bit sRGB, or YUYV of that.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
@@ -110,7 +110,7 @@ fn codes_of(index: u32) -> u32 {
     return code_of(color.r) | (code_of(color.g) << 8u) | (code_of(color.b) << 16u);
 }
 
-// A pixel each; four of them are three words.
+// A pixel each; four of them are three words, or two of them one.
 @compute @workgroup_size(LINE)
 fn composite(@builtin(workgroup_id) line: vec3<u32>, @builtin(num_workgroups) lines: vec3<u32>,
              @builtin(local_invocation_index) thread: u32) {
@@ -120,6 +120,12 @@ fn composite(@builtin(workgroup_id) line: vec3<u32>, @builtin(num_workgroups) li
         codes[thread] = codes_of(first + thread);
     }
     workgroupBarrier();
+    if frame.yuyv == 1u {
+        if 2u * thread < LINE && first + 2u * thread < pixels {
+            result[first / 2u + thread] = yuyv_of(codes[2u * thread], codes[2u * thread + 1u]);
+        }
+        return;
+    }
     // A word has the last bytes of a pixel, `word % 3` done, and the first ones of the next.
     let word = 3u * first / 4u + thread;
     let pixel = 4u * (thread / 3u) + thread % 3u;

@@ -63,6 +63,36 @@ impl ColorImage {
     }
 }
 
+/// A picture as cameras give it: `height` x `width` x 2 bytes (Y Cb Y Cr), row-major, no padding. The width is even: two
+/// pixels share their colour. BT.601, limited range.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct YuyvImage {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `height * width * 2` bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl YuyvImage {
+    /// A picture of zeros.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self { width, height, bytes: vec![0; width as usize * height as usize * 2] }
+    }
+
+    /// Gives the picture another size, keeping its memory where that suffices. The content is unspecified after.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        (self.width, self.height) = (width, height);
+        make_room(&mut self.bytes, width as usize * height as usize * 2);
+    }
+
+    /// Columns and rows.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+}
+
 /// An 8-bit grey picture: `height` x `width` bytes of sRGB luma, row-major, no padding.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct GrayImage {

@@ -49,7 +49,7 @@ use crate::compute::Backend;
 use crate::computing::Computing;
 use crate::depth::DepthSource;
 use crate::frame::crop::Cropper;
-use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
+use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp, YuyvImage};
 use crate::link::demand::Demand;
 use crate::link::pool::Pool;
 use crate::link::{self, Receiver, Sender};
@@ -211,6 +211,9 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let rights = Pool::new(if info.brings == Brings::RightEye { places.rights() } else { 0 }, GrayImage::default);
     let taken = Pool::new(places.taken(), staging::Taken::default);
     let outs = Pool::new(places.outs(), || ColorImage::new(info.size.0, info.size.1));
+    let yuyvs = Pool::new(places.outs(), YuyvImage::default);
+    // Whether the sink takes pictures as YUYV, and nobody else is given them.
+    let wants_yuyv = AtomicBool::new(false);
 
     let (to_depth, from_capture) = link(pace);
     let (to_blur, from_depth) = link(pace);
@@ -262,7 +265,9 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         rule: quality,
         about: &mut about,
         outs: &outs,
+        yuyvs: &yuyvs,
         wanted: run.wanted.filter(|_| !run.mirror),
+        wants_yuyv: &wants_yuyv,
         viewed: places.viewed,
         tally: &tally,
         clock: &clock,
@@ -273,6 +278,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         sink: &mut *sink,
         view: run.view,
         mirror: run.mirror,
+        wants_yuyv: &wants_yuyv,
         total: info.frames,
         progress: run.progress,
         playout: live_ns.map(playout::Playout::new),

@@ -21,9 +21,10 @@ use bokehcam::compute::device::Device;
 use bokehcam::compute::{Backend, Place};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::{self, Effort, Pair};
-use bokehcam::frame::{ColorImage, DisparityMap, GrayImage};
+use bokehcam::frame::{ColorImage, DisparityMap, GrayImage, YuyvImage};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
+use bokehcam::sink::yuyv;
 use common::{coc, noise, settings, three_depths};
 use tempfile::TempDir;
 
@@ -73,6 +74,7 @@ fn test_under(layer: &TempDir, fault: &str, test: &str) -> String {
     told
 }
 
+/// A frame; every other one may be YUYV.
 fn job(ticket: u64) -> Job {
     Job {
         ticket,
@@ -82,6 +84,7 @@ fn job(ticket: u64) -> Job {
         quality: Quality::Balanced,
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
+        yuyv: (ticket % 2 == 1).then(|| Pooled::detached(YuyvImage::default())),
     }
 }
 
@@ -91,6 +94,8 @@ fn blur(bokeh: &mut dyn Bokeh, mut before: impl FnMut(u64)) {
     let Job { color, depth, coc, .. } = job(0);
     let mut cpu = CpuBokeh::new(Plan::new(&settings(CocKind::Depth), SIZE.0, SIZE.1), Some(1));
     cpu.blur(&color, depth.as_deref(), &coc, &mut expected).unwrap();
+    let mut expected_yuyv = YuyvImage::new(SIZE.0, SIZE.1);
+    yuyv::Encoder::new().encode(&expected, &mut expected_yuyv.bytes);
     let (mut submitted, mut collected) = (0, 0);
     while collected < FRAMES {
         if submitted < FRAMES && bokeh.in_flight() < bokeh.capacity() {
@@ -99,11 +104,18 @@ fn blur(bokeh: &mut dyn Bokeh, mut before: impl FnMut(u64)) {
             submitted += 1;
             continue;
         }
-        let finished = bokeh.collect(true).expect("the frame is blurred").expect("a frame is in flight");
+        let mut finished = bokeh.collect(true).expect("the frame is blurred").expect("a frame is in flight");
         assert_eq!(finished.ticket, collected);
-        let picture = finished.picture.memory().expect("it is in memory");
-        let worst = picture.rgb.iter().zip(&expected.rgb).map(|(&a, &b)| a.abs_diff(b)).max();
-        assert!(picture.size() == SIZE && worst <= Some(CODES), "frame {collected}: {worst:?}");
+        let size = finished.picture.size();
+        let (picture, expected) = match finished.picture.yuyv_mut() {
+            Some(picture) => (&picture.bytes, &expected_yuyv.bytes),
+            None => (&finished.picture.memory().expect("it is in memory").rgb, &expected.rgb),
+        };
+        let worst = picture.iter().zip(expected).map(|(&a, &b)| a.abs_diff(b)).max();
+        assert!(
+            size == SIZE && picture.len() == expected.len() && worst <= Some(CODES),
+            "frame {collected}: {worst:?}"
+        );
         collected += 1;
     }
 }

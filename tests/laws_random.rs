@@ -192,6 +192,7 @@ mod on_the_gpu {
                 quality,
                 place: Place::Memory,
                 out: Pooled::detached(ColorImage::default()),
+                yuyv: None,
             })
             .expect("the GPU takes a frame");
             let finished = self.collect(true).expect("the GPU blurs").expect("a frame comes back");

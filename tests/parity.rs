@@ -43,6 +43,7 @@ fn job(ticket: u64, color: &ColorImage, map: &DepthMap, field: &CocField) -> Job
         quality: Quality::default(),
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
+        yuyv: None,
     }
 }
 

@@ -167,6 +167,7 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
         quality,
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
+        yuyv: None,
     })
     .unwrap();
     (cpu.collect(true).unwrap().unwrap().picture.memory().unwrap().clone(), field)

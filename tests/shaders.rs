@@ -41,7 +41,7 @@ fn every_file_is_a_pass_or_shared_and_short() {
     for entry in std::fs::read_dir(folder).expect("the folder of shaders") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
-        let shared = "base common filter list meet mixed next pyramid range show tent tiles todo work stereo_common stereo_line \
+        let shared = "base common filter list meet mixed next pyramid range show tent tiles todo work yuyv stereo_common stereo_line \
              stereo_path stereo_root stereo_row stereo_touch refine_common refine_ends refine_lanes refine_select \
              refine_window";
         let known = shared.split(' ').any(|file| file == name)
@@ -84,7 +84,8 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
             mixed,
             even,
             extent,
-            rows_apart
+            rows_apart,
+            yuyv
         }),
         layout!(Bin {
             size,

@@ -29,17 +29,12 @@ fn tidied(device: &Device, size: (usize, usize), island: u32, map: &[u16]) -> Ve
     });
     let scratch = Scratch { labels: &used[0], sizes: &used[1], filled: &used[2] };
     let out = buffer(pixels * 2, Usage::STORAGE | Usage::COPY_SRC);
-    let back = Readback::new(device, "words back", pixels * 2);
+    let mut back = Readback::new(device, "words back", pixels * 2);
     let constants = shaders::constants(size, 16, island, false);
     let mut recorder = Recorder::new(device, None);
     passes(device, size, &constants, &on_device, scratch, &out).iter().for_each(|pass| recorder.run(pass));
-    back.copy(&mut recorder.encoder, &out);
-    let submission = recorder.submit(device);
-    back.map();
-    back.wait(device, submission).expect("the device is there");
-    let taken = back
-        .read(device, |bytes| bytes.as_chunks().0[..pixels].iter().map(|bytes| u16::from_le_bytes(*bytes)).collect());
-    taken.expect("it is mapped")
+    let take = |bytes: &[u8]| bytes.as_chunks().0[..pixels].iter().map(|bytes| u16::from_le_bytes(*bytes)).collect();
+    recorder.fetch(device, &mut back, (&out, out.size()), take).expect("the device is there")
 }
 
 /// The same, pixel by pixel.

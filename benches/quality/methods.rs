@@ -258,6 +258,7 @@ impl Blurrer {
             quality: Quality::default(),
             place: Place::Memory,
             out: Pooled::detached(ColorImage::default()),
+            yuyv: None,
         })?;
         let finished = bokeh.collect(true)?;
         Ok(finished.and_then(|mut finished| finished.picture.memory_mut().map(std::mem::take)).unwrap_or_default())

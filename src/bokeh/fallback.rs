@@ -210,7 +210,16 @@ mod tests {
 
     fn job(ticket: u64, pool: &Pool<ColorImage>, coc: CocField) -> Job {
         let quality = Quality::Balanced;
-        Job { ticket, color: pool.take(), depth: None, coc, quality, place: Place::Memory, out: pool.take() }
+        Job {
+            ticket,
+            color: pool.take(),
+            depth: None,
+            coc,
+            quality,
+            place: Place::Memory,
+            out: pool.take(),
+            yuyv: None,
+        }
     }
 
     const UNIFORM: CocField = CocField::Uniform { radius_px: 1.0 };

@@ -40,7 +40,7 @@ pub use picture::Picture;
 
 pub use crate::compute::{Backend, PassTimes};
 use crate::compute::{Device, GpuError, Place};
-use crate::frame::{ColorImage, DepthMap};
+use crate::frame::{ColorImage, DepthMap, YuyvImage};
 use crate::link::pool::Pooled;
 use crate::names::named;
 use crate::optics::{CocField, CocKind};
@@ -125,6 +125,9 @@ pub struct Job {
     pub place: Place,
     /// Buffer for the result in memory; resized to the picture's size.
     pub out: Pooled<ColorImage>,
+    /// A buffer for the result as YUYV, where that is as good: an executor that makes it as easily fills this one in the
+    /// place of `out`. Not for results on the device.
+    pub yuyv: Option<Pooled<YuyvImage>>,
 }
 
 /// A blurred frame.

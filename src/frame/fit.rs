@@ -48,6 +48,15 @@ impl Fit {
             self.scale.row(&from.rgb, y, 0..place.width, &mut self.row, scaled);
         }
     }
+
+    /// `from` where that has the size of `room`, else [`fit`](Self::fit) into `room`.
+    pub fn fitted<'a>(&mut self, from: &'a ColorImage, room: &'a mut ColorImage) -> &'a ColorImage {
+        if from.size() == room.size() {
+            return from;
+        }
+        self.fit(from, room);
+        room
+    }
 }
 
 /// `None` where either picture has no pixels.

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::depth::Ready;
 use super::quality::{LateRule, Picker};
@@ -13,7 +14,7 @@ use crate::bokeh::{Bokeh, Finished, Job, PassTimes, Picture};
 use crate::budget::Quality;
 use crate::clock::Clock;
 use crate::compute::Place;
-use crate::frame::{ColorImage, DepthMap, Stamp};
+use crate::frame::{ColorImage, DepthMap, Stamp, YuyvImage};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{Receiver, Sender};
 use crate::look::QualityRule;
@@ -35,6 +36,7 @@ pub(super) struct Stage<'a> {
     /// `None` blurs every frame.
     pub late: Option<LateRule>,
     pub outs: &'a Pool<ColorImage>,
+    pub yuyvs: &'a Pool<YuyvImage>,
     pub tally: &'a Tally,
     pub clock: &'a Clock,
     pub picker: Picker,
@@ -46,6 +48,8 @@ pub(super) struct Stage<'a> {
     pub about: &'a mut About,
     /// Where pictures are wanted; in memory where nobody says.
     pub wanted: Option<Arc<Wanted>>,
+    /// Whether those in memory may be YUYV.
+    pub wants_yuyv: &'a AtomicBool,
     /// Whether somebody looks at what the pictures were made of.
     pub viewed: bool,
     pub budget_ns: u64,
@@ -165,7 +169,10 @@ impl Stage<'_> {
         }
         let quality = self.picker.quality();
         let place = self.wanted.as_ref().map_or(Place::Memory, |wanted| wanted.place());
-        let job = Job { ticket: ticket.id.0, color, depth, coc, quality, place, out: self.outs.take() };
+        // A part is cut out of the picture in full colour.
+        let is_yuyv = trace.part.is_none() && self.wants_yuyv.load(Ordering::Relaxed);
+        let (out, yuyv) = (self.outs.take(), is_yuyv.then(|| self.yuyvs.take()));
+        let job = Job { ticket: ticket.id.0, color, depth, coc, quality, place, out, yuyv };
         pending.push_back(Pending { ticket, stamp, trace, coc, taken, began_ns, quality });
         match executor.submit(job) {
             Ok(()) => Ok(true),

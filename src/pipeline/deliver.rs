@@ -1,15 +1,17 @@
 //! Last stage, on the caller's thread: hands pictures to the sink.
 
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::blur::Blurred;
 use super::playout::Playout;
 use super::{Ended, Frame, Progress, View};
+use crate::bokeh::Picture;
 use crate::clock::Clock;
 use crate::frame::ColorImage;
 use crate::frame::crop::Cropper;
 use crate::link::{self, Received, Receiver, Sender};
-use crate::sink::Sink;
+use crate::sink::{Sink, SinkError};
 use crate::stats::{Cause, Histogram, Tally, Ticket};
 
 pub(super) struct Stage<'a> {
@@ -17,6 +19,8 @@ pub(super) struct Stage<'a> {
     /// A viewer that is sent every frame as well.
     pub view: Option<Sender<View>>,
     pub mirror: bool,
+    /// Told before each frame whether pictures may be YUYV: where the sink wants that, and nobody else gets them.
+    pub wants_yuyv: &'a AtomicBool,
     /// Frames to be captured in all, where that is known.
     pub total: Option<u64>,
     pub progress: &'a dyn Fn(Progress),
@@ -49,6 +53,8 @@ impl Stage<'_> {
         // Ticket of the frame that was sent to the viewer last, where that decides whether it was delivered.
         let mut at_viewer = None;
         loop {
+            let wants_yuyv = self.view.is_none() && !self.mirror && self.sink.wants_yuyv();
+            self.wants_yuyv.store(wants_yuyv, Ordering::Relaxed);
             let Frame { ticket, stamp, mut trace, since_ns, item: mut frame } = match self.next(&mut from) {
                 Received::Item(frame) => frame,
                 Received::Nothing => match self.sink.repeat()? {
@@ -75,19 +81,14 @@ impl Stage<'_> {
             }
             let began_ns = ready_ns + trace.playout_ns;
             trace.age_ns = began_ns.saturating_sub(ticket.captured_ns);
-            if let Some(whole) = frame.picture.memory() {
-                self.sink.captured(ticket.captured_ns);
-                match self.sink.put(if is_cropped { &self.cropped } else { whole }, stamp.time_ns) {
-                    Ok(flow) if flow.is_break() => break,
-                    Ok(_) => {}
-                    Err(error) => {
-                        self.tally.dropped(ticket, Cause::Failed);
-                        return Err(error.into());
-                    }
+            let was_given = match self.give(&mut frame.picture, is_cropped, ticket.captured_ns, stamp.time_ns) {
+                Ok(ControlFlow::Continue(was_given)) => was_given,
+                Ok(ControlFlow::Break(())) => break,
+                Err(error) => {
+                    self.tally.dropped(ticket, Cause::Failed);
+                    return Err(error.into());
                 }
-            } else {
-                self.sink.pass_by();
-            }
+            };
             let now_ns = self.clock.now_ns();
             self.times.sink.add(now_ns - began_ns);
             self.times.latency.add(now_ns.saturating_sub(ticket.captured_ns));
@@ -96,7 +97,7 @@ impl Stage<'_> {
             }
             let captured_ns = ticket.captured_ns;
             // What the sink does not keep is delivered once the viewer took it.
-            let kept = frame.picture.memory().is_some() && self.sink.keeps();
+            let kept = was_given && self.sink.keeps();
             let (done, open) = if self.view.is_none() || kept { (Some(ticket), None) } else { (None, Some(ticket)) };
             done.into_iter().for_each(|ticket| self.tally.delivered(ticket));
             if let Some(view) = &mut self.view {
@@ -122,6 +123,27 @@ impl Stage<'_> {
         // The viewer still takes the last one.
         self.count_viewed(true, at_viewer);
         Ok(())
+    }
+
+    /// Gives the sink a picture, where that is in memory; `Continue` says whether it was.
+    fn give(
+        &mut self,
+        picture: &mut Picture,
+        is_cropped: bool,
+        captured_ns: u64,
+        time_ns: u64,
+    ) -> Result<ControlFlow<(), bool>, SinkError> {
+        let flow = if let Some(yuyv) = picture.yuyv_mut() {
+            self.sink.captured(captured_ns);
+            self.sink.put_yuyv(yuyv, time_ns)?
+        } else if let Some(whole) = picture.memory() {
+            self.sink.captured(captured_ns);
+            self.sink.put(if is_cropped { &self.cropped } else { whole }, time_ns)?
+        } else {
+            self.sink.pass_by();
+            return Ok(ControlFlow::Continue(false));
+        };
+        Ok(flow.map_continue(|()| true))
     }
 
     /// Counts a frame whose delivery was up to the viewer: delivered if that took it, else evicted.

@@ -107,6 +107,7 @@ pub(super) fn blur_into(
         quality,
         place: Place::Memory,
         out: Pooled::detached(out),
+        yuyv: None,
     })?;
     let Finished { mut picture, mut color, depth, .. } = bokeh.collect(true)?.ok_or(BokehError::Lost)?;
     let blurred = std::mem::take(picture.memory_mut().ok_or(BokehError::Lost)?);

@@ -54,6 +54,9 @@ pub enum SinkError {
         /// Width and height of the frame.
         got: (u32, u32),
     },
+    /// A defect of this program.
+    #[error("this output was given YUYV, which it did not ask for; please report this")]
+    Yuyv,
     /// The PNG encoder refused.
     #[error("cannot write {} as PNG: {message}", path.display())]
     Png { path: PathBuf, message: String },

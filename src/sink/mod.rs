@@ -46,7 +46,7 @@ pub use target::Target;
 pub use tee::Tee;
 pub use y4m::{Y4m, Y4mFile};
 
-use crate::frame::ColorImage;
+use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
 use crate::stats::NodeUse;
 
@@ -71,7 +71,24 @@ pub trait Sink: Send {
     /// The frame could not be written. A file then takes no more; what it had is kept, and the error says where.
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError>;
 
-    /// Told before [`Sink::put`] when that frame was captured, by the clock of the run: for outputs that hand it on.
+    /// Whether pictures are to come by [`Sink::put_yuyv`] from now on, where that is easy. Those that are under way come
+    /// as they were wanted before, so whoever has said so once takes both for good.
+    fn wants_yuyv(&mut self) -> bool {
+        false
+    }
+
+    /// [`Sink::put`] of a picture that is YUYV already, for sinks that [wanted](Sink::wants_yuyv) such. The memory of
+    /// another picture may be left in its place.
+    ///
+    /// # Errors
+    /// As for [`Sink::put`]; it never wanted such.
+    fn put_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        let _ = (frame, time_ns);
+        Err(SinkError::Yuyv)
+    }
+
+    /// Told before [`Sink::put`] and [`Sink::put_yuyv`] when that frame was captured, by the clock of the run: for outputs
+    /// that hand it on.
     fn captured(&mut self, captured_ns: u64) {
         let _ = captured_ns;
     }
@@ -177,6 +194,6 @@ impl Options {
 }
 
 /// The frames of a stream keep the size that its header states.
-fn check_size(made_for: (u32, u32), frame: &ColorImage) -> Result<(), SinkError> {
-    if frame.size() == made_for { Ok(()) } else { Err(SinkError::Size { made_for, got: frame.size() }) }
+fn check_size(made_for: (u32, u32), got: (u32, u32)) -> Result<(), SinkError> {
+    if got == made_for { Ok(()) } else { Err(SinkError::Size { made_for, got }) }
 }

@@ -1,7 +1,8 @@
 //! A virtual camera of PipeWire's: what call programs of the session list as a camera, without a kernel module.
 //!
-//! Pictures go to the node's thread by a slot in which the newest wins, and are encoded there into the readers' memory. While
-//! nobody watches they stay here. The node shows a still card until the first one comes, and again once nobody watches.
+//! Pictures go to the node's thread as YUYV, by a slot in which the newest wins, and are copied there to the readers'
+//! memory. While nobody watches they stay here. The node shows a still card until the first one comes, and again once
+//! nobody watches.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -9,9 +10,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use super::rate::frame_rate;
-use super::{Options, Sink, SinkError, card, yuyv};
-use crate::frame::ColorImage;
+use super::{Options, Sink, SinkError, card, check_size, yuyv};
 use crate::frame::fit::Fit;
+use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::{Demand, Watch};
 use crate::link::pool::{Pool, Pooled};
 use crate::link::{self, Receiver, Sender};
@@ -32,8 +33,12 @@ pub struct PipeWire {
     label: String,
     size: (u32, u32),
     to: Sender<Frame>,
-    pictures: Pool<ColorImage>,
+    pictures: Pool<YuyvImage>,
+    /// Whether the pictures of the run have its size.
+    wants_yuyv: bool,
+    encoder: yuyv::Encoder,
     fit: Fit,
+    fitted: ColorImage,
     is_watched: Arc<AtomicBool>,
     captured_ns: u64,
     /// Pictures while nobody watched.
@@ -44,7 +49,7 @@ pub struct PipeWire {
 
 /// A picture on its way to the node.
 struct Frame {
-    picture: Pooled<ColorImage>,
+    picture: Pooled<YuyvImage>,
     /// By the system's monotonic clock.
     captured_ns: u64,
 }
@@ -71,14 +76,16 @@ impl PipeWire {
         };
         let (to, from) = link::live();
         let is_watched = Arc::new(AtomicBool::new(false));
-        let mut card = ColorImage::new(size.0, size.1);
-        card::draw(&mut card);
+        let (mut fitted, encoder) = (ColorImage::new(size.0, size.1), yuyv::Encoder::new());
+        card::draw(&mut fitted);
+        let blank = || YuyvImage::new(size.0, size.1);
+        let mut card = blank();
+        encoder.encode(&fitted, &mut card.bytes);
         let screen = Screen {
             from,
             frame: None,
             is_new: false,
             card,
-            encoder: yuyv::Encoder::new(),
             demand: options.demand.clone(),
             watch: None,
             is_watched: Arc::clone(&is_watched),
@@ -88,8 +95,11 @@ impl PipeWire {
             label,
             size,
             to,
-            pictures: Pool::new(PICTURES, || ColorImage::new(size.0, size.1)),
+            pictures: Pool::new(PICTURES, blank),
+            wants_yuyv: size == options.size,
+            encoder,
             fit: Fit::default(),
+            fitted,
             is_watched,
             captured_ns: 0,
             unwatched: 0,
@@ -105,28 +115,46 @@ fn node_name(label: &str) -> String {
     if name.is_empty() { NAME.to_owned() } else { name }
 }
 
+impl PipeWire {
+    /// Sends the node a picture, which `make` makes where it is for somebody.
+    fn send(&mut self, make: impl FnOnce(&mut Self, &mut YuyvImage)) -> ControlFlow<()> {
+        if !self.is_watched.load(Ordering::Relaxed) {
+            self.unwatched += 1;
+            return ControlFlow::Continue(());
+        }
+        let Some(mut picture) = self.pictures.try_take() else {
+            self.overtaken += 1;
+            return ControlFlow::Continue(());
+        };
+        make(self, &mut picture);
+        match self.to.send(Frame { picture, captured_ns: self.captured_ns }) {
+            Ok(overtaken) => self.overtaken += u64::from(overtaken.is_some()),
+            // The node's thread has panicked, which was printed.
+            Err(link::Abandoned) => return ControlFlow::Break(()),
+        }
+        self.node.wake();
+        ControlFlow::Continue(())
+    }
+}
+
 impl Sink for PipeWire {
     fn captured(&mut self, captured_ns: u64) {
         self.captured_ns = captured_ns;
     }
 
     fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        if !self.is_watched.load(Ordering::Relaxed) {
-            self.unwatched += 1;
-            return Ok(ControlFlow::Continue(()));
-        }
-        let Some(mut picture) = self.pictures.try_take() else {
-            self.overtaken += 1;
-            return Ok(ControlFlow::Continue(()));
-        };
-        self.fit.fit(frame, &mut picture);
-        match self.to.send(Frame { picture, captured_ns: self.captured_ns }) {
-            Ok(overtaken) => self.overtaken += u64::from(overtaken.is_some()),
-            // The node's thread has panicked, which was printed.
-            Err(link::Abandoned) => return Ok(ControlFlow::Break(())),
-        }
-        self.node.wake();
-        Ok(ControlFlow::Continue(()))
+        Ok(self.send(|camera, picture| {
+            camera.encoder.encode(camera.fit.fitted(frame, &mut camera.fitted), &mut picture.bytes);
+        }))
+    }
+
+    fn wants_yuyv(&mut self) -> bool {
+        self.wants_yuyv
+    }
+
+    fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        check_size(self.size, frame.size())?;
+        Ok(self.send(|_, picture| std::mem::swap(picture, frame)))
     }
 
     fn nodes(&self) -> Vec<NodeUse> {
@@ -157,8 +185,7 @@ struct Screen {
     /// Whether that was not drawn yet.
     is_new: bool,
     /// Shown while there is none.
-    card: ColorImage,
-    encoder: yuyv::Encoder,
+    card: YuyvImage,
     demand: Option<Demand>,
     watch: Option<Watch>,
     is_watched: Arc<AtomicBool>,
@@ -175,7 +202,7 @@ impl Show for Screen {
 
     fn draw(&mut self, bytes: &mut [u8]) -> Option<u64> {
         let picture = self.frame.as_ref().map_or(&self.card, |frame| &frame.picture);
-        self.encoder.encode(picture, bytes);
+        bytes.copy_from_slice(&picture.bytes);
         let is_new = std::mem::take(&mut self.is_new);
         self.frame.as_ref().filter(|_| is_new).map(|frame| frame.captured_ns)
     }

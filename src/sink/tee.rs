@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use super::{Ending, Sink, SinkError};
-use crate::frame::ColorImage;
+use crate::frame::{ColorImage, YuyvImage};
 use crate::stats::NodeUse;
 
 /// Gives every frame to each of its sinks, in turn. One whose reader has gone is completed and removed; once all are,
@@ -94,6 +94,17 @@ impl Sink for Tee {
 
     fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         let flow = self.each(|sink| Ok(sink.cover(card, time_ns)?.map_continue(|()| true)))?;
+        Ok(flow.map_continue(|_| ()))
+    }
+
+    /// Whoever is given YUYV may keep its memory, so there can be only one.
+    fn wants_yuyv(&mut self) -> bool {
+        let [(_, only)] = &mut self.sinks[..] else { return false };
+        only.wants_yuyv()
+    }
+
+    fn put_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
+        let flow = self.each(|sink| Ok(sink.put_yuyv(frame, time_ns)?.map_continue(|()| true)))?;
         Ok(flow.map_continue(|_| ()))
     }
 
@@ -197,6 +208,34 @@ mod tests {
         assert_eq!(tee.hold(), None);
         tee.finish(Ending::Whole).unwrap();
         assert_eq!(*log.lock().unwrap(), ["a put", "a finish", "b put", "b repeat", "b put", "b finish"]);
+    }
+
+    /// Wants YUYV, and nothing else.
+    struct Camera;
+
+    impl Sink for Camera {
+        fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+            panic!("it wanted YUYV")
+        }
+        fn wants_yuyv(&mut self) -> bool {
+            true
+        }
+        fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+            frame.bytes.clear();
+            Ok(ControlFlow::Continue(()))
+        }
+    }
+
+    #[test]
+    fn only_one_alone_is_given_yuyv() {
+        let mut frame = YuyvImage::default();
+        frame.resize(2, 2);
+        let mut alone = Tee::new(vec![Box::new(Camera)]);
+        assert!(alone.wants_yuyv() && alone.put_yuyv(&mut frame, 0).unwrap().is_continue());
+        assert!(frame.bytes.is_empty());
+        assert!(!Tee::new(vec![Box::new(Camera), Box::new(Camera)]).wants_yuyv());
+        assert!(!Tee::new(vec![Box::new(Broken(None))]).wants_yuyv(), "nobody does who does not say so");
+        assert!(matches!(Broken(None).put_yuyv(&mut frame, 0), Err(SinkError::Yuyv)));
     }
 
     #[test]

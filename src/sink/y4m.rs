@@ -64,7 +64,7 @@ impl<W: Write> Y4m<W> {
     /// # Errors
     /// The frame has another size, or writing failed.
     pub fn write(&mut self, frame: &ColorImage, time_ns: u64) -> Result<(), SinkError> {
-        check_size(self.size, frame)?;
+        check_size(self.size, frame.size())?;
         let missing = match self.steady.place(time_ns) {
             Place::Taken => return Ok(()),
             Place::After(missing) => missing,

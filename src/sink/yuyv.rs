@@ -58,31 +58,31 @@ impl WithSimd for Yuyv<'_> {
 }
 
 /// Converts pixels to YUYV (BT.601, limited range), within one code of the exact value. 16-bit integers with
-/// coefficients of 8 bits fit the most pixels into a vector.
+/// coefficients of 8 bits fit the most pixels into a vector. Two pixels are taken apart as three words and put together
+/// as two: words are cheaper to move about than bytes.
 #[inline(always)]
 fn rgb_to_yuyv(rgb: &[u8; 3 * BLOCK], yuyv: &mut [u8; 2 * BLOCK]) {
-    let (mut r, mut g, mut b) = ([0_u16; BLOCK], [0_u16; BLOCK], [0_u16; BLOCK]);
-    for at in 0..BLOCK {
-        r[at] = u16::from(rgb[3 * at]);
-        g[at] = u16::from(rgb[3 * at + 1]);
-        b[at] = u16::from(rgb[3 * at + 2]);
+    const PAIRS: usize = BLOCK / 2;
+    let (mut rg, mut br, mut gb) = ([0_u16; PAIRS], [0_u16; PAIRS], [0_u16; PAIRS]);
+    for pair in 0..PAIRS {
+        let word = |at: usize| u16::from_le_bytes([rgb[6 * pair + at], rgb[6 * pair + at + 1]]);
+        (rg[pair], br[pair], gb[pair]) = (word(0), word(2), word(4));
     }
-    let mut luma = [0_u8; BLOCK];
-    for at in 0..BLOCK {
-        // At most 56 228: no overflow.
-        luma[at] = (((66 * r[at] + 129 * g[at] + 25 * b[at] + 128) >> 8) + 16) as u8;
-    }
-    let mut chroma = [0_u8; BLOCK];
-    for pair in 0..BLOCK / 2 {
-        let sum = |values: &[u16; BLOCK]| (values[2 * pair] + values[2 * pair + 1]) as i16;
-        let (r, g, b) = (sum(&r), sum(&g), sum(&b));
+    // At most 56 228: no overflow.
+    let luma = |r: u16, g: u16, b: u16| ((66 * r + 129 * g + 25 * b + 128) >> 8) + 16;
+    let bytes = |word: u16| (word & 0xFF, word >> 8);
+    let (mut left, mut right) = ([0_u16; PAIRS], [0_u16; PAIRS]);
+    for pair in 0..PAIRS {
+        let ((r0, g0), (b0, r1), (g1, b1)) = (bytes(rg[pair]), bytes(br[pair]), bytes(gb[pair]));
+        let (r, g, b) = ((r0 + r1) as i16, (g0 + g1) as i16, (b0 + b1) as i16);
         // Coefficients are halved, since these are sums of two pixels: at most 28 560 to either side.
-        chroma[2 * pair] = (((56 * b - 19 * r - 37 * g + 128) >> 8) + 128) as u8;
-        chroma[2 * pair + 1] = (((56 * r - 47 * g - 9 * b + 128) >> 8) + 128) as u8;
+        let cb = (((56 * b - 19 * r - 37 * g + 128) >> 8) + 128) as u16;
+        let cr = (((56 * r - 47 * g - 9 * b + 128) >> 8) + 128) as u16;
+        (left[pair], right[pair]) = (luma(r0, g0, b0) | cb << 8, luma(r1, g1, b1) | cr << 8);
     }
-    for at in 0..BLOCK {
-        yuyv[2 * at] = luma[at];
-        yuyv[2 * at + 1] = chroma[at];
+    for pair in 0..PAIRS {
+        let bytes = (u32::from(left[pair]) | u32::from(right[pair]) << 16).to_le_bytes();
+        yuyv[4 * pair..][..4].copy_from_slice(&bytes);
     }
 }
 

@@ -5,7 +5,7 @@ use std::process::Command;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-use bokehcam::frame::ColorImage;
+use bokehcam::frame::{ColorImage, YuyvImage};
 use bokehcam::sink::{Ending, Options, Target};
 use bokehcam::v4l2::FourCc;
 use bokehcam::v4l2::node::nodes;
@@ -129,7 +129,7 @@ fn a_few_small_frames_are_blurred_on_the_way() {
 #[ignore = "needs the camera VM (tests/vm/run)"]
 fn a_hundred_writers_come_and_go() {
     let options = Options::new((64, 48), 33_333_333);
-    let mut picture = ColorImage::new(64, 48);
+    let (mut picture, mut ready) = (ColorImage::new(64, 48), YuyvImage::default());
     for version in VERSIONS {
         let machine = Machine::new();
         machine.loopback(version);
@@ -141,11 +141,16 @@ fn a_hundred_writers_come_and_go() {
                 .unwrap_or_else(|error| panic!("{version}, {turn}: {error}"));
             let _ = sink.put(&picture, 0).unwrap();
             let mut reader = open(VIRTUAL, wish((64, 48), 30.0, yuyv()));
-            let code = 2 * turn + 20;
+            // Every other one goes on with another picture, which is YUYV already.
+            let is_yuyv = turn % 2 == 1;
+            assert!(sink.wants_yuyv());
+            let code = if is_yuyv { 235 - 2 * turn } else { 2 * turn + 20 };
             let seen = |image: ColorImage| image.rgb.iter().all(|seen| seen.abs_diff(code) <= 2);
             // What was written before may come first.
             until("the reader sees it", || {
-                let _ = sink.put(&picture, 0).unwrap();
+                ready.resize(64, 48);
+                ready.bytes.as_chunks_mut().0.fill([(u32::from(code) * 220 / 256 + 16) as u8, 128]);
+                let _ = if is_yuyv { sink.put_yuyv(&mut ready, 0) } else { sink.put(&picture, 0) }.unwrap();
                 frame_now(&mut reader).is_some_and(seen)
             });
             drop(reader);

@@ -15,3 +15,4 @@ mod seek;
 mod setup;
 mod stepper;
 mod stereo;
+mod yuyv;

@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use bokehcam::frame::YuyvImage;
+use bokehcam::sink::{Options, PipeWire, Sink};
 use rustix::fs::inotify;
 
 use super::readers::GStreamer;
@@ -71,6 +73,33 @@ fn readers_get_each_picture_as_it_is_in_order_and_in_time() {
     });
     let report = player.end();
     assert!(report["pipewire"][0]["shown"].as_u64() >= Some(read as u64), "{}", report["pipewire"]);
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn pictures_that_are_yuyv_already_come_as_they_are_between_others() {
+    folder();
+    let mut sink = PipeWire::open(Some("Ready"), &Options::new(SIZE, 1_000_000_000 / u64::from(FPS))).unwrap();
+    assert!(sink.wants_yuyv());
+    let mut reader = GStreamer::start("ready", 40);
+    let mut ready = YuyvImage::default();
+    for number in (0..PICTURES).cycle().take(600) {
+        let picture = picture(number);
+        let flow = if number % 2 == 0 {
+            sink.put(&picture, 0)
+        } else {
+            ready.resize(SIZE.0, SIZE.1);
+            ready.bytes.copy_from_slice(&yuyv(&picture));
+            sink.put_yuyv(&mut ready, 0)
+        };
+        assert!(flow.unwrap().is_continue());
+        if !reader.is_reading() {
+            break;
+        }
+        std::thread::sleep(Duration::from_secs(1) / FPS);
+    }
+    let numbers = numbers(&reader.end().frames);
+    assert!([0, 1].iter().all(|form| numbers.iter().any(|number| number % 2 == *form)), "{numbers:?}");
 }
 
 #[test]

@@ -127,6 +127,8 @@ impl GpuBokeh {
             expansion: if plan.expansion.is_finite() { plan.expansion } else { 0.0 },
             steps_per_px: STEPS_PER_PX,
             mixed: plan.matte(job.depth.as_deref(), &job.coc).map_or(0, |matte| matte.pixels.len() as u32),
+            yuyv: u32::from(job.yuyv.is_some()),
+            unused: [0; 3],
         }
     }
 }
@@ -160,6 +162,13 @@ impl Bokeh for GpuBokeh {
         let started = Instant::now();
         let on_device = self.device_picture(job.place);
         job.out.resize(made_for.0, made_for.1);
+        // Two pixels of a row share their colour.
+        if job.place != Place::Memory || !made_for.0.is_multiple_of(2) {
+            job.yuyv = None;
+        }
+        if let Some(yuyv) = &mut job.yuyv {
+            yuyv.resize(made_for.0, made_for.1);
+        }
         if let (CocField::Depth(lens), Some(map)) = (job.coc, &job.depth) {
             if radii::radii_bytes(map.metres.len()) > self.radii.size() {
                 self.radii = Buffers::radii(&self.device, map.metres.len());
@@ -185,11 +194,16 @@ impl Bokeh for GpuBokeh {
             encoder.copy_buffer_to_buffer(result, 0, picture.buffer(), 0, result.size().min(picture.buffer().size()));
         }
         let in_memory = on_device.is_none() || job.place == Place::Both;
-        if in_memory {
-            slot.picture.copy(encoder, result);
+        let copied = match &job.yuyv {
+            _ if !in_memory => 0,
+            Some(yuyv) => yuyv.bytes.len() as u64,
+            None => result.size(),
+        };
+        if copied > 0 {
+            slot.picture.copy(encoder, result, copied);
         }
         let submission = recorder.submit(&self.device);
-        self.ring.push(&self.device, slot, Sent { job, on_device, in_memory, submission, started });
+        self.ring.push(&self.device, slot, Sent { job, on_device, copied, submission, started });
         Ok(())
     }
 

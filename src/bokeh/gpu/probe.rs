@@ -62,14 +62,10 @@ impl GpuBokeh {
     fn read(&self, buffer: &wgpu::Buffer, first: u32, count: u32) -> Result<Vec<u32>, BokehError> {
         let (device, bytes) = (&self.device, u64::from(count) * 4);
         let part = device.buffer("probe", bytes as usize, wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST);
-        let readback = Readback::new(device, "probe back", bytes as usize);
+        let mut readback = Readback::new(device, "probe back", bytes as usize);
         let mut recorder = Recorder::new(device, None);
         recorder.encoder.copy_buffer_to_buffer(buffer, u64::from(first) * 4, &part, 0, bytes);
-        readback.copy(&mut recorder.encoder, &part);
-        let submission = recorder.submit(device);
-        readback.map();
-        readback.wait(device, submission)?;
-        Ok(readback.read(device, |words| bytemuck::pod_collect_to_vec(&words[..bytes as usize]))?)
+        Ok(recorder.fetch(device, &mut readback, (&part, bytes), bytemuck::pod_collect_to_vec)?)
     }
 }
 

@@ -29,8 +29,8 @@ pub struct Sent {
     pub job: Job,
     /// Where the result is left on the device.
     pub on_device: Option<Pooled<DevicePicture>>,
-    /// Whether it was copied to the slot.
-    pub in_memory: bool,
+    /// Bytes of it that were copied to the slot; 0 where it stays on the device.
+    pub copied: u64,
     /// What to wait for.
     pub submission: wgpu::SubmissionIndex,
     /// When it was begun.
@@ -86,7 +86,7 @@ impl Ring {
 
     /// Starts the way back of a frame that was submitted.
     pub fn push(&mut self, device: &Device, slot: Slot, sent: Sent) {
-        if sent.in_memory {
+        if sent.copied > 0 {
             slot.picture.map();
         }
         let done = Arc::new(AtomicBool::new(false));
@@ -109,8 +109,8 @@ impl Ring {
             return Ok(None);
         }
         let Some(Pending { slot, sent, .. }) = self.pending.front_mut() else { return Ok(None) };
-        if sent.in_memory {
-            let out = &mut sent.job.out.rgb;
+        if sent.copied > 0 {
+            let out = sent.job.yuyv.as_mut().map_or(&mut sent.job.out.rgb, |yuyv| &mut yuyv.bytes);
             let length = out.len();
             slot.picture.read(device, |bytes| out.copy_from_slice(&bytes[..length]))?;
         }
@@ -125,12 +125,13 @@ impl Ring {
         self.last = Some(Instant::now());
         // Only now, so that the frame can be given back after an error.
         let Some(Pending { slot, sent, .. }) = self.pending.pop_front() else { return Ok(None) };
-        let Sent { job, on_device, in_memory, .. } = sent;
+        let Sent { job, on_device, copied, .. } = sent;
         self.free.push(slot);
-        let Job { ticket, color, depth, out, .. } = job;
-        let picture = match on_device {
-            Some(device) => Picture::on_device(device, out, in_memory),
-            None => Picture::in_memory(out),
+        let Job { ticket, color, depth, out, yuyv, .. } = job;
+        let picture = match (on_device, yuyv) {
+            (Some(device), _) => Picture::on_device(device, out, copied > 0),
+            (None, Some(yuyv)) => Picture::as_yuyv(yuyv, out),
+            (None, None) => Picture::in_memory(out),
         };
         Ok(Some(Finished { ticket, picture, color, depth, times }))
     }

@@ -27,7 +27,7 @@ pub const PULL: Shader = shader!("common"; "pull", "pyramid", "base");
 pub const COARSE: Shader = shader!("common"; "coarse", "pyramid");
 /// Back to the picture.
 pub const FILL: Shader = shader!("common"; "fill", "pyramid", "base", "range", "list", "tiles", "next", "meet");
-pub const COMPOSITE: Shader = shader!("common"; "composite", "list");
+pub const COMPOSITE: Shader = shader!("common"; "composite", "list", "yuyv");
 
 pub const ALL: [Shader; 12] =
     [CLEAR, UNPACK, BIN, REACH, BLUR_ROWS, BLUR_COLUMNS, GATHER, HIDE, PULL, COARSE, FILL, COMPOSITE];
@@ -98,6 +98,9 @@ pub struct Frame {
     pub even: u32,
     pub extent: f32,
     pub rows_apart: u32,
+    pub yuyv: u32,
+    /// As long as the uniform is.
+    pub unused: [u32; 3],
 }
 
 /// `Bin` of `common.wgsl`.

@@ -78,6 +78,7 @@ fn differing(device: &Arc<Device>) -> Result<usize, BokehError> {
         quality: Quality::default(),
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
+        yuyv: None,
     })?;
     let finished = gpu.collect(true)?.ok_or(BokehError::Lost)?;
     let made = finished.picture.memory().ok_or(BokehError::Lost)?;

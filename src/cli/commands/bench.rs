@@ -251,6 +251,7 @@ impl Buffers {
             quality: Quality::default(),
             place: Place::Memory,
             out: self.results.take(),
+            yuyv: None,
         };
         let began = Instant::now();
         bokeh.submit(job)?;

@@ -72,10 +72,30 @@ impl<'a> Recorder<'a> {
         recorded.dispatch_workgroups(x, y, z);
     }
 
+    /// Has the device do all of it, waits, and gives the first `bytes` of `source`, whole words, to `take`.
+    ///
+    /// # Errors
+    /// The device failed, or took too long.
+    pub fn fetch<T>(
+        mut self,
+        device: &Device,
+        readback: &mut Readback,
+        (source, bytes): (&wgpu::Buffer, u64),
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
+        readback.copy(&mut self.encoder, source, bytes);
+        let submission = self.submit(device);
+        readback.map();
+        device.poll(Some(submission))?;
+        // Where others use the device, too, one of them may be about to run the callback.
+        device.wait_for(|| !readback.is_pending())?;
+        readback.read(device, take)
+    }
+
     /// Has the device do all of it, and asks for the times.
     pub fn submit(self, device: &Device) -> wgpu::SubmissionIndex {
-        let Self { mut encoder, stamps } = self;
-        if let Some(stamps) = &stamps {
+        let Self { mut encoder, mut stamps } = self;
+        if let Some(stamps) = &mut stamps {
             stamps.fetch(&mut encoder);
         }
         let submission = device.queue.submit([encoder.finish()]);
@@ -132,9 +152,9 @@ impl Stamps {
     }
 
     /// Copies the stamps to where the host can read them.
-    fn fetch(&self, encoder: &mut wgpu::CommandEncoder) {
+    fn fetch(&mut self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.set, 0..2 * self.names.len() as u32, &self.resolved, 0);
-        self.readback.copy(encoder, &self.resolved);
+        self.readback.copy(encoder, &self.resolved, self.resolved.size());
     }
 
     /// Whether they are still on their way.

@@ -11,6 +11,8 @@ pub struct Readback {
     buffer: wgpu::Buffer,
     /// [`PENDING`], [`READY`] or [`FAILED`]: set by the device's callback.
     state: Arc<AtomicU8>,
+    /// Bytes of it that are copied to.
+    copied: u64,
 }
 
 const READY: u8 = 0;
@@ -21,19 +23,20 @@ impl Readback {
     /// For so many bytes.
     pub fn new(device: &Device, label: &str, bytes: usize) -> Self {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        Self { buffer: device.buffer(label, bytes, usage), state: Arc::new(AtomicU8::new(READY)) }
+        Self { buffer: device.buffer(label, bytes, usage), state: Arc::new(AtomicU8::new(READY)), copied: 0 }
     }
 
-    /// Records that the first bytes of `source` are copied here, as many as there is room for.
-    pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer) {
-        encoder.copy_buffer_to_buffer(source, 0, &self.buffer, 0, self.buffer.size());
+    /// Records that the first `bytes` of `source`, whole words, are copied here.
+    pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, bytes: u64) {
+        encoder.copy_buffer_to_buffer(source, 0, &self.buffer, 0, bytes);
+        self.copied = bytes;
     }
 
     /// Asks for what was copied, once that was submitted.
     pub fn map(&self) {
         self.state.store(PENDING, Ordering::Relaxed);
         let state = Arc::clone(&self.state);
-        self.buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
+        self.buffer.map_async(wgpu::MapMode::Read, ..self.copied, move |mapped| {
             state.store(if mapped.is_ok() { READY } else { FAILED }, Ordering::Release);
         });
     }
@@ -41,16 +44,6 @@ impl Readback {
     /// Whether it is still on its way.
     pub fn is_pending(&self) -> bool {
         self.state.load(Ordering::Acquire) == PENDING
-    }
-
-    /// Waits for it, and for the device to be done with `submission`.
-    ///
-    /// # Errors
-    /// The device failed, or took too long.
-    pub fn wait(&self, device: &Device, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
-        device.poll(Some(submission))?;
-        // Where others use the device, too, one of them may be about to run the callback.
-        device.wait_for(|| !self.is_pending())
     }
 
     /// Takes what has come back.
@@ -62,7 +55,7 @@ impl Readback {
         if self.state.load(Ordering::Acquire) != READY {
             return Err(fault(&"a result could not be read back"));
         }
-        let taken = take(&self.buffer.get_mapped_range(..).map_err(|error| fault(&error))?);
+        let taken = take(&self.buffer.get_mapped_range(..self.copied).map_err(|error| fault(&error))?);
         self.buffer.unmap();
         Ok(taken)
     }

@@ -115,7 +115,7 @@ fn check_outcome(ended: io::Result<Ended>, path: &Path, part: &Path, container: 
 
 impl Sink for Ffmpeg {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        check_size(self.size, frame)?;
+        check_size(self.size, frame.size())?;
         let Some(input) = &mut self.input else { return Ok(ControlFlow::Break(())) };
         let Err(cause) = input.write(frame, time_ns) else {
             self.output.frames += 1;

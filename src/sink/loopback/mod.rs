@@ -14,12 +14,12 @@ use std::time::Duration;
 use self::encode::Encoder;
 use self::watch::Watcher;
 use super::rate::frame_rate;
-use super::{Ending, Options, Sink, SinkError, card};
-use crate::frame::ColorImage;
+use super::{Ending, Options, Sink, SinkError, card, check_size};
 use crate::frame::fit::Fit;
+use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
 use crate::v4l2::audience::Audience;
-use crate::v4l2::loopback::{LoopbackError, Output};
+use crate::v4l2::loopback::{Layout, LoopbackError, Output};
 
 /// The shortest time after which a picture is repeated.
 const SHORTEST_HOLD: Duration = Duration::from_millis(100);
@@ -29,6 +29,8 @@ const IDLE_HOLD: Duration = Duration::from_secs(1);
 /// A virtual camera that is written to.
 pub struct Loopback {
     output: Output,
+    /// Whether frames of the run that are YUYV can be written as they are.
+    wants_yuyv: bool,
     encoder: Encoder,
     fit: Fit,
     fitted: ColorImage,
@@ -61,6 +63,7 @@ impl Loopback {
         }
         let _watcher = options.demand.clone().map(|demand| start_watcher(path, &output, demand)).transpose()?;
         let mut loopback = Self {
+            wants_yuyv: output.layout() == Layout::Yuyv && output.size() == options.size,
             encoder: Encoder::new(output.layout()),
             fit: Fit::default(),
             fitted: ColorImage::new(output.size().0, output.size().1),
@@ -109,12 +112,19 @@ fn start_watcher(path: &Path, output: &Output, demand: Demand) -> Result<Watcher
 
 impl Sink for Loopback {
     fn put(&mut self, frame: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-        if frame.size() == self.output.size() {
-            self.encoder.encode(frame, &mut self.bytes);
-        } else {
-            self.fit.fit(frame, &mut self.fitted);
-            self.encoder.encode(&self.fitted, &mut self.bytes);
-        }
+        self.encoder.encode(self.fit.fitted(frame, &mut self.fitted), &mut self.bytes);
+        self.shows_card = false;
+        self.output.write(&self.bytes)?;
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn wants_yuyv(&mut self) -> bool {
+        self.wants_yuyv
+    }
+
+    fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
+        check_size(self.output.size(), frame.size())?;
+        std::mem::swap(&mut self.bytes, &mut frame.bytes);
         self.shows_card = false;
         self.output.write(&self.bytes)?;
         Ok(ControlFlow::Continue(()))

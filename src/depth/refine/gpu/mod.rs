@@ -192,15 +192,11 @@ impl Work {
 
     /// Runs the passes, and takes the refined map.
     fn run(&mut self, device: &Device, map: &mut DepthMap, is_empty: bool, is_fresh: bool) -> Result<(), GpuError> {
-        let Buffers { counts, refined, readback, .. } = &self.buffers;
+        let Buffers { counts, refined, readback, .. } = &mut self.buffers;
         let mut recorder = Recorder::new(device, self.stamps.as_mut());
         recorder.encoder.clear_buffer(counts, 0, None);
         self.passes.record(&mut recorder, is_empty, is_fresh);
-        readback.copy(&mut recorder.encoder, refined);
-        let submission = recorder.submit(device);
-        readback.map();
-        readback.wait(device, submission)?;
-        readback.read(device, |bytes| {
+        recorder.fetch(device, readback, (refined, refined.size()), |bytes| {
             map.resize(self.size.0, self.size.1);
             let out: &mut [u8] = bytemuck::cast_slice_mut(&mut map.metres);
             let length = out.len();

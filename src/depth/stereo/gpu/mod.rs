@@ -161,11 +161,7 @@ impl Executor for GpuExecutor {
         let mut recorder = Recorder::new(device, stamps.as_mut());
         passes.iter().for_each(|pass| recorder.run(pass));
         recorder.encoder.copy_buffer_to_buffer(luma, 0, last_luma, 0, last_luma.size());
-        readback.copy(&mut recorder.encoder, words);
-        let submission = recorder.submit(device);
-        readback.map();
-        readback.wait(device, submission)?;
-        readback.read(device, |bytes| {
+        recorder.fetch(device, readback, (words, words.size()), |bytes| {
             let each = bands::share(out.len(), LEAST_PIXELS);
             workers.run_each(out.chunks_mut(each).zip(bytes.chunks(2 * each)), &|(out, bytes): (&mut [u16], &[u8])| {
                 for (out, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {

@@ -44,17 +44,15 @@ impl Eye {
         Self { raw, pass, readback: Readback::new(device, "rectified back", bytes), rectified }
     }
 
-    fn rectify(&self, device: &Device, from: &[u8], into: &mut [u8]) -> Result<(), GpuError> {
+    fn rectify(&mut self, device: &Device, from: &[u8], into: &mut [u8]) -> Result<(), GpuError> {
         device.check()?;
         device.upload(&self.raw, 0, from);
         let mut recorder = Recorder::new(device, None);
         recorder.run(&self.pass);
-        self.readback.copy(&mut recorder.encoder, &self.rectified);
-        let submission = recorder.submit(device);
-        self.readback.map();
-        self.readback.wait(device, submission)?;
-        let length = into.len();
-        self.readback.read(device, |bytes| into.copy_from_slice(&bytes[..length]))
+        let (rectified, length) = (&self.rectified, into.len());
+        recorder.fetch(device, &mut self.readback, (rectified, rectified.size()), |bytes| {
+            into.copy_from_slice(&bytes[..length]);
+        })
     }
 }
 

@@ -1,0 +1,21 @@
+// YUYV of BT.601 in limited range, as src/sink/yuyv.rs makes it of a picture, to the bit.
+
+// Red is in the lowest byte, then green and blue.
+fn channels(codes: u32) -> vec3<i32> {
+    return vec3<i32>(vec3(codes, codes >> 8u, codes >> 16u) & vec3(255u));
+}
+
+// The weighted sum of some channels in limited range.
+fn weighed(weights: vec3<i32>, rgb: vec3<i32>, zero: i32) -> u32 {
+    let product = weights * rgb;
+    return u32(((product.x + product.y + product.z + 128) >> 8u) + zero);
+}
+
+// Two pixels, which share their colour.
+fn yuyv_of(left: u32, right: u32) -> u32 {
+    let a = channels(left);
+    let b = channels(right);
+    let luma = vec3(66, 129, 25);
+    return weighed(luma, a, 16) | (weighed(vec3(-19, -37, 56), a + b, 128) << 8u)
+        | (weighed(luma, b, 16) << 16u) | (weighed(vec3(56, -47, -9), a + b, 128) << 24u);
+}
