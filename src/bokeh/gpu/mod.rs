@@ -197,7 +197,7 @@ impl Bokeh for GpuBokeh {
         let copied = match &job.yuyv {
             _ if !in_memory => 0,
             Some(yuyv) => yuyv.bytes.len() as u64,
-            None => result.size(),
+            None => slot.picture.size(),
         };
         if copied > 0 {
             slot.picture.copy(encoder, result, copied);

@@ -26,6 +26,11 @@ impl Readback {
         Self { buffer: device.buffer(label, bytes, usage), state: Arc::new(AtomicU8::new(READY)), copied: 0 }
     }
 
+    /// Bytes that there is room for.
+    pub fn size(&self) -> u64 {
+        self.buffer.size()
+    }
+
     /// Records that the first `bytes` of `source`, whole words, are copied here.
     pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, bytes: u64) {
         encoder.copy_buffer_to_buffer(source, 0, &self.buffer, 0, bytes);
