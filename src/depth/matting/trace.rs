@@ -12,7 +12,7 @@ use crate::depth::bits::{Bits, places};
 use crate::frame::DepthMap;
 
 /// Neighbours of a pixel with this share are looked at, too, where the map has no edge.
-const TRACED_FROM: f32 = 0.15;
+pub const TRACED_FROM: f32 = 0.15;
 
 /// Follows thin things, such as hair, to where the depth map has nothing of them: from pixels that show something near though
 /// the map has none there, to neighbours that do so, too (hysteresis, as edges are traced).
@@ -33,11 +33,13 @@ pub struct Trace<'a> {
 }
 
 impl WithSimd for Trace<'_> {
-    type Output = ();
+    /// How many pixels it has marked.
+    type Output = usize;
     // One after the other, as the clusters that one needs are made of what is marked until then.
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn with_simd<S: pulp::Simd>(self, _: S) -> usize {
         let Self { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels } = self;
+        let mut marked = 0;
         for k in compared {
             let Pixel { edge, share, .. } = pixels[k];
             if edge.labels.is_near || share < TRACED_FROM {
@@ -52,6 +54,7 @@ impl WithSimd for Trace<'_> {
                         continue;
                     }
                     at_edge.set(x, y);
+                    marked += 1;
                     let next = EdgePixel { x: x as u32, y: y as u32, labels: Labels::default(), ..edge };
                     let asked = clusters.asked();
                     let answer = clusters.ask(jump, &next);
@@ -64,6 +67,7 @@ impl WithSimd for Trace<'_> {
                 }
             }
         }
+        marked
     }
 }
 

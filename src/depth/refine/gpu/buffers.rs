@@ -4,7 +4,7 @@ use super::super::align::ROUNDS;
 use super::super::votes;
 use super::shaders::{ASKED, COUNTS, Frame, MEASURES, SAMPLES, WAVES, Wave};
 use crate::compute::GpuError;
-use crate::compute::device::Device;
+use crate::compute::device::{Device, Readback};
 
 /// The distance of one uniform from the next, as devices may ask for.
 const UNIFORM_STRIDE: u64 = 256;
@@ -39,8 +39,7 @@ pub struct Buffers {
     /// What is remembered of earlier frames.
     pub memory: wgpu::Buffer,
     pub refined: wgpu::Buffer,
-    /// A copy of the refined map that the CPU can map.
-    pub readback: wgpu::Buffer,
+    pub readback: Readback,
 }
 
 impl Buffers {
@@ -53,7 +52,7 @@ impl Buffers {
         let (width, height) = (size.0 as usize, size.1 as usize);
         let pixels = width * height;
         // What is remembered is the largest: three numbers a pixel.
-        has_room(device, size, pixels as u64 * 12)?;
+        device.has_room(size, pixels as u64 * 12, "refined")?;
         let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
         let words = |label, count: usize| buffer(label, 4 * count, Usage::STORAGE | Usage::COPY_DST);
         let buffers = device.attempt(|| Self {
@@ -76,7 +75,7 @@ impl Buffers {
             samples: words("samples", SAMPLES),
             memory: words("memory", 3 * pixels),
             refined: buffer("refined", 4 * pixels, Usage::STORAGE | Usage::COPY_SRC),
-            readback: buffer("refined back", 4 * pixels, Usage::MAP_READ | Usage::COPY_DST),
+            readback: Readback::new(device, "refined back", 4 * pixels),
         })?;
         device.upload(&buffers.nearby, 0, bytemuck::cast_slice(votes::weights_by_distance().as_flattened()));
         for round in 0..ROUNDS {
@@ -104,18 +103,4 @@ impl Buffers {
 
 fn wave_at(round: usize, wave: usize) -> u64 {
     (round * (WAVES + 1) + wave) as u64 * UNIFORM_STRIDE
-}
-
-/// Refuses sizes whose largest buffer, or whose number of workgroups, exceeds the limits of the device.
-pub fn has_room(device: &Device, (width, height): (u32, u32), bytes: u64) -> Result<(), GpuError> {
-    let limits = device.device.limits();
-    let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let longest = limits.max_compute_workgroups_per_dimension;
-    if bytes > most || width.max(height) > longest {
-        let name = &device.name;
-        return Err(GpuError::Failed(format!(
-            "{name}: pictures of {width} x {height} are too large to be refined there"
-        )));
-    }
-    Ok(())
 }

@@ -13,7 +13,6 @@ mod trial;
 
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
 
 use buffers::Buffers;
 use passes::Passes;
@@ -52,12 +51,7 @@ struct Work {
     has_filled: bool,
     /// What is remembered is of a frame at this time, with this distance in focus.
     last: Option<(u64, f32)>,
-    state: Arc<AtomicU8>,
 }
-
-const PENDING: u8 = 0;
-const READY: u8 = 1;
-const FAILED: u8 = 2;
 
 impl GpuRefiner {
     /// On a device, whether it does it right or not.
@@ -111,8 +105,7 @@ impl Work {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
         let (from, columns, rows) = ((0, 0), Vec::new(), Vec::new());
-        let state = Arc::new(AtomicU8::new(PENDING));
-        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None, state })
+        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None })
     }
 
     /// Takes maps of another size.
@@ -129,7 +122,7 @@ impl Work {
         device.upload(&buffers.taps, 0, bytemuck::cast_slice(&words));
         let samples = from.0 as usize * from.1 as usize;
         if 4 * samples as u64 > buffers.map.size() {
-            buffers::has_room(device, from, 4 * samples as u64)?;
+            device.has_room(from, 4 * samples as u64, "refined")?;
             buffers.map = device.attempt(|| Buffers::map(device, samples))?;
             passes.set_map(device, *size, buffers);
         }
@@ -179,47 +172,23 @@ impl Work {
         if !is_empty {
             device.upload(&self.buffers.map, 0, bytemuck::cast_slice(&map.metres));
         }
-        self.run(device, is_empty, last.is_none())?;
-        self.read(device, map)?;
+        self.run(device, map, is_empty, last.is_none())?;
         self.has_filled = true;
         self.last = Some((time_ns, focus_m));
         Ok(())
     }
 
-    /// Runs the passes, and waits for the refined map.
-    fn run(&self, device: &Device, is_empty: bool, is_fresh: bool) -> Result<(), GpuError> {
+    /// Runs the passes, and takes the refined map.
+    fn run(&self, device: &Device, map: &mut DepthMap, is_empty: bool, is_fresh: bool) -> Result<(), GpuError> {
         let Buffers { counts, refined, readback, .. } = &self.buffers;
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.clear_buffer(counts, 0, None);
         self.passes.encode(&mut encoder, is_empty, is_fresh);
-        encoder.copy_buffer_to_buffer(refined, 0, readback, 0, readback.size());
-        let submission = device.queue.submit([encoder.finish()]);
-        self.state.store(PENDING, Ordering::Relaxed);
-        let state = Arc::clone(&self.state);
-        readback.map_async(wgpu::MapMode::Read, .., move |mapped| {
-            state.store(if mapped.is_ok() { READY } else { FAILED }, Ordering::Release);
-        });
-        device.poll(Some(submission))?;
-        // Where others use the device, too, one of them may be about to run the callback.
-        device.wait_for(|| self.state.load(Ordering::Acquire) != PENDING)?;
-        match self.state.load(Ordering::Acquire) {
-            READY => Ok(()),
-            _ => Err(GpuError::Failed(format!("{}: the refined map could not be read back", device.name))),
-        }
-    }
-
-    /// Takes the refined map.
-    fn read(&self, device: &Device, map: &mut DepthMap) -> Result<(), GpuError> {
-        let readback = &self.buffers.readback;
-        {
-            let bytes =
-                readback.get_mapped_range(..).map_err(|error| GpuError::Failed(format!("{}: {error}", device.name)))?;
+        readback.fetch(device, encoder, (refined, readback.size()), |bytes| {
             map.resize(self.size.0, self.size.1);
             let out: &mut [u8] = bytemuck::cast_slice_mut(&mut map.metres);
             let length = out.len();
             out.copy_from_slice(&bytes[..length]);
-        }
-        readback.unmap();
-        Ok(())
+        })
     }
 }

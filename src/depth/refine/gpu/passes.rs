@@ -3,23 +3,7 @@
 use super::super::align::ROUNDS;
 use super::buffers::Buffers;
 use super::shaders::{self, COLUMNS, STRIP, TILE, WAVES};
-use crate::compute::device::{Device, Shader};
-
-/// A pipeline, its buffers, and how many workgroups it takes.
-struct Pass {
-    pipeline: wgpu::ComputePipeline,
-    bindings: wgpu::BindGroup,
-    workgroups: [u32; 2],
-}
-
-impl Pass {
-    fn encode(&self, pass: &mut wgpu::ComputePass) {
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.bindings, &[]);
-        let [x, y] = self.workgroups;
-        pass.dispatch_workgroups(x, y, 1);
-    }
-}
+use crate::compute::device::{Device, Pass, Shader};
 
 /// Everything that a frame runs.
 pub struct Passes {
@@ -49,10 +33,8 @@ impl<'a> Maker<'a> {
         buffers: impl IntoIterator<Item = wgpu::BufferBinding<'a>>,
         workgroups: [u32; 2],
     ) -> Pass {
-        let pipeline = self.device.pipeline(shader, &shaders::constants(again));
-        let frame = self.b.frame.as_entire_buffer_binding();
-        let bindings = self.device.bindings(&pipeline, std::iter::once(frame).chain(buffers));
-        Pass { pipeline, bindings, workgroups }
+        let frame = std::iter::once(self.b.frame.as_entire_buffer_binding());
+        Pass::new(self.device, shader, &shaders::constants(again), frame.chain(buffers), workgroups)
     }
 
     fn over<const N: usize>(
