@@ -70,7 +70,9 @@ const LONE = 16u;       // its surfaces have none
 const BEHIND = 32u;     // what is behind it is known
 const MIXED = 64u;
 const WIDE = 128u;      // it is part of something that is wide
-const SEEN = 256u;      // traced, it shows something near; the next bits are for the rounds of `matte_wide`
+const SEEN = 256u;      // traced, it shows something near, or is part of the outline of something wide
+const GROWN = 512u;     // such an outline, found in this or the last of the steps with even numbers; the next bit, with odd ones
+const STEP = 65536u;    // times the step in which it was traced
 
 // A pixel that may be mixed.
 struct Entry {

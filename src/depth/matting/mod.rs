@@ -226,6 +226,7 @@ impl Matting {
         pixels.retain(|pixel| clusters.at(pixel.answer).is_some());
         let on_edges = pixels.len();
         let (mut compared, mut marked) = (0..0, edges.len());
+        wide.steps.clear();
         let (mut prior, mut steps) = (Prior::default(), 0);
         loop {
             let found = compared.end..pixels.len();
@@ -239,6 +240,9 @@ impl Matting {
             });
             let is_first = steps == 0;
             arch.dispatch(Weigh { prior: &mut prior, is_first, evidence, pixels: &mut pixels[found.clone()] });
+            if !is_first {
+                wide.steps.push(found.clone());
+            }
             compared = found;
             if compared.is_empty() || steps == MOST_STEPS {
                 break;
@@ -254,7 +258,7 @@ impl Matting {
             }
             steps += 1;
         }
-        wide.drop(size, &mut pixels[on_edges..]);
+        wide.drop(size, pixels);
         sort(size.0, pixels, on_edges, (order, traced));
 
         let each = bands::share(order.len(), LEAST_PIXELS);

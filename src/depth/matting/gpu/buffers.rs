@@ -1,9 +1,8 @@
 //! The memory for pictures of one size.
 
-use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MOST_BUFFERS, Turn, WORD};
+use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MOST_BUFFERS, TURNS, Turn, WORD};
 use crate::compute::GpuError;
 use crate::compute::device::{Device, Readback};
-use crate::depth::matting::MOST_STEPS;
 use crate::depth::matting::clusters::CELL_PX;
 use crate::depth::matting::share::PRIOR_ROUNDS;
 use crate::frame::{Matte, MixedPixel};
@@ -80,7 +79,7 @@ impl Buffers {
         let record = size_of::<MixedPixel>();
         let buffers = device.attempt(|| Self {
             frame: uniform("matted frame", size_of::<Frame>()),
-            turns: uniform("turns", (MOST_STEPS + 1) * UNIFORM_STRIDE as usize),
+            turns: uniform("turns", TURNS * UNIFORM_STRIDE as usize),
             lights: uniform("lights", 256 * 16),
             metres: storage("refined depth", 4 * pixels),
             rgb: storage("matted rgb", 3 * pixels),
@@ -97,7 +96,7 @@ impl Buffers {
             mixed: buffer("mixed", record * (1 + most), Usage::STORAGE | Usage::COPY_SRC),
             readback: Readback::new(device, "mixed back", record * (1 + most)),
         })?;
-        for turn in 0..=MOST_STEPS {
+        for turn in 0..TURNS {
             device.upload(&buffers.turns, turn as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&Turn { at: turn as u32 }));
         }
         Ok(buffers)

@@ -2,9 +2,9 @@
 //! `shaders/`. The map and its picture go up, the mixed pixels come down, as many as there are; nothing is read back in
 //! between. What is remembered to lie behind goes up when it has changed.
 //!
-//! It does what the processor does but for these. Whether a number is above a limit may fall either way where rounding decides
-//! it. Of several pixels that trace the same one in a step, the first in the picture counts, where the processor has the
-//! first that was traced. And what is wide spreads a few times, where the processor lets it do so along with the trace.
+//! It does what the processor does but for two things. Whether a number is above a limit may fall either way where rounding decides
+//! it. And of several pixels that trace the same one in a step, the first in the picture counts, where the processor has the
+//! first that was traced.
 
 mod buffers;
 mod passes;

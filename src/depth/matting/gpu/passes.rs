@@ -1,9 +1,8 @@
 //! The passes in their order: bind groups made once for pictures of one size, one `encode` a frame.
 
 use super::buffers::{Buffers, Extent};
-use super::shaders::{self, BLOCK, LANES, ROWS, WIDE_ROUNDS, WORD, turns};
+use super::shaders::{self, BLOCK, LANES, ROWS, TURNS, WORD, turns};
 use crate::compute::device::{Device, Pass, Shader};
-use crate::depth::matting::MOST_STEPS;
 use crate::depth::matting::share::PRIOR_ROUNDS;
 
 /// Everything that a frame runs.
@@ -43,9 +42,9 @@ impl Passes {
         passes.push(over(shaders::WEIGH, false, None, &weigh, of_entries));
         let trace = [&b.lights, &b.metres, &b.rgb, &b.known, &b.partials, &b.clusters, &b.counts];
         let trace = [&trace[..], &entered].concat();
-        passes.extend((1..=MOST_STEPS).map(|step| over(shaders::TRACE, false, Some(step), &trace, of_cells)));
+        passes.extend((1..TURNS).map(|step| over(shaders::TRACE, false, Some(step), &trace, of_cells)));
         let wide = [&b.counts, &b.places, &b.entries];
-        passes.extend((0..WIDE_ROUNDS).map(|round| over(shaders::SPREAD, false, Some(round), &wide, of_entries)));
+        passes.extend((1..TURNS).map(|step| over(shaders::SPREAD, false, Some(step), &wide, of_entries)));
         passes.push(over(shaders::MARK, false, None, &[&b.counts, &b.entries, &b.marks], of_entries));
         passes.extend(count(true));
         let mix = [&b.lights, &b.rgb, &b.known, &b.marks, &b.counts, &b.colors, &b.entries, &b.mixed];

@@ -47,8 +47,8 @@ pub const BLOCK: u32 = 256;
 pub const LANES: u32 = 64;
 /// Numbers in `counts` before those of blocks.
 pub const COUNTS: usize = 64;
-/// How often what is wide spreads: on the processor it does so along with the trace.
-pub const WIDE_ROUNDS: usize = 4;
+/// Times that a pass runs, at most, and one.
+pub const TURNS: usize = MOST_STEPS + 1;
 /// Storage buffers of the pass that has most of them.
 pub const MOST_BUFFERS: u32 = 10;
 /// How many workgroups take turns with so many entries, or cells: no more than any device runs at once.
@@ -57,7 +57,7 @@ pub fn turns(count: usize) -> u32 {
 }
 
 // As `matte_common`, `matte_clusters` and `matte_compare` have them, where they are lengths of arrays, or places of bits.
-const _: () = assert!(CELL_PX == 8 && CLOSE_PX == 3 && STEPS == 9 && MOST_STEPS < 20 && WIDE_ROUNDS < 20);
+const _: () = assert!(CELL_PX == 8 && CLOSE_PX == 3 && STEPS == 9 && MOST_STEPS < 20);
 
 /// The `override` constants of `matte_common.wgsl`; `again` for the second run of a pass.
 pub fn constants(again: bool) -> [(&'static str, f64); 32] {
