@@ -277,6 +277,34 @@ fn blurred_pictures_are_alike() {
 
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
+fn a_map_that_was_refined_there_need_not_go_up() {
+    let device = device();
+    let (mut refiner, mut matting) = (Refiner::new().on(Some(&device)), Matting::default().on(Some(&device)));
+    for (k, size) in [(160, 120), (160, 120), (91, 63), (160, 120)].into_iter().enumerate() {
+        let (color, mut map) = scene(size, 4 * k, 0.01);
+        if k == 3 {
+            // Nothing is refined of it.
+            refiner.forget();
+            map.metres.fill(0.0);
+        }
+        refiner.refine(&mut map, &color, k as u64 * FRAME_NS);
+        assert_eq!(refiner.on_device().is_some(), k < 3);
+        let frame = (color, map);
+        matting.take_from(refiner.on_device());
+        let of_device = matted(&mut matting, &frame, None).matte;
+        // Once only: this one goes up.
+        let of_memory = matted(&mut matting, &frame, None).matte;
+        assert!(of_device == of_memory && (of_device.pixels.len() > 300) == (k < 3), "frame {k}");
+        let unknown = (frame.0.clone(), DepthMap::new(size.0, size.1));
+        matting.take_from(refiner.on_device());
+        let taken = matted(&mut matting, &unknown, None).matte;
+        assert!(taken == of_device, "frame {k}: what was taken is what the device has");
+        assert!(matted(&mut matting, &unknown, None).matte.pixels.is_empty(), "frame {k}: it is taken once");
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_device_that_is_gone_is_followed_by_the_processor() {
     for gone_before in [0, 1, 3] {
         let device = device();

@@ -5,7 +5,7 @@ mod picture;
 mod readback;
 
 pub use pass::{Pass, workgroups_2d};
-pub use picture::DevicePicture;
+pub use picture::{DeviceFrame, DevicePicture};
 pub use readback::Readback;
 
 use std::collections::HashMap;

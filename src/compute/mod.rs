@@ -14,7 +14,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use crate::names::named;
 
 #[cfg(feature = "gpu")]
-pub use device::{Device, DevicePicture};
+pub use device::{Device, DeviceFrame, DevicePicture};
 
 /// A GPU, of which this build has none.
 #[cfg(not(feature = "gpu"))]
@@ -25,6 +25,11 @@ pub enum Device {}
 #[cfg(not(feature = "gpu"))]
 #[derive(Debug)]
 pub enum DevicePicture {}
+
+/// A depth map and its picture in a GPU's memory, of which this build has none.
+#[cfg(not(feature = "gpu"))]
+#[derive(Debug)]
+pub enum DeviceFrame {}
 
 named! {
     /// Where the executors run. A software Vulkan driver is far slower than plain code, so it has to be asked for.

@@ -213,6 +213,7 @@ impl CocMaker {
                     refiner.set_focus(focus_m);
                     refiner.refine_on(&mut self.workers, map, color, time_ns);
                     map.is_smooth = false;
+                    self.matting.take_from(refiner.on_device());
                 }
             }
             done(if matches!(self.finisher, Finisher::Refine(_)) { "refine" } else { "fill" });

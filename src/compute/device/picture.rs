@@ -1,4 +1,4 @@
-//! A picture in a device's memory.
+//! Pictures and their depth in a device's memory.
 
 use super::Device;
 
@@ -29,6 +29,28 @@ impl DevicePicture {
     }
 
     /// Whether the picture is in the memory of `device`.
+    pub fn is_on(&self, device: &Device) -> bool {
+        self.device == device.device
+    }
+}
+
+/// A depth map as large as its picture, and that picture, in a device's memory, until the next ones take their place.
+#[derive(Clone, Debug)]
+pub struct DeviceFrame {
+    device: wgpu::Device,
+    /// Depth of each pixel, in metres.
+    pub metres: wgpu::Buffer,
+    /// 8-bit sRGB, 3 bytes a pixel.
+    pub rgb: wgpu::Buffer,
+}
+
+impl DeviceFrame {
+    /// Buffers of `device`, which can be copied from.
+    pub fn new(device: &Device, metres: &wgpu::Buffer, rgb: &wgpu::Buffer) -> Self {
+        Self { device: device.device.clone(), metres: metres.clone(), rgb: rgb.clone() }
+    }
+
+    /// Whether it is in the memory of `device`.
     pub fn is_on(&self, device: &Device) -> bool {
         self.device == device.device
     }

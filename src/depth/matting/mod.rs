@@ -24,9 +24,9 @@ use std::sync::Arc;
 use pulp::Arch;
 
 use crate::color::light_of_codes;
-use crate::compute::Device;
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
+use crate::compute::{Device, DeviceFrame};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
 pub use behind::{Behind, light_at};
@@ -65,6 +65,8 @@ pub struct Matting {
     /// The places of those that are mixed, in the order of the picture, and memory for that.
     order: Vec<u32>,
     traced: Vec<u64>,
+    /// The next map and its picture.
+    on_device: Option<DeviceFrame>,
     /// Finds them in the processor's place, as long as the device does not fail.
     #[cfg(feature = "gpu")]
     gpu: Option<gpu::GpuMatting>,
@@ -146,6 +148,7 @@ impl Default for Matting {
             wide: Wide::default(),
             order: Vec::new(),
             traced: Vec::new(),
+            on_device: None,
             #[cfg(feature = "gpu")]
             gpu: None,
             #[cfg(feature = "gpu")]
@@ -168,6 +171,11 @@ impl Matting {
             let _ = device;
             self
         }
+    }
+
+    /// The map and the picture of the next call are on a device already, as they are in memory.
+    pub fn take_from(&mut self, on_device: Option<DeviceFrame>) {
+        self.on_device = on_device;
     }
 
     /// What finds mattes, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
@@ -196,17 +204,21 @@ impl Matting {
         jump: f32,
         behind: Option<&Behind>,
     ) {
+        let on_device = self.on_device.take();
         map.matte.pixels.clear();
         if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
             return;
         }
+        #[cfg(not(feature = "gpu"))]
+        let _ = on_device;
         #[cfg(feature = "gpu")]
         if let Some(gpu) = &mut self.gpu {
-            match gpu.find(map, color, jump, behind) {
+            match gpu.find((map, color), on_device, jump, behind) {
                 Ok(()) => return,
                 Err(error) => tracing::warn!("{error}; the CPU finds mattes from here on"),
             }
             (self.gpu, self.has_failed) = (None, true);
+            map.matte.pixels.clear();
         }
         let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced, .. } = self;
         let arch = *arch;

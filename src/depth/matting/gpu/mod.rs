@@ -1,6 +1,7 @@
 //! The GPU executor of matting: what [`super::Matting`] does on the processor, as wgpu compute passes, one WGSL file each under
-//! `shaders/`. The map and its picture go up, the mixed pixels come down, as many as there are; nothing is read back in
-//! between. What is remembered to lie behind goes up when it has changed.
+//! `shaders/`. The map and its picture go up, or are copied where they are, on the device that has refined the map; the mixed
+//! pixels come down, as many as there are; nothing is read back in between. What is remembered to lie behind goes up when it has
+//! changed.
 //!
 //! It does what the processor does but for two things. Whether a number is above a limit may fall either way where rounding decides
 //! it. And of several pixels that trace the same one in a step, the first in the picture counts, where the processor has the
@@ -21,7 +22,7 @@ use shaders::Frame;
 use super::Behind;
 use crate::color::light_of_codes;
 use crate::compute::GpuError;
-use crate::compute::device::Device;
+use crate::compute::device::{Device, DeviceFrame};
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
 
 /// Finds the mattes of frame after frame on a device; owns the memory for it.
@@ -64,14 +65,15 @@ impl GpuMatting {
         trial::is_passed(device).then(|| Self::new(device))
     }
 
-    /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_before`] does.
+    /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_before`] does. What is `on_device` is
+    /// that map and picture; where another device has them, they go up.
     ///
     /// # Errors
     /// The device failed, or has no room; the map has no mixed pixels.
     pub fn find(
         &mut self,
-        map: &mut DepthMap,
-        color: &ColorImage,
+        (map, color): (&mut DepthMap, &ColorImage),
+        on_device: Option<DeviceFrame>,
         jump: f32,
         behind: Option<&Behind>,
     ) -> Result<(), GpuError> {
@@ -89,7 +91,7 @@ impl GpuMatting {
             }
         }
         device.upload(&work.buffers.lights, 0, bytemuck::cast_slice(&**lights));
-        work.find(device, map, color, jump, behind)
+        work.find(device, (map, color, on_device.filter(|frame| frame.is_on(device))), jump, behind)
     }
 }
 
@@ -103,8 +105,7 @@ impl Work {
     fn find(
         &mut self,
         device: &Device,
-        map: &mut DepthMap,
-        color: &ColorImage,
+        (map, color, on_device): (&mut DepthMap, &ColorImage, Option<DeviceFrame>),
         jump: f32,
         behind: Option<&Behind>,
     ) -> Result<(), GpuError> {
@@ -112,8 +113,6 @@ impl Work {
         let (known, other) = behind.map_or((0, 0.0), |behind| (behind.known.into(), behind.other));
         let frame = Frame { size: [self.size.0, self.size.1], most: most as u32, known, jump, other };
         device.upload(&b.frame, 0, bytemuck::bytes_of(&frame));
-        device.upload(&b.metres, 0, bytemuck::cast_slice(&map.metres));
-        device.upload(&b.rgb, 0, &color.rgb);
         if let Some(behind) = behind.filter(|behind| self.revision != Some(behind.revision)) {
             let [rgb, rounds, inverse] = known_at(pixels);
             device.upload(&b.known, rgb, behind.rgb);
@@ -123,6 +122,15 @@ impl Work {
         }
         let encoder = || device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut passes = encoder();
+        let is_whole = |frame: &DeviceFrame| (frame.metres.size(), frame.rgb.size()) == (b.metres.size(), b.rgb.size());
+        if let Some(frame) = on_device.filter(is_whole) {
+            for (from, to) in [(&frame.metres, &b.metres), (&frame.rgb, &b.rgb)] {
+                passes.copy_buffer_to_buffer(from, 0, to, 0, to.size());
+            }
+        } else {
+            device.upload(&b.metres, 0, bytemuck::cast_slice(&map.metres));
+            device.upload(&b.rgb, 0, &color.rgb);
+        }
         [&b.counts, &b.cells, &b.places, &b.marks].iter().for_each(|buffer| passes.clear_buffer(buffer, 0, None));
         self.passes.encode(&mut passes);
         let found = self.fetch(device, passes, map, self.expected.min(most))?;

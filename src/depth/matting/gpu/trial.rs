@@ -50,7 +50,7 @@ fn differing(device: &Arc<Device>) -> Result<(usize, usize), GpuError> {
     for behind in [None, Some(&behind)] {
         let [mut expected, mut made] = [map.clone(), map.clone()];
         cpu.find_before(&mut workers, (&mut expected, &color), JUMP, behind);
-        gpu.find(&mut made, &color, JUMP, behind)?;
+        gpu.find((&mut made, &color), None, JUMP, behind)?;
         let (expected, made) = (&expected.matte.pixels, &made.matte.pixels);
         let is_same = |a: &MixedPixel, b: &MixedPixel| (a.share - b.share).abs() <= SHARE;
         let same = expected.iter().filter(|pixel| {

@@ -60,7 +60,7 @@ impl Buffers {
             waves: buffer("waves", ROUNDS * (WAVES + 1) * UNIFORM_STRIDE as usize, Usage::UNIFORM | Usage::COPY_DST),
             map: Self::map(device, pixels),
             taps: words("taps", 2 * (width + height)),
-            rgb: words("rgb", (3 * pixels).div_ceil(4)),
+            rgb: buffer("rgb", 3 * pixels, Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC),
             colors: words("colors", pixels),
             before: words("colors before", pixels),
             flags: words("flags", pixels),

@@ -20,7 +20,7 @@ use shaders::Frame;
 
 use super::temporal;
 use crate::compute::GpuError;
-use crate::compute::device::Device;
+use crate::compute::device::{Device, DeviceFrame};
 use crate::depth::guided_fill;
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap};
@@ -51,6 +51,8 @@ struct Work {
     has_filled: bool,
     /// What is remembered is of a frame at this time, with this distance in focus.
     last: Option<(u64, f32)>,
+    /// Whether the last refined map, and its picture, are on the device.
+    is_there: bool,
 }
 
 impl GpuRefiner {
@@ -72,9 +74,10 @@ impl GpuRefiner {
         }
     }
 
-    /// Whether it is on this device.
-    pub fn is_on(&self, device: &Arc<Device>) -> bool {
-        Arc::ptr_eq(&self.device, device)
+    /// The map that was refined last, and its picture, where they are on the device.
+    pub fn refined(&self) -> Option<DeviceFrame> {
+        let Buffers { refined, rgb, .. } = &self.work.as_ref().filter(|work| work.is_there)?.buffers;
+        Some(DeviceFrame::new(&self.device, refined, rgb))
     }
 
     /// Refines the depth `map` of the picture `color` at `time_ns`, with this distance in focus.
@@ -105,7 +108,7 @@ impl Work {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
         let (from, columns, rows) = ((0, 0), Vec::new(), Vec::new());
-        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None })
+        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None, is_there: false })
     }
 
     /// Takes maps of another size.
@@ -146,6 +149,7 @@ impl Work {
         time_ns: u64,
         focus_m: f32,
     ) -> Result<(), GpuError> {
+        self.is_there = false;
         if !map.metres.is_empty() && self.from != map.size() {
             self.take_maps(device, map.size())?;
         }
@@ -173,7 +177,7 @@ impl Work {
             device.upload(&self.buffers.map, 0, bytemuck::cast_slice(&map.metres));
         }
         self.run(device, map, is_empty, last.is_none())?;
-        self.has_filled = true;
+        (self.has_filled, self.is_there) = (true, true);
         self.last = Some((time_ns, focus_m));
         Ok(())
     }
