@@ -61,7 +61,9 @@ fn scene(size: (u32, u32), frame: usize, noise: f32) -> Frame {
             if (0.0..*length).contains(&along) { 0.6 * (1.0 - beside).max(0.0) } else { 0.0 }
         });
         let hair = hair.fold(0.0, f32::max);
-        let share = (0.5 - 0.7 * off).clamp(hair, 1.0);
+        // Something far that looks like hair, but is wide.
+        let is_patch = dx > 0.0 && (dy + 0.3 * radius).abs() < 5.0 && off < 0.6 * radius && chance(k, 41) > 0.15;
+        let share = (0.5 - 0.7 * off).clamp(if is_patch { 0.4 } else { hair }, 1.0);
         let is_pole = (x as f32 - 0.85 * width).abs() < 2.2;
         for (p, code) in pixel.iter_mut().enumerate() {
             let mixed = share * [60.0, 45.0, 40.0][p] + (1.0 - share) * [150.0, 160.0, 190.0][p];
