@@ -129,6 +129,15 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
     }
 }
 
+#[test]
+fn no_pass_of_the_matte_has_more_buffers_than_a_device_is_asked_for() {
+    let is_storage = |space: &naga::AddressSpace| matches!(space, naga::AddressSpace::Storage { .. });
+    let count = |shader: Shader| {
+        parse(shader.source).global_variables.iter().filter(|(_, variable)| is_storage(&variable.space)).count()
+    };
+    assert_eq!(matte::ALL.map(count).into_iter().max(), Some(matte::MOST_BUFFERS as usize));
+}
+
 /// A struct's name, size, and the places of its fields.
 type Layout = (&'static str, usize, Vec<(&'static str, usize)>);
 
