@@ -48,11 +48,10 @@ const CELL = 8u;
 const WORD = 32u;
 const BLOCK = 256u;
 
-// Places in `counts`: edges, 0 where there are too many; the next entry; mixed pixels; for each step, of which the first is that
+// Places in `counts`: edges, 0 where there are too many; the next entry; for each step, of which the first is that
 // of edges, pixels that were claimed for it, and its cells; before each block of words, the bits that are set.
 const EDGES = 0u;
 const NEXT = 1u;
-const MIXED_PIXELS = 2u;
 const CLAIMED = 4u;
 const LISTED = 24u;
 const TOTALS = 64u;

@@ -22,7 +22,6 @@ fn matte_total(@builtin(local_invocation_index) thread: u32) {
             counts[EDGES] = select(all, 0u, all > frame.most);
             counts[NEXT] = counts[EDGES];
         } else {
-            counts[MIXED_PIXELS] = all;
             mixed[0] = vec4(all, 0u, 0u, 0u);
         }
     }
