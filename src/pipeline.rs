@@ -240,7 +240,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let knows_background = source.as_ref().is_some_and(|source| source.knows_background());
     let mut preparation = prepare::Preparation::new(&look, info.size, run.measured, knows_background, run.threads);
     preparation.beside(executor.as_deref());
-    let mut refined_by = None;
+    let (mut refined_by, mut matted_by) = (None, None);
     let depth = depth::Stage {
         adaptive: run.adaptive,
         changes: run.changes,
@@ -256,6 +256,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
         times: depth_times,
         held,
         refined_by: &mut refined_by,
+        matted_by: &mut matted_by,
     };
     let blur = blur::Stage {
         executor,
@@ -302,7 +303,7 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     let is_cut = run.stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
     about.pipewire = sink.nodes();
-    about.refined_by = refined_by.unwrap_or("none").into();
+    [about.refined_by, about.matted_by] = [refined_by, matted_by].map(|by| by.unwrap_or("none").into());
     let finished = guard("sink", &over, move || Ok(sink.finish(ending)?));
     // What came first is the cause.
     let ended = ended.and(finished);

@@ -200,7 +200,7 @@ fn refinement() {
             map.resize(measured.width, measured.height);
             map.metres.copy_from_slice(&measured.metres);
             refiner.refine_on(&mut workers, &mut map, &image, index * 33_000_000);
-            matting.find_before(&mut workers, (&mut map, &image), 0.05, |_, _| None);
+            matting.find_before(&mut workers, (&mut map, &image), 0.05, None);
         };
         frame(0);
         frame(1);

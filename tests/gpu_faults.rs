@@ -19,9 +19,10 @@ use bokehcam::bokeh::{self, Bokeh, BokehError, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::device::Device;
 use bokehcam::compute::{Backend, Place};
+use bokehcam::depth::matting::Matting;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::{self, Effort, Pair};
-use bokehcam::frame::{ColorImage, DisparityMap, GrayImage, YuyvImage};
+use bokehcam::frame::{ColorImage, DisparityMap, GrayImage, MixedPixel, YuyvImage};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
 use bokehcam::sink::yuyv;
@@ -283,6 +284,51 @@ fn refining_goes_on_after_the_gpu() {
         ("submit:1000000", "ran on gpu"),
     ] {
         let told = test_under(&layer, fault, "depth_is_refined_whatever_becomes_of_the_device");
+        let line = told.lines().find_map(|line| line.find("ran on").map(|at| &line[at..]));
+        assert_eq!(line, Some(ran), "{fault}: {told}");
+    }
+}
+
+/// Under the layer, the faults are its.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn mattes_are_found_whatever_becomes_of_the_device() {
+    let mut device = device();
+    // The trial compiles the shaders, which may take longer than a second.
+    let shared = Arc::new(device);
+    let _ = Matting::default().on(Some(&shared));
+    device = Arc::into_inner(shared).expect("nobody else has it").with_patience(Duration::from_secs(1));
+    let mut matting = Matting::default().on(Some(&Arc::new(device)));
+    let mut cpu = Matting::default();
+    for frame in 0..8 {
+        let (color, measured) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
+        let [mut made, mut expected] = [measured.clone(), measured];
+        matting.find(&mut made, &color, 0.05);
+        cpu.find(&mut expected, &color, 0.05);
+        let (made, expected) = (made.matte.pixels, expected.matte.pixels);
+        let is_same = |(a, b): &(&MixedPixel, &MixedPixel)| a.at == b.at && (a.share - b.share).abs() < 1e-3;
+        let same = made.iter().zip(&expected).filter(is_same).count();
+        assert!(same > 50 && same == made.len() && same == expected.len(), "frame {frame}: {same}");
+    }
+    println!("ran on {}", matting.backends());
+}
+
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn matting_goes_on_after_the_gpu() {
+    let layer = layer();
+    for (fault, ran) in [
+        // In the trial, and later.
+        ("submit:2", "ran on cpu"),
+        ("submit:6", "ran on gpu, then cpu"),
+        ("wait:7", "ran on gpu, then cpu"),
+        ("hang:7", "ran on gpu, then cpu"),
+        // Passes that are not run.
+        ("idle:1", "ran on cpu"),
+        ("idle:40", "ran on cpu"),
+        ("submit:1000000", "ran on gpu"),
+    ] {
+        let told = test_under(&layer, fault, "mattes_are_found_whatever_becomes_of_the_device");
         let line = told.lines().find_map(|line| line.find("ran on").map(|at| &line[at..]));
         assert_eq!(line, Some(ran), "{fault}: {told}");
     }

@@ -50,7 +50,17 @@ const DOORS: [(&str, &[&str]); 30] = [
     ("strsim", &["source", "v4l2"]),
     ("toml_edit", &["cli"]),
     ("v4l", &["v4l2"]),
-    ("wgpu", &["bokeh/gpu", "compute/device", "depth/refine/gpu", "depth/stereo/gpu", "preview/present"]),
+    (
+        "wgpu",
+        &[
+            "bokeh/gpu",
+            "compute/device",
+            "depth/matting/gpu",
+            "depth/refine/gpu",
+            "depth/stereo/gpu",
+            "preview/present",
+        ],
+    ),
     ("winit", &["preview/present", "preview/window"]),
     ("zbus", &["preview/window"]),
     ("zune_jpeg", &["capture"]),

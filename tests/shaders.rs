@@ -7,6 +7,7 @@ use std::mem::offset_of;
 use bokehcam::bokeh::gpu::shaders::{ALL, Bin, CONSTANTS, Frame, Work};
 use bokehcam::bokeh::plan::MAX_BINS;
 use bokehcam::compute::device::Shader;
+use bokehcam::depth::matting::gpu::shaders as matte;
 use bokehcam::depth::refine::gpu::shaders as refine;
 use bokehcam::depth::stereo::gpu::shaders as stereo;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -22,7 +23,8 @@ fn every_shader_validates_and_is_named_like_its_file() {
     let matching = stereo::ALL.map(|shader| (shader, constants.to_vec()));
     let refine = refine::ALL.map(|shader| (shader, refine::constants(false).map(|(name, _)| name).to_vec()));
     let rectify = (stereo::RECTIFY, stereo::rectify_constants(4, 4, 1).map(|(name, _)| name).to_vec());
-    for (shader, constants) in blur.into_iter().chain(matching).chain(refine).chain([rectify]) {
+    let matte = matte::ALL.map(|shader| (shader, matte::constants(false).map(|(name, _)| name).to_vec()));
+    for (shader, constants) in blur.into_iter().chain(matching).chain(refine).chain(matte).chain([rectify]) {
         let module = parse(shader.source);
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SHADER_FLOAT16_IN_FLOAT32);
         if let Err(error) = validator.validate(&module) {
@@ -43,13 +45,12 @@ fn every_file_is_a_pass_or_shared_and_short() {
         let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().to_owned();
         let shared = "base common filter list meet mixed next pyramid range show tent tiles todo work yuyv stereo_common stereo_line \
              stereo_path stereo_root stereo_row stereo_touch refine_common refine_ends refine_lanes refine_select \
-             refine_window";
+             refine_window matte_common matte_behind matte_claim matte_compare matte_contrast matte_enter matte_light \
+             matte_prior matte_sum matte_surfaces matte_turn matte_weights";
         let known = shared.split(' ').any(|file| file == name)
-            || ALL
+            || [&ALL[..], &stereo::ALL, &refine::ALL, &matte::ALL, &[stereo::RECTIFY]]
+                .concat()
                 .iter()
-                .chain(&stereo::ALL)
-                .chain(&refine::ALL)
-                .chain([&stereo::RECTIFY])
                 .any(|shader| shader.name == name)
             || name == "present";
         assert!(known, "{} belongs to no pass", path.display());
@@ -117,6 +118,29 @@ fn structs_have_the_same_layout_in_rust_and_wgsl() {
         let frame = layout!(Frame { size, map_size, focus_m, times, longest, empty, fresh });
         have_layouts(&refine::ALL, [frame, layout!(Wave { first, at, marks })]);
     }
+    {
+        use matte::{Frame, Turn};
+        let frame = layout!(Frame { size, most, known, jump, other });
+        have_layouts(&matte::ALL, [frame, layout!(Turn { at })]);
+    }
+    let matte = matte::ALL.map(|shader| parse(shader.source));
+    for (name, size) in [("Entry", matte::ENTRY), ("Cell", matte::CELL), ("Color", matte::COLORS / 2)] {
+        let types = matte.iter().flat_map(|module| module.types.iter());
+        let spans: Vec<_> =
+            types.filter(|(_, kind)| kind.name.as_deref() == Some(name)).map(|(_, kind)| &kind.inner).collect();
+        let has_size =
+            |kind: &&naga::TypeInner| matches!(kind, naga::TypeInner::Struct { span, .. } if *span as usize == size);
+        assert!(!spans.is_empty() && spans.iter().all(has_size), "{name} has {size} bytes");
+    }
+}
+
+#[test]
+fn no_pass_of_the_matte_has_more_buffers_than_a_device_is_asked_for() {
+    let is_storage = |space: &naga::AddressSpace| matches!(space, naga::AddressSpace::Storage { .. });
+    let count = |shader: Shader| {
+        parse(shader.source).global_variables.iter().filter(|(_, variable)| is_storage(&variable.space)).count()
+    };
+    assert_eq!(matte::ALL.map(count).into_iter().max(), Some(matte::MOST_BUFFERS as usize));
 }
 
 /// A struct's name, size, and the places of its fields.

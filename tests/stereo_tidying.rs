@@ -5,9 +5,7 @@
 
 mod common;
 
-use bokehcam::compute::device::Device;
-use bokehcam::compute::device::pass::Recorder;
-use bokehcam::compute::device::readback::Readback;
+use bokehcam::compute::device::{Device, Readback, Recorder};
 use bokehcam::depth::stereo::fixed::{FILLED, STEP, UNKNOWN};
 use bokehcam::depth::stereo::gpu::shaders;
 use bokehcam::depth::stereo::gpu::tidying::{Scratch, passes};

@@ -1,7 +1,12 @@
 //! Which adapter, and the device on it.
 
-pub mod pass;
-pub mod readback;
+mod pass;
+mod picture;
+mod readback;
+
+pub use pass::{Pass, Recorder, Stamps, workgroups_2d};
+pub use picture::{DeviceFrame, DevicePicture};
+pub use readback::Readback;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -62,8 +67,9 @@ pub struct Device {
     pub timestamps: bool,
     /// What the trial of this device found wrong, once that is over.
     pub trial: OnceLock<Option<String>>,
-    /// Whether it refines depth as the processor does, once that was tried.
+    /// Whether it refines depth, and finds mattes, as the processor does, once that was tried.
     pub refining: OnceLock<bool>,
+    pub matting: OnceLock<bool>,
     /// Those made so far, by the names of their shaders and the bits of their constants.
     pipelines: Mutex<HashMap<(&'static str, Vec<u64>), wgpu::ComputePipeline>>,
     patience: Duration,
@@ -121,8 +127,22 @@ impl Device {
         // Dropping the device calls this, too; then nobody is left to read the fault.
         device.set_device_lost_callback(move |_, message| on_loss(format!("device lost: {message}")));
         let patience = if infos[best].device_type == wgpu::DeviceType::Cpu { PATIENCE_WITH_SOFTWARE } else { PATIENCE };
-        let (trial, refining, pipelines) = (OnceLock::new(), OnceLock::new(), Mutex::default());
-        Ok(Self { instance, adapter, device, queue, name, timestamps, trial, refining, pipelines, patience, fault })
+        let [refining, matting] = [OnceLock::new(), OnceLock::new()];
+        let (trial, pipelines) = (OnceLock::new(), Mutex::default());
+        Ok(Self {
+            instance,
+            adapter,
+            device,
+            queue,
+            name,
+            timestamps,
+            trial,
+            refining,
+            matting,
+            pipelines,
+            patience,
+            fault,
+        })
     }
 
     /// The same device, which may take so long before it counts as hung.
@@ -192,6 +212,20 @@ impl Device {
             usage,
             mapped_at_creation: false,
         })
+    }
+
+    /// Refuses sizes whose largest buffer, or whose number of workgroups, exceeds the limits of the device.
+    ///
+    /// # Errors
+    /// It does: so large pictures cannot be `done` there.
+    pub fn has_room(&self, (width, height): (u32, u32), bytes: u64, done: &str) -> Result<(), GpuError> {
+        let limits = self.device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes > most || width.max(height) > limits.max_compute_workgroups_per_dimension {
+            let (name, size) = (&self.name, format!("{width} x {height}"));
+            return Err(GpuError::Failed(format!("{name}: pictures of {size} are too large to be {done} there")));
+        }
+        Ok(())
     }
 
     /// Copies any number of bytes to a buffer, from byte `at` on, a multiple of 4. A device takes whole words only, so
@@ -280,38 +314,6 @@ impl Device {
 /// Records a fault, unless there is one already.
 fn note(fault: &Mutex<Option<String>>, message: String) {
     fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
-}
-
-/// An 8-bit sRGB picture in a device's memory: the bytes of a [`crate::frame::ColorImage`].
-#[derive(Debug)]
-pub struct DevicePicture {
-    device: wgpu::Device,
-    size: (u32, u32),
-    buffer: wgpu::Buffer,
-}
-
-impl DevicePicture {
-    /// Memory for a picture of `size` pixels.
-    pub fn new(device: &Device, size: (u32, u32)) -> Self {
-        use wgpu::BufferUsages as Usage;
-        // Whole quads of pixels: what follows the last pixel is unspecified.
-        let quads = (size.0 as usize * size.1 as usize).div_ceil(4);
-        let buffer = device.buffer("picture", quads * 12, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST);
-        Self { device: device.device.clone(), size, buffer }
-    }
-
-    pub fn size(&self) -> (u32, u32) {
-        self.size
-    }
-
-    pub fn buffer(&self) -> &wgpu::Buffer {
-        &self.buffer
-    }
-
-    /// Whether the picture is in the memory of `device`.
-    pub fn is_on(&self, device: &Device) -> bool {
-        self.device == device.device
-    }
 }
 
 /// Whether the kernel offers any GPU at all. Asking Vulkan instead takes time, and some drivers write to stderr.

@@ -15,7 +15,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use crate::names::named;
 
 #[cfg(feature = "gpu")]
-pub use device::{Device, DevicePicture};
+pub use device::{Device, DeviceFrame, DevicePicture};
 pub use pass_times::PassTimes;
 
 /// A GPU, of which this build has none.
@@ -27,6 +27,11 @@ pub enum Device {}
 #[cfg(not(feature = "gpu"))]
 #[derive(Debug)]
 pub enum DevicePicture {}
+
+/// A depth map and its picture in a GPU's memory, of which this build has none.
+#[cfg(not(feature = "gpu"))]
+#[derive(Debug)]
+pub enum DeviceFrame {}
 
 named! {
     /// Where the executors run. A software Vulkan driver is far slower than plain code, so it has to be asked for.

@@ -37,9 +37,11 @@ pub struct CocMaker {
     focus: Focus,
     finisher: Finisher,
     mending: Mending,
-    /// Where depth is refined, if not on the processor.
+    /// Where depth is refined and mattes are found, if not on the processor.
     device: Option<Arc<Device>>,
     matting: Matting,
+    /// Whether a matte was looked for since it is known where: a device is not tried for nothing.
+    has_matted: bool,
     background: Option<Background>,
     workers: ThreadPool,
 }
@@ -87,6 +89,7 @@ impl CocMaker {
             mending,
             device: None,
             matting,
+            has_matted: false,
             background: None,
             workers: ThreadPool::new("depth", 1),
         }
@@ -97,11 +100,12 @@ impl CocMaker {
         Self { workers: ThreadPool::new("depth", threads), ..self }
     }
 
-    /// Refines on a device from now on; nothing changes where that is `None`, or the one that does so already.
-    pub fn refine_on(&mut self, device: Option<Arc<Device>>) {
+    /// Refines and finds mattes on a device from now on; nothing changes where that is `None`, or the one that does so already.
+    pub fn compute_on(&mut self, device: Option<Arc<Device>>) {
         let is_other = |device: &Arc<Device>| !self.device.as_ref().is_some_and(|own| Arc::ptr_eq(own, device));
         if let Some(device) = device.filter(is_other) {
             self.device = Some(device);
+            self.has_matted = false;
             if matches!(self.finisher, Finisher::Refine(_)) {
                 self.renew(Finish::Refine);
             }
@@ -114,6 +118,11 @@ impl CocMaker {
             (Finisher::Refine(refiner), CocRule::Depth { .. }) => Some(refiner.backends()),
             _ => None,
         }
+    }
+
+    /// What found mattes, for the report; `None` where none was looked for.
+    pub fn matted_by(&self) -> Option<&'static str> {
+        self.has_matted.then(|| self.matting.backends())
     }
 
     /// Finishes maps with no memory of those before.
@@ -204,6 +213,7 @@ impl CocMaker {
                     refiner.set_focus(focus_m);
                     refiner.refine_on(&mut self.workers, map, color, time_ns);
                     map.is_smooth = false;
+                    self.matting.take_from(refiner.on_device());
                 }
             }
             done(if matches!(self.finisher, Finisher::Refine(_)) { "refine" } else { "fill" });
@@ -228,11 +238,14 @@ impl CocMaker {
     fn find_matte(&mut self, map: &mut DepthMap, color: &ColorImage, field: &CocField) {
         map.matte.pixels.clear();
         if let (CocField::Depth(lens), false) = (field, map.is_smooth) {
+            if !std::mem::replace(&mut self.has_matted, true) {
+                self.matting = std::mem::take(&mut self.matting).on(self.device.as_ref());
+            }
             let Self { matting, workers, .. } = self;
             let jump = lens.inverse_depth_of_px(matting::FROM_PX);
             match &self.background {
                 Some(background) => background.find_matte(matting, workers, (map, color), lens),
-                None => matting.find_before(workers, (map, color), jump, |_, _| None),
+                None => matting.find_before(workers, (map, color), jump, None),
             }
         }
     }

@@ -54,8 +54,9 @@ pub(super) struct Stage<'a> {
     pub wanted: Option<Arc<Wanted>>,
     /// Counts frames that took over the depth of the one before.
     pub held: &'a mut u64,
-    /// Told what refines ([`Preparation::refined_by`]).
+    /// Told what refines, and what finds mattes ([`Preparation::refined_by`], [`Preparation::matted_by`]).
     pub refined_by: &'a mut Option<&'static str>,
+    pub matted_by: &'a mut Option<&'static str>,
 }
 
 impl Stage<'_> {
@@ -128,6 +129,7 @@ impl Stage<'_> {
                 }
             };
             *self.refined_by = preparation.refined_by().or(*self.refined_by);
+            *self.matted_by = preparation.matted_by().or(*self.matted_by);
             (trace.change, trace.between) = (change, between);
             let taken = depth.as_deref().zip(self.taken.filter(|_| preparation.replaces(&coc))).map(|(map, pool)| {
                 let mut taken = pool.take();

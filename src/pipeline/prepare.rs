@@ -38,14 +38,19 @@ impl Preparation {
         self.staging.follow(look);
     }
 
-    /// Refines depth where the blur runs ([`CocMaker::refine_on`]).
+    /// Refines depth and finds mattes where the blur runs ([`CocMaker::compute_on`]).
     pub fn beside(&mut self, bokeh: Option<&dyn Bokeh>) {
-        self.coc.refine_on(bokeh.and_then(Bokeh::device));
+        self.coc.compute_on(bokeh.and_then(Bokeh::device));
     }
 
     /// What refined ([`CocMaker::refined_by`]).
     pub fn refined_by(&self) -> Option<&'static str> {
         self.coc.refined_by()
+    }
+
+    /// What found mattes ([`CocMaker::matted_by`]).
+    pub fn matted_by(&self) -> Option<&'static str> {
+        self.coc.matted_by()
     }
 
     /// Another scene comes: nothing is left of those before.

@@ -16,6 +16,8 @@ pub struct About {
     pub adapter: String,
     /// What refined their depth, as `backend`.
     pub refined_by: String,
+    /// What found their mattes, as `backend`.
+    pub matted_by: String,
     /// Where the frames came from.
     pub source: String,
     /// Where they went.
@@ -57,6 +59,8 @@ pub struct Report {
     pub adapter: String,
     /// What refined the depth: `cpu`, `gpu`, `gpu, then cpu` or `none`.
     pub refined_by: String,
+    /// What found the mattes, as that.
+    pub matted_by: String,
     /// Where the frames came from.
     pub source: String,
     /// Where they went.
@@ -180,6 +184,7 @@ impl Report {
             backend: about.backend,
             adapter: about.adapter,
             refined_by: about.refined_by,
+            matted_by: about.matted_by,
             source: about.source,
             sink: about.sink,
             elapsed_s: ms(about.elapsed_ns) / 1000.0,
@@ -311,7 +316,7 @@ mod tests {
             (&json["budget_ms"], &json["elapsed_s"], &json["cpu_s"]),
             (&33.333.into(), &0.5.into(), &0.25.into())
         );
-        for key in ["misses", "backend", "adapter", "refined_by", "source", "sink", "versions"] {
+        for key in ["misses", "backend", "adapter", "refined_by", "matted_by", "source", "sink", "versions"] {
             assert!(!json[key].is_null(), "{key}");
         }
     }

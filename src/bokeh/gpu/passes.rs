@@ -7,8 +7,7 @@ use super::layout::{self, Layout, tiles};
 use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, TAKING_TURNS, TILE, Work};
 use crate::bokeh::occlusion::MOST_LAYERS;
 use crate::bokeh::plan::{MAX_BINS, Plan};
-use crate::compute::device::pass::{Pass, Recorder, workgroups_2d};
-use crate::compute::device::{Device, Shader};
+use crate::compute::device::{Device, Pass, Recorder, Shader, workgroups_2d};
 
 /// Which uniform `Work` a dispatch has: that of its layer, of `reach`, or of a batch of the filters.
 const ALL: usize = MOST_LAYERS;

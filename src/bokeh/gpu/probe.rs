@@ -4,8 +4,7 @@ use super::GpuBokeh;
 use super::shaders::{LIST_HEAD, RESULT_TILE};
 use crate::bokeh::plan::CELL;
 use crate::bokeh::{BokehError, Probe};
-use crate::compute::device::pass::Recorder;
-use crate::compute::device::readback::Readback;
+use crate::compute::device::{Readback, Recorder};
 
 impl GpuBokeh {
     /// The result of a pass over the last frame, in the layout that [`Probe`] states. Waits and allocates; for tests.

@@ -7,9 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::bokeh::{BokehError, Finished, Job, PassTimes, Picture};
-use crate::compute::device::pass::Stamps;
-use crate::compute::device::readback::Readback;
-use crate::compute::device::{Device, DevicePicture};
+use crate::compute::device::{Device, DevicePicture, Readback, Stamps};
 use crate::link::pool::Pooled;
 
 /// Frames that may be in flight: one on the device, one waiting, one on its way back.

@@ -36,6 +36,7 @@ impl Background {
     /// Learns from the rows of a picture that are due. Surfaces are another beyond a step `other` of inverse depth.
     pub(super) fn learn_rows(&mut self, workers: &mut ThreadPool, (map, color): (&DepthMap, &ColorImage), other: f32) {
         let (size, lesson) = (self.size, self.frame / LESSONS);
+        self.revise();
         self.mixed.clear(size);
         for pixel in &map.matte.pixels {
             self.mixed.set(pixel.at as usize % size.0, pixel.at as usize / size.0);

@@ -8,6 +8,8 @@ mod cells;
 mod learning;
 mod reveal;
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::color::light_of_codes;
 use crate::compute::thread_pool::ThreadPool;
 use crate::frame::{ColorImage, DepthMap, MixedPixel};
@@ -15,7 +17,7 @@ use crate::optics::DepthCoc;
 
 use super::alignment::{Aligner, Alignment};
 use super::bits::Bits;
-use super::matting::{FROM_PX, Matting};
+use super::matting::{Behind, FROM_PX, Matting};
 use super::reduced::{MOST, Reducer, block_px, reduced_size};
 use cells::Cells;
 
@@ -43,6 +45,8 @@ pub struct Background {
     rgb: Vec<u8>,
     inverse: Vec<f32>,
     rounds: Vec<u8>,
+    /// A number that these three have for themselves ([`Behind::revision`]).
+    revision: u64,
     frame: usize,
     time_ns: u64,
     /// The camera moved before this time: nothing is learned until then.
@@ -74,6 +78,7 @@ impl Default for Background {
             rgb: Vec::new(),
             inverse: Vec::new(),
             rounds: Vec::new(),
+            revision: 0,
             frame: 0,
             time_ns: 0,
             resumes_ns: 0,
@@ -137,9 +142,8 @@ impl Background {
         lens: &DepthCoc,
     ) {
         let (jump, other) = [FROM_PX, OTHER_PX].map(|px| lens.inverse_depth_of_px(px)).into();
-        let knows = self.knows(color);
-        let behind = |at, near| if knows { self.light_behind(at, near, other) } else { None };
-        matting.find_before(workers, (map, color), jump, behind);
+        let behind = self.knows(color).then(|| self.seen(other));
+        matting.find_before(workers, (map, color), jump, behind.as_ref());
     }
 
     /// Whether anything is known of pictures like this one.
@@ -147,22 +151,10 @@ impl Background {
         self.size == (color.width as usize, color.height as usize) && self.time_ns >= self.resumes_ns
     }
 
-    /// The light behind pixel `at`, as the camera exposes now, whose nearer surface has inverse depth `near`, in 1/m; `None`
-    /// where that is not known. Surfaces are another beyond a step `other` of it.
-    #[inline(always)]
-    fn light_behind(&self, at: usize, near: f32, other: f32) -> Option<[f32; 3]> {
-        let is_known = (self.rounds[at] >= KNOWN) & (near - self.inverse[at] > other);
-        if is_known { Some(self.light_at(at)) } else { None }
-    }
-
-    /// The light that is remembered of a pixel, as the camera exposes now.
-    #[inline(always)]
-    fn light_at(&self, at: usize) -> [f32; 3] {
-        let (rgb, mut light) = (&self.rgb[3 * at..][..3], [0.0; 3]);
-        for p in 0..3 {
-            light[p] = self.light[p][usize::from(rgb[p])];
-        }
-        light
+    /// What is remembered, where surfaces are another beyond a step `other` of inverse depth, in 1/m.
+    fn seen(&self, other: f32) -> Behind<'_> {
+        let Self { rgb, inverse, rounds, light, revision, .. } = self;
+        Behind { rgb, inverse, rounds, known: KNOWN, light, other, revision: *revision }
     }
 
     /// Starts anew.
@@ -175,6 +167,13 @@ impl Background {
         self.rounds.resize(count, 0);
         self.reduced.clear();
         self.gain = [1.0; 3];
+        self.revise();
+    }
+
+    /// What is remembered changes.
+    fn revise(&mut self) {
+        static REVISIONS: AtomicU64 = AtomicU64::new(1);
+        self.revision = REVISIONS.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Finds how the camera exposes now. Whether it stands where it stood.

@@ -8,6 +8,7 @@ use super::cells::{CELL, Known};
 use super::{Background, OTHER_PX};
 use crate::compute::bands::Bands;
 use crate::compute::thread_pool::ThreadPool;
+use crate::depth::matting::light_at;
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use crate::optics::DepthCoc;
 
@@ -44,7 +45,7 @@ impl Background {
     /// A pixel at `metres` and what it hides.
     #[inline(always)]
     fn behind(&self, at: usize, metres: f32, rgb: &[u8]) -> MixedPixel {
-        let (light, own) = (self.light_at(at), &rgb[3 * at..][..3]);
+        let (light, own) = (light_at(&self.rgb, &self.light, at), &rgb[3 * at..][..3]);
         let mut difference = [0.0; 3];
         for p in 0..3 {
             difference[p] = self.own_light[usize::from(own[p])] - light[p];

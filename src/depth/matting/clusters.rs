@@ -12,16 +12,20 @@ use super::symmetric::{Symmetric, outer};
 use crate::depth::bits::Bits;
 
 pub(super) use answers::Clusters;
+#[cfg(feature = "gpu")]
+pub(super) use answers::{FRINGE_PIXELS, HALF_PX, REACHES_CELLS};
+#[cfg(feature = "gpu")]
+pub(super) use cell::{AT_EDGE_WEIGHT, CLOSE_PX, CLOSE_WEIGHT};
 
 /// Side of a cell, in pixels.
-const CELL_PX: usize = 8;
+pub(super) const CELL_PX: usize = 8;
 
 /// The place of the cluster of the near surface's pixels at edges, after those of the near and the far surface.
 const FRINGE: usize = 2;
 /// So much of a pixel at an edge that the map gives to the near surface is that, on average.
-const FRINGE_SHARE: f32 = 0.75;
+pub(super) const FRINGE_SHARE: f32 = 0.75;
 /// From the first share down, the colour of such pixels is not that of the near surface; from the second up, it is.
-const FRINGE_SHARES: [f32; 2] = [-0.1, 0.25];
+pub(super) const FRINGE_SHARES: [f32; 2] = [-0.1, 0.25];
 
 /// Pixels of one surface in a cell, weighted.
 #[derive(Clone, Copy, Debug, Default)]

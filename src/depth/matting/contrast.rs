@@ -8,11 +8,14 @@ use super::symmetric::{Symmetric, dot, inverse, times};
 use super::{larger, smaller};
 
 /// Covariances of few pixels are too narrow: so much of them goes evenly into all directions.
-const SHRINKAGE: f32 = 0.01;
+pub(super) const SHRINKAGE: f32 = 0.01;
 /// Variance of what quantisation alone does, in linear light.
-const QUANTISATION: f32 = 5e-6;
+pub(super) const QUANTISATION: f32 = 5e-6;
 /// Light that is off a surface's by more than so many standard deviations is not of it.
-const MOST_DEVIATION: f32 = 3.0;
+pub(super) const MOST_DEVIATION: f32 = 3.0;
+
+/// No share is more precise, as colours are in steps.
+pub(super) const MOST_PRECISION: f32 = 1000.0;
 
 /// How the colours of two surfaces differ, for how much they vary.
 #[derive(Clone, Copy, Debug)]
@@ -46,8 +49,8 @@ impl Discriminant {
         let contrast = dot(direction, difference).max(1e-9);
         let scale = 1.0 / contrast;
         let direction = direction.map(|value| scale * value);
-        // Both surfaces' variances are in it, of which a mixed pixel has half each. No finer than the steps.
-        Self { direction, offset: dot(direction, far), precision: (2.0 * contrast).min(1000.0) }
+        // Both surfaces' variances are in it, of which a mixed pixel has half each.
+        Self { direction, offset: dot(direction, far), precision: (2.0 * contrast).min(MOST_PRECISION) }
     }
 
     /// Of a [`Contrast::front`] before this light.

@@ -5,8 +5,12 @@
 //! each share (Bayesian matting, after Chuang et al. 2001), and the map says which shares are likely before that.
 //! Everything is local, from one frame, and in time that grows with the length of the outlines.
 
+mod behind;
 mod clusters;
 mod contrast;
+#[cfg(feature = "gpu")]
+#[doc(hidden)]
+pub mod gpu;
 pub mod mask;
 mod passes;
 mod share;
@@ -15,13 +19,17 @@ mod symmetric;
 mod trace;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use pulp::Arch;
 
 use crate::color::light_of_codes;
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
+use crate::compute::{Device, DeviceFrame};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
+
+pub use behind::{Behind, light_at};
 
 use super::bits::Bits;
 use clusters::{Clusters, View};
@@ -57,6 +65,14 @@ pub struct Matting {
     /// The places of those that are mixed, in the order of the picture, and memory for that.
     order: Vec<u32>,
     traced: Vec<u64>,
+    /// The next map and its picture.
+    on_device: Option<DeviceFrame>,
+    /// Finds them in the processor's place, as long as the device does not fail.
+    #[cfg(feature = "gpu")]
+    gpu: Option<gpu::GpuMatting>,
+    /// Whether the device did.
+    #[cfg(feature = "gpu")]
+    has_failed: bool,
 }
 
 /// A pixel beside a jump of depth.
@@ -132,31 +148,79 @@ impl Default for Matting {
             wide: Wide::default(),
             order: Vec::new(),
             traced: Vec::new(),
+            on_device: None,
+            #[cfg(feature = "gpu")]
+            gpu: None,
+            #[cfg(feature = "gpu")]
+            has_failed: false,
         }
     }
 }
 
 impl Matting {
+    /// The same on a device, where there is one that finds mattes as the processor does. When it fails, the processor goes on, from
+    /// the frame on with which it does.
+    #[must_use]
+    pub fn on(self, device: Option<&Arc<Device>>) -> Self {
+        #[cfg(feature = "gpu")]
+        {
+            Self { gpu: device.and_then(gpu::GpuMatting::tried), ..self }
+        }
+        #[cfg(not(feature = "gpu"))]
+        {
+            let _ = device;
+            self
+        }
+    }
+
+    /// The map and the picture of the next call are on a device already, as they are in memory.
+    pub fn take_from(&mut self, on_device: Option<DeviceFrame>) {
+        self.on_device = on_device;
+    }
+
+    /// What finds mattes, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
+    pub fn backends(&self) -> &'static str {
+        #[cfg(feature = "gpu")]
+        match (&self.gpu, self.has_failed) {
+            (Some(_), _) => return "gpu",
+            (None, true) => return "gpu, then cpu",
+            (None, false) => {}
+        }
+        "cpu"
+    }
+
     /// Finds the mixed pixels of a map as large as its picture, beside jumps of inverse depth of more than `jump`, in 1/m.
     /// Of another size, or where `jump` is not finite, or with more edges than [`Matte::most`], it has none.
     pub fn find(&mut self, map: &mut DepthMap, color: &ColorImage, jump: f32) {
-        self.find_before(&mut ThreadPool::new("matte", 1), (map, color), jump, |_, _| None);
+        self.find_before(&mut ThreadPool::new("matte", 1), (map, color), jump, None);
     }
 
-    /// The same on several threads, where `behind` may know the light behind a pixel, by its place and the inverse depth of its
-    /// nearer surface. The matte is the same to the bit for any number of threads.
+    /// The same on several threads, with what is known to lie behind pixels. The matte is the same to the bit for any number of
+    /// threads.
     pub fn find_before(
         &mut self,
         workers: &mut ThreadPool,
         (map, color): (&mut DepthMap, &ColorImage),
         jump: f32,
-        behind: impl Fn(usize, f32) -> Option<[f32; 3]> + Sync,
+        behind: Option<&Behind>,
     ) {
+        let on_device = self.on_device.take();
         map.matte.pixels.clear();
         if map.size() != color.size() || map.metres.is_empty() || !jump.is_finite() {
             return;
         }
-        let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced } = self;
+        #[cfg(not(feature = "gpu"))]
+        let _ = on_device;
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &mut self.gpu {
+            match gpu.find((map, color), on_device, jump, behind) {
+                Ok(()) => return,
+                Err(error) => tracing::warn!("{error}; the CPU finds mattes from here on"),
+            }
+            (self.gpu, self.has_failed) = (None, true);
+            map.matte.pixels.clear();
+        }
+        let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced, .. } = self;
         let arch = *arch;
         survey.find((arch, workers), map, jump, (at_edge, edges));
         let size = (map.width as usize, map.height as usize);
@@ -173,7 +237,9 @@ impl Matting {
         // Those between surfaces of which one has no pixels tell nothing.
         pixels.retain(|pixel| clusters.at(pixel.answer).is_some());
         let on_edges = pixels.len();
-        let (mut compared, mut prior, mut steps) = (0..0, Prior::default(), 0);
+        let (mut compared, mut marked) = (0..0, edges.len());
+        wide.steps.clear();
+        let (mut prior, mut steps) = (Prior::default(), 0);
         loop {
             let found = compared.end..pixels.len();
             evidence.resize(found.len().div_ceil(LANES), Evidence::default());
@@ -181,20 +247,30 @@ impl Matting {
             let view = View { size, metres, jump, at_edge, rgb, light };
             let parts = pixels[found.clone()].chunks_mut(each).zip(evidence.chunks_mut(each / LANES));
             workers.run_each(parts, &|(pixels, evidence)| {
-                let (view, behind) = (&view, &behind);
+                let view = &view;
                 arch.dispatch(Compare { view, clusters, behind, pixels, evidence });
             });
             let is_first = steps == 0;
             arch.dispatch(Weigh { prior: &mut prior, is_first, evidence, pixels: &mut pixels[found.clone()] });
+            if !is_first {
+                wide.steps.push(found.clone());
+            }
             compared = found;
-            if compared.is_empty() || compared.end >= most || steps == MOST_STEPS {
+            if compared.is_empty() || steps == MOST_STEPS {
                 break;
             }
             let (compared, workers) = (compared.clone(), &mut *workers);
-            arch.dispatch(Trace { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels });
+            let found_until = compared.end;
+            let trace = Trace { arch, workers, size, metres, jump, rgb, light, at_edge, clusters, compared, pixels };
+            marked += arch.dispatch(trace);
+            // Noise, too: no hair is that long.
+            if marked > most {
+                pixels.truncate(found_until);
+                break;
+            }
             steps += 1;
         }
-        wide.drop(size, &mut pixels[on_edges..]);
+        wide.drop(size, pixels);
         sort(size.0, pixels, on_edges, (order, traced));
 
         let each = bands::share(order.len(), LEAST_PIXELS);

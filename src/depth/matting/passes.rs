@@ -3,21 +3,22 @@
 use pulp::WithSimd;
 
 use super::Pixel;
+use super::behind::Behind;
 use super::clusters::{Clusters, View};
 use super::contrast::Parts;
 use super::share::{Colors, Evidence, LANES, Prior};
 use crate::frame::MixedPixel;
 
 /// Compares pixels with the surfaces around them.
-pub struct Compare<'a, B> {
+pub struct Compare<'a> {
     pub view: &'a View<'a>,
     pub clusters: &'a Clusters,
-    pub behind: &'a B,
+    pub behind: Option<&'a Behind<'a>>,
     pub pixels: &'a mut [Pixel],
     pub evidence: &'a mut [Evidence],
 }
 
-impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Compare<'_, B> {
+impl WithSimd for Compare<'_> {
     type Output = ();
     // No vectors by hand: the call has the compiler use what the processor has, in all that it takes in. Loops, not closures for
     // iterators, which would not have them.
@@ -28,7 +29,11 @@ impl<B: Fn(usize, f32) -> Option<[f32; 3]>> WithSimd for Compare<'_, B> {
             // What lies apart in memory first, so that none waits for another.
             for pixel in &mut *pixels {
                 let at = pixel.at(view.size.0);
-                (pixel.own, pixel.behind) = (view.light(at), behind(at, pixel.edge.near));
+                pixel.own = view.light(at);
+                pixel.behind = match behind {
+                    Some(behind) => behind.light(at, pixel.edge.near),
+                    None => None,
+                };
             }
             let mut colors = Colors::NONE;
             for (k, pixel) in pixels.iter_mut().enumerate() {

@@ -10,15 +10,15 @@ pub const LANES: usize = 16;
 pub type Lanes = [f32; LANES];
 
 /// Shares are tried in steps of an eighth.
-const STEPS: usize = 9;
+pub const STEPS: usize = 9;
 const STEP: f32 = 1.0 / (STEPS - 1) as f32;
 /// Surfaces have spots that no pixel around is like: so likely a pure pixel is one, times what evens out densities.
-const OUTLIER: f32 = 0.02;
+pub const OUTLIER: f32 = 0.02;
 /// Of two pixels in a row at an edge, one borders the other surface only at a corner: it is mixed so much more rarely.
-const AT_CORNER: f32 = 0.3;
+pub const AT_CORNER: f32 = 0.3;
 /// Likelihoods that are as good as nothing, of a share, and of a colour that is off the line between both surfaces.
-const LEAST: f32 = 1e-18;
-const LEAST_OFF_LINE: f32 = 1e-6;
+pub const LEAST: f32 = 1e-18;
+pub const LEAST_OFF_LINE: f32 = 1e-6;
 
 /// What the depth map says of a pixel at an edge.
 #[derive(Clone, Copy, Debug, Default)]
@@ -127,17 +127,22 @@ impl Evidence {
 /// and from a camera half of them are. Found by expectation maximisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Prior {
-    mixed: f32,
-    wrong: f32,
+    pub mixed: f32,
+    pub wrong: f32,
 }
+
+/// The first guess, what is least likely of both, what is most, and rounds until it is found.
+pub const PRIOR: Prior = Prior { mixed: 0.3, wrong: 0.01 };
+pub const PRIOR_FLOOR: f32 = 0.002;
+pub const PRIOR_MOST: Prior = Prior { mixed: 0.9, wrong: 0.3 };
+pub const PRIOR_ROUNDS: usize = 4;
 
 impl Prior {
     /// What makes all that is known of a frame's pixels most likely.
     #[inline(always)]
     pub fn of(evidence: &[Evidence]) -> Self {
-        const FLOOR: f32 = 0.002;
-        let mut prior = Self { mixed: 0.3, wrong: 0.01 };
-        for _ in 0..4 {
+        let mut prior = PRIOR;
+        for _ in 0..PRIOR_ROUNDS {
             let [mut mixed, mut bordering, mut wrong, mut all] = [[0.0f32; LANES]; 4];
             for one in evidence {
                 for k in 0..LANES {
@@ -153,8 +158,8 @@ impl Prior {
                 }
             }
             let [mixed, bordering, wrong, all] = [mixed, bordering, wrong, all].map(|sums| sums.iter().sum::<f32>());
-            prior.mixed = (mixed / bordering.max(1.0)).clamp(FLOOR, 0.9);
-            prior.wrong = (wrong / all.max(1.0)).clamp(FLOOR, 0.3);
+            prior.mixed = (mixed / bordering.max(1.0)).clamp(PRIOR_FLOOR, PRIOR_MOST.mixed);
+            prior.wrong = (wrong / all.max(1.0)).clamp(PRIOR_FLOOR, PRIOR_MOST.wrong);
         }
         prior
     }

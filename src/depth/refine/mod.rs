@@ -29,8 +29,8 @@ use self::smooth::{Smoother, over};
 use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
-use crate::compute::Device;
 use crate::compute::thread_pool::ThreadPool;
+use crate::compute::{Device, DeviceFrame};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
 
@@ -135,6 +135,14 @@ impl Refiner {
             (None, false) => {}
         }
         "cpu"
+    }
+
+    /// The map that was refined last, and its picture, where a device has refined it.
+    pub fn on_device(&self) -> Option<DeviceFrame> {
+        #[cfg(feature = "gpu")]
+        return self.gpu.as_ref()?.refined();
+        #[cfg(not(feature = "gpu"))]
+        None
     }
 
     /// Another scene comes: nothing is left of the frames before.

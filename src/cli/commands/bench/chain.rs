@@ -184,7 +184,7 @@ fn measure(
     let measured = source.is_measured();
     let coc = CocMaker::new(look.coc_rule(size), Finish::measured(look.refines(measured)));
     let mut coc = coc.on_threads(computing.threads());
-    coc.refine_on(executors.first().and_then(|(_, executor)| executor.device()));
+    coc.compute_on(executors.first().and_then(|(_, executor)| executor.device()));
     let is_known = source.depth.as_ref().is_some_and(|source| source.knows_background());
     coc.remember(look.background_memory == BackgroundMemory::On && !is_known);
     let mut notes = Notes { clock: Clock::system(), since: [0; 2], parts: Vec::new(), measures: false };

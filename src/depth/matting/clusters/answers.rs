@@ -12,11 +12,11 @@ use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
 
 /// So many cells in every direction are looked at; more where they have nothing of a surface, as at the tips of hair.
-const REACHES_CELLS: [usize; 3] = [1, 2, 5];
+pub(in super::super) const REACHES_CELLS: [usize; 3] = [1, 2, 5];
 /// A cluster's weight falls to an eighth at this distance, in pixels; its long tail reaches hair.
-const HALF_PX: f32 = 6.0;
+pub(in super::super) const HALF_PX: f32 = 6.0;
 /// So many pixels of the fringe, near ones above all, tell nothing, as a lone hair is mostly what is behind it; so many are enough.
-const FRINGE_PIXELS: [f32; 2] = [6.0, 14.0];
+pub(in super::super) const FRINGE_PIXELS: [f32; 2] = [6.0, 14.0];
 /// Fewer cells, and answers, are not worth another thread.
 const LEAST_CELLS: usize = 16;
 const LEAST_ANSWERS: usize = 32;

@@ -11,10 +11,10 @@ use crate::depth::matting::symmetric::outer;
 use crate::frame::DepthMap;
 
 /// Pixels at an edge may be mixed themselves. They count so little that they matter only where nothing is pure.
-const AT_EDGE_WEIGHT: f32 = 4e-4;
+pub(in super::super) const AT_EDGE_WEIGHT: f32 = 4e-4;
 /// So many pixels beside an edge, too, the map may be wrong: they count less than those further away.
-const CLOSE_PX: usize = 3;
-const CLOSE_WEIGHT: f32 = 0.02;
+pub(in super::super) const CLOSE_PX: usize = 3;
+pub(in super::super) const CLOSE_WEIGHT: f32 = 0.02;
 
 /// Pixels of a cell, and every other of them, as on a chessboard, which tells enough.
 const PIXELS: usize = CELL_PX * CELL_PX;

@@ -4,8 +4,7 @@ use super::super::align::ROUNDS;
 use super::super::votes;
 use super::shaders::{ASKED, COUNTS, Frame, MEASURES, SAMPLES, WAVES, Wave};
 use crate::compute::GpuError;
-use crate::compute::device::Device;
-use crate::compute::device::readback::Readback;
+use crate::compute::device::{Device, Readback};
 
 /// The distance of one uniform from the next, as devices may ask for.
 const UNIFORM_STRIDE: u64 = 256;
@@ -40,7 +39,6 @@ pub struct Buffers {
     /// What is remembered of earlier frames.
     pub memory: wgpu::Buffer,
     pub refined: wgpu::Buffer,
-    /// A copy of the refined map that the CPU can map.
     pub readback: Readback,
 }
 
@@ -54,7 +52,7 @@ impl Buffers {
         let (width, height) = (size.0 as usize, size.1 as usize);
         let pixels = width * height;
         // What is remembered is the largest: three numbers a pixel.
-        has_room(device, size, pixels as u64 * 12)?;
+        device.has_room(size, pixels as u64 * 12, "refined")?;
         let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
         let words = |label, count: usize| buffer(label, 4 * count, Usage::STORAGE | Usage::COPY_DST);
         let buffers = device.attempt(|| Self {
@@ -62,7 +60,7 @@ impl Buffers {
             waves: buffer("waves", ROUNDS * (WAVES + 1) * UNIFORM_STRIDE as usize, Usage::UNIFORM | Usage::COPY_DST),
             map: Self::map(device, pixels),
             taps: words("taps", 2 * (width + height)),
-            rgb: words("rgb", (3 * pixels).div_ceil(4)),
+            rgb: buffer("rgb", 3 * pixels, Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC),
             colors: words("colors", pixels),
             before: words("colors before", pixels),
             flags: words("flags", pixels),
@@ -105,18 +103,4 @@ impl Buffers {
 
 fn wave_at(round: usize, wave: usize) -> u64 {
     (round * (WAVES + 1) + wave) as u64 * UNIFORM_STRIDE
-}
-
-/// Refuses sizes whose largest buffer, or whose number of workgroups, exceeds the limits of the device.
-pub fn has_room(device: &Device, (width, height): (u32, u32), bytes: u64) -> Result<(), GpuError> {
-    let limits = device.device.limits();
-    let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let longest = limits.max_compute_workgroups_per_dimension;
-    if bytes > most || width.max(height) > longest {
-        let name = &device.name;
-        return Err(GpuError::Failed(format!(
-            "{name}: pictures of {width} x {height} are too large to be refined there"
-        )));
-    }
-    Ok(())
 }

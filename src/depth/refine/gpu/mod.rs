@@ -19,8 +19,7 @@ use passes::Passes;
 use shaders::Frame;
 
 use super::temporal;
-use crate::compute::device::Device;
-use crate::compute::device::pass::{Recorder, Stamps};
+use crate::compute::device::{Device, DeviceFrame, Recorder, Stamps};
 use crate::compute::{GpuError, PassTimes};
 use crate::depth::guided_fill;
 use crate::depth::tap::Tap;
@@ -52,6 +51,8 @@ struct Work {
     has_filled: bool,
     /// What is remembered is of a frame at this time, with this distance in focus.
     last: Option<(u64, f32)>,
+    /// Whether the last refined map, and its picture, are on the device.
+    is_there: bool,
     stamps: Option<Stamps>,
     times: PassTimes,
 }
@@ -83,9 +84,10 @@ impl GpuRefiner {
         self.work.as_ref().map(|work| work.times).unwrap_or_default()
     }
 
-    /// Whether it is on this device.
-    pub fn is_on(&self, device: &Arc<Device>) -> bool {
-        Arc::ptr_eq(&self.device, device)
+    /// The map that was refined last, and its picture, where they are on the device.
+    pub fn refined(&self) -> Option<DeviceFrame> {
+        let Buffers { refined, rgb, .. } = &self.work.as_ref().filter(|work| work.is_there)?.buffers;
+        Some(DeviceFrame::new(&self.device, refined, rgb))
     }
 
     /// Refines the depth `map` of the picture `color` at `time_ns`, with this distance in focus.
@@ -116,8 +118,8 @@ impl Work {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
         let (from, columns, rows) = ((0, 0), Vec::new(), Vec::new());
-        let (stamps, times) = (Stamps::new(device, MOST_PASSES), PassTimes::new());
-        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None, stamps, times })
+        let (is_there, stamps, times) = (false, Stamps::new(device, MOST_PASSES), PassTimes::new());
+        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None, is_there, stamps, times })
     }
 
     /// Takes maps of another size.
@@ -134,7 +136,7 @@ impl Work {
         device.upload(&buffers.taps, 0, bytemuck::cast_slice(&words));
         let samples = from.0 as usize * from.1 as usize;
         if 4 * samples as u64 > buffers.map.size() {
-            buffers::has_room(device, from, 4 * samples as u64)?;
+            device.has_room(from, 4 * samples as u64, "refined")?;
             buffers.map = device.attempt(|| Buffers::map(device, samples))?;
             passes.set_map(device, *size, buffers);
         }
@@ -158,6 +160,7 @@ impl Work {
         time_ns: u64,
         focus_m: f32,
     ) -> Result<(), GpuError> {
+        self.is_there = false;
         if !map.metres.is_empty() && self.from != map.size() {
             self.take_maps(device, map.size())?;
         }
@@ -185,7 +188,7 @@ impl Work {
             device.upload(&self.buffers.map, 0, bytemuck::cast_slice(&map.metres));
         }
         self.run(device, map, is_empty, last.is_none())?;
-        self.has_filled = true;
+        (self.has_filled, self.is_there) = (true, true);
         self.last = Some((time_ns, focus_m));
         Ok(())
     }

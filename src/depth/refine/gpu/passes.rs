@@ -3,8 +3,7 @@
 use super::super::align::ROUNDS;
 use super::buffers::Buffers;
 use super::shaders::{self, COLUMNS, STRIP, TILE, WAVES};
-use crate::compute::device::pass::{Pass, Recorder};
-use crate::compute::device::{Device, Shader};
+use crate::compute::device::{Device, Pass, Recorder, Shader};
 
 /// Everything that a frame runs.
 pub struct Passes {

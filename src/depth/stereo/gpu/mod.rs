@@ -19,9 +19,7 @@ use shaders::in_line;
 use super::executor::Executor;
 use super::fixed::{self, UNKNOWN};
 use super::penalty::Penalties;
-use crate::compute::device::Device;
-use crate::compute::device::pass::{Pass, Recorder, Stamps};
-use crate::compute::device::readback::Readback;
+use crate::compute::device::{Device, Pass, Readback, Recorder, Stamps};
 use crate::compute::thread_pool::ThreadPool;
 use crate::compute::{GpuError, PassTimes, bands};
 

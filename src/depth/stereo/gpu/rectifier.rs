@@ -5,9 +5,7 @@ use std::sync::Arc;
 use super::shaders::{self, in_line};
 use crate::calibration::map::Map;
 use crate::compute::GpuError;
-use crate::compute::device::Device;
-use crate::compute::device::pass::{Pass, Recorder};
-use crate::compute::device::readback::Readback;
+use crate::compute::device::{Device, Pass, Readback, Recorder};
 use crate::frame::{ColorImage, GrayImage};
 
 /// Rectifies pictures of one size on a GPU.

@@ -2,8 +2,7 @@
 
 use super::super::fixed::{AGREE, BONUS, FILLED, NOISE, ONE, OUTSIDE, SLOPE, STEP, UNKNOWN};
 use crate::calibration::map::{DOWN_SHIFT, NOWHERE, ONE as WHOLE};
-use crate::compute::device::pass::workgroups_2d;
-use crate::compute::device::{Shader, shader};
+use crate::compute::device::{Shader, shader, workgroups_2d};
 
 /// What the last pair makes likely.
 pub const LIKELY: Shader = shader!("stereo_common"; "stereo_likely", "stereo_line");

@@ -6,8 +6,7 @@
 //! begins a run.
 
 use super::shaders::{self, Constants, in_line};
-use crate::compute::device::Device;
-use crate::compute::device::pass::Pass;
+use crate::compute::device::{Device, Pass};
 
 /// Four bytes a pixel each, of any content.
 pub struct Scratch<'a> {

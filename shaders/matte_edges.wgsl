@@ -1,0 +1,70 @@
+// Pass matte_edges: the pixels at edges are entered, row by row, with what the map says of them, and compared with the colours of
+// both surfaces around. Workgroups take turns with the cells.
+
+@group(0) @binding(1) var<uniform> lights: array<vec4<f32>, 256>;
+@group(0) @binding(2) var<storage, read> metres: array<u32>;
+@group(0) @binding(3) var<storage, read> rgb: array<u32>;
+@group(0) @binding(4) var<storage, read> known: array<u32>;
+@group(0) @binding(5) var<storage, read> words: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read> counts: array<u32>;
+@group(0) @binding(7) var<storage, read> clusters: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read_write> cells: array<Cell>;
+@group(0) @binding(9) var<storage, read_write> places: array<atomic<u32>>;
+@group(0) @binding(10) var<storage, read_write> entries: array<Entry>;
+@group(0) @binding(11) var<storage, read_write> colors: array<Color>;
+
+// The inverse depth of the pixel that is so many to the right and down, less one each; what is beyond the picture is as its
+// last column and row.
+fn beside(pixel: vec2<u32>, right: u32, down: u32) -> f32 {
+    let at = min(max(pixel + vec2(right, down), vec2(1u)) - 1u, frame.size - 1u);
+    return inverse_of(metres[at.y * frame.size.x + at.x]);
+}
+
+// What the map says of a pixel between two surfaces.
+fn labels_of(pixel: vec2<u32>, surfaces: vec2<f32>) -> u32 {
+    let middle = 0.5 * (surfaces.x + surfaces.y);
+    let is_near = beside(pixel, 1u, 1u) > middle;
+    var alike = 0u;
+    var borders = false;
+    for (var k = 0u; k < 9u; k++) {
+        let is_alike = (beside(pixel, k % 3u, k / 3u) > middle) == is_near;
+        let is_there = all(pixel + vec2(k % 3u, k / 3u) - 1u < frame.size);
+        alike += select(0u, 1u, is_alike && is_there);
+        borders = borders || (k % 2u == 1u && !is_alike);
+    }
+    // Itself, and two neighbours in a row.
+    let is_thin = is_near && alike <= 3u;
+    return select(0u, NEAR, is_near) | select(0u, BORDERS, borders) | select(0u, THIN, is_thin);
+}
+
+fn enter_edges(cell: vec2<u32>, thread: u32) {
+    let pixel = cell * CELL + vec2(thread % CELL, thread / CELL);
+    let word = min(pixel.y, frame.size.y - 1u) * words_across() + pixel.x / WORD;
+    let bit = 1u << (pixel.x % WORD);
+    let is_chosen = all(pixel < frame.size) && (words[word].x & bit) != 0u;
+    let count = choose(thread, is_chosen);
+    var surfaces = vec2(0.0);
+    var entry = 0u;
+    var labels = 0u;
+    if is_chosen {
+        surfaces = vec2(beside(pixel, 1u, 1u));
+        for (var k = 0u; k < 9u; k++) {
+            let inverse = beside(pixel, k % 3u, k / 3u);
+            surfaces = vec2(max(surfaces.x, inverse), min(surfaces.y, inverse));
+        }
+        labels = labels_of(pixel, surfaces);
+        entry = counts[TOTALS + word / BLOCK] + words[word].y + countOneBits(words[word].x & (bit - 1u));
+    }
+    enter(cell, 0u, count, thread, is_chosen, entry, pixel.y * frame.size.x + pixel.x, surfaces, labels);
+}
+
+@compute @workgroup_size(PIXELS)
+fn matte_edges(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+               @builtin(local_invocation_index) thread: u32) {
+    let end = select(counts[LISTED], 0u, counts[EDGES] == 0u);
+    for (var k = group.x; k < end; k += groups.x) {
+        let cell = cells[k].list[0];
+        enter_edges(vec2(cell % cells_across(), cell / cells_across()), thread);
+        workgroupBarrier();
+    }
+}

@@ -1,0 +1,31 @@
+// Pass matte_expect: a round of expectation maximisation over the entries at edges, 64 workgroups: from what was likely after the
+// rounds before, how many are mixed, and how often the map errs.
+
+@group(0) @binding(1) var<uniform> turn: Turn;
+@group(0) @binding(2) var<storage, read> counts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> entries: array<Entry>;
+@group(0) @binding(4) var<storage, read_write> partials: array<vec4<f32>>;
+
+@compute @workgroup_size(LANES)
+fn matte_expect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let prior = prior_after(turn.at, thread);
+    var own = vec4(0.0);
+    for (var k = group.x * LANES + thread; k < min(counts[EDGES], frame.most); k += LANES * LANES) {
+        let labels = atomicLoad(&entries[k].flags);
+        if (labels & LONE) != 0u {
+            continue;
+        }
+        let weights = weights_of(prior, labels);
+        let sided = weights.y * entries[k].sided.x;
+        let wrong = weights.z * entries[k].every.x;
+        let total = weights.x * entries[k].clean + sided + wrong;
+        let is_told = select(0.0, 1.0, total > TINY);
+        let borders = select(0.0, 1.0, (labels & BORDERS) != 0u);
+        let scale = is_told / max(total, TINY);
+        own += vec4(borders * sided * scale, borders * is_told, wrong * scale, is_told);
+    }
+    let total = total_of(own, thread);
+    if thread == 0u {
+        partials[turn.at * LANES + group.x] = total;
+    }
+}

@@ -1,0 +1,77 @@
+// Shared by the passes that find the colours around entries. Such a pass has the `clusters`, and `colors`, two of each answer.
+
+// Sums of clusters, as these have them.
+struct Sums {
+    a: vec4<f32>,
+    b: vec4<f32>,
+    c: vec2<f32>,
+}
+
+fn color_of(s: Sums) -> Color {
+    let mean = s.a.yzw / s.a.x;
+    return Color(mean, s.b.xyz / s.a.x - mean.x * mean, vec3(s.b.w, s.c) / s.a.x - mean.yyz * mean.yzz);
+}
+
+fn plus(s: Sums, weight: f32, k: u32) -> Sums {
+    return Sums(s.a + weight * clusters[k], s.b + weight * clusters[k + 1u], s.c + weight * clusters[k + 2u].xy);
+}
+
+// What of the near surface is at edges has other colours than where it is pure, as hair beside a face: then those count.
+fn with_fringe(near: Color, far: Color, sums: Sums) -> Color {
+    let counts = clamp((sums.a.x - FRINGE_FEW) / (FRINGE_ENOUGH - FRINGE_FEW), 0.0, 1.0);
+    if counts <= 0.0 {
+        return near;
+    }
+    let fringe = color_of(sums);
+    let share = share_of(discriminant_of(near.mean, spread_of(near, far), far.mean), fringe.mean);
+    let other = counts * clamp((FRINGE_SAME - share) / (FRINGE_SAME - FRINGE_OTHER), 0.0, 1.0);
+    if other <= 0.0 {
+        return near;
+    }
+    let own = clamp(far.mean + (fringe.mean - far.mean) / FRINGE_SHARE, vec3(0.0), vec3(1.0));
+    return Color(mix(near.mean, own, other), mix(near.row, fringe.row, other), mix(near.rest, fringe.rest, other));
+}
+
+// Finds the colours of both surfaces around a cell, for the answer of an entry with these inverse depths; whether both have any.
+fn find_colors(cell: vec2<u32>, near: f32, far: f32, answer: u32) -> bool {
+    // A surface's inverse depth may change on the way, but by less than would make it the other one.
+    let tolerance = max(2.0 * frame.jump, 0.25 * (near - far));
+    let across = cells_across();
+    let last = vec2(across, (frame.size.y + CELL - 1u) / CELL) - 1u;
+    let middle = vec2<f32>(cell * CELL) + 0.5 * f32(CELL - 1u);
+    for (var turn = 0u; turn < 3u; turn++) {
+        let reach = select(select(REACH_FARTHEST, REACH_FURTHER, turn == 1u), REACH, turn == 0u);
+        let from_cell = cell - min(cell, vec2(reach));
+        let to_cell = min(cell + reach, last);
+        var of_near = Sums();
+        var of_far = Sums();
+        var of_fringe = Sums();
+        for (var row = from_cell.y; row <= to_cell.y; row++) {
+            for (var k = 12u * (row * across + from_cell.x); k < 12u * (row * across + to_cell.x + 1u); k += 4u) {
+                let inverse = clusters[k + 3u].x;
+                let is_near = inverse > 0.5 * (near + far);
+                let is_fringe = k % 12u == 8u;
+                if clusters[k].x <= 0.0 || abs(inverse - select(far, near, is_near)) > tolerance || (is_fringe && !is_near) {
+                    continue;
+                }
+                let off = clusters[k + 2u].zw - middle;
+                let falloff = 1.0 / (1.0 + dot(off, off) / (HALF_PX * HALF_PX));
+                let weight = falloff * falloff * falloff;
+                if is_fringe {
+                    of_fringe = plus(of_fringe, weight, k);
+                } else if is_near {
+                    of_near = plus(of_near, weight, k);
+                } else {
+                    of_far = plus(of_far, weight, k);
+                }
+            }
+        }
+        if of_near.a.x > 0.0 && of_far.a.x > 0.0 {
+            let color = color_of(of_far);
+            colors[2u * answer] = with_fringe(color_of(of_near), color, of_fringe);
+            colors[2u * answer + 1u] = color;
+            return true;
+        }
+    }
+    return false;
+}

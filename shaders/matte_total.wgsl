@@ -1,0 +1,33 @@
+// Pass matte_total, one workgroup: how many bits are set before each block, and in all: at first of edges, then of mixed
+// pixels, whose number goes before their list, too.
+
+@group(0) @binding(1) var<storage, read_write> counts: array<u32>;
+@group(0) @binding(2) var<storage, read_write> mixed: array<vec4<u32>>;     // two for the number, and two a pixel
+
+@compute @workgroup_size(BLOCK)
+fn matte_total(@builtin(local_invocation_index) thread: u32) {
+    let blocks = (words_across() * frame.size.y + BLOCK - 1u) / BLOCK;
+    let each = (blocks + BLOCK - 1u) / BLOCK;
+    let begin = min(thread * each, blocks);
+    let end = min(begin + each, blocks);
+    var own = 0u;
+    for (var k = begin; k < end; k++) {
+        own += counts[TOTALS + k];
+    }
+    var before = sum_before(own, thread);
+    if thread == BLOCK - 1u {
+        let all = before + own;
+        if AGAIN == 0u {
+            // Noise: so many edges no picture has.
+            counts[EDGES] = select(all, 0u, all > frame.most);
+            counts[NEXT] = counts[EDGES];
+        } else {
+            mixed[0] = vec4(all, 0u, 0u, 0u);
+        }
+    }
+    for (var k = begin; k < end; k++) {
+        let of_block = counts[TOTALS + k];
+        counts[TOTALS + k] = before;
+        before += of_block;
+    }
+}

@@ -1,0 +1,79 @@
+// Pass matte_trace: a step beyond the edges. The pixels that were claimed for it are entered between the surfaces of the first that
+// claimed them, and compared; those that show something near claim theirs for the next. Workgroups take turns with the cells.
+
+@group(0) @binding(1) var<uniform> turn: Turn;      // from 1 on
+@group(0) @binding(2) var<uniform> lights: array<vec4<f32>, 256>;
+@group(0) @binding(3) var<storage, read> metres: array<u32>;
+@group(0) @binding(4) var<storage, read> rgb: array<u32>;
+@group(0) @binding(5) var<storage, read> known: array<u32>;
+@group(0) @binding(6) var<storage, read> partials: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read> clusters: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read_write> counts: array<atomic<u32>>;
+@group(0) @binding(9) var<storage, read_write> cells: array<Cell>;
+@group(0) @binding(10) var<storage, read_write> places: array<atomic<u32>>;
+@group(0) @binding(11) var<storage, read_write> entries: array<Entry>;
+@group(0) @binding(12) var<storage, read_write> colors: array<Color>;
+
+var<workgroup> listed: u32;
+var<workgroup> own_cell: u32;
+var<workgroup> first: u32;
+
+// The number of cells that are listed for this step: none where it has more pixels than there is room for.
+fn cells_to_do() -> u32 {
+    var all = atomicLoad(&counts[EDGES]);
+    for (var step = 1u; step <= turn.at; step++) {
+        all += atomicLoad(&counts[CLAIMED + step]);
+    }
+    return select(atomicLoad(&counts[LISTED + turn.at]), 0u, all > frame.most);
+}
+
+@compute @workgroup_size(LANES)
+fn matte_trace(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+               @builtin(local_invocation_index) thread: u32) {
+    if thread == 0u {
+        listed = cells_to_do();
+    }
+    let end = workgroupUniformLoad(&listed);
+    if group.x >= end {
+        return;
+    }
+    let prior = prior_after(PRIOR_ROUNDS, thread);
+    for (var k = group.x; k < end; k += groups.x) {
+        if thread == 0u {
+            own_cell = cells[k].list[turn.at % 2u];
+        }
+        let number = workgroupUniformLoad(&own_cell);
+        let cell = vec2(number % cells_across(), number / cells_across());
+        let pixel = cell * CELL + vec2(thread % CELL, thread / CELL);
+        let at = pixel.y * frame.size.x + pixel.x;
+        var claims = 0u;
+        if all(pixel < frame.size) {
+            let place = atomicLoad(&places[at]);
+            claims = select((place >> shift_of(turn.at)) & ALL_DIRECTIONS, 0u, (place & ENTERED) != 0u);
+        }
+        let is_chosen = claims != 0u;
+        let count = choose(thread, is_chosen);
+        if thread == 0u {
+            first = atomicAdd(&counts[NEXT], count);
+        }
+        let entry = workgroupUniformLoad(&first) + chosen_before(thread);
+        var surfaces = vec2(0.0);
+        if is_chosen {
+            let direction = firstTrailingBit(claims);
+            let other = pixel + vec2(direction % 3u, direction / 3u) - 1u;
+            let parent = atomicLoad(&places[other.y * frame.size.x + other.x]) & ~ENTERED;
+            surfaces = vec2(entries[parent].near, entries[parent].far);
+        }
+        if enter(cell, cells[number].answered, count, thread, is_chosen, entry, at, surfaces, STEP * turn.at) {
+            let share = share_at(entry, prior, 0u);
+            entries[entry].share = share;
+            if share >= TRACED_FROM {
+                atomicOr(&entries[entry].flags, SEEN);
+                if turn.at < STEPS_TRACED {
+                    claim(at, surfaces.y, turn.at);
+                }
+            }
+        }
+        workgroupBarrier();
+    }
+}

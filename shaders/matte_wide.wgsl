@@ -1,0 +1,57 @@
+// Pass matte_wide, once for each step: what was traced in it and is part of something wide is none, as a hair nowhere fills a square
+// of three pixels. The outline of what is wide is part of it, and counts as seen from the next step on.
+
+@group(0) @binding(1) var<uniform> turn: Turn;
+@group(0) @binding(2) var<storage, read_write> counts: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read_write> places: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> entries: array<Entry>;
+
+const NONE = 0xffffffffu;
+
+// The entry of a pixel that was traced and can be told, or `NONE`.
+fn traced_at(pixel: vec2<u32>, edges: u32) -> u32 {
+    let place = atomicLoad(&places[pixel.y * frame.size.x + pixel.x]);
+    let entry = place & ~ENTERED;
+    if (place & ENTERED) == 0u || entry < edges || (atomicLoad(&entries[entry].flags) & LONE) != 0u {
+        return NONE;
+    }
+    return entry;
+}
+
+@compute @workgroup_size(64)
+fn matte_wide(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let edges = atomicLoad(&counts[EDGES]);
+    let end = atomicLoad(&counts[NEXT]);
+    let now = GROWN << (turn.at % 2u);
+    let before = GROWN << ((turn.at + 1u) % 2u);
+    for (var k = edges + id.x; k < end; k += 64u * groups.x) {
+        let flags = atomicLoad(&entries[k].flags);
+        if (flags & before) != 0u {
+            atomicOr(&entries[k].flags, SEEN);
+        }
+        if (flags & LONE) != 0u || flags / STEP != turn.at {
+            continue;
+        }
+        let pixel = vec2(entries[k].at % frame.size.x, entries[k].at / frame.size.x);
+        var is_full = true;
+        for (var n = 0u; n < 9u && is_full; n++) {
+            let other = pixel + vec2(n % 3u, n / 3u) - 1u;
+            if all(other < frame.size) {
+                let entry = traced_at(other, edges);
+                is_full = entry != NONE;
+                if is_full {
+                    is_full = (atomicLoad(&entries[entry].flags) & (SEEN | before)) != 0u;
+                }
+            }
+        }
+        for (var n = 0u; n < 25u && is_full; n++) {
+            let other = pixel + vec2(n % 5u, n / 5u) - 2u;
+            if all(other < frame.size) {
+                let entry = traced_at(other, edges);
+                if entry != NONE {
+                    atomicOr(&entries[entry].flags, WIDE | now);
+                }
+            }
+        }
+    }
+}

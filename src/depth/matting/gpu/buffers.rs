@@ -1,0 +1,116 @@
+//! The memory for pictures of one size.
+
+use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MOST_BUFFERS, TURNS, Turn, WORD};
+use crate::compute::GpuError;
+use crate::compute::device::{Device, Readback};
+use crate::depth::matting::clusters::CELL_PX;
+use crate::depth::matting::share::PRIOR_ROUNDS;
+use crate::frame::{Matte, MixedPixel};
+
+/// The distance of one uniform from the next, as devices may ask for.
+const UNIFORM_STRIDE: u64 = 256;
+
+/// Buffers for a picture.
+pub struct Buffers {
+    pub frame: wgpu::Buffer,
+    turns: wgpu::Buffer,
+    /// For each code its linear light, and that of what is remembered in each channel.
+    pub lights: wgpu::Buffer,
+    pub metres: wgpu::Buffer,
+    pub rgb: wgpu::Buffer,
+    /// What is remembered: sRGB, rounds, and inverse depth.
+    pub known: wgpu::Buffer,
+    /// Bits of pixels, and how many are set before each word: of edges, and of what is mixed.
+    pub edges: wgpu::Buffer,
+    pub marks: wgpu::Buffer,
+    pub counts: wgpu::Buffer,
+    pub clusters: wgpu::Buffer,
+    pub cells: wgpu::Buffer,
+    /// Per pixel, its entry, or what claims it.
+    pub places: wgpu::Buffer,
+    pub entries: wgpu::Buffer,
+    /// The colours of both surfaces of answers.
+    pub colors: wgpu::Buffer,
+    /// Of each round of expectation maximisation, what each workgroup has found.
+    pub partials: wgpu::Buffer,
+    /// How many pixels are mixed, and these.
+    pub mixed: wgpu::Buffer,
+    pub readback: Readback,
+}
+
+/// What a picture of one size has.
+#[derive(Clone, Copy)]
+pub struct Extent {
+    pub pixels: usize,
+    /// Entries, and mixed pixels, at most.
+    pub most: usize,
+    /// Words of bits, of 32 pixels of a row, and cells of clusters, each way.
+    pub words: usize,
+    pub cells: [u32; 2],
+}
+
+impl Extent {
+    pub fn new((width, height): (u32, u32)) -> Self {
+        let (pixels, most) = (width as usize * height as usize, Matte::most(width as usize, height as usize));
+        let words = width.div_ceil(WORD) as usize * height as usize;
+        Self { pixels, most, words, cells: [width, height].map(|side| side.div_ceil(CELL_PX as u32)) }
+    }
+}
+
+impl Buffers {
+    /// For pictures of `size` pixels.
+    ///
+    /// # Errors
+    /// The device has no room for that.
+    pub fn new(device: &Device, size: (u32, u32)) -> Result<Self, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        let Extent { pixels, most, words, cells } = Extent::new(size);
+        // No buffer is empty.
+        let most = most.max(1);
+        let cells: usize = cells.iter().map(|&side| side as usize).product();
+        // Colours of surfaces are the largest.
+        device.has_room(size, (COLORS * most) as u64, "matted")?;
+        if device.device.limits().max_storage_buffers_per_shader_stage < MOST_BUFFERS {
+            return Err(GpuError::Failed(format!("{}: a shader may have too few buffers to find mattes", device.name)));
+        }
+        let buffer = |label, bytes, usage| device.buffer(label, bytes, usage);
+        let storage = |label, bytes: usize| buffer(label, bytes, Usage::STORAGE | Usage::COPY_DST);
+        let uniform = |label, bytes: usize| buffer(label, bytes, Usage::UNIFORM | Usage::COPY_DST);
+        let record = size_of::<MixedPixel>();
+        let buffers = device.attempt(|| Self {
+            frame: uniform("matted frame", size_of::<Frame>()),
+            turns: uniform("turns", TURNS * UNIFORM_STRIDE as usize),
+            lights: uniform("lights", 256 * 16),
+            metres: storage("refined depth", 4 * pixels),
+            rgb: storage("matted rgb", 3 * pixels),
+            known: storage("known behind", known_at(pixels)[2] as usize + 4 * pixels),
+            edges: storage("edges", 8 * words),
+            marks: storage("marks", 8 * words),
+            counts: storage("matte counts", 4 * (COUNTS + words.div_ceil(BLOCK as usize))),
+            clusters: storage("clusters", 12 * 16 * cells),
+            cells: storage("cells", CELL * cells),
+            places: storage("places", 4 * pixels),
+            entries: storage("entries", ENTRY * most),
+            colors: storage("colors of surfaces", COLORS * most),
+            partials: storage("partials", 16 * LANES as usize * PRIOR_ROUNDS),
+            mixed: buffer("mixed", record * (1 + most), Usage::STORAGE | Usage::COPY_SRC),
+            readback: Readback::new(device, "mixed back", record * (1 + most)),
+        })?;
+        for turn in 0..TURNS {
+            device.upload(&buffers.turns, turn as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&Turn { at: turn as u32 }));
+        }
+        Ok(buffers)
+    }
+
+    /// The uniform of a turn.
+    pub fn turn(&self, turn: usize) -> wgpu::BufferBinding<'_> {
+        let size = wgpu::BufferSize::new(size_of::<Turn>() as u64);
+        wgpu::BufferBinding { buffer: &self.turns, offset: turn as u64 * UNIFORM_STRIDE, size }
+    }
+}
+
+/// Where in `known` the sRGB, the rounds, and the inverse depth of so many pixels are, in bytes.
+pub fn known_at(pixels: usize) -> [u64; 3] {
+    let rounds = (3 * pixels).next_multiple_of(4);
+    [0, rounds as u64, (rounds + pixels.next_multiple_of(4)) as u64]
+}

@@ -1,0 +1,81 @@
+//! Whether a device finds mattes as the processor does: drivers have faults, and none is to be found out by whoever is looked at.
+
+use std::sync::Arc;
+
+use super::super::Matting;
+use super::GpuMatting;
+use crate::compute::GpuError;
+use crate::compute::device::Device;
+use crate::compute::thread_pool::ThreadPool;
+use crate::depth::matting::Behind;
+use crate::frame::{ColorImage, DepthMap, MixedPixel};
+
+const SIZE: (u32, u32) = (96, 64);
+const JUMP: f32 = 0.05;
+/// A share that differs by more is wrong; one mixed pixel in fifty may be, or be there on one side only, as roundings fall either
+/// way.
+const SHARE: f32 = 0.01;
+const ONE_IN: usize = 50;
+
+/// Whether the device is sound: finds the mattes of two small pictures there and on the processor, once for each device, and says
+/// what is wrong. A device that has failed is not; who had it has said so.
+pub fn is_passed(device: &Arc<Device>) -> bool {
+    device.check().is_ok() && *device.matting.get_or_init(|| try_out(device))
+}
+
+fn try_out(device: &Arc<Device>) -> bool {
+    match differing(device) {
+        Ok((wrong, all)) if wrong * ONE_IN <= all => return true,
+        Ok((wrong, all)) => tracing::warn!(
+            "GPU: {}: {wrong} of the {all} mixed pixels of a trial are wrong: its driver may have a fault; the CPU finds \
+             mattes",
+            device.name
+        ),
+        Err(error) => tracing::warn!("{error}; the CPU finds mattes"),
+    }
+    false
+}
+
+/// How many mixed pixels differ, and how many there are.
+fn differing(device: &Arc<Device>) -> Result<(usize, usize), GpuError> {
+    let (mut cpu, mut gpu) = (Matting::default(), GpuMatting::new(device));
+    let mut workers = ThreadPool::new("matte", 1);
+    let (color, map) = scene();
+    let pixels = map.metres.len();
+    let light: Box<[[f32; 256]; 3]> = Box::new([[0.5; 256]; 3]);
+    let (rgb, inverse, rounds) = (vec![0; 3 * pixels], vec![0.25; pixels], vec![1; pixels]);
+    let behind =
+        Behind { rgb: &rgb, inverse: &inverse, rounds: &rounds, known: 1, light: &light, other: JUMP, revision: 0 };
+    let (mut wrong, mut all) = (0, 0);
+    for behind in [None, Some(&behind)] {
+        let [mut expected, mut made] = [map.clone(), map.clone()];
+        cpu.find_before(&mut workers, (&mut expected, &color), JUMP, behind);
+        gpu.find((&mut made, &color), None, JUMP, behind)?;
+        let (expected, made) = (&expected.matte.pixels, &made.matte.pixels);
+        let is_same = |a: &MixedPixel, b: &MixedPixel| (a.share - b.share).abs() <= SHARE;
+        let same = expected.iter().filter(|pixel| {
+            made.binary_search_by_key(&pixel.at, |made| made.at).is_ok_and(|k| is_same(&made[k], pixel))
+        });
+        // In order, and each once.
+        let is_sorted = made.is_sorted_by(|a, b| a.at < b.at);
+        wrong += if is_sorted { expected.len().max(made.len()) - same.count() } else { expected.len() + 1 };
+        all += expected.len();
+    }
+    Ok((wrong, all))
+}
+
+/// Somebody with a soft outline before a wall, whose hair the map has in part.
+fn scene() -> (ColorImage, DepthMap) {
+    let chance = |k: usize| ((k as u32).wrapping_mul(0x9e37_79b1) >> 24) as u8;
+    let (mut color, mut map) = (ColorImage::new(SIZE.0, SIZE.1), DepthMap::new(SIZE.0, SIZE.1));
+    for (k, (pixel, metres)) in color.rgb.chunks_exact_mut(3).zip(&mut map.metres).enumerate() {
+        let (x, y) = ((k as u32 % SIZE.0) as f32, (k as u32 / SIZE.0) as f32);
+        let off = (x - 40.0).hypot(y - 40.0) - 20.3;
+        let hair = if (y as u32).is_multiple_of(9) && x > 55.0 && x < 80.0 { 0.4 } else { 0.0 };
+        let share = (0.5 - off).clamp(hair, 1.0);
+        let code = |p: usize| share * [60.0, 50.0, 40.0][p] + (1.0 - share) * [180.0, 190.0, 200.0][p];
+        pixel.copy_from_slice(&[0, 1, 2].map(|p| code(p) as u8 + chance(k + 7 * p) % 9));
+        *metres = if off < 0.0 || (hair > 0.0 && (x as u32).is_multiple_of(7)) { 1.0 } else { 3.0 + 0.01 * x };
+    }
+    (color, map)
+}
