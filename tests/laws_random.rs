@@ -193,6 +193,7 @@ mod on_the_gpu {
                 place: Place::Memory,
                 out: Pooled::detached(ColorImage::default()),
                 yuyv: None,
+                on_device: None,
             })
             .expect("the GPU takes a frame");
             let finished = self.collect(true).expect("the GPU blurs").expect("a frame comes back");

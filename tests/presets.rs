@@ -168,6 +168,7 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
         yuyv: None,
+        on_device: None,
     })
     .unwrap();
     (cpu.collect(true).unwrap().unwrap().picture.memory().unwrap().clone(), field)

@@ -37,6 +37,7 @@ fn yuyv_is_the_picture_encoded() {
             place,
             out: Pooled::detached(ColorImage::default()),
             yuyv: yuyv.then(|| Pooled::detached(YuyvImage::default())),
+            on_device: None,
         };
         let made = |bokeh: &mut dyn Bokeh, job: Job| {
             bokeh.submit(job).expect("room for a frame");

@@ -259,6 +259,7 @@ impl Blurrer {
             place: Place::Memory,
             out: Pooled::detached(ColorImage::default()),
             yuyv: None,
+            on_device: None,
         })?;
         let finished = bokeh.collect(true)?;
         Ok(finished.and_then(|mut finished| finished.picture.memory_mut().map(std::mem::take)).unwrap_or_default())

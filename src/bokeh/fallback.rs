@@ -219,6 +219,7 @@ mod tests {
             place: Place::Memory,
             out: pool.take(),
             yuyv: None,
+            on_device: None,
         }
     }
 

@@ -155,7 +155,7 @@ impl Stage<'_> {
         pending: &mut VecDeque<Pending>,
     ) -> Result<bool, Fault> {
         let Frame { ticket, stamp, mut trace, since_ns, item } = frame;
-        let Ready { color, depth, coc, taken, times, .. } = item;
+        let Ready { color, depth, coc, taken, times, on_device, .. } = item;
         let began_ns = self.clock.now_ns();
         trace.between_ns += began_ns.saturating_sub(since_ns);
         times.into_iter().for_each(|times| self.picker.note_depth(times));
@@ -172,7 +172,7 @@ impl Stage<'_> {
         // A part is cut out of the picture in full colour.
         let is_yuyv = trace.part.is_none() && self.wants_yuyv.load(Ordering::Relaxed);
         let (out, yuyv) = (self.outs.take(), is_yuyv.then(|| self.yuyvs.take()));
-        let job = Job { ticket: ticket.id.0, color, depth, coc, quality, place, out, yuyv };
+        let job = Job { ticket: ticket.id.0, color, depth, coc, quality, place, out, yuyv, on_device };
         pending.push_back(Pending { ticket, stamp, trace, coc, taken, began_ns, quality });
         match executor.submit(job) {
             Ok(()) => Ok(true),

@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
-use crate::compute::Device;
 use crate::compute::thread_pool::ThreadPool;
+use crate::compute::{Device, DevicePicture};
 use crate::depth::background::Background;
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
 use crate::depth::matting::{self, Matting};
 use crate::depth::refine::{Mending, Refiner};
 use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pooled;
 use crate::look::CocRule;
 use crate::optics::CocField;
 
@@ -117,6 +118,14 @@ impl CocMaker {
         match (&self.finisher, self.rule) {
             (Finisher::Refine(refiner), CocRule::Depth { .. }) => Some(refiner.backends()),
             _ => None,
+        }
+    }
+
+    /// A copy of the picture of the last map that it made, where a device has it: once for each.
+    pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
+        match &mut self.finisher {
+            Finisher::Refine(refiner) => refiner.take_picture(),
+            Finisher::Keep | Finisher::Fill(_) => None,
         }
     }
 

@@ -12,6 +12,7 @@ use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, hand_on};
 use crate::budget::DepthTimes;
 use crate::clock::Clock;
+use crate::compute::DevicePicture;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
@@ -27,6 +28,8 @@ pub(super) struct Ready {
     pub color: Pooled<ColorImage>,
     pub depth: Option<Pooled<DepthMap>>,
     pub coc: CocField,
+    /// The picture, where the device that refined its depth has it.
+    pub on_device: Option<Pooled<DevicePicture>>,
     /// The picture and its depth before something else stood behind the subject, where that is so and somebody looks at them.
     pub taken: Option<Pooled<Taken>>,
     /// What its depth took; `None` where it has none.
@@ -103,12 +106,12 @@ impl Stage<'_> {
             let held_before = *self.held;
             // A CoC that is the same for every frame needs no depth.
             let made = match preparation.fixed() {
-                Some(field) => Ok((None, field)),
+                Some(field) => Ok((None, field, None)),
                 None => self
                     .depth_and_coc(&mut preparation, (depth, right), &mut color, stamp)
-                    .map(|(map, field)| (Some(map), field)),
+                    .map(|(map, field, on_device)| (Some(map), field, on_device)),
             };
-            let (mut depth, coc) = match made {
+            let (mut depth, coc, on_device) = match made {
                 Ok(made) => made,
                 Err(fault) => {
                     let (cause, goes_on) = match &fault {
@@ -136,6 +139,8 @@ impl Stage<'_> {
                 taken.keep(&color, map);
                 taken
             });
+            // What is staged has another picture.
+            let on_device = on_device.filter(|_| !preparation.replaces(&coc));
             trace.part = depth.as_mut().and_then(|map| preparation.stage(&mut color, map, &coc, stamp.time_ns));
             let since_ns = self.clock.now_ns();
             (trace.depth_ns, trace.depth_held) = (since_ns - began_ns, *self.held > held_before);
@@ -143,7 +148,7 @@ impl Stage<'_> {
             let age_ns = began_ns.saturating_sub(ticket.captured_ns);
             let times = DepthTimes { effort, took_ns: trace.depth_ns, age_ns, at_ns: since_ns };
             let times = depth.is_some().then_some(times);
-            let item = Ready { color, depth, coc, taken, times, swap: swap.clone() };
+            let item = Ready { color, depth, coc, on_device, taken, times, swap: swap.clone() };
             let frame = Frame { ticket, stamp, trace, since_ns, item };
             if !hand_on(&mut to, frame, self.tally) {
                 break;
@@ -156,14 +161,15 @@ impl Stage<'_> {
         self.source.as_ref().is_some_and(|source| source.knows_background())
     }
 
-    /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more.
+    /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more. With new ones comes the
+    /// picture on the device that refined them.
     fn depth_and_coc(
         &mut self,
         preparation: &mut Preparation,
         (brought, right): (Option<Pooled<DepthMap>>, Option<Pooled<GrayImage>>),
         color: &mut ColorImage,
         stamp: Stamp,
-    ) -> Result<(Pooled<DepthMap>, CocField), Fault> {
+    ) -> Result<(Pooled<DepthMap>, CocField, Option<Pooled<DevicePicture>>), Fault> {
         let began_ns = self.clock.now_ns();
         if let Some(source) = &mut self.source {
             source.rectify(color);
@@ -176,7 +182,7 @@ impl Stage<'_> {
             rate.give_held(&mut map, color);
             preparation.share(&mut map, color, &field);
             *self.held += 1;
-            return Ok((map, field));
+            return Ok((map, field, None));
         }
         let seen = Seen { stamp, color, right: right.as_deref() };
         let mut map = brought.map_or_else(|| self.read(seen), Ok)?;
@@ -187,7 +193,7 @@ impl Stage<'_> {
         if let Some(rate) = &mut self.rate {
             rate.made((&map, field), color);
         }
-        Ok((map, field))
+        Ok((map, field, preparation.take_picture()))
     }
 
     /// A depth map from the source, made with as much effort as there is time for.

@@ -5,8 +5,10 @@ use super::coc::{CocMaker, Finish};
 use super::fit_check::{FitCheck, Verdict};
 use super::staging::Staging;
 use crate::bokeh::Bokeh;
+use crate::compute::DevicePicture;
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pooled;
 use crate::look::{BackgroundMemory, Look};
 use crate::optics::CocField;
 
@@ -51,6 +53,11 @@ impl Preparation {
     /// What found mattes ([`CocMaker::matted_by`]).
     pub fn matted_by(&self) -> Option<&'static str> {
         self.coc.matted_by()
+    }
+
+    /// The picture that was prepared last, on a device ([`CocMaker::take_picture`]).
+    pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
+        self.coc.take_picture()
     }
 
     /// Another scene comes: nothing is left of those before.

@@ -108,6 +108,7 @@ pub(super) fn blur_into(
         place: Place::Memory,
         out: Pooled::detached(out),
         yuyv: None,
+        on_device: None,
     })?;
     let Finished { mut picture, mut color, depth, .. } = bokeh.collect(true)?.ok_or(BokehError::Lost)?;
     let blurred = std::mem::take(picture.memory_mut().ok_or(BokehError::Lost)?);

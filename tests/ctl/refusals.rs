@@ -71,9 +71,11 @@ fn who_says_nothing_holds_nobody_up() {
     let _stream = world.stream("stream", &["--to", "null"]);
     let connect = || UnixStream::connect(world.socket("stream")).unwrap();
     let began = Instant::now();
-    let silent: Vec<UnixStream> = (0..7).map(|_| connect()).collect();
-    // Seven say nothing, and an eighth is served all the same.
-    assert!(world.tell("stream", b"{\"do\":\"status\"}\n").contains("\"on\":true"));
+    // One of the eight places may be held for a moment by somebody of before.
+    let silent: Vec<UnixStream> = (0..6).map(|_| connect()).collect();
+    // Six say nothing, and a seventh is served all the same.
+    let served = world.tell("stream", b"{\"do\":\"status\"}\n");
+    assert!(served.contains("\"on\":true"), "{served}");
     let took = began.elapsed();
     assert!(took < Duration::from_secs(1), "{took:?}");
     for stream in &silent {
@@ -84,7 +86,6 @@ fn who_says_nothing_holds_nobody_up() {
     let answers: Vec<String> = silent.iter().map(answer).collect();
     let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
     let late = answers.iter().filter(|answer| answer.contains("did not come within 1 s")).count();
-    // One of the eight places may be held for a moment by somebody of before.
     assert!(refused >= 12 && late >= 7 && refused + late == 20, "{answers:?}");
     assert_eq!(world.status(&[])["on"], true);
     // A request in pieces comes in time, or does not.

@@ -146,6 +146,7 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
                 place,
                 out: Pooled::detached(ColorImage::default()),
                 yuyv: None,
+                on_device: None,
             };
             bokeh.submit(job).expect("room for a frame");
             let finished = bokeh.collect(true).expect("the GPU blurs").expect("a frame comes back");
@@ -190,6 +191,7 @@ fn results_go_to_memory_when_the_device_has_no_more_room_for_them() {
             place: Place::Device,
             out: Pooled::detached(ColorImage::default()),
             yuyv: None,
+            on_device: None,
         };
         bokeh.submit(job).expect("room for a frame");
         kept.push(bokeh.collect(true).expect("the GPU blurs").expect("a frame comes back"));

@@ -178,7 +178,6 @@ impl Bokeh for GpuBokeh {
         if let Some(matte) = self.plan.matte(job.depth.as_deref(), &job.coc) {
             self.device.upload(&self.buffers.mixed, 0, bytemuck::cast_slice(&matte.pixels));
         }
-        self.device.upload(&self.buffers.color, 0, &job.color.rgb);
         self.plan.set_quality(job.quality);
         self.plan.split(job.depth.as_deref(), &job.coc);
         self.layout.lay_out(&self.plan, &self.capacity);
@@ -187,6 +186,15 @@ impl Bokeh for GpuBokeh {
         self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
 
         let mut recorder = Recorder::new(&self.device, slot.stamps.as_mut());
+        let color = &self.buffers.color;
+        // What is done to the picture there later comes after this frame.
+        match job.on_device.take().filter(|picture| picture.is_on(&self.device) && picture.size() == made_for) {
+            Some(picture) => {
+                let picture = picture.buffer();
+                recorder.encoder.copy_buffer_to_buffer(picture, 0, color, 0, picture.size().min(color.size()));
+            }
+            None => self.device.upload(color, 0, &job.color.rgb),
+        }
         self.passes.record(&mut recorder, &self.plan, &self.layout);
         let (result, encoder) = (&self.buffers.result, &mut recorder.encoder);
         if let Some(picture) = &on_device {

@@ -79,6 +79,7 @@ fn differing(device: &Arc<Device>) -> Result<usize, BokehError> {
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
         yuyv: None,
+        on_device: None,
     })?;
     let finished = gpu.collect(true)?.ok_or(BokehError::Lost)?;
     let made = finished.picture.memory().ok_or(BokehError::Lost)?;

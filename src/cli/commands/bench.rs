@@ -252,6 +252,7 @@ impl Buffers {
             place: Place::Memory,
             out: self.results.take(),
             yuyv: None,
+            on_device: None,
         };
         let began = Instant::now();
         bokeh.submit(job)?;

@@ -30,9 +30,10 @@ use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
 use crate::compute::thread_pool::ThreadPool;
-use crate::compute::{Device, DeviceFrame};
+use crate::compute::{Device, DeviceFrame, DevicePicture};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::Pooled;
 
 /// A step of inverse depth from here on is an edge: 0.6 px of CoC at a radius of 10 px at infinity; less shows no edge
 /// in the blur.
@@ -141,6 +142,14 @@ impl Refiner {
     pub fn on_device(&self) -> Option<DeviceFrame> {
         #[cfg(feature = "gpu")]
         return self.gpu.as_ref()?.refined();
+        #[cfg(not(feature = "gpu"))]
+        None
+    }
+
+    /// A copy of the last picture in the memory of the device that refined its map, once for each.
+    pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
+        #[cfg(feature = "gpu")]
+        return self.gpu.as_mut()?.take_picture();
         #[cfg(not(feature = "gpu"))]
         None
     }

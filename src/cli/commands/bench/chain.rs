@@ -253,8 +253,17 @@ impl Buffers {
             let depth = std::mem::replace(&mut self.depth, Pooled::detached(DepthMap::default()));
             let depth = coc.fixed().is_none().then_some(depth);
             notes.begin();
-            let job =
-                Job { ticket: 0, color, depth, coc: field, quality: *quality, place: Place::Memory, out, yuyv: None };
+            let job = Job {
+                ticket: 0,
+                color,
+                depth,
+                coc: field,
+                quality: *quality,
+                place: Place::Memory,
+                out,
+                yuyv: None,
+                on_device: None,
+            };
             executor.submit(job)?;
             let finished = executor.collect(true)?.ok_or(BokehError::Lost)?;
             notes.note(quality.name(), "blur");

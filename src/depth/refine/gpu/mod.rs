@@ -19,11 +19,12 @@ use passes::Passes;
 use shaders::Frame;
 
 use super::temporal;
-use crate::compute::device::{Device, DeviceFrame, Recorder, Stamps};
+use crate::compute::device::{Device, DeviceFrame, DevicePicture, Recorder, Stamps};
 use crate::compute::{GpuError, PassTimes};
 use crate::depth::guided_fill;
 use crate::depth::tap::Tap;
 use crate::frame::{ColorImage, DepthMap};
+use crate::link::pool::{Pool, Pooled};
 
 /// Refines the depth of frame after frame on a device; owns the memory for it, and remembers the last frame.
 pub struct GpuRefiner {
@@ -53,9 +54,15 @@ struct Work {
     last: Option<(u64, f32)>,
     /// Whether the last refined map, and its picture, are on the device.
     is_there: bool,
+    /// Copies of pictures, for the blur, and that of the last one.
+    pictures: Pool<DevicePicture>,
+    picture: Option<Pooled<DevicePicture>>,
     stamps: Option<Stamps>,
     times: PassTimes,
 }
+
+/// Copies of pictures that may be on their way at once; when all are, they go up again.
+const PICTURES: usize = 4;
 
 /// More passes than a frame has.
 const MOST_PASSES: usize = 48;
@@ -90,6 +97,11 @@ impl GpuRefiner {
         Some(DeviceFrame::new(&self.device, refined, rgb))
     }
 
+    /// A copy of the last picture on the device, once for each.
+    pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
+        self.work.as_mut()?.picture.take()
+    }
+
     /// Refines the depth `map` of the picture `color` at `time_ns`, with this distance in focus.
     ///
     /// # Errors
@@ -118,8 +130,22 @@ impl Work {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
         let (from, columns, rows) = ((0, 0), Vec::new(), Vec::new());
-        let (is_there, stamps, times) = (false, Stamps::new(device, MOST_PASSES), PassTimes::new());
-        Ok(Self { size, buffers, passes, from, columns, rows, has_filled: false, last: None, is_there, stamps, times })
+        let pictures = device.attempt(|| Pool::new(PICTURES, || DevicePicture::new(device, size)))?;
+        Ok(Self {
+            size,
+            buffers,
+            passes,
+            from,
+            columns,
+            rows,
+            has_filled: false,
+            last: None,
+            is_there: false,
+            pictures,
+            picture: None,
+            stamps: Stamps::new(device, MOST_PASSES),
+            times: PassTimes::new(),
+        })
     }
 
     /// Takes maps of another size.
@@ -160,7 +186,7 @@ impl Work {
         time_ns: u64,
         focus_m: f32,
     ) -> Result<(), GpuError> {
-        self.is_there = false;
+        (self.is_there, self.picture) = (false, None);
         if !map.metres.is_empty() && self.from != map.size() {
             self.take_maps(device, map.size())?;
         }
@@ -195,16 +221,21 @@ impl Work {
 
     /// Runs the passes, and takes the refined map.
     fn run(&mut self, device: &Device, map: &mut DepthMap, is_empty: bool, is_fresh: bool) -> Result<(), GpuError> {
-        let Buffers { counts, refined, readback, .. } = &mut self.buffers;
+        let Buffers { counts, rgb, refined, readback, .. } = &mut self.buffers;
         let mut recorder = Recorder::new(device, self.stamps.as_mut());
         recorder.encoder.clear_buffer(counts, 0, None);
         self.passes.record(&mut recorder, is_empty, is_fresh);
+        let picture = self.pictures.try_take();
+        if let Some(copy) = picture.as_deref().map(DevicePicture::buffer) {
+            recorder.encoder.copy_buffer_to_buffer(rgb, 0, copy, 0, rgb.size().min(copy.size()));
+        }
         recorder.fetch(device, readback, (refined, refined.size()), |bytes| {
             map.resize(self.size.0, self.size.1);
             let out: &mut [u8] = bytemuck::cast_slice_mut(&mut map.metres);
             let length = out.len();
             out.copy_from_slice(&bytes[..length]);
         })?;
+        self.picture = picture;
         if let Some(stamps) = &self.stamps {
             self.times = stamps.read(device)?;
         }
