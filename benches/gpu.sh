@@ -13,8 +13,9 @@ sizes=${SIZES:-1920x1080,3840x2160}
 frames=${FRAMES:-30}
 if [[ -z "${BOKEHCAM:-}" ]]; then
     cargo build --release --locked
-    cargo test --release --locked --test parity --test stereo_gpu --test stereo_tidying --test refine_gpu --test matte_gpu -- \
-        --include-ignored
+    parity=(--test parity --test yuyv --test shared_picture --test stereo_gpu --test stereo_tidying --test rectify_gpu)
+    parity+=(--test refine_gpu --test matte_gpu)
+    cargo test --release --locked "${parity[@]}" -- --include-ignored
     # Depth from two eyes: each pass by the device's own timestamps, then whole pairs.
     for pair in 640x480x64 1280x720x128; do
         BOKEHCAM_PAIR=$pair cargo test --release --locked --test stereo_gpu -- --ignored --nocapture the_passes

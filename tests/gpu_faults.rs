@@ -86,6 +86,7 @@ fn job(ticket: u64) -> Job {
         place: Place::Memory,
         out: Pooled::detached(ColorImage::default()),
         yuyv: (ticket % 2 == 1).then(|| Pooled::detached(YuyvImage::default())),
+        on_device: None,
     }
 }
 

@@ -4,8 +4,6 @@
 
 mod common;
 
-use std::sync::Arc;
-
 use bokehcam::bokeh::aperture::{Aperture, Shape};
 use bokehcam::bokeh::bank::STEPS_PER_PX;
 use bokehcam::bokeh::cpu::CpuBokeh;
@@ -14,7 +12,7 @@ use bokehcam::bokeh::ladder::Compositing;
 use bokehcam::bokeh::plan::{CELL, Plan, SEGMENT};
 use bokehcam::bokeh::{Bokeh, Job, Method, Probe, Rank, Settings};
 use bokehcam::budget::Quality;
-use bokehcam::compute::{Device, DevicePicture, Place};
+use bokehcam::compute::Place;
 use bokehcam::depth::matting::{self, Matting};
 use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::link::pool::Pooled;
@@ -324,34 +322,4 @@ fn frames_in_flight_come_back_in_order_and_whole() {
         back += 1;
     }
     assert!(gpu.collect(true).expect("nothing is no failure").is_none());
-}
-
-/// A picture that is on the executor's device is taken from there, and one of another size or device is not: told by another
-/// picture there.
-#[test]
-#[ignore = "needs a Vulkan adapter (software will do)"]
-fn a_picture_on_the_device_need_not_go_up() {
-    let (width, height) = (97, 71);
-    let field = coc(CocKind::Depth, height);
-    let plan = Plan::new(&settings(CocKind::Depth), width, height);
-    let device = || Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"));
-    let (own, other) = (device(), device());
-    let mut gpu = GpuBokeh::on(&plan, Arc::clone(&own)).expect("room for the picture");
-    let (map, there) = (three_depths(width, height), noise(width, height));
-    let given = color(width, height, |x, y| [x as u8, 200, y as u8]);
-    let mut made = |color: &ColorImage, on_device: Option<(&Device, (u32, u32))>| {
-        let on_device = on_device.map(|(device, size)| {
-            let picture = DevicePicture::new(device, size);
-            device.upload(picture.buffer(), 0, &there.rgb[..3 * (size.0 * size.1) as usize]);
-            Pooled::detached(picture)
-        });
-        gpu.submit(Job { on_device, ..job(0, color, &map, &field) }).expect("room for a frame");
-        let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
-        finished.picture.memory().expect("in memory").clone()
-    };
-    let [of_given, of_there] = [made(&given, None), made(&there, None)];
-    assert!(of_given != of_there);
-    assert!(made(&given, Some((&own, (width, height)))) == of_there);
-    assert!(made(&given, Some((&own, (width, height - 1)))) == of_given, "it has another size");
-    assert!(made(&given, Some((&other, (width, height)))) == of_given, "it is on another device");
 }

@@ -106,12 +106,12 @@ impl Stage<'_> {
             let held_before = *self.held;
             // A CoC that is the same for every frame needs no depth.
             let made = match preparation.fixed() {
-                Some(field) => Ok((None, field, None)),
+                Some(field) => Ok((None, field)),
                 None => self
                     .depth_and_coc(&mut preparation, (depth, right), &mut color, stamp)
-                    .map(|(map, field, on_device)| (Some(map), field, on_device)),
+                    .map(|(map, field)| (Some(map), field)),
             };
-            let (mut depth, coc, on_device) = match made {
+            let (mut depth, coc) = match made {
                 Ok(made) => made,
                 Err(fault) => {
                     let (cause, goes_on) = match &fault {
@@ -140,7 +140,7 @@ impl Stage<'_> {
                 taken
             });
             // What is staged has another picture.
-            let on_device = on_device.filter(|_| !preparation.replaces(&coc));
+            let on_device = preparation.take_picture().filter(|_| !preparation.replaces(&coc));
             trace.part = depth.as_mut().and_then(|map| preparation.stage(&mut color, map, &coc, stamp.time_ns));
             let since_ns = self.clock.now_ns();
             (trace.depth_ns, trace.depth_held) = (since_ns - began_ns, *self.held > held_before);
@@ -161,15 +161,14 @@ impl Stage<'_> {
         self.source.as_ref().is_some_and(|source| source.knows_background())
     }
 
-    /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more. With new ones comes the
-    /// picture on the device that refined them.
+    /// The frame's depth and CoC: new ones, or those of the frame before where there is no time for more.
     fn depth_and_coc(
         &mut self,
         preparation: &mut Preparation,
         (brought, right): (Option<Pooled<DepthMap>>, Option<Pooled<GrayImage>>),
         color: &mut ColorImage,
         stamp: Stamp,
-    ) -> Result<(Pooled<DepthMap>, CocField, Option<Pooled<DevicePicture>>), Fault> {
+    ) -> Result<(Pooled<DepthMap>, CocField), Fault> {
         let began_ns = self.clock.now_ns();
         if let Some(source) = &mut self.source {
             source.rectify(color);
@@ -182,7 +181,7 @@ impl Stage<'_> {
             rate.give_held(&mut map, color);
             preparation.share(&mut map, color, &field);
             *self.held += 1;
-            return Ok((map, field, None));
+            return Ok((map, field));
         }
         let seen = Seen { stamp, color, right: right.as_deref() };
         let mut map = brought.map_or_else(|| self.read(seen), Ok)?;
@@ -193,7 +192,7 @@ impl Stage<'_> {
         if let Some(rate) = &mut self.rate {
             rate.made((&map, field), color);
         }
-        Ok((map, field, preparation.take_picture()))
+        Ok((map, field))
     }
 
     /// A depth map from the source, made with as much effort as there is time for.
