@@ -75,6 +75,20 @@ fn test_under(layer: &TempDir, fault: &str, test: &str) -> String {
     told
 }
 
+/// The test, under the layer with this fault, says what it ran on.
+fn assert_ran(layer: &TempDir, fault: &str, test: &str, ran: &str) {
+    let told = test_under(layer, fault, test);
+    let line = told.lines().find_map(|line| line.find("ran on").map(|at| &line[at..]));
+    assert_eq!(line, Some(ran), "{fault}: {told}");
+}
+
+/// A device on which this was tried, as that compiles the shaders, which may take longer than the second that it has after.
+fn tried(try_out: impl FnOnce(&Arc<Device>)) -> Arc<Device> {
+    let device = Arc::new(device());
+    try_out(&device);
+    Arc::new(Arc::into_inner(device).expect("nobody else has it").with_patience(Duration::from_secs(1)))
+}
+
 /// A frame; every other one may be YUYV.
 fn job(ticket: u64) -> Job {
     Job {
@@ -250,12 +264,8 @@ fn matching_goes_on_after_the_gpu() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn depth_is_refined_whatever_becomes_of_the_device() {
-    let mut device = device();
-    // The trial compiles the shaders, which may take longer than a second.
-    let shared = Arc::new(device);
-    let _ = Refiner::new().on(Some(&shared));
-    device = Arc::into_inner(shared).expect("nobody else has it").with_patience(Duration::from_secs(1));
-    let mut refiner = Refiner::new().on(Some(&Arc::new(device)));
+    let device = tried(|device| drop(Refiner::new().on(Some(device))));
+    let mut refiner = Refiner::new().on(Some(&device));
     let mut cpu = Refiner::new();
     for frame in 0..8 {
         let (color, measured) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
@@ -284,9 +294,7 @@ fn refining_goes_on_after_the_gpu() {
         ("idle:30", "ran on cpu"),
         ("submit:1000000", "ran on gpu"),
     ] {
-        let told = test_under(&layer, fault, "depth_is_refined_whatever_becomes_of_the_device");
-        let line = told.lines().find_map(|line| line.find("ran on").map(|at| &line[at..]));
-        assert_eq!(line, Some(ran), "{fault}: {told}");
+        assert_ran(&layer, fault, "depth_is_refined_whatever_becomes_of_the_device", ran);
     }
 }
 
@@ -294,12 +302,8 @@ fn refining_goes_on_after_the_gpu() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn mattes_are_found_whatever_becomes_of_the_device() {
-    let mut device = device();
-    // The trial compiles the shaders, which may take longer than a second.
-    let shared = Arc::new(device);
-    let _ = Matting::default().on(Some(&shared));
-    device = Arc::into_inner(shared).expect("nobody else has it").with_patience(Duration::from_secs(1));
-    let mut matting = Matting::default().on(Some(&Arc::new(device)));
+    let device = tried(|device| drop(Matting::default().on(Some(device))));
+    let mut matting = Matting::default().on(Some(&device));
     let mut cpu = Matting::default();
     for frame in 0..8 {
         let (color, measured) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
@@ -329,9 +333,7 @@ fn matting_goes_on_after_the_gpu() {
         ("idle:40", "ran on cpu"),
         ("submit:1000000", "ran on gpu"),
     ] {
-        let told = test_under(&layer, fault, "mattes_are_found_whatever_becomes_of_the_device");
-        let line = told.lines().find_map(|line| line.find("ran on").map(|at| &line[at..]));
-        assert_eq!(line, Some(ran), "{fault}: {told}");
+        assert_ran(&layer, fault, "mattes_are_found_whatever_becomes_of_the_device", ran);
     }
 }
 

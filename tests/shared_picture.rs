@@ -12,10 +12,32 @@ use bokehcam::bokeh::{Bokeh, Job};
 use bokehcam::budget::Quality;
 use bokehcam::compute::{Device, DevicePicture, Place};
 use bokehcam::depth::refine::Refiner;
-use bokehcam::frame::ColorImage;
+use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
 use common::{coc, color, noise, settings, three_depths};
+
+fn blurred(
+    gpu: &mut GpuBokeh,
+    color: &ColorImage,
+    map: &DepthMap,
+    on_device: Option<Pooled<DevicePicture>>,
+) -> ColorImage {
+    let job = Job {
+        ticket: 0,
+        color: Pooled::detached(color.clone()),
+        depth: Some(Pooled::detached(map.clone())),
+        coc: coc(CocKind::Depth, color.height),
+        quality: Quality::default(),
+        place: Place::Memory,
+        out: Pooled::detached(ColorImage::default()),
+        yuyv: None,
+        on_device,
+    };
+    gpu.submit(job).expect("room for a frame");
+    let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
+    finished.picture.memory().expect("in memory").clone()
+}
 
 /// A picture that is on the executor's device is taken from there, and one of another size or device is not: told by another
 /// picture there.
@@ -23,7 +45,6 @@ use common::{coc, color, noise, settings, three_depths};
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_picture_on_the_device_need_not_go_up() {
     let (width, height) = (97, 71);
-    let field = coc(CocKind::Depth, height);
     let plan = Plan::new(&settings(CocKind::Depth), width, height);
     let device = || Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"));
     let (own, other) = (device(), device());
@@ -36,20 +57,7 @@ fn a_picture_on_the_device_need_not_go_up() {
             device.upload(picture.buffer(), 0, &there.rgb[..3 * (size.0 * size.1) as usize]);
             Pooled::detached(picture)
         });
-        let job = Job {
-            ticket: 0,
-            color: Pooled::detached(color.clone()),
-            depth: Some(Pooled::detached(map.clone())),
-            coc: field,
-            quality: Quality::default(),
-            place: Place::Memory,
-            out: Pooled::detached(ColorImage::default()),
-            yuyv: None,
-            on_device,
-        };
-        gpu.submit(job).expect("room for a frame");
-        let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
-        finished.picture.memory().expect("in memory").clone()
+        blurred(&mut gpu, color, &map, on_device)
     };
     let [of_given, of_there] = [made(&given, None), made(&there, None)];
     assert!(of_given != of_there);
@@ -74,24 +82,8 @@ fn a_refined_frame_gives_its_own_picture_once() {
         refiner.refine(&mut map, &color, u64::from(frame) * 33_000_000);
         let picture = refiner.take_picture();
         assert!(picture.is_some() && refiner.take_picture().is_none(), "frame {frame}");
-        let mut made = |on_device| {
-            let job = Job {
-                ticket: 0,
-                color: Pooled::detached(color.clone()),
-                depth: Some(Pooled::detached(map.clone())),
-                coc: coc(CocKind::Depth, height),
-                quality: Quality::default(),
-                place: Place::Memory,
-                out: Pooled::detached(ColorImage::default()),
-                yuyv: None,
-                on_device,
-            };
-            gpu.submit(job).expect("room for a frame");
-            let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
-            finished.picture.memory().expect("in memory").clone()
-        };
-        let expected = made(None);
-        assert!(made(picture) == expected, "frame {frame}");
+        let expected = blurred(&mut gpu, &color, &map, None);
+        assert!(blurred(&mut gpu, &color, &map, picture) == expected, "frame {frame}");
     }
     assert_eq!(refiner.backends(), "gpu");
 }

@@ -4,7 +4,7 @@ mod pass;
 mod picture;
 mod readback;
 
-pub use pass::{Pass, Recorder, Stamps, workgroups_2d};
+pub use pass::{Pass, Recorder, Stamps, UNIFORM_STRIDE, uniform_at, workgroups_2d};
 pub use picture::{DeviceFrame, DevicePicture};
 pub use readback::Readback;
 

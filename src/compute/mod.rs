@@ -8,6 +8,8 @@ pub mod memory;
 pub mod pass_times;
 pub mod simd;
 pub mod thread_pool;
+#[cfg(feature = "gpu")]
+pub mod until_fault;
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};

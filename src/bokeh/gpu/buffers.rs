@@ -7,11 +7,8 @@ use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
 use crate::bokeh::occlusion::MOST_LAYERS;
 use crate::bokeh::plan::{MAX_BINS, Plan};
-use crate::compute::device::Device;
+use crate::compute::device::{Device, UNIFORM_STRIDE};
 use crate::frame::{Matte, MixedPixel};
-
-/// Bytes from one uniform `Work` to the next: no device asks for more.
-pub const WORK_STRIDE: u64 = 256;
 
 /// The buffers of a plan.
 pub struct Buffers {
@@ -19,7 +16,7 @@ pub struct Buffers {
     pub frame: wgpu::Buffer,
     /// Uniform `Bin`, an array.
     pub bins: wgpu::Buffer,
-    /// Uniform `Work`, one every [`WORK_STRIDE`] bytes.
+    /// Uniform `Work`, one every [`UNIFORM_STRIDE`] bytes.
     pub work: wgpu::Buffer,
     pub color: wgpu::Buffer,
     /// Linear light and CoC.
@@ -108,7 +105,7 @@ impl Buffers {
         let (behind, tiles) = (if layered { width * height } else { 1 }, width.div_ceil(16) * height.div_ceil(16));
         let mixed = if layered { Matte::most(width, height).max(1) } else { 1 };
         let (kernels, starts) = if plan.exact { kernels(&plan.bank) } else { (vec![0.0], vec![0]) };
-        let work_bytes = work_count(plan) * WORK_STRIDE as usize;
+        let work_bytes = work_count(plan) * UNIFORM_STRIDE as usize;
         Self {
             frame: buffer("frame", size_of::<Frame>(), Usage::UNIFORM),
             bins: buffer("bins", MAX_BINS * size_of::<Bin>(), Usage::UNIFORM),

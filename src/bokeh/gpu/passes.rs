@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use super::buffers::{Buffers, Filters, WORK_STRIDE, work_count};
+use super::buffers::{Buffers, Filters, work_count};
 use super::layout::{self, Layout, tiles};
 use super::shaders::{self, Bin, EDGES_TILE, LINE, RESULT_TILE, ROWS_TILE, TAKING_TURNS, TILE, Work};
 use crate::bokeh::occlusion::MOST_LAYERS;
 use crate::bokeh::plan::{MAX_BINS, Plan};
-use crate::compute::device::{Device, Pass, Recorder, Shader, workgroups_2d};
+use crate::compute::device::{Device, Pass, Recorder, Shader, UNIFORM_STRIDE, uniform_at, workgroups_2d};
 
 /// Which uniform `Work` a dispatch has: that of its layer, of `reach`, or of a batch of the filters.
 const ALL: usize = MOST_LAYERS;
@@ -61,21 +61,15 @@ impl Maker<'_> {
     /// A pass over several bins at once, which are in uniform `Work` number `work`; binds that and the bins first. How many
     /// workgroups it takes is up to the frame.
     fn over_bins(&self, shader: Shader, work: usize, buffers: &[&wgpu::Buffer]) -> Pass {
-        let uniforms = [work_binding(self.buffers, work), self.buffers.bins.as_entire_buffer_binding()];
+        let uniforms = [uniform_at::<Work>(&self.buffers.work, work), self.buffers.bins.as_entire_buffer_binding()];
         self.pass(shader, &uniforms, buffers, [1; 3])
     }
-}
-
-/// Uniform `Work` number `index`.
-fn work_binding(b: &Buffers, index: usize) -> wgpu::BufferBinding<'_> {
-    let size = wgpu::BufferSize::new(size_of::<Work>() as u64);
-    wgpu::BufferBinding { buffer: &b.work, offset: index as u64 * WORK_STRIDE, size }
 }
 
 /// What `unpack` binds: the CoC of the depth map is in it, whose buffer may become another.
 fn unpack_bindings<'a>(b: &'a Buffers, radii: &'a wgpu::Buffer) -> impl Iterator<Item = wgpu::BufferBinding<'a>> {
     let buffers = [&b.bins, &b.frame, &b.color, radii, &b.scene, &b.ranges, &b.mixed, &b.shown, &b.binned];
-    std::iter::once(work_binding(b, 0)).chain(buffers.map(wgpu::Buffer::as_entire_buffer_binding))
+    std::iter::once(uniform_at::<Work>(&b.work, 0)).chain(buffers.map(wgpu::Buffer::as_entire_buffer_binding))
 }
 
 /// Workgroups for so many pieces of work, which they take turns with.
@@ -105,7 +99,7 @@ impl Passes {
                 let known = [&b.pyramid, &b.known];
                 let (seen, nearest) = ([&b.scene, &b.ranges, &b.behind], &b.nearest_px);
                 let filled = [&b.frame, known[0], known[1], seen[0], seen[1], seen[2], nearest, &b.bins, &b.binned];
-                let work = [work_binding(b, index)];
+                let work = [uniform_at::<Work>(&b.work, index)];
                 [
                     // A thread takes four pixels of half the size, or of the picture.
                     maker.pass(shaders::PULL, &work, &pulled, over(half, 2 * TILE)).named(FILL),
@@ -154,7 +148,7 @@ impl Passes {
             reach: maker.over_bins(shaders::REACH, ALL, &[&b.grid, &b.edges]),
             blur,
             composite: maker.pass(shaders::COMPOSITE, &[], &composite, lines),
-            work: vec![0; work_count(plan) * WORK_STRIDE as usize],
+            work: vec![0; work_count(plan) * UNIFORM_STRIDE as usize],
         }
     }
 
@@ -178,7 +172,7 @@ impl Passes {
                 unhidden: plan.unhidden(bins.start).front.into(),
             };
             let bytes = bytemuck::bytes_of(&work);
-            self.work[index * WORK_STRIDE as usize..][..bytes.len()].copy_from_slice(bytes);
+            self.work[index * UNIFORM_STRIDE as usize..][..bytes.len()].copy_from_slice(bytes);
         };
         for (index, bins) in plan.layers().enumerate() {
             set(index, &bins, 0);

@@ -84,26 +84,38 @@ impl<'a> Recorder<'a> {
         take: impl FnOnce(&[u8]) -> T,
     ) -> Result<T, GpuError> {
         readback.copy(&mut self.encoder, source, bytes);
-        let submission = self.submit(device);
+        let Self { encoder, mut stamps } = self;
+        let submission = submit(device, encoder, stamps.as_deref_mut());
         readback.map();
         device.poll(Some(submission))?;
         // Where others use the device, too, one of them may be about to run the callback.
         device.wait_for(|| !readback.is_pending())?;
-        readback.read(device, take)
+        let taken = readback.read(device, take)?;
+        if let Some(stamps) = stamps {
+            stamps.last = stamps.read(device)?;
+        }
+        Ok(taken)
     }
 
     /// Has the device do all of it, and asks for the times.
     pub fn submit(self, device: &Device) -> wgpu::SubmissionIndex {
-        let Self { mut encoder, mut stamps } = self;
-        if let Some(stamps) = &mut stamps {
-            stamps.fetch(&mut encoder);
-        }
-        let submission = device.queue.submit([encoder.finish()]);
-        if let Some(stamps) = &stamps {
-            stamps.readback.map();
-        }
-        submission
+        submit(device, self.encoder, self.stamps)
     }
+}
+
+fn submit(
+    device: &Device,
+    mut encoder: wgpu::CommandEncoder,
+    mut stamps: Option<&mut Stamps>,
+) -> wgpu::SubmissionIndex {
+    if let Some(stamps) = &mut stamps {
+        stamps.fetch(&mut encoder);
+    }
+    let submission = device.queue.submit([encoder.finish()]);
+    if let Some(stamps) = stamps {
+        stamps.readback.map();
+    }
+    submission
 }
 
 /// Timestamps before and after each pass of a frame, and their way back.
@@ -114,6 +126,7 @@ pub struct Stamps {
     /// The timed passes, in order; no more than there is room for.
     names: Vec<&'static str>,
     most: usize,
+    last: PassTimes,
 }
 
 impl Stamps {
@@ -135,6 +148,7 @@ impl Stamps {
             readback: Readback::new(device, "stamps back", bytes),
             names: Vec::with_capacity(most),
             most,
+            last: PassTimes::new(),
         })
     }
 
@@ -155,6 +169,11 @@ impl Stamps {
     fn fetch(&mut self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.set, 0..2 * self.names.len() as u32, &self.resolved, 0);
         self.readback.copy(encoder, &self.resolved, self.resolved.size());
+    }
+
+    /// The time of each pass of what was [fetched](Recorder::fetch) last.
+    pub fn last(&self) -> PassTimes {
+        self.last
     }
 
     /// Whether they are still on their way.
@@ -180,6 +199,15 @@ impl Stamps {
             times
         })
     }
+}
+
+/// Bytes from one uniform to the next in a buffer of several: no device asks for more.
+pub const UNIFORM_STRIDE: u64 = 256;
+
+/// Uniform number `index` of several in a buffer.
+pub fn uniform_at<T>(buffer: &wgpu::Buffer, index: usize) -> wgpu::BufferBinding<'_> {
+    let size = wgpu::BufferSize::new(size_of::<T>() as u64);
+    wgpu::BufferBinding { buffer, offset: index as u64 * UNIFORM_STRIDE, size }
 }
 
 /// Workgroups in x and y, as a device may limit both to 65,535: `workgroups` in all, or a few more.

@@ -26,6 +26,8 @@ use pulp::Arch;
 use crate::color::light_of_codes;
 use crate::compute::bands;
 use crate::compute::thread_pool::ThreadPool;
+#[cfg(feature = "gpu")]
+use crate::compute::until_fault::UntilFault;
 use crate::compute::{Device, DeviceFrame};
 use crate::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 
@@ -69,10 +71,7 @@ pub struct Matting {
     on_device: Option<DeviceFrame>,
     /// Finds them in the processor's place, as long as the device does not fail.
     #[cfg(feature = "gpu")]
-    gpu: Option<gpu::GpuMatting>,
-    /// Whether the device did.
-    #[cfg(feature = "gpu")]
-    has_failed: bool,
+    gpu: UntilFault<gpu::GpuMatting>,
 }
 
 /// A pixel beside a jump of depth.
@@ -150,9 +149,7 @@ impl Default for Matting {
             traced: Vec::new(),
             on_device: None,
             #[cfg(feature = "gpu")]
-            gpu: None,
-            #[cfg(feature = "gpu")]
-            has_failed: false,
+            gpu: UntilFault::default(),
         }
     }
 }
@@ -164,7 +161,7 @@ impl Matting {
     pub fn on(self, device: Option<&Arc<Device>>) -> Self {
         #[cfg(feature = "gpu")]
         {
-            Self { gpu: device.and_then(gpu::GpuMatting::tried), ..self }
+            Self { gpu: UntilFault::new(device.and_then(gpu::GpuMatting::tried)), ..self }
         }
         #[cfg(not(feature = "gpu"))]
         {
@@ -181,11 +178,8 @@ impl Matting {
     /// What finds mattes, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
     pub fn backends(&self) -> &'static str {
         #[cfg(feature = "gpu")]
-        match (&self.gpu, self.has_failed) {
-            (Some(_), _) => return "gpu",
-            (None, true) => return "gpu, then cpu",
-            (None, false) => {}
-        }
+        return self.gpu.backends();
+        #[cfg(not(feature = "gpu"))]
         "cpu"
     }
 
@@ -212,14 +206,10 @@ impl Matting {
         #[cfg(not(feature = "gpu"))]
         let _ = on_device;
         #[cfg(feature = "gpu")]
-        if let Some(gpu) = &mut self.gpu {
-            match gpu.find((map, color), on_device, jump, behind) {
-                Ok(()) => return,
-                Err(error) => tracing::warn!("{error}; the CPU finds mattes from here on"),
-            }
-            (self.gpu, self.has_failed) = (None, true);
-            map.matte.pixels.clear();
+        if self.gpu.did("finds mattes", |gpu| gpu.find((map, color), on_device, jump, behind)) {
+            return;
         }
+        map.matte.pixels.clear();
         let Self { arch, light, at_edge, survey, edges, pixels, clusters, evidence, wide, order, traced, .. } = self;
         let arch = *arch;
         survey.find((arch, workers), map, jump, (at_edge, edges));

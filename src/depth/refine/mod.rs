@@ -30,6 +30,8 @@ use self::temporal::{Limits, TemporalFilter};
 use self::upsample::Upsampler;
 use super::fill::Filler;
 use crate::compute::thread_pool::ThreadPool;
+#[cfg(feature = "gpu")]
+use crate::compute::until_fault::UntilFault;
 use crate::compute::{Device, DeviceFrame, DevicePicture};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
@@ -83,10 +85,7 @@ pub struct Refiner {
     fit: Fit,
     /// Refines in the processor's place, as long as the device does not fail.
     #[cfg(feature = "gpu")]
-    gpu: Option<gpu::GpuRefiner>,
-    /// Whether the device did.
-    #[cfg(feature = "gpu")]
-    has_failed: bool,
+    gpu: UntilFault<gpu::GpuRefiner>,
 }
 
 /// The distance in focus, in metres. Inverse depth is this over the depth, so that equal steps of it blur equally.
@@ -118,7 +117,7 @@ impl Refiner {
         #[cfg(feature = "gpu")]
         {
             let device = device.filter(|_| self.mending == Mending::default());
-            Self { gpu: device.and_then(gpu::GpuRefiner::tried), ..self }
+            Self { gpu: UntilFault::new(device.and_then(gpu::GpuRefiner::tried)), ..self }
         }
         #[cfg(not(feature = "gpu"))]
         {
@@ -130,18 +129,15 @@ impl Refiner {
     /// What refined, for the report: `cpu`, `gpu`, or `gpu, then cpu`.
     pub fn backends(&self) -> &'static str {
         #[cfg(feature = "gpu")]
-        match (&self.gpu, self.has_failed) {
-            (Some(_), _) => return "gpu",
-            (None, true) => return "gpu, then cpu",
-            (None, false) => {}
-        }
+        return self.gpu.backends();
+        #[cfg(not(feature = "gpu"))]
         "cpu"
     }
 
     /// The map that was refined last, and its picture, where a device has refined it.
     pub fn on_device(&self) -> Option<DeviceFrame> {
         #[cfg(feature = "gpu")]
-        return self.gpu.as_ref()?.refined();
+        return self.gpu.worker()?.refined();
         #[cfg(not(feature = "gpu"))]
         None
     }
@@ -149,7 +145,7 @@ impl Refiner {
     /// A copy of the last picture in the memory of the device that refined its map, once for each.
     pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
         #[cfg(feature = "gpu")]
-        return self.gpu.as_mut()?.take_picture();
+        return self.gpu.worker_mut()?.take_picture();
         #[cfg(not(feature = "gpu"))]
         None
     }
@@ -160,7 +156,7 @@ impl Refiner {
         self.temporal.forget();
         self.focus = Focus::default();
         #[cfg(feature = "gpu")]
-        self.gpu.iter_mut().for_each(gpu::GpuRefiner::forget);
+        self.gpu.worker_mut().into_iter().for_each(gpu::GpuRefiner::forget);
     }
 
     /// What is in focus from the next frame on, in metres: for a street, a step of depth counts less than for a desk. A
@@ -183,12 +179,8 @@ impl Refiner {
     /// The same on several threads: the map is the same to the bit for any number of them.
     pub fn refine_on(&mut self, workers: &mut ThreadPool, map: &mut DepthMap, color: &ColorImage, time_ns: u64) {
         #[cfg(feature = "gpu")]
-        if let Some(gpu) = &mut self.gpu {
-            match gpu.refine(map, color, time_ns, self.focus.0) {
-                Ok(()) => return,
-                Err(error) => tracing::warn!("{error}; the CPU refines from here on"),
-            }
-            (self.gpu, self.has_failed) = (None, true);
+        if self.gpu.did("refines", |gpu| gpu.refine(map, color, time_ns, self.focus.0)) {
+            return;
         }
         let Mending { mut distance_px, coarsest: mut scale } = self.mending;
         while scale > 1 {

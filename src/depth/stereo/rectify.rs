@@ -7,14 +7,16 @@ use std::sync::Arc;
 use super::gpu::rectifier::GpuRectifier;
 use crate::calibration::rectifier::Rectifier;
 #[cfg(feature = "gpu")]
-use crate::compute::{Device, GpuError};
+use crate::compute::Device;
+#[cfg(feature = "gpu")]
+use crate::compute::until_fault::UntilFault;
 use crate::frame::{ColorImage, GrayImage};
 
 /// Rectifies the pictures of both eyes; the same to the bit wherever it does.
 pub(super) struct PairRectifier {
     rectifier: Rectifier,
     #[cfg(feature = "gpu")]
-    gpu: Option<GpuRectifier>,
+    gpu: UntilFault<GpuRectifier>,
 }
 
 impl PairRectifier {
@@ -23,7 +25,7 @@ impl PairRectifier {
         Self {
             rectifier,
             #[cfg(feature = "gpu")]
-            gpu: None,
+            gpu: UntilFault::default(),
         }
     }
 
@@ -37,13 +39,13 @@ impl PairRectifier {
                 None
             }
         });
-        Self { gpu, ..self }
+        Self { gpu: UntilFault::new(gpu), ..self }
     }
 
     /// The left picture, rectified, into `into`.
     pub fn left(&mut self, from: &ColorImage, into: &mut ColorImage) {
         #[cfg(feature = "gpu")]
-        if self.takes(|gpu| gpu.left(from, into)) {
+        if self.gpu.did("rectifies", |gpu| gpu.left(from, into)) {
             return;
         }
         self.rectifier.left(from, into);
@@ -52,21 +54,9 @@ impl PairRectifier {
     /// The right picture, rectified, into `into`.
     pub fn right(&mut self, from: &GrayImage, into: &mut GrayImage) {
         #[cfg(feature = "gpu")]
-        if self.takes(|gpu| gpu.right(from, into)) {
+        if self.gpu.did("rectifies", |gpu| gpu.right(from, into)) {
             return;
         }
         self.rectifier.right(from, into);
-    }
-
-    /// Whether there is a device, and it did this; one that fails is not asked again.
-    #[cfg(feature = "gpu")]
-    fn takes(&mut self, rectify: impl FnOnce(&mut GpuRectifier) -> Result<(), GpuError>) -> bool {
-        match self.gpu.as_mut().map(rectify) {
-            Some(Ok(())) => return true,
-            Some(Err(error)) => tracing::warn!("{error}; the CPU rectifies from here on"),
-            None => {}
-        }
-        self.gpu = None;
-        false
     }
 }

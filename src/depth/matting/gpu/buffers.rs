@@ -2,13 +2,10 @@
 
 use super::shaders::{BLOCK, CELL, COLORS, COUNTS, ENTRY, Frame, LANES, MOST_BUFFERS, TURNS, Turn, WORD};
 use crate::compute::GpuError;
-use crate::compute::device::{Device, Readback};
+use crate::compute::device::{Device, Readback, UNIFORM_STRIDE, uniform_at};
 use crate::depth::matting::clusters::CELL_PX;
 use crate::depth::matting::share::PRIOR_ROUNDS;
 use crate::frame::{Matte, MixedPixel};
-
-/// The distance of one uniform from the next, as devices may ask for.
-const UNIFORM_STRIDE: u64 = 256;
 
 /// Buffers for a picture.
 pub struct Buffers {
@@ -104,8 +101,7 @@ impl Buffers {
 
     /// The uniform of a turn.
     pub fn turn(&self, turn: usize) -> wgpu::BufferBinding<'_> {
-        let size = wgpu::BufferSize::new(size_of::<Turn>() as u64);
-        wgpu::BufferBinding { buffer: &self.turns, offset: turn as u64 * UNIFORM_STRIDE, size }
+        uniform_at::<Turn>(&self.turns, turn)
     }
 }
 

@@ -50,7 +50,6 @@ struct Work {
     /// So many mixed pixels are fetched at once: some more than the last frame had.
     expected: usize,
     stamps: Option<Stamps>,
-    times: PassTimes,
 }
 
 /// More passes than a frame has.
@@ -72,7 +71,7 @@ impl GpuMatting {
 
     /// The time of each pass over the last frame; of none where the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
-        self.work.as_ref().map(|work| work.times).unwrap_or_default()
+        self.work.as_ref().and_then(|work| work.stamps.as_ref()).map(Stamps::last).unwrap_or_default()
     }
 
     /// Finds the mixed pixels of a map as large as its picture, as [`super::Matting::find_before`] does. What is `on_device` is
@@ -109,8 +108,8 @@ impl Work {
     fn new(device: &Arc<Device>, size: (u32, u32)) -> Result<Self, GpuError> {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
-        let (stamps, times) = (Stamps::new(device, MOST_PASSES), PassTimes::new());
-        Ok(Self { size, buffers, passes, revision: None, expected: 0, stamps, times })
+        let stamps = Stamps::new(device, MOST_PASSES);
+        Ok(Self { size, buffers, passes, revision: None, expected: 0, stamps })
     }
 
     fn find(
@@ -148,9 +147,6 @@ impl Work {
         let found = fetch(&mut self.buffers, device, recorder, map, self.expected.min(most))?;
         if found > map.matte.pixels.len() {
             fetch(&mut self.buffers, device, Recorder::new(device, None), map, found)?;
-        }
-        if let Some(stamps) = &self.stamps {
-            self.times = stamps.read(device)?;
         }
         self.expected = found + found / 4 + 256;
         Ok(())

@@ -4,10 +4,7 @@ use super::super::align::ROUNDS;
 use super::super::votes;
 use super::shaders::{ASKED, COUNTS, Frame, MEASURES, SAMPLES, WAVES, Wave};
 use crate::compute::GpuError;
-use crate::compute::device::{Device, Readback};
-
-/// The distance of one uniform from the next, as devices may ask for.
-const UNIFORM_STRIDE: u64 = 256;
+use crate::compute::device::{Device, Readback, UNIFORM_STRIDE, uniform_at};
 
 /// Buffers for a picture; some serve one pass after the other, which says what is in them then.
 pub struct Buffers {
@@ -83,7 +80,11 @@ impl Buffers {
                 let first = (1 + round * (WAVES + 2)) as u32;
                 let marks = if round == 0 { ASKED } else { 0 };
                 let uniform = Wave { first, at: first + wave as u32, marks };
-                device.upload(&buffers.waves, wave_at(round, wave), bytemuck::bytes_of(&uniform));
+                device.upload(
+                    &buffers.waves,
+                    wave_index(round, wave) as u64 * UNIFORM_STRIDE,
+                    bytemuck::bytes_of(&uniform),
+                );
             }
         }
         Ok(buffers)
@@ -96,11 +97,10 @@ impl Buffers {
 
     /// The uniform of a wave.
     pub fn wave(&self, round: usize, wave: usize) -> wgpu::BufferBinding<'_> {
-        let size = wgpu::BufferSize::new(size_of::<Wave>() as u64);
-        wgpu::BufferBinding { buffer: &self.waves, offset: wave_at(round, wave), size }
+        uniform_at::<Wave>(&self.waves, wave_index(round, wave))
     }
 }
 
-fn wave_at(round: usize, wave: usize) -> u64 {
-    (round * (WAVES + 1) + wave) as u64 * UNIFORM_STRIDE
+fn wave_index(round: usize, wave: usize) -> usize {
+    round * (WAVES + 1) + wave
 }

@@ -58,7 +58,6 @@ struct Work {
     pictures: Pool<DevicePicture>,
     picture: Option<Pooled<DevicePicture>>,
     stamps: Option<Stamps>,
-    times: PassTimes,
 }
 
 /// Copies of pictures that may be on their way at once; when all are, they go up again.
@@ -88,7 +87,7 @@ impl GpuRefiner {
 
     /// The time of each pass over the last frame; of none where the device has no timestamps.
     pub fn pass_times(&self) -> PassTimes {
-        self.work.as_ref().map(|work| work.times).unwrap_or_default()
+        self.work.as_ref().and_then(|work| work.stamps.as_ref()).map(Stamps::last).unwrap_or_default()
     }
 
     /// The map that was refined last, and its picture, where they are on the device.
@@ -144,7 +143,6 @@ impl Work {
             pictures,
             picture: None,
             stamps: Stamps::new(device, MOST_PASSES),
-            times: PassTimes::new(),
         })
     }
 
@@ -236,9 +234,6 @@ impl Work {
             out.copy_from_slice(&bytes[..length]);
         })?;
         self.picture = picture;
-        if let Some(stamps) = &self.stamps {
-            self.times = stamps.read(device)?;
-        }
         Ok(())
     }
 }
