@@ -16,9 +16,8 @@ use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::gpu::try_out;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{self, Bokeh, BokehError, Job};
-use bokehcam::budget::Quality;
+use bokehcam::compute::Backend;
 use bokehcam::compute::device::Device;
-use bokehcam::compute::{Backend, Place};
 use bokehcam::depth::matting::Matting;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::stereo::{self, Effort, Pair};
@@ -91,17 +90,10 @@ fn tried(try_out: impl FnOnce(&Arc<Device>)) -> Arc<Device> {
 
 /// A frame; every other one may be YUYV.
 fn job(ticket: u64) -> Job {
-    Job {
-        ticket,
-        color: Pooled::detached(noise(SIZE.0, SIZE.1)),
-        depth: Some(Pooled::detached(three_depths(SIZE.0, SIZE.1))),
-        coc: coc(CocKind::Depth, SIZE.1),
-        quality: Quality::Balanced,
-        place: Place::Memory,
-        out: Pooled::detached(ColorImage::default()),
-        yuyv: (ticket % 2 == 1).then(|| Pooled::detached(YuyvImage::default())),
-        on_device: None,
-    }
+    let (color, depth) = (noise(SIZE.0, SIZE.1), three_depths(SIZE.0, SIZE.1));
+    let yuyv = (ticket % 2 == 1).then(|| Pooled::detached(YuyvImage::default()));
+    let job = Job::new(Pooled::detached(color), Some(Pooled::detached(depth)), coc(CocKind::Depth, SIZE.1));
+    Job { ticket, yuyv, ..job }
 }
 
 /// Blurs frames, each of which is what the CPU makes of it; `before` is called before each.

@@ -177,25 +177,15 @@ mod on_the_gpu {
     use super::*;
     use bokehcam::bokeh::gpu::GpuBokeh;
     use bokehcam::bokeh::{Bokeh, Job};
-    use bokehcam::compute::Place;
+
     use bokehcam::compute::device::Device;
     use bokehcam::link::pool::Pooled;
     use std::sync::Arc;
 
     impl Blurs for GpuBokeh {
         fn blur(&mut self, quality: Quality, image: &ColorImage, map: &DepthMap, field: &CocField) -> ColorImage {
-            self.submit(Job {
-                ticket: 0,
-                color: Pooled::detached(image.clone()),
-                depth: Some(Pooled::detached(map.clone())),
-                coc: *field,
-                quality,
-                place: Place::Memory,
-                out: Pooled::detached(ColorImage::default()),
-                yuyv: None,
-                on_device: None,
-            })
-            .expect("the GPU takes a frame");
+            let job = Job::new(Pooled::detached(image.clone()), Some(Pooled::detached(map.clone())), *field);
+            self.submit(Job { quality, ..job }).expect("the GPU takes a frame");
             let finished = self.collect(true).expect("the GPU blurs").expect("a frame comes back");
             finished.picture.memory().unwrap().clone()
         }

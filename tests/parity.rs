@@ -12,7 +12,6 @@ use bokehcam::bokeh::ladder::Compositing;
 use bokehcam::bokeh::plan::{CELL, Plan, SEGMENT};
 use bokehcam::bokeh::{Bokeh, Job, Method, Probe, Rank, Settings};
 use bokehcam::budget::Quality;
-use bokehcam::compute::Place;
 use bokehcam::depth::matting::{self, Matting};
 use bokehcam::frame::{ColorImage, DepthMap, MixedPixel};
 use bokehcam::link::pool::Pooled;
@@ -35,17 +34,8 @@ fn gpu(plan: &Plan) -> GpuBokeh {
 }
 
 fn job(ticket: u64, color: &ColorImage, map: &DepthMap, field: &CocField) -> Job {
-    Job {
-        ticket,
-        color: Pooled::detached(color.clone()),
-        depth: Some(Pooled::detached(map.clone())),
-        coc: *field,
-        quality: Quality::default(),
-        place: Place::Memory,
-        out: Pooled::detached(ColorImage::default()),
-        yuyv: None,
-        on_device: None,
-    }
+    let job = Job::new(Pooled::detached(color.clone()), Some(Pooled::detached(map.clone())), *field);
+    Job { ticket, ..job }
 }
 
 fn same(settings: &Settings, image: &ColorImage, map: &DepthMap, field: &CocField, what: &str) {

@@ -11,7 +11,6 @@ use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Bokeh, Job};
 use bokehcam::budget::Quality;
-use bokehcam::compute::Place;
 use bokehcam::depth::focus::FocusRule;
 use bokehcam::depth::matting::{self, Matting};
 use bokehcam::frame::{ColorImage, DepthMap};
@@ -159,18 +158,8 @@ fn blurred(look: &Look, color: &ColorImage, map: &DepthMap, focus_m: f32, qualit
     // As a live run does it: one executor for all levels.
     let settings = look.settings(size, true).unwrap();
     let mut cpu = CpuBokeh::new(Plan::new(&settings, size.0, size.1), Some(2));
-    cpu.submit(Job {
-        ticket: 1,
-        color: Pooled::detached(color.clone()),
-        depth: Some(Pooled::detached(map)),
-        coc: field,
-        quality,
-        place: Place::Memory,
-        out: Pooled::detached(ColorImage::default()),
-        yuyv: None,
-        on_device: None,
-    })
-    .unwrap();
+    let job = Job::new(Pooled::detached(color.clone()), Some(Pooled::detached(map)), field);
+    cpu.submit(Job { quality, ..job }).unwrap();
     (cpu.collect(true).unwrap().unwrap().picture.memory().unwrap().clone(), field)
 }
 

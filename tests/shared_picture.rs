@@ -9,8 +9,7 @@ use std::sync::Arc;
 use bokehcam::bokeh::gpu::GpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Bokeh, Job};
-use bokehcam::budget::Quality;
-use bokehcam::compute::{Device, DevicePicture, Place};
+use bokehcam::compute::{Device, DevicePicture};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::link::pool::Pooled;
@@ -23,18 +22,9 @@ fn blurred(
     map: &DepthMap,
     on_device: Option<Pooled<DevicePicture>>,
 ) -> ColorImage {
-    let job = Job {
-        ticket: 0,
-        color: Pooled::detached(color.clone()),
-        depth: Some(Pooled::detached(map.clone())),
-        coc: coc(CocKind::Depth, color.height),
-        quality: Quality::default(),
-        place: Place::Memory,
-        out: Pooled::detached(ColorImage::default()),
-        yuyv: None,
-        on_device,
-    };
-    gpu.submit(job).expect("room for a frame");
+    let (given, map) = (Pooled::detached(color.clone()), Pooled::detached(map.clone()));
+    let job = Job::new(given, Some(map), coc(CocKind::Depth, color.height));
+    gpu.submit(Job { on_device, ..job }).expect("room for a frame");
     let finished = gpu.collect(true).expect("the GPU blurs").expect("a frame comes back");
     finished.picture.memory().expect("in memory").clone()
 }

@@ -8,9 +8,8 @@ use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::gpu::GpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::bokeh::{Bokeh, Job};
-use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
-use bokehcam::frame::{ColorImage, YuyvImage};
+use bokehcam::frame::YuyvImage;
 use bokehcam::link::pool::Pooled;
 use bokehcam::optics::CocKind;
 use bokehcam::sink::yuyv;
@@ -29,15 +28,9 @@ fn yuyv_is_the_picture_encoded() {
         let mut cpu = CpuBokeh::new(plan, Some(1));
         let (image, map) = (noise(width, height), three_depths(width, height));
         let job = |place, yuyv: bool| Job {
-            ticket: 0,
-            color: Pooled::detached(image.clone()),
-            depth: Some(Pooled::detached(map.clone())),
-            coc: field,
-            quality: Quality::default(),
             place,
-            out: Pooled::detached(ColorImage::default()),
             yuyv: yuyv.then(|| Pooled::detached(YuyvImage::default())),
-            on_device: None,
+            ..Job::new(Pooled::detached(image.clone()), Some(Pooled::detached(map.clone())), field)
         };
         let made = |bokeh: &mut dyn Bokeh, job: Job| {
             bokeh.submit(job).expect("room for a frame");

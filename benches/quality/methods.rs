@@ -5,7 +5,6 @@ use std::fmt;
 use bokehcam::bokeh::aperture::Aperture;
 use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Job, Rank, Settings};
 use bokehcam::budget::Quality;
-use bokehcam::compute::Place;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
 use bokehcam::depth::fill::Filler;
@@ -250,17 +249,8 @@ impl Blurrer {
 
     fn run(&mut self, shot: &Shot, depth: DepthMap) -> Result<ColorImage, BokehError> {
         let Some(bokeh) = &mut self.bokeh else { return Ok(shot.image.clone()) };
-        bokeh.submit(Job {
-            ticket: 0,
-            color: Pooled::detached(shot.image.clone()),
-            depth: Some(Pooled::detached(depth)),
-            coc: CocField::Depth(shot.lens),
-            quality: Quality::default(),
-            place: Place::Memory,
-            out: Pooled::detached(ColorImage::default()),
-            yuyv: None,
-            on_device: None,
-        })?;
+        let (color, depth) = (Pooled::detached(shot.image.clone()), Pooled::detached(depth));
+        bokeh.submit(Job::new(color, Some(depth), CocField::Depth(shot.lens)))?;
         let finished = bokeh.collect(true)?;
         Ok(finished.and_then(|mut finished| finished.picture.memory_mut().map(std::mem::take)).unwrap_or_default())
     }

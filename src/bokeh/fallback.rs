@@ -141,8 +141,7 @@ mod tests {
     use super::*;
     use crate::bokeh::PassTimes;
     use crate::bokeh::Picture;
-    use crate::budget::Quality;
-    use crate::compute::Place;
+
     use crate::frame::ColorImage;
     use crate::link::pool::Pool;
     use crate::optics::CocField;
@@ -209,18 +208,7 @@ mod tests {
     }
 
     fn job(ticket: u64, pool: &Pool<ColorImage>, coc: CocField) -> Job {
-        let quality = Quality::Balanced;
-        Job {
-            ticket,
-            color: pool.take(),
-            depth: None,
-            coc,
-            quality,
-            place: Place::Memory,
-            out: pool.take(),
-            yuyv: None,
-            on_device: None,
-        }
+        Job { ticket, out: pool.take(), ..Job::new(pool.take(), None, coc) }
     }
 
     const UNIFORM: CocField = CocField::Uniform { radius_px: 1.0 };

@@ -133,6 +133,14 @@ pub struct Job {
     pub on_device: Option<Pooled<DevicePicture>>,
 }
 
+impl Job {
+    /// A frame with ticket 0, to be blurred at the default quality into memory of its own.
+    pub fn new(color: Pooled<ColorImage>, depth: Option<Pooled<DepthMap>>, coc: CocField) -> Self {
+        let (quality, place, out) = (Quality::default(), Place::Memory, Pooled::detached(ColorImage::default()));
+        Self { ticket: 0, color, depth, coc, quality, place, out, yuyv: None, on_device: None }
+    }
+}
+
 /// A blurred frame.
 pub struct Finished {
     /// The job's ticket.

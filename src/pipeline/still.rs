@@ -4,7 +4,6 @@ use super::staging::Staging;
 use super::{CocMaker, Finish};
 use crate::bokeh::{Bokeh, BokehError, Finished, Job};
 use crate::budget::Quality;
-use crate::compute::Place;
 use crate::computing::Computing;
 use crate::depth::misfit::Misfit;
 use crate::frame::{ColorImage, DepthMap};
@@ -99,17 +98,8 @@ pub(super) fn blur_into(
     depth: Option<DepthMap>,
     coc: CocField,
 ) -> Result<Blurred, BokehError> {
-    bokeh.submit(Job {
-        ticket: 0,
-        color: Pooled::detached(color),
-        depth: depth.map(Pooled::detached),
-        coc,
-        quality,
-        place: Place::Memory,
-        out: Pooled::detached(out),
-        yuyv: None,
-        on_device: None,
-    })?;
+    let job = Job::new(Pooled::detached(color), depth.map(Pooled::detached), coc);
+    bokeh.submit(Job { quality, out: Pooled::detached(out), ..job })?;
     let Finished { mut picture, mut color, depth, .. } = bokeh.collect(true)?.ok_or(BokehError::Lost)?;
     let blurred = std::mem::take(picture.memory_mut().ok_or(BokehError::Lost)?);
     let depth = depth.map(|mut depth| std::mem::take(&mut *depth));

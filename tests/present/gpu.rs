@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::common::{coc, color, noise, settings, three_depths};
 use bokehcam::bokeh::{self, Job};
-use bokehcam::budget::Quality;
 use bokehcam::compute::Place;
 use bokehcam::compute::device::{Device, DevicePicture};
 use bokehcam::frame::ColorImage;
@@ -137,18 +136,9 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
         let (image, map) = (noise(width, height), three_depths(width, height));
         let mut results = Vec::new();
         for place in [Place::Memory, Place::Both, Place::Device] {
-            let job = Job {
-                ticket: 0,
-                color: Pooled::detached(image.clone()),
-                depth: Some(Pooled::detached(map.clone())),
-                coc: coc(CocKind::Depth, height),
-                quality: Quality::default(),
-                place,
-                out: Pooled::detached(ColorImage::default()),
-                yuyv: None,
-                on_device: None,
-            };
-            bokeh.submit(job).expect("room for a frame");
+            let (color, depth) = (Pooled::detached(image.clone()), Pooled::detached(map.clone()));
+            let job = Job::new(color, Some(depth), coc(CocKind::Depth, height));
+            bokeh.submit(Job { place, ..job }).expect("room for a frame");
             let finished = bokeh.collect(true).expect("the GPU blurs").expect("a frame comes back");
             assert_eq!(
                 (finished.picture.memory().is_some(), finished.picture.device().is_some()),
@@ -182,18 +172,8 @@ fn results_go_to_memory_when_the_device_has_no_more_room_for_them() {
     let mut bokeh = bokeh::create_on(&settings(CocKind::Uniform), (16, 16), device(), None).expect("a blur");
     let mut kept = Vec::new();
     for frame in 0..40 {
-        let job = Job {
-            ticket: frame,
-            color: Pooled::detached(noise(16, 16)),
-            depth: None,
-            coc: coc(CocKind::Uniform, 16),
-            quality: Quality::default(),
-            place: Place::Device,
-            out: Pooled::detached(ColorImage::default()),
-            yuyv: None,
-            on_device: None,
-        };
-        bokeh.submit(job).expect("room for a frame");
+        let job = Job::new(Pooled::detached(noise(16, 16)), None, coc(CocKind::Uniform, 16));
+        bokeh.submit(Job { ticket: frame, place: Place::Device, ..job }).expect("room for a frame");
         kept.push(bokeh.collect(true).expect("the GPU blurs").expect("a frame comes back"));
     }
     let stayed = kept.iter().take_while(|finished| finished.picture.device().is_some()).count();

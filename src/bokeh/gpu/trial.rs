@@ -8,8 +8,8 @@ use crate::bokeh::cpu::CpuBokeh;
 use crate::bokeh::plan::Plan;
 use crate::bokeh::{Bokeh, BokehError, Job, Method, Settings};
 use crate::budget::Quality;
+use crate::compute::GpuError;
 use crate::compute::device::Device;
-use crate::compute::{GpuError, Place};
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
 use crate::optics::{CocField, CocKind, DepthCoc};
@@ -70,17 +70,7 @@ fn differing(device: &Arc<Device>) -> Result<usize, BokehError> {
     let mut expected = ColorImage::default();
     CpuBokeh::new(plan.clone(), Some(1)).blur(&color, Some(&depth), &coc, &mut expected)?;
     let mut gpu = GpuBokeh::on(&plan, Arc::clone(device))?;
-    gpu.submit(Job {
-        ticket: 0,
-        color: Pooled::detached(color),
-        depth: Some(Pooled::detached(depth)),
-        coc,
-        quality: Quality::default(),
-        place: Place::Memory,
-        out: Pooled::detached(ColorImage::default()),
-        yuyv: None,
-        on_device: None,
-    })?;
+    gpu.submit(Job::new(Pooled::detached(color), Some(Pooled::detached(depth)), coc))?;
     let finished = gpu.collect(true)?.ok_or(BokehError::Lost)?;
     let made = finished.picture.memory().ok_or(BokehError::Lost)?;
     Ok(made.rgb.iter().zip(&expected.rgb).filter(|(a, b)| a.abs_diff(**b) > CODES).count())

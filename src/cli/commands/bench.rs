@@ -16,7 +16,7 @@ use crate::cli::settings::layers::Given;
 use crate::cli::settings::look;
 use crate::cli::settings::unused;
 use crate::cli::terminal::print;
-use crate::compute::{Backend, Place, thread_pool::cores};
+use crate::compute::{Backend, thread_pool::cores};
 use crate::computing::Computing;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pool;
@@ -243,17 +243,8 @@ struct Buffers {
 impl Buffers {
     /// Blurs the frame once: the time from handing it over until it is back, and the times of its passes.
     fn time_frame(&self, bokeh: &mut dyn Bokeh, coc: CocField) -> Result<(Duration, PassTimes), CliError> {
-        let job = Job {
-            ticket: 0,
-            color: self.colors.take(),
-            depth: self.depths.as_ref().map(Pool::take),
-            coc,
-            quality: Quality::default(),
-            place: Place::Memory,
-            out: self.results.take(),
-            yuyv: None,
-            on_device: None,
-        };
+        let (color, depth) = (self.colors.take(), self.depths.as_ref().map(Pool::take));
+        let job = Job { out: self.results.take(), ..Job::new(color, depth, coc) };
         let began = Instant::now();
         bokeh.submit(job)?;
         let finished = bokeh.collect(true)?;

@@ -15,7 +15,7 @@ use crate::cli::settings::look;
 use crate::cli::settings::unused;
 use crate::cli::terminal::print;
 use crate::clock::{Clock, cpu_ns};
-use crate::compute::{Backend, Place, thread_pool::cores};
+use crate::compute::{Backend, thread_pool::cores};
 use crate::computing::Computing;
 use crate::depth::Seen;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
@@ -253,18 +253,7 @@ impl Buffers {
             let depth = std::mem::replace(&mut self.depth, Pooled::detached(DepthMap::default()));
             let depth = coc.fixed().is_none().then_some(depth);
             notes.begin();
-            let job = Job {
-                ticket: 0,
-                color,
-                depth,
-                coc: field,
-                quality: *quality,
-                place: Place::Memory,
-                out,
-                yuyv: None,
-                on_device: None,
-            };
-            executor.submit(job)?;
+            executor.submit(Job { quality: *quality, out, ..Job::new(color, depth, field) })?;
             let finished = executor.collect(true)?.ok_or(BokehError::Lost)?;
             notes.note(quality.name(), "blur");
             self.color = finished.color;
