@@ -13,7 +13,7 @@ sizes=${SIZES:-1920x1080,3840x2160}
 frames=${FRAMES:-30}
 if [[ -z "${BOKEHCAM:-}" ]]; then
     cargo build --release --locked
-    parity=(--test parity --test yuyv --test shared_picture --test stereo_gpu --test stereo_tidying --test rectify_gpu)
+    parity=(--test parity --test yuyv --test shared_frame --test stereo_gpu --test stereo_tidying --test rectify_gpu)
     parity+=(--test refine_gpu --test matte_gpu)
     cargo test --release --locked "${parity[@]}" -- --include-ignored
     # Depth from two eyes: each pass by the device's own timestamps, then whole pairs.

@@ -30,7 +30,7 @@ const MIXED = 0x8000u;      // of a pixel of the scene: see scene_packed
 struct Frame {
     size: vec2<u32>,            // columns, rows
     depth_size: vec2<u32>,
-    coc_kind: u32,              // 0 uniform, 1 ramp, 2 depth
+    coc_kind: u32,              // 0 uniform, 1 ramp, 2 depth as CoC, 3 depth in metres
     compositing: u32,           // 0 layers, 1 select, 2 gather
     bins: u32,
     near_bins: u32,             // they come first

@@ -1,12 +1,12 @@
 // Pass unpack: 8-bit sRGB to linear light with highlights expanded; mixed pixels to two surfaces. Reads packed RGB bytes, and
-// of a depth map the signed CoC; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile, which shows
+// of a depth map the signed CoC or metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile, which shows
 // no bins yet; lists the tiles of the bins of the foremost layer.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
 @group(0) @binding(2) var<uniform> frame: Frame;
 @group(0) @binding(3) var<storage, read> color: array<u32>;
-@group(0) @binding(4) var<storage, read> radii: array<u32>;      // two CoC a word, as in scene_packed
+@group(0) @binding(4) var<storage, read> radii: array<u32>;      // two CoC a word, as in scene_packed; or metres
 @group(0) @binding(5) var<storage, read_write> scene: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read_write> ranges: array<vec2<f32>>;
 @group(0) @binding(7) var<storage, read_write> mixed: array<MixedPixel>;
@@ -49,6 +49,9 @@ fn coc_of(x: u32, y: u32) -> f32 {
 }
 
 fn radius_at(index: u32) -> f32 {
+    if frame.coc_kind == 3u {
+        return coc_of_depth(bitcast<f32>(radii[index]));
+    }
     let roots = unpack2x16snorm(radii[index / 2u]);
     let root = select(roots.x, roots.y, index % 2u == 1u);
     return root * abs(root) * frame.most_px;

@@ -39,7 +39,7 @@ pub use error::BokehError;
 pub use picture::Picture;
 
 pub use crate::compute::{Backend, PassTimes};
-use crate::compute::{Device, DevicePicture, GpuError, Place};
+use crate::compute::{Device, DeviceFrame, GpuError, Place};
 use crate::frame::{ColorImage, DepthMap, YuyvImage};
 use crate::link::pool::Pooled;
 use crate::names::named;
@@ -128,9 +128,10 @@ pub struct Job {
     /// A buffer for the result as YUYV, where that is as good: an executor that makes it as easily fills this one in the
     /// place of `out`. Not for results on the device.
     pub yuyv: Option<Pooled<YuyvImage>>,
-    /// The picture once more, where it is in the memory of the executor's device already, so that it need not go up.
+    /// The picture and its depth once more, where they are in the memory of the executor's device already, so that they need
+    /// not go up.
     #[doc(hidden)]
-    pub on_device: Option<Pooled<DevicePicture>>,
+    pub on_device: Option<Pooled<DeviceFrame>>,
 }
 
 impl Job {

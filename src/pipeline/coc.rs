@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::compute::thread_pool::ThreadPool;
-use crate::compute::{Device, DevicePicture};
+use crate::compute::{Device, DeviceFrame};
 use crate::depth::background::Background;
 use crate::depth::fill::Filler;
 use crate::depth::focus::{Focus, FocusRule};
@@ -121,10 +121,10 @@ impl CocMaker {
         }
     }
 
-    /// A copy of the picture of the last map that it made, where a device has it: once for each.
-    pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
+    /// A copy of the last map that it made, with its picture, where a device has both: once for each.
+    pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
         match &mut self.finisher {
-            Finisher::Refine(refiner) => refiner.take_picture(),
+            Finisher::Refine(refiner) => refiner.take_copy(),
             Finisher::Keep | Finisher::Fill(_) => None,
         }
     }

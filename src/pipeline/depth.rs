@@ -12,7 +12,7 @@ use super::wanted::Wanted;
 use super::{Ended, Fault, Frame, hand_on};
 use crate::budget::DepthTimes;
 use crate::clock::Clock;
-use crate::compute::DevicePicture;
+use crate::compute::DeviceFrame;
 use crate::depth::{DepthError, DepthSource, Seen};
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::{Pool, Pooled};
@@ -28,8 +28,8 @@ pub(super) struct Ready {
     pub color: Pooled<ColorImage>,
     pub depth: Option<Pooled<DepthMap>>,
     pub coc: CocField,
-    /// The picture, where the device that refined its depth has it.
-    pub on_device: Option<Pooled<DevicePicture>>,
+    /// The picture and its depth, where a device has refined that.
+    pub on_device: Option<Pooled<DeviceFrame>>,
     /// The picture and its depth before something else stood behind the subject, where that is so and somebody looks at them.
     pub taken: Option<Pooled<Taken>>,
     /// What its depth took; `None` where it has none.
@@ -140,7 +140,7 @@ impl Stage<'_> {
                 taken
             });
             // What is staged has another picture.
-            let on_device = preparation.take_picture().filter(|_| !preparation.replaces(&coc));
+            let on_device = preparation.take_copy().filter(|_| !preparation.replaces(&coc));
             trace.part = depth.as_mut().and_then(|map| preparation.stage(&mut color, map, &coc, stamp.time_ns));
             let since_ns = self.clock.now_ns();
             (trace.depth_ns, trace.depth_held) = (since_ns - began_ns, *self.held > held_before);

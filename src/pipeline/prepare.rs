@@ -5,7 +5,7 @@ use super::coc::{CocMaker, Finish};
 use super::fit_check::{FitCheck, Verdict};
 use super::staging::Staging;
 use crate::bokeh::Bokeh;
-use crate::compute::DevicePicture;
+use crate::compute::DeviceFrame;
 use crate::frame::crop::Crop;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -55,9 +55,9 @@ impl Preparation {
         self.coc.matted_by()
     }
 
-    /// The picture that was prepared last, on a device ([`CocMaker::take_picture`]).
-    pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
-        self.coc.take_picture()
+    /// The frame that was prepared last, on a device ([`CocMaker::take_copy`]).
+    pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
+        self.coc.take_copy()
     }
 
     /// Another scene comes: nothing is left of those before.

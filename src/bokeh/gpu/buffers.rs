@@ -1,7 +1,6 @@
 //! What lives on the device: allocated once per picture size.
 
 use super::layout::Capacity;
-use super::radii::radii_bytes;
 use super::shaders::{Bin, Frame, LIST_HEAD};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::ladder::Compositing;
@@ -147,9 +146,9 @@ impl Buffers {
         }
     }
 
-    /// A buffer for the CoC of a depth map of so many pixels.
-    pub fn radii(device: &Device, pixels: usize) -> wgpu::Buffer {
-        device.buffer("radii", radii_bytes(pixels) as usize, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
+    /// A buffer for a depth map, of so many bytes.
+    pub fn radii(device: &Device, bytes: u64) -> wgpu::Buffer {
+        device.buffer("radii", bytes as usize, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST)
     }
 }
 

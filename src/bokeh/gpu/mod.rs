@@ -24,7 +24,7 @@ use super::bank::STEPS_PER_PX;
 use super::ladder::Compositing;
 use super::plan::Plan;
 use super::{Bokeh, BokehError, Finished, Job};
-use crate::compute::device::{Device, DevicePicture, Recorder};
+use crate::compute::device::{Device, DeviceFrame, DevicePicture, Recorder};
 use crate::compute::{Backend, GpuError, Place};
 use crate::link::pool::{Pool, Pooled};
 use crate::optics::CocField;
@@ -38,7 +38,7 @@ pub struct GpuBokeh {
     plan: Plan,
     device: Arc<Device>,
     buffers: Buffers,
-    /// CoC of the current frame's depth map; grows to the largest that came.
+    /// The current frame's depth map, as CoC or in metres; grows to the largest that came.
     radii: wgpu::Buffer,
     capacity: Capacity,
     layout: Layout,
@@ -78,7 +78,7 @@ impl GpuBokeh {
             .into());
         }
         let buffers = Buffers::new(&device, plan, &capacity);
-        let radii = Buffers::radii(&device, plan.width * plan.height);
+        let radii = Buffers::radii(&device, radii::radii_bytes(plan.width * plan.height));
         let passes = Passes::new(&device, plan, &buffers, &radii);
         let ring = Ring::new(&device, buffers::picture_bytes(plan) as usize);
         device.check()?;
@@ -95,13 +95,15 @@ impl GpuBokeh {
         self.results.get_or_insert_with(|| Pool::new(ON_DEVICE, || DevicePicture::new(device, size))).try_take()
     }
 
-    /// The uniform `Frame` of a job; `common.wgsl` says what the numbers mean.
-    fn frame_uniform(&self, job: &Job) -> shaders::Frame {
+    /// The uniform `Frame` of a job, whose depth may be `in_metres`; `common.wgsl` says what the numbers mean.
+    fn frame_uniform(&self, job: &Job, in_metres: bool) -> shaders::Frame {
         let plan = &self.plan;
         let (coc_kind, coc, ramp) = match job.coc {
             CocField::Uniform { radius_px } => (0, [radius_px, 0.0, 0.0, 0.0], [0.0; 2]),
             CocField::Ramp(r) => (1, [r.normal.x, r.normal.y, r.offset_px, r.half_band_px], [r.slope, r.max_px]),
-            CocField::Depth(d) => (2, [d.coc_at_infinity_px, d.near_m(), d.far_m(), d.max_coc_px], [0.0; 2]),
+            CocField::Depth(d) => {
+                (2 + u32::from(in_metres), [d.coc_at_infinity_px, d.near_m(), d.far_m(), d.max_coc_px], [0.0; 2])
+            }
         };
         shaders::Frame {
             size: [plan.width as u32, plan.height as u32],
@@ -168,12 +170,20 @@ impl Bokeh for GpuBokeh {
         if let Some(yuyv) = &mut job.yuyv {
             yuyv.resize(made_for.0, made_for.1);
         }
+        let is_here = |frame: &Pooled<DeviceFrame>| frame.is_on(&self.device) && frame.size() == made_for;
+        // Kept until this frame is submitted: whatever takes its place there has to come later.
+        let shared = job.on_device.take().filter(is_here);
+        let mut shared_metres = None;
         if let (CocField::Depth(lens), Some(map)) = (job.coc, &job.depth) {
-            if radii::radii_bytes(map.metres.len()) > self.radii.size() {
-                self.radii = Buffers::radii(&self.device, map.metres.len());
+            shared_metres = shared.as_deref().filter(|_| map.size() == made_for).map(|frame| &frame.metres);
+            let bytes = shared_metres.map_or(radii::radii_bytes(map.metres.len()), wgpu::Buffer::size);
+            if bytes > self.radii.size() {
+                self.radii = Buffers::radii(&self.device, bytes);
                 self.passes.set_radii(&self.device, &self.buffers, &self.radii);
             }
-            radii::upload(&self.device.queue, &self.radii, map, lens, most_px(&job.coc));
+            if shared_metres.is_none() {
+                radii::upload(&self.device.queue, &self.radii, map, lens, most_px(&job.coc));
+            }
         }
         if let Some(matte) = self.plan.matte(job.depth.as_deref(), &job.coc) {
             self.device.upload(&self.buffers.mixed, 0, bytemuck::cast_slice(&matte.pixels));
@@ -182,18 +192,19 @@ impl Bokeh for GpuBokeh {
         self.plan.split(job.depth.as_deref(), &job.coc);
         self.layout.lay_out(&self.plan, &self.capacity);
         self.passes.upload(&self.device, &self.buffers, &self.plan, &self.layout);
-        let frame = self.frame_uniform(&job);
+        let frame = self.frame_uniform(&job, shared_metres.is_some());
         self.device.queue.write_buffer(&self.buffers.frame, 0, bytemuck::bytes_of(&frame));
 
         let mut recorder = Recorder::new(&self.device, slot.stamps.as_mut());
         let color = &self.buffers.color;
-        // What is done to the picture there later comes after this frame.
-        match job.on_device.take().filter(|picture| picture.is_on(&self.device) && picture.size() == made_for) {
-            Some(picture) => {
-                let picture = picture.buffer();
-                recorder.encoder.copy_buffer_to_buffer(picture, 0, color, 0, picture.size().min(color.size()));
+        match shared.as_deref() {
+            Some(DeviceFrame { rgb, .. }) => {
+                recorder.encoder.copy_buffer_to_buffer(rgb, 0, color, 0, rgb.size().min(color.size()));
             }
             None => self.device.upload(color, 0, &job.color.rgb),
+        }
+        if let Some(metres) = shared_metres {
+            recorder.encoder.copy_buffer_to_buffer(metres, 0, &self.radii, 0, metres.size());
         }
         self.passes.record(&mut recorder, &self.plan, &self.layout);
         let (result, encoder) = (&self.buffers.result, &mut recorder.encoder);
@@ -210,6 +221,7 @@ impl Bokeh for GpuBokeh {
             slot.picture.copy(encoder, result, copied);
         }
         let submission = recorder.submit(&self.device);
+        drop(shared);
         self.ring.push(&self.device, slot, Sent { job, on_device, copied, submission, started });
         Ok(())
     }

@@ -34,10 +34,11 @@ impl DevicePicture {
     }
 }
 
-/// A depth map as large as its picture, and that picture, in a device's memory, until the next ones take their place.
+/// A depth map as large as its picture, and that picture, in a device's memory.
 #[derive(Clone, Debug)]
 pub struct DeviceFrame {
     device: wgpu::Device,
+    size: (u32, u32),
     /// Depth of each pixel, in metres.
     pub metres: wgpu::Buffer,
     /// 8-bit sRGB, 3 bytes a pixel.
@@ -45,9 +46,21 @@ pub struct DeviceFrame {
 }
 
 impl DeviceFrame {
-    /// Buffers of `device`, which can be copied from.
-    pub fn new(device: &Device, metres: &wgpu::Buffer, rgb: &wgpu::Buffer) -> Self {
-        Self { device: device.device.clone(), metres: metres.clone(), rgb: rgb.clone() }
+    /// Memory for a frame of `size` pixels.
+    pub fn new(device: &Device, size: (u32, u32)) -> Self {
+        use wgpu::BufferUsages as Usage;
+        let pixels = size.0 as usize * size.1 as usize;
+        let buffer = |label, bytes| device.buffer(label, bytes, Usage::COPY_SRC | Usage::COPY_DST);
+        Self::of(device, size, &buffer("metres", 4 * pixels), &buffer("rgb", 3 * pixels))
+    }
+
+    /// What is in buffers of `device`, which can be copied from, until something else is.
+    pub fn of(device: &Device, size: (u32, u32), metres: &wgpu::Buffer, rgb: &wgpu::Buffer) -> Self {
+        Self { device: device.device.clone(), size, metres: metres.clone(), rgb: rgb.clone() }
+    }
+
+    pub fn size(&self) -> (u32, u32) {
+        self.size
     }
 
     /// Whether it is in the memory of `device`.

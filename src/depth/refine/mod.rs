@@ -32,7 +32,7 @@ use super::fill::Filler;
 use crate::compute::thread_pool::ThreadPool;
 #[cfg(feature = "gpu")]
 use crate::compute::until_fault::UntilFault;
-use crate::compute::{Device, DeviceFrame, DevicePicture};
+use crate::compute::{Device, DeviceFrame};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, DepthMap};
 use crate::link::pool::Pooled;
@@ -134,7 +134,7 @@ impl Refiner {
         "cpu"
     }
 
-    /// The map that was refined last, and its picture, where a device has refined it.
+    /// The map that was refined last, and its picture, where a device has refined it, until it refines the next.
     pub fn on_device(&self) -> Option<DeviceFrame> {
         #[cfg(feature = "gpu")]
         return self.gpu.worker()?.refined();
@@ -142,10 +142,10 @@ impl Refiner {
         None
     }
 
-    /// A copy of the last picture in the memory of the device that refined its map, once for each.
-    pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
+    /// A copy of that, which stays as it is, once for each.
+    pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
         #[cfg(feature = "gpu")]
-        return self.gpu.worker_mut()?.take_picture();
+        return self.gpu.worker_mut()?.take_copy();
         #[cfg(not(feature = "gpu"))]
         None
     }

@@ -19,7 +19,7 @@ use passes::Passes;
 use shaders::Frame;
 
 use super::temporal;
-use crate::compute::device::{Device, DeviceFrame, DevicePicture, Recorder, Stamps};
+use crate::compute::device::{Device, DeviceFrame, Recorder, Stamps};
 use crate::compute::{GpuError, PassTimes};
 use crate::depth::guided_fill;
 use crate::depth::tap::Tap;
@@ -54,14 +54,14 @@ struct Work {
     last: Option<(u64, f32)>,
     /// Whether the last refined map, and its picture, are on the device.
     is_there: bool,
-    /// Copies of pictures, for the blur, and that of the last one.
-    pictures: Pool<DevicePicture>,
-    picture: Option<Pooled<DevicePicture>>,
+    /// Copies of refined maps with their pictures, for the blur, and that of the last one.
+    copies: Pool<DeviceFrame>,
+    copy: Option<Pooled<DeviceFrame>>,
     stamps: Option<Stamps>,
 }
 
-/// Copies of pictures that may be on their way at once; when all are, they go up again.
-const PICTURES: usize = 4;
+/// Copies that may be on their way at once; when all are, frames go up again.
+const COPIES: usize = 4;
 
 /// More passes than a frame has.
 const MOST_PASSES: usize = 48;
@@ -90,15 +90,16 @@ impl GpuRefiner {
         self.work.as_ref().and_then(|work| work.stamps.as_ref()).map(Stamps::last).unwrap_or_default()
     }
 
-    /// The map that was refined last, and its picture, where they are on the device.
+    /// The map that was refined last, and its picture, where they are on the device, until the next one is.
     pub fn refined(&self) -> Option<DeviceFrame> {
-        let Buffers { refined, rgb, .. } = &self.work.as_ref().filter(|work| work.is_there)?.buffers;
-        Some(DeviceFrame::new(&self.device, refined, rgb))
+        let Work { size, buffers: Buffers { refined, rgb, .. }, .. } =
+            self.work.as_ref().filter(|work| work.is_there)?;
+        Some(DeviceFrame::of(&self.device, *size, refined, rgb))
     }
 
-    /// A copy of the last picture on the device, once for each.
-    pub fn take_picture(&mut self) -> Option<Pooled<DevicePicture>> {
-        self.work.as_mut()?.picture.take()
+    /// A copy of that, once for each.
+    pub fn take_copy(&mut self) -> Option<Pooled<DeviceFrame>> {
+        self.work.as_mut()?.copy.take()
     }
 
     /// Refines the depth `map` of the picture `color` at `time_ns`, with this distance in focus.
@@ -129,7 +130,7 @@ impl Work {
         let buffers = Buffers::new(device, size)?;
         let passes = Passes::new(device, size, &buffers);
         let (from, columns, rows) = ((0, 0), Vec::new(), Vec::new());
-        let pictures = device.attempt(|| Pool::new(PICTURES, || DevicePicture::new(device, size)))?;
+        let copies = device.attempt(|| Pool::new(COPIES, || DeviceFrame::new(device, size)))?;
         Ok(Self {
             size,
             buffers,
@@ -140,8 +141,8 @@ impl Work {
             has_filled: false,
             last: None,
             is_there: false,
-            pictures,
-            picture: None,
+            copies,
+            copy: None,
             stamps: Stamps::new(device, MOST_PASSES),
         })
     }
@@ -184,7 +185,7 @@ impl Work {
         time_ns: u64,
         focus_m: f32,
     ) -> Result<(), GpuError> {
-        (self.is_there, self.picture) = (false, None);
+        (self.is_there, self.copy) = (false, None);
         if !map.metres.is_empty() && self.from != map.size() {
             self.take_maps(device, map.size())?;
         }
@@ -223,9 +224,9 @@ impl Work {
         let mut recorder = Recorder::new(device, self.stamps.as_mut());
         recorder.encoder.clear_buffer(counts, 0, None);
         self.passes.record(&mut recorder, is_empty, is_fresh);
-        let picture = self.pictures.try_take();
-        if let Some(copy) = picture.as_deref().map(DevicePicture::buffer) {
-            recorder.encoder.copy_buffer_to_buffer(rgb, 0, copy, 0, rgb.size().min(copy.size()));
+        let copy = self.copies.try_take();
+        for (from, to) in copy.iter().flat_map(|copy| [(&*refined, &copy.metres), (rgb, &copy.rgb)]) {
+            recorder.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
         }
         recorder.fetch(device, readback, (refined, refined.size()), |bytes| {
             map.resize(self.size.0, self.size.1);
@@ -233,7 +234,7 @@ impl Work {
             let length = out.len();
             out.copy_from_slice(&bytes[..length]);
         })?;
-        self.picture = picture;
+        self.copy = copy;
         Ok(())
     }
 }
