@@ -1,11 +1,9 @@
 //! Which processor does the work: one choice for the blur and for stereo matching.
 
-#[cfg(feature = "gpu")]
 use std::sync::Arc;
 
 use crate::bokeh::{self, Backend, Bokeh, BokehError};
-#[cfg(feature = "gpu")]
-use crate::compute::device::Device;
+use crate::compute::Device;
 use crate::compute::thread_pool::cores;
 use crate::depth::DepthError;
 use crate::depth::stereo::{self, Matcher};
@@ -22,26 +20,6 @@ pub struct Computing {
 }
 
 impl Computing {
-    /// The GPU to blur and draw with; `None` where the CPU does.
-    ///
-    /// # Errors
-    /// A GPU was asked for and there is none that fits.
-    #[cfg(feature = "gpu")]
-    pub fn device(&self) -> Result<Option<Arc<Device>>, BokehError> {
-        let asked_for = self.backend == Backend::Gpu || self.adapter.is_some();
-        if self.backend == Backend::Cpu {
-            return Ok(None);
-        }
-        match Device::open(!asked_for, self.adapter.as_deref()) {
-            Ok(device) => Ok(Some(Arc::new(device))),
-            Err(error) if asked_for => Err(error.into()),
-            Err(error) => {
-                tracing::info!("blurring and drawing on the CPU: {error}");
-                Ok(None)
-            }
-        }
-    }
-
     /// Threads for what the CPU does.
     pub fn threads(&self) -> usize {
         self.threads.unwrap_or_else(cores)
@@ -52,7 +30,7 @@ impl Computing {
     /// # Errors
     /// There is no such GPU, or the picture is larger than memory.
     pub fn blur(&self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
-        bokeh::create(settings, size, self.backend, self.adapter.as_deref(), self.threads)
+        Executors::new(self.clone()).blur(settings, size)
     }
 
     /// A stereo matcher for pairs of `size` pixels that tries so many `disparities`.
@@ -73,19 +51,41 @@ impl Computing {
 /// Makes one executor after the other, on one device.
 pub struct Executors {
     computing: Computing,
-    /// The GPU, if there is one; it is opened for the first executor.
-    #[cfg(feature = "gpu")]
+    /// The GPU, if there is one; it is opened when it is first asked for.
     device: Option<Option<Arc<Device>>>,
 }
 
 impl Executors {
     /// As `computing` says.
     pub fn new(computing: Computing) -> Self {
-        Self {
-            computing,
-            #[cfg(feature = "gpu")]
-            device: None,
+        Self { computing, device: None }
+    }
+
+    /// Whether it has to be a GPU.
+    fn needs_gpu(&self) -> bool {
+        let Computing { backend, adapter, .. } = &self.computing;
+        *backend == Backend::Gpu || (*backend == Backend::Auto && adapter.is_some())
+    }
+
+    /// The GPU to blur and draw with; `None` where the CPU does.
+    ///
+    /// # Errors
+    /// A GPU was asked for and there is none that fits.
+    #[doc(hidden)]
+    pub fn device(&mut self) -> Result<Option<Arc<Device>>, BokehError> {
+        if let Some(device) = &self.device {
+            return Ok(device.clone());
         }
+        let open = || Device::open(!self.needs_gpu(), self.computing.adapter.as_deref());
+        let device = match (self.computing.backend != Backend::Cpu).then(open).transpose() {
+            Ok(device) => device.map(Arc::new),
+            Err(error) if self.needs_gpu() => return Err(error.into()),
+            Err(error) => {
+                tracing::info!("the CPU does all: {error}");
+                None
+            }
+        };
+        Ok(self.device.insert(device).clone())
     }
 
     /// An executor for pictures of `size` pixels.
@@ -94,17 +94,16 @@ impl Executors {
     /// As for [`Computing::blur`].
     pub fn blur(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, BokehError> {
         let threads = self.computing.threads;
-        #[cfg(feature = "gpu")]
-        {
-            let device = match &self.device {
-                Some(device) => device,
-                None => self.device.insert(self.computing.device()?),
-            };
-            // A device that failed does not recover.
-            if let Some(device) = device.as_ref().filter(|device| device.check().is_ok()) {
-                return bokeh::create_on(settings, size, Arc::clone(device), threads);
+        // A device that failed does not recover.
+        if let Some(device) = self.device()?.filter(|device| device.check().is_ok()) {
+            match bokeh::create(settings, size, Some(device), threads) {
+                Err(BokehError::Gpu(error)) if !self.needs_gpu() => {
+                    tracing::warn!("blurring on the CPU: {error}");
+                    self.device = Some(None);
+                }
+                made => return made,
             }
         }
-        bokeh::create(settings, size, Backend::Cpu, None, threads)
+        bokeh::create(settings, size, None, threads)
     }
 }

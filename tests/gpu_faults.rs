@@ -133,7 +133,7 @@ fn blur(bokeh: &mut dyn Bokeh, mut before: impl FnMut(u64)) {
 fn a_destroyed_device_is_followed_by_the_cpu() {
     for gone_before in [0, 1, 2, 3, 5] {
         let device = Arc::new(device());
-        let mut bokeh = bokeh::create_on(&settings(CocKind::Depth), SIZE, Arc::clone(&device), Some(1)).unwrap();
+        let mut bokeh = bokeh::create(&settings(CocKind::Depth), SIZE, Some(Arc::clone(&device)), Some(1)).unwrap();
         blur(&mut *bokeh, |frame| {
             if frame == gone_before {
                 device.device.destroy();
@@ -149,7 +149,7 @@ fn a_destroyed_device_is_followed_by_the_cpu() {
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn executors_come_and_go() {
     for _ in 0..40 {
-        bokeh::create_on(&settings(CocKind::Uniform), SIZE, Arc::new(device()), Some(1)).unwrap();
+        bokeh::create(&settings(CocKind::Uniform), SIZE, Some(Arc::new(device())), Some(1)).unwrap();
     }
 }
 
@@ -162,7 +162,7 @@ fn frames_are_blurred_whatever_becomes_of_the_device() {
         // The trial compiles the shaders, which may take longer than a second.
         try_out(&device)?;
         let device = Arc::into_inner(device).expect("nobody else has it").with_patience(Duration::from_secs(1));
-        bokeh::create_on(&settings(CocKind::Depth), SIZE, Arc::new(device), Some(1))
+        bokeh::create(&settings(CocKind::Depth), SIZE, Some(Arc::new(device)), Some(1))
     });
     match made {
         Ok(mut bokeh) => {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use bokehcam::bokeh::aperture::Aperture;
-use bokehcam::bokeh::{self, Backend, Bokeh, BokehError, Job, Rank, Settings};
+use bokehcam::bokeh::{self, Bokeh, BokehError, Job, Rank, Settings};
 use bokehcam::budget::Quality;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
@@ -160,7 +160,7 @@ impl Blurrer {
             far_max_px: shot.lens.coc_at_infinity_px,
             near_max_px: shot.lens.max_coc_px,
         };
-        let bokeh = bokeh::create(&settings, shot.image.size(), Backend::Cpu, None, None)?;
+        let bokeh = bokeh::create(&settings, shot.image.size(), None, None)?;
         Ok(Self::of(method, Some(bokeh)))
     }
 

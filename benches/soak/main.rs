@@ -21,10 +21,11 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use bokehcam::bokeh::{self, Backend};
+use bokehcam::bokeh::Backend;
 use bokehcam::budget::Quality;
 use bokehcam::clock::Clock;
 use bokehcam::compute::thread_pool::cores;
+use bokehcam::computing::Computing;
 use bokehcam::depth::DepthSource;
 use bokehcam::depth::recorded::Recorded;
 use bokehcam::look::number::OrAuto;
@@ -181,7 +182,7 @@ fn replay(options: &Options, frames: u64) -> Result<(Report, Deliveries), Box<dy
     };
     let settings = look.settings(size, true).ok_or("there is no blur")?;
     let backend = if options.gpu { Backend::Auto } else { Backend::Cpu };
-    let executor = bokeh::create(&settings, size, backend, None, None)?;
+    let executor = Computing { backend, ..Computing::default() }.blur(&settings, size)?;
     let clock = Clock::system();
     let stamps = Stamps::with_room_for(frames as usize);
     let stop = AtomicBool::new(false);

@@ -39,7 +39,7 @@ pub use error::BokehError;
 pub use picture::Picture;
 
 pub use crate::compute::{Backend, PassTimes};
-use crate::compute::{Device, DeviceFrame, GpuError, Place};
+use crate::compute::{Device, DeviceFrame, Place};
 use crate::frame::{ColorImage, DepthMap, YuyvImage};
 use crate::link::pool::Pooled;
 use crate::names::named;
@@ -168,54 +168,27 @@ pub enum Probe {
     Blur(usize),
 }
 
-/// The executor for pictures of `size` (width, height).
-///
-/// `adapter` is part of a GPU adapter's name; `threads` is for the CPU executor, all cores when `None`.
+/// The executor for pictures of `size` (width, height), on a GPU or on the CPU; `threads` is for the CPU, all cores when
+/// `None`.
 ///
 /// # Errors
-/// The blur is too wide ([`Settings::check`]); a GPU was asked for and there is none that fits, or it failed, or blurs
-/// otherwise than the CPU. A GPU that fails later is no error: the CPU takes over.
+/// The blur is too wide ([`Settings::check`]); the GPU is too small for such pictures, failed, or blurs otherwise than the
+/// CPU. A GPU that fails later is no error: the CPU takes over.
 pub fn create(
     settings: &Settings,
     size: (u32, u32),
-    backend: Backend,
-    adapter: Option<&str>,
+    device: Option<Arc<Device>>,
     threads: Option<usize>,
 ) -> Result<Box<dyn Bokeh>, BokehError> {
     settings.check(size)?;
     let plan = plan::Plan::new(settings, size.0, size.1);
     #[cfg(feature = "gpu")]
-    if backend != Backend::Cpu {
-        let open = || Ok(Arc::new(Device::open(backend == Backend::Auto, adapter)?));
-        match open().and_then(|device| gpu_with_fallback(&plan, device, threads)) {
-            Ok(bokeh) => return Ok(bokeh),
-            Err(error) if backend == Backend::Gpu || adapter.is_some() => return Err(error),
-            Err(error @ BokehError::Gpu(GpuError::NoAdapter { .. })) => tracing::info!("blurring on the CPU: {error}"),
-            Err(error) => tracing::warn!("blurring on the CPU: {error}"),
-        }
+    if let Some(device) = device {
+        return gpu_with_fallback(&plan, device, threads);
     }
     #[cfg(not(feature = "gpu"))]
-    if backend == Backend::Gpu || adapter.is_some() {
-        return Err(GpuError::left_out().into());
-    }
+    let _ = device;
     Ok(Box::new(cpu::CpuBokeh::new(plan, threads)))
-}
-
-/// The executor for pictures of `size` (width, height) on a device that is open already; `threads` as for [`create`].
-///
-/// # Errors
-/// The blur is too wide ([`Settings::check`]), the device is too small for such pictures, failed, or blurs otherwise than
-/// the CPU.
-#[cfg(feature = "gpu")]
-pub fn create_on(
-    settings: &Settings,
-    size: (u32, u32),
-    device: Arc<Device>,
-    threads: Option<usize>,
-) -> Result<Box<dyn Bokeh>, BokehError> {
-    settings.check(size)?;
-    let plan = plan::Plan::new(settings, size.0, size.1);
-    gpu_with_fallback(&plan, device, threads)
 }
 
 /// The executor on a GPU that blurs as the CPU does, with the CPU to take over: its buffers are allocated only when the

@@ -81,6 +81,25 @@ impl GpuError {
     }
 }
 
+#[cfg(not(feature = "gpu"))]
+impl Device {
+    /// Finds none.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn open(_: bool, _: Option<&str>) -> Result<Self, GpuError> {
+        Err(GpuError::left_out())
+    }
+
+    /// There is nothing that could fail.
+    ///
+    /// # Errors
+    /// Never.
+    pub fn check(&self) -> Result<(), GpuError> {
+        match *self {}
+    }
+}
+
 thread_local! {
     /// Whether the thread is in [`catch_panic`].
     static CATCHES: Cell<bool> = const { Cell::new(false) };

@@ -8,9 +8,9 @@ use std::sync::atomic::AtomicBool;
 use super::dialog;
 use super::services::{Browse, Opened, Pick, Services, SettingsStore, Switch};
 use super::state::Camera;
-use crate::bokeh::{self, Backend, Bokeh};
+use crate::bokeh::{self, Bokeh};
 use crate::capture::demo;
-use crate::compute::device::Device;
+use crate::computing::Executors;
 use crate::knob::Knob;
 use crate::look::{Effect, Look};
 use crate::recording::{Options as Reading, Recording};
@@ -36,8 +36,8 @@ pub struct System {
     pub options: Options,
     /// The look at the start.
     pub look: Look,
-    /// The GPU that blurs and draws, where one does.
-    pub device: Option<Arc<Device>>,
+    /// Makes what blurs.
+    pub executors: Executors,
     /// Width and height of virtual cameras; `None`: those of the frames.
     pub out_size: Option<(u32, u32)>,
     /// Overwrite what exists.
@@ -59,12 +59,12 @@ pub struct System {
 }
 
 impl System {
-    /// A system without a GPU that overwrites nothing; nothing is open yet.
+    /// A system that overwrites nothing; nothing is open yet.
     pub fn new(options: Options, look: Look, settings: Box<dyn SettingsStore>) -> Self {
         Self {
+            executors: Executors::new(options.computing.clone()),
             options,
             look,
-            device: None,
             out_size: None,
             force: false,
             settings,
@@ -202,13 +202,7 @@ impl Services for System {
     }
 
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
-        let threads = self.options.computing.threads;
-        // A device that failed does not recover.
-        let made = match self.device.as_ref().filter(|device| device.check().is_ok()) {
-            Some(device) => bokeh::create_on(settings, size, Arc::clone(device), threads),
-            None => bokeh::create(settings, size, Backend::Cpu, None, threads),
-        };
-        made.map_err(|error| error.to_string())
+        self.executors.blur(settings, size).map_err(|error| error.to_string())
     }
 
     fn output(

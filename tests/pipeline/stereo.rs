@@ -199,7 +199,7 @@ fn what_has_the_disparity_of_the_focus_is_sharp_and_the_rest_is_not() {
             let matcher = matcher((width, height));
             run(Run {
                 depth: Some(Box::new(StereoDepth::of_rectified("two planes", rig, matcher, 16))),
-                bokeh: Some(bokeh::create(&settings, (width, height), Backend::Cpu, None, Some(1)).unwrap()),
+                bokeh: Some(bokeh::create(&settings, (width, height), None, Some(1)).unwrap()),
                 look: dof_with(FocusRule::Point { x: focus.0, y: focus.1 }, 16.0),
                 ..simple(Box::new(TwoPlanes(1)), fake_sink(&received), &stop, Pace::Asap)
             })

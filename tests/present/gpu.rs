@@ -132,7 +132,7 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
     let mut canvas = Canvas::new(Arc::clone(&device), FORMAT);
     for (width, height) in [(97, 71), (64, 48)] {
         let settings = settings(CocKind::Depth);
-        let mut bokeh = bokeh::create_on(&settings, (width, height), Arc::clone(&device), None).expect("a blur");
+        let mut bokeh = bokeh::create(&settings, (width, height), Some(Arc::clone(&device)), None).expect("a blur");
         let (image, map) = (noise(width, height), three_depths(width, height));
         let mut results = Vec::new();
         for place in [Place::Memory, Place::Both, Place::Device] {
@@ -169,7 +169,7 @@ fn a_picture_on_the_device_is_the_one_in_memory_and_is_shown_the_same() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn results_go_to_memory_when_the_device_has_no_more_room_for_them() {
-    let mut bokeh = bokeh::create_on(&settings(CocKind::Uniform), (16, 16), device(), None).expect("a blur");
+    let mut bokeh = bokeh::create(&settings(CocKind::Uniform), (16, 16), Some(device()), None).expect("a blur");
     let mut kept = Vec::new();
     for frame in 0..40 {
         let job = Job::new(Pooled::detached(noise(16, 16)), None, coc(CocKind::Uniform, 16));

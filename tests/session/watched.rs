@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use bokehcam::bokeh::{self, Backend, Bokeh};
+use bokehcam::bokeh::{self, Bokeh};
 use bokehcam::capture::synthetic::{Format, Synthetic};
 use bokehcam::capture::{Brings, Camera as Capture, CaptureError, Captured, Shot, SourceInfo};
 use bokehcam::depth::plate::PlateDepth;
@@ -92,7 +92,7 @@ impl Services for Small {
     }
     fn executor(&mut self, settings: &bokeh::Settings, size: (u32, u32)) -> Result<Box<dyn Bokeh>, String> {
         self.executors.fetch_add(1, Ordering::SeqCst);
-        bokeh::create(settings, size, Backend::Cpu, None, Some(1)).map_err(|error| error.to_string())
+        bokeh::create(settings, size, None, Some(1)).map_err(|error| error.to_string())
     }
     fn output(&mut self, name: &str, _: (u32, u32), _: u64, _: &Arc<AtomicBool>) -> Result<Box<dyn Sink>, String> {
         if name == "full" {

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use bokehcam::bokeh::{self, Backend, BokehError, Method, Rank, Settings, aperture::Aperture};
+use bokehcam::bokeh::{self, BokehError, Method, Rank, Settings, aperture::Aperture};
 use bokehcam::budget::Quality;
 use bokehcam::optics::CocKind;
 use bokehcam::recording::snapshot::{self, Snapshot};
@@ -66,7 +66,7 @@ fn the_library_refuses_what_the_command_line_does() {
         far_max_px: radius_px,
         near_max_px: 0.0,
     };
-    let create = |settings: &Settings| bokeh::create(settings, (640, 360), Backend::Cpu, None, Some(1)).map(|_| ());
+    let create = |settings: &Settings| bokeh::create(settings, (640, 360), None, Some(1)).map(|_| ());
     for (coc, method, rank, most_px) in [
         (CocKind::Uniform, Method::Layered, None, 735.0),
         (CocKind::Ramp, Method::Layered, None, 735.0),

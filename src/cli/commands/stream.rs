@@ -124,7 +124,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         focus::warn_of_focus(&look, info.size, map, source.depth_from == DepthFrom::Units);
     }
     let settings = look.settings(info.size, adaptive);
-    let bokeh = settings.map(|settings| options.computing.blur(&settings, info.size)).transpose()?;
+    // What a change of the look needs runs on the same device.
+    let mut executors = Executors::new(options.computing.clone());
+    let bokeh = settings.map(|settings| executors.blur(&settings, info.size)).transpose()?;
     // Outputs are opened last, so that none is begun where the run cannot start.
     let demand = Demand::new();
     // Where nobody notices who watches, somebody may at any time.
@@ -183,7 +185,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         release,
         beat: Arc::clone(&beat),
     };
-    let looks = Looks { look: look.clone(), adaptive, changes, executors: Executors::new(options.computing.clone()) };
+    let looks = Looks { look: look.clone(), adaptive, changes, executors };
     let server = claim.ok().map(|claim| control::serve(claim, facts, looks)).transpose()?;
     let ended = pipeline::run(Run {
         camera: source.camera,

@@ -16,7 +16,7 @@ use crate::cli::settings::unused;
 use crate::cli::terminal::print;
 use crate::clock::{Clock, cpu_ns};
 use crate::compute::{Backend, thread_pool::cores};
-use crate::computing::Computing;
+use crate::computing::{Computing, Executors};
 use crate::depth::Seen;
 use crate::frame::{ColorImage, DepthMap, GrayImage, Stamp};
 use crate::link::pool::Pooled;
@@ -170,6 +170,7 @@ fn measure(
     let info = source.camera.info();
     let size = info.size;
     let levels = if command.quality.is_empty() { &Quality::ALL[..] } else { &command.quality };
+    let mut on_one_device = Executors::new(computing.clone());
     let mut executors: Vec<(Quality, Box<dyn Bokeh>)> = Vec::new();
     for &quality in levels {
         let look = Look { quality: Some(quality), ..look.clone() };
@@ -177,7 +178,7 @@ fn measure(
             let what = "--effect none leaves nothing to measure: use dof, tilt-shift or blur";
             return Err(CliError::Usage(what.to_string()));
         };
-        executors.push((quality, computing.blur(&settings, size)?));
+        executors.push((quality, on_one_device.blur(&settings, size)?));
     }
     let executor = executors.first().map(|(_, executor)| executor.describe()).unwrap_or_default();
 

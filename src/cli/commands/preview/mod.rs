@@ -129,7 +129,6 @@ pub fn show(
     let texts =
         texts::chosen(window.language.as_deref()).map_err(|line| CliError::Usage(format!("--language: {line}")))?;
     texts.into_iter().for_each(texts::speak);
-    let device = computing.choice().device()?;
     let mirror_chosen = given.stated.iter().any(|name| name == "mirror");
     let store = FileStore { chosen: global.config.clone(), given };
     let mut state = first_state(look, &source, window, stream.mirror, &memory);
@@ -145,7 +144,7 @@ pub fn show(
     });
     let look = state.look.clone();
     let mut system = System::new(parts.source_options(), look.clone(), Box::new(store));
-    system.device.clone_from(&device);
+    let device = system.executors.device()?;
     system.out_size = stream.out_size.map(|size| (size.width, size.height));
     system.force = output.force;
     state.mirror_chosen = mirror_chosen;
@@ -167,7 +166,7 @@ pub fn show(
             folders: window.save_to.clone().map_or_else(Folders::of_user, Folders::at),
         },
         theme: window.theme,
-        device: device.clone(),
+        device,
         close_at_end,
         memory,
         memory_file,
