@@ -20,9 +20,9 @@ if [[ -z "${BOKEHCAM:-}" ]]; then
     for pair in 640x480x64 1280x720x128; do
         BOKEHCAM_PAIR=$pair cargo test --release --locked --test stereo_gpu -- --ignored --nocapture the_passes
     done
-    # Refinement of depth, in the same way.
+    # Refinement of depth and mattes, in the same way.
     for size in ${sizes//,/ }; do
-        BOKEHCAM_SIZE=$size cargo test --release --locked --test refine_gpu -- --ignored --nocapture the_passes
+        BOKEHCAM_SIZE=$size cargo test --release --locked --test refine_gpu --test matte_gpu -- --ignored --nocapture the_passes
     done
     cargo bench --locked --bench stereo -- times --gpu "${ADAPTER:-}" --size 640x480,1280x720 --disparities 64,128
     BOKEHCAM=${CARGO_TARGET_DIR:-target}/release/bokehcam

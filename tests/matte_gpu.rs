@@ -7,22 +7,25 @@
 #![allow(missing_docs)]
 
 mod common;
+#[path = "common/on_gpu.rs"]
+mod on_gpu;
 
-use std::path::PathBuf;
-use std::process::Command;
 use std::sync::Arc;
+use std::time::Instant;
 
 use bokehcam::bokeh::cpu::CpuBokeh;
 use bokehcam::bokeh::plan::Plan;
 use bokehcam::compute::Device;
 use bokehcam::compute::thread_pool::ThreadPool;
 use bokehcam::depth::background::Background;
+use bokehcam::depth::matting::gpu::GpuMatting;
 use bokehcam::depth::matting::{Behind, FROM_PX, Matting};
 use bokehcam::depth::refine::Refiner;
 use bokehcam::frame::{ColorImage, DepthMap, Matte, MixedPixel};
 use bokehcam::optics::{CocField, CocKind, DepthCoc};
 use bokehcam::recording::{Options, Recording, Scratch};
 use common::{coc, settings};
+use on_gpu::{device, portrait, size_of_timed, streamed, tell_of_passes};
 
 const JUMP: f32 = 0.05;
 const FRAME_NS: u64 = 33_000_000;
@@ -30,10 +33,6 @@ const ONE_IN: usize = 200;
 const ONE_IN_OF_FEW: usize = 40;
 
 type Frame = (ColorImage, DepthMap);
-
-fn device() -> Arc<Device> {
-    Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"))
-}
 
 /// Numbers of chance, 0 to 1, the same for the same place.
 fn chance(k: usize, frame: usize) -> f32 {
@@ -231,10 +230,6 @@ fn what_is_remembered_of_a_sequence_counts_as_on_the_processor() {
     assert!(known > 100, "behind {known} pixels it is known");
 }
 
-fn portrait() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait"))
-}
-
 fn psnr_db(a: &ColorImage, b: &ColorImage) -> f64 {
     let square = |(a, b): (&u8, &u8)| f64::from(a.abs_diff(*b)).powi(2);
     let mean = a.rgb.iter().zip(&b.rgb).map(square).sum::<f64>() / a.rgb.len() as f64;
@@ -328,19 +323,24 @@ fn a_device_that_is_gone_is_followed_by_the_processor() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_stream_is_matted_where_it_is_blurred() {
-    let folder = tempfile::tempdir().expect("a folder");
     for (backend, effect, expected) in [("gpu", "dof", "gpu"), ("cpu", "dof", "cpu"), ("cpu", "blur", "none")] {
-        let report = folder.path().join(format!("{backend} {effect}.json"));
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        command.env("XDG_CONFIG_HOME", folder.path()).arg("stream").arg(portrait());
-        command
-            .args(["--backend", backend, "--effect", effect, "--pace", "asap", "--to", "null", "--report"])
-            .arg(&report);
-        let output = command.output().expect("the program");
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && !told.contains("the CPU finds mattes"), "{told}");
-        let report = std::fs::read_to_string(report).expect("a report");
-        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+        let (told, report) = streamed(&["--backend", backend, "--effect", effect]);
+        assert!(!told.contains("the CPU finds mattes"), "{told}");
         assert_eq!((&report["matted_by"], &report["backend"]), (&expected.into(), &backend.into()), "{report}");
+    }
+}
+
+/// Prints the times, of frames of any size: `BOKEHCAM_SIZE=1280x720 cargo test --release --test matte_gpu -- --ignored
+/// --nocapture the_passes`.
+#[test]
+#[ignore = "needs a Vulkan adapter (software will do)"]
+fn the_passes_of_a_frame_take_less_time_than_the_frame() {
+    let (device, size) = (device(), size_of_timed());
+    let mut gpu = GpuMatting::new(&device);
+    for frame in 0..5 {
+        let (color, mut map) = scene(size, frame, 0.0);
+        let began = Instant::now();
+        gpu.find((&mut map, &color), None, JUMP, None).expect("the GPU finds mattes");
+        tell_of_passes(&device, began.elapsed(), &gpu.pass_times());
     }
 }

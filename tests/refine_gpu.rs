@@ -6,15 +6,18 @@
 #![cfg(feature = "gpu")]
 #![allow(missing_docs)]
 
-use std::path::PathBuf;
-use std::process::Command;
+#[path = "common/on_gpu.rs"]
+mod on_gpu;
+
 use std::sync::Arc;
+use std::time::Instant;
 
 use bokehcam::compute::Device;
 use bokehcam::depth::refine::Refiner;
 use bokehcam::depth::refine::gpu::GpuRefiner;
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::recording::{Options, Recording, Scratch};
+use on_gpu::{device, portrait, size_of_timed, streamed, tell_of_passes};
 
 const FRAME_NS: u64 = 33_000_000;
 const SAME: f32 = 1e-4;
@@ -22,10 +25,6 @@ const ONE_IN: usize = 500;
 
 /// A frame: picture, map, media time, and what is in focus.
 type Frame = (ColorImage, DepthMap, u64, f32);
-
-fn device() -> Arc<Device> {
-    Arc::new(Device::open(false, None).expect("a Vulkan adapter, software included"))
-}
 
 /// Numbers of chance, 0 to 1, the same for the same place.
 fn chance(k: usize, frame: usize) -> f32 {
@@ -241,10 +240,6 @@ fn a_device_that_is_gone_is_followed_by_the_processor() {
     }
 }
 
-fn portrait() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait"))
-}
-
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn the_bundled_recording_agrees() {
@@ -262,19 +257,9 @@ fn the_bundled_recording_agrees() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn a_stream_is_refined_where_it_is_blurred() {
-    let folder = tempfile::tempdir().expect("a folder");
     for (backend, refine, expected) in [("gpu", "on", "gpu"), ("cpu", "on", "cpu"), ("cpu", "off", "none")] {
-        let report = folder.path().join(format!("{backend} {refine}.json"));
-        let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
-        command.env("XDG_CONFIG_HOME", folder.path()).arg("stream").arg(portrait());
-        command
-            .args(["--backend", backend, "--refine", refine, "--pace", "asap", "--to", "null", "--report"])
-            .arg(&report);
-        let output = command.output().expect("the program");
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && !told.contains("the CPU refines"), "{told}");
-        let report = std::fs::read_to_string(report).expect("a report");
-        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+        let (told, report) = streamed(&["--backend", backend, "--refine", refine]);
+        assert!(!told.contains("the CPU refines"), "{told}");
         assert_eq!((&report["refined_by"], &report["backend"]), (&expected.into(), &backend.into()), "{report}");
     }
 }
@@ -284,17 +269,11 @@ fn a_stream_is_refined_where_it_is_blurred() {
 #[test]
 #[ignore = "needs a Vulkan adapter (software will do)"]
 fn the_passes_of_a_frame_take_less_time_than_the_frame() {
-    let wanted = std::env::var("BOKEHCAM_SIZE").unwrap_or_else(|_| "160x120".to_owned());
-    let (width, height) = wanted.split_once('x').expect("COLUMNSxROWS");
-    let size = [width, height].map(|side| side.parse().expect("COLUMNSxROWS"));
-    let device = device();
+    let (device, size) = (device(), size_of_timed());
     let mut gpu = GpuRefiner::new(&device);
-    for (color, mut map, time_ns, focus_m) in scenes(size.into(), size.into(), 5, 0.05) {
-        let started = std::time::Instant::now();
+    for (color, mut map, time_ns, focus_m) in scenes(size, size, 5, 0.05) {
+        let began = Instant::now();
         gpu.refine(&mut map, &color, time_ns, focus_m).expect("the GPU refines");
-        let (whole, passes) = (started.elapsed(), gpu.pass_times());
-        eprintln!("{}: {whole:?} {:?}", device.name, passes.iter().collect::<Vec<_>>());
-        assert!(passes.iter().map(|(_, time)| time).sum::<std::time::Duration>() <= whole);
-        assert_eq!(passes.iter().count() > 0, device.timestamps);
+        tell_of_passes(&device, began.elapsed(), &gpu.pass_times());
     }
 }
