@@ -3,11 +3,12 @@
 //! With the name of a recording it renders that one alone; with `--check` it writes nothing and compares what is there
 //! with what it renders.
 
+mod folder;
+
 use std::error::Error;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::thread;
 
@@ -19,6 +20,8 @@ use bokehcam::scene::{Scene, ThinLens, View};
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
+
+use folder::Folder;
 
 const SIZE_PX: (u32, u32) = (640, 360);
 const FRAMES_PER_SECOND: u32 = 12;
@@ -270,83 +273,4 @@ fn calibration_text(view: &View) -> String {
         format!("{focal_px:.5} 0 {:.5} {eye_px:.5} 0 {focal_px:.5} {:.5} 0 0 0 1 0", centre.x, centre.y)
     };
     format!("P2: {}\nP3: {}\n", row(0.0), row(-view.focal_px * BASELINE_M))
-}
-
-/// Where files are written, or compared.
-struct Folder {
-    root: PathBuf,
-    check: bool,
-    differing: usize,
-}
-
-/// Bytes, depth or disparity units may differ by this much, and a thousandth of them by more: the mathematical functions of
-/// two machines round differently, and a ray at an edge may then fall on its other side.
-const TOLERANCE: i32 = 2;
-
-impl Folder {
-    fn color(&mut self, name: &str, image: &ColorImage) -> Outcome {
-        if self.check {
-            let there = image::open(self.root.join(name))?.into_rgb8();
-            let same_size = there.dimensions() == image.size();
-            self.compare(name, same_size, there.iter().zip(&image.rgb).map(|(a, b)| i32::from(*a) - i32::from(*b)));
-            return Ok(());
-        }
-        self.encode(name, &image.rgb, image.size(), ExtendedColorType::Rgb8)
-    }
-
-    /// A depth map in units that are made of its metres.
-    fn gray16(&mut self, name: &str, map: &DepthMap, units: impl Fn(f32) -> f32) -> Outcome {
-        let units: Vec<u16> = map.metres.iter().map(|&z_m| units(z_m).round() as u16).collect();
-        if self.check {
-            let there = image::open(self.root.join(name))?.into_luma16();
-            let same_size = there.dimensions() == map.size();
-            self.compare(name, same_size, there.iter().zip(&units).map(|(a, b)| i32::from(*a) - i32::from(*b)));
-            return Ok(());
-        }
-        let bytes: Vec<u8> = units.iter().flat_map(|unit| unit.to_ne_bytes()).collect();
-        self.encode(name, &bytes, map.size(), ExtendedColorType::L16)
-    }
-
-    fn text(&mut self, name: &str, text: &str) -> Outcome {
-        let path = self.root.join(name);
-        if self.check {
-            if fs::read_to_string(path)? != text {
-                self.differs(name);
-            }
-            return Ok(());
-        }
-        make_parent(&path)?;
-        Ok(fs::write(path, text)?)
-    }
-
-    fn encode(&self, name: &str, bytes: &[u8], size: (u32, u32), color: ExtendedColorType) -> Outcome {
-        let path = self.root.join(name);
-        make_parent(&path)?;
-        let file = BufWriter::new(fs::File::create(&path)?);
-        PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive)
-            .write_image(bytes, size.0, size.1, color)?;
-        eprintln!("{name}: {} kB", fs::metadata(path)?.len() / 1000);
-        Ok(())
-    }
-
-    fn compare(&mut self, name: &str, same_size: bool, differences: impl Iterator<Item = i32>) {
-        let (mut count, mut beyond) = (0usize, 0usize);
-        for difference in differences {
-            count += 1;
-            beyond += usize::from(difference.abs() > TOLERANCE);
-        }
-        eprintln!("{name}: {beyond} of {count} values beyond {TOLERANCE}");
-        if !same_size || beyond * 1000 > count {
-            self.differs(name);
-        }
-    }
-
-    fn differs(&mut self, name: &str) {
-        eprintln!("{name} differs");
-        self.differing += 1;
-    }
-}
-
-fn make_parent(path: &Path) -> Outcome {
-    Ok(path.parent().map_or(Ok(()), fs::create_dir_all)?)
 }

@@ -1,0 +1,92 @@
+//! The files of a recording.
+
+use std::fs;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use bokehcam::frame::{ColorImage, DepthMap};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+
+use super::Outcome;
+
+/// Where files are written, or compared.
+pub struct Folder {
+    pub root: PathBuf,
+    /// Whether they are only compared.
+    pub check: bool,
+    /// So many differ.
+    pub differing: usize,
+}
+
+/// Bytes, depth or disparity units may differ by this much, and a thousandth of them by more: the mathematical functions of
+/// two machines round differently, and a ray at an edge may then fall on its other side.
+const TOLERANCE: i32 = 2;
+
+impl Folder {
+    pub fn color(&mut self, name: &str, image: &ColorImage) -> Outcome {
+        if self.check {
+            let there = image::open(self.root.join(name))?.into_rgb8();
+            let same_size = there.dimensions() == image.size();
+            self.compare(name, same_size, there.iter().zip(&image.rgb).map(|(a, b)| i32::from(*a) - i32::from(*b)));
+            return Ok(());
+        }
+        self.encode(name, &image.rgb, image.size(), ExtendedColorType::Rgb8)
+    }
+
+    /// A depth map in units that are made of its metres.
+    pub fn gray16(&mut self, name: &str, map: &DepthMap, units: impl Fn(f32) -> f32) -> Outcome {
+        let units: Vec<u16> = map.metres.iter().map(|&z_m| units(z_m).round() as u16).collect();
+        if self.check {
+            let there = image::open(self.root.join(name))?.into_luma16();
+            let same_size = there.dimensions() == map.size();
+            self.compare(name, same_size, there.iter().zip(&units).map(|(a, b)| i32::from(*a) - i32::from(*b)));
+            return Ok(());
+        }
+        let bytes: Vec<u8> = units.iter().flat_map(|unit| unit.to_ne_bytes()).collect();
+        self.encode(name, &bytes, map.size(), ExtendedColorType::L16)
+    }
+
+    pub fn text(&mut self, name: &str, text: &str) -> Outcome {
+        let path = self.root.join(name);
+        if self.check {
+            if fs::read_to_string(path)? != text {
+                self.differs(name);
+            }
+            return Ok(());
+        }
+        make_parent(&path)?;
+        Ok(fs::write(path, text)?)
+    }
+
+    pub fn encode(&self, name: &str, bytes: &[u8], size: (u32, u32), color: ExtendedColorType) -> Outcome {
+        let path = self.root.join(name);
+        make_parent(&path)?;
+        let file = BufWriter::new(fs::File::create(&path)?);
+        PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive)
+            .write_image(bytes, size.0, size.1, color)?;
+        eprintln!("{name}: {} kB", fs::metadata(path)?.len() / 1000);
+        Ok(())
+    }
+
+    pub fn compare(&mut self, name: &str, same_size: bool, differences: impl Iterator<Item = i32>) {
+        let (mut count, mut beyond) = (0usize, 0usize);
+        for difference in differences {
+            count += 1;
+            beyond += usize::from(difference.abs() > TOLERANCE);
+        }
+        eprintln!("{name}: {beyond} of {count} values beyond {TOLERANCE}");
+        if !same_size || beyond * 1000 > count {
+            self.differs(name);
+        }
+    }
+
+    fn differs(&mut self, name: &str) {
+        eprintln!("{name} differs");
+        self.differing += 1;
+    }
+}
+
+fn make_parent(path: &Path) -> Outcome {
+    Ok(path.parent().map_or(Ok(()), fs::create_dir_all)?)
+}
