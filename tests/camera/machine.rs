@@ -29,7 +29,7 @@ const VIVID: &str = "n_devs=1 node_types=0x1 num_inputs=2 input_types=0xc vid_ca
 
 /// Nothing takes so long: this is against a hang. How long things do take is printed, and no test asks for less: the
 /// machine is emulated, and others use it as well.
-pub const HANG: Duration = Duration::from_secs(120);
+pub const HANG: Duration = Duration::from_secs(300);
 
 static ALONE: Mutex<()> = Mutex::new(());
 

@@ -82,8 +82,11 @@ fn a_stream_tells_a_person_to_step_out_and_makes_a_portrait() {
                 "never said: {part}"
             );
         };
-        (1..=3).rev().for_each(|seconds| hears(&format!("step out of the picture: {seconds}")));
-        is_there.store(false, Ordering::SeqCst);
+        (1..=3).rev().for_each(|seconds| {
+            hears(&format!("step out of the picture: {seconds}"));
+            // At once, so that the last picture of the person has gone by when the plate begins.
+            is_there.store(false, Ordering::SeqCst);
+        });
         hears("come back");
         is_there.store(true, Ordering::SeqCst);
         let newest = || fs::read_dir(folder).unwrap().flatten().map(|entry| entry.path()).max();

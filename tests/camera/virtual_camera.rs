@@ -67,15 +67,20 @@ fn what_goes_in_at_30_frames_per_second_comes_out_for_other_programs() {
         machine.at_30_fps();
         machine.control("horizontal_movement", "Move Right Fast");
         let (width, height) = size;
-        let stream = Stream::show(&format!("0 --size {width}x{height} --fps 30 --effect none"));
         let began = Instant::now();
-        sh(&format!(
-            "timeout 20 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-skip=5 --stream-count=60 --stream-to=/tmp/frames 2>&1"
-        ));
-        let took_s = began.elapsed().as_secs_f64();
-        let frames = fs::read("/tmp/frames").unwrap();
-        assert_eq!(frames.len(), 60 * 2 * width * height);
-        let steps = steps(&frames, (width, height));
+        let stream = Stream::show(&format!("0 --size {width}x{height} --fps 30 --effect none"));
+        let mut moved = Vec::new();
+        // On a machine that stood still for long, all of them may be one picture that was shown again.
+        until("a picture that moves", || {
+            sh(&format!(
+                "timeout 120 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-skip=5 --stream-count=60 --stream-to=/tmp/frames 2>&1"
+            ));
+            let frames = fs::read("/tmp/frames").unwrap();
+            assert_eq!(frames.len(), 60 * 2 * width * height);
+            moved = steps(&frames, size);
+            moved.iter().any(|step| *step > 0)
+        });
+        let steps = moved;
         machine.control("horizontal_movement", "No Movement");
         sh(&format!(
             "timeout 120 ffmpeg -v error -y -probesize 32 -analyzeduration 0 -f v4l2 -i {VIRTUAL} -frames:v 10 -c copy -f rawvideo /tmp/frames"
@@ -86,11 +91,10 @@ fn what_goes_in_at_30_frames_per_second_comes_out_for_other_programs() {
         assert!(far <= 4, "{width}x{height}: {far} codes from what went in");
 
         let report = stream.report(true);
+        let runs_s = began.elapsed().as_secs_f64();
         let frames = &report["frames"];
         let (captured, delivered) = (frames["captured"].as_f64().unwrap(), frames["delivered"].as_f64().unwrap());
         println!("{width}x{height}: {frames} {}", report["stages_ms"]);
-        // 65 frames are no sooner there than they were taken; how much later is the machine's affair.
-        assert!(took_s > 1.9, "{took_s} s for 65 frames: {report}");
         // The picture moves by a whole number of frames from each to the next, and no more pass than are captured.
         let least = *steps.iter().filter(|step| **step > 0).min().unwrap();
         // Where frames were left out each time, the least of what passed is more than one frame's; and it may be short by a
@@ -102,11 +106,16 @@ fn what_goes_in_at_30_frames_per_second_comes_out_for_other_programs() {
         assert!(frames_passed as f64 <= captured, "{report}: steps {steps:?}");
         let per_second = captured / report["elapsed_s"].as_f64().unwrap();
         println!("{per_second:.1} frames per second captured, {:.1} % delivered", 100.0 * delivered / captured);
-        assert!(per_second < 32.0, "no more than the camera takes: {report}");
+        // How many of them there is time for is the machine's affair. Counting begins with the camera's own start, which
+        // is before the run's.
+        assert!(captured <= 31.0 * runs_s + 1.0, "no more than the camera takes: {runs_s} s, {report}");
         // The camera repeats its last picture where none comes in time, so other programs may have more pictures than
         // were delivered, but no more that differ.
         let differ = 1 + steps.iter().filter(|step| **step > 0).count();
         assert!(differ > 1 && differ as f64 <= delivered, "{differ} pictures that differ: {frames}");
+        // And none comes twice unless it was shown again.
+        let again = steps.len() + 1 - differ;
+        assert!(again as u64 <= report["repeats"].as_u64().unwrap(), "{again} pictures again: {report}");
         assert_eq!(frames["dropped"]["corrupt"], 0, "{frames}");
     }
 }
@@ -177,7 +186,7 @@ fn readers_come_and_go() {
         read.args(["-d", VIRTUAL, "--stream-mmap", "--stream-count=1000"]);
         let mut lost = Lost::default();
         for _ in 0..3 {
-            sh(&format!("timeout 20 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-count=10 2>&1"));
+            sh(&format!("timeout 120 v4l2-ctl -d {VIRTUAL} --stream-mmap --stream-count=10 2>&1"));
             // Killed in the middle, as a browser is.
             let killed = Beside::start(clone(&read));
             std::thread::sleep(Duration::from_millis(600));

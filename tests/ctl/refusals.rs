@@ -4,7 +4,7 @@ use std::io::Write;
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-use crate::world::{World, answer};
+use crate::world::{HANG, World, answer, until};
 
 #[test]
 fn a_setting_that_cannot_be_changes_none() {
@@ -70,23 +70,29 @@ fn who_says_nothing_holds_nobody_up() {
     let world = World::new();
     let _stream = world.stream("stream", &["--to", "null"]);
     let connect = || UnixStream::connect(world.socket("stream")).unwrap();
-    let began = Instant::now();
-    // One of the eight places may be held for a moment by somebody of before.
-    let silent: Vec<UnixStream> = (0..6).map(|_| connect()).collect();
-    // Six say nothing, and a seventh is served all the same.
-    let served = world.tell("stream", b"{\"do\":\"status\"}\n");
-    assert!(served.contains("\"on\":true"), "{served}");
-    let took = began.elapsed();
-    assert!(took < Duration::from_secs(1), "{took:?}");
-    for stream in &silent {
-        assert!(answer(stream).contains("did not come within 1 s"));
-    }
-    // More than there is room for are told so at once, and served once there is.
-    let silent: Vec<UnixStream> = (0..20).map(|_| connect()).collect();
-    let answers: Vec<String> = silent.iter().map(answer).collect();
-    let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
-    let late = answers.iter().filter(|answer| answer.contains("did not come within 1 s")).count();
-    assert!(refused >= 12 && late >= 7 && refused + late == 20, "{answers:?}");
+    // Each of them has a second, so that one after the other would take six. One of the eight places may be held for a
+    // moment by somebody of before, and a busy machine may need another try.
+    until("six say nothing, and a seventh is served all the same", || {
+        let began = Instant::now();
+        let silent: Vec<UnixStream> = (0..6).map(|_| connect()).collect();
+        let served = world.tell("stream", b"{\"do\":\"status\"}\n");
+        let took = began.elapsed();
+        assert!(served.contains("\"on\":true"), "{served}");
+        for stream in &silent {
+            assert!(answer(stream).contains("did not come within 1 s"));
+        }
+        took < Duration::from_secs(1)
+    });
+    // More than there is room for are told so at once, and served once there is: for those who come when the first ones have
+    // had their second, there is room again.
+    until("most are told at once that there is no room", || {
+        let silent: Vec<UnixStream> = (0..20).map(|_| connect()).collect();
+        let answers: Vec<String> = silent.iter().map(answer).collect();
+        let refused = answers.iter().filter(|answer| answer.contains("too many ask at once")).count();
+        let late = answers.iter().filter(|answer| answer.contains("did not come within 1 s")).count();
+        assert_eq!(refused + late, 20, "{answers:?}");
+        refused >= 12 && late >= 7
+    });
     assert_eq!(world.status(&[])["on"], true);
     // A request in pieces comes in time, or does not.
     let mut slow = connect();
@@ -108,7 +114,7 @@ fn a_run_that_ends_waits_for_no_client() {
     let _silent: Vec<UnixStream> = (0..4).map(|_| UnixStream::connect(world.socket("stream")).unwrap()).collect();
     let began = Instant::now();
     assert_eq!(stream.interrupt(), 0);
-    assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+    assert!(began.elapsed() < HANG, "{:?}", began.elapsed());
     assert!(!world.socket("stream").exists());
 }
 

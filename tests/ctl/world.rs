@@ -13,6 +13,16 @@ use std::time::{Duration, Instant};
 /// Nothing here takes so long: against a hang.
 pub const HANG: Duration = Duration::from_secs(60);
 
+/// Waits until something is so.
+#[track_caller]
+pub fn until(what: &str, mut is: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !is() {
+        assert!(began.elapsed() < HANG, "never: {what}");
+        thread::sleep(Duration::from_millis(20));
+    }
+}
+
 pub struct Ran {
     pub code: i32,
     pub stdout: String,

@@ -24,8 +24,8 @@ const PATCHES: [[u8; 3]; 8] = [
 const SIZE: (usize, usize) = (640, 360);
 /// Codes of 8 bits.
 const NEAR: u8 = 3;
-/// A browser's first start on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(90);
+/// Nothing takes so long, a browser's first start on a busy machine neither.
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// A program that is ended when this is dropped.
 struct Beside(Child);
@@ -176,13 +176,14 @@ fn see(browser: impl FnOnce(&Path, &str) -> Command) {
     println!("{seen}");
     assert!(seen["cameras"].as_array().is_some_and(|cameras| cameras.contains(&"Desk, blurred".into())), "{seen}");
     assert_eq!(seen["size"], serde_json::json!([SIZE.0, SIZE.1]));
-    assert!(seen["rate"].as_f64().unwrap() >= 28.0, "{seen}");
     for (told, sent) in seen["colors"].as_array().unwrap().iter().zip(PATCHES) {
         let told: Vec<u8> = serde_json::from_value(told.clone()).unwrap();
         assert!(told.iter().zip(sent).all(|(told, sent)| told.abs_diff(sent) <= NEAR), "{told:?} of {sent:?}: {seen}");
     }
     until("the browser to let go", || (state("desk-blurred")? != "running").then_some(()));
-    run.end();
+    let node = run.end()["pipewire"][0].clone();
+    let given = node["shown"].as_u64().unwrap() + node["repeats"].as_u64().unwrap();
+    assert!((60..=given).contains(&seen["shown"].as_u64().unwrap()), "{seen} of {node}");
 }
 
 #[test]

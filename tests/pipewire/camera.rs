@@ -7,18 +7,17 @@ use std::time::{Duration, Instant};
 use bokehcam::frame::YuyvImage;
 use bokehcam::sink::{Options, PipeWire, Sink};
 use rustix::fs::inotify;
+use serde_json::Value;
 
 use super::readers::GStreamer;
-use super::session::{FPS, PICTURES, Player, SIZE, folder, in_a_calm_moment, kill, node, picture, state, until, yuyv};
+use super::session::{FPS, PICTURES, Player, SIZE, folder, kill, node, picture, state, until, yuyv};
 
 /// The numbers of the pictures that readers got; before the first one there may be the still card.
 fn numbers(frames: &[Vec<u8>]) -> Vec<usize> {
     let known: HashMap<Vec<u8>, usize> = (0..PICTURES).map(|number| (yuyv(&picture(number)), number)).collect();
     let is_card = |frame: &&Vec<u8>| !known.contains_key(*frame);
     let cards = frames.iter().take_while(is_card).count();
-    // One is shown in each tenth of a second at most, and the first picture comes within half a second, also on a machine
-    // that is busy.
-    assert!(cards <= 4, "{cards} cards");
+    assert!(cards < frames.len(), "{cards} cards, and no picture");
     assert!(frames[..cards].iter().all(|frame| *frame == frames[0] && frame.len() == frames[cards].len()));
     let number = |frame: &Vec<u8>| *known.get(frame).expect("no picture of ours, byte by byte");
     frames[cards..].iter().map(number).collect()
@@ -50,29 +49,51 @@ fn the_node_is_what_browsers_and_obs_list() {
     until("the nodes to go", || (node("desk-left").is_none() && node("desk-left-2").is_none()).then_some(()));
 }
 
+/// How far each picture is behind the one before it; the recording is played round and round.
+fn steps(numbers: &[usize]) -> Vec<usize> {
+    numbers.windows(2).map(|pair| (pair[1] + PICTURES - pair[0]) % PICTURES).collect()
+}
+
+/// A reader gets every picture once, in order: what it was given twice the report counts as shown again, and what it missed
+/// as lost on the way. How many those are is the machine's affair.
+fn is_accounted_for(report: &Value, frames: &[Vec<u8>]) {
+    let (numbers, count) = (numbers(frames), |value: &Value| value.as_u64().unwrap() as usize);
+    let (node, steps) = (&report["pipewire"][0], steps(&numbers));
+    let again = frames.len() - numbers.len() + steps.iter().filter(|step| **step == 0).count();
+    assert!(again <= count(&node["repeats"]), "{again} again: {node}, {steps:?}");
+    let missed: usize = steps.iter().map(|step| step.saturating_sub(1)).sum();
+    let dropped: usize = report["frames"]["dropped"].as_object().unwrap().values().map(count).sum();
+    let lost = dropped + count(&node["overtaken"]) + count(&node["no_buffer"]);
+    println!("{again} again, {missed} missed: {node}, {}", report["frames"]);
+    assert!(missed <= lost, "{missed} missed: {node}, {}, {steps:?}", report["frames"]);
+}
+
 #[test]
 #[ignore = "needs PipeWire (tests/pipewire/session)"]
-fn readers_get_each_picture_as_it_is_in_order_and_in_time() {
+fn readers_get_each_picture_as_it_is_in_order_and_with_its_time() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
-    let mut read = 0;
-    in_a_calm_moment(|| {
-        let got = GStreamer::start("bokehcam", 60).end();
-        assert_eq!(got.frames.len(), 60);
-        assert!(got.sequence.windows(2).all(|pair| pair[1] == pair[0] + 1), "{:?}", got.sequence);
-        let numbers = numbers(&got.frames);
-        read += numbers.len();
-        let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
-        assert!(times_ns.windows(2).all(|pair| pair[0] < pair[1]), "{times_ns:?}");
-        let steps: Vec<usize> = numbers.windows(2).map(|pair| (pair[1] + PICTURES - pair[0]) % PICTURES).collect();
-        let off_ns = times_ns.windows(2).map(|pair| (pair[1] - pair[0]).abs_diff(1_000_000_000 / u64::from(FPS)));
-        match off_ns.max() {
-            Some(off_ns) if off_ns < 5_000_000 && steps.iter().all(|step| *step == 1) => Ok(()),
-            off_ns => Err(format!("{off_ns:?} ns off, {steps:?}")),
-        }
-    });
+    let got = GStreamer::start("bokehcam", 60).end();
+    assert_eq!(got.frames.len(), 60);
+    assert!(got.sequence.windows(2).all(|pair| pair[1] == pair[0] + 1), "{:?}", got.sequence);
+    let numbers = numbers(&got.frames);
+    let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
+    assert!(times_ns.windows(2).all(|pair| pair[0] < pair[1]), "{times_ns:?}");
+    // A picture's time is when it was due. Behind one that was shown again, as it did not come in time, it is later.
+    let steps = steps(&numbers);
+    let is_new = |at: usize| at == 0 || steps[at - 1] > 0;
+    let own: Vec<usize> = (1..numbers.len()).filter(|&at| is_new(at) && is_new(at - 1)).collect();
+    let period_ns = 1e9 / f64::from(FPS);
+    for pair in own.windows(2) {
+        let due = (numbers[pair[1]] + PICTURES - numbers[pair[0]]) % PICTURES;
+        let periods = (times_ns[pair[1]] - times_ns[pair[0]]) as f64 / period_ns;
+        // It may have been more than once round.
+        let off = (periods - due as f64 + 0.5).rem_euclid(PICTURES as f64) - 0.5;
+        assert!(off.abs() < 0.15, "{off} periods off: {numbers:?}, {times_ns:?}");
+    }
     let report = player.end();
-    assert!(report["pipewire"][0]["shown"].as_u64() >= Some(read as u64), "{}", report["pipewire"]);
+    assert!(report["pipewire"][0]["shown"].as_u64() >= Some(steps.iter().filter(|step| **step > 0).count() as u64));
+    is_accounted_for(&report, &got.frames);
 }
 
 #[test]
@@ -104,22 +125,22 @@ fn pictures_that_are_yuyv_already_come_as_they_are_between_others() {
 
 #[test]
 #[ignore = "needs PipeWire (tests/pipewire/session)"]
-fn two_readers_at_once_get_the_full_rate() {
+fn two_readers_at_once_get_every_picture() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
-    in_a_calm_moment(|| {
-        let mut first = GStreamer::start("bokehcam", 150);
-        std::thread::sleep(Duration::from_millis(700));
-        let second = GStreamer::start("bokehcam", 90).end();
-        assert!(first.is_reading(), "they read at the same time");
-        let rates = [first.end(), second].map(|got| {
-            let numbers = numbers(&got.frames);
-            let times_ns = &got.times_ns[got.frames.len() - numbers.len()..];
-            (times_ns.len() - 1) as f64 * 1e9 / (times_ns[times_ns.len() - 1] - times_ns[0]) as f64
-        });
-        if rates.iter().all(|rate| *rate > 28.0) { Ok(()) } else { Err(format!("{rates:?} pictures a second")) }
-    });
-    player.end();
+    // More than it reads while the other one does.
+    let mut first = GStreamer::start("bokehcam", 100_000);
+    until("the first one reads", || (first.frames().len() > 20).then_some(()));
+    let before = first.frames().len();
+    let second = GStreamer::start("bokehcam", 90).end();
+    assert!(first.is_reading(), "they read at the same time");
+    let frames = first.frames();
+    // Neither is kept waiting for the other.
+    assert!(frames.len() >= before + 60, "{} pictures and {}", frames.len() - before, second.frames.len());
+    drop(first);
+    let report = player.end();
+    is_accounted_for(&report, &frames);
+    is_accounted_for(&report, &second.frames);
 }
 
 #[test]
@@ -128,8 +149,7 @@ fn a_reader_comes_after_the_session_manager_has_suspended_the_node() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire"]);
     numbers(&GStreamer::start("bokehcam", 20).end().frames);
-    std::thread::sleep(Duration::from_secs(7));
-    assert_eq!(state("bokehcam").as_deref(), Some("suspended"));
+    until("it is suspended", || (state("bokehcam")? == "suspended").then_some(()));
     numbers(&GStreamer::start("bokehcam", 20).end().frames);
     player.end();
 }
@@ -141,7 +161,7 @@ fn a_program_of_before_pipewire_reads_by_pw_v4l2() {
     let to = folder().join("old.yuv");
     let size = format!("{}x{}", SIZE.0, SIZE.1);
     let read = Command::new("timeout")
-        .args(["20", "pw-v4l2", "ffmpeg", "-loglevel", "error", "-y", "-f", "v4l2", "-input_format", "yuyv422"])
+        .args(["120", "pw-v4l2", "ffmpeg", "-loglevel", "error", "-y", "-f", "v4l2", "-input_format", "yuyv422"])
         .args(["-video_size", &size, "-i", "/dev/video0", "-frames:v", "20", "-f", "rawvideo"])
         .arg(&to)
         .output()
@@ -204,21 +224,24 @@ fn the_source_is_read_only_while_somebody_watches() {
     let opened = Openings::of(&player.pictures());
     std::thread::sleep(Duration::from_secs(1));
     assert!(!opened.any(), "nobody watches");
+    let (mut watched, mut read) = (Duration::ZERO, 0);
     for _ in 0..2 {
+        let began = Instant::now();
         let reader = GStreamer::start("bokehcam", 45);
-        let streams = until("a reader", || (state("bokehcam")? == "running").then(Instant::now));
         until("a picture", || opened.any().then_some(()));
-        assert!(streams.elapsed() < Duration::from_millis(500), "{:?}", streams.elapsed());
-        numbers(&reader.end().frames);
-        let left = Instant::now();
-        // Off within a second of the last reader's leaving.
-        std::thread::sleep(Duration::from_secs(1).saturating_sub(left.elapsed()));
-        opened.any();
-        std::thread::sleep(Duration::from_secs(2));
-        assert!(!opened.any(), "nobody watches any more");
+        read += steps(&numbers(&reader.end().frames)).iter().filter(|step| **step > 0).count() as u64;
+        // What is on its way is still read.
+        let mut last = Instant::now();
+        until("nobody watches any more", || {
+            if opened.any() {
+                last = Instant::now();
+            }
+            (last.elapsed() > Duration::from_secs(2)).then_some(())
+        });
+        watched += last - began;
     }
     let report = player.end();
     let captured = report["frames"]["captured"].as_u64().unwrap();
-    // 45 pictures and half a second, twice; a card or two among them.
-    assert!((80..=150).contains(&captured), "{captured} captured");
+    let most = (watched.as_secs_f64() * f64::from(FPS)) as u64 + 10;
+    assert!((read..=most).contains(&captured), "{captured} captured where {read} were read, in {watched:?}");
 }

@@ -4,6 +4,8 @@ use std::process::{Child, Command, Stdio};
 
 use super::session::{SIZE, until};
 
+const FRAME_BYTES: usize = 2 * (SIZE.0 * SIZE.1) as usize;
+
 /// What GStreamer got.
 pub struct Got {
     /// Pictures, encoded as they came.
@@ -40,6 +42,13 @@ impl GStreamer {
         self.child.try_wait().unwrap().is_none()
     }
 
+    /// What it has got so far.
+    pub fn frames(&self) -> Vec<Vec<u8>> {
+        let bytes = std::fs::read(self.folder.path().join("frames")).unwrap_or_default();
+        // The last one may be on its way into the file.
+        bytes.chunks_exact(FRAME_BYTES).map(<[u8]>::to_vec).collect()
+    }
+
     /// Waits for its end.
     pub fn end(mut self) -> Got {
         until("the reader's end", || (!self.is_reading()).then_some(()));
@@ -51,7 +60,7 @@ impl GStreamer {
             value.split([',', ' ']).next().unwrap().to_owned()
         };
         Got {
-            frames: bytes.chunks(2 * (SIZE.0 * SIZE.1) as usize).map(<[u8]>::to_vec).collect(),
+            frames: bytes.chunks(FRAME_BYTES).map(<[u8]>::to_vec).collect(),
             sequence: chained.iter().map(|line| field(line, "offset: ").parse().unwrap()).collect(),
             times_ns: chained.iter().map(|line| nanoseconds(&field(line, "pts: "))).collect(),
         }

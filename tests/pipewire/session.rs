@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use bokehcam::frame::ColorImage;
 use serde_json::Value;
 
-/// Longer than anything takes on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(20);
+/// Nothing takes so long, on a busy machine neither: this is against a hang.
+pub const PATIENCE: Duration = Duration::from_secs(120);
 pub const SIZE: (u32, u32) = (320, 180);
 pub const FPS: u32 = 30;
 /// Pictures of the recording, which is played round and round.
@@ -31,18 +31,6 @@ pub fn until<T>(what: &str, mut is: impl FnMut() -> Option<T>) -> T {
         assert!(began.elapsed() < PATIENCE, "this took too long: {what}");
         std::thread::sleep(Duration::from_millis(20));
     }
-}
-
-/// Tries what takes a machine with time to spare, which a busy one may have for a moment only: six times at most.
-pub fn in_a_calm_moment(mut attempt: impl FnMut() -> Result<(), String>) {
-    let mut failed = Vec::new();
-    for _ in 0..6 {
-        match attempt() {
-            Ok(()) => return,
-            Err(why) => failed.push(why),
-        }
-    }
-    panic!("{}", failed.join("\n"));
 }
 
 /// Everything in the graph, as PipeWire's own program tells it.
@@ -128,6 +116,11 @@ impl Run {
 
     fn said(&self) -> String {
         fs::read_to_string(self.folder.path().join("said")).unwrap()
+    }
+
+    /// Whether it has ended.
+    pub fn is_over(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_some()
     }
 
     /// Waits for its end by an error of run time or of usage; returns what it said.

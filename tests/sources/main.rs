@@ -10,7 +10,6 @@ mod store;
 
 use std::path::Path;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
 use bokehcam::frame::{ColorImage, DepthMap};
 use bokehcam::look::{Look, Strength};
@@ -168,9 +167,8 @@ fn a_camera_that_comes_is_offered_and_opened_where_it_was_missing_and_its_pictur
         Update::Choices { sources, .. } => sources.iter().any(|choice| choice.name == CAMERA),
         _ => false,
     };
-    let began = Instant::now();
+    // As long as a test has patience: nobody has to ask for it.
     watched.until("it is offered", has_it);
-    assert!(began.elapsed() < Duration::from_secs(20), "{:?}", began.elapsed());
     watched.until("its sizes", |told| matches!(told, Update::Camera(camera) if camera.modes.len() == 2));
     watched.until("it runs", is_running);
     watched.frame("a frame", |view| view.picture.size() == (64, 48));

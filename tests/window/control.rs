@@ -1,6 +1,8 @@
 //! Others ask the window from outside: what they change shows in it, and what the person changes shows to them.
 
-use std::fs;
+use std::fs::{self, File};
+use std::os::unix::fs::FileExt;
+use std::path::Path;
 use std::process::Command;
 
 use bokehcam::recording::still::read_color;
@@ -24,6 +26,23 @@ fn status(program: &Program) -> Value {
     let (code, said) = ctl(program, &["status", "--json"]);
     assert_eq!(code, 0, "{said}");
     serde_json::from_str(&said).unwrap()
+}
+
+const LUMA: usize = 640 * 360;
+const FRAME: usize = "FRAME\n".len() + LUMA * 3 / 2;
+
+/// Whether the last whole picture of a video is the card: dark, the same from side to side.
+fn ends_with_the_card(video: &Path) -> bool {
+    let file = File::open(video).unwrap();
+    let mut first = [0; 200];
+    let read = file.read_at(&mut first, 0).unwrap();
+    let Some(header) = first[..read].iter().position(|byte| *byte == b'\n') else { return false };
+    let bytes = file.metadata().unwrap().len() as usize - header - 1;
+    let Some(last) = (bytes / FRAME).checked_sub(1) else { return false };
+    let mut luma = vec![0; LUMA];
+    let at = header + 1 + last * FRAME + "FRAME\n".len();
+    file.read_exact_at(&mut luma, at as u64).unwrap();
+    luma[0].abs_diff(57) <= 3 && luma[LUMA - 640].abs_diff(38) <= 3
 }
 
 #[test]
@@ -62,13 +81,12 @@ fn what_is_asked_from_outside_shows_here_and_what_is_done_here_shows_there() {
     assert_eq!(ctl(&program, &["toggle"]).0, 0);
     window.until("the person again", is_photograph);
     assert_eq!(ctl(&program, &["off"]).0, 0);
-    std::thread::sleep(std::time::Duration::from_millis(500));
+    let is_part = |file: &fs::DirEntry| file.file_name().to_string_lossy().starts_with(".out.y4m.");
+    let part = fs::read_dir(program.home()).unwrap().flatten().find(is_part).expect("it is being written").path();
+    until("the card is recorded", PATIENCE, || ends_with_the_card(&part));
     program.interrupt();
     let ended = program.end();
     ended.succeeded();
-    // What was recorded ends with the card: dark, the same from side to side.
-    let video = fs::read(ended.home.path().join("out.y4m")).unwrap();
-    let luma = &video[video.len() - 640 * 360 * 3 / 2..][..640 * 360];
-    assert!(luma[0].abs_diff(57) <= 3 && luma[640 * 359].abs_diff(38) <= 3, "{} {}", luma[0], luma[640 * 359]);
+    assert!(ends_with_the_card(&ended.home.path().join("out.y4m")), "what was recorded ends with the card");
     assert!(!ended.home.path().join("run/bokehcam/preview.sock").exists());
 }
