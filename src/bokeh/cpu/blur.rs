@@ -9,7 +9,9 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::filter::{BLOCK_ROWS, Taps, along_column, along_column_block, along_row, keep_in_range};
+use super::filter::{
+    BLOCK_ROWS, Taps, along_column, along_column_block, along_row, keep_in_range, most_row_len, row_len,
+};
 use super::rows::{Cells, EDGE_VALUES, Edges, PIECE, STRIP, STRIP_EDGES, STRIP_ROW, Strips};
 use crate::bokeh::bank::Bank;
 use crate::bokeh::plan::{CELL, Plan, SEGMENT};
@@ -66,7 +68,7 @@ impl Scratch {
     pub fn new(plan: &Plan) -> Self {
         let reach = plan.ladder.most_reach();
         Self {
-            rows: Aligned::zeros(ring_rows(reach) * GROUP.min(plan.ladder.most_terms()) * STRIP_ROW),
+            rows: Aligned::zeros(ring_rows(reach) * most_row_len(GROUP.min(plan.ladder.most_terms()))),
             lines: Aligned::zeros(BLOCK_ROWS * 4 * (STRIP + 2 * reach.next_multiple_of(PIECE))),
             filtered: Vec::with_capacity(plan.height.div_ceil(CELL)),
         }
@@ -136,7 +138,7 @@ impl Strip<'_> {
     #[inline(always)]
     fn filter_group<S: Simd, const R: usize, const EVEN: bool, const P: usize>(&mut self, simd: S, first: usize) {
         let mut scratch = std::mem::take(&mut self.scratch.rows);
-        let rows = &mut scratch[..ring_rows(self.reach) * R * STRIP_ROW];
+        let rows = &mut scratch[..ring_rows(self.reach) * row_len::<S>(R)];
         let mut next_y = 0;
         for y in (0..self.size.1).step_by(BLOCK_ROWS) {
             if !self.active[y / CELL] {
@@ -167,7 +169,7 @@ impl Strip<'_> {
         ys: Range<usize>,
         rows: &mut [f32],
     ) {
-        let row_len = R * STRIP_ROW;
+        let row_len = row_len::<S>(R);
         let ring_mask = rows.len() / row_len - 1;
         let mut lines = std::mem::take(&mut self.scratch.lines);
         // The source's rows are copied `PIECE` columns at a time.
@@ -236,7 +238,7 @@ impl Strip<'_> {
                     same &= taps.steady && taps.left == shared.left;
                 }
                 if same {
-                    let sums = along_column_block::<S, R, P>(simd, &shared, rows, ys.start, x, self.size.1);
+                    let sums = along_column_block::<S, R, EVEN, P>(simd, &shared, rows, ys.start, x, self.size.1);
                     for k in 0..BLOCK_ROWS {
                         self.add_to_result::<S, R, P>(simd, first, (x, ys.start + k), sums[k], &edges[k]);
                     }

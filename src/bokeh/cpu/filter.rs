@@ -10,12 +10,30 @@
 
 use pulp::Simd;
 
-use super::rows::{EDGE_VALUES, STRIP, STRIP_EDGES};
+use super::rows::{EDGE_VALUES, PIECE, STRIP, STRIP_EDGES, STRIP_ROW};
 use crate::bokeh::plan::SEGMENT;
 use crate::compute::simd::{fma, load};
 
 /// Rows of the result that are filtered at once, where they can share what they read.
 pub const BLOCK_ROWS: usize = 4;
+
+/// AVX2 has half the registers of others, too few for a block's sums of all planes.
+#[inline(always)]
+fn has_few_registers<S: Simd>() -> bool {
+    S::F32_LANES == 8
+}
+
+/// Values from one row between both passes to the next, of so many terms: `[term][4][STRIP]`. Where one plane after the other is
+/// read down the rows, these are a line further apart, as a power of two would share few lines of the nearest cache.
+#[inline(always)]
+pub fn row_len<S: Simd>(terms: usize) -> usize {
+    if has_few_registers::<S>() { most_row_len(terms) } else { terms * STRIP_ROW }
+}
+
+/// [`row_len`] of any processor.
+pub fn most_row_len(terms: usize) -> usize {
+    terms * STRIP_ROW + PIECE
+}
 
 /// Clamps coverage to 0..1 and premultiplied colour to the range of colours within reach: truncated filters overshoot.
 #[inline(always)]
@@ -126,7 +144,7 @@ pub fn along_row<S: Simd, const R: usize, const EVEN: bool, const VARY: bool, co
 /// The vertical pass for one vector of columns and `BLOCK_ROWS` rows from `y` on: `R` terms, `P` planes (3 without
 /// coverage, else 4). A tap is one number for all of these pixels, so a row that is read once serves all their sums.
 #[inline(always)]
-pub fn along_column_block<S: Simd, const R: usize, const P: usize>(
+pub fn along_column_block<S: Simd, const R: usize, const EVEN: bool, const P: usize>(
     simd: S,
     taps: &Taps<'_, R>,
     rows: &[f32],
@@ -134,7 +152,10 @@ pub fn along_column_block<S: Simd, const R: usize, const P: usize>(
     x: usize,
     height: usize,
 ) -> [[S::f32s; 4]; BLOCK_ROWS] {
-    let row_len = R * 4 * STRIP;
+    if EVEN && has_few_registers::<S>() && y >= taps.reach && y + BLOCK_ROWS + taps.reach <= height {
+        return along_column_planes::<S, R, P>(simd, taps, rows, y, x);
+    }
+    let row_len = row_len::<S>(R);
     let ring_mask = rows.len() / row_len - 1;
     let mut sums = [[simd.splat_f32s(0.0); 4]; BLOCK_ROWS];
     let reach = taps.reach as isize;
@@ -161,6 +182,52 @@ pub fn along_column_block<S: Simd, const R: usize, const P: usize>(
     sums
 }
 
+/// The same for even profiles, one plane of a term after the other, where the taps reach neither end of the picture: as they go
+/// outwards, `BLOCK_ROWS` rows above and below stay in registers, and one more of each is read.
+#[inline(always)]
+fn along_column_planes<S: Simd, const R: usize, const P: usize>(
+    simd: S,
+    taps: &Taps<'_, R>,
+    rows: &[f32],
+    y: usize,
+    x: usize,
+) -> [[S::f32s; 4]; BLOCK_ROWS] {
+    const N: usize = BLOCK_ROWS;
+    let row_len = row_len::<S>(R);
+    let ring_mask = rows.len() / row_len - 1;
+    let mut all = [[simd.splat_f32s(0.0); 4]; N];
+    for r in 0..R {
+        let weight = |j: usize| simd.splat_f32s(taps.table[taps.left.wrapping_add_signed(j as isize * taps.step) + r]);
+        for p in 0..P {
+            let value = |y: usize| load::<S>(rows, (y & ring_mask) * row_len + (r * 4 + p) * STRIP + x);
+            // Row `y + i` is at `i % N`, seen from either side.
+            let mut above = [value(y), value(y + 1), value(y + 2), value(y + 3)];
+            let mut below = above;
+            let mut sums = above;
+            let here = weight(0);
+            for k in 0..N {
+                sums[k] = fma(simd, here, above[k], all[k][p]);
+            }
+            for first in (1..=taps.reach).step_by(N) {
+                for i in 0..N.min(taps.reach + 1 - first) {
+                    let j = first + i;
+                    above[N - 1 - i] = value(y - j);
+                    below[i] = value(y + N - 1 + j);
+                    let weight = weight(j);
+                    for k in 0..N {
+                        let both = simd.add_f32s(above[(k + N - 1 - i) % N], below[(k + 1 + i) % N]);
+                        sums[k] = fma(simd, weight, both, sums[k]);
+                    }
+                }
+            }
+            for k in 0..N {
+                all[k][p] = sums[k];
+            }
+        }
+    }
+    all
+}
+
 /// The vertical pass for one vector: the terms of the group summed, every plane. Unlike along a row the terms meet
 /// here, so one sum a plane suffices.
 #[inline(always)]
@@ -172,7 +239,7 @@ pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool,
     x: usize,
     height: usize,
 ) -> [S::f32s; 4] {
-    let row_len = R * 4 * STRIP;
+    let row_len = row_len::<S>(R);
     let weights = taps.at::<S, VARY>(simd, 0);
     // Rows lie in a ring, a power of two of them.
     let ring_mask = rows.len() / row_len - 1;
@@ -201,4 +268,60 @@ pub fn along_column<S: Simd, const R: usize, const EVEN: bool, const VARY: bool,
         }
     }
     sums
+}
+
+#[cfg(test)]
+mod tests {
+    use pulp::{Arch, WithSimd};
+
+    use super::*;
+    use crate::compute::aligned::Aligned;
+
+    const HEIGHT: usize = 60;
+
+    /// Compares the columns of a block with those of each of its rows, at the ends of the picture and between.
+    struct Compare {
+        reach: usize,
+    }
+
+    impl WithSimd for Compare {
+        type Output = ();
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) {
+            const R: usize = 2;
+            let number = |k: usize| (k as u32).wrapping_mul(0x9e37_79b1) as f32 / 4.3e9;
+            let (reach, width) = (self.reach, row_len::<S>(R));
+            let mut rows = Aligned::zeros(HEIGHT.next_power_of_two() * width);
+            rows.iter_mut().enumerate().for_each(|(k, value)| *value = number(k));
+            let table: Vec<f32> =
+                (0..2 * reach + 1).flat_map(|j| [j.abs_diff(reach), 99 + j.abs_diff(reach)]).map(number).collect();
+            let (left, step) = (reach * R, R as isize);
+            let taps = Taps::<R> { table: &table, left, right: left, step, reach, lane: 0, steady: true };
+            for y in (0..HEIGHT).step_by(BLOCK_ROWS) {
+                for x in (0..STRIP).step_by(S::F32_LANES) {
+                    let block = along_column_block::<S, R, true, 3>(simd, &taps, &rows, y, x, HEIGHT);
+                    for (k, sums) in block.iter().enumerate() {
+                        let row = along_column::<S, R, true, false, 3>(simd, &taps, &rows, y + k, x, HEIGHT);
+                        for p in 0..3 {
+                            let apart = simd.abs_f32s(simd.sub_f32s(sums[p], row[p]));
+                            let apart = simd.reduce_max_f32s(apart);
+                            assert!(apart < 1e-4, "reach {reach}, row {}, column {x}, plane {p}: {apart}", y + k);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_block_of_rows_is_filtered_as_each_of_them_on_every_processor() {
+        for reach in [0, 1, 2, 3, 4, 5, 7, 16, 28] {
+            Arch::new().dispatch(Compare { reach });
+            Arch::Scalar.dispatch(Compare { reach });
+            #[cfg(target_arch = "x86_64")]
+            if let Some(avx2) = pulp::x86::V3::try_new() {
+                Arch::V3(avx2).dispatch(Compare { reach });
+            }
+        }
+    }
 }
