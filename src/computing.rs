@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::bokeh::{self, Backend, Bokeh, BokehError};
-use crate::compute::Device;
 use crate::compute::thread_pool::cores;
+use crate::compute::{Device, GpuError};
 use crate::depth::DepthError;
 use crate::depth::stereo::{self, Matcher};
 
@@ -81,7 +81,10 @@ impl Executors {
             Ok(device) => device.map(Arc::new),
             Err(error) if self.needs_gpu() => return Err(error.into()),
             Err(error) => {
-                tracing::info!("the CPU does all: {error}");
+                match error {
+                    GpuError::NoAdapter { .. } => tracing::info!("the CPU does all: {error}"),
+                    GpuError::Failed(_) => tracing::warn!("the CPU does all: {error}"),
+                }
                 None
             }
         };

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import subprocess
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -100,11 +101,22 @@ def test_a_node_is_killed(cluster, sources, expected, tmp_path):
     out = tmp_path / "out"
     driver = start(out, sources, cluster)
 
+    stopped: set[int] = set()
+
     def on_last() -> list[int]:
-        return [child for child in children_at_work(out) if parent_of(parent_of(child)) == cluster.raylets[-1]]
+        children = children_at_work(out)
+        last = [child for child in children if parent_of(parent_of(child)) == cluster.raylets[-1]]
+        # The first node stays at its recording, or it may have made all of them before the second one begins.
+        for child in {*children} - {*last} - stopped:
+            with suppress(ProcessLookupError):
+                os.kill(child, signal.SIGSTOP)
+                stopped.add(child)
+        return last
 
     child = until(on_last, "a recording on the second node")[0]
     cluster.kill_last()
+    for other in stopped:
+        os.kill(other, signal.SIGCONT)
     until(lambda: not is_alive(child), "the death of the program with its node")
     ended(driver)
     check(out, expected)
