@@ -1,6 +1,6 @@
 // Pass unpack: 8-bit sRGB to linear light with highlights expanded; mixed pixels to two surfaces. Reads packed RGB bytes, and
-// of a depth map the signed CoC or metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile, which shows
-// no bins yet; lists the tiles of the bins of the foremost layer.
+// of a depth map the signed CoC or metres; writes linear r, g, b and the CoC in pixels, and the range of CoC of every tile,
+// which shows no bins yet; lists the tiles of the bins of the foremost layer.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> bins: array<Bin, MAX_BINS>;
