@@ -57,6 +57,12 @@ impl ColorImage {
         make_room(&mut self.rgb, width as usize * height as usize * 3);
     }
 
+    /// Takes over size and content of another picture, keeping its own memory where that suffices.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.resize(other.width, other.height);
+        self.rgb.copy_from_slice(&other.rgb);
+    }
+
     /// Columns and rows.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)

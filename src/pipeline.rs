@@ -302,11 +302,14 @@ pub fn run(run: Run) -> Result<Report, PipelineError> {
     // A source that has an end of its own was broken off before it.
     let is_cut = run.stop.load(Ordering::Relaxed) && info.frames.is_some_and(|frames| tally.frames().captured < frames);
     let ending = if ended.is_err() || is_cut { Ending::Cut } else { Ending::Whole };
-    about.pipewire = sink.nodes();
+    let (outputs, nodes) = (sink.outputs(), sink.nodes());
     [about.refined_by, about.matted_by] = [refined_by, matted_by].map(|by| by.unwrap_or("none").into());
     let finished = guard("sink", &over, move || Ok(sink.finish(ending)?));
     // What came first is the cause.
     let ended = ended.and(finished);
+    // Only now have they taken all that was under way.
+    about.outputs = outputs.iter().map(|count| count()).collect();
+    about.pipewire = nodes.iter().map(|count| count()).collect();
     about.elapsed_ns = clock.now_ns() - began_ns;
     about.cpu_ns = clock::cpu_ns() - cpu_ns;
     let report = Report::new(tally.frames(), &timings, about);

@@ -10,7 +10,7 @@ mod rungs;
 mod tally;
 
 pub use histogram::{Histogram, PassHistograms};
-pub use node_use::NodeUse;
+pub use node_use::{NodeUse, OutputUse};
 pub use pulse::Pulse;
 pub use report::{About, QualityUse, Report, Spread, StageMs, StagesMs, Versions, WindowUse};
 pub use rungs::RungCounts;

@@ -24,7 +24,7 @@ fn a_source_is_never_a_target() {
         "stream self --to self/ --force",
         "stream link --to self/rgb/ --force",
         "stream self --to link/rgb/ --force",
-        "stream self --to . --force",
+        "stream self --to ./ --force",
         "stream self --to self/new/",
         "stream self --to self/clip.y4m",
         "stream self --to null --to other/../link/clip.mkv",

@@ -1,12 +1,14 @@
 //! From `--to` to one sink.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::error::CliError;
 use super::files::refuse_source;
 use super::options::Streaming;
 use crate::files::{place, whole};
-use crate::sink::{Options, Sink, Target, Tee};
+use crate::sink::{Backpressure, Options, Sink, Target, Tee};
 use crate::source::{DepthChoice, SourceName};
 
 /// Refuses sinks (and a report) that collide with each other or with what is read, and options that need other sinks.
@@ -80,17 +82,23 @@ pub fn try_report(path: Option<&Path>) -> Result<(), CliError> {
     }
 }
 
-/// Opens all sinks as one.
+/// Opens all sinks as one. With [`Backpressure::Block`] all files get every frame, unless `closed` says that pictures are
+/// kept away.
 ///
 /// # Errors
 /// One cannot be opened; the others are then given up.
-pub fn open(targets: &[Target], options: &Options) -> Result<Box<dyn Sink>, CliError> {
+pub fn open(
+    targets: &[Target],
+    options: &Options,
+    backpressure: Backpressure,
+    closed: &Arc<AtomicBool>,
+) -> Result<Box<dyn Sink>, CliError> {
     let mut sinks = targets.iter().map(|target| target.open(options)).collect::<Result<Vec<_>, _>>()?;
     Ok(match sinks.pop() {
         Some(only) if sinks.is_empty() => only,
         last => {
             sinks.extend(last);
-            Box::new(Tee::new(sinks))
+            Box::new(Tee::new(sinks, backpressure, Arc::clone(closed))?)
         }
     })
 }

@@ -57,6 +57,11 @@ impl FolderError {
     }
 }
 
+/// Whether this is a folder that we have written files into.
+pub fn is_ours(path: &Path) -> bool {
+    path.join(LIST).symlink_metadata().is_ok_and(|list| list.is_file())
+}
+
 /// Which files will be written.
 pub struct Set<'a> {
     /// Folders within the folder that have files of the set.

@@ -42,6 +42,8 @@ mod sync;
 
 use std::time::Duration;
 
+use crossbeam_channel::{RecvTimeoutError, SendTimeoutError};
+
 /// The receiving end is gone: nobody will read what is sent, and what is pending goes with the sender.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the next stage is gone")]
@@ -58,6 +60,16 @@ pub enum Received<T> {
     Nothing,
     /// The sender is gone and nothing is pending.
     Ended,
+}
+
+/// What came of sending an item.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sent<T> {
+    Taken,
+    /// It took the place of this older item (live links only).
+    Displaced(T),
+    /// There was no room in time: this is the item (lossless links only).
+    Full(T),
 }
 
 /// A link in which the newest item wins and sending never waits.
@@ -91,6 +103,21 @@ impl<T> Sender<T> {
             Tx::Lossless(queue) => queue.send(item).map(|()| None).map_err(|_| Abandoned),
         }
     }
+
+    /// [`Sender::send`] that waits for room no longer than `patience`.
+    ///
+    /// # Errors
+    /// The receiver is gone; `item` is dropped.
+    pub fn send_timeout(&mut self, item: T, patience: Duration) -> Result<Sent<T>, Abandoned> {
+        match &mut self.0 {
+            Tx::Live(mailbox) => Ok(mailbox.send(item)?.map_or(Sent::Taken, Sent::Displaced)),
+            Tx::Lossless(queue) => match queue.send_timeout(item, patience) {
+                Ok(()) => Ok(Sent::Taken),
+                Err(SendTimeoutError::Timeout(item)) => Ok(Sent::Full(item)),
+                Err(SendTimeoutError::Disconnected(_)) => Err(Abandoned),
+            },
+        }
+    }
 }
 
 /// The receiving end of a link.
@@ -116,8 +143,8 @@ impl<T> Receiver<T> {
             Rx::Live(mailbox) => mailbox.recv_timeout(patience),
             Rx::Lossless(queue) => match queue.recv_timeout(patience) {
                 Ok(item) => Received::Item(item),
-                Err(crossbeam_channel::RecvTimeoutError::Timeout) => Received::Nothing,
-                Err(crossbeam_channel::RecvTimeoutError::Disconnected) => Received::Ended,
+                Err(RecvTimeoutError::Timeout) => Received::Nothing,
+                Err(RecvTimeoutError::Disconnected) => Received::Ended,
             },
         }
     }

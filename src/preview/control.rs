@@ -1,11 +1,12 @@
 //! Control of a preview by others: what they ask goes to the window's thread, which answers.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
-use crate::control::{Answer, Claim, Request, Server};
+use super::session::CurrentRelease;
+use crate::control::{Answer, Claim, Request, Server, Status};
 use crate::look::Patch;
 
 /// How long the window, and who saves pictures, may take to answer.
@@ -45,11 +46,16 @@ pub struct Asked {
 }
 
 impl Control {
-    /// Listens from now on. `wake` is called when somebody asks.
+    /// Listens from now on. `wake` is called when somebody asks. That outputs were switched off is answered once they show
+    /// the card, which `release` knows.
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn begin(self, wake: impl Fn() + Send + Sync + 'static) -> std::io::Result<(Server, Receiver<Asked>)> {
+    pub fn begin(
+        self,
+        release: CurrentRelease,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> std::io::Result<(Server, Receiver<Asked>)> {
         let (ask, asked) = mpsc::channel();
         let understand = self.understand;
         let server = self.claim.serve(Arc::new(move |request| {
@@ -57,13 +63,27 @@ impl Control {
                 Ok(wish) => wish,
                 Err(answer) => return answer,
             };
+            let switches = matches!(wish, Wish::On(_) | Wish::Toggle);
             let (answer, answered) = mpsc::sync_channel(1);
             if ask.send(Asked { wish, answer }).is_err() {
                 return Answer::failed("the window is closed");
             }
             wake();
-            answered.recv_timeout(PATIENCE).unwrap_or_else(|_| Answer::failed("the window does not answer in time"))
+            match answered.recv_timeout(PATIENCE) {
+                Ok(Answer::Done { status, .. }) if switches && !status.on => covered(&release, status),
+                Ok(answer) => answer,
+                Err(_) => Answer::failed("the window does not answer in time"),
+            }
         }))?;
         Ok((server, asked))
+    }
+}
+
+/// The answer once the outputs show the card.
+fn covered(release: &CurrentRelease, status: Box<Status>) -> Answer {
+    let release = release.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    match release.map_or(Ok(None), |release| release.wait_covered()) {
+        Ok(note) => Answer::Done { status, note },
+        Err(error) => Answer::failed(error.to_string()),
     }
 }

@@ -8,9 +8,9 @@ use crate::pipewire::PipeWireError;
 use crate::v4l2::loopback::LoopbackError;
 
 const NO_WINDOW: &str =
-    "the window is opened by who shows it, such as `bokehcam preview SOURCE`; for a folder of this name, ./window";
+    "the window is opened by who shows it, such as `bokehcam preview SOURCE`; for a folder of this name, window/";
 const NOT_BUILT: &str = "this program was built without a window; build it with the feature window. For a folder of \
-                         this name, ./window";
+                         this name, window/";
 
 /// Why a frame could not be written.
 #[allow(missing_docs)] // The messages say what the fields are.
@@ -18,11 +18,19 @@ const NOT_BUILT: &str = "this program was built without a window; build it with 
 pub enum SinkError {
     /// Not the name of a sink.
     #[error(
-        "no sink '{name}': use /dev/videoN or pipewire[:NAME] (a virtual camera), {}DIR/, FILE.y4m, FILE.mp4, FILE.mkv, FILE.webm, \
-         - (y4m on standard output) or null",
+        "no sink '{name}'{}: use /dev/videoN or pipewire[:NAME] (a virtual camera), {}DIR/ (a folder, with the slash), FILE.y4m, \
+         FILE.mp4, FILE.mkv, FILE.webm, - (y4m on standard output) or null",
+        near.as_ref().map_or(String::new(), |near| format!(" (did you mean {near}?)")),
         if cfg!(feature = "window") { "window, " } else { "" }
     )]
-    Target { name: String },
+    Target {
+        name: String,
+        /// What may have been meant.
+        near: Option<String>,
+    },
+    /// A folder that is there, and may be meant or not.
+    #[error("no sink '{name}': it is a folder; to write numbered PNG files into it, give {name}/ (with the slash)")]
+    NoSlash { name: String },
     #[error("{} exists; choose another name or overwrite it with --force", path.display())]
     Exists { path: PathBuf },
     /// The folder cannot be written.
@@ -38,6 +46,9 @@ pub enum SinkError {
     /// A defect of this program.
     #[error("{sink}: panicked: {what}; please report this")]
     Panic { sink: String, what: String },
+    /// The system gives no thread for an output.
+    #[error("{sink}: cannot start its thread: {cause}")]
+    Thread { sink: String, cause: io::Error },
     /// The file system refused.
     #[error("cannot write {}: {cause}", path.display())]
     Write {

@@ -10,6 +10,7 @@ mod ffmpeg;
 #[cfg(feature = "camera")]
 mod loopback;
 mod output;
+mod output_thread;
 mod pipe;
 #[cfg(feature = "pipewire")]
 mod pipewire;
@@ -38,9 +39,10 @@ pub use ffmpeg::Ffmpeg;
 #[cfg(feature = "camera")]
 pub use loopback::Loopback;
 pub use output::recover_all;
+pub use output_thread::Backpressure;
 pub use pipe::Pipe;
 pub use png::PngFolder;
-pub use shutter::{Release, Shutter};
+pub use shutter::{NotCovered, Release, Shutter};
 pub use switch::{Switch, Switchboard};
 pub use target::Target;
 pub use tee::Tee;
@@ -48,7 +50,7 @@ pub use y4m::{Y4m, Y4mFile};
 
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
-use crate::stats::NodeUse;
+use crate::stats::{NodeUse, OutputUse};
 
 /// Whether all frames came that were to come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,8 +128,23 @@ pub trait Sink: Send {
         true
     }
 
+    /// Whether people see pictures as they come, as those of a virtual camera.
+    fn is_live(&self) -> bool {
+        false
+    }
+
+    /// Outputs that were given the card last, by [`Sink::cover`], and have not taken it yet.
+    fn uncovered(&self) -> Vec<Uncovered> {
+        Vec::new()
+    }
+
     /// What became of the frames that were put, of cameras that were given to PipeWire.
-    fn nodes(&self) -> Vec<NodeUse> {
+    fn nodes(&self) -> Vec<Counter<NodeUse>> {
+        Vec::new()
+    }
+
+    /// The same, of several outputs that get their frames at a time of their own.
+    fn outputs(&self) -> Vec<Counter<OutputUse>> {
         Vec::new()
     }
 
@@ -145,6 +162,18 @@ pub trait Sink: Send {
     fn describe(&self) -> String {
         "a sink of its own".into()
     }
+}
+
+/// Counts what a sink did, also after that has ended.
+pub type Counter<T> = Arc<dyn Fn() -> T + Send + Sync>;
+
+/// An output that may still show a picture in the place of the card.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Uncovered {
+    /// What it is, and where.
+    pub output: String,
+    /// Whether people see its pictures as they come.
+    pub is_live: bool,
 }
 
 /// Takes frames and forgets them.

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use super::rate::frame_rate;
-use super::{Options, Sink, SinkError, card, check_size, yuyv};
+use super::{Counter, Options, Sink, SinkError, card, check_size, yuyv};
 use crate::frame::fit::Fit;
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::{Demand, Watch};
@@ -41,10 +41,6 @@ pub struct PipeWire {
     fitted: ColorImage,
     is_watched: Arc<AtomicBool>,
     captured_ns: u64,
-    /// Pictures while nobody watched.
-    unwatched: u64,
-    /// Pictures that a newer one overtook on the way to the node.
-    overtaken: u64,
 }
 
 /// A picture on its way to the node.
@@ -102,10 +98,12 @@ impl PipeWire {
             fitted,
             is_watched,
             captured_ns: 0,
-            unwatched: 0,
-            overtaken: 0,
         })
     }
+}
+
+fn count(counter: &AtomicU64, pictures: u64) {
+    counter.fetch_add(pictures, Ordering::Relaxed);
 }
 
 /// The name that programs remember a camera by: small letters and digits, and dashes for what is between them.
@@ -119,16 +117,16 @@ impl PipeWire {
     /// Sends the node a picture, which `make` makes where it is for somebody.
     fn send(&mut self, make: impl FnOnce(&mut Self, &mut YuyvImage)) -> ControlFlow<()> {
         if !self.is_watched.load(Ordering::Relaxed) {
-            self.unwatched += 1;
+            count(&self.node.counts().unwatched, 1);
             return ControlFlow::Continue(());
         }
         let Some(mut picture) = self.pictures.try_take() else {
-            self.overtaken += 1;
+            count(&self.node.counts().overtaken, 1);
             return ControlFlow::Continue(());
         };
         make(self, &mut picture);
         match self.to.send(Frame { picture, captured_ns: self.captured_ns }) {
-            Ok(overtaken) => self.overtaken += u64::from(overtaken.is_some()),
+            Ok(overtaken) => count(&self.node.counts().overtaken, overtaken.is_some().into()),
             // The node's thread has panicked, which was printed.
             Err(link::Abandoned) => return ControlFlow::Break(()),
         }
@@ -157,18 +155,22 @@ impl Sink for PipeWire {
         Ok(self.send(|_, picture| std::mem::swap(picture, frame)))
     }
 
-    fn nodes(&self) -> Vec<NodeUse> {
-        let counts = self.node.counts();
+    fn is_live(&self) -> bool {
+        true
+    }
+
+    fn nodes(&self) -> Vec<Counter<NodeUse>> {
+        let (node, counts) = (self.node.name().to_owned(), Arc::clone(self.node.counts()));
         let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        vec![NodeUse {
-            node: self.node.name().to_owned(),
+        vec![Arc::new(move || NodeUse {
+            node: node.clone(),
             shown: of(&counts.shown),
             repeats: of(&counts.repeats),
-            unwatched: self.unwatched + of(&counts.unwatched),
-            overtaken: self.overtaken + of(&counts.overtaken),
+            unwatched: of(&counts.unwatched),
+            overtaken: of(&counts.overtaken),
             no_buffer: of(&counts.no_buffer),
             returns: of(&counts.returns),
-        }]
+        })]
     }
 
     fn describe(&self) -> String {

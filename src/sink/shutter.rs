@@ -3,14 +3,14 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
-use std::time::Duration;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, SyncSender};
+use std::time::{Duration, Instant};
 
-use super::{Ending, Sink, SinkError, card};
+use super::{Counter, Ending, Sink, SinkError, Uncovered, card};
 use crate::clock::Clock;
 use crate::frame::{ColorImage, YuyvImage};
 use crate::link::demand::Demand;
-use crate::stats::NodeUse;
+use crate::stats::{NodeUse, OutputUse};
 
 /// A sink that others can keep the pictures from, by its [`Release`]. The card comes at once, also between two frames;
 /// from then on the camera rests: nobody counts as watching. The card goes on, as often as frames came, until there is a
@@ -18,9 +18,11 @@ use crate::stats::NodeUse;
 pub struct Shutter {
     sink: Box<dyn Sink>,
     closed: Arc<AtomicBool>,
-    /// Who wants a copy of the next picture, as they come and as they wait for it.
-    asked: Receiver<SyncSender<ColorImage>>,
-    waiting: Vec<SyncSender<ColorImage>>,
+    asked: Receiver<Asked>,
+    /// Who wants a copy of the next picture.
+    copies: Vec<SyncSender<ColorImage>>,
+    /// Who waits until all outputs show the card, and until when.
+    covers: Vec<(SyncSender<Vec<Uncovered>>, Instant)>,
     demand: Demand,
     /// Whether the demand is withheld.
     rests: bool,
@@ -41,11 +43,31 @@ pub struct Shutter {
 const TICK: Duration = Duration::from_millis(20);
 const IDLE_TICK: Duration = Duration::from_millis(100);
 
+/// How long outputs may take to show the card.
+const PATIENCE: Duration = Duration::from_secs(1);
+
 /// Closes and opens a [`Shutter`], and takes pictures behind it, from any thread.
 #[derive(Clone)]
 pub struct Release {
     closed: Arc<AtomicBool>,
-    ask: Sender<SyncSender<ColorImage>>,
+    ask: Sender<Asked>,
+}
+
+/// What others want of a shutter, and where the answer goes. Who gave up waiting misses nothing.
+enum Asked {
+    Picture(SyncSender<ColorImage>),
+    Covered(SyncSender<Vec<Uncovered>>, Instant),
+}
+
+/// Outputs may still show a picture though they were to show the card.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NotCovered {
+    /// These, which people see live.
+    #[error("no more pictures come, but {0} may still show the last one: it does not take the card")]
+    Live(String),
+    /// What gives the outputs their pictures waits for one of them.
+    #[error("no more pictures come, but the output takes nothing, and its reader may still show the last one")]
+    Unknown,
 }
 
 impl Shutter {
@@ -66,7 +88,8 @@ impl Shutter {
             sink,
             closed: Arc::clone(&closed),
             asked,
-            waiting: Vec::new(),
+            copies: Vec::new(),
+            covers: Vec::new(),
             demand,
             rests: false,
             shows_card: false,
@@ -106,10 +129,34 @@ impl Shutter {
         give(self, time_ns)
     }
 
+    /// Takes note of who wants something; tells those who wait for the card where it is.
+    fn hear(&mut self) {
+        for asked in self.asked.try_iter() {
+            match asked {
+                Asked::Picture(to) => self.copies.push(to),
+                Asked::Covered(to, until) => self.covers.push((to, until)),
+            }
+        }
+        if self.covers.is_empty() {
+            return;
+        }
+        // Once it was opened again there is nothing to wait for.
+        let is_given = self.shows_card || !self.closed.load(Ordering::Acquire);
+        let uncovered = if self.shows_card { self.sink.uncovered() } else { Vec::new() };
+        let now = Instant::now();
+        self.covers.retain(|(to, until)| {
+            let waits = !(is_given && uncovered.is_empty()) && now < *until;
+            if !waits {
+                let _ = to.try_send(uncovered.clone());
+            }
+            waits
+        });
+    }
+
     /// Whether anybody waits for a copy.
     fn is_asked(&mut self) -> bool {
-        self.waiting.extend(self.asked.try_iter());
-        !self.waiting.is_empty()
+        self.hear();
+        !self.copies.is_empty()
     }
 
     /// Gives the sink the card.
@@ -117,6 +164,7 @@ impl Shutter {
         self.note(time_ns, true);
         let given = self.sink.cover(&self.card, time_ns);
         self.is_closed();
+        self.hear();
         given
     }
 
@@ -146,8 +194,7 @@ impl Sink for Shutter {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
         self.pass(time_ns, |shutter, time_ns| {
             if shutter.is_asked() {
-                // Who gave up waiting misses nothing.
-                shutter.waiting.drain(..).for_each(|ask| drop(ask.try_send(frame.clone())));
+                shutter.copies.drain(..).for_each(|to| drop(to.try_send(frame.clone())));
             }
             shutter.sink.put(frame, time_ns)
         })
@@ -170,19 +217,33 @@ impl Sink for Shutter {
         self.sink.captured(captured_ns);
     }
 
-    fn nodes(&self) -> Vec<NodeUse> {
+    fn is_live(&self) -> bool {
+        self.sink.is_live()
+    }
+
+    fn uncovered(&self) -> Vec<Uncovered> {
+        self.sink.uncovered()
+    }
+
+    fn nodes(&self) -> Vec<Counter<NodeUse>> {
         self.sink.nodes()
+    }
+
+    fn outputs(&self) -> Vec<Counter<OutputUse>> {
+        self.sink.outputs()
     }
 
     /// Until the sink or the card is due, but never longer than a tick: it may be closed meanwhile.
     fn hold(&self) -> Option<Duration> {
         let due = if self.shows_card { Some(self.period) } else { self.sink.hold() };
-        let tick = if self.shows_card || !self.demand.is_watched() { IDLE_TICK } else { TICK };
+        let rests = self.shows_card || !self.demand.is_watched();
+        let tick = if rests && self.covers.is_empty() { IDLE_TICK } else { TICK };
         Some(due.map_or(tick, |due| due.saturating_sub(self.silent()).min(tick)))
     }
 
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
         let (closed, silent) = (self.is_closed(), self.silent());
+        self.hear();
         if closed || self.shows_card && self.demand.is_watched() {
             if self.shows_card && silent < self.period {
                 return Ok(ControlFlow::Continue(false));
@@ -230,9 +291,34 @@ impl Release {
 
     /// A copy of the next picture that passes; `None` where none does in time.
     pub fn picture(&self, patience: Duration) -> Option<ColorImage> {
-        let (give, take) = mpsc::sync_channel(1);
-        self.ask.send(give).ok()?;
+        let (to, take) = mpsc::sync_channel(1);
+        self.ask.send(Asked::Picture(to)).ok()?;
         take.recv_timeout(patience).ok()
+    }
+
+    /// Waits until every output has taken the card, after [`Release::close`]. Gives a note back where one that nobody sees
+    /// live has not yet.
+    ///
+    /// # Errors
+    /// One may still show a picture.
+    pub fn wait_covered(&self) -> Result<Option<String>, NotCovered> {
+        let (to, take) = mpsc::sync_channel(1);
+        // A run that has ended shows nothing.
+        let asked = self.ask.send(Asked::Covered(to, Instant::now() + PATIENCE));
+        let uncovered = match asked.map(|()| take.recv_timeout(2 * PATIENCE)) {
+            Ok(Ok(uncovered)) => uncovered,
+            Ok(Err(RecvTimeoutError::Timeout)) => return Err(NotCovered::Unknown),
+            Ok(Err(RecvTimeoutError::Disconnected)) | Err(_) => Vec::new(),
+        };
+        let names = |is_live: bool| {
+            let names = uncovered.iter().filter(|left| left.is_live == is_live).map(|left| left.output.as_str());
+            names.collect::<Vec<_>>().join(", ")
+        };
+        match [names(true), names(false)] {
+            [live, _] if !live.is_empty() => Err(NotCovered::Live(live)),
+            [_, others] if !others.is_empty() => Ok(Some(format!("{others}: busy, so the card comes there later"))),
+            _ => Ok(None),
+        }
     }
 }
 

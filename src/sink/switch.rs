@@ -3,25 +3,28 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use super::{Ending, Sink, SinkError};
+use super::output_thread::{Backpressure, Outcome, OutputThread, Pictures};
+use super::{Counter, Ending, Sink, SinkError, Uncovered};
 use crate::frame::ColorImage;
-use crate::stats::NodeUse;
+use crate::stats::{NodeUse, OutputUse};
 
-/// A sink of members that others add and remove by its [`Switchboard`]. One that fails, or whose reader has gone, is
-/// taken out, and the others go on.
+/// A sink of members that others add and remove by its [`Switchboard`], each with a thread of its own, so that none waits
+/// for another. One that fails, or whose reader has gone, is taken out, and the others go on.
 ///
-/// A member that is taken out is completed on a thread of its own, since that may take seconds. What people recorded
+/// What people recorded
 /// is theirs however the run ends: without [`Sink::finish`], the members are completed when this is dropped.
 pub struct Switch {
     name: String,
-    members: Vec<Member>,
+    /// With the names that they were added by.
+    members: Vec<(String, OutputThread)>,
     asked: Receiver<Asked>,
-    ending: Vec<JoinHandle<Result<(), SinkError>>>,
-    /// How long there was no picture, by the times that [`Sink::hold`] gave.
-    silent: Duration,
+    /// Those that are being completed.
+    ending: Vec<OutputThread>,
+    pictures: Pictures,
+    captured_ns: u64,
+    frames: Vec<Counter<OutputUse>>,
 }
 
 /// Adds members to a [`Switch`] and removes them, from any thread. Both come about with the next frame, or after a
@@ -48,12 +51,12 @@ pub enum Fate {
     Began,
     /// It is whole.
     Completed {
-        /// Frames that it was given.
+        /// Frames that it took.
         frames: u64,
     },
     /// It was given up.
     Failed {
-        /// Frames that it was given.
+        /// Frames that it took.
         frames: u64,
         /// Why: one line.
         why: String,
@@ -68,7 +71,7 @@ pub struct Over;
 type Tell = Arc<dyn Fn(Notice) + Send + Sync>;
 
 enum Asked {
-    Add(Member),
+    Add(Joining),
     Remove(String),
 }
 
@@ -80,114 +83,120 @@ impl Switch {
     /// life, among others on the thread that frames are on: it must be quick.
     pub fn new(name: &str, tell: impl Fn(Notice) + Send + Sync + 'static) -> (Self, Switchboard) {
         let (to, asked) = mpsc::channel();
-        let switch = Self { name: name.into(), members: Vec::new(), asked, ending: Vec::new(), silent: Duration::ZERO };
+        let switch = Self {
+            name: name.into(),
+            members: Vec::new(),
+            asked,
+            ending: Vec::new(),
+            pictures: Pictures::default(),
+            captured_ns: 0,
+            frames: Vec::new(),
+        };
         (switch, Switchboard { to, tell: Arc::new(tell) })
     }
 
-    /// Adds and removes members as was asked by a [`Switchboard`] since the last call.
+    /// Adds and removes members as was asked by a [`Switchboard`] since the last call, and forgets those that have ended.
     fn take_orders(&mut self) {
         while let Ok(asked) = self.asked.try_recv() {
             let name = match &asked {
                 Asked::Add(member) => &member.life.name,
                 Asked::Remove(name) => name,
             };
-            if let Some(at) = self.members.iter().position(|member| member.life.name == *name) {
-                self.take_out(at, Ok(Ending::Whole));
+            if let Some(at) = self.members.iter().position(|(member, _)| member == name) {
+                self.take_out(at, Ending::Whole);
             }
-            if let Asked::Add(member) = asked {
-                member.life.tell(Fate::Began);
-                self.members.push(member);
+            if let Asked::Add(Joining { sink, life }) = asked {
+                self.add(sink, life);
             }
         }
+        self.members.retain_mut(|(_, output)| output.outcome().is_none());
     }
 
-    /// Calls `give` for each member, and takes out those that fail or whose reader has gone.
-    fn each<T>(&mut self, mut give: impl FnMut(&mut Member) -> Result<ControlFlow<(), T>, SinkError>) {
-        let mut at = 0;
-        while at < self.members.len() {
-            match give(&mut self.members[at]) {
-                Ok(ControlFlow::Continue(_)) => at += 1,
-                Ok(ControlFlow::Break(())) => self.take_out(at, Ok(Ending::Whole)),
-                Err(error) => self.take_out(at, Err(error)),
-            }
+    fn add(&mut self, sink: Box<dyn Sink>, life: Life) {
+        let name = life.name.clone();
+        life.tell(Fate::Began);
+        // If no thread can be started, sink and life are dropped, which tells that the member was given up.
+        let started =
+            OutputThread::start(sink, Backpressure::DropOldest, |frames, outcome| life.ended(frames, outcome));
+        if let Ok(output) = started {
+            self.frames.push(output.counter());
+            self.members.push((name, output));
         }
     }
 
     /// Gives a picture to each member.
-    fn give(&mut self, mut give: impl FnMut(&mut dyn Sink) -> Result<ControlFlow<()>, SinkError>) {
+    fn give(&mut self, frame: &ColorImage, time_ns: u64, is_card: bool) {
         self.take_orders();
-        self.silent = Duration::ZERO;
-        self.each(|member| {
-            let flow = give(&mut *member.sink)?;
-            member.life.frames += u64::from(flow.is_continue());
-            Ok(flow)
-        });
+        if self.members.is_empty() {
+            return;
+        }
+        let picture = self.pictures.share(frame, time_ns, self.captured_ns, is_card);
+        for (_, output) in &mut self.members {
+            // It never waits.
+            output.send(Arc::clone(&picture), Duration::ZERO);
+        }
     }
 
-    /// Completes a member, or drops one that has failed, on a thread of its own.
-    fn take_out(&mut self, at: usize, ending: Result<Ending, SinkError>) {
-        let Member { sink, life } = self.members.remove(at);
-        let end = move || match ending {
-            Err(error) => {
-                drop(sink);
-                life.failed(&error.to_string());
-                Ok(())
-            }
-            Ok(ending) => life.ended(sink.finish(ending)),
-        };
-        // If no thread can be started, sink and life are dropped, which tells that the member was given up.
-        self.ending.extend(thread::Builder::new().name("output".into()).spawn(end));
+    /// Completes a member, on its thread.
+    fn take_out(&mut self, at: usize, ending: Ending) {
+        let (_, mut output) = self.members.remove(at);
+        output.close(ending);
+        self.ending.push(output);
     }
 
     /// Takes out all members, and waits until they are completed, which they are in parallel.
     fn end(&mut self, ending: Ending) -> Result<(), SinkError> {
         self.take_orders();
         while !self.members.is_empty() {
-            self.take_out(0, Ok(ending));
+            self.take_out(0, ending);
         }
-        // A panic was told when its thread dropped the member's life.
-        let ended: Vec<_> = self.ending.drain(..).flat_map(JoinHandle::join).collect();
-        ended.into_iter().collect()
+        let ended: Vec<_> = self.ending.drain(..).map(OutputThread::join).collect();
+        // One that failed while it ran was told, and is its own affair.
+        let errors = ended.into_iter().filter_map(|outcome| match outcome {
+            Outcome::Ended(ended) => ended.err(),
+            Outcome::Failed(_) => None,
+        });
+        errors.into_iter().next().map_or(Ok(()), Err)
     }
 }
 
 impl Sink for Switch {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.give(|sink| sink.put(frame, time_ns));
+        self.give(frame, time_ns, false);
         Ok(ControlFlow::Continue(()))
     }
 
     fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        self.give(|sink| sink.cover(card, time_ns));
+        self.give(card, time_ns, true);
         Ok(ControlFlow::Continue(()))
     }
 
     fn captured(&mut self, captured_ns: u64) {
-        self.members.iter_mut().for_each(|member| member.sink.captured(captured_ns));
+        self.captured_ns = captured_ns;
+    }
+
+    fn uncovered(&self) -> Vec<Uncovered> {
+        self.members.iter().filter_map(|(_, output)| output.uncovered()).collect()
     }
 
     /// Of the members that there are now.
-    fn nodes(&self) -> Vec<NodeUse> {
-        self.members.iter().flat_map(|member| member.sink.nodes()).collect()
+    fn nodes(&self) -> Vec<Counter<NodeUse>> {
+        self.members.iter().flat_map(|(_, output)| output.nodes()).cloned().collect()
     }
 
-    /// Until the first member is due, but never longer than a tick: requests must be seen.
+    /// Of all members that there were.
+    fn outputs(&self) -> Vec<Counter<OutputUse>> {
+        self.frames.clone()
+    }
+
+    /// Requests must be seen. The members repeat their pictures themselves.
     fn hold(&self) -> Option<Duration> {
-        let due = self.members.iter().filter_map(|member| member.sink.hold()).min();
-        Some(due.map_or(TICK, |due| due.saturating_sub(self.silent).min(TICK)))
+        Some(TICK)
     }
 
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
-        // Called once that has passed.
-        self.silent += self.hold().unwrap_or_default();
         self.take_orders();
-        let due = self.members.iter().filter_map(|member| member.sink.hold()).min();
-        let shown = due.is_some_and(|due| due <= self.silent);
-        if shown {
-            self.silent = Duration::ZERO;
-            self.each(|member| member.sink.repeat());
-        }
-        Ok(ControlFlow::Continue(shown))
+        Ok(ControlFlow::Continue(false))
     }
 
     fn pass_by(&mut self) {
@@ -222,8 +231,8 @@ impl Switchboard {
     /// # Errors
     /// The run is over: the sink was given up, which is told as well.
     pub fn add(&self, name: &str, sink: Box<dyn Sink>) -> Result<(), Over> {
-        let life = Life { name: name.into(), frames: 0, over: false, tell: Arc::clone(&self.tell) };
-        self.to.send(Asked::Add(Member { sink, life })).map_err(|_| Over)
+        let life = Life { name: name.into(), over: false, tell: Arc::clone(&self.tell) };
+        self.to.send(Asked::Add(Joining { sink, life })).map_err(|_| Over)
     }
 
     /// Takes the member of this name out and completes it; nothing where there is none.
@@ -233,8 +242,8 @@ impl Switchboard {
     }
 }
 
-/// A sink among others. Dropped in this order: given up, then told.
-struct Member {
+/// A sink on its way in. Dropped in this order: given up, then told.
+struct Joining {
     sink: Box<dyn Sink>,
     life: Life,
 }
@@ -242,7 +251,6 @@ struct Member {
 /// Tells what becomes of a member, in any case.
 struct Life {
     name: String,
-    frames: u64,
     /// Whether its end was told.
     over: bool,
     tell: Tell,
@@ -253,28 +261,20 @@ impl Life {
         (self.tell)(Notice { member: self.name.clone(), fate });
     }
 
-    fn failed(mut self, why: &str) {
+    /// Tells how a member ended that took so many frames.
+    fn ended(mut self, frames: u64, outcome: &Outcome) {
         self.over = true;
-        self.tell(Fate::Failed { frames: self.frames, why: why.into() });
-    }
-
-    /// Tells how completing the member went, and gives that back.
-    fn ended(mut self, ended: Result<(), SinkError>) -> Result<(), SinkError> {
-        match &ended {
-            Ok(()) => {
-                self.over = true;
-                self.tell(Fate::Completed { frames: self.frames });
-            }
-            Err(error) => self.failed(&error.to_string()),
-        }
-        ended
+        self.tell(match outcome {
+            Outcome::Ended(Ok(())) => Fate::Completed { frames },
+            Outcome::Failed(error) | Outcome::Ended(Err(error)) => Fate::Failed { frames, why: error.to_string() },
+        });
     }
 }
 
 impl Drop for Life {
     fn drop(&mut self) {
         if !self.over {
-            self.tell(Fate::Failed { frames: self.frames, why: "it was given up".into() });
+            self.tell(Fate::Failed { frames: 0, why: "it was given up".into() });
         }
     }
 }

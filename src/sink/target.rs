@@ -11,7 +11,7 @@ use super::Loopback;
 #[cfg(feature = "pipewire")]
 use super::PipeWire;
 use super::{Ffmpeg, Null, Options, PngFolder, Sink, SinkError, Y4m, Y4mFile};
-use crate::files::place;
+use crate::files::{folder, place};
 
 /// How the name of a camera of PipeWire's begins.
 const PIPEWIRE: &str = "pipewire";
@@ -33,7 +33,7 @@ pub enum Target {
     PipeWire(Option<String>),
     /// `window`: seen on the screen.
     Window,
-    /// `DIR/`, or any other name without an extension: numbered PNG files.
+    /// `DIR/`, or an existing folder that we wrote: numbered PNG files.
     Folder(PathBuf),
 }
 
@@ -44,7 +44,7 @@ impl FromStr for Target {
         let path = PathBuf::from(name);
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match (name, extension.as_deref()) {
-            ("", _) => Err(SinkError::Target { name: name.into() }),
+            ("", _) => Err(SinkError::Target { name: name.into(), near: None }),
             ("null", _) => Ok(Self::Null),
             ("-", _) => Ok(Self::Stdout),
             ("window", _) => Ok(Self::Window),
@@ -54,14 +54,30 @@ impl FromStr for Target {
                 is_label.then(|| Self::PipeWire(Some(label.to_owned()))).ok_or(SinkError::NoLabel)
             }
             _ if is_device(&path) => Ok(Self::Device(path)),
-            _ if name.ends_with('/') => Ok(Self::Folder(path)),
+            _ if name.ends_with('/') || folder::is_ours(&path) => Ok(Self::Folder(path)),
             (_, Some("y4m")) => Ok(Self::Y4m(path)),
             (_, Some("mp4" | "mkv" | "webm")) => Ok(Self::Video(path)),
-            (_, None) => Ok(Self::Folder(path)),
-            _ if path.is_dir() => Ok(Self::Folder(path)),
-            _ => Err(SinkError::Target { name: name.into() }),
+            // Not a folder just because it is nothing else: a slip in the name of a camera would fill the disk.
+            _ if path.is_dir() => Err(SinkError::NoSlash { name: name.into() }),
+            _ => Err(SinkError::Target { name: name.into(), near: near(name) }),
         }
     }
+}
+
+/// Least Jaro-Winkler similarity (0 to 1) of a name that is suggested: one or two slips in a word of usual length.
+const SIMILAR: f64 = 0.8;
+
+/// The sink that `name` may have been meant for.
+fn near(name: &str) -> Option<String> {
+    let number = name.trim_start_matches("/dev/").trim_start_matches("video");
+    if !number.is_empty() && number.bytes().all(|digit| digit.is_ascii_digit()) {
+        return Some(format!("/dev/video{number}"));
+    }
+    let (word, label) = name.find(':').map_or((name, ""), |at| name.split_at(at));
+    let similar = |sink: &str| strsim::jaro_winkler(&word.to_lowercase(), sink);
+    let rated = [PIPEWIRE, "window", "null"].map(|sink| (similar(sink), sink)).into_iter();
+    let near = rated.filter(|(similar, _)| *similar >= SIMILAR).max_by(|a, b| a.0.total_cmp(&b.0));
+    near.map(|(_, sink)| format!("{sink}{label}"))
 }
 
 /// Whether this is a character device, or the name of a video device that is not there yet.

@@ -1,134 +1,163 @@
 //! Several sinks as one.
 
 use std::ops::ControlFlow;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use super::{Ending, Sink, SinkError};
-use crate::frame::{ColorImage, YuyvImage};
-use crate::stats::NodeUse;
+use super::output_thread::{Backpressure, Outcome, OutputThread, Pictures};
+use super::{Counter, Ending, Sink, SinkError, Uncovered};
+use crate::frame::ColorImage;
+use crate::stats::{NodeUse, OutputUse};
 
-/// Gives every frame to each of its sinks, in turn. One whose reader has gone is completed and removed; once all are,
-/// [`Sink::put`] says `Break`. One that fails is removed, too, which is logged, and its error is returned at the end;
-/// the error of a live one is returned at once, which ends the run.
+/// Gives every frame to each of its sinks, which have a thread each, so that none waits for another one in real time.
+/// One whose reader has gone is completed and removed; once all are, [`Sink::put`] says `Break`. One that fails is
+/// removed, too, which is logged, and its error is returned at the end; the error of a live one is returned at once,
+/// which ends the run.
 pub struct Tee {
-    sinks: Vec<Named>,
+    outputs: Vec<OutputThread>,
     name: String,
+    backpressure: Backpressure,
+    /// Whether pictures are kept away: then nobody waits for one that has no room.
+    closed: Arc<AtomicBool>,
+    pictures: Pictures,
+    captured_ns: u64,
     /// The error of the first one that failed.
     failed: Option<SinkError>,
+    frames: Vec<Counter<OutputUse>>,
+    nodes: Vec<Counter<NodeUse>>,
 }
 
-/// A sink, and what it calls itself.
-type Named = (String, Box<dyn Sink>);
-
-type Flow = Result<ControlFlow<(), bool>, SinkError>;
+/// How often it is looked whether an output has ended, and for room where frames wait for it.
+const TICK: Duration = Duration::from_millis(50);
 
 impl Tee {
-    /// One sink of several.
-    pub fn new(sinks: Vec<Box<dyn Sink>>) -> Self {
-        let names: Vec<String> = sinks.iter().map(|sink| sink.describe()).collect();
-        let name = names.join(", ");
-        Self { sinks: names.into_iter().zip(sinks).collect(), name, failed: None }
+    /// One sink of several. With [`Backpressure::Block`] those that are not live get every frame, unless `closed` says that
+    /// pictures are kept away.
+    ///
+    /// # Errors
+    /// The system gives no threads; the sinks are given up.
+    pub fn new(
+        sinks: Vec<Box<dyn Sink>>,
+        backpressure: Backpressure,
+        closed: Arc<AtomicBool>,
+    ) -> Result<Self, SinkError> {
+        let start = |sink: Box<dyn Sink>| {
+            // What people see as it comes waits for nothing.
+            let own = if sink.is_live() { Backpressure::DropOldest } else { backpressure };
+            let name = sink.describe();
+            OutputThread::start(sink, own, |_, _| {}).map_err(|cause| SinkError::Thread { sink: name, cause })
+        };
+        let mut outputs = sinks.into_iter().map(start).collect::<Result<Vec<_>, _>>()?;
+        let name = outputs.iter().map(|output| output.name.as_str()).collect::<Vec<_>>().join(", ");
+        // Those that never wait come first.
+        outputs.sort_by_key(|output| !output.is_live);
+        Ok(Self {
+            name,
+            frames: outputs.iter().map(OutputThread::counter).collect(),
+            nodes: outputs.iter().flat_map(OutputThread::nodes).cloned().collect(),
+            outputs,
+            backpressure,
+            closed,
+            pictures: Pictures::default(),
+            captured_ns: 0,
+            failed: None,
+        })
     }
 
-    /// Calls `give` for each sink, and removes those that fail or whose reader has gone. `Continue` says whether any of
-    /// them showed something.
-    fn each(&mut self, mut give: impl FnMut(&mut dyn Sink) -> Flow) -> Flow {
-        let (mut at, mut any) = (0, false);
-        while at < self.sinks.len() {
-            let (name, sink) = &mut self.sinks[at];
-            let is_live = sink.hold().is_some();
-            match guarded(name, || give(&mut **sink)) {
-                Ok(ControlFlow::Continue(shown)) => {
-                    any |= shown;
-                    at += 1;
+    /// Hands a picture to each output.
+    fn give(&mut self, frame: &ColorImage, time_ns: u64, is_card: bool) -> Result<ControlFlow<()>, SinkError> {
+        let picture = self.pictures.share(frame, time_ns, self.captured_ns, is_card);
+        for output in &mut self.outputs {
+            let mut left = output.send(Arc::clone(&picture), TICK);
+            while let Some(picture) = left {
+                if self.closed.load(Ordering::Acquire) {
+                    output.lose();
+                    break;
                 }
-                Ok(ControlFlow::Break(())) => {
-                    if let Err(error) = end(self.sinks.remove(at), Ending::Whole) {
-                        self.note_failure(error);
-                    }
-                }
-                Err(error) => {
-                    // Not finished: a sink that fails has kept its output itself.
-                    drop(self.sinks.remove(at));
-                    if is_live {
-                        return Err(error);
-                    }
-                    self.note_failure(error);
-                }
+                left = output.send(picture, TICK);
             }
         }
-        match self.failed.take_if(|_| self.sinks.is_empty()) {
+        self.look()
+    }
+
+    /// Removes outputs that have ended. `Break` where none takes frames any more.
+    fn look(&mut self) -> Result<ControlFlow<()>, SinkError> {
+        let mut at = 0;
+        while at < self.outputs.len() {
+            let Some(outcome) = self.outputs[at].outcome() else {
+                at += 1;
+                continue;
+            };
+            let is_live = self.outputs.remove(at).is_live;
+            match outcome {
+                Outcome::Failed(error) if is_live => return Err(error),
+                outcome => self.note(outcome.error()),
+            }
+        }
+        if self.outputs.iter().any(OutputThread::is_open) {
+            return Ok(ControlFlow::Continue(()));
+        }
+        match self.failed.take_if(|_| self.outputs.is_empty()) {
             Some(error) => Err(error),
-            None if self.sinks.is_empty() => Ok(ControlFlow::Break(())),
-            None => Ok(ControlFlow::Continue(any)),
+            None => Ok(ControlFlow::Break(())),
         }
     }
 
     /// Logs an error while other sinks go on, and keeps the first one for the end.
-    fn note_failure(&mut self, error: SinkError) {
-        if !self.sinks.is_empty() {
+    fn note(&mut self, error: Option<SinkError>) {
+        let Some(error) = error else { return };
+        if !self.outputs.is_empty() {
             tracing::error!("{error}; going on without it");
         }
         self.failed.get_or_insert(error);
     }
 }
 
-fn end((name, sink): Named, ending: Ending) -> Result<(), SinkError> {
-    guarded(&name, || sink.finish(ending))
-}
-
-/// Makes an error of a panic, so that the other sinks can go on.
-fn guarded<T>(name: &str, call: impl FnOnce() -> Result<T, SinkError>) -> Result<T, SinkError> {
-    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
-        Err(SinkError::Panic { sink: name.into(), what: text.unwrap_or("no reason given").into() })
-    })
-}
-
 impl Sink for Tee {
     fn put(&mut self, frame: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        let flow = self.each(|sink| Ok(sink.put(frame, time_ns)?.map_continue(|()| true)))?;
-        Ok(flow.map_continue(|_| ()))
+        self.give(frame, time_ns, false)
     }
 
     fn cover(&mut self, card: &ColorImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        let flow = self.each(|sink| Ok(sink.cover(card, time_ns)?.map_continue(|()| true)))?;
-        Ok(flow.map_continue(|_| ()))
-    }
-
-    /// Whoever is given YUYV may keep its memory, so there can be only one.
-    fn wants_yuyv(&mut self) -> bool {
-        let [(_, only)] = &mut self.sinks[..] else { return false };
-        only.wants_yuyv()
-    }
-
-    fn put_yuyv(&mut self, frame: &mut YuyvImage, time_ns: u64) -> Result<ControlFlow<()>, SinkError> {
-        let flow = self.each(|sink| Ok(sink.put_yuyv(frame, time_ns)?.map_continue(|()| true)))?;
-        Ok(flow.map_continue(|_| ()))
+        self.give(card, time_ns, true)
     }
 
     fn captured(&mut self, captured_ns: u64) {
-        self.sinks.iter_mut().for_each(|(_, sink)| sink.captured(captured_ns));
+        self.captured_ns = captured_ns;
     }
 
-    fn nodes(&self) -> Vec<NodeUse> {
-        self.sinks.iter().flat_map(|(_, sink)| sink.nodes()).collect()
+    fn is_live(&self) -> bool {
+        self.outputs.iter().any(|output| output.is_live)
     }
 
+    fn uncovered(&self) -> Vec<Uncovered> {
+        self.outputs.iter().filter_map(OutputThread::uncovered).collect()
+    }
+
+    fn nodes(&self) -> Vec<Counter<NodeUse>> {
+        self.nodes.clone()
+    }
+
+    fn outputs(&self) -> Vec<Counter<OutputUse>> {
+        self.frames.clone()
+    }
+
+    /// The outputs repeat their pictures themselves; what is to be noticed is that they end.
     fn hold(&self) -> Option<Duration> {
-        self.sinks.iter().filter_map(|(_, sink)| sink.hold()).min()
+        (self.backpressure == Backpressure::DropOldest || self.is_live()).then_some(TICK)
     }
 
     fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
-        self.each(|sink| sink.repeat())
+        Ok(self.look()?.map_continue(|()| false))
     }
 
     /// Completes them all, also after one could not be: the first error of all is told.
     fn finish(self: Box<Self>, ending: Ending) -> Result<(), SinkError> {
-        let Self { sinks, failed, .. } = *self;
-        let ended: Vec<_> = sinks.into_iter().map(|sink| end(sink, ending)).collect();
-        failed.map(Err).into_iter().chain(ended).collect()
+        let Self { mut outputs, failed, .. } = *self;
+        outputs.iter_mut().for_each(|output| output.close(ending));
+        let ended: Vec<_> = outputs.into_iter().map(|output| output.join().error()).collect();
+        failed.into_iter().chain(ended.into_iter().flatten()).next().map_or(Ok(()), Err)
     }
 
     fn describe(&self) -> String {
@@ -137,145 +166,4 @@ impl Sink for Tee {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::io;
-    use std::sync::{Arc, Mutex};
-
-    use super::*;
-
-    /// Writes down what is asked of it.
-    struct Witness {
-        name: &'static str,
-        log: Arc<Mutex<Vec<String>>>,
-        hold_ms: Option<u64>,
-        /// Frames until its reader goes.
-        wants: usize,
-        breaks_down: bool,
-    }
-
-    impl Witness {
-        fn note(&self, what: &str) {
-            self.log.lock().unwrap().push(format!("{} {what}", self.name));
-        }
-
-        fn end(&self) -> Result<(), SinkError> {
-            if self.breaks_down { Err(SinkError::write(self.name.as_ref())(io::Error::other("full"))) } else { Ok(()) }
-        }
-    }
-
-    impl Sink for Witness {
-        fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-            self.note("put");
-            self.wants -= 1;
-            Ok(if self.wants == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
-        }
-
-        fn hold(&self) -> Option<Duration> {
-            self.hold_ms.map(Duration::from_millis)
-        }
-
-        fn repeat(&mut self) -> Result<ControlFlow<(), bool>, SinkError> {
-            self.note("repeat");
-            Ok(ControlFlow::Continue(self.hold_ms.is_some()))
-        }
-
-        fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-            self.note("finish");
-            self.end()
-        }
-
-        fn describe(&self) -> String {
-            self.name.into()
-        }
-    }
-
-    fn tee(log: &Arc<Mutex<Vec<String>>>, sinks: [(&'static str, Option<u64>, usize, bool); 2]) -> Box<Tee> {
-        let sinks = sinks.map(|(name, hold_ms, wants, breaks_down)| {
-            Box::new(Witness { name, log: Arc::clone(log), hold_ms, wants, breaks_down }) as Box<dyn Sink>
-        });
-        Box::new(Tee::new(sinks.into()))
-    }
-
-    #[test]
-    fn a_sink_whose_reader_goes_is_left_out_and_the_last_ends_it() {
-        let log = Arc::default();
-        let mut tee = tee(&log, [("a", None, 1, false), ("b", Some(50), 2, false)]);
-        assert_eq!((tee.describe().as_str(), tee.hold()), ("a, b", Some(Duration::from_millis(50))));
-        let frame = ColorImage::new(2, 2);
-        assert!(tee.put(&frame, 0).unwrap().is_continue());
-        assert_eq!(tee.repeat().unwrap(), ControlFlow::Continue(true));
-        assert!(tee.put(&frame, 0).unwrap().is_break());
-        assert_eq!(tee.hold(), None);
-        tee.finish(Ending::Whole).unwrap();
-        assert_eq!(*log.lock().unwrap(), ["a put", "a finish", "b put", "b repeat", "b put", "b finish"]);
-    }
-
-    /// Wants YUYV, and nothing else.
-    struct Camera;
-
-    impl Sink for Camera {
-        fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-            panic!("it wanted YUYV")
-        }
-        fn wants_yuyv(&mut self) -> bool {
-            true
-        }
-        fn put_yuyv(&mut self, frame: &mut YuyvImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-            frame.bytes.clear();
-            Ok(ControlFlow::Continue(()))
-        }
-    }
-
-    #[test]
-    fn only_one_alone_is_given_yuyv() {
-        let mut frame = YuyvImage::default();
-        frame.resize(2, 2);
-        let mut alone = Tee::new(vec![Box::new(Camera)]);
-        assert!(alone.wants_yuyv() && alone.put_yuyv(&mut frame, 0).unwrap().is_continue());
-        assert!(frame.bytes.is_empty());
-        assert!(!Tee::new(vec![Box::new(Camera), Box::new(Camera)]).wants_yuyv());
-        assert!(!Tee::new(vec![Box::new(Broken(None))]).wants_yuyv(), "nobody does who does not say so");
-        assert!(matches!(Broken(None).put_yuyv(&mut frame, 0), Err(SinkError::Yuyv)));
-    }
-
-    #[test]
-    fn all_are_completed_and_the_first_error_is_told() {
-        let log = Arc::default();
-        let broken = tee(&log, [("a", Some(200), 9, true), ("b", Some(100), 9, true)]);
-        assert_eq!(broken.hold(), Some(Duration::from_millis(100)));
-        assert_eq!(broken.finish(Ending::Whole).unwrap_err().to_string(), "cannot write a: full");
-        assert_eq!(*log.lock().unwrap(), ["a finish", "b finish"]);
-    }
-
-    /// Fails at once; live, if it is one.
-    struct Broken(Option<Duration>);
-
-    impl Sink for Broken {
-        fn put(&mut self, _: &ColorImage, _: u64) -> Result<ControlFlow<()>, SinkError> {
-            Err(SinkError::write("broken".as_ref())(io::Error::other("gone")))
-        }
-        fn hold(&self) -> Option<Duration> {
-            self.0
-        }
-        fn finish(self: Box<Self>, _: Ending) -> Result<(), SinkError> {
-            panic!("it has failed")
-        }
-        fn describe(&self) -> String {
-            "broken".into()
-        }
-    }
-
-    #[test]
-    fn one_that_fails_is_left_out_unless_it_is_live_and_is_an_error_in_the_end() {
-        for (hold, ends) in [(None, false), (Some(Duration::from_millis(50)), true)] {
-            let log: Arc<Mutex<Vec<String>>> = Arc::default();
-            let good = Witness { name: "a", log: Arc::clone(&log), hold_ms: None, wants: 9, breaks_down: false };
-            let mut tee = Box::new(Tee::new(vec![Box::new(Broken(hold)), Box::new(good)]));
-            let frame = ColorImage::new(2, 2);
-            assert_eq!(tee.put(&frame, 0).is_err(), ends);
-            assert_eq!(tee.finish(Ending::Cut).is_err(), !ends, "what ended the run was told");
-            let expected: &[&str] = if ends { &["a finish"] } else { &["a put", "a finish"] };
-            assert_eq!(*log.lock().unwrap(), expected);
-        }
-    }
-}
+mod tests;

@@ -1,3 +1,5 @@
+//! What became of the pictures in each of several outputs.
+
 use std::fmt;
 
 use serde::Serialize;
@@ -33,5 +35,27 @@ impl fmt::Display for NodeUse {
             (self.returns, "returns of PipeWire"),
         ];
         others.iter().filter(|(count, _)| *count > 0).try_for_each(|(count, what)| write!(f, ", {count} {what}"))
+    }
+}
+
+/// What one of several outputs did with the frames that were delivered: each was taken, or lost; the last one may be on its
+/// way.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct OutputUse {
+    /// What it is, and where.
+    pub output: String,
+    /// Frames that it took, the still card included.
+    pub frames: u64,
+    /// Times that it was given its last picture again, because no new one came.
+    pub repeats: u64,
+    /// Frames that a newer one overtook while it was busy with those before.
+    pub lost: u64,
+}
+
+impl fmt::Display for OutputUse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { output, frames, lost, .. } = self;
+        write!(f, "{output}: {frames} frames")?;
+        if *lost > 0 { write!(f, ", {lost} lost as it was busy with those before") } else { Ok(()) }
     }
 }

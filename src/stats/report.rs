@@ -5,7 +5,7 @@ use std::io;
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::{Frames, Histogram, NodeUse, Timings};
+use super::{Frames, Histogram, NodeUse, OutputUse, Timings};
 
 /// What a run was made of, after all defaults were resolved.
 #[derive(Clone, Debug, Default)]
@@ -28,6 +28,8 @@ pub struct About {
     pub elapsed_ns: u64,
     /// Processor time that the program used meanwhile.
     pub cpu_ns: u64,
+    /// The outputs, where there were several.
+    pub outputs: Vec<OutputUse>,
     /// Cameras that were given to PipeWire.
     pub pipewire: Vec<NodeUse>,
 }
@@ -69,6 +71,9 @@ pub struct Report {
     pub elapsed_s: f64,
     /// Processor time that the program used meanwhile, all threads together, in seconds.
     pub cpu_s: f64,
+    /// What each of several outputs did with the frames.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<OutputUse>,
     /// What became of the pictures in cameras that were given to PipeWire.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pipewire: Vec<NodeUse>,
@@ -180,7 +185,7 @@ impl Report {
             budget_ms: ms(about.budget_ns),
             misses: timings.misses,
             depth_held: timings.held,
-            repeats: timings.repeats,
+            repeats: timings.repeats + about.outputs.iter().map(|output| output.repeats).sum::<u64>(),
             backend: about.backend,
             adapter: about.adapter,
             refined_by: about.refined_by,
@@ -189,6 +194,7 @@ impl Report {
             sink: about.sink,
             elapsed_s: ms(about.elapsed_ns) / 1000.0,
             cpu_s: ms(about.cpu_ns) / 1000.0,
+            outputs: about.outputs,
             pipewire: about.pipewire,
             window: None,
             versions: Versions {
@@ -266,6 +272,10 @@ impl fmt::Display for Report {
         }
         if self.depth_held > 0 {
             write!(f, "\ndepth: {} frames took over that of an earlier one, to save time", self.depth_held)?;
+        }
+        // Which of several took less than was delivered.
+        for output in self.outputs.iter().filter(|output| output.lost > 0) {
+            write!(f, "\n{output}")?;
         }
         for node in &self.pipewire {
             write!(f, "\n{node}")?;

@@ -52,6 +52,7 @@ impl Heard {
             wanted: Arc::default(),
             demand: demand.clone(),
             off: Arc::default(),
+            release: Arc::default(),
         };
         let session = Session::begin(start, Arc::new(|| {})).unwrap();
         let (told, blurred) = (Vec::new(), Vec::new());

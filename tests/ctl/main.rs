@@ -1,6 +1,7 @@
 //! `bokehcam ctl` against streams that run: what goes out changes, nobody else is listened to, and nobody holds it up.
 #![allow(missing_docs)]
 
+mod outputs;
 mod refusals;
 mod runs;
 mod world;

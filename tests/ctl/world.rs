@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -179,14 +179,14 @@ pub struct Pictures(Arc<Mutex<Seen>>);
 type Seen = (Vec<(Instant, bool)>, Option<Picture>);
 
 impl Pictures {
-    fn of(from: ChildStdout) -> Self {
+    pub fn of(from: impl Read + Send + 'static) -> Self {
         let pictures = Self(Arc::default());
         let seen = pictures.clone();
         thread::spawn(move || seen.read(from));
         pictures
     }
 
-    fn read(&self, from: ChildStdout) {
+    fn read(&self, from: impl Read) {
         let mut from = BufReader::new(from);
         let mut header = String::new();
         from.read_line(&mut header).unwrap();

@@ -166,7 +166,8 @@ fn of_several_sinks_the_good_ones_go_on_to_the_end() {
     for trouble in [Trouble::fails_at(2), Trouble::panics_at(2)] {
         let (good, bad) = (Received::default(), Received::default());
         let sinks: Vec<Box<dyn Sink>> = vec![Box::new(fake(&bad, trouble)), Box::new(fake(&good, Trouble::default()))];
-        let failed = run(simple(Box::new(fake_camera(9)), Box::new(Tee::new(sinks)), &stop, Pace::Asap)).unwrap_err();
+        let tee = Tee::new(sinks, Backpressure::Block, Arc::default()).unwrap();
+        let failed = run(simple(Box::new(fake_camera(9)), Box::new(tee), &stop, Pace::Asap)).unwrap_err();
         assert!(matches!(failed.fault, Fault::Sink(_)), "{failed}");
         assert_eq!((bad.count(), good.count(), failed.report.frames.delivered), (2, 9, 9));
         assert_eq!((bad.ending(), good.ending()), (None, Some(Ending::Whole)));

@@ -218,6 +218,36 @@ impl Openings {
 
 #[test]
 #[ignore = "needs PipeWire (tests/pipewire/session)"]
+fn off_is_off_for_readers_while_another_output_hangs() {
+    folder();
+    let place = tempfile::tempdir().unwrap();
+    let video = place.path().join("call.mp4");
+    let player = Player::start("hung", &["--to", "pipewire:Hung", "--to", video.to_str().unwrap(), "--name", "hung"]);
+    let reader = GStreamer::start("hung", 1_000_000);
+    let known: Vec<Vec<u8>> = (0..PICTURES).map(|number| yuyv(&picture(number))).collect();
+    until("the reader's first pictures", || reader.frames().last().filter(|last| known.contains(last)).map(|_| ()));
+    let signal = |signal: &str, process: &str| Command::new("kill").args([signal, process]).status().unwrap();
+    let ffmpeg = player.child();
+    assert!(signal("-STOP", &ffmpeg).success());
+    let mut last = Vec::new();
+    for _ in 0..8 {
+        last = until("another picture", || reader.frames().pop().filter(|frame| *frame != last));
+    }
+    let off = Command::new(env!("CARGO_BIN_EXE_bokehcam")).args(["ctl", "--name", "hung", "off"]).output().unwrap();
+    let said = String::from_utf8_lossy(&off.stderr);
+    assert!(off.status.success() && said.contains("call.mp4: busy"), "{said}");
+    let before = reader.frames().len();
+    // What the reader was about to write when the answer came may be a picture still.
+    let after = until("more pictures", || Some(reader.frames()).filter(|frames| frames.len() > before + 4));
+    assert!(after[before + 2..].iter().all(|frame| !known.contains(frame) && *frame == after[before + 2]));
+    let stat = std::fs::read_to_string(format!("/proc/{ffmpeg}/stat")).unwrap();
+    assert!(stat.contains(" T "), "it still hangs: {stat}");
+    assert!(signal("-CONT", &ffmpeg).success());
+    player.end();
+}
+
+#[test]
+#[ignore = "needs PipeWire (tests/pipewire/session)"]
 fn the_source_is_read_only_while_somebody_watches() {
     folder();
     let player = Player::start("bokehcam", &["--to", "pipewire", "--on-demand"]);

@@ -114,15 +114,16 @@ fn a_picture_comes_to_the_reader_without_the_next_one() {
     });
     let (mut delays_ns, mut by_itself) = (Vec::new(), 0);
     while delays_ns.len() < PICTURES {
-        let before = sink.nodes().remove(0);
+        let count = sink.nodes().remove(0);
+        let before = count();
         let put_ns = put(&mut sink);
         // None comes after it, but for one that is shown again where this one is late.
         let delay_ns = until("the picture", || {
-            let now = sink.nodes().remove(0);
+            let now = count();
             let is_lost = now.overtaken + now.no_buffer > before.overtaken + before.no_buffer;
             reader.got(put_ns).map(Some).or(is_lost.then_some(None))
         });
-        by_itself += usize::from(sink.nodes()[0].repeats == before.repeats);
+        by_itself += usize::from(count().repeats == before.repeats);
         delays_ns.extend(delay_ns);
     }
     let times: Vec<u64> = reader.heard.iter().map(|told| told.0).collect();

@@ -176,6 +176,13 @@ impl Player {
         player
     }
 
+    /// The program that it has started.
+    pub fn child(&self) -> String {
+        let tasks = fs::read_dir(format!("/proc/{}/task", self.0.child.id())).unwrap().flatten();
+        let children = tasks.filter_map(|task| fs::read_to_string(task.path().join("children")).ok());
+        children.collect::<String>().split_whitespace().next().expect("a child").to_owned()
+    }
+
     /// Where the recording lies.
     pub fn pictures(&self) -> PathBuf {
         self.0.folder.path().join("recording/rgb")

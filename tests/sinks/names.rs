@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use bokehcam::sink::Target;
+use bokehcam::sink::{Ending, Target};
 
 use crate::{open, options};
 
@@ -13,18 +13,16 @@ fn names_become_sinks() {
         ("null", Target::Null),
         ("-", Target::Stdout),
         ("window", Target::Window),
-        ("./window", Target::Folder("./window".into())),
         ("window/", Target::Folder("window/".into())),
         ("out/", Target::Folder("out/".into())),
         ("clip.mp4/", Target::Folder("clip.mp4/".into())),
-        ("out", Target::Folder("out".into())),
         ("a/b.Y4M", Target::Y4m("a/b.Y4M".into())),
         ("b.mp4", Target::Video("b.mp4".into())),
         ("b.mkv", Target::Video("b.mkv".into())),
         ("b.webm", Target::Video("b.webm".into())),
         ("/dev/video10", Target::Device("/dev/video10".into())),
         ("/dev/null", Target::Device("/dev/null".into())),
-        ("/dev/shm/out", Target::Folder("/dev/shm/out".into())),
+        ("/dev/shm/out/", Target::Folder("/dev/shm/out/".into())),
         ("/dev/video10.mp4", Target::Video("/dev/video10.mp4".into())),
     ] {
         assert_eq!(name.parse::<Target>().unwrap(), target);
@@ -33,6 +31,35 @@ fn names_become_sinks() {
         let error = name.parse::<Target>().unwrap_err().to_string();
         assert!(error.contains(&format!("'{name}'")) && error.contains("FILE.y4m"), "{error}");
     }
+}
+
+/// A slip in the name of a camera must not fill the disk with pictures.
+#[test]
+fn what_is_nothing_else_is_no_folder_and_what_was_meant_is_said() {
+    for (name, meant) in [
+        ("pipwire", "pipewire"),
+        ("PipeWire", "pipewire"),
+        ("pipwire:Desk", "pipewire:Desk"),
+        ("video10", "/dev/video10"),
+        ("10", "/dev/video10"),
+        ("windw", "window"),
+        ("nul", "null"),
+    ] {
+        let error = name.parse::<Target>().unwrap_err().to_string();
+        assert!(error.starts_with(&format!("no sink '{name}' (did you mean {meant}?): ")), "{error}");
+    }
+    for name in ["out", "bokehcam", "a/b", "./window", "/dev/shm/out"] {
+        let error = name.parse::<Target>().unwrap_err().to_string();
+        assert!(error.starts_with(&format!("no sink '{name}': ")) && error.contains("with the slash"), "{error}");
+    }
+    // A folder that is there: by the slash, or if we wrote it.
+    let folder = tempfile::tempdir().unwrap();
+    let name = folder.path().to_str().unwrap().to_owned();
+    let error = name.parse::<Target>().unwrap_err().to_string();
+    assert!(error.contains("it is a folder") && error.contains(&format!("{name}/ (with")), "{error}");
+    let sink = open(&folder.path().join(""), &options((6, 4))).unwrap();
+    sink.finish(Ending::Whole).unwrap();
+    assert_eq!(name.parse::<Target>().unwrap(), Target::Folder(name.into()));
 }
 
 #[test]

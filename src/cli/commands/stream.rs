@@ -28,7 +28,7 @@ use crate::control::{Name, Status};
 use crate::link::demand::Demand;
 use crate::look::Strength;
 use crate::pipeline::{self, Changes, Pace, Run};
-use crate::sink::{self, Shutter, Target};
+use crate::sink::{self, Backpressure, Shutter, Target};
 use crate::source::{DepthChoice, DepthFrom, Source, SourceName};
 
 /// Blur a camera, a recording, the demonstration or the synthetic scene, frame by frame
@@ -143,7 +143,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
         ..sink::Options::new(info.size, info.period_ns)
     };
     sinks::try_report(stream.report.as_deref())?;
-    let sink = sinks::open(&command.to, &sink_options)?;
+    let backpressure = if pace == Pace::Realtime { Backpressure::DropOldest } else { Backpressure::Block };
+    let closed = Arc::default();
+    let sink = sinks::open(&command.to, &sink_options, backpressure, &closed)?;
 
     if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
         terminal::say(&format!("depth by {networks}"));
@@ -151,8 +153,9 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     if let Some(note) = command.source.note(&source).filter(|_| !global.quiet) {
         terminal::say(&note);
     }
-    if info.live && !global.quiet {
-        terminal::say(&format!("{}, to {}; Ctrl-C ends", info.name, sink.describe()));
+    if !global.quiet {
+        let ends = if info.live { "; Ctrl-C ends" } else { "" };
+        terminal::say(&format!("{}, to {}{ends}", info.name, sink.describe()));
     }
     if parts.blur.takes_whatever_depth() && !source.has_depth() {
         unused::warn_of_no_depth(unused::From::Source(command.source.kind()));
@@ -160,7 +163,7 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     let guidance = terminal::Guidance::new(source.guide, global);
     let bar = terminal::Progress::new(info.frames, global);
     let period = Duration::from_nanos(info.period_ns);
-    let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), Arc::default());
+    let (sink, release) = Shutter::new(sink, info.size, period, demand.clone(), Clock::system(), closed);
     let (changes, to_come) = Changes::new(look.clone(), info.size, adaptive);
     if let Some(why) = claim.as_ref().err().filter(|_| is_live || adaptive || command.name.is_some()) {
         tracing::warn!("{why}");

@@ -64,9 +64,9 @@ pub struct Counts {
     pub shown: AtomicU64,
     /// Pictures that they were given again, the still card included.
     pub repeats: AtomicU64,
-    /// Pictures that came when the last reader had just left.
+    /// Pictures that came while nobody watched.
     pub unwatched: AtomicU64,
-    /// Pictures that a newer one overtook before the graph asked for it.
+    /// Pictures that a newer one overtook on their way.
     pub overtaken: AtomicU64,
     /// Pictures for which there was no buffer: the readers held them all.
     pub no_buffer: AtomicU64,
@@ -107,7 +107,7 @@ impl Node {
         &self.name
     }
 
-    pub fn counts(&self) -> &Counts {
+    pub fn counts(&self) -> &Arc<Counts> {
         &self.counts
     }
 

@@ -1,8 +1,8 @@
 //! One run of the pipeline.
 
 use std::str::FromStr;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -61,7 +61,8 @@ impl Live {
         let (switch, board) = Switch::new("window", wrote);
         let period = Duration::from_nanos(info.period_ns);
         let (demand, off) = (start.demand.clone(), Arc::clone(&start.off));
-        let (sink, _) = Shutter::new(Box::new(switch), info.size, period, demand, Clock::system(), off);
+        let (sink, release) = Shutter::new(Box::new(switch), info.size, period, demand, Clock::system(), off);
+        *start.release.lock().unwrap_or_else(PoisonError::into_inner) = Some(release);
         let (changes, to_come) = Changes::new(look.clone(), info.size, ADAPTIVE);
         let (view, views) = link::live();
         let stop = Arc::new(AtomicBool::new(false));

@@ -6,9 +6,9 @@ mod host;
 mod live;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{self, SyncSender};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -28,6 +28,7 @@ use crate::link::demand::Demand;
 use crate::look::Look;
 use crate::optics::CocField;
 use crate::pipeline::{PipelineError, View, Wanted};
+use crate::sink::Release;
 use crate::sink::switch::Notice;
 use crate::stats::Report;
 
@@ -60,7 +61,12 @@ pub struct Start {
     pub demand: Demand,
     /// Whether outputs have the still card in place of pictures.
     pub off: Arc<AtomicBool>,
+    /// By what it is known whether they do.
+    pub release: CurrentRelease,
 }
+
+/// What keeps pictures from the outputs of the run that there is. Locked when a run begins, and by who asks from outside.
+pub type CurrentRelease = Arc<Mutex<Option<Release>>>;
 
 /// What comes from a session.
 pub enum SessionEvent {

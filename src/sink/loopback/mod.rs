@@ -142,6 +142,10 @@ impl Sink for Loopback {
         Ok(ControlFlow::Continue(()))
     }
 
+    fn is_live(&self) -> bool {
+        true
+    }
+
     /// Once nobody watches, the card soon takes the place of the last picture, and then seldom needs to be written.
     fn hold(&self) -> Option<Duration> {
         match (self.is_unwatched(), self.shows_card) {

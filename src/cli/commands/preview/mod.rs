@@ -163,6 +163,7 @@ pub fn show(
             wanted: Arc::default(),
             demand: Demand::default(),
             off: Arc::default(),
+            release: Arc::default(),
             folders: window.save_to.clone().map_or_else(Folders::of_user, Folders::at),
         },
         theme: window.theme,

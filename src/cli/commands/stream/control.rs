@@ -158,11 +158,16 @@ impl Controlled {
         let done = match request {
             Request::Status => Ok(None),
             Request::On | Request::Off | Request::Toggle => {
-                release.close(match request {
+                let closes = match request {
                     Request::Toggle => !release.is_closed(),
                     request => request == Request::Off,
-                });
-                Ok(None)
+                };
+                release.close(closes);
+                if closes {
+                    release.wait_covered().map_err(|error| CliError::Control(error.to_string()))
+                } else {
+                    Ok(None)
+                }
             }
             Request::Preset { name } => {
                 changes::preset(self.facts.config.as_deref(), &name).and_then(|patch| self.change(&patch))

@@ -11,7 +11,7 @@ use super::App;
 use crate::control::{Answer, Server, Status};
 use crate::look::{Look, Patch};
 use crate::preview::control::{Asked, Control, Wish};
-use crate::preview::session::StillOrder;
+use crate::preview::session::{CurrentRelease, StillOrder};
 use crate::preview::state::{Action, Source};
 use crate::preview::window::Call;
 
@@ -25,10 +25,10 @@ pub(super) struct Controlled {
 }
 
 impl Controlled {
-    pub fn begin(control: Control, proxy: &EventLoopProxy<Call>) -> std::io::Result<Self> {
+    pub fn begin(control: Control, release: CurrentRelease, proxy: &EventLoopProxy<Call>) -> std::io::Result<Self> {
         let proxy = proxy.clone();
         // An event loop that is gone needs no waking.
-        let (server, asked) = control.begin(move || drop(proxy.send_event(Call::Control)))?;
+        let (server, asked) = control.begin(release, move || drop(proxy.send_event(Call::Control)))?;
         Ok(Self { server, asked, began: Instant::now(), order: None })
     }
 

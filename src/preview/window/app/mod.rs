@@ -115,7 +115,9 @@ impl App {
             }
         });
         let control = control.inspect_err(|why| tracing::warn!("{why}")).ok();
-        let controlled = control.map(|control| control::Controlled::begin(control, &proxy)).transpose()?;
+        let controlled =
+            control.map(|control| control::Controlled::begin(control, Arc::clone(&session.release), &proxy));
+        let controlled = controlled.transpose()?;
         let off = Arc::clone(&session.off);
         let (wanted, demand) = (Arc::clone(&session.wanted), session.demand.clone());
         let clock = Clock::system();
