@@ -26,7 +26,7 @@ use crate::source::{DepthChoice, Options, Source, SourceName, one_camera};
 Examples:
   bokehcam plate /dev/video0 --to room.png
   bokehcam stream /dev/video0 --depth plate:room.png --to /dev/video10
-  bokehcam plate recordings/empty-room --to room.png
+  bokehcam plate somewhere/empty-room --to room.png
 
 Step out of the picture when you are told to, for some four seconds. The camera has to stand still from then on. Of a
 recording, each pixel is what it is most of the time.")]

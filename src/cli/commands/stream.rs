@@ -40,10 +40,10 @@ Examples:
   bokehcam stream C920 --size 1920x1080 --fps 30 --control exposure_dynamic_framerate=0 --to /dev/video10
   bokehcam stream 0,2 --calib stereo.yml --to /dev/video10
   bokehcam stream /dev/video4 --side-by-side --rectified --to /dev/video10
-  bokehcam stream recordings/portrait --to out/
-  bokehcam stream recordings/portrait --to out.mp4 --aperture polygon:6 --focus 1.2
-  bokehcam stream recordings/portrait --to - --quiet --pace realtime | ffplay -
-  bokehcam stream recordings/portrait --loop --to /dev/video10 --out-size 1280x720
+  bokehcam stream demo --frames 90 --to out/
+  bokehcam stream demo --frames 90 --to out.mp4 --aperture polygon:6 --focus 1.2
+  bokehcam stream demo --to - --quiet --pace realtime | ffplay -
+  bokehcam stream somewhere/rgbd --loop --to /dev/video10 --out-size 1280x720
   bokehcam stream somewhere/rgbd --depth-scale 1000 --loop --frames 500 --to out.mkv
   bokehcam stream synthetic --frames 90 --pace realtime --to null --report report.json")]
 pub struct StreamCommand {
