@@ -5,6 +5,8 @@
 #[allow(dead_code)] // Of the networks that it makes, one is wanted here.
 #[path = "common/onnx.rs"]
 mod onnx;
+#[path = "documents/pages.rs"]
+mod pages;
 
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
@@ -44,74 +46,8 @@ const ONLY_CHECKED: [(&str, &str); 8] = [
     ("bokehcam bench", "measures this machine, for minutes"),
 ];
 
-/// What a sentence leaves open, and what stands there when it is tried.
-const OPEN: [(&str, &str); 14] = [
-    ("bokehcam COMMAND", "bokehcam render"),
-    ("bokehcam stream ...", "bokehcam stream demo --frames 1 --to null"),
-    ("bokehcam render ...", "bokehcam render photo.jpg --depth-map depth.png --out any.png"),
-    ("IMAGE", "photo.jpg"),
-    ("DEPTH", "depth.png"),
-    ("METRES", "1.2"),
-    ("WxH", "64x36"),
-    ("--coc PX", "--coc 4"),
-    ("--threads N", "--threads 1"),
-    ("[SOURCE]", "demo"),
-    ("--like FILE.png", "--like NAME.png"),
-    ("--out FILE.png", "--out sentence.png"),
-    ("--out DIR", "--out dir/"),
-    ("--debug-dir DIR", "--debug-dir steps/"),
-];
-
 /// A file of settings that is not there: who names it has all other arguments read, and is then refused.
 const NO_SETTINGS: &str = "no-settings.toml";
-
-/// The commands of a page, without their comments, in its order; one that goes on in the next line is whole.
-fn commands(page: &str) -> Vec<String> {
-    let mut commands: Vec<String> = Vec::new();
-    let (mut block, mut goes_on, mut sentences) = (None, false, String::new());
-    for line in page.lines().map(str::trim_end).chain(["```"]) {
-        match (block, line.strip_prefix("```")) {
-            (None, Some(language)) => {
-                commands.extend(within_sentences(&sentences));
-                sentences.clear();
-                block = Some(language);
-            }
-            (None, None) => sentences.extend([line, " "]),
-            (Some(_), Some(_)) => block = None,
-            (Some("sh"), None) => {
-                let code = line.split_once(" # ").map_or(line, |(code, _)| code).trim_end();
-                match commands.last_mut().filter(|_| goes_on) {
-                    Some(last) => *last += code,
-                    None => commands.push(code.to_owned()),
-                }
-                goes_on = code.ends_with(['\\', '|']);
-                if let Some(last) = commands.last_mut().filter(|_| goes_on) {
-                    *last = format!("{} ", last.trim_end_matches('\\').trim_end());
-                }
-            }
-            // What the session's unit runs.
-            (Some(_), None) => {
-                let stream = line.strip_prefix("STREAM=\"").and_then(|line| line.strip_suffix('"'));
-                commands.extend(stream.map(|stream| format!("bokehcam stream {stream}")));
-            }
-        }
-    }
-    commands
-}
-
-/// The commands that sentences name. One without any argument is only meant: that there is help of it is all there is to try.
-fn within_sentences(text: &str) -> Vec<String> {
-    let code = text.split('`').skip(1).step_by(2).filter(|code| code.starts_with("bokehcam "));
-    let tried = code.map(|code| {
-        let whole = OPEN.iter().fold(code.to_owned(), |code, (open, with)| code.replace(open, with));
-        let is_meant = ["stream", "preview", "record", "render", "depth", "plate", "bench", "ctl"];
-        match is_meant.contains(&&whole["bokehcam ".len()..]) {
-            true => whole + " --help",
-            false => whole,
-        }
-    });
-    tried.collect()
-}
 
 /// A page that is being followed: a folder as its owner has it, with the repository's recordings, and pictures by the
 /// names that the pages use.
@@ -203,12 +139,14 @@ impl Follower {
         }
     }
 
-    /// Whether the program takes the arguments of a command that cannot be run; a camera's name is that of no camera here.
+    /// Whether the program takes the arguments of a command that cannot be run; what is no source here has another's place.
     fn check(&self, command: &str) -> Result<(), String> {
+        let command = command.split(['>', '|']).next().unwrap_or_default().trim_end();
         let mut words: Vec<&str> = command.split(' ').collect();
         if let [_, "stream" | "preview" | "plate" | "record", source, ..] = &mut words[..] {
-            let is_camera = source.starts_with(|first: char| first.is_ascii_digit()) || source.starts_with("pipewire:");
-            if is_camera || *source == "C920" {
+            let elsewhere = ["/dev/", "pipewire:", "C920", "somewhere/"];
+            let is_number = source.starts_with(|first: char| first.is_ascii_digit());
+            if is_number || elsewhere.iter().any(|begin| source.starts_with(begin)) {
                 *source = "demo";
             }
         }
@@ -261,7 +199,7 @@ fn follow(page: &str, least: usize) {
     let mut follower = Follower::new();
     let mut done: Vec<String> = Vec::new();
     let (mut ran, mut faults) = (0, Vec::new());
-    for command in commands(&text) {
+    for command in pages::commands(&text) {
         // What is named again is not done again.
         if done.contains(&command) {
             continue;
@@ -288,14 +226,6 @@ fn follow(page: &str, least: usize) {
 }
 
 #[test]
-fn commands_are_found_in_pages() {
-    let page = "text `bokehcam\nx y` and `x`\n```sh\na b   # why\nc \\\n  d |\n    e\n```\n```toml\nx = 1\n```\n`y`, \
-                `bokehcam stream`\n```ini\nSTREAM=\"0 --to z\"\n```\n";
-    let found = commands(page);
-    assert_eq!(found, ["bokehcam x y", "a b", "c   d |     e", "bokehcam stream --help", "bokehcam stream 0 --to z"]);
-}
-
-#[test]
 fn arguments_are_checked_without_what_they_need() {
     let follower = Follower::new();
     assert_eq!(follower.check("bokehcam stream 0,2 --calib any.yml --to /dev/video10"), Ok(()));
@@ -305,6 +235,40 @@ fn arguments_are_checked_without_what_they_need() {
         ("bokehcam bench --quality nosuch", "nosuch"),
     ] {
         assert!(follower.check(wrong).unwrap_err().contains(said), "{wrong}");
+    }
+}
+
+/// What the help of a command lists of the commands below it, such as `config dump`, and its examples.
+fn help_of(follower: &Follower, command: &str) -> Vec<(String, Vec<String>)> {
+    let output = follower.output(&format!("{command} --help"));
+    let help = String::from_utf8(output.stdout).unwrap();
+    let section = |begins: &'static str| {
+        let lines = help.lines().skip_while(move |line| !line.starts_with(begins)).skip(1);
+        lines.take_while(|line| line.starts_with("  ")).filter(|line| !line.starts_with("   ")).map(str::trim)
+    };
+    let below = section("Commands:").filter_map(|line| line.split(' ').next()).filter(|name| *name != "help");
+    let below = below.flat_map(|name| help_of(follower, &format!("{command} {name}")));
+    let examples = section("Example").map(|line| line.split_once("  ").map_or(line, |(code, _)| code).to_owned());
+    [(command.to_owned(), examples.collect())].into_iter().chain(below).collect()
+}
+
+/// With nothing beside the program, as where it is installed.
+#[test]
+fn the_examples_of_help_are_right() {
+    let mut follower = Follower::new();
+    fs::remove_file(follower.path("recordings")).unwrap();
+    let help = help_of(&follower, "bokehcam");
+    assert!(help.len() > 12, "{} commands", help.len());
+    for (command, examples) in help {
+        assert!(!examples.is_empty() || command.split(' ').count() > 2, "{command} has no examples");
+        for example in examples {
+            // Of the program as a whole, each is run.
+            let done = match command == "bokehcam" {
+                true => follower.follow(&example).map(drop),
+                false => follower.check(&example),
+            };
+            assert_eq!(done, Ok(()), "{command}: {example}");
+        }
     }
 }
 

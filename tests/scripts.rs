@@ -49,12 +49,14 @@ fn setup_looks_for_the_library_that_the_build_needs() {
 fn scripts_tell_what_they_do() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let of_scripts = std::fs::read_dir(here.join("scripts")).unwrap().map(|entry| entry.unwrap().path());
-    let elsewhere = ["gst/test", "python/test", "python/wheel", "benches/gpu.sh", "tests/vm/run", "tests/pipewire/session"];
+    let elsewhere =
+        ["gst/test", "python/test", "python/wheel", "benches/gpu.sh", "tests/vm/run", "tests/pipewire/session"];
     let mut tried = 0;
     for path in of_scripts.chain(elsewhere.map(|name| here.join(name))) {
         let text = std::fs::read_to_string(&path).unwrap();
         // What is run by others alone has a usage line.
-        let Some(first) = text.strip_prefix("#!/usr/bin/env bash\n# ").filter(|_| !path.ends_with("scripts/within")) else {
+        let Some(first) = text.strip_prefix("#!/usr/bin/env bash\n# ").filter(|_| !path.ends_with("scripts/within"))
+        else {
             continue;
         };
         let output = script("within").arg("20s").arg(&path).arg("--help").output().unwrap();
