@@ -189,9 +189,7 @@ impl SourceName {
             Some(demo::NAME) => Ok(SourceName::Demo),
             _ if path.is_dir() => Ok(SourceName::Folder(path.to_owned())),
             _ if path.is_file() && photo::is_photo(path) => Ok(SourceName::Photo(path.to_owned())),
-            _ if path.is_file() => {
-                SourceError::usage(format!("it is neither a folder nor a photo: use {}", sources()))
-            }
+            _ if path.is_file() => SourceError::usage(format!("it is neither a folder nor a photo: use {}", sources())),
             Some(text) if looks_like_a_path(text) => Err(no_folder(text)),
             Some(text) => parse_cameras(text),
             None => Err(no_folder(&path.display().to_string())),

@@ -13,7 +13,7 @@ use control::{Beat, Facts, Looks};
 use crate::cli::commands::preview;
 use crate::cli::controlled;
 use crate::cli::error::CliError;
-use crate::cli::files::{check_report, write_report};
+use crate::cli::files::{check_report, tell_of_leftovers, write_report};
 use crate::cli::focus;
 use crate::cli::options;
 use crate::cli::settings::layers::Given;
@@ -144,6 +144,8 @@ pub fn run(command: &StreamCommand, global: &options::Global, given: Given) -> R
     };
     sinks::try_report(stream.report.as_deref())?;
     let sink = sinks::open(&command.to, &sink_options)?;
+    // By now the outputs have what was left of them.
+    tell_of_leftovers(command.to.iter().filter(|target| !target.is_camera()).filter_map(Target::path));
 
     if let Some(networks) = source.networks.as_ref().filter(|_| !global.quiet) {
         terminal::say(&format!("depth by {networks}"));
