@@ -118,6 +118,8 @@ impl Follower {
         shell.args(["-o", "pipefail", "-c", command]).current_dir(&self.folder).stdin(Stdio::null());
         let path = format!("{}:{}", self.path("programs").display(), std::env::var("PATH").unwrap());
         shell.env("PATH", path).env("HOME", self.path("home")).env("XDG_RUNTIME_DIR", self.path("session"));
+        // As wide as help becomes.
+        shell.env("COLUMNS", "110");
         shell
     }
 

@@ -48,16 +48,15 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     whole::write(path, bytes, true).map_err(CliError::io(path))
 }
 
-/// Makes the folder that `path` is to be in, and [tells](tell_of_leftovers) what is hidden there.
+/// Makes the folder that `path` is to be in.
 ///
 /// # Errors
 /// [`CliError::Io`] when it cannot be made.
 pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
-    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        fs::create_dir_all(folder).map_err(CliError::io(folder))?;
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        Some(folder) => fs::create_dir_all(folder).map_err(CliError::io(folder)),
+        None => Ok(()),
     }
-    tell_of_leftovers([path]);
-    Ok(())
 }
 
 /// Says what runs that were killed left hidden in the folders of `paths`. It is left to the user: where nodes share a

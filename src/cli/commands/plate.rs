@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::capture::{Camera, Captured, Shot};
 use crate::cli::error::CliError;
-use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source};
+use crate::cli::files::{make_folder_of, refuse_overwrite, refuse_source, tell_of_leftovers};
 use crate::cli::options;
 use crate::cli::settings::layers::Given;
 use crate::cli::settings::unused;
@@ -78,6 +78,7 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
         false => usual(&mut frames)?,
     };
     make_folder_of(to)?;
+    tell_of_leftovers([to]);
     still::write_color(to, &plate, output.force)?;
     if !global.quiet {
         terminal::say(&format!("{}: written, for --depth plate:{0}", to.display()));
