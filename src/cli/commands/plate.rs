@@ -78,7 +78,7 @@ pub fn run(command: &PlateCommand, global: &options::Global, given: &Given) -> R
         false => usual(&mut frames)?,
     };
     make_folder_of(to)?;
-    tell_of_leftovers([to]);
+    tell_of_leftovers([to.as_path()]);
     still::write_color(to, &plate, output.force)?;
     if !global.quiet {
         terminal::say(&format!("{}: written, for --depth plate:{0}", to.display()));

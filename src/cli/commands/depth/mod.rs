@@ -140,7 +140,7 @@ pub fn run(command: &DepthCommand, global: &options::Global) -> Result<(), CliEr
 
     let force = command.output.force;
     make_folder_of(&command.out)?;
-    tell_of_leftovers([&*command.out]);
+    tell_of_leftovers([command.out.as_path()]);
     match geometry.filter(|_| command.metres) {
         Some(Geometry { rig, .. }) => {
             let depth = disparity.depth(|px| rig.depth_m(px));

@@ -107,7 +107,7 @@ pub fn run(command: &RenderCommand, global: &options::Global, given: &Given) -> 
     command.warn(&look, &color, depth.as_ref(), given);
     let computing = command.computing.choice();
     make_folder_of(&command.out)?;
-    tell_of_leftovers([&*command.out]);
+    tell_of_leftovers([command.out.as_path()]);
     let (result, executor) = match &command.debug_dir {
         Some(dir) => debug::blurred(color, depth, &look, &computing, (dir, command.output.force))?,
         None => pipeline::still::blur(&look, color, depth, &computing)?,
