@@ -1,13 +1,16 @@
 //! The commands that a page has.
 
 /// What a sentence leaves open, and what stands there when it is tried.
-const OPEN: [(&str, &str); 14] = [
+const OPEN: [(&str, &str); 17] = [
     ("bokehcam COMMAND", "bokehcam render"),
     ("bokehcam stream ...", "bokehcam stream demo --frames 1 --to null"),
     ("bokehcam render ...", "bokehcam render photo.jpg --depth-map depth.png --out any.png"),
     ("IMAGE", "photo.jpg"),
     ("DEPTH", "depth.png"),
     ("METRES", "1.2"),
+    ("DAMAGED", "depth.png"),
+    ("off|on", "on"),
+    ("--chain DIR", "--chain demo"),
     ("WxH", "64x36"),
     ("--coc PX", "--coc 4"),
     ("--threads N", "--threads 1"),
