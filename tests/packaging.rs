@@ -210,6 +210,8 @@ fn examples_and_the_unit_are_those_of_the_page_on_calls() {
 fn exit_code(args: &[&str]) -> (i32, String) {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("text.txt"), "text").unwrap();
+    let photo = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/portrait/rgb/000000.png");
+    fs::copy(photo, folder.path().join("photo.png")).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_bokehcam"));
     for name in ["HOME", "XDG_RUNTIME_DIR", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "PIPEWIRE_RUNTIME_DIR"] {
         command.env(name, folder.path());
@@ -227,7 +229,7 @@ fn the_unit_gives_up_on_wrong_arguments_alone() {
     let two_eyes = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/stereo");
     let mut may_come = vec![
         vec!["./folder/of/a/disk", "--to", "null"],
-        vec!["demo", "--depth", "./folder/of/a/disk", "--to", "null"],
+        vec!["photo.png", "--depth", "./folder/of/a/disk", "--to", "null"],
         vec![two_eyes, "--depth", "stereo", "--calib", "nothing.yml", "--to", "null"],
     ];
     if cfg!(feature = "camera") {
@@ -235,7 +237,7 @@ fn the_unit_gives_up_on_wrong_arguments_alone() {
         let cameras =
             ["4711", "4711,4712", "/dev/video4711", by_id, "usb-Nobody_s_camera-video-index0", "Nobody's camera"];
         may_come.extend(cameras.map(|camera| vec![camera, "--to", "/dev/video10", "--on-demand"]));
-        may_come.push(vec!["demo", "--depth", "/dev/video4711", "--to", "null"]);
+        may_come.push(vec!["photo.png", "--depth", "/dev/video4711", "--to", "null"]);
         may_come.push(vec!["demo", "--to", "/dev/video4711"]);
     }
     if cfg!(all(feature = "camera", feature = "pipewire")) {
@@ -243,7 +245,7 @@ fn the_unit_gives_up_on_wrong_arguments_alone() {
         may_come.push(vec!["demo", "--to", "pipewire"]);
     }
     if cfg!(feature = "networks") {
-        may_come.push(vec!["demo", "--depth", "matte", "--to", "null"]);
+        may_come.push(vec!["photo.png", "--depth", "matte", "--to", "null"]);
     }
     for args in may_come {
         let (code, said) = exit_code(&[&["stream"], args.as_slice()].concat());
